@@ -1,4 +1,4 @@
-"""The adapter between proofroll and Pinocchio."""
+"""Adapter between proofroll and Pinocchio."""
 
 import dataclasses
 from collections.abc import Mapping, Sequence
@@ -21,15 +21,15 @@ from proofroll.engines.pinocchio.mechanism_run import MechanismRun
 from proofroll.engines.pinocchio.rows_run import RowsRun
 from proofroll.engines.pinocchio.settings import OF_MECHANISMS, PRESETS, PinocchioSettings, lowered
 
-# Before 4.0 the constraints have other signatures and other results.
+# Before 4.0 the constraints had other signatures and other results.
 _OF_PINOCCHIO_4 = {"contact", "constraint_dynamics", "impulses"}
 
 
 class Pinocchio:
-    """Pinocchio's equations of motion with rows of rolling put to them, or its own solver of contact with friction."""
+    """Adapter of Pinocchio: its equations of motion with rolling constraints, or its own frictional contact solver."""
 
     name: ClassVar[str] = "pinocchio"
-    oldest: ClassVar[str] = "3.9"  # the oldest that was tried
+    oldest: ClassVar[str] = "3.9"  # oldest version tried
     provides: ClassVar[Mapping[str, frozenset[str]]] = {
         "composite": ALL_OF_A_BALL,
         "free_flyer": ALL_OF_A_BALL | {BallCapability.MOVING_WALL},
@@ -89,7 +89,7 @@ class Pinocchio:
 
     @staticmethod
     def caveat(settings: PinocchioSettings) -> str:
-        """See :class:`proofroll.core.engine_abilities.TellsCaveats`: Pinocchio computes terms, and has no steps."""
+        """See :class:`proofroll.core.engine_abilities.TellsCaveats`: Pinocchio computes terms, it has no integrator."""
         terms = "contact solver" if settings.solver else "terms"
         return f"proofroll's own integrator on Pinocchio's {terms}, for Pinocchio brings none"
 
@@ -112,7 +112,7 @@ class Pinocchio:
 
     @classmethod
     def build(cls, scene: Scene, settings: PinocchioSettings) -> ContactRun | RowsRun | MechanismRun:
-        """See :class:`proofroll.core.engine.Engine`; what it builds is a run of a formulation."""
+        """See :class:`proofroll.core.engine.Engine`; returns a run of the formulation."""
         if settings.formulation in _OF_PINOCCHIO_4 and release(cls.version()) < (4,):
             raise Refused(f"{settings.formulation} needs the constraints of pinocchio 4.0, and this is {cls.version()}")
         if settings.formulation in OF_MECHANISMS:
@@ -140,7 +140,11 @@ def _of_mechanism(scene: Scene, settings: PinocchioSettings) -> MechanismRun:
 
 
 def _decided(scene: Scene, settings: PinocchioSettings) -> PinocchioSettings:
-    """The settings with the orientation as the scene asks for it; refused where they leave it out."""
+    """Settings with the orientation as the scene requires.
+
+    Raises:
+        Refused: the scene requires the orientation, and the settings exclude it.
+    """
     if settings.formulation == "contact":
         return settings
     asked = BallCapability.ORIENTATION in scene.requires

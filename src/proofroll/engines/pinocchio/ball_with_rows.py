@@ -1,4 +1,4 @@
-"""Base of the two formulations with rows, for the integrators and the adapter."""
+"""Base class of the two formulations that add constraint rows to Pinocchio's equations of a ball."""
 
 import math
 import sys
@@ -13,24 +13,24 @@ from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Diverged
 from proofroll.elements.ball_on_surface.model import RollingBall
 
-# A pull of the wall smaller than this part of the ball's weight, and of the force that turns its path by a radius, is
-# round-off.
+# Largest pull of the wall that is round-off, relative to the ball's weight plus the force that bends its path to the
+# ball's radius.
 _FAINT = 1e-9
-# Friction relative to the normal force, and excess of it, that is round-off.
+# Round-off of friction, and of its excess over the available friction, relative to the normal force.
 NOISE = 1e-13
 
 
 class ContactRows(NamedTuple):
-    """Rows of the contact at a state; mass matrix and bias forces are then in the ``data``.
+    """Constraint rows of the contact at a state; mass matrix and bias forces are then in ``data``.
 
-    The next evaluation may write to the same arrays: copy them to keep them longer.
+    The next evaluation may overwrite the arrays: copy them to keep them.
 
     Attributes:
         frame: e1, e2, e3 as columns, in the world, shape (3, 3).
-        rows: on the joint velocities, shape (n, nv); the last two are those of rolling, the slip along e2 and e3.
-        drift: their rate at zero joint acceleration, shape (n,).
-        resistance: rolling resistance per unit of normal force, on the joints [m], shape (nv,): of the moment
-            f e1 × v/V about the centre (Blajer 2006, section 2.4), which at V = 0 has no direction and is zero.
+        rows: Jacobian for joint velocities, shape (n, nv); the last two rows are the slip along e2 and e3.
+        drift: time derivative of the constrained velocities at zero joint acceleration, shape (n,).
+        resistance: generalised force of rolling resistance per unit of normal force [m], shape (nv,); from the moment f
+            e1 × v/V about the centre (Blajer 2006, section 2.4), zero at V = 0, where it has no direction.
     """
 
     frame: FloatArray
@@ -47,7 +47,7 @@ class SlidingContact:
         acceleration: of the joints, shape (nv,).
         normal_force: N [N].
         slip: velocity of the contact point in the world [m/s], shape (3,).
-        slip_rate: its rate along the wall, in the world [m/s²], shape (3,).
+        slip_rate: its time derivative along the wall, in the world [m/s²], shape (3,).
         friction: on the ball, in the world [N], shape (3,).
         e1: normal towards the wall, shape (3,).
     """
@@ -61,28 +61,28 @@ class SlidingContact:
 
 
 def unit(vector: FloatArray) -> FloatArray:
-    """The vector made a unit vector; zero stays zero."""
+    """Unit vector in the same direction; zero stays zero."""
     length = math.sqrt(vector @ vector)
     return vector / length if length > 0 else vector
 
 
 def left_the_wall(when: str) -> Diverged:
-    """Error that ends the run where the wall would have to pull; ``when`` is e.g. ``at 0.2 s``."""
+    """Error that ends a run where the wall would have to pull; ``when`` is e.g. ``at 0.2 s``."""
     return Diverged(f"the ball leaves the wall {when}, which this formulation does not model")
 
 
 class BallWithRows(ABC):
-    """A ball on its surface as a Pinocchio model with rows on top.
+    """A ball on its surface as a Pinocchio model with additional constraint rows.
 
-    Every method takes the ``data`` that it may overwrite, so that sampling leaves the running data alone.
+    Every method takes the ``data`` that it may overwrite, so sampling leaves the running data alone.
 
     Attributes:
         model: pin.Model.
         ball: index of the joint that carries the ball.
         q0, v0: joint configuration and velocity at time 0.
         q_scale, v_scale: natural sizes of their components, for tolerances.
-        faint: size of normal force that is round-off [N].
-        slips0: whether the ball starts slipping.
+        faint: normal force that is round-off [N].
+        slips0: True if the ball starts slipping.
     """
 
     ball: int
@@ -109,7 +109,7 @@ class BallWithRows(ABC):
         self._rest = np.zeros(self.model.nv)
 
     def _own_bias(self, data: Any, q: FloatArray, v: FloatArray) -> FloatArray:
-        """Acceleration of centre and spin while joint accelerations are zero, in the joint's axes, shape (6,).
+        """Acceleration of centre and spin at zero joint acceleration, in the joint's axes, shape (6,).
 
         Leaves kinematics, mass matrix and bias forces in ``data``.
         """
@@ -120,20 +120,20 @@ class BallWithRows(ABC):
 
     @abstractmethod
     def rows(self, data: Any, q: FloatArray, v: FloatArray) -> ContactRows:
-        """The rows at a state."""
+        """Constraint rows at a state."""
 
     @abstractmethod
     def accelerate(self, data: Any, q: FloatArray, v: FloatArray) -> FloatArray:
-        """Joint acceleration, shape (nv,), which the next call may overwrite; leaves the reactions in ``data``."""
+        """Joint acceleration without slip, shape (nv,), overwritten by the next call; ``data`` has the reactions."""
 
     @abstractmethod
     def normal_force(self, data: Any) -> float:
-        """N [N] that the last :meth:`accelerate` left in ``data``."""
+        """Normal force N [N] that the last :meth:`accelerate` left in ``data``."""
 
     def excess(self, data: Any, q: FloatArray, v: FloatArray, mu_static: float) -> tuple[float, float]:
-        """(needed - available) / (needed + available) friction while sticking [1], and N [N].
+        """(needed - available) / (needed + available) friction while sticking [1], and normal force N [N].
 
-        Slip begins where the first is positive.
+        Slip starts where the first is positive.
         """
         self.accelerate(data, q, v)
         return self.last_excess(data, mu_static)
@@ -143,52 +143,53 @@ class BallWithRows(ABC):
         *_, F2, F3 = data.lambda_c.tolist()
         needed, normal_force = math.hypot(F2, F3), self.normal_force(data)
         available = mu_static * normal_force
-        # A friction of round-off is needed even where none is: it must not count as more than none (mu_static = 0).
+        # Round-off makes the needed friction positive even where it is zero; that must not exceed a friction of zero
+        # (mu_static = 0).
         noise = NOISE * abs(normal_force)
         size = max(needed + abs(available) + noise, sys.float_info.min)
         return (needed - available - noise) / size, normal_force
 
     @abstractmethod
     def reaction(self, data: Any, q: FloatArray, v: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Joint acceleration, shape (nv,), and force of the wall on the ball in the world [N], shape (3,)."""
+        """Joint acceleration without slip, shape (nv,), and wall force on the ball [N], world axes, shape (3,)."""
 
     @abstractmethod
     def slide(self, data: Any, q: FloatArray, v: FloatArray, direction: FloatArray) -> SlidingContact:
-        """The ball on its surface with friction mu_kinetic N against ``direction``, shape (3,), in the world.
+        """Motion on the surface with friction mu_kinetic N opposite to ``direction``, shape (3,), in the world.
 
-        The direction is a unit vector along the wall; zero leaves the friction out.
+        The direction is a unit vector along the wall; zero omits the friction.
         """
 
     @abstractmethod
     def sliding_reaction(
         self, data: Any, q: FloatArray, v: FloatArray, direction: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
-        """Reaction as :meth:`reaction`, while sliding against ``direction``."""
+        """Joint acceleration and force as :meth:`reaction`, while sliding in ``direction``."""
 
     @abstractmethod
     def project_sliding(self, data: Any, q: FloatArray, v: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """The state put back on the surface alone; the same arrays if it cannot have left it."""
+        """Configuration and velocity projected onto the surface only; the same arrays if they cannot have left it."""
 
     def friction(self, normal_force: float, direction: FloatArray) -> FloatArray:
-        """Friction [N] while sliding along ``direction``; both by components along e2 and e3, shape (2,)."""
+        """Friction [N] while sliding along ``direction``; both as components along e2 and e3, shape (2,)."""
         return -self._mu_kinetic * normal_force * direction
 
     def on_surface(self, q: FloatArray) -> FloatArray:
-        """The configuration with the centre put back on the surface; here the joints hold it there."""
+        """Configuration with the centre projected onto the surface; here unchanged, as the joints hold it there."""
         return q
 
     def gap(self, q: FloatArray) -> float | None:  # noqa: ARG002 -- for those that have one
-        """Value of the row of the surface [m]; None where there is no such row."""
+        """Distance from the surface [m]; None if no row constrains it."""
         return None
 
     def project(self, data: Any, q: FloatArray, v: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """The state put back on the constraints, velocities orthogonally in the metric of the mass (Blajer 2002).
+        """State projected onto the constraints, velocities orthogonally in the mass metric (Blajer 2002).
 
-        The centre moves along the normal; an impulse at the contact removes slip, and sinking where that is possible.
+        The centre moves along the normal; an impulse at the contact removes slip, and any normal velocity.
         """
         q = self.on_surface(q)
         return q, np.array(pin.impulseDynamics(self.model, data, v, self._only_rows(data, q, v)))
 
     def _only_rows(self, data: Any, q: FloatArray, v: FloatArray) -> FloatArray:
-        """The rows, and the mass matrix in ``data``."""
+        """Constraint rows alone; leaves the mass matrix in ``data``."""
         return self.rows(data, q, v).rows

@@ -1,4 +1,4 @@
-"""Formulation ``composite``: joints that follow the surface, so that the ball cannot leave it."""
+"""Formulation ``composite``: joints along the surface, so that the ball cannot leave it."""
 
 import math
 from collections.abc import Sequence
@@ -13,17 +13,17 @@ from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.surfaces import Generator
 from proofroll.engines.pinocchio.ball_with_rows import BallWithRows, ContactRows, SlidingContact
 
-# Two places on the surface, at which its geometry along the local axes is compared.
+# Two positions on the surface at which the geometry in local axes is compared.
 _SHIFTS = np.zeros(6), np.array([0.7, -0.4, 0.0, 0.0, 0.0, 0.0])
 
 
 class _AlongAxes(NamedTuple):
-    """Constants along e1, e2, e3, from Pinocchio's Jacobian of the ball there.
+    """Constant terms along e1, e2, e3, from Pinocchio's Jacobian of the ball in these axes.
 
     Attributes:
         directions: slip along e2 and e3 from (v, ω), shape (2, 6).
-        rows: the same from the joint velocities, shape (2, 5).
-        by_moment: joint torques of a moment on the ball, shape (5, 3).
+        rows: slip along e2 and e3 from the joint velocities, shape (2, 5).
+        by_moment: joint torques from a moment on the ball, shape (5, 3).
         tangents: velocity of the centre along e2 and e3 per rate of each coordinate [m/unit].
         turns: angular velocity of the carriage about e1, e2 and e3 per rate of each coordinate [rad/unit].
     """
@@ -39,11 +39,12 @@ class Composite(BallWithRows):
     """Two joints along the generators carry a massless carriage; a spherical joint in it carries the ball.
 
     Coordinates are (u1, u2, orientation of the ball in the carriage), velocities (u̇1, u̇2, spin relative to the
-    carriage in the ball's axes). The two rows of rolling are the only constraints. The spherical joint transmits the
+    carriage in the ball's axes). The two rolling rows are the only constraints. The spherical joint transmits the
     normal force.
 
-    Without integrated orientation the ball's axes are those of the carriage, e1, e2, e3, along which all quantities of
-    Pinocchio are taken. If the two motions of the surface commute, Jacobian and rows are constant in these axes.
+    Without integrated orientation the ball's axes are those of the carriage, e1, e2, e3, and all quantities of
+    Pinocchio have components along them. If the two motions of the surface commute, Jacobian and rows are constant in
+    these axes.
     """
 
     def __init__(self, body: RollingBall, orientation: bool) -> None:
@@ -58,7 +59,7 @@ class Composite(BallWithRows):
         super().__init__(body)
         self._frame0 = body.surface.frame(np.zeros(2))
         self._carriage = 0
-        self._read: Any = None  # the data in which self._wrench is
+        self._read: Any = None  # the data to which self._wrench refers
         for name, generator in zip(body.surface.coordinates, generators, strict=True):
             self._carriage = self.model.addJoint(self._carriage, _joint(generator), pin.SE3.Identity(), name)
         placement = pin.SE3(self._frame0, body.surface.position(np.zeros(2)))
@@ -79,7 +80,7 @@ class Composite(BallWithRows):
         self.v_scale = np.concatenate([self._speed / metres, np.full(3, self._speed / self._radius)])
 
     def rows(self, data: Any, q: FloatArray, v: FloatArray) -> ContactRows:
-        """See :class:`~proofroll.engines.pinocchio.ball_with_rows.BallWithRows`; those of rolling."""
+        """See :class:`~proofroll.engines.pinocchio.ball_with_rows.BallWithRows`; the two rolling rows."""
         model, ball, a, axes = self.model, self.ball, self._radius, pin.LOCAL_WORLD_ALIGNED
         # computeAllTerms does not touch data.a, so the bias needs forwardKinematics with a joint acceleration of zero
         pin.forwardKinematics(model, data, q, v, self._rest)
@@ -88,7 +89,7 @@ class Composite(BallWithRows):
         frame = data.oMi[self._carriage].rotation.dot(self._frame0)
         e1, (x2, y2, z2), (x3, y3, z3) = frame.T.tolist()
         directions = _slip_directions(a, frame)
-        # ω × ė1 by plain floats: numpy's overhead on three numbers is that of all that Pinocchio computes here
+        # ω × ė1 in plain floats: numpy's overhead would take as long as all computations of Pinocchio here
         turning = pin.getVelocity(model, data, self._carriage, axes).angular
         x, y, z = _cross(velocity.angular.tolist(), _cross(turning.tolist(), e1))
         drift = directions.dot(pin.getClassicalAcceleration(model, data, ball, axes).vector)
@@ -103,16 +104,16 @@ class Composite(BallWithRows):
         return ContactRows(frame, directions.dot(jacobian), drift, resistance)
 
     def _along_axes(self) -> _AlongAxes | None:
-        """Constant terms along the ball's axes; None if they change from place to place."""
-        here, there = (self._own_jacobian(self.q0 + shift) for shift in _SHIFTS)
-        if not np.allclose(here, there, rtol=1e-12, atol=1e-12):
+        """Constant terms along the ball's axes; None if they depend on the position."""
+        here, elsewhere = (self._own_jacobian(self.q0 + shift) for shift in _SHIFTS)
+        if not np.allclose(here, elsewhere, rtol=1e-12, atol=1e-12):
             return None
         directions = _slip_directions(self._radius, np.eye(3))
         (_, _), (t2u, t2v), (t3u, t3v), *turns = here[:, :2].tolist()
         return _AlongAxes(directions, directions @ here, here[3:].T.copy(), ((t2u, t2v), (t3u, t3v)), tuple(turns))
 
     def _own_jacobian(self, q: FloatArray) -> FloatArray:
-        """Jacobian of the ball's (v, ω) for the joint velocities, in the axes of its joint; shape (6, 5)."""
+        """Jacobian from joint velocities to the ball's (v, ω), in the axes of its joint, shape (6, 5)."""
         return np.array(pin.computeJointJacobian(self.model, self.model.createData(), q, self.ball))
 
     def _only_rows(self, data: Any, q: FloatArray, v: FloatArray) -> FloatArray:
@@ -122,13 +123,13 @@ class Composite(BallWithRows):
         return self._own.rows
 
     def _accelerate_along(self, own: _AlongAxes, data: Any, q: FloatArray, v: FloatArray) -> FloatArray:
-        """Acceleration as :meth:`accelerate`, from constant terms along the ball's axes."""
+        """Result of :meth:`accelerate`, from constant terms along the ball's axes."""
         drift = own.directions.dot(self._own_bias(data, q, v))
-        # a ω × ė1 with ė1 = Ω × e1 and Ω of the carriage.
+        # a ω × ė1 with ė1 = Ω × e1, where Ω is the carriage's angular velocity
         first, second, spin, _, _ = v.tolist()
         (x1, y1), (x2, y2), (x3, y3) = own.turns
         lever = self._radius * (spin + x1 * first + y1 * second)
-        along2, along3 = drift.tolist()  # to add to one in an array takes numpy three times as long
+        along2, along3 = drift.tolist()  # adding to array elements takes three times as long
         drift[0] = along2 + lever * (x2 * first + y2 * second)
         drift[1] = along3 + lever * (x3 * first + y3 * second)
         torque = self._rest
@@ -141,7 +142,7 @@ class Composite(BallWithRows):
         return pin.forwardDynamics(self.model, data, torque, own.rows, drift)  # type: ignore[no-any-return]  # it is an array
 
     def _transmitted(self, data: Any, e1: FloatArray) -> float:
-        """N [N] from the wrench in the spherical joint that the last pass of Pinocchio left in ``data``."""
+        """Normal force N [N] from the wrench in the spherical joint that Pinocchio's last pass left in ``data``."""
         return -float(e1.dot(data.oMi[self.ball].rotation.dot(data.f[self.ball].linear)))
 
     def accelerate(self, data: Any, q: FloatArray, v: FloatArray) -> FloatArray:
@@ -150,7 +151,7 @@ class Composite(BallWithRows):
             return self._accelerate_along(self._own, data, q, v)
         frame, rows, drift, torque = self.rows(data, q, v)
         if self._f:
-            # The joints cannot accelerate the ball along e1, so N follows from the bias pass alone.
+            # The joints cannot accelerate the ball along e1, so N follows from the bias alone.
             torque = torque * self._transmitted(data, frame[:, 0])
         return pin.forwardDynamics(self.model, data, torque, rows, drift)  # type: ignore[no-any-return]  # it is an array
 
@@ -158,7 +159,7 @@ class Composite(BallWithRows):
         """See :class:`~proofroll.engines.pinocchio.ball_with_rows.BallWithRows`: forwardDynamics keeps the bias."""
         if self._own is not None:
             if data is not self._read:
-                # Pinocchio's memory, looked up once: that takes as long as the dynamics.
+                # A view of Pinocchio's memory, looked up once: the look-up takes as long as the dynamics.
                 self._read, self._wrench = data, data.f[self.ball].linear
             return -self._wrench.item(0)
         return self._transmitted(data, data.oMi[self._carriage].rotation.dot(self._frame0[:, 0]))
@@ -171,10 +172,10 @@ class Composite(BallWithRows):
         return acceleration, frame @ np.array([-self._transmitted(data, frame[:, 0]), *friction])
 
     def slide(self, data: Any, q: FloatArray, v: FloatArray, direction: FloatArray) -> SlidingContact:
-        """See :class:`~proofroll.engines.pinocchio.ball_with_rows.BallWithRows`; the friction is put to the joints."""
+        """See :class:`~proofroll.engines.pinocchio.ball_with_rows.BallWithRows`; friction acts as joint torques."""
         frame, rows, drift, resistance = self.rows(data, q, v)
         e1, along = frame[:, 0], frame[:, 1:]
-        # Friction along the wall cannot change N, no more than the joints can.
+        # Neither friction along the wall nor the joints can change N.
         normal_force = self._transmitted(data, e1)
         friction = self.friction(normal_force, along.T @ direction)
         torque = rows.T @ friction
@@ -194,7 +195,7 @@ class Composite(BallWithRows):
         return sliding.acceleration, np.asarray(force)
 
     def project_sliding(self, data: Any, q: FloatArray, v: FloatArray) -> tuple[FloatArray, FloatArray]:  # noqa: ARG002 -- the protocol's
-        """See :class:`~proofroll.engines.pinocchio.ball_with_rows.BallWithRows`: the joints hold the ball there."""
+        """See :class:`~proofroll.engines.pinocchio.ball_with_rows.BallWithRows`: the joints hold the surface."""
         return q, v
 
 
@@ -206,7 +207,7 @@ def _joint(generator: Generator) -> Any:
 
 
 def _slip_directions(a: float, frame: FloatArray) -> FloatArray:
-    """Slip velocity along e2 and e3 from (v, ω) of a ball of radius a [m], shape (2, 6).
+    """Matrix from (v, ω) to the slip velocity along e2 and e3 of a ball of radius a [m], shape (2, 6).
 
     Slip is v + a ω × e1, so its components are e2·v + a e3·ω and e3·v - a e2·ω.
     """

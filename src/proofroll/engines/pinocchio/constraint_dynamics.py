@@ -1,7 +1,7 @@
-"""Formulation ``constraint_dynamics``: the loops as Pinocchio's own rigid constraints, solved by its proximal method.
+"""Formulation ``constraint_dynamics``: loops as Pinocchio's own rigid constraints, solved by its proximal method.
 
-It holds points or whole frames together, which leaves out the loops between: a revolute one is two points on its axis
-(one where the mechanism is planar). Without the proximal term μ, dependent rows give NaN.
+Pinocchio constrains points or whole frames, nothing in between. A revolute loop is two points on its axis (one if the
+mechanism is planar); other loops are not supported. Without the proximal term μ, dependent rows give NaN.
 """
 
 from collections.abc import Mapping
@@ -32,9 +32,9 @@ class ConstraintDynamics:
     """Accelerations and reactions of a tree with Pinocchio's rigid constraints.
 
     Attributes:
-        constraints: Pinocchio's.
-        proximal: accuracy, μ and most iterations of its method.
-        on_couplings: forces of couplings; none.
+        constraints: Pinocchio's constraint models.
+        proximal: accuracy, μ and maximum iterations of the proximal method.
+        on_couplings: forces of couplings; empty, as there are none.
     """
 
     def __init__(self, tree: JointTree, proximal: float) -> None:
@@ -55,18 +55,18 @@ class ConstraintDynamics:
         self._results = pin.StdVec_RigidConstraintData()
         for constraint in self.constraints:
             self._results.append(constraint.createData())
-        self._ready: Any = None  # the data that the results belong to
+        self._ready: Any = None  # the data for which constraints were initialised
 
     @staticmethod
     def _first_is_b(loop: Loop) -> bool:
-        """True if Pinocchio's first joint carries body_b: its solver crashes where that is the world."""
+        """True if Pinocchio's first joint carries body_b: its solver crashes if the first joint is the world."""
         return loop.body_a == WORLD
 
     def acceleration(self, data: Any, q: Array, v: Array) -> Array:
-        """Acceleration of the joints, shape (nv,), which the next call may overwrite."""
+        """Joint acceleration, shape (nv,), overwritten by the next call."""
         tree, model = self._tree, self._model
         tau = tree.drives(q, v)
-        if tree.springs:  # constraintDynamics takes no external forces: they are put to the joints
+        if tree.springs:  # constraintDynamics takes no external forces, so they act as joint torques
             pin.forwardKinematics(model, data, q, v)
             pin.updateFramePlacements(model, data)
             rest = np.zeros(model.nv)
@@ -81,7 +81,7 @@ class ConstraintDynamics:
         return acceleration
 
     def reactions(self, data: Any, q: Array, v: Array) -> tuple[Array, Any, Array]:
-        """Acceleration; forces on Pinocchio's joints of springs and loops; force and moment on body_b of each loop."""
+        """Joint acceleration; spring and loop forces on Pinocchio's joints; force and moment on body_b of each loop."""
         tree = self._tree
         acceleration = self.acceleration(data, q, v).copy()
         pin.updateFramePlacements(self._model, data)
@@ -100,7 +100,7 @@ class ConstraintDynamics:
         return acceleration, forces, on_loops
 
     def constraint_rows(self, data: Any, q: Array, v: Array) -> Array:
-        """Rows of Pinocchio's constraints on the velocities of the joints."""
+        """Jacobian of Pinocchio's constraints for joint velocities, shape (rows, nv)."""
         if not self._loops:
             return np.zeros((0, self._model.nv))
         self.acceleration(data, q, v)

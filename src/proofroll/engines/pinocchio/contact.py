@@ -1,7 +1,7 @@
-"""Formulation ``contact``: a free ball against the wall through Pinocchio's own solver of contact with friction.
+"""Formulation ``contact``: a free ball against the wall, with Pinocchio's own frictional contact solver.
 
-The wall is presented as a plane, posed anew in each step tangent to it at the contact; Pinocchio's PGS or ADMM solver
-finds the impulse of the step in its friction cone.
+In each step the wall is the plane tangent to it at the contact. Pinocchio's PGS or ADMM solver finds the impulse of the
+step within the friction cone.
 """
 
 import math
@@ -29,15 +29,15 @@ from proofroll.engines.pinocchio.integrators import QUATERNION
 from proofroll.engines.pinocchio.plane_contact import PlaneContact
 from proofroll.engines.pinocchio.settings import PinocchioSettings
 
-# Pinocchio's cone needs a number where friction is unbounded. PGS takes any; the iterations of ADMM grow with it.
+# Pinocchio's cone needs a number for unbounded friction. PGS accepts any; the iterations of ADMM grow with it.
 UNBOUNDED_FRICTION = {"pgs": 1e6, "admm": 1e2}
-# An impulse nearer to the cone than this is on it [1].
+# Ratio of friction to its bound above which an impulse lies on the cone [1].
 _ON_CONE = 1 - 1e-9
-# A normal impulse smaller than this part of gravity's is round-off of the gap: the wall does not press.
+# Normal impulse, relative to that of gravity, that is round-off of the gap: the wall does not press.
 _FAINT = 1e-9
-# A rebound of less than so many steps of gravity is none: the ball stays on the wall.
+# Rebound speed, in steps of gravity, below which the ball stays on the wall.
 _SOFT = 5.0
-# The moment of rolling resistance follows the normal force, and is found by repetition.
+# Fixed-point iteration for rolling resistance, which depends on the normal force: most iterations, and tolerance.
 _REPEATS, _SETTLED = 10, 1e-13
 
 
@@ -47,7 +47,7 @@ class Kick(NamedTuple):
     Attributes:
         v: joint velocity after it, shape (6,).
         impulse: along the axes of the plane [N s], shape (3,).
-        normal_force: mean of it over the span of the kick [N].
+        normal_force: mean over the span of the kick [N].
         status: ``stick``, ``slip``, or ``lift_off`` where the wall does not press.
     """
 
@@ -61,27 +61,31 @@ class ContactSteps:
     """Velocity-level time stepping.
 
     With ``semi_implicit_euler`` the plane is that at the start of the step, and position and velocity belong to the
-    same time. With ``leapfrog`` the velocity runs half a step ahead of the position (the first kick is half as long),
-    and the rate at which the plane turns is given to the solver, so that at the middle of the step the ball is on the
-    wall and does not slip; that is of order 2.
+    same time. With ``leapfrog`` the velocity is half a step ahead of the position (the first kick is half as long), and
+    the solver takes the plane's rate of turning into account, so that in the middle of the step the ball is on the wall
+    and does not slip; this is of order 2.
 
     Attributes:
-        contact: Pinocchio's model, and its contact.
+        contact: Pinocchio's model with its contact.
         dt: step [s].
-        leapfrog: whether the velocity runs ahead.
-        solver, tolerance: Pinocchio's solver, and where it stops.
-        started: whether a step was made.
-        bounded: whether friction is.
+        leapfrog: True if the velocity is ahead.
+        solver, tolerance: Pinocchio's solver, and its tolerance.
+        started: True after the first step.
+        bounded: True if friction is bounded.
         mu_static, mu_kinetic: coefficients of the cone [1].
         q, v: joint configuration and velocity.
-        happened: events so far; with unbounded friction, too.
+        happened: events so far, also with unbounded friction.
     """
 
     def __init__(self, body: RollingBall, settings: PinocchioSettings) -> None:
-        """Starts at time 0. Raises Refused if Pinocchio's solver does not find the first impulse."""
+        """Starts at time 0.
+
+        Raises:
+            Refused: Pinocchio's solver does not find the first impulse.
+        """
         self._surface, self._f = body.surface, body.contact.rolling_resistance
         rolls = 1 + body.ball.inertia_ratio
-        # Of a ball that rolls: moment per rate of its speed [N s²], and acceleration by gravity [m/s²].
+        # For a rolling ball: moment per rate of its speed [N s²], and acceleration by gravity [m/s²].
         self._stopping, self._pull = rolls * body.ball.mass * body.ball.radius, (body.gravity / rolls).tolist()
         self._wall_rate, self._radius = body.wall_rate, body.ball.radius
         self._restitution, self._gravity = body.contact.restitution, body.gravity.tolist()
@@ -99,7 +103,7 @@ class ContactSteps:
 
         self._status: EventKind = "stick"
         self._pressed = False
-        self._normal_force = 0.0  # where the repetition for rolling resistance starts
+        self._normal_force = 0.0  # start of the fixed-point iteration for rolling resistance
         self.happened: list[Event] = []
         self._time = 0.0
         try:
@@ -117,7 +121,11 @@ class ContactSteps:
         return self.dt if self.started or not self.leapfrog else 0.5 * self.dt
 
     def advance(self, end: float) -> None:
-        """Advances to ``end`` [s]; raises Diverged where Pinocchio's solver does not find the impulse."""
+        """Advances to ``end`` [s].
+
+        Raises:
+            Diverged: Pinocchio's solver does not find the impulse.
+        """
         model, dt, start = self.contact.model, self.dt, self._time
         for number in range(whole_steps(start, end, dt)):
             self._time = start + number * dt
@@ -133,7 +141,7 @@ class ContactSteps:
         self._time = end
 
     def kick(self) -> Kick:
-        """The impulse around the present time. Changes nothing but scratch data."""
+        """Impulse around the present time; changes nothing but scratch data."""
         contact, q, v, f = self.contact, self.q, self.v, self._f
         model, data, span = contact.model, contact.data, self.span
         pin.computeJointJacobians(model, data, q)
@@ -142,10 +150,10 @@ class ContactSteps:
         jacobian = contact.pose(place, triad)
         to_joints = contact.inverse.dot(jacobian.T)
         delassus = pin.DelassusOperatorDense(jacobian.dot(to_joints))
-        # What is added to the velocity of the contact point along e2, -e3 and -e1: that the gap closes within the step.
+        # Shifts of the contact point's velocity along e2, -e3 and -e1; the last closes the gap within the step.
         shift2, shift3, shift1 = 0.0, 0.0, self._closing(gap, triad, along)
         if self.leapfrog:
-            # What the turning of the normal adds in half a step: a ω × ė1, and the bend of the path.
+            # Change due to the normal's turning in half a step: a ω × ė1, and the curvature of the path.
             _, _, _, x2, y2, z2, x3, y3, z3 = triad
             vx, vy, vz = along
             wx, wy, wz = contact.turned.dot(v[3:]).tolist()
@@ -153,7 +161,7 @@ class ContactSteps:
             shift2 = self._lever * (x2 * tx + y2 * ty + z2 * tz)
             shift3 = -self._lever * (x3 * tx + y3 * ty + z3 * tz)
             shift1 -= 0.5 * self.dt * (rx * vx + ry * vy + rz * vz)
-        if self._wall_rate is not None:  # where the ball will be at the time that the velocity is for
+        if self._wall_rate is not None:  # wall velocity at the ball's position at the time of the new velocity
             x1, y1, z1, x2, y2, z2, x3, y3, z3 = triad
             ahead = (0.5 if self.leapfrog else 1.0) * self.dt
             there = np.array(place) + ahead * np.array(along) + self._radius * np.array((x1, y1, z1))
@@ -174,16 +182,16 @@ class ContactSteps:
             if not f or (abs(normal - normal_force) <= _SETTLED * abs(normal) and (number or not centred)):
                 break
             normal_force = normal
-            # the resistance is that at the present time, which with leapfrog is the middle of the kick
+            # the resistance belongs to the present time, which with leapfrog is the middle of the kick
             if centred:
                 along = (0.5 * (v + after)[:3]).tolist()
         return Kick(after, impulse, normal, status)
 
     def _closing(self, gap: float, triad: Sequence[float], v: Sequence[float]) -> float:
-        """Speed [m/s] with which the ball may come to the wall, at most: that the gap closes within the step.
+        """Largest speed [m/s] at which the ball may approach the wall: it closes the gap within the step.
 
-        Pinocchio's solver has no restitution. Where the ball would reach the wall within the step, it is asked for
-        the velocity after an impact instead; an approach of a few steps of gravity is no impact any more.
+        Pinocchio's solver has no restitution. If the ball would reach the wall within the step, the result is the
+        negative rebound speed instead; an approach slower than a few steps of gravity does not count as an impact.
         """
         e = self._restitution
         if e is None:
@@ -199,9 +207,10 @@ class ContactSteps:
     def resistance(
         self, triad: Sequence[float], v: Sequence[float], normal_force: float, span: float = 0.0
     ) -> FloatArray:
-        """Rolling resistance on the joints [N m], shape (6,), of a ball at ``v`` [m/s].
+        """Generalised force of rolling resistance on the joints, shape (6,), of a ball at ``v`` [m/s].
 
-        No more than ends the motion within the ``span`` [s] of the kick, or the ball would go back and forth for ever.
+        It is limited to what stops the ball within the ``span`` [s] of the kick; otherwise the ball would rock for
+        ever.
         """
         x, y, z, *_ = triad
         vx, vy, vz = v
@@ -219,14 +228,14 @@ class ContactSteps:
         return torque
 
     def _solved(self, delassus: Any, free: FloatArray) -> tuple[FloatArray, float, EventKind]:
-        """Impulse [N s] for the velocity of the contact point that it would have without, each shape (3,); its N."""
+        """Impulse [N s], shape (3,), its normal part, and status; ``free``: contact velocity without impulse [m/s]."""
         mu = self.mu_static if self._status == "stick" else self.mu_kinetic
         impulse = self.contact.impulse(delassus, free, mu)
         if impulse is None:
             raise self._not_found()
         F2, F3, N = impulse.tolist()
         if not self._faint < N:
-            # a plane does not press before the ball has moved into it
+            # the status does not change before the wall first presses
             return impulse, N, "lift_off" if self._pressed else self._status
         if math.hypot(F2, F3) < _ON_CONE * mu * N:
             return impulse, N, "stick"
@@ -245,12 +254,12 @@ class ContactSteps:
         )
 
 
-# Errors that the solver's tolerance and round-off explain, over what was measured at most on either scene.
+# Factor on the errors due to solver tolerance and round-off, above the largest measured on any scene.
 _MARGIN = 10.0
 
 
 class ContactRun(ContactSteps):
-    """See :class:`proofroll.core.engine.Engine` for the methods."""
+    """Run of formulation ``contact``; see :class:`proofroll.core.engine.Engine` for the methods."""
 
     def __init__(self, body: RollingBall, settings: PinocchioSettings) -> None:
         super().__init__(body, settings)
@@ -258,9 +267,9 @@ class ContactRun(ContactSteps):
         self._looked_at = self.contact.model.createData()  # for sampling, which leaves the running data alone
 
     def sample(self) -> BallSample:
-        """See :class:`proofroll.core.engine.Engine`; the force is that of the step beginning or centred here."""
+        """See :class:`proofroll.core.engine.Engine`; the force is that of the step that starts or is centred here."""
         contact, kick, data = self.contact, self.kick(), self._looked_at
-        # The velocity runs ahead by half a step with leapfrog, once it has begun to run.
+        # With leapfrog the velocity is half a step ahead after the first step.
         v = 0.5 * (self.v + kick.v) if self.leapfrog and self.started else self.v
         pin.forwardKinematics(contact.model, data, self.q, v)
         velocity = pin.getVelocity(contact.model, data, contact.ball, pin.LOCAL_WORLD_ALIGNED)
@@ -278,7 +287,7 @@ class ContactRun(ContactSteps):
         """See :class:`proofroll.core.engine.Engine`; from the model, its contact and its torques now."""
         contact, kick = self.contact, self.kick()
         inertia, point, pose = contact.model.inertias[contact.ball], contact.point, contact.data.oMi[contact.ball]
-        # At rest the resistance has no direction, so its lever is looked at in motion.
+        # At rest the resistance has no direction, so its lever is evaluated in motion.
         triad = self._body.surface.triad(*pose.translation.tolist())
         lever = float(np.linalg.norm(self.resistance(triad, triad[3:6], 1.0)))
         acceleration = (kick.v - self.v) / self.span
@@ -290,7 +299,7 @@ class ContactRun(ContactSteps):
             rolling_resistance=lever,
             mu_static=contact.friction(self.mu_static),
             mu_kinetic=contact.friction(self.mu_kinetic),
-            # The plane is posed at the contact; how far the wall is from there, the solver is told besides.
+            # The plane is at the contact; the distance of the wall from it enters the solver separately.
             gap=float(contact.point_data.c1Mc2.translation[2] + self._body.surface.gap(pose.translation)),
             acceleration=acceleration[:3],
             angular_acceleration=pose.rotation @ acceleration[3:],
@@ -310,9 +319,10 @@ class ContactRun(ContactSteps):
 def _softened(body: RollingBall, steps: ContactSteps) -> dict[str, Regularised]:
     """Entries of :attr:`proofroll.elements.ball_on_surface.sampling.BallBuilt.regularised`."""
     dt = steps.dt
-    impulse = 0.0 if steps.solver == "pgs" else steps.tolerance  # what the solver leaves of a velocity, but round-off
+    # velocity error that the solver leaves beyond round-off
+    impulse = 0.0 if steps.solver == "pgs" else steps.tolerance
     natural = natural_acceleration(body)
-    # Velocities are wrong by what the solver leaves and by the round-off of the position over a step.
+    # Velocity errors: what the solver leaves, and the round-off of the position over a step.
     size = body.ball.radius + float(np.linalg.norm(body.p0))
     velocity = impulse + float(np.finfo(float).eps) * size / dt
     rough = _MARGIN * velocity / (dt * natural)
@@ -320,7 +330,7 @@ def _softened(body: RollingBall, steps: ContactSteps) -> dict[str, Regularised]:
     if impulse:
         reasons.append("impulses are found to solver_tolerance")
     missing = dict.fromkeys(("acceleration", "angular acceleration", "N", "F2", "F3"), 0.0)
-    if not steps.leapfrog:  # which tells the solver how the wall bends during a step
+    if not steps.leapfrog:  # leapfrog tells the solver how the wall curves during a step
         missing = {name: value / natural for name, value in _missing_bend(body).items()}
         if max(missing.values()) > rough:
             reasons.append("for the length of a step the wall is a plane, and at time 0 it does not yet bend the path")
@@ -339,14 +349,17 @@ def _softened(body: RollingBall, steps: ContactSteps) -> dict[str, Regularised]:
 
 
 def _missing_bend(body: RollingBall) -> dict[str, float]:
-    """Accelerations [m/s²], angular times the radius and forces over the mass, that the bend of the wall makes."""
+    """Parts due to the wall's curvature of the initial accelerations and forces, all in m/s².
+
+    Angular acceleration is multiplied by the radius, forces are divided by the mass.
+    """
     acceleration, force = initial_response(body)
     turning = initial_angular_acceleration(body)
     e1 = body.surface.normal(body.p0)
-    # In the equations of motion the bend is multiplied by the spin, and nothing else is.
+    # In the equations of motion the curvature is multiplied by the spin only.
     flat = replace(body, w0=np.zeros(3))
     flat_acceleration, flat_turning, flat_force = body.gravity, np.zeros(3), np.zeros(3)
-    # A plane that would have to pull does nothing; round-off is no push.
+    # A plane that would have to pull has no effect; the threshold is round-off.
     if -newton_euler(flat, flat.p0, flat.v0, flat.w0)[2] @ e1 > 1e-9 * float(np.linalg.norm(force)):
         flat_acceleration, flat_force = initial_response(flat)
         flat_turning = initial_angular_acceleration(flat)

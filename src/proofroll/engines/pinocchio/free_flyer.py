@@ -1,4 +1,4 @@
-"""Formulation ``free_flyer``: a free ball, held on the surface and kept from slipping by three rows."""
+"""Formulation ``free_flyer``: a free ball, held on the surface without slip by three constraint rows."""
 
 import math
 from collections.abc import Sequence
@@ -13,10 +13,10 @@ from proofroll.engines.pinocchio.ball_with_rows import BallWithRows, ContactRows
 
 
 class FreeFlyer(BallWithRows):
-    """Six freedoms; the rows come from the signed distance to the surface and its derivatives.
+    """Six degrees of freedom; the rows follow from the signed distance to the surface and its derivatives.
 
     Velocities are those of the free-flyer joint, in the ball's own axes. The multipliers are the components of the
-    wall's force along e1, e2 and e3. Where the orientation is not integrated, the ball's axes stay the world's.
+    wall's force along e1, e2 and e3. If the orientation is not integrated, the ball's axes stay the world's.
     """
 
     def __init__(self, body: RollingBall, orientation: bool) -> None:
@@ -37,7 +37,7 @@ class FreeFlyer(BallWithRows):
     def project(self, data: Any, q: FloatArray, v: FloatArray) -> tuple[FloatArray, FloatArray]:
         """See :class:`~proofroll.engines.pinocchio.ball_with_rows.BallWithRows`.
 
-        A ball that the wall carried along as if it were part of it would not slip: what is projected is the rest.
+        On a moving wall, the velocity relative to rigid motion with the wall is projected: that motion has no slip.
         """
         if self._wall_rate is None:
             return super().project(data, q, v)
@@ -47,7 +47,7 @@ class FreeFlyer(BallWithRows):
         return q, rest + carried
 
     def _aimed(self, moving: Sequence[float]) -> FloatArray:
-        """Velocity along e1, and of slip along e2 and e3, from (v, ω) in the world, shape (3, 6); overwritten."""
+        """Matrix from (v, ω) to normal velocity and slip along e2, e3, world axes, shape (3, 6); overwritten."""
         entries = self._entries
         for index, source, factor in self._sources:
             entries[index] = factor * moving[source]
@@ -56,13 +56,14 @@ class FreeFlyer(BallWithRows):
     def _at(
         self, data: Any, q: FloatArray, v: FloatArray
     ) -> tuple[Sequence[float], FloatArray, FloatArray, FloatArray]:
-        """Triad with its distance before it and ė1 behind, rows, drift, and the resistance; see :class:`ContactRows`.
+        """Distance, triad and ė1 as 13 numbers; rows, drift and resistance of :class:`ContactRows`.
 
-        First the row of the surface, then the two of rolling. Components as plain floats: to add to one in an array
-        takes numpy three times as long.
+        The surface's row comes first, then the two of rolling. Components are plain floats: adding to array elements
+        takes three times as long.
         """
         bias = self._own_bias(data, q, v)
-        turned = data.oMi[self.ball].rotation if self._orientation else None  # else the joint's axes are the world's
+        # without orientation the joint's axes are the world's
+        turned = data.oMi[self.ball].rotation if self._orientation else None
         px, py, pz = q[:3].tolist()
         if turned is None:
             vx, vy, vz, wx, wy, wz = v.tolist()
@@ -72,7 +73,7 @@ class FreeFlyer(BallWithRows):
         _, x1, y1, z1, x2, y2, z2, x3, y3, z3, x, y, z = moving
         rows = self._aimed(moving)
         if turned is not None:
-            rows = rows.reshape(6, 3).dot(turned).reshape(3, 6)  # both halves of each
+            rows = rows.reshape(6, 3).dot(turned).reshape(3, 6)  # both halves of each row
         drift = rows.dot(bias)
         along1, along2, along3 = drift.tolist()
         a = self._radius
@@ -80,7 +81,9 @@ class FreeFlyer(BallWithRows):
         drift[0] = along1 + (x * vx + y * vy + z * vz)
         drift[1] = along2 + (x2 * tx + y2 * ty + z2 * tz)
         drift[2] = along3 + (x3 * tx + y3 * ty + z3 * tz)
-        if self._wall_rate is not None:  # at the contact it goes by W × (p + a e1), and that point along with the ball
+        if (
+            self._wall_rate is not None
+        ):  # acceleration of the wall at the contact, W × velocity of the contact position p + a e1
             gain = cross(self._wall_rate, np.array((vx, vy, vz)) + a * np.array((x, y, z)))
             drift[1] -= gain @ (x2, y2, z2)
             drift[2] -= gain @ (x3, y3, z3)
@@ -94,7 +97,7 @@ class FreeFlyer(BallWithRows):
         return moving, rows, drift, resistance
 
     def rows(self, data: Any, q: FloatArray, v: FloatArray) -> ContactRows:
-        """See :class:`~proofroll.engines.pinocchio.ball_with_rows.BallWithRows`; the wall's, then those of rolling."""
+        """See :class:`~proofroll.engines.pinocchio.ball_with_rows.BallWithRows`; surface row, then rolling rows."""
         moving, *rest = self._at(data, q, v)
         return ContactRows(np.array(moving[1:10]).reshape(3, 3).T, *rest)
 
@@ -106,10 +109,10 @@ class FreeFlyer(BallWithRows):
         return self._aimed(self._surface.moving_triad(x, y, z, 0.0, 0.0, 0.0))
 
     def _solve(self, data: Any, rows: FloatArray, drift: FloatArray, resistance: FloatArray) -> FloatArray:
-        """Joint acceleration; the multipliers (-N, F2, F3) [N] are left in ``data``.
+        """Joint acceleration; leaves the multipliers (-N, F2, F3) [N] in ``data``.
 
-        Rolling resistance is proportional to N, an unknown here: it makes the columns differ from the rows, which
-        forwardDynamics does not allow.
+        Rolling resistance is proportional to the unknown N: it makes the matrix unsymmetric, which forwardDynamics does
+        not allow.
         """
         if not self._f:
             return pin.forwardDynamics(self.model, data, self._rest, rows, drift)  # type: ignore[no-any-return]  # it is an array
@@ -123,8 +126,8 @@ class FreeFlyer(BallWithRows):
     def accelerate(self, data: Any, q: FloatArray, v: FloatArray) -> FloatArray:
         """See :class:`~proofroll.engines.pinocchio.ball_with_rows.BallWithRows`.
 
-        Without orientation the acceleration is that of world components: the joint accelerates in the ball's axes,
-        which turn with ω, and axes that are held fixed do not.
+        Without orientation the acceleration has world components: the joint's acceleration refers to the ball's axes,
+        which turn with ω, while the axes held fixed do not.
         """
         _, *rows = self._at(data, q, v)
         acceleration = self._solve(data, *rows)
@@ -147,7 +150,7 @@ class FreeFlyer(BallWithRows):
         return np.array(self._solve(data, *rows)), frame @ data.lambda_c
 
     def on_surface(self, q: FloatArray) -> FloatArray:
-        """The configuration with the centre moved onto the surface along its normal."""
+        """Configuration with the centre moved onto the surface along its normal."""
         q = q.copy()
         gap, x, y, z = self._surface.nearby(*q[:3].tolist())
         q[0] += gap * x
@@ -156,11 +159,11 @@ class FreeFlyer(BallWithRows):
         return q
 
     def gap(self, q: FloatArray) -> float:
-        """Value of the row of the surface [m]."""
+        """Distance from the surface [m]."""
         return float(self._surface.gap(q[:3]))
 
     def _slide(self, data: Any, q: FloatArray, v: FloatArray, direction: FloatArray) -> SlidingContact:
-        """One row, that of the surface; friction and rolling resistance are columns, for both follow N."""
+        """Sliding with the surface's row only; its column includes friction and rolling resistance per unit of N."""
         frame, rows, drift, resistance = self.rows(data, q, v)
         e1, along = frame[:, 0], frame[:, 1:]
         against = self.friction(1.0, along.T @ direction)  # per unit of N
@@ -195,9 +198,9 @@ class FreeFlyer(BallWithRows):
 
 
 def _sources(radius: float) -> list[tuple[int, int, float]]:
-    """Sources of the directions: place in their 18 numbers, place in a moving triad, and factor.
+    """Entries of the directions: index in their 18 numbers, index in a moving triad, and factor.
 
-    Along e1 it is e1·v, along e2 the slip e2·v + a e3·ω, along e3 the slip e3·v - a e2·ω.
+    The row along e1 is e1·v, along e2 the slip e2·v + a e3·ω, along e3 the slip e3·v - a e2·ω.
     """
     blocks = ((0, 1, 1.0), (6, 4, 1.0), (9, 7, radius), (12, 7, 1.0), (15, 4, -radius))
     return [(index + k, source + k, factor) for index, source, factor in blocks for k in range(3)]

@@ -1,4 +1,4 @@
-"""Formulation ``impulses``: bodies that touch, joints that rub and stop, and what is read back of their motion."""
+"""Formulation ``impulses``: run of a mechanism with contacts, dry friction and stops, and its samples."""
 
 from dataclasses import replace
 from typing import Any
@@ -17,7 +17,7 @@ from proofroll.engines.pinocchio.mechanism_run import MechanismRun
 from proofroll.engines.pinocchio.null_space import LoopRows, NullSpace
 from proofroll.engines.pinocchio.settings import PinocchioSettings
 
-# Part of a step in which the accelerations at the start are looked at, and what their errors are multiplied by.
+# Fraction of a step over which the initial accelerations are evaluated, and factor on their errors.
 _PART, _MARGIN = 1 / 16, 4.0
 _PARTS = "in the convex problem what slips parts"
 _FOUND = (
@@ -27,7 +27,7 @@ _FOUND = (
 
 
 class ImpulseRun(MechanismRun):
-    """See :class:`proofroll.core.engine.Engine` for the methods."""
+    """Run of formulation ``impulses``; see :class:`proofroll.core.engine.Engine` for the methods."""
 
     def __init__(self, mechanism: Mechanism, settings: PinocchioSettings) -> None:
         self._mechanism, self._settings = mechanism, settings
@@ -47,9 +47,9 @@ class ImpulseRun(MechanismRun):
         steps.t = t
 
     def _kick(self) -> tuple[Array, Array, Array]:
-        """Accelerations v̇, forces on body a of each contact [N] and of rows of joints, of the step that begins.
+        """Joint accelerations v̇, forces on body a of each contact [N], and forces of joint rows, in the next step.
 
-        At time 0 they are those of a part of it, with what later steps find one step late.
+        At time 0 they belong to a fraction of that step, and include effects that later steps see one step late.
         """
         steps = self.steps
         if steps.t:
@@ -60,7 +60,7 @@ class ImpulseRun(MechanismRun):
         return (kick.v - steps.v) / span, kick.impulse / span, kick.along / span
 
     def _evaluated(self) -> tuple[Any, Array, Array, Array, Any, Array]:
-        """Data of the present state, q, v, and accelerations and forces of the step that begins."""
+        """Data of the present state, q, v, accelerations, joint forces in the next step, and empty loop forces."""
         q, v, (acceleration, pressing, _) = self.steps.q, self.steps.v, self._kick()
         touching = self.steps.terms(q, v, self._dt)[-1]
         self.tree.now = self.steps.t
@@ -81,7 +81,7 @@ class ImpulseRun(MechanismRun):
         return data
 
     def sample(self) -> MechanismSample:
-        """See :class:`proofroll.core.engine.Engine`; the forces are those of the step that begins."""
+        """See :class:`proofroll.core.engine.Engine`; the forces are those of the next step."""
         _, pressing, along = self._kick()
         forces = self.steps.joints.along_joints(self.steps.q, along) if along.size else {}
         return replace(super().sample(), contact_force=pressing if self.steps.contacts else None, **forces)
@@ -95,7 +95,7 @@ class ImpulseRun(MechanismRun):
         step = self._accelerations(self.steps.kick(self.steps.q, self.steps.v), self._dt)
         softened = dict[str, Regularised]()
         for name, value in hard.items():
-            size = float(np.abs(value).max()) or 1.0  # nothing moves otherwise than freely
+            size = float(np.abs(value).max()) or 1.0  # 1 if all accelerations are zero
             others = twice[name], step[name], getattr(plain, name)
             unsure = float(self._settings.solver_tolerance or 0.0) / span / size
             apart = sum(float(np.abs(value - other).max()) / size for other in others)
@@ -103,7 +103,7 @@ class ImpulseRun(MechanismRun):
         return replace(plain, **self.steps.read() if self.steps.contacts else {}, regularised=softened)
 
     def _accelerations(self, kick: Impulses, span: float) -> dict[str, Array]:
-        """Accelerations of all bodies in the time of a kick [s]."""
+        """Accelerations of all bodies during a kick of length ``span`` [s]."""
         data = self._placed((kick.v - self.steps.v) / span)
         accelerations = [
             pin.getFrameClassicalAcceleration(self._model, data, frame, pin.LOCAL_WORLD_ALIGNED)

@@ -1,8 +1,8 @@
-"""Steps of a mechanism whose bodies touch, or whose joints rub and stop: Pinocchio's terms, and its solver.
+"""Steps of a mechanism with contacts, dry friction and stops, by Pinocchio's terms and its contact solver.
 
-Contacts are points to Pinocchio, posed anew in each step where the shapes are nearest. Its solver finds the impulses of
-a step in the cones of friction: those of Coulomb's law (De Saxcé's term makes of the cone's dual the law), or those of
-the convex problem without it, whose contacts part as they slip.
+Contacts are points in Pinocchio, posed in each step where the shapes are nearest. Its solver finds the impulses of a
+step within the friction cones: by Coulomb's law, or by the convex problem without De Saxcé's term, where slipping
+contacts separate.
 """
 
 from collections.abc import Mapping, Sequence
@@ -32,16 +32,16 @@ PROVIDES: frozenset[str] = (
 )
 _OF_A_TREE = "its steps are those of a tree with contacts"
 LACKING: Mapping[str, str] = dict.fromkeys(ALL_LOOPS | {_CAPABILITY.COUPLINGS}, _OF_A_TREE)
-# An approach of less than so many steps of gravity is no impact: nothing rebounds.
+# Approach speed, in steps of gravity, below which nothing rebounds.
 _SOFT = 5.0
-# Part of a gap that a step at its middle closes; all of it would throw what has sunk in.
+# Fraction of a gap that a step by the midpoint rule closes; closing all of it would eject what has penetrated.
 _CLOSED = 0.1
-# From this ratio of its responses along two directions of the surface on PGS returns a wrong impulse.
+# Ratio of the contact's mobility in two directions of the surface above which PGS returns a wrong impulse.
 _UNEQUAL = 2.0
 
 
 def family(settings: PinocchioSettings) -> Mapping[str, str]:
-    """See :class:`proofroll.core.engine_abilities.TellsFamily`; balls and bodies have the same."""
+    """See :class:`proofroll.core.engine_abilities.TellsFamily`; the same for balls and mechanisms."""
     return of_contact(Family.CONVEX if settings.convex else Family.HARD)
 
 
@@ -51,7 +51,7 @@ class Impulses(NamedTuple):
     Attributes:
         v: velocity after it, shape (nv,).
         impulse: on body a of each contact, world axes [N s], shape (contacts, 3).
-        along: of the joints' rows [N s, N m s], shape (rows,).
+        along: impulses of joint rows [N s, N m s], shape (rows,).
     """
 
     v: Array
@@ -60,7 +60,7 @@ class Impulses(NamedTuple):
 
 
 class _Solver(NamedTuple):
-    """Pinocchio's objects for some of the contacts and rows of joints: points, its solver with options and result."""
+    """Pinocchio's objects for a subset of contacts and joint rows: constraints, solver, its options and result."""
 
     points: list[Any]
     point_datas: list[Any]
@@ -72,16 +72,20 @@ class _Solver(NamedTuple):
 
 
 class ImpulseSteps:
-    """A tree with contacts, dry friction and stops of joints, and its steps.
+    """Steps of a tree with contacts, dry friction and stops of joints.
 
     Attributes:
         q, v, t: configuration, velocity, time [s].
         restitution: of each contact [1].
-        joints: rows of joints, which come after the contacts.
+        joints: joint rows, numbered after the contacts.
     """
 
     def __init__(self, tree: JointTree, settings: PinocchioSettings) -> None:
-        """Starts at time 0. Raises Refused if Pinocchio's solver returns wrong impulses for such contacts."""
+        """Starts at time 0.
+
+        Raises:
+            Refused: Pinocchio's solver returns wrong impulses for such contacts.
+        """
         self._tree, self._model, self._data = tree, tree.model, tree.model.createData()
         self._settings, self._dt = settings, float(settings.dt or 0.0)
         self._midpoint = settings.integrator == "midpoint"
@@ -104,7 +108,11 @@ class ImpulseSteps:
             raise Refused(str(error)) from None
 
     def _check(self, k: int, G: Array) -> None:
-        """Ends where PGS returns wrong impulses for a contact, by what impulses do to its slide, shape (3, 3)."""
+        """Checks that PGS returns right impulses for contact ``k`` with the mobility ``G``, shape (3, 3).
+
+        Raises:
+            Diverged: it does not.
+        """
         one, two = float(G[0, 0]), float(G[1, 1])
         if self._settings.solver == "pgs" and self.contacts[k].friction and max(one, two) > _UNEQUAL * min(one, two):
             raise Diverged(
@@ -113,7 +121,11 @@ class ImpulseSteps:
             )
 
     def step(self) -> None:
-        """One step from the present state; raises Diverged where Pinocchio's solver does not find the impulses."""
+        """Makes one step from the present state.
+
+        Raises:
+            Diverged: Pinocchio's solver does not find the impulses.
+        """
         kick = self.kick(self.q, self.v)
         if self._midpoint:
             middle = pin.integrate(self._model, self.q, 0.5 * self._dt * self.v)
@@ -131,9 +143,9 @@ class ImpulseSteps:
         return self._solved(J, free, inverse, touching, shifts, self._dt, convex=self._settings.convex)
 
     def beginning(self, span: float, *, convex: bool) -> Impulses:
-        """Impulses of a short time from the present on, with the turning of the contacts (J̇v), which steps find later.
+        """Impulses of a short time from now on, with the turning of the contacts (J̇v), which steps see one step late.
 
-        What is apart stays apart.
+        Open gaps stay open.
         """
         J, free, inverse, touching = self.terms(self.q, self.v, span)
         ahead = self.terms(pin.integrate(self._model, self.q, span * self.v), self.v, span)[0]
@@ -144,7 +156,7 @@ class ImpulseSteps:
         return self._solved(J, free, inverse, touching, shifts, span, convex=convex)
 
     def read(self) -> dict[str, Any]:
-        """Normals, places and friction of the contacts' points as Pinocchio holds them; gaps of shapes at its poses."""
+        """Normals, positions and friction of contact points in Pinocchio, with gaps of the shapes at its poses."""
         J, _, inverse, touching = self.terms(self.q, self.v, self._dt)
         world = np.array([frame_of_axis(each.normal) for each in touching]) @ J
         solver, data = self._solver(tuple(range(len(self.contacts)))), self._data
@@ -162,9 +174,9 @@ class ImpulseSteps:
         }
 
     def terms(self, q: Array, v: Array, span: float) -> tuple[Array, Array, Array, list[Touching]]:
-        """Rows of all contacts (contacts, 3, nv), velocity without impulses, inverse mass matrix, and the contacts.
+        """Contact rows (contacts, 3, nv), velocity without impulses, inverse mass matrix, and geometry of the contacts.
 
-        The rows are slides along the normal's :func:`frame_of_axis`, the normal last.
+        The rows are slip velocities along the normal's :func:`frame_of_axis`, the normal last.
         """
         tree, model, data = self._tree, self._model, self._data
         pin.forwardKinematics(model, data, q, v)
@@ -195,7 +207,7 @@ class ImpulseSteps:
         return Moving(pose.translation.copy(), pose.rotation.copy(), velocity.linear, velocity.angular)
 
     def _posed(self, solver: _Solver, own: int, there: Touching) -> Array:
-        """Poses the ``own``-th point of a solver; its rows, shape (3, nv)."""
+        """Poses the ``own``-th point of a solver and returns its rows, shape (3, nv)."""
         point, data = solver.points[own], self._data
         place = pin.SE3(frame_of_axis(there.normal), there.place)
         point.joint1_placement = data.oMi[point.joint1_id].actInv(place)
@@ -230,7 +242,7 @@ class ImpulseSteps:
         return 0 if k < 0 else int(self._model.frames[self._tree.body[k]].parentJoint)
 
     def _shifts(self, J: Array, q: Array, v: Array, touching: Sequence[Touching]) -> Array:
-        """Terms added to slides and speeds of gaps [m/s], shape (contacts + rows of joints, 3); inf: cannot close."""
+        """Terms added to slip and gap velocities [m/s], shape (contacts + joint rows, 3); inf: the gap cannot close."""
         first, dt = len(touching) + len(self.joints.friction), self._dt
         shifts = np.zeros((len(self._returned), 3))
         gaps = [(k, each.gap, float(J[k, 2] @ v)) for k, each in enumerate(touching)]
@@ -259,7 +271,7 @@ class ImpulseSteps:
         *,
         convex: bool,
     ) -> Impulses:
-        """Impulses of friction, of those contacts and stops that would close, and of those that they close in turn."""
+        """Impulses of dry friction and of all contacts and stops that would close, also due to other impulses."""
         count, v = len(touching), free
         blocks = [*J, *self.joints.J[:, None]]
         of_blocks = [*shifts[:count], *shifts[count:, 2:]]
@@ -277,7 +289,7 @@ class ImpulseSteps:
                 if k < count:
                     self._posed(solver, own, touching[k])
                 elif k < rubs:
-                    solver.points[own].setTimeStep(span)  # bounds are forces, and without it of a step of 1 s
+                    solver.points[own].setTimeStep(span)  # bounds are forces; the default step would be 1 s
                     solver.points[own].calc(self._model, self._data, solver.point_datas[own])
             rows = np.concatenate([blocks[k] for k in which])
             to_joints = inverse @ rows.T

@@ -1,4 +1,4 @@
-"""Time stepping on the configurations of Pinocchio."""
+"""Time integration on Pinocchio's configurations."""
 
 import math
 from abc import ABC, abstractmethod
@@ -17,20 +17,24 @@ from proofroll.engines.pinocchio.settings import PinocchioSettings
 
 
 def require_tangent_map() -> None:
-    """Raises Refused where this version has no rates of quaternions."""
+    """Refuses versions of Pinocchio without rates of quaternions.
+
+    Raises:
+        Refused: ``tangentMap`` is missing.
+    """
     if not hasattr(pin, "tangentMap"):
         raise Refused(f"the rates of quaternions need tangentMap of pinocchio 4.0, and this is {pin.__version__}")
 
 
 class TangentIntegrator(ABC):
-    """Moves the state of a mechanism.
+    """Integrator of a ball with constraint rows.
 
     Attributes:
         t, q, v: time [s], joint configuration and velocity now.
-        turns: whether the orientation of the ball is integrated.
-        events: so far; of a ball that cannot slip, that it left the wall.
-        mu_static: largest |F|/N while sticking [1]; None: the rows of rolling hold always.
-        sticking: whether the ball sticks now; None where it cannot slip.
+        turns: True if the orientation of the ball is integrated.
+        events: so far; of a ball that cannot slip, only that it left the wall.
+        mu_static: largest |F|/N while sticking [1]; None: unbounded.
+        sticking: True if the ball sticks now; None if it cannot slip.
     """
 
     mu_static: float | None = None
@@ -66,13 +70,13 @@ class TangentIntegrator(ABC):
 
 
 class FixedStep(TangentIntegrator):
-    """Steps of ``dt``; subclasses say what one step is."""
+    """Base of methods with a fixed step ``dt``; subclasses define one step."""
 
     def __init__(self, mechanism: BallWithRows, settings: PinocchioSettings) -> None:
         super().__init__(mechanism, settings)
-        # Factors on the joint velocity where it moves the configuration: 0 holds the ball's orientation. Isotropy: the
-        # inertia of the ball is the same in any axes fixed in it, so at each instant axes may be chosen that coincide
-        # with the carriage's (or the world's). In both formulations the spin is last.
+        # Factors on the joint velocity that moves the configuration: 0 freezes the ball's orientation. The ball's
+        # inertia is the same in all axes, so at each instant axes may be chosen that coincide with the carriage's (or
+        # the world's). In both formulations the spin comes last.
         self._moving = np.ones(self._model.nv)
         self._moving[-3:] = float(self.turns)
         self._dt = float(settings.dt or 0.0)
@@ -89,7 +93,7 @@ class FixedStep(TangentIntegrator):
         self._start = self._pressed(time + self._dt)
 
     def _pressed(self, time: float) -> FloatArray:
-        """Acceleration at the end of a step, with which the next one starts; ends the run if the wall would pull."""
+        """Acceleration at the end of a step, where the next one starts; ends the run if the wall would pull."""
         acceleration = self._acceleration(self.q, self.v)
         if self._mechanism.normal_force(self._data) < -self._mechanism.faint:
             self.events.append(Event("lift_off", time - 0.5 * self._dt, time - self._dt, time))
@@ -101,11 +105,11 @@ class FixedStep(TangentIntegrator):
 
     @abstractmethod
     def _step(self, acceleration: FloatArray) -> None:
-        """One step; the acceleration is that at its start."""
+        """Makes one step from the state with this acceleration."""
 
 
 class SemiImplicitEuler(FixedStep):
-    """Velocity first, then the configuration with the new velocity."""
+    """Semi-implicit Euler: first the velocity, then the configuration with the new velocity."""
 
     def _step(self, acceleration: FloatArray) -> None:
         self.v = self.v + self._dt * acceleration
@@ -113,11 +117,11 @@ class SemiImplicitEuler(FixedStep):
 
 
 class TangentRungeKutta4(FixedStep):
-    """The classical scheme; displacements within a step are tangent vectors at its start.
+    """Classical Runge-Kutta scheme; displacements within a step are tangent vectors at its start.
 
-    As usually written, the displacement's rate is taken to be the joint velocity. That is so only where
-    configurations form a vector space: with rotations the rate is dexp⁻¹ times the velocity (Munthe-Kaas 1998), and
-    without it the orientation is of order 2. ``rk4_dexpinv`` has the term.
+    As usually written, the rate of the displacement is the joint velocity. This holds only in vector spaces: with
+    rotations the rate is dexp⁻¹ times the velocity (Munthe-Kaas 1998), and without it the orientation is of order 2.
+    ``rk4_dexpinv`` has the term.
     """
 
     def _rate(self, displacement: FloatArray, v: FloatArray) -> FloatArray:
@@ -141,31 +145,31 @@ class TangentRungeKutta4(FixedStep):
         self.v = self.v + h / 6 * (v1 + 2 * (v2 + v3) + v4)
 
 
-# A step shorter than this part of the time in which the ball turns by a radian, this many times in a row, leads
-# nowhere: ordinary steps are a hundred times longer, and one jump of the forces is passed in a few dozen.
+# PATIENCE successive steps, each shorter than SHORT times the time of a radian of rolling, mean no progress: ordinary
+# steps are a hundred times longer, and a jump of the forces is passed in a few dozen.
 SHORT = 1e-4
 PATIENCE = 500
-# Numbers of the ball's orientation in a configuration.
+# Number of components of the orientation in a configuration.
 QUATERNION = 4
 
 
 class Adaptive(TangentIntegrator):
-    """DOP853 on configuration and velocity together, the quaternion by its rate (pin.tangentMap) if it is integrated.
+    """DOP853 on configuration and velocity together; an integrated quaternion by its rate (pin.tangentMap).
 
-    One solver lives from event to event. Its bound moves from sample to sample, so that a step ends at each: the dense
-    output of DOP853 has a lower order.
+    One solver lives from event to event. Its time limit moves from sample to sample, so that a step ends at each: the
+    dense output of DOP853 has a lower order.
     """
 
     def __init__(self, mechanism: BallWithRows, settings: PinocchioSettings) -> None:
         super().__init__(mechanism, settings)
         if self.turns:
             require_tangent_map()
-        # In both formulations the orientation is last. Without it, see FixedStep, no more than the place is integrated,
-        # and its rates are velocities of the joints.
+        # In both formulations the orientation comes last. Without it (see FixedStep) only the position is integrated,
+        # and its rates are joint velocities.
         self._places = self._model.nq if self.turns else self._model.nq - QUATERNION
         self._rtol = float(settings.rtol or 0.0)
-        # Components in the ball's turning axes pass through zero all the time: a hundredth of their natural size
-        # keeps the tolerance relative to most of their range.
+        # Components in the ball's turning axes pass through zero often: with a hundredth of their natural size the
+        # tolerance is relative over most of their range.
         self._atol = 1e-2 * self._rtol * np.concatenate([mechanism.q_scale[: self._places], mechanism.v_scale])
         self._turning_time = mechanism.q_scale[0] / mechanism.v_scale[0]
         self._solver: Any = None
@@ -173,19 +177,19 @@ class Adaptive(TangentIntegrator):
         self._q = mechanism.q0.copy()
 
     def _joined(self, q: FloatArray, v: FloatArray) -> FloatArray:
-        """State vector that is integrated."""
+        """Integrated state vector."""
         return np.concatenate([q[: self._places], v])
 
     def _split(self, y: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Configuration and velocity; the next call overwrites the configuration."""
         n = self._places
-        if self.turns:  # the rates must not depend on the length to which the quaternion has drifted
+        if self.turns:  # the rates must not depend on the quaternion's length, which drifts
             return pin.normalize(self._model, y[:n]), y[n:]
         self._q[:n] = y[:n]
         return self._q, y[n:]
 
     def _moved(self, q: FloatArray, v: FloatArray, acceleration: FloatArray) -> FloatArray:
-        """Rates of what is integrated."""
+        """Time derivative of the integrated state vector."""
         return np.concatenate(
             [pin.tangentMap(self._model, q).dot(v) if self.turns else v[: self._places], acceleration]
         )
@@ -194,7 +198,7 @@ class Adaptive(TangentIntegrator):
         if self.turns:
             q, v = self._split(y)
             return self._moved(q, v, self._mechanism.accelerate(self._data, q, v))
-        # The same as plain statements, for it runs a dozen times a step.
+        # The same in plain statements, as it runs a dozen times per step.
         n, q = self._places, self._q
         v = y[n:]
         q[:n] = y[:n]
@@ -212,7 +216,7 @@ class Adaptive(TangentIntegrator):
         solver = self._solver
         while solver.t < end:
             self._make_step(solver, end)
-            # The rates that were found last are those at the end of the step, with projection or without.
+            # The last evaluated rates belong to the end of the step, with or without projection.
             if self._mechanism.normal_force(self._data) < -self._mechanism.faint:
                 self.events.append(Event("lift_off", 0.5 * (solver.t_old + solver.t), solver.t_old, solver.t))
                 raise left_the_wall(f"before {solver.t:.6g} s")
@@ -223,7 +227,7 @@ class Adaptive(TangentIntegrator):
         self.q, self.v = q.copy(), v.copy()
 
     def _make_step(self, solver: Any, end: float, most: float = math.inf) -> None:
-        """One step, to ``end`` [s] at most and no longer than ``most`` [s]; ends the run if steps become too short."""
+        """Makes one step, to ``end`` [s] at most and at most ``most`` [s] long; ends the run if steps get too short."""
         controlled_step(solver, self._accepted, end, most)
         longest = SHORT * self._turning_time
         is_short = solver.step_size < longest
@@ -238,7 +242,7 @@ class Adaptive(TangentIntegrator):
             )
 
     def _accepted(self, _: float, y: FloatArray) -> FloatArray:
-        """The state after a step put back on the constraints, if that is wanted."""
+        """State after a step, projected onto the constraints if the settings say so."""
         if not self._settings.projection:
             return y
         return self._joined(*self._mechanism.project(self._data, *self._split(y)))

@@ -1,4 +1,4 @@
-"""Dry friction and stops of joints as Pinocchio's own constraints of one row each, for its solver of a step."""
+"""Dry friction and stops of joints as Pinocchio's own constraints of one row each, for its contact solver."""
 
 from typing import Any, NamedTuple
 
@@ -16,9 +16,9 @@ class JointRow(NamedTuple):
     """One constraint of a joint.
 
     Attributes:
-        joint: whose.
+        joint: the constrained joint.
         model: pin.ConstraintModel.
-        sign: of the coordinate in its row: what friction opposes, or what leads away from a stop.
+        sign: factor on the coordinate's velocity in the row; at a stop the row is positive away from it.
         limit: coordinate of the stop; None: friction.
     """
 
@@ -28,7 +28,7 @@ class JointRow(NamedTuple):
     limit: float | None
 
     def gap(self, q: Array) -> float:
-        """Distance from the stop."""
+        """Distance from the stop, rad or m."""
         return self.sign * float(q[self.joint.coordinate] - (self.limit or 0.0))
 
     def closed(self, q: Array) -> bool:
@@ -37,11 +37,11 @@ class JointRow(NamedTuple):
 
 
 class JointRows:
-    """The rows of all joints: of friction first, then of stops.
+    """Rows of all joints: friction first, then stops.
 
     Attributes:
-        friction, stops: these rows.
-        J: all of them on the velocities, (rows, nv).
+        friction, stops: the rows of each sort.
+        J: Jacobian of all rows for joint velocities, (rows, nv).
     """
 
     def __init__(self, tree: JointTree) -> None:
@@ -60,7 +60,7 @@ class JointRows:
 
     @staticmethod
     def _friction(tree: JointTree, joint: SwitchedJoint) -> JointRow:
-        bound = np.full(tree.model.nv, joint.friction)  # of all coordinates, of which those of its joints count
+        bound = np.full(tree.model.nv, joint.friction)  # for all coordinates; only those of the joints count
         model = pin.JointFrictionConstraintModel(tree.model, [tree.joint[joint.number]], -bound, bound)
         return JointRow(joint, pin.ConstraintModel(model), 1.0, None)
 
@@ -75,7 +75,7 @@ class JointRows:
     def along_joints(self, q: Array, force: Array) -> dict[str, Array]:
         """Forces of friction and stops along the coordinates of all joints, from those of the rows [N, N m].
 
-        A stop whose gap is open has none: what it does in a step that closes the gap is an impulse.
+        The force of a stop with an open gap is omitted: in a step that closes the gap it is an impulse.
         """
         along = {"friction": np.full(self._count, np.nan), "stop": np.full(self._count, np.nan)}
         total = {joint.number: 0.0 for joint in self.switched}

@@ -1,8 +1,8 @@
-"""A mechanism as a pin.Model: its tree of joints, a frame wherever something is attached, its forces.
+"""Mechanism as a pin.Model: its tree of joints, a frame at every attachment, and its forces.
 
-Joints are added depth-first, which is the order of a mechanism's joints: in any other, Pinocchio's crba gives a wrong
-mass matrix without a word. A joint's frame is our frame B on the child; bodies that fixed joints hold are appended to
-the joint that carries them.
+Joints are added depth-first, the order of a mechanism's joints; in any other order Pinocchio's crba silently gives a
+wrong mass matrix. A joint's frame is frame B on the child; bodies held by fixed joints are appended to the joint that
+carries them.
 """
 
 from collections.abc import Mapping
@@ -25,32 +25,33 @@ LACKING: Mapping[str, str] = {
     for name in ("JOINT_FRICTION", "STOPS", "REBOUNDS")
 }
 _X, _Z = np.array([1.0, 0.0, 0.0]), np.array([0.0, 0.0, 1.0])
-# Column of a joint's own velocities that turns about (or slides along) its axis.
+# Column of the axis of rotation or translation among a joint's own velocities.
 AXIS_COLUMN = {"revolute": 0, "prismatic": 0, "universal": 0, "planar": 2}
 
 
 class JointTree:
-    """The model and its forces.
+    """Pinocchio's model of a mechanism, and the mechanism's forces.
 
     Attributes:
         model: pin.Model.
         q0, v0: configuration and velocity at time 0.
-        joint: Pinocchio's joint of each of the mechanism's joints; that of the carrying joint where it is fixed.
-        body, at_joint: Pinocchio's frames of the bodies, and of the joints on their children.
-        loops, springs: the frames at their two ends, after each spring itself.
+        joint: index of Pinocchio's joint for each joint of the mechanism; for a fixed one, of the carrying joint.
+        body, at_joint: indices of Pinocchio's frames of the bodies, and of the joints on their children.
+        loops: frames at both ends of each loop.
+        springs: each spring with the frames at both ends.
         drive, damping: of each velocity, shape (nv,).
-        sprung: stiffness, rest, and slices of configuration and velocity, of each joint that has a spring.
-        varies: whether a drive or a target changes in time.
-        now: time at which these are evaluated [s].
-        closed: whether loops or couplings hold joints together.
-        geared: rows on the velocities of the couplings, (couplings, nv).
+        sprung: stiffness, rest, and slices of configuration and velocity, of each joint with a spring.
+        varies: True if a drive or a target changes in time.
+        now: time at which drives and targets are evaluated [s].
+        closed: True if there are loops or couplings.
+        geared: Jacobian of the couplings for joint velocities, (couplings, nv).
     """
 
     def __init__(self, mechanism: Mechanism, *, apart: bool = False) -> None:
-        """Takes whether the places of free bodies are coordinates ``apart`` from their orientations.
+        """Builds the model; ``apart`` separates positions of free bodies from their orientations.
 
         Velocities of a free-flyer joint turn with the body, and a step of semi-implicit Euler multiplies them by the
-        square root of 1 + (ω dt)²; apart, they stay along the world's axes.
+        square root of 1 + (ω dt)²; with ``apart`` they have world axes.
         """
         self.mechanism, self._apart = mechanism, apart
         self.model: Any = pin.Model()
@@ -87,7 +88,7 @@ class JointTree:
         return int(self.model.addFrame(frame, inertia is not None))
 
     def _ends(self, carried: Any, item: Loop | Spring, A: Array, B: Array) -> tuple[int, int]:
-        """Frames at both ends of a loop or a spring, with these axes in the bodies."""
+        """Frames at both ends of a loop or a spring, with axes A and B in the bodies."""
         (on_a, at_a), (on_b, at_b) = carried[item.body_a], carried[item.body_b]
         return (
             self._frame(f"{item.name} a", on_a, at_a * pin.SE3(A, np.array(item.position_a))),
@@ -145,11 +146,11 @@ class JointTree:
         self._offsets = np.array([coupling.offset for coupling in couplings])
 
     def apart(self, q: Array) -> Array:
-        """Distance of each coupling's joint_b from where it has to be."""
+        """Residual of each coupling: distance of joint_b from its place, rad or m."""
         return np.asarray(self._geared_q @ q - self._offsets)
 
     def drives(self, q: Array, v: Array) -> Array:
-        """Generalised forces of joints' springs, dampers, drives and actuators, shape (nv,); not to be written to."""
+        """Generalised forces of joints' springs, dampers, drives and actuators, shape (nv,); read-only."""
         if self._constant:
             return self.drive
         tau = self.drive - self.damping * v
@@ -162,11 +163,11 @@ class JointTree:
         return tau
 
     def efforts(self, q: Array, v: Array) -> Array:
-        """Efforts of the actuators, (actuators,)."""
+        """Efforts of the actuators, N or N m, (actuators,)."""
         return np.array([item.effort(self.now, float(q[at_q]), float(v[at_v])) for item, at_q, at_v in self._actuators])
 
     def pulls(self, data: Any) -> Any:
-        """Forces of springs on Pinocchio's joints, in their axes; positions and velocities are in ``data``."""
+        """Forces of springs on Pinocchio's joints, in their axes; positions and velocities come from ``data``."""
         forces = pin.StdVec_Force()
         for _ in range(self.model.njoints):
             forces.append(pin.Force.Zero())
@@ -183,11 +184,11 @@ class JointTree:
         return forces
 
     def velocity(self, data: Any, frame: int) -> Any:
-        """Velocity of a frame's origin, and its angular velocity, in the world's axes."""
+        """Linear and angular velocity of a frame's origin, in world axes."""
         return pin.getFrameVelocity(self.model, data, frame, pin.LOCAL_WORLD_ALIGNED)
 
     def put(self, forces: Any, data: Any, frame: int, place: Array, force: Array, torque: Array | None = None) -> None:
-        """Adds a force and a moment at a place, in the world's axes, to those on the joint that carries a frame."""
+        """Adds a force and a moment at a point, in world axes, to the forces on the joint that carries a frame."""
         joint = self.model.frames[frame].parentJoint
         at = data.oMi[joint].inverse() * pin.SE3(np.eye(3), place)
         forces[joint] = forces[joint] + at.act(pin.Force(force, np.zeros(3) if torque is None else torque))

@@ -1,4 +1,4 @@
-"""Formulations ``null_space`` and ``constraint_dynamics``: a mechanism's motion, and what is read back of it."""
+"""Formulations ``null_space`` and ``constraint_dynamics``: motion of a mechanism, and its samples."""
 
 from typing import Any
 
@@ -20,7 +20,7 @@ from proofroll.engines.pinocchio.settings import PinocchioSettings
 
 
 class MechanismMotion:
-    """Steps of a mechanism from sample to sample."""
+    """Time integration of a mechanism from sample to sample."""
 
     def __init__(self, mechanism: Mechanism, settings: PinocchioSettings) -> None:
         self._mechanism = mechanism
@@ -28,14 +28,14 @@ class MechanismMotion:
         self._model, self._data = self.tree.model, self.tree.model.createData()
         self._nq, self._end = self._model.nq, self._model.nq + self._model.nv
         rows = LoopRows(self.tree)
-        mu = settings.proximal  # which constraint_dynamics has, and nothing else
+        mu = settings.proximal  # only constraint_dynamics has it
         self.dynamics = NullSpace(self.tree, rows) if mu is None else ConstraintDynamics(self.tree, mu)
         self.rows, self.rank = rows, rows.rank
         self._turns = self._nq != self._model.nv  # configurations hold quaternions
         if self._turns:
             require_tangent_map()
         self._eliminates = settings.projection and bool(rows.rank)
-        # where signals change in time, it is the last component of the state: integrators hand on nothing else
+        # if signals change in time, it is the last component of the state, as integrators pass on nothing else
         start = np.concatenate([self.tree.q0, self.tree.v0, np.zeros(int(self.tree.varies))])
         resolution = float(getattr(settings, settings.resolution))
         self.motion = INTEGRATORS[settings.integrator](resolution)
@@ -51,7 +51,7 @@ class MechanismMotion:
     def _rates_now(self, q: Array, v: Array) -> Array:
         if not self._turns:
             return np.concatenate([v, self.dynamics.acceleration(self._data, q, v)])
-        q = pin.normalize(self._model, q)  # the rates must not depend on the length to which a quaternion has drifted
+        q = pin.normalize(self._model, q)  # the rates must not depend on a quaternion's length, which drifts
         rate = pin.tangentMap(self._model, q).dot(v)
         return np.concatenate([rate, self.dynamics.acceleration(self._data, q, v)])
 
@@ -78,18 +78,18 @@ class MechanismMotion:
             raise Diverged(f"{error}{self._where()}") from None
 
     def _where(self) -> str:
-        """Clause on the pose now, for messages."""
+        """Clause for messages on the present pose."""
         return ""
 
 
 class MechanismRun(MechanismMotion):
-    """See :class:`proofroll.core.engine.Engine` for the methods."""
+    """Run of a mechanism; see :class:`proofroll.core.engine.Engine` for the methods."""
 
     def _where(self) -> str:
         return f"; {pose(self._mechanism, self.sample())}"
 
     def _evaluated(self) -> tuple[Any, Array, Array, Array, Any, Array]:
-        """Data of the present state, q, v, and what the reactions are."""
+        """Data of the present state, q, v, accelerations, forces on Pinocchio's joints, and on loops."""
         data = self._model.createData()
         q, v = self.motion.x[: self._nq], self.motion.x[self._nq : self._end]
         self.tree.now = self.motion.t
@@ -107,7 +107,7 @@ class MechanismRun(MechanismMotion):
         force[count:], torque[count:] = on_loops
         pin.rnea(self._model, data, q, v, acceleration, forces)
         for number, (joint, index) in enumerate(zip(self._mechanism.joints, self.tree.joint, strict=True)):
-            if joint.kind != "fixed":  # bodies held by a fixed joint are one body to Pinocchio
+            if joint.kind != "fixed":  # Pinocchio joins bodies held by a fixed joint into one
                 R = data.oMi[index].rotation
                 force[number], torque[number] = R @ data.f[index].linear, R @ data.f[index].angular
         return MechanismSample(
@@ -147,20 +147,20 @@ class MechanismRun(MechanismMotion):
         )
 
     def _axes(self, q: Array) -> Array:
-        """Directions in which the joints' own velocities turn or slide, in the world."""
+        """World directions of the joints' own axes of rotation or translation, (joints, 3)."""
         data = self._model.createData()
         pin.computeJointJacobians(self._model, data, q)
         axes = np.full((len(self._mechanism.joints), 3), np.nan)
         for number, (joint, index) in enumerate(zip(self._mechanism.joints, self.tree.joint, strict=True)):
             if joint.kind in AXIS_COLUMN:
                 J = pin.getJointJacobian(self._model, data, index, pin.LOCAL_WORLD_ALIGNED)
-                J = J.reshape(6, self._model.nv)  # of a single column it is a vector
+                J = J.reshape(6, self._model.nv)  # a single column is returned as a vector
                 column = J[:, self._model.joints[index].idx_v + AXIS_COLUMN[joint.kind]]
                 axes[number] = column[:3] if joint.kind == "prismatic" else column[3:]
         return axes
 
     def _mass_matrix_error(self, q: Array) -> float:
-        """The mass matrix of crba, which the equations use, against unit accelerations of rnea."""
+        """Relative difference of the mass matrix of crba, used in the equations, from unit accelerations of rnea."""
         model, data, rest = self._model, self._model.createData(), np.zeros(self._model.nv)
         M = np.reshape(pin.crba(model, data, q), (model.nv, model.nv))
         M = np.triu(M) + np.triu(M, 1).T

@@ -1,8 +1,8 @@
 """Formulation ``null_space``: Pinocchio's terms of the joint tree, loops by projection on their rows' null space.
 
 With M = L Lᵀ, the singular vectors of C L⁻ᵀ split velocities into those that the loops lock and those that they allow.
-Which row depends on which never matters, and the number of independent ones is found once, at the start: where it is
-found anew at each evaluation, it flickers with round-off.
+It does not matter which rows are dependent. The number of independent rows is determined once, at the start, since
+round-off would make it change from one evaluation to the next.
 """
 
 from functools import partial
@@ -21,7 +21,15 @@ from proofroll.engines.pinocchio.joint_tree import JointTree
 
 
 class RowsAtState(NamedTuple):
-    """Φ, C with C v = Φ̇, Ċ v; of each loop's row the loop, and force and moment on body_b of a unit multiplier."""
+    """Rows at one state, in world axes.
+
+    Attributes:
+        residual: Φ.
+        C: Jacobian with C v = Φ̇.
+        drift: Ċ v.
+        loop: index of the loop of each of its rows.
+        force, torque: applied to body_b by a unit multiplier of each row.
+    """
 
     residual: Array
     C: Array
@@ -32,7 +40,7 @@ class RowsAtState(NamedTuple):
 
 
 class Split(NamedTuple):
-    """L⁻ᵀ, its product with the locked directions, and what takes a row's value to them."""
+    """Matrices that split velocities: L⁻ᵀ, L⁻ᵀ times the locked directions, and row values to locked components."""
 
     into: Array
     locked: Array
@@ -40,7 +48,7 @@ class Split(NamedTuple):
 
 
 class LoopRows:
-    """The rows of all loops of a tree, then of its couplings.
+    """Rows of all loops of a tree, then of its couplings.
 
     Attributes:
         rank: number of independent rows.
@@ -50,7 +58,7 @@ class LoopRows:
         self._model, self._tree = tree.model, tree
         kinds = [loop.kind for loop in tree.mechanism.loops]
         (self._point, self._axis), (self._angle, self._x, self._y) = rows_of(kinds)
-        # whether a row's direction turns with body_a; points that coincide do so along the world's axes too
+        # True where a row's direction turns with body_a; coincident points need no such rows and use world axes
         self._turning = np.array([len(FACTS[kinds[number]].translations) < 3 for number in self._point]).reshape(-1, 1)
         self._fixed = np.eye(3)[self._axis]
         self._loop = np.concatenate([self._point, self._angle])
@@ -66,7 +74,7 @@ class LoopRows:
             self.rank = independent_anywhere(tree.q0, at_rest, partial(pin.integrate, self._model))
 
     def at(self, data: Any, q: Array, v: Array) -> RowsAtState:
-        """Rows at a state; positions, velocities and drifts of all frames are in ``data`` then."""
+        """Rows at a state; leaves positions, velocities and drifts of all frames in ``data``."""
         if not self._tree.mechanism.couplings:
             return self._of_loops(data, q, v)
         rows, geared = self._of_loops(data, q, v), self._tree.geared
@@ -86,7 +94,7 @@ class LoopRows:
         i, j, turning = self._point, self._angle, self._turning
         n = np.where(turning, A[i, :, self._axis], self._fixed)
         x, y, first, then = A[j, :, self._x], B[j, :, self._y], len(n), len(n) + len(self._angle)
-        # ω × each direction, and again; the moments d × n and y × x. One call for all costs as much as for one.
+        # ω × each direction, and again; the moments d × n and y × x. One call for all takes as long as one for each.
         spins = np.concatenate([w_a[i], w_a[j], w_b[j]])
         rates = cross(spins, np.concatenate([n, x, y]))
         bends = cross(spins, rates)
@@ -107,7 +115,7 @@ class LoopRows:
         )
 
     def _frames(self, data: Any, frames: NDArray[np.intp]) -> tuple[Array, Array, Array, Array, Array]:
-        """Places, axes, Jacobians, velocities and accelerations at v̇ = 0 of frames, world axes; the world's stand."""
+        """Positions, axes, Jacobians, velocities, accelerations at v̇ = 0 of frames, world axes; zero for the world."""
         model, count = self._model, len(frames)
         p, R, J = np.empty((count, 3)), np.empty((count, 3, 3)), np.zeros((count, 6, model.nv))
         v, a = np.zeros((count, 6)), np.zeros((count, 6))
@@ -116,13 +124,17 @@ class LoopRows:
             p[number], R[number] = pose.translation, pose.rotation
             if model.frames[frame].parentJoint:
                 jacobian = pin.getFrameJacobian(model, data, frame, pin.LOCAL_WORLD_ALIGNED)
-                J[number] = jacobian.reshape(6, model.nv)  # of a single column it is a vector
+                J[number] = jacobian.reshape(6, model.nv)  # a single column is returned as a vector
                 v[number] = pin.getFrameVelocity(model, data, frame, pin.LOCAL_WORLD_ALIGNED).vector
                 a[number] = pin.getFrameClassicalAcceleration(model, data, frame, pin.LOCAL_WORLD_ALIGNED).vector
         return p, R, J, v, a
 
     def split(self, M: Array, C: Array) -> Split:
-        """Splitting of velocities by the rows, in the metric of the mass matrix (upper triangle)."""
+        """Splitting of velocities by the rows, in the metric of the mass matrix (upper triangle).
+
+        Raises:
+            LinAlgError: the mass matrix is not positive definite, or the singular values are not found.
+        """
         upper, failed = dpotrf(M, lower=0)
         if failed:
             raise np.linalg.LinAlgError("the mass matrix is not positive definite")
@@ -134,7 +146,7 @@ class LoopRows:
         return Split(into, into @ Vt[:r].T, U[:, :r].T / S[:r, None])
 
     def eliminated(self, data: Any, q: Array, v: Array) -> tuple[Array, Array]:
-        """The state with violations of the loops taken away along the locked directions (Blajer 2002)."""
+        """State without violations of the loops, moved along the locked directions (Blajer 2002)."""
         rows = self.at(data, q, v)
         split = self.split(pin.crba(self._model, data, q), rows.C)
         v = v - split.locked @ (split.back @ (rows.C @ v))
@@ -142,7 +154,7 @@ class LoopRows:
 
 
 def _times(a: Array, J: Array) -> Array:
-    """Each vector times its matrix of three rows."""
+    """Product of each vector with its matrix of three rows."""
     return np.asarray(np.matmul(a[:, None, :], J)[:, 0])
 
 
@@ -150,7 +162,7 @@ class NullSpace:
     """Accelerations and reactions of a tree with loops and couplings.
 
     Attributes:
-        on_couplings: force of each on its joint_b when reactions were last asked for.
+        on_couplings: force of each coupling on its joint_b at the last call of :meth:`reactions`.
     """
 
     def __init__(self, tree: JointTree, rows: LoopRows) -> None:
@@ -159,7 +171,7 @@ class NullSpace:
         self.on_couplings = np.zeros(0)
 
     def acceleration(self, data: Any, q: Array, v: Array) -> Array:
-        """Acceleration of the joints, shape (nv,), which the next call may overwrite."""
+        """Joint acceleration, shape (nv,), overwritten by the next call."""
         tree, model = self._tree, self._model
         tau = tree.drives(q, v)
         if not tree.closed:
@@ -172,7 +184,7 @@ class NullSpace:
         return self._solved(data, q, v, tau)[0]
 
     def _solved(self, data: Any, q: Array, v: Array, tau: Array) -> tuple[Array, RowsAtState, Array]:
-        """Acceleration, rows and multipliers, the smallest in norm where rows depend on each other."""
+        """Acceleration, rows, and multipliers; of dependent rows, the multipliers of least norm."""
         tree, model = self._tree, self._model
         rows = self._rows.at(data, q, v)
         pulls = tree.pulls(data) if tree.springs else None
@@ -184,7 +196,7 @@ class NullSpace:
         return free + split.locked @ normal, rows, split.back.T @ normal
 
     def reactions(self, data: Any, q: Array, v: Array) -> tuple[Array, Any, Array]:
-        """Acceleration; forces on Pinocchio's joints of springs and loops; force and moment on body_b of each loop."""
+        """Joint acceleration; spring and loop forces on Pinocchio's joints; force and moment on body_b of each loop."""
         tree = self._tree
         on_loops = np.zeros((2, len(tree.loops), 3))
         if not tree.closed:
@@ -204,5 +216,5 @@ class NullSpace:
         return acceleration, forces, on_loops
 
     def constraint_rows(self, data: Any, q: Array, v: Array) -> Array:
-        """Rows of loops and couplings on the velocities of the joints."""
+        """Jacobian of loops and couplings for joint velocities, shape (rows, nv)."""
         return self._rows.at(data, q, v).C if self._tree.closed else np.zeros((0, self._model.nv))

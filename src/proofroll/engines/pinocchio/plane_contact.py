@@ -1,8 +1,8 @@
-"""A ball, one plane that touches it, and Pinocchio's own solver of contact with friction between the two.
+"""A ball, a plane that touches it, and Pinocchio's own frictional contact solver between the two.
 
-The ball has a translation joint with a spherical joint in it: with a free-flyer joint the velocity of the centre has
-components in the ball's turning axes, and a step of semi-implicit Euler multiplies it by the square root of
-1 + (ω dt)², so that a fast ball blows up at any useful step.
+The ball has a translation joint followed by a spherical joint. With a free-flyer joint the velocity of the centre would
+have components in the ball's turning axes, and a step of semi-implicit Euler would multiply it by the square root of 1
++ (ω dt)², so that a fast ball blows up at any useful step.
 """
 
 from collections.abc import Sequence
@@ -14,7 +14,7 @@ import pinocchio as pin
 from proofroll.core.arrays import FloatArray
 from proofroll.elements.ball_on_surface.model import RollingBall
 
-# Pinocchio's limit of 1000 is met at tight tolerances where the normal force is small.
+# Pinocchio's limit of 1000 is reached at tight tolerances where the normal force is small.
 _ADMM_ITERATIONS = 10_000
 
 
@@ -24,17 +24,18 @@ class PlaneContact:
     Attributes:
         model, data: pin.Model and pin.Data.
         ball: index of the joint that turns the ball.
-        turned: rotation from the ball's axes into the world: Pinocchio's memory, which follows the last call.
+        turned: rotation from the ball's axes to the world's: a view of Pinocchio's memory, as of its last call.
         q0, v0: joint configuration and velocity at time 0; the first three numbers are the ball's centre [m] and its
-            velocity [m/s] in the world.
-        inverse: of the mass matrix, shape (6, 6): that of a ball in these joints does not change.
-        axes: of the plane where it was last posed, as columns e2, -e3, -e1: the last one from the wall into the ball.
-        point, point_data: the contact as Pinocchio has it.
+        velocity [m/s] in the world.
+        inverse: inverse mass matrix, shape (6, 6); constant for a ball in these joints.
+        axes: columns e2, -e3, -e1 of the plane where it was last posed; the last one points from the wall into the
+            ball.
+        point, point_data: Pinocchio's model and data of the contact.
         options: of the solver.
     """
 
     def __init__(self, body: RollingBall, kind: str, tolerance: float) -> None:
-        """Takes the ``kind`` of solver, ``pgs`` or ``admm``, which stops at ``tolerance``."""
+        """Takes the ``kind`` of solver, ``pgs`` or ``admm``, and its ``tolerance``."""
         self._radius = body.ball.radius
         self.model = pin.Model()
         self.model.gravity.linear = body.gravity
@@ -54,19 +55,21 @@ class PlaneContact:
         self.models, self._datas = pin.StdVec_ConstraintModel(), pin.StdVec_ConstraintData()
         self.models.append(pin.ConstraintModel(point))
         self._datas.append(self.models[0].createData())
-        # Both refer to what is in the vectors; to extract them again takes longer than to solve for the impulse.
+        # References to the vectors' elements; extracting them again takes longer than solving for the impulse.
         self.point, self.point_data = self.models[0].extract(), self._datas[0].extract()
-        # As these do to the placements in the contact; to make new ones takes longer than to solve, too.
+        # References to the placements in the contact; new ones would also take longer than solving.
         self._on_wall, self._on_ball = self.point.joint1_placement, self.point.joint2_placement
         self._from_centre, self._foot = np.zeros((3, 4)), np.zeros(3)  # axes and contact point, in the world
         self._entries, self.axes = self._from_centre.reshape(-1), self._from_centre[:, :3]
         self._solver, self.options, self._result = solver_of(kind, tolerance)
 
     def pose(self, place: Sequence[float], triad: Sequence[float]) -> FloatArray:
-        """Poses the plane where a ball at ``place`` [m] touches, with the components of e1, e2, e3.
+        """Poses the plane where a ball at ``place`` [m] touches; ``triad``: components of e1, e2, e3.
 
-        Returns the velocity of the contact point per joint velocity, along :attr:`axes`, shape (3, 6). Expects the
-        joints' placements and Jacobians in ``data``.
+        Expects the joints' placements and Jacobians in ``data``.
+
+        Returns:
+            Jacobian from joint velocities to the velocity of the contact point along :attr:`axes`, shape (3, 6).
         """
         x, y, z = place
         x1, y1, z1, x2, y2, z2, x3, y3, z3 = triad
@@ -83,26 +86,26 @@ class PlaneContact:
         return self.point.jacobian(self.model, self.data, self.point_data)  # type: ignore[no-any-return]  # it is an array
 
     def impulse(self, delassus: Any, free: FloatArray, mu: float) -> FloatArray | None:
-        """Impulse along the axes [N s], shape (3,), which the next call may overwrite; None if it is not found.
+        """Impulse along the axes [N s], shape (3,), overwritten by the next call; None if the solver does not find it.
 
-        ``delassus`` is the contact's pin.DelassusOperatorDense, ``free`` the velocity of the contact point without an
+        ``delassus`` is the contact's pin.DelassusOperatorDense, ``free`` the velocity of the contact point without
         impulse [m/s], along the axes, shape (3,).
         """
         self.point.setFriction(mu)
-        # No guess from the last step: the answer must not depend on what was looked at in between.
+        # No warm start: the result must not depend on samples taken in between.
         self._result.reset()
         if not self._solver.solve(delassus, free, self.models, self._datas, self.options, self._result):
             return None
         return self._result.retrieveConstraintImpulses()  # type: ignore[no-any-return]  # it is an array
 
     def friction(self, mu: float) -> float:
-        """Coefficient that the contact's cone holds when it is given ``mu``, as before each impulse."""
+        """Friction coefficient that the contact's cone has after it is set to ``mu``, as before each impulse."""
         self.point.setFriction(mu)
         return float(self.point.getFriction())
 
 
 def solver_of(kind: str, tolerance: float, size: int = 3) -> tuple[Any, Any, Any]:
-    """Solver, its options and its result for so many rows."""
+    """Solver, its options and its result object for ``size`` rows."""
     if kind == "pgs":
         solver, options, result = pin.PGSConstraintSolver(size), pin.PGSSolverSettings(), pin.PGSSolverResult()
     else:

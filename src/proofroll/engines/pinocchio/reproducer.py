@@ -1,4 +1,4 @@
-"""Writes the program that shows what Pinocchio does without proofroll: the steps of the adapter, cut out of it."""
+"""Writer of programs that show Pinocchio's behaviour without proofroll, from the adapter's own code."""
 
 import math
 from typing import Any
@@ -45,10 +45,10 @@ _CONTACT = """    steps = ContactSteps(BODY, SETTINGS)
 
 
 def source(body: RollingBall, settings: PinocchioSettings) -> str:
-    """See :class:`proofroll.core.engine_abilities.Reproduces`; the settings say whether the orientation is integrated.
+    """See :class:`proofroll.core.engine_abilities.Reproduces`; with the orientation if the settings integrate it.
 
     Raises:
-        Refused: the scene or the settings have something that the program has not.
+        Refused: the scene or the settings have something that programs cannot express.
     """
     if settings.formulation == "contact":
         return cut_program(body, settings, [ContactSteps], ["advance", "kick"], _SEEN + _CONTACT)
@@ -92,7 +92,11 @@ def run(times):
 
 
 def mechanism_source(run: MechanismRun, settings: PinocchioSettings) -> str:
-    """The program's part that runs a mechanism, with the dynamics of the settings; drives that change are refused."""
+    """Program that runs a mechanism, with the dynamics of the settings.
+
+    Raises:
+        Refused: drives change in time.
+    """
     if run.tree.varies:
         raise Refused("programs hold no drives in time yet")
     mechanism: Any = run.tree.mechanism

@@ -1,4 +1,4 @@
-"""Pinocchio's own importers of URDF and MJCF, the model read back."""
+"""Reader of robot files by Pinocchio's own importers of URDF and MJCF."""
 
 import importlib.metadata
 from collections.abc import Mapping
@@ -26,12 +26,12 @@ class PinocchioRobots:
         return importlib.metadata.version("pin")
 
     def as_written(self, request: Request) -> Whole:
-        """Numbers of the file itself, loaded from its path."""
+        """Degrees of freedom and mass of the model loaded from the file's path."""
         model = _build(request)
         return Whole(int(model.nv), float(sum(body.mass for body in list(model.inertias)[1:])))
 
     def read(self, request: Request) -> Reading:
-        """The model, evaluated by crba, rnea and aba."""
+        """Model read from the file, evaluated by crba, rnea and aba."""
         model = _build(request)
         if request.kind == "urdf":
             model.gravity.linear = request.gravity
@@ -62,7 +62,8 @@ class PinocchioRobots:
             def forward(torque: Array) -> Array:
                 return np.array(pin.aba(model, data, q, v, torque))
 
-            return AtState(T, drift, M, g, h, inverse, None if reduced else forward)  # aba knows no following joints
+            # aba does not support mimic joints
+            return AtState(T, drift, M, g, h, inverse, None if reduced else forward)
 
         arrays = evaluate(request, joints, dofs, at)
         mass, com, inertia = {}, {}, {}
@@ -86,14 +87,14 @@ def _build(request: Request) -> Any:
     if request.kind == "mjcf":
         try:
             return pin.buildModelFromMJCF(str(request.path))
-        except IndexError as error:  # of its C++, which would be taken for a mistake of this reader
+        except IndexError as error:  # raised by Pinocchio's C++; unhandled it would look like an error of this reader
             raise Refused(f"IndexError: {error}") from None
     free = (pin.JointModelFreeFlyer(),) if request.base == "free" else ()
     return pin.buildModelFromUrdf(str(request.path), *free, **mimic)
 
 
 def _columns(request: Request, model: Any) -> list[tuple[str, int, int]]:
-    """Joints by the file's names in the order of velocities: name, index in the model, velocities.
+    """Joints by the file's names in the order of velocities: name, index in the model, number of velocities.
 
     Several joints in one body of an MJCF are one composite joint of the model.
     """
@@ -116,7 +117,7 @@ def _columns(request: Request, model: Any) -> list[tuple[str, int, int]]:
 
 
 def _twins(model: Any) -> dict[int, tuple[int, int]]:
-    """Joints whose name an earlier joint has: index -> index of the first, and which of them it is, from 2."""
+    """Joints with the name of an earlier joint: index -> index of the first, and count among them from 2."""
     first: dict[str, int] = {}
     twins: dict[int, tuple[int, int]] = {}
     for index, name in enumerate(map(str, model.names)):
@@ -127,13 +128,13 @@ def _twins(model: Any) -> dict[int, tuple[int, int]]:
 
 
 def _composite(request: Request, model: Any, index: int) -> list[str]:
-    """The file's names of the joints within a composite one, whose body they move."""
+    """Names in the file of the joints within a composite joint, which move its body."""
     bodies = {str(frame.name) for frame in model.frames if frame.parentJoint == index}
     return [name for name, child in request.children.items() if child.rpartition("/")[0] in bodies or child in bodies]
 
 
 def _frame(request: Request, model: Any, joint: str, index: int) -> int | None:
-    """The frame of the body that a joint carries, where the model has it; its placement is against the joint."""
+    """Frame of the body that a joint carries, relative to that joint; None if the model has none."""
     body = request.children.get(joint)
     if body is None or not model.existFrame(body, pin.FrameType.BODY):
         return None
@@ -144,9 +145,9 @@ def _frame(request: Request, model: Any, joint: str, index: int) -> int | None:
 def _state(
     request: Request, model: Any, columns: list[tuple[str, int, int]], k: int
 ) -> tuple[Array, Array, Array, Array]:
-    """Configuration, velocity, and the relation to the common velocity: both parts of a free base have body axes."""
+    """Configuration, velocity, and map T, drift from the common velocity; a free base has both parts in body axes."""
     states = request.states
-    described = [entry.key() for entry in model.referenceConfigurations]  # the pose that an MJCF describes
+    described = [entry.key() for entry in model.referenceConfigurations]  # the pose that an MJCF defines
     q = np.array(model.referenceConfigurations["qpos0"] if "qpos0" in described else pin.neutral(model))
     v = np.zeros(model.nv)
     T, drift = np.eye(model.nv), np.zeros(model.nv)

@@ -1,4 +1,4 @@
-"""Formulations ``composite`` and ``free_flyer``: a mechanism with rows on top, and the integrator of its motion."""
+"""Formulations ``composite`` and ``free_flyer``: a ball with constraint rows, and the integrator of its motion."""
 
 import math
 
@@ -15,7 +15,7 @@ from proofroll.engines.pinocchio.integrators import Adaptive, SemiImplicitEuler,
 from proofroll.engines.pinocchio.settings import PinocchioSettings
 from proofroll.engines.pinocchio.stick_slip import AdaptiveStickSlip, StickSlipEuler, StickSlipRungeKutta4
 
-# Of a ball that rolls, and of one that can slip.
+# For unbounded friction, and for bounded friction.
 _INTEGRATORS = {
     "dop853": (Adaptive, AdaptiveStickSlip),
     "semi_implicit_euler": (SemiImplicitEuler, StickSlipEuler),
@@ -25,10 +25,10 @@ _INTEGRATORS = {
 
 
 class RowsRun:
-    """See :class:`proofroll.core.engine.Engine` for the methods."""
+    """Run of a ball with constraint rows; see :class:`proofroll.core.engine.Engine` for the methods."""
 
     def __init__(self, body: RollingBall, settings: PinocchioSettings) -> None:
-        """Starts at time 0; the settings now decide whether the orientation is integrated, not the scene."""
+        """Starts at time 0; ``settings.orientation`` decides if the orientation is integrated, not the scene."""
         kind = Composite if settings.formulation == "composite" else FreeFlyer
         self.mechanism: BallWithRows = kind(body, bool(settings.orientation))
         self.motion: TangentIntegrator
@@ -44,7 +44,7 @@ class RowsRun:
         self.motion.advance(t)
 
     def sample(self) -> BallSample:
-        """See :class:`proofroll.core.engine.Engine`; no orientation where it is not integrated."""
+        """See :class:`proofroll.core.engine.Engine`; no orientation unless it is integrated."""
         model, ball, data = self.mechanism.model, self.mechanism.ball, self._looked_at
         force = self.motion.reaction(data)[1]
         velocity = pin.getVelocity(model, data, ball, pin.LOCAL_WORLD_ALIGNED)
@@ -59,19 +59,20 @@ class RowsRun:
         )
 
     def events(self) -> tuple[Event, ...]:
-        """See :class:`proofroll.core.engine_abilities.LocatesEvents`; unbounded friction has but leaving the wall."""
+        """See :class:`proofroll.core.engine_abilities.LocatesEvents`; with unbounded friction only lift-off."""
         return tuple(self.motion.events)
 
     def built(self) -> BallBuilt:
-        """See :class:`proofroll.core.engine.Engine`: from the model, and from its rows and torques at the state now."""
+        """See :class:`proofroll.core.engine.Engine`: from the model, and from rows and torques at the present state."""
         mechanism, q, v = self.mechanism, self.motion.q, self.motion.v
         model, data, ball = mechanism.model, mechanism.model.createData(), mechanism.ball
         inertia = model.inertias[ball]
-        # In both formulations the spin is last, in orthonormal axes: the row of slip has the length a there, and
-        # rolling resistance the length f. At rest that has no direction, so it is looked at in a motion along that row.
+        # In both formulations the spin comes last, in orthonormal axes: there the row of slip has the norm a, and
+        # rolling resistance the norm f. At rest the resistance has no direction, so it is evaluated for a motion along
+        # that row.
         row = mechanism.rows(data, q, v).rows[-2].copy()
         torque = mechanism.rows(data, q, row).resistance
-        mu_kinetic = None  # without a bound nothing stands for it
+        mu_kinetic = None  # None: friction is unbounded
         if self.motion.mu_static is not None:
             mu_kinetic = float(np.linalg.norm(mechanism.friction(1.0, np.array([1.0, 0.0]))))
         acceleration = self.motion.reaction(data)[0]

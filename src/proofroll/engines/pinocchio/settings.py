@@ -1,4 +1,4 @@
-"""Settings of Pinocchio, and the presets."""
+"""Settings and presets of Pinocchio."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -18,7 +18,7 @@ _SCHEMES = {
     "leapfrog": Scheme.LEAPFROG,
     "rk4": Scheme.RK4,
 }
-# Formulations of mechanisms, and their integrators.
+# Formulations of mechanisms, with their integrators.
 OF_MECHANISMS = {
     "null_space": ("rk4", "dop853"),
     "constraint_dynamics": ("rk4", "dop853"),
@@ -80,7 +80,7 @@ class PinocchioSettings:
         return () if self.formulation == "impulses" else ("convex",)
 
     def __post_init__(self) -> None:
-        """Refuses what the formulation or the integrator does not have, and what would change nothing."""
+        """Refuses settings that the formulation or the integrator does not have, or that have no effect."""
         refuse_first("pinocchio", self, self._rules())
 
     def _rules(self) -> Iterator[tuple[bool, str, str]]:
@@ -123,8 +123,9 @@ class PinocchioSettings:
     def order(self) -> int | None:
         """See :class:`proofroll.core.engine.Settings`.
 
-        rk4 is of order 4 only where configurations form a vector space, that is without the orientation: see
-        :mod:`proofroll.engines.pinocchio.integrators`. Where the scene decides, :func:`lowered` says the other.
+        rk4 is of order 4 only if configurations form a vector space, that is without the orientation: see
+        :mod:`proofroll.engines.pinocchio.integrators`. Where the scene decides, :func:`lowered` gives the order with
+        it.
         """
         if self.formulation in OF_MECHANISMS and self.formulation != "impulses":
             return 4 if self.integrator == "rk4" else None
@@ -149,18 +150,18 @@ def lowered(settings: PinocchioSettings) -> Mapping[str, int]:
     )
 
 
-# Of 1e-12 to 1e-5 any gave accelerations to 1e-13; without it, dependent rows give NaN.
+# Any value from 1e-12 to 1e-5 gave accelerations accurate to 1e-13; with zero, dependent rows give NaN.
 PROXIMAL = 1e-8
 
 
 def _presets(formulation: Literal["composite", "free_flyer"]) -> Mapping[str, PinocchioSettings]:
     return {
-        # what one writes first: a classical scheme with pin.integrate, which turns the ball, nothing against drift
+        # the obvious first model: a classical scheme with pin.integrate, which turns the ball, without drift correction
         "default": PinocchioSettings(formulation, "default", "rk4", 1e-3, None, orientation=True, projection=False),
-        # the same model, integrated so that only round-off is left, and no more of it than the scene asks for: without
-        # the orientation goes the fast turning of the ball's own axes that dictates the step
+        # the same model, integrated to round-off; without the orientation, unless the scene requires it, as the fast
+        # turning of the ball's own axes would dictate the step
         "matched": PinocchioSettings(formulation, "matched", rtol=3e-14),
-        # the tolerance from which on a tighter one buys a tenth more time and no digit: round-off is what is left
+        # tightest useful tolerance: a tighter one takes a tenth more time and gains no digit
         "tuned": PinocchioSettings(formulation, "tuned"),
     }
 
@@ -179,7 +180,7 @@ PRESETS: Mapping[str, Mapping[str, PinocchioSettings]] = {
     "composite": _presets("composite"),
     "free_flyer": _presets("free_flyer"),
     "contact": {
-        # what one writes first: the plane where the ball is when the step begins, the solver as it comes
+        # the obvious first model: the plane at the ball's position when the step begins, the solver's default tolerance
         "default": PinocchioSettings(
             "contact",
             "default",
@@ -190,15 +191,16 @@ PRESETS: Mapping[str, Mapping[str, PinocchioSettings]] = {
             solver="pgs",
             solver_tolerance=1e-6,
         ),
-        # the same contact, with its turning during a step taken into account, and solved to round-off
+        # the same contact, with the plane's turning during a step taken into account, solved to round-off
         "matched": PinocchioSettings(
             "contact", "matched", "leapfrog", 1e-3, None, projection=False, solver="pgs", solver_tolerance=1e-12
         ),
     },
     "impulses": {
-        # what one writes first: the contacts where the bodies are when the step begins, the solver as it comes
+        # the obvious first model: contacts at the bodies' positions when the step begins, the solver's default
+        # tolerance
         "default": _impulses("default", "semi_implicit_euler", 1e-6),
-        # solved as far as ADMM comes in its iterations, impacts and all
+        # solved as accurately as ADMM can within its iterations, impacts included
         "matched": _impulses("matched", "semi_implicit_euler", 1e-9),
         # all terms in the middle of the step
         "tuned": _impulses("tuned", "midpoint", 1e-9),
@@ -206,7 +208,7 @@ PRESETS: Mapping[str, Mapping[str, PinocchioSettings]] = {
     "null_space": {
         "default": PinocchioSettings("null_space", "default", "rk4", 1e-3, None, projection=False),
         "matched": PinocchioSettings("null_space", "matched", "rk4", 1e-3, None),
-        # nothing left of the integrator but round-off
+        # integrated to round-off
         "tuned": PinocchioSettings("null_space", "tuned", rtol=TIGHTEST),
     },
     "constraint_dynamics": {

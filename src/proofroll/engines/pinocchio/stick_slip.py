@@ -3,11 +3,10 @@
 With a fixed step the law changes between steps, and each event lies within one. With an adaptive step there are three
 laws, and events are located.
 
-Sticking, the rows of rolling hold. Sliding, friction mu_kinetic N acts against the slip velocity u. Between them lies
-the start of a slip, where the direction u/|u| is stiff like 1/|u| and at first does not exist: there, *creeping*,
-friction takes the direction on which the stiff one settles. With b the rate that u would have without friction, and G
-the rate that friction takes from |u|, that is the direction of b, lagging by |u| ω_b / (2|b| - G) while b turns at
-ω_b.
+While sticking, the rolling rows hold. While sliding, friction mu_kinetic N acts opposite to the slip velocity u. At the
+start of a slip, called *creeping*, the direction u/|u| is at first undefined, and then stiff like 1/|u|; friction takes
+the direction to which the stiff one converges. If b is the rate of u without friction, and G the rate by which friction
+reduces |u|, this is the direction of b, lagging by |u| ω_b / (2|b| - G) while b turns at ω_b.
 """
 
 import math
@@ -25,29 +24,29 @@ from proofroll.engines.pinocchio.ball_with_rows import NOISE, BallWithRows, Slid
 from proofroll.engines.pinocchio.integrators import Adaptive, FixedStep, SemiImplicitEuler, TangentRungeKutta4
 from proofroll.engines.pinocchio.settings import PinocchioSettings
 
-# |u| at which creeping ends, relative to |b|/ω_b: what is left out of the direction goes with its square.
+# |u| at which creeping ends, relative to |b|/ω_b; the error of its direction is of the order of the square.
 _HANDOVER = 1e-4
-# |u| at which the rest of a slip is extrapolated, relative to where creeping ended.
+# |u| below which the rest of a slip is extrapolated, relative to its value at the end of creeping.
 _FLOOR = 1e-6
-# The least values of both, relative to the speed that friction gives while the ball turns by a radian: a slip that
-# barely begins has no |b| to measure by, and |u| below round-off never ends.
+# Least values of both, relative to the speed that friction gives while the ball rolls by a radian: a slip that barely
+# starts has no |b| as a scale, and |u| below round-off never ends.
 _LEAST_HANDOVER, _LEAST_FLOOR = 1e-10, 1e-14
-# The same of a slip that does not begin from rest, relative to its first |u|.
+# Least floor for a slip that does not start from rest, relative to its initial |u|.
 _BEGUN = 1e-9
-# Part of the time that is left until |u| = 0 which one step may take.
+# Fraction of the time left until |u| = 0 that one step may take.
 _APPROACH = 0.7
-# Span over which the turning of b is measured, relative to the time in which the ball turns by a radian.
+# Time span over which the turning of b is measured, relative to the time in which the ball rolls by a radian.
 _SPAN = 1e-4
-# A steady b counts as turning by a radian in so many of these times.
+# Time, in the same unit, in which a steady b is taken to turn by a radian.
 _STEADY = 100.0
 
-# Excess at which slip begins. Above round-off, so that a crest which only touches the cone cannot begin a slip that
-# ends at the same instant and begins again; where the excess rises through it, it costs about as many seconds.
+# Excess at which slip starts. It is above round-off, so that a peak that only touches the cone cannot start a slip that
+# ends at once and starts again; where the excess rises, it delays the slip by about as many seconds.
 _GRAZE = 1e-12
 
 
 class FrictionLaw(Enum):
-    """The law that holds now."""
+    """Law of motion that holds now."""
 
     STICKING = auto()
     CREEPING = auto()
@@ -69,7 +68,7 @@ class AdaptiveStickSlip(Adaptive):
         y = self._joined(self.q, self.v)
         if mechanism.slips0:
             self._record("slip", 0.0, 0.0)
-            self._creep(y)  # sets the scales of this slip, too
+            self._creep(y)  # also sets the scales of this slip
             self._mode = FrictionLaw.SLIDING
             self._floor = max(self._floor, _BEGUN * self._speed(y)[0])
         elif self._excess(y) > 0:
@@ -77,7 +76,7 @@ class AdaptiveStickSlip(Adaptive):
             self._creep(y)
 
     @property
-    def sticking(self) -> bool:  # type: ignore[override]  # follows the mode
+    def sticking(self) -> bool:  # type: ignore[override]  # True if the ball sticks now.
         """True if the ball sticks now."""
         return self._mode is FrictionLaw.STICKING
 
@@ -101,14 +100,14 @@ class AdaptiveStickSlip(Adaptive):
         return self._mechanism.excess(self._data, *self._split(y), self.mu_static)[0]
 
     def _turning(self, data: Any, y: FloatArray) -> tuple[SlidingContact, FloatArray]:
-        """The ball without friction, and the rate at which the direction of its slip_rate turns [1/s], shape (3,)."""
+        """Frictionless motion, and the rate at which the direction of its slip_rate turns [1/s], shape (3,)."""
         free = self._slide(data, y, np.zeros(3))
         along = unit(free.slip_rate)
         ahead = y + self._span * self._sliding_rates(data, y, along)[0]
         return free, (unit(self._slide(data, ahead, np.zeros(3)).slip_rate) - along) / self._span
 
     def _direction(self, data: Any, y: FloatArray) -> FloatArray:
-        """Direction against which friction acts, shape (3,)."""
+        """Direction of slip, which friction opposes, as a unit vector, shape (3,)."""
         if self._mode is FrictionLaw.SLIDING:
             return unit(self._slide(data, y, np.zeros(3)).slip)
         free, turning = self._turning(data, y)
@@ -125,11 +124,11 @@ class AdaptiveStickSlip(Adaptive):
         return self._moved(q, v, sliding.acceleration), sliding
 
     def _law(self, _: float, y: FloatArray) -> FloatArray:
-        """Rates while the ball does not stick."""
+        """Rates of the integrated state while the ball slips."""
         return self._sliding_rates(self._data, y, self._direction(self._data, y))[0]
 
     def _speed(self, y: FloatArray) -> tuple[float, float, float]:
-        """|u| [m/s], in creeping with its sign, its rate [m/s²], and N [N]."""
+        """Slip speed |u| [m/s], signed while creeping, its rate [m/s²], and normal force N [N]."""
         direction = self._direction(self._data, y)
         sliding = self._slide(self._data, y, direction)
         return float(sliding.slip @ direction), float(sliding.slip_rate @ direction), sliding.normal_force
@@ -137,10 +136,10 @@ class AdaptiveStickSlip(Adaptive):
     # -- from event to event ----------------------------------------------------------------------------------------
 
     def _leg(self, start: float, end: float) -> float:
-        """Integrates in the present mode until the mode changes or ``end``; returns that time [s]."""
+        """Integrates in the present mode until it changes or to ``end``; returns that time [s]."""
         if self._solver is None:
             y = self._joined(self.q, self.v)
-            law = self._rates if self._mode is FrictionLaw.STICKING else self._law  # a solver lives as long as its mode
+            law = self._rates if self._mode is FrictionLaw.STICKING else self._law  # one solver for each mode
             self._solver, self._short_steps = self._solver_from(law, start, y), 0
             self._monitored = self._monitor(y)
         solver, monitor = self._solver, self._monitored
@@ -166,7 +165,7 @@ class AdaptiveStickSlip(Adaptive):
         return end
 
     def _rest_of_slip(self, solver: Any, end: float) -> float:
-        """Extrapolates to ``end`` [s], where hardly any slip is left and it ends after that."""
+        """Extrapolates to ``end`` [s] a slip that is almost over and ends later."""
         self._keep(solver.y + (end - solver.t) * solver.f)
         self._solver = None
         return end
@@ -175,7 +174,7 @@ class AdaptiveStickSlip(Adaptive):
         """Values of :meth:`_monitor` after a step."""
         if self._mode is not FrictionLaw.STICKING:
             return self._speed(y)
-        # The rates that were found last are those at the end of the step, with projection or without.
+        # The last evaluated rates belong to the end of the step, with or without projection.
         beyond, normal_force = self._mechanism.last_excess(self._data, self.mu_static)
         return beyond, 0.0, normal_force
 
@@ -187,29 +186,29 @@ class AdaptiveStickSlip(Adaptive):
         return y if back[1] is v else self._joined(*back)
 
     def _monitor(self, y: FloatArray) -> tuple[float, float, float]:
-        """Margin of the mode: the excess of needed friction when sticking, else |u| and its rate; and N [N]."""
+        """Margin of the mode (sticking: excess of needed friction, 0; else |u| and its rate), and N [N]."""
         if self._mode is not FrictionLaw.STICKING:
             return self._speed(y)
         beyond, normal_force = self._mechanism.excess(self._data, *self._split(y), self.mu_static)
         return beyond, 0.0, normal_force
 
     def _stop(self, solver: Any, before: tuple[float, float, float], after: tuple[float, float, float]) -> Rise | None:
-        """End of the mode within the last step."""
+        """End of the mode within the last step; None: it goes on."""
         if self._mode is FrictionLaw.STICKING:
-            # The excess lies in [-1, 1] and its crests are many steps wide, so far below zero nothing is missed.
+            # The excess lies in [-1, 1] and its peaks are many steps wide, so far below zero no event is missed.
             if max(before[0], after[0]) < -0.1 - abs(after[0] - before[0]):
                 return None
             return located(solver, lambda y: np.array([self._excess(y) - _GRAZE]))
         if self._mode is FrictionLaw.CREEPING:
             if after[0] >= self._handover:
                 return located(solver, lambda y: np.array([self._speed(y)[0] - self._handover]))
-            # It ends below zero by more than round-off, or the zero at which it began would be found again.
+            # Below zero by more than round-off, or the zero at the start would be found again.
             if after[0] < -self._least and after[1] < 0:
                 return located(solver, lambda y: np.array([-self._speed(y)[0] - self._least]))
         return None
 
     def _leave(self, solver: Any, stop: Rise | None) -> None:
-        """Ends the run where N falls through zero and the ball leaves the wall, unless the mode ends before that."""
+        """Ends the run if N falls through zero and the ball leaves the wall before the mode ends."""
         lift = located(solver, lambda y: np.array([-self._monitor(y)[2]]))
         time, width = lift[:2] if lift else (float(solver.t), float(solver.step_size))
         if stop is None or time <= stop[0]:
@@ -217,14 +216,14 @@ class AdaptiveStickSlip(Adaptive):
             raise left_the_wall(f"at {time:.6g} s")
 
     def _switch(self, time: float, width: float, y: FloatArray) -> float:
-        """Enters the mode that follows the state at which the last one ended."""
+        """Enters the mode that follows from the state at the end of the last one; returns the time [s]."""
         self._solver = None
         self._keep(y)
         was = self._mode
         if was is FrictionLaw.CREEPING and self._speed(y)[0] > 0.5 * self._handover:
             self._mode = FrictionLaw.SLIDING
             return time
-        # The contact point is at rest up to round-off; the ball sticks if it can.
+        # The contact point is at rest within round-off; the ball sticks if it can.
         self.q, self.v = self._mechanism.project(self._data, self.q, self.v)
         y = self._joined(self.q, self.v)
         if was is FrictionLaw.STICKING:
@@ -255,7 +254,7 @@ class AdaptiveStickSlip(Adaptive):
 class FixedStickSlip(FixedStep):
     """Mixin for the schemes of :mod:`~proofroll.engines.pinocchio.integrators`.
 
-    The time of an event is interpolated, its bracket is the step.
+    The time of an event is interpolated; its bracket is the step.
     """
 
     mu_static: float
@@ -300,21 +299,21 @@ class FixedStickSlip(FixedStep):
         return self._mechanism.slide(self._data, self.q, self.v, np.zeros(3))
 
     def _must_press(self, time: float, normal_force: float) -> None:
-        """Remembers N [N]; ends the run if it is gone."""
+        """Stores N [N]; ends the run if the wall would have to pull."""
         before, self._normal_force = self._normal_force, normal_force
         if normal_force >= -self._mechanism.faint:
             return
         low = max(time - self._dt, 0.0)
         best = low + (time - low) * before / (before - normal_force) if before > 0 else low
-        best = max([best, *(event.time for event in self.events[-1:])])  # after the slip that comes with it
+        best = max([best, *(event.time for event in self.events[-1:])])  # not before a slip in the same step
         self.events.append(Event("lift_off", best, low, time))
         raise left_the_wall(f"at {best:.6g} s")
 
     def _stick_if_it_can(self, time: float) -> None:
-        """Sticks if friction can bring the contact point to rest within the step and keep it so."""
+        """Starts sticking if friction can stop the contact point within the step and then hold it."""
         free = self._free
         ahead = free.slip + self._dt * free.slip_rate
-        # what friction takes from the slip velocity in a step if it acts along that velocity
+        # slip velocity that friction removes in a step if it acts along that velocity, divided by dt
         taken = free.slip_rate - self._mechanism.slide(self._data, self.q, self.v, unit(ahead)).slip_rate
         if math.sqrt(ahead @ ahead) > self._dt * math.sqrt(taken @ taken):
             return
@@ -329,10 +328,10 @@ class FixedStickSlip(FixedStep):
         self.q, self.v, self._excess, self.sticking = q, v, needed, True
 
     def _direction(self, data: Any, q: FloatArray, v: FloatArray) -> FloatArray:
-        """Direction of friction's opposite, shape (3,).
+        """Direction of slip, which friction opposes, as a unit vector, shape (3,).
 
-        Where a step is longer than the time in which the direction of slip settles, the direction after a step
-        without friction is taken, which is stable (Moreau 1988); else that of the slip velocity, which is exact.
+        If a step is longer than the time in which the direction of slip settles, it is the direction after a step
+        without friction, which is stable (Moreau 1988); otherwise that of the slip velocity, which is exact.
         """
         free = self._mechanism.slide(data, q, v, np.zeros(3))
         size, pull = math.sqrt(free.slip @ free.slip), math.sqrt(free.slip_rate @ free.slip_rate)

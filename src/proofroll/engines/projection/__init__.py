@@ -1,4 +1,4 @@
-"""Blajer's projection method for a ball that rolls on a surface (Blajer 2006), coded by hand; no engine behind it."""
+"""Blajer's projection method (Blajer 2006) for a ball on a surface and for mechanisms, coded by hand."""
 
 from proofroll.engines.projection.adapter import Projection
 

@@ -1,4 +1,4 @@
-"""The projection method behind proofroll's engine protocol."""
+"""Engine adapter of the projection method."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -28,13 +28,13 @@ from proofroll.engines.projection.settings import PRESETS, ProjectionSettings
 from proofroll.engines.projection.switching import Switching
 from proofroll.engines.projection.taylor import TaylorSeries
 
-# Numbers of the state that are not the ball's orientation: two coordinates and five velocities.
+# Components of the state without the ball's orientation: two coordinates and five velocities.
 _WITHOUT_ORIENTATION = 7
 _OF_BALLS = ("euler", "rotating_frame")
 
 
 class Projection:
-    """Blajer's projection method on any surface that guides a ball."""
+    """Blajer's projection method, for a ball on any surface that guides it and for mechanisms."""
 
     name: ClassVar[str] = "projection"
     provides: ClassVar[Mapping[str, frozenset[str]]] = {
@@ -68,12 +68,12 @@ class Projection:
 
     @staticmethod
     def version() -> str:
-        """The method is part of proofroll; heyoka integrates it where it is installed and asked for."""
+        """Version of proofroll, of which the method is part, and of heyoka if installed."""
         return with_heyoka(proofroll.__version__)
 
     @classmethod
     def build(cls, scene: Scene, settings: ProjectionSettings) -> Self | ProjectionMechanism:
-        """See :class:`proofroll.core.engine.Engine`; what ``dependent`` builds is a run of a mechanism."""
+        """See :class:`proofroll.core.engine.Engine`; ``dependent`` gives a run of a mechanism."""
         if settings.formulation == "dependent":
             return ProjectionMechanism(scene, settings)
         require_provided(cls, settings.formulation, scene)
@@ -83,7 +83,7 @@ class Projection:
         return cls(rolling_ball(scene), settings, follow=follow)
 
     def __init__(self, body: RollingBall, settings: ProjectionSettings, *, follow: bool = False) -> None:
-        """The ball at time 0; ``follow`` its orientation too where the formulation does not need it."""
+        """Ball at time 0; ``follow``: integrate its orientation too if the formulation does not need it."""
         self._surface = body.surface
         geometry = geometry_of(body.surface)
         self._orientation: Orientation
@@ -105,7 +105,7 @@ class Projection:
         scales = _scales(body, self._orientation.size)
         self._motion: Integrator | Switching | TaylorSeries
         if settings.integrator == "taylor":
-            assert settings.formulation != "dependent"  # see the settings
+            assert settings.formulation != "dependent"  # refused by the settings
             self._motion = TaylorSeries(body, settings.formulation, x, resolution, self._check, self._accepted)
         elif math.isfinite(body.contact.mu_static) or body.contact.rolling_resistance > 0:
             stepper = INTEGRATORS[settings.integrator](resolution)
@@ -125,16 +125,17 @@ class Projection:
         return self._accepted(t, x)
 
     def _accepted(self, t: float, x: FloatArray) -> FloatArray:
-        """The state from which the motion goes on, without violation and away from the singularity."""
+        """State from which the motion goes on, without violations and away from the singularity."""
         x = self._ball.eliminated(x) if self._eliminate else x
         renewed = self._renewed(t, x)
         return self._within_a_turn(x if renewed is None else renewed)
 
     def _within_a_turn(self, x: FloatArray) -> FloatArray:
-        """The state with each angle less than a turn from zero.
+        """State with each angle less than a turn from zero.
 
-        Nothing depends on whole turns, but round-off and the tolerance of a step go with the largest component of the
-        state: after ten thousand turns the angles would be known to eleven digits, and with them what rolls.
+        Nothing depends on whole turns, but round-off and the tolerance of a step are relative to the largest component
+        of the state: after ten thousand turns the angles would be accurate to eleven digits only, and so would the
+        rolling.
         """
         beyond = [index for index in self._angles if abs(x.item(index)) > math.tau]
         if beyond:
@@ -143,7 +144,7 @@ class Projection:
         return x
 
     def _renewed(self, t: float, x: FloatArray) -> FloatArray | None:
-        """The state in angles chosen anew, or None; see :meth:`Orientation.renewed`."""
+        """State in other angles, or None if these are kept; see :meth:`Orientation.renewed`."""
         n = self._coordinates
         renewed = self._orientation.renewed(t, x[2:n], x[n + 2 :])
         return None if renewed is None else np.concatenate([x[:2], renewed[0], x[n : n + 2], renewed[1]])
@@ -152,7 +153,7 @@ class Projection:
         """See :class:`proofroll.core.engine.Engine`."""
         start = self._motion.t
         try:
-            with np.errstate(over="ignore", invalid="ignore"):  # found by _check, and raised as Diverged
+            with np.errstate(over="ignore", invalid="ignore"):  # detected by _check, and raised as Diverged
                 self._motion.advance(t)
         except ArithmeticError as error:
             raise Diverged(f"{error}, between t = {start:.6g} s and {t:.6g} s") from None
@@ -213,9 +214,9 @@ class Projection:
 
 
 def _scales(body: RollingBall, angles: int) -> FloatArray:
-    """Natural size of each component of the state, against which an adaptive step measures absolute errors.
+    """Natural size of each component of the state, the unit of absolute errors in an adaptive step.
 
-    The lengths are of the order of the ball's radius, the speeds of the natural one.
+    Lengths are of the order of the ball's radius, speeds of the natural speed.
     """
     a, speed = body.ball.radius, natural_speed(body)
     per_metre = 1 / np.asarray(body.surface.length_scales)

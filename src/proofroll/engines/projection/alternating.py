@@ -1,7 +1,7 @@
-"""Motion of a mechanism in one mode after another: steps, ends of modes within them, events.
+"""Motion of a mechanism whose mode changes: steps, ends of modes within them, events.
 
-Between two switches the equations are smooth; a switch is located within a step by shorter steps of the same method, so
-that it is as accurate as these.
+Between two changes the equations are smooth. A change is located within a step by shorter steps of the same method, so
+it is as accurate as these.
 """
 
 from abc import ABC, abstractmethod
@@ -19,19 +19,19 @@ from proofroll.elements.mechanism.switches import Settling
 from proofroll.engines.projection.dependent import DependentCoordinates
 
 ModeT = TypeVar("ModeT")
-# A mode that ends where it started is possible; as many in a row as this are an endless loop.
+# Number of successive modes of zero length that counts as an endless loop; a single one is possible.
 WITHOUT_PROGRESS = 20
-_ULPS = 4  # of the time, to which switches are located
+_ULPS = 4  # accuracy of located changes, in units of the last digit of the time
 
 
 class Excess(NamedTuple):
     """Excess of a mode over one of its ends.
 
     Attributes:
-        which: number of the joint or contact.
-        kind: of the end.
+        which: index of the joint or contact; motors are numbered after all of them.
+        kind: kind of the end.
         size: positive where the mode has ended.
-        closing: whether it moves towards that end.
+        closing: True if the motion is towards that end.
     """
 
     which: int
@@ -43,7 +43,7 @@ class Excess(NamedTuple):
 def ends_of_efforts(
     motors: Iterable[Actuator], modes: Sequence[str], wanted: Sequence[float], first: int
 ) -> list[Excess]:
-    """Excess of the modes of efforts with a limit over their ends; these are numbered from ``first`` on."""
+    """Excess of the modes of efforts with a limit over their ends; ``first``: index of the first effort."""
     ends = list[Excess]()
     for k, (motor, mode, effort) in enumerate(zip(motors, modes, wanted, strict=True), first):
         over, under = effort - motor.bound, -motor.bound - effort
@@ -55,7 +55,7 @@ def ends_of_efforts(
 
 
 class AlternatingMotion(ABC, Generic[ModeT]):
-    """Motion by an integrator, which begins anew with each mode; its states y are x and the time.
+    """Motion by an integrator that restarts with each mode; its states y are x with the time appended.
 
     Attributes:
         t, x: present time [s] and state.
@@ -63,7 +63,7 @@ class AlternatingMotion(ABC, Generic[ModeT]):
         events: so far.
     """
 
-    alternates: ClassVar[str]  # what does so without end, in words
+    alternates: ClassVar[str]  # name for messages of what may alternate without end
     mode: ModeT
 
     def __init__(
@@ -73,7 +73,7 @@ class AlternatingMotion(ABC, Generic[ModeT]):
         accept: Callable[[float, Array], Array],
         breaks: Sequence[float] = (),
     ) -> None:
-        """Takes what puts x back on its constraints after a step, and times at which rates jump [s]."""
+        """Takes ``accept``, which projects x onto its constraints after a step, and times [s] of jumps of the rates."""
         self._equations, self._stepper, self._accept, self._breaks = equations, stepper, accept, breaks
         self._settles = Settling()
         self._idle, self.events = 0, list[Event]()
@@ -85,7 +85,7 @@ class AlternatingMotion(ABC, Generic[ModeT]):
 
     @property
     def x(self) -> Array:
-        """State now."""
+        """Present state."""
         return self._stepper.x[:-1]
 
     @abstractmethod
@@ -94,17 +94,17 @@ class AlternatingMotion(ABC, Generic[ModeT]):
 
     @abstractmethod
     def _next(self, y: Array, which: int, kind: str) -> tuple[Array, ModeT, list[tuple[str, str]]]:
-        """State, mode and happenings, each with the name of what it happens to, where a mode has ended."""
+        """State and mode after an end of a mode, and events: kind and name of the joint or contact."""
 
     @abstractmethod
     def _rates(self, y: Array) -> Array:
-        """Rates of x in the present mode."""
+        """Time derivative of x in the present mode."""
 
     def _look(self, y: Array) -> None:
-        """Sees a state that lies within the mode."""
+        """Notes a state within the mode; for subclasses."""
 
     def _at(self, y: Array) -> Array:
-        """X of a state, to whose time drives are set."""
+        """State x of y; sets the time of drives to that of y."""
         self._equations.applied.now = float(y[-1])
         return y[:-1]
 
@@ -114,19 +114,23 @@ class AlternatingMotion(ABC, Generic[ModeT]):
         return y if accepted is x else np.append(accepted, y[-1])
 
     def _enter(self, t: float, y: Array, mode: ModeT) -> None:
-        """Goes on in a mode."""
+        """Continues in a mode."""
         self.mode = mode
         self._stepper.begin(t, y, lambda y: np.append(self._rates(y), 1.0), self._accepted, np.ones(len(y)))
 
     def advance(self, t: float) -> None:
-        """Moves to time t [s]; raises Diverged where modes alternate without end, or the integration gives up."""
+        """Moves to time t [s].
+
+        Raises:
+            Diverged: modes alternate without end, or the integration fails.
+        """
         stepper = self._stepper
         stepper.aim(t)
         while stepper.t < t:
             stepper.step(min([t, *(at for at in self._breaks if at > stepper.t)]), np.inf)
-            ended = [one for one in self._excess(stepper.x) if one.size > 0 and one.closing]
+            ended = [end for end in self._excess(stepper.x) if end.size > 0 and end.closing]
             if ended:
-                self._switch(*min((self._crossing(one), one.which, one.kind) for one in ended))
+                self._switch(*min((self._crossing(end), end.which, end.kind) for end in ended))
                 continue
             self._idle = 0
             self._look(stepper.x)
@@ -137,7 +141,7 @@ class AlternatingMotion(ABC, Generic[ModeT]):
         """Time just after a mode ended within the last step [s]."""
 
         def margin(y: Array) -> float:
-            return -next(one.size for one in self._excess(y) if one[:2] == end[:2])
+            return -next(other.size for other in self._excess(y) if other[:2] == end[:2])
 
         now = self._stepper.t
         return self._stepper.crossing(margin, now, _ULPS * float(np.spacing(now)))[1]

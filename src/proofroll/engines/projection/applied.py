@@ -1,4 +1,4 @@
-"""Applied forces of a mechanism besides its weight: springs between points, and laws of joints."""
+"""Applied forces of a mechanism except its weight: springs between points, and force laws of joints."""
 
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -15,9 +15,10 @@ from proofroll.engines.projection.connections import SKEW, Bodies, Ends
 
 
 class _Law(NamedTuple):
-    """Spring, damper and drive of one coordinate of a joint; ``axis`` z (of A), x (of B) or slide (along z of A).
+    """Spring, damper and drive of one coordinate of a joint.
 
-    ``push`` of time, coordinate and rate stands in for them.
+    ``axis``: z (of A), x (of B), or slide (along z of A). ``push``, a function of time, coordinate and rate, replaces
+    them.
     """
 
     connection: int
@@ -30,13 +31,14 @@ class _Law(NamedTuple):
 
 
 class Applied:
-    """Forces on the bodies besides weight and reactions.
+    """Forces on the bodies except weight and reactions.
 
     Attributes:
-        springs: whether there are any between points.
-        laws: whether joints have any.
-        now: time at which drives and targets are taken [s].
-        modes: of efforts with a limit, by the actuator's number; without one its own size clamps an effort.
+        springs: True if there are springs between points.
+        laws: True if joints have force laws.
+        now: time at which drives and targets are evaluated [s].
+        modes: mode of each effort with a limit, by the index of the actuator; an effort without a mode is clamped by
+            its size.
     """
 
     def __init__(self, mechanism: Mechanism) -> None:
@@ -61,7 +63,7 @@ class Applied:
             if joint.kind == "spherical" and joint.damping
         ]
         self.laws = bool(self._laws or self._balls)
-        # coordinates to look at, without a law of their own here
+        # coordinates to evaluate, without a force law
         watched = {joint.number for joint in switched_joints(mechanism)}
         watched |= {number[name] for item in mechanism.couplings for name in (item.joint_a, item.joint_b)}
         axes = {k: "slide" if mechanism.joints[k].kind == "prismatic" else "z" for k in sorted(watched)}
@@ -77,7 +79,7 @@ class Applied:
         self.springs = bool(self._springs)
 
     def pulls(self, bodies: Bodies) -> Array:
-        """Forces of springs on the bodies, (bodies, 4, 4): matrices f pᵀ of a force at p."""
+        """Forces of springs on the bodies, (bodies, 4, 4): matrices f pᵀ of a force f at p."""
         forces = np.zeros((len(bodies.pose), 4, 4), dtype=bodies.pose.dtype)
         for spring, (a, at_a), (b, at_b) in self._springs:
             place_a, place_b = bodies.pose[a] @ at_a, bodies.pose[b] @ at_b
@@ -93,7 +95,7 @@ class Applied:
         return forces[:-1]
 
     def of_joints(self, ends: Ends) -> tuple[Array, Array]:
-        """Forces and moments of the joints' own laws on body b at its point, world axes, (connections, 3) each."""
+        """Forces and moments of the joints' force laws on body b at its point, world axes, (connections, 3) each."""
         force, torque = np.zeros_like(ends.d), np.zeros_like(ends.d)
         for law in self._laws:
             on = force if law.axis == "slide" else torque
@@ -103,7 +105,7 @@ class Applied:
         return force, torque
 
     def efforts(self, ends: Ends) -> Array:
-        """Efforts of the actuators at their joints, (actuators,)."""
+        """Efforts of the actuators, N or N m, (actuators,)."""
         return np.array([self._size(law, ends) for law in self._motors])
 
     def _size(self, law: _Law, ends: Ends) -> float:
@@ -113,17 +115,17 @@ class Applied:
         return size - law.stiffness * (self._coordinate(law, ends) - law.rest) if law.stiffness else size
 
     def watched(self, ends: Ends) -> dict[int, tuple[float, float]]:
-        """Coordinate and velocity of each joint, by its number, that has dry friction, stops or a coupling."""
+        """Coordinate and velocity of each joint with dry friction, stops or a coupling, by its index."""
         return {k: (self._coordinate(law, ends), self._rate(law, ends)) for k, law in self._watched.items()}
 
     def along(self, joints: Sequence[int], ends: Ends) -> tuple[Array, Array]:
-        """Forces and moments of joints that push by 1 along their coordinates, on body b at its point, (joints, 3)."""
+        """Forces and moments on body b at its point of unit forces along coordinates of joints, (joints, 3) each."""
         laws = [self._watched[k] for k in joints]
         ways, slides = np.array([_direction(law, ends) for law in laws]), [[law.axis == "slide"] for law in laws]
         return np.where(slides, ways, 0.0), np.where(slides, 0.0, ways)
 
     def wanted(self, ends: Ends) -> list[float]:
-        """Efforts with a limit before they are clamped."""
+        """Efforts that the actuators with a limit would apply without it, N or N m."""
         places = ((self._actuators[k], self._motors[k]) for k in self._limited)
         return [
             float(actuator.wanted(self.now, self._coordinate(law, ends), self._rate(law, ends)))
@@ -131,7 +133,7 @@ class Applied:
         ]
 
     def _motor(self, place: int, actuator: Actuator, number: int, joint: Joint) -> _Law:
-        """The effort of an actuator: a spring, damper and drive at its joint, or a push with a limit or in time."""
+        """Force law of an actuator: spring, damper and drive at its joint; a push if it has a limit or varies."""
         n, target = actuator.gear, actuator.target
         axis = "slide" if joint.kind == "prismatic" else "z"
         if actuator.limit is not None or not isinstance(target, float):
@@ -165,7 +167,7 @@ class Applied:
         return bool(self._angles)
 
     def accept(self, ends: Ends) -> None:
-        """Remembers the angles of springs, so that they may turn more than once."""
+        """Stores the angles of springs, so that they may exceed a turn."""
         for law in self._angles:
             self._angles[law] = self._coordinate(law, ends)
 

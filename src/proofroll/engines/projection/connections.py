@@ -1,14 +1,13 @@
-"""Connections of a mechanism, and the rows of their holonomic constraints: every joint and loop cuts the bodies apart.
+"""Connections of a mechanism, and the rows of their holonomic constraints: all joints and loops are cut.
 
-Poses and twists are matrices of four rows: a pose [R r; 0 1] takes a point of a body to the world, a twist [ω× v; 0 0]
-takes a point of the world to its velocity. A connection of body a (point a, axes A) with body b (point b, axes B), d
-from point a to b, gives rows of two kinds:
-
+Poses and twists are 4 × 4 matrices: a pose [R r; 0 1] maps a point of a body to the world, a twist [ω× v; 0 0] maps a
+point of the world to its velocity. A connection of body a (point a, axes A) with body b (point b, axes B), d from point
+a to b, gives two kinds of rows:
 * n·d = 0, two points do not separate along n, an axis of A;
 * x·y = 0, an axis x of A and an axis y of B stay perpendicular.
 
-Their rates are n·e and t·w, with e the velocity of b relative to a at point b, w the relative angular velocity, and
-t = y × x. Both depend on the difference of two twists alone, and so do the null spaces of joints.
+Their rates are n·e and t·w, with e the velocity of b relative to a at point b, w the relative angular velocity, and t =
+y × x. Both depend only on the difference of two twists, and so do the null spaces of joints.
 """
 
 from __future__ import annotations
@@ -24,7 +23,7 @@ from proofroll.elements.mechanism.checks import Vector
 from proofroll.elements.mechanism.joint import rows_of
 from proofroll.elements.mechanism.rotations import Array
 
-# Matrix of ω × from ω, its nine elements in a row; and back, from any matrix by its part that changes sign.
+# ω @ SKEW: the nine elements of the matrix ω ×. 0.5 * elements @ SKEW.T: ω of the antisymmetric part of any matrix.
 SKEW = np.array([[0.0, 0, 0, 0, 0, -1, 0, 1, 0], [0.0, 0, 1, 0, 0, 0, -1, 0, 0], [0.0, -1, 0, 1, 0, 0, 0, 0, 0]])
 
 
@@ -33,9 +32,9 @@ class Bodies(NamedTuple):
 
     Attributes:
         pose, inverse: [R r; 0 1] and its inverse; r from :attr:`Bodies.origin`.
-        own: twist along the body's own axes, [ω× v; 0 0].
-        twist: along the world's axes, at the origin.
-        origin: place in the world from which places are measured here, so that digits are lost by none that is far.
+        own: twist in the body's own axes, [ω× v; 0 0].
+        twist: in world axes, at the origin.
+        origin: reference point for positions, the mean of the bodies', so that distant bodies lose no digits.
     """
 
     pose: Array
@@ -46,23 +45,23 @@ class Bodies(NamedTuple):
 
     @property
     def rotation(self) -> Array:
-        """R without the world's, (bodies, 3, 3)."""
+        """Rotations without the world's, (bodies, 3, 3)."""
         return self.pose[:-1, :3, :3]
 
     @property
     def spin(self) -> Array:
-        """ω along the world's axes, without the world's, (bodies, 3)."""
+        """Angular velocities in world axes, without the world's, (bodies, 3)."""
         return np.asarray(0.5 * self.twist[:-1, :3, :3].reshape(-1, 9) @ SKEW.T)
 
 
 class Ends(NamedTuple):
-    """Connections now, world axes, (connections, …).
+    """Geometry and relative motion of connections, world axes, (connections, …).
 
     Attributes:
         A, B: axes as columns.
-        place: of point b, from the origin of :class:`Bodies`.
-        d: from point a to b.
-        relative: twist of b less that of a.
+        place: position of point b, from the origin of :class:`Bodies`.
+        d: vector from point a to b.
+        relative: twist of b minus twist of a.
         e: velocity of b relative to a at point b.
     """
 
@@ -75,14 +74,15 @@ class Ends(NamedTuple):
 
 
 class ConnectionRows(NamedTuple):
-    """Constraint rows, (rows, …).
+    """Constraint rows at one state, rows of points first, then of angles, (rows, …).
 
     Attributes:
         residual, rate: Φ and Φ̇.
         form: matrix from the relative twist to Φ̇, (rows, 16).
         force, torque: of a unit multiplier on body b at its point.
-        x, y: the axes of rows of angles; none of those of points, which are first.
-        twist: gives this row the rate 1, and other rows of the connection, where it is closed, none; (rows, 16).
+        x, y: axes of the rows of angles only.
+        twist: relative twist that gives this row the rate 1 and other rows of the closed connection the rate 0, (rows,
+            16).
     """
 
     residual: Array
@@ -99,7 +99,7 @@ class ProjectedConnections:
     """All joints, then all loops, of a mechanism.
 
     Attributes:
-        a, b: index of the bodies of each connection; the world is the last body.
+        a, b: indices of the bodies of each connection; the world is the last body.
     """
 
     def __init__(self, mechanism: Mechanism) -> None:
@@ -121,13 +121,13 @@ class ProjectedConnections:
         return Ends(of_a[:, :3, :3], of_b[:, :3, :3], place[:, :3, 0], of_b[:, :3, 3] - of_a[:, :3, 3], relative, e)
 
     def constraints(self, chosen: slice = slice(None)) -> Constraints:
-        """The rows of some connections."""
+        """Constraint rows of some connections."""
         return Constraints(self._kinds[chosen])
 
     def on_bodies(self, bodies: Bodies, ends: Ends, owner: NDArray[np.intp], force: Array, torque: Array) -> Array:
-        """Rows on the velocities (v, ω along their own axes) of all bodies, (rows, 6 bodies).
+        """Jacobian of rows for the velocities (v, ω in own axes) of all bodies, (rows, 6 bodies).
 
-        ``force`` and ``torque`` are those of a unit multiplier on body b of the connection that is a row's ``owner``.
+        ``force`` and ``torque``: of a unit multiplier on body b of the connection ``owner`` of each row.
         """
         number, count = np.arange(len(owner)), len(bodies.pose)
         C, place = np.zeros((len(owner), count, 6)), ends.place[owner]
@@ -140,17 +140,17 @@ class ProjectedConnections:
 
 
 def turned(R: Array, a: Array) -> Array:
-    """Each vector by its own matrix."""
+    """Product of each matrix with its vector."""
     turned: Array = np.matmul(R, a[:, :, None])[:, :, 0]
     return turned
 
 
 class Constraints:
-    """Rows of connections of some kinds: those of points, then those of angles.
+    """Rows of connections of some kinds: first those of points, then those of angles.
 
     Attributes:
-        owner: the connection of each row.
-        points: the number of rows of points.
+        owner: connection of each row.
+        points: number of rows of points.
     """
 
     def __init__(self, kinds: list[str]) -> None:
@@ -159,7 +159,7 @@ class Constraints:
         self._sums = (self.owner == np.arange(len(kinds))[:, None]).astype(float)
 
     def at(self, ends: Ends) -> ConnectionRows:
-        """The rows now."""
+        """Rows at one state."""
         i, j, points = self._point, self._angle, self.points
         n, x, y = ends.A[i, :, self._axis], ends.A[j, :, self._x], ends.B[j, :, self._y]
         t = cross(y, x)
@@ -177,7 +177,7 @@ class Constraints:
         return ConnectionRows(residual, rate, form.reshape(-1, 16), force, torque, x, y, twist.reshape(-1, 16))
 
     def bending(self, ends: Ends, rows: ConnectionRows) -> Array:
-        """Φ̈ of a motion in which each relative twist stands still in body a."""
+        """Φ̈ of a motion in which each relative twist is constant in body a."""
         points = self.points
         w = (ends.relative[:, :3, :3].reshape(-1, 9) @ SKEW.T) / 2
         turning = w[self._angle]
@@ -186,7 +186,7 @@ class Constraints:
         return np.concatenate([of_points, wx * wy - (turning * turning).sum(1) * rows.residual[points:]])
 
     def twists(self, rows: ConnectionRows, rates: Array) -> Array:
-        """Relative twists of the connections that give the rows these rates (…, rows), (…, connections, 16)."""
+        """Relative twists that give the rows these rates, (…, rows) -> (…, connections, 16)."""
         return np.asarray(self._sums @ (rows.twist * rates[..., None]))
 
 

@@ -1,9 +1,9 @@
-"""Contacts of bodies: which is open, slips or sticks, when that ends, and what comes next.
+"""Contacts of bodies: open, slipping or sticking, ends of these modes, and transitions.
 
-Forces of contact act along the velocities ν of the tree, whose mass matrix the projection has. Between two switches the
-equations are smooth; a switch is located within a step by shorter steps of the same method. Which mode comes next
-follows from Coulomb's law at all contacts at once, by the same solver as in the truth's first route: that both decide
-alike is no news, that both move alike in between is.
+Contact forces act along the velocities ν of the tree, whose mass matrix the projection provides. Between two
+transitions the equations are smooth; a transition is located within a step by shorter steps of the same method. The
+next mode follows from Coulomb's law at all contacts at once, by the same solver as in the truth's first route: so equal
+decisions confirm nothing, but equal motions between them do.
 """
 
 import math
@@ -28,19 +28,19 @@ from proofroll.engines.projection.dependent import DependentCoordinates, SolvedS
 from proofroll.engines.projection.elimination import Space
 from proofroll.engines.projection.elimination import solved as divided
 
-_RANK = 1e-10  # of the largest singular value: rows of contacts that depend on each other
-_STANDS = 1e-6  # of a natural acceleration: what is slower will not move
-_REST = 1e-2  # of what gravity makes in a fixed step: slips as slow as this end with another that ends
+_RANK = 1e-10  # smallest singular value of independent contact rows, relative to the largest
+_STANDS = 1e-6  # acceleration, relative to the natural one, too small to start a motion
+_REST = 1e-2  # slip speed, relative to gravity times a fixed step, below which slips end together with another one
 
 
 class ContactsThere(NamedTuple):
     """Contacts at a state, without their forces.
 
     Attributes:
-        touching: each of them.
-        J: of each slide by the velocities ν, (contacts, 3, nv).
-        response: rates of the velocities by a force along them (inverse mass matrix), times Jᵀ, (nv, contacts, 3).
-        rate: of each slide without forces of contact, (contacts, 3).
+        touching: geometry and sliding velocity of each contact.
+        J: derivative of each sliding velocity with respect to ν, (contacts, 3, nv).
+        response: H⁻¹ Jᵀ with the mass matrix H, (nv, contacts, 3).
+        rate: rate of each sliding velocity without contact forces, (contacts, 3).
     """
 
     touching: tuple[Touching, ...]
@@ -50,7 +50,7 @@ class ContactsThere(NamedTuple):
 
 
 class ContactMotion(AlternatingMotion[ContactMode]):
-    """Motion of a tree whose bodies touch; a state ends with the time."""
+    """Motion of a tree with contacts; the last component of a state is the time."""
 
     alternates = "contacts"
 
@@ -62,12 +62,12 @@ class ContactMotion(AlternatingMotion[ContactMode]):
         accept: Accept,
         step: float,
     ) -> None:
-        """Takes the size of a fixed ``step`` [s]; 0: it adapts."""
+        """Takes the size of a fixed ``step`` [s]; 0: the step adapts."""
         super().__init__(equations, stepper, accept, breaks(mechanism.signals))
         self.contacts, self._index = mechanism.contacts, mechanism.body_index
         self.friction = np.array([contact.friction for contact in self.contacts])
         scale = natural_scale(mechanism)
-        self._unit = math.prod(scale)  # a natural speed
+        self._unit = math.prod(scale)  # natural speed
         self._still, self._rate = scale.speed, scale.rate
         self._timed = any(map(varies, mechanism.signals))
         self._faint = max(self._still, _REST * step * float(np.linalg.norm(mechanism.gravity)))
@@ -79,12 +79,12 @@ class ContactMotion(AlternatingMotion[ContactMode]):
         self._enter(0.0, start, self._decided(now, closed, still))
 
     def _limit_efforts(self, y: Array) -> None:
-        """Lets each effort act as it is wanted, or at the limit that it exceeds, from a state on."""
+        """Sets the mode of each effort with a limit: linear, or clamped if the state requires more."""
         wanted = zip(self._motors.items(), self._equations.wanted(self._at(y)), strict=True)
         self._equations.applied.modes = {k: motor.mode_of(effort) for (k, motor), effort in wanted}
 
     def at(self, y: Array) -> ContactsThere:
-        """Contacts at a state, with what forces do to them."""
+        """Contacts at a state, with their response to forces."""
         equations, spaces, x = self._equations, list[Space](), self._at(y)
 
         def closing(space: Space, _: Array, push: Array) -> tuple[Array, Array]:
@@ -120,7 +120,7 @@ class ContactMotion(AlternatingMotion[ContactMode]):
         return moving
 
     def _material(self, x: Array, free: SolvedState, i: int, body: Moving, there: Touching) -> Array:
-        """Rate of the velocity of a body's material at the place of contact, which moves over it."""
+        """Rate of the velocity of a body's material at the contact point, which moves over the body."""
         arm = there.place - self._equations.parts(x)[0][i]
         turning = cross(body.R @ free.angular[i], arm) + cross(body.w, cross(body.w, arm))
         return np.asarray(free.linear[i] + turning + cross(body.w, there.place_rate - body.velocity(there.place)))
@@ -129,7 +129,7 @@ class ContactMotion(AlternatingMotion[ContactMode]):
         """Forces on body a of each contact in a mode [N], (contacts, 3).
 
         Raises:
-            Diverged: friction makes a normal force that tears (Painlevé).
+            Diverged: friction makes a normal force negative (Painlevé).
         """
         rows = _rows(now, mode)
         along = [
@@ -153,7 +153,7 @@ class ContactMotion(AlternatingMotion[ContactMode]):
         return force
 
     def _settled(self, y: Array, mode: ContactMode) -> Array:
-        """The state without velocities that closed contacts do not allow."""
+        """State without velocities that violate closed contacts."""
         now = self.at(y)
         rows = _rows(now, mode)
         if not rows:
@@ -164,11 +164,11 @@ class ContactMotion(AlternatingMotion[ContactMode]):
         return self._pushed(y, -D.T @ np.linalg.lstsq(K @ D.T, left, rcond=_RANK)[0])
 
     def _pushed(self, y: Array, change: Array) -> Array:
-        """The state with a change of the velocities ν."""
+        """State after a change of the velocities ν."""
         return np.append(self._equations.pushed(y[:-1], change), y[-1])
 
     def _heading(self, k: int, there: Touching) -> Array:
-        """Direction of a slip; beyond its end within a step it goes on as before it."""
+        """Direction of a slip; after the end of the slip within a step, the direction before."""
         slip, toward = across(there), self._toward[k]
         speed = float(np.linalg.norm(slip))
         if speed <= np.finfo(float).tiny:
@@ -176,7 +176,7 @@ class ContactMotion(AlternatingMotion[ContactMode]):
         return np.asarray(slip / speed if slip @ toward >= 0 else -slip / speed)
 
     def solve(self) -> tuple[SolvedState, Array, tuple[Touching, ...]]:
-        """Equations of motion now, the forces of contact, and the contacts."""
+        """Equations of motion solved now, contact forces [N], (contacts, 3), and geometry of the contacts."""
         now = self.at(self._stepper.x)
         force = self.forces(now, self.mode)
         return self._equations.solve(self.x, np.einsum("kin,ki->n", now.J, force)), force, now.touching
@@ -200,7 +200,7 @@ class ContactMotion(AlternatingMotion[ContactMode]):
         return self._equations.rates(y[:-1], load)
 
     def _look(self, y: Array) -> None:
-        """Keeps the directions of slips, to know when one has turned."""
+        """Stores the directions of slips, to detect reversals."""
         moving = self._moving(y[:-1])
         for k, (own, each) in enumerate(zip(self.mode, self.contacts, strict=True)):
             if own.kind == "slip":
@@ -227,7 +227,7 @@ class ContactMotion(AlternatingMotion[ContactMode]):
             elif own.kind == "stick":
                 beyond = float(np.linalg.norm(force[k] - N * each.normal)) - self.friction[k] * N
                 if beyond > 0 and sum(one.kind == "stick" for one in self.mode) > 1:
-                    # of friction that several share only the sum is determinate: others may hold what this cannot
+                    # forces shared by several sticking contacts are not unique: others may hold what this one cannot
                     held = held or self._decided(
                         now, [one.kind != "open" for one in self.mode], [one.kind == "stick" for one in self.mode]
                     )
@@ -246,7 +246,7 @@ class ContactMotion(AlternatingMotion[ContactMode]):
         still = [own.kind == "stick" for own in was]
         if kind == "impact":
             x, closed, settles = self._struck(x, now, k)
-            self._limit_efforts(x)  # what a servo wants jumps with the velocity
+            self._limit_efforts(x)  # the effort that a servo requires jumps with the velocity
             happened = [("settle" if settles else "impact", self.contacts[k].name)]
             now = self.at(x)
             still = [bool(np.linalg.norm(across(each)) <= self._still) for each in now.touching]
@@ -254,25 +254,25 @@ class ContactMotion(AlternatingMotion[ContactMode]):
             slips = [float(np.linalg.norm(across(each))) for each in now.touching]
             still = [stuck or own == k or slips[own] <= self._faint for own, stuck in enumerate(still)]
         mode = self._leaving(now, k) if kind == "slip" else self._decided(now, closed, still)
-        if kind == "still" and slips[k] > self._still and mode[k].kind == "slip":  # it has turned, and not stopped
+        if kind == "still" and slips[k] > self._still and mode[k].kind == "slip":  # it has turned, not stopped
             mode = self._decided(now, closed, [stands and own != k for own, stands in enumerate(still)])
         struck = {name for _, name in happened}
         happened += [one for one in changes(self.contacts, was, mode, self._stands(x, mode)) if one[1] not in struck]
         return x, mode, happened
 
     def _stands(self, y: Array, mode: ContactMode) -> bool:
-        """True if nothing moves in a mode, and nothing will."""
+        """True if nothing moves in a mode, or is about to move."""
         if self._timed or any(own.kind == "slip" for own in mode):
             return False
         now = self.at(y := self._settled(y, mode))
         load = np.einsum("kin,ki->n", now.J, self.forces(now, mode))
         n, rate = len(self._equations.mass), self._equations.rates(y[:-1], load)
-        sizes = np.repeat([1.0, self._unit / self._rate], 3 * n)  # of velocities, and of turning
+        sizes = np.repeat([1.0, self._unit / self._rate], 3 * n)  # for velocities and angular velocities
         moves, will = (float(np.abs(sizes * part[7 * n : 13 * n]).max()) for part in (y, rate))
         return moves <= self._still and will <= _STANDS * self._unit * self._rate
 
     def _leaving(self, now: ContactsThere, k: int) -> ContactMode:
-        """The mode with a contact that slips from now on, against the friction that held it."""
+        """Mode in which a contact starts to slip, opposite to the friction that held it."""
         force, n = self.forces(now, self.mode)[k], now.touching[k].normal
         held = force - n * (n @ force)
         x, y, z = (-held / np.linalg.norm(held)).tolist()
@@ -280,7 +280,7 @@ class ContactMotion(AlternatingMotion[ContactMode]):
         return (*self.mode[:k], Acting("slip", line, (x, y, z)), *self.mode[k + 1 :])
 
     def _struck(self, x: Array, now: ContactsThere, hit: int) -> tuple[Array, list[bool], bool]:
-        """The state after an impact, by Newton's law and Coulomb's, which contacts stay closed, and if it settles."""
+        """State after an impact by Newton's and Coulomb's laws; which contacts stay closed; True if it is the last."""
         which = [k for k, own in enumerate(self.mode) if own.kind != "open" or k == hit]
         frames, J, response = self._framed(now, which)
         c = np.concatenate([frame.T @ now.touching[k].slide for frame, k in zip(frames, which, strict=True)])
@@ -296,7 +296,7 @@ class ContactMotion(AlternatingMotion[ContactMode]):
         return x, closed, settles
 
     def _framed(self, now: ContactsThere, which: Sequence[int]) -> tuple[list[Array], Array, Array]:
-        """Normal and two directions of some contacts; J along them, and what forces along them do."""
+        """Normal and two tangents of some contacts; J along them, and response to forces along them."""
         frames = [frame_of_axis(now.touching[k].normal)[:, [2, 0, 1]] for k in which]
         J = np.concatenate([frame.T @ now.J[k] for frame, k in zip(frames, which, strict=True)])
         response = np.concatenate([now.response[:, k] @ frame for frame, k in zip(frames, which, strict=True)], 1)
@@ -309,7 +309,7 @@ class ContactMotion(AlternatingMotion[ContactMode]):
             raise Diverged(f"at t = {self.t if hasattr(self._stepper, 't') else 0.0:.6g} s: {error}") from None
 
     def _decided(self, now: ContactsThere, closed: Sequence[bool], still: Sequence[bool]) -> ContactMode:
-        """Mode that follows from the forces: of contacts that are closed, and do not slide where they are still."""
+        """Mode that follows from the forces, for contacts that are closed, and at rest where ``still``."""
         which, mode = [k for k, shut in enumerate(closed) if shut], [OPEN for _ in closed]
         if not which:
             return tuple(mode)
@@ -330,7 +330,7 @@ class ContactMotion(AlternatingMotion[ContactMode]):
 
 
 def _rows(now: ContactsThere, mode: ContactMode) -> list[tuple[int, Array]]:
-    """Directions along which closed contacts hold, each with its contact: the normal of a slip, all of a stick."""
+    """Directions in which closed contacts are constrained, with their contact: normal if slipping, all if sticking."""
     directions: list[tuple[int, Array]] = []
     for k, (own, each) in enumerate(zip(mode, now.touching, strict=True)):
         if own.kind == "slip":

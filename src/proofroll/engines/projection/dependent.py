@@ -1,14 +1,14 @@
-"""Blajer's projection method for a mechanism in dependent coordinates: those of its bodies, cut apart.
+"""Blajer's projection method for a mechanism in dependent coordinates: those of its separate bodies.
 
-With M u̇ = h + Cᵀλ and C u̇ = −γ, the velocities u of the bodies are split by the constraints into two subspaces that
-are orthogonal in the metric of M: the constrained one, spanned by M⁻¹Cᵀ, in which the constraints alone decide, and the
-one tangent to them, spanned by D with C D = 0, in which the applied forces alone decide. Projection on the second,
-DᵀM D ν̇ = Dᵀ(h − M u̇₀) with any u̇₀ that obeys the constraints, gives the motion; what is left, M u̇ − h, lies in the
-first and gives the reactions, joint by joint from the tips of the tree.
+With M u̇ = h + Cᵀλ and C u̇ = −γ, the constraints split the velocities u of the bodies into two subspaces, orthogonal
+in the metric of M: the constrained one, spanned by M⁻¹Cᵀ, in which only the constraints act, and the tangent one,
+spanned by D with C D = 0, in which only the applied forces act. Projection on the second, DᵀM D ν̇ = Dᵀ(h − M u̇₀) with
+any u̇₀ that satisfies the constraints, gives the motion. The remainder, M u̇ − h, lies in the first and gives the
+reactions, joint by joint from the tips of the tree.
 
-D comes from elimination along the tree (see :mod:`proofroll.engines.projection.elimination`); loops, couplings and
-joints that are held are projected once more, in the velocities ν, by a row for each. The number of independent rows of
-loops and couplings is found at the start and kept.
+D follows from elimination along the tree (see :mod:`proofroll.engines.projection.elimination`). Loops, couplings and
+held joints are projected in a second stage, in the velocities ν, with one row each. The number of independent rows of
+loops and couplings is determined at the start and kept.
 
 Sources: W. Blajer, Math. Comput. Model. Dyn. Syst. 12(6), 2006, 543-553, for the projections; W. Blajer, Multibody
 Syst. Dyn. 7, 2002, 265-284, for the elimination of constraint violations.
@@ -32,15 +32,15 @@ from proofroll.engines.projection.elimination import Closing, Elimination, Loads
 
 
 class SolvedState(NamedTuple):
-    """Accelerations of the bodies, with what they were found from.
+    """Accelerations of the bodies, with the quantities used to find them.
 
     Attributes:
-        bodies: motion.
-        linear: of the centres of mass, world axes, (bodies, 3).
-        angular: along the bodies' own axes, (bodies, 3).
-        forces: that the bodies need besides their weight, matrices as in :meth:`Elimination.forces`.
-        rates: of the velocities ν, (nv,).
-        multipliers: of the rows of loops, of couplings (forces on their second joints), and of what is held.
+        bodies: motion of the bodies.
+        linear: accelerations of the centres of mass, world axes, (bodies, 3).
+        angular: angular accelerations in the bodies' own axes, (bodies, 3).
+        forces: forces needed in addition to weight, as accelerations of :meth:`Elimination.forces`.
+        rates: ν̇, (nv,).
+        multipliers: of the rows of loops, of couplings (forces on their second joints), and of held joints.
     """
 
     bodies: Bodies
@@ -52,18 +52,17 @@ class SolvedState(NamedTuple):
 
 
 class DependentCoordinates:
-    """Equations of motion in the state (r, quaternions, v, ω): of all bodies one after the other.
+    """Equations of motion in the state (r, quaternions, v, ω), each for all bodies in order.
 
     Attributes:
-        mass, inertia: of the bodies, about their centres of mass and along their axes.
-        com: in their frames.
+        mass, inertia: of the bodies, about their centres of mass in their own axes.
+        com: centres of mass in the bodies' frames.
         rank: number of independent rows.
         nq, nv: numbers of coordinates and of velocities of the tree.
-        gravity: acceleration of it.
-        start: the state at time 0.
-        loop_rows, coupled: numbers of rows of loops, and of these with those of couplings.
-        regularity: of these rows where the equations were solved last: the least singular value that counts over the
-            largest; 1 without any.
+        gravity: its acceleration.
+        start: state at time 0.
+        loop_rows, coupled: number of rows of loops, and of loops and couplings together.
+        regularity: smallest relevant over largest singular value of these rows at the last solution; 1 without rows.
     """
 
     def __init__(self, mechanism: Mechanism, elimination: type[Elimination] = Elimination) -> None:
@@ -88,7 +87,7 @@ class DependentCoordinates:
             row[mechanism.v_slices[a]], row[mechanism.v_slices[b]] = -ratio, 1.0
         self.loop_rows = len(self._loop_rows.owner)
         self.coupled = self.loop_rows + len(self._geared)
-        # of other joints the axes stand still in one of the two bodies
+        # the axes of other joints are fixed in one of the two bodies
         self._bent = any(joint.kind == "universal" for joint in mechanism.joints)
         self.gravity = np.array(mechanism.gravity)
         self.regularity = 1.0
@@ -107,7 +106,7 @@ class DependentCoordinates:
         return _joined(r, quaternions, v, np.einsum("nji,nj->ni", R, w))
 
     def parts(self, x: Array) -> tuple[Array, Array, Array, Array]:
-        """r, quaternions, v and ω (own axes) of a state, (bodies, …)."""
+        """Positions r, quaternions, v and ω (own axes) of a state, (bodies, …)."""
         n = self._count
         return (
             x[: 3 * n].reshape(n, 3),
@@ -134,20 +133,21 @@ class DependentCoordinates:
     def solve(
         self, x: Array, drives: Array | float = 0.0, closing: Closing | None = None, held: Sequence[int] = ()
     ) -> SolvedState:
-        """Projections of the equations of motion at a state.
+        """Solution of the projected equations of motion at a state.
 
         Args:
             x: the state.
-            drives: further forces along the velocities ν, (nv,); several at once, (…, nv), give as many accelerations.
-            closing: of a tree what its velocities are, if not those of free joints.
-            held: velocities that do not change.
+            drives: additional forces along the velocities ν, (nv,); several at once, (…, nv), give as many
+                accelerations.
+            closing: solver for the velocities of the tree; None: of free joints, or with loops and held joints.
+            held: indices of velocities that do not change.
         """
         bodies, joints = self.bodies(x), self._joints
         pose, inverse, own = bodies.pose[:-1], bodies.inverse[:-1], bodies.own[:-1]
         bent = own @ own
         bent[:, :3, 3:] -= inverse[:, :3, :3] @ self.gravity[:, None]
         of_a, of_b = bodies.twist[self.connections.a], bodies.twist[self.connections.b]
-        # rates of relative twists that stand still in body a
+        # rates of relative twists that are constant in body a
         still = (of_a @ of_b - of_b @ of_a).reshape(-1, 16)
         relative, loads = still[:joints], Loads(bent, drives=drives)
         if self._bent or self.applied.laws:
@@ -172,14 +172,14 @@ class DependentCoordinates:
         return SolvedState(bodies, linear, angular, rates + bent, velocities, multipliers)
 
     def _with_zeros(self, of_loops: Array, held: Sequence[int]) -> Array:
-        """Rates wanted of all rows where couplings and what is held change nothing, (…, rows)."""
+        """Right-hand sides of all rows, (…, rows), from those of loops; zero for couplings and held joints."""
         more = len(self._geared) + len(held)
         return np.concatenate([of_loops, np.zeros((*of_loops.shape[:-1], more))], axis=-1) if more else of_loops
 
     def _closed(
         self, rows: ConnectionRows, wanted: Array, held: Sequence[int], space: Space, given: Array, push: Array
     ) -> Any:
-        """Velocities (…, nv) and multipliers by which the rows have the rates that are wanted, (…, rows)."""
+        """Velocities (…, nv) and multipliers that give the rows the rates ``wanted``, (…, rows)."""
         flat = given.reshape(*given.shape[:-2], 16)
         C = rows.form @ space.S.T * self._between
         of_given = (rows.form * (flat[..., self._loop_b, :] - flat[..., self._loop_a, :])).sum(-1)
@@ -194,13 +194,13 @@ class DependentCoordinates:
         return velocities.T, multipliers.T
 
     def responses(self, x: Array, drives: Array, at: Sequence[int]) -> tuple[Array, Array]:
-        """ν̇ at a state, (nv,), and what unit forces along some of the velocities add, (nv, forces)."""
+        """ν̇ at a state, (nv,), and its change due to unit forces along some of the velocities, (nv, forces)."""
         units = np.vstack([np.zeros(self.nv), np.eye(self.nv)[list(at)]])
         accelerations = self.solve(x, drives + units).rates
         return accelerations[0], (accelerations[1:] - accelerations[0]).T
 
     def pushed(self, x: Array, change: Array) -> Array:
-        """The state after a change of the velocities ν, (nv,)."""
+        """State after a change of the velocities ν, (nv,)."""
         bodies, x = self.bodies(x), x.copy()
         motion = self.tree.twists(bodies, change)[:-1]
         pose, inverse = bodies.pose[:-1], bodies.inverse[:-1]
@@ -210,11 +210,11 @@ class DependentCoordinates:
         return x
 
     def watched(self, x: Array) -> dict[int, tuple[float, float]]:
-        """Coordinate and velocity of each joint, by its number, that has dry friction, stops or a coupling."""
+        """Coordinate and velocity of each joint with dry friction, stops or a coupling, by its index."""
         return self.applied.watched(self.connections.ends(self.bodies(x), slice(0, self._joints)))
 
     def wanted(self, x: Array) -> list[float]:
-        """Efforts with a limit before they are clamped."""
+        """Efforts that the actuators with a limit would apply without it, N or N m."""
         return self.applied.wanted(self.connections.ends(self.bodies(x), slice(0, self._joints)))
 
     def _apart(self, bodies: Bodies) -> Array:
@@ -226,7 +226,7 @@ class DependentCoordinates:
         return np.transpose(violations)
 
     def rates(self, x: Array, drives: Array | float = 0.0, held: Sequence[int] = ()) -> Array:
-        """ẋ; for the arguments see :meth:`solve`."""
+        """Time derivative ẋ; for the arguments see :meth:`solve`."""
         _, q, v, w = self.parts(x)
         solved = self.solve(x, drives, held=held)
         return _joined(v, quaternion_rates(q, w), solved.linear, solved.angular)
@@ -234,14 +234,14 @@ class DependentCoordinates:
     def eliminated(self, x: Array, held: Sequence[int] = ()) -> Array:
         """State projected onto the constraints, quaternions normalised.
 
-        Velocities that are ``held`` stay what they are.
+        Velocities with an index in ``held`` are kept.
         """
         x = self._with_unit_quaternions(x)
         if not self.rank and not held:
             return x
         bodies, closing = self.bodies(x), None
         rows = self._joint_rows.at(self.connections.ends(bodies, slice(0, self._joints)))
-        # of places and of velocities: motions that take the violations away, then these without what D allows
+        # of positions and of velocities: motions that remove the violations, then without their components along D
         relative = -self._joint_rows.twists(rows, np.stack([rows.residual, rows.rate]))
         if self._locked or held:
             rows = self._loop_rows.at(self.connections.ends(bodies, self._loops_at))
@@ -285,11 +285,11 @@ class DependentCoordinates:
         return force, torque
 
     def efforts(self, bodies: Bodies) -> Array:
-        """Efforts of the actuators at their joints, (actuators,)."""
+        """Efforts of the actuators, N or N m, (actuators,)."""
         return self.applied.efforts(self.connections.ends(bodies, slice(0, self._joints)))
 
     def constraint_rows(self, bodies: Bodies) -> Array:
-        """Rows of all connections and couplings on the velocities of the bodies, (rows, 6 bodies)."""
+        """Jacobian of all connections and couplings for the velocities of the bodies, (rows, 6 bodies)."""
         ends, every = self.connections.ends(bodies), self.connections.constraints()
         rows, on_bodies = every.at(ends), partial(self.connections.on_bodies, bodies, ends)
         blocks = [on_bodies(every.owner, rows.force, rows.torque)]
@@ -300,7 +300,7 @@ class DependentCoordinates:
         return np.concatenate(blocks)
 
     def accept(self, x: Array) -> None:
-        """Tells the forces that the motion goes on from a state."""
+        """Notes a state from which the motion goes on, for forces that depend on turns."""
         if self.applied.remembers:
             self.applied.accept(self.connections.ends(self.bodies(x)))
 
@@ -324,12 +324,12 @@ def _rank_of_loops(mechanism: Mechanism) -> int:
 
 
 def _joined(*parts: Array) -> Array:
-    """A state, or its rates, from r, quaternions, v and ω."""
+    """Joined state, or its rates, from r, quaternions, v and ω."""
     return np.concatenate([part.ravel() for part in parts])
 
 
 def _rotation(p: Array, q: Array) -> Array:
-    """Bilinear in lists of quaternions (w, x, y, z): of one with itself its rotation, and its length, both squared."""
+    """Bilinear form of two lists of quaternions (w, x, y, z); for equal lists, |q|² times the rotation, and |q|²."""
     (a, b, c, d), (w, x, y, z) = p.T, q.T
     rows = (
         (a * w + b * x - c * y - d * z, 2 * (b * y - a * z), 2 * (b * z + a * y)),
@@ -340,22 +340,22 @@ def _rotation(p: Array, q: Array) -> Array:
 
 
 def _rate(q: Array, w: Array) -> Array:
-    """Bilinear: half the products of quaternions and angular velocities along the bodies' own axes."""
+    """Half the products of quaternions and angular velocities in the bodies' own axes; bilinear."""
     (a, b, c, d), (x, y, z) = q.T, 0.5 * w.T
     return np.array((-b * x - c * y - d * z, a * x + c * z - d * y, a * y + d * x - b * z, a * z + b * y - c * x)).T
 
 
-# Both of all pairs of units: the products of all pairs of elements times these are three calls of numpy, not thirty.
+# Both for all pairs of units: with the products of all pairs of elements this takes three calls of numpy, not thirty.
 _ROTATION = _rotation(np.repeat(np.eye(4), 4, axis=0), np.tile(np.eye(4), (4, 1)))
 _RATE = _rate(np.repeat(np.eye(4), 3, axis=0), np.tile(np.eye(3), (4, 1)))
 
 
 def rotations(q: Array) -> Array:
-    """Rotation matrices of quaternions (w, x, y, z) of any length but zero, (bodies, 3, 3)."""
+    """Rotation matrices of quaternions (w, x, y, z) of any nonzero length, (bodies, 3, 3)."""
     squared = (q[:, :, None] * q[:, None, :]).reshape(-1, 16) @ _ROTATION
     return np.asarray((squared[:, :9] / squared[:, 9:]).reshape(-1, 3, 3))
 
 
 def quaternion_rates(q: Array, w: Array) -> Array:
-    """Half the product of quaternions and angular velocities along the bodies' own axes, (bodies, 4)."""
+    """Half the product of quaternions and angular velocities in the bodies' own axes, (bodies, 4)."""
     return np.asarray((q[:, :, None] * w[:, None, :]).reshape(-1, 12) @ _RATE)

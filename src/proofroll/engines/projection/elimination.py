@@ -1,10 +1,10 @@
-"""Null space of the constraints, found by elimination along the tree of joints, and within it that of the loops.
+"""Null space of the constraints, by elimination along the tree of joints, and the part of it that loops allow.
 
-A joint fixes the twist of its child but for a few directions S of its own, so velocities ν along these give the twists
-of all bodies: V = Σ S ν over the joints between a body and the world. That is the null space D of the joints' rows, and
-DᵀMD needs no more than sums over the bodies behind each joint: with a body's inertia matrix Σ, the integral of p pᵀ
-over its mass, p = [place; 1], its element (k, l) is ⟨S_k, S_l Σ_l⟩, where Σ_l sums what is behind l. Rows of loops act
-on differences of two twists, and are few: their singular vectors in the metric of DᵀMD take dependent rows as they are.
+A joint determines the twist of its child except along a few directions S, so velocities ν along these give the twists
+of all bodies: V = Σ S ν over the joints between a body and the world. This is the null space D of the joints' rows.
+DᵀMD needs only sums over the bodies behind each joint: with a body's inertia matrix Σ, the integral of p pᵀ over its
+mass, p = [position; 1], its element (k, l) is ⟨S_k, S_l Σ_l⟩, where Σ_l sums the bodies behind l. Rows of loops act on
+differences of two twists, and are few; their singular vectors in the metric of DᵀMD allow for dependent rows.
 """
 
 from collections.abc import Callable
@@ -16,7 +16,7 @@ from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.engines.projection.connections import SKEW, Bodies, ProjectedConnections
 
-# Of each velocity of a kind of joint: whether it turns; the axis of the frame on its carrier; whether that is body b.
+# Velocities of each kind of joint: (rotation?, axis of the frame on its carrier, is the carrier body b?).
 _TURN_B, _SLIDE_A = [(True, k, True) for k in range(3)], [(False, k, False) for k in range(3)]
 DIRECTIONS: dict[str, list[tuple[bool, int, bool]]] = {
     "fixed": [],
@@ -42,11 +42,11 @@ class Space(NamedTuple):
 
 
 class Loads(NamedTuple):
-    """Forces on the bodies, and what acts like some.
+    """Forces on the bodies, and accelerations that act like forces.
 
     Attributes:
-        bent: accelerations of the bodies at rest of their twists' rates, less gravity, (bodies, 4, 4).
-        pulls: forces on them, as matrices, (bodies, 4, 4).
+        bent: accelerations at constant twists, minus gravity, in the bodies' own axes, (bodies, 4, 4).
+        pulls: forces on the bodies, as matrices f pᵀ, (bodies, 4, 4).
         drives: forces along the joints' velocities, (nv,).
     """
 
@@ -55,16 +55,18 @@ class Loads(NamedTuple):
     drives: Array | float = 0.0
 
 
-# Velocities (…, nv) and multipliers from the null space, given twists and forces along the velocities (…, nv).
+# Function of null space, given twists, and forces along the velocities (…, nv): velocities (…, nv) and multipliers.
 Closing = Callable[[Space, Array, Array], tuple[Array, Array]]
 
 
 class Elimination:
-    """The tree of a mechanism.
+    """Tree of a mechanism.
 
     Attributes:
-        behind: 1 where a body is carried by a joint, (joints, bodies).
-        joint: the joint of each velocity; ``turns`` whether it turns its child.
+        behind: 1 where a joint carries a body, (joints, bodies).
+        joint: index of the joint of each velocity.
+        turns: True for each velocity that is a rotation.
+        moves: 1 where a velocity moves a body, the world last, (bodies + 1, nv).
         armature: inertia of the drive along each velocity.
     """
 
@@ -93,7 +95,7 @@ class Elimination:
                 own[:3, 3] = direction
         self.armature = np.array([joints[number].armature for number in self.joint.tolist()])
         self._carrier = np.array(carriers, dtype=np.intp)
-        # bodies behind each velocity, and velocities before each body; the world moves with none
+        # bodies behind each velocity, and velocities before each body; none for the world
         self._sums = self.behind[self.joint]
         self.moves = np.vstack([self._sums.T, np.zeros(len(ways))])
         self._steps = np.vstack([self.behind.T, np.zeros(len(joints))])
@@ -110,22 +112,22 @@ class Elimination:
         return np.asarray(bodies.pose[c] @ self._own @ bodies.inverse[c])
 
     def inertia(self, bodies: Bodies) -> Array:
-        """Matrices Σ (mass, first and second moments) of the bodies along the world's axes, (bodies, 4, 4)."""
+        """Matrices Σ (mass, first and second moments) of the bodies in world axes, (bodies, 4, 4)."""
         pose = bodies.pose[:-1]
         return np.asarray(pose @ self._inertia @ pose.swapaxes(1, 2))
 
     def space(self, bodies: Bodies) -> Space:
-        """The null space at a state."""
+        """Null space at a state."""
         S, inertia = self.directions(bodies), self.inertia(bodies).reshape(-1, 16)
         moved = (S @ (self._sums @ inertia).reshape(-1, 4, 4)).reshape(-1, 16)
         flat = S.reshape(-1, 16)
         return Space(flat, (flat @ moved.T) * self._related + np.diag(self.armature))
 
     def forces(self, bodies: Bodies, acceleration: Array) -> Array:
-        """Forces that bodies need for accelerations [α× a; 0 0] along their own axes, (…, bodies, 4, 4).
+        """Forces needed for accelerations [α× a; 0 0] of the bodies in their own axes, (…, bodies, 4, 4).
 
-        A force at a place is the matrix f pᵀ, a moment the half of its ×; of moments no more than the part that
-        changes sign is kept, where a body that spins about a principal axis has none to the last digit.
+        A force f at p is the matrix f pᵀ, a moment half of its cross-product matrix. Only the antisymmetric part of
+        moments is kept: it vanishes exactly for a body that spins about a principal axis.
         """
         own = acceleration @ self._inertia
         turning = own[..., :3, :3]
@@ -136,17 +138,16 @@ class Elimination:
     def motions(
         self, bodies: Bodies, relative: Array, loads: Loads, closing: Closing | None = None
     ) -> tuple[Array, Array, Array]:
-        """Projected motions of the bodies: rates of their twists, or, of violations, twists.
+        """Projected motions of the bodies: rates of their twists; or twists, for the removal of violations.
 
         Args:
             bodies: their motion.
-            relative: twists of children less those of their parents, as the joints prescribe them, but for what
-                they leave free, (…, joints, 16).
+            relative: twists of children minus those of their parents that the joints prescribe, (…, joints, 16).
             loads: forces on the bodies.
-            closing: effect of further rows on it.
+            closing: solver for the velocities under additional rows; None: no such rows.
 
         Returns:
-            (…, bodies + 1, 4, 4), the same of the velocities, (…, nv), and the multipliers of the further rows.
+            Motions (…, bodies + 1, 4, 4), velocities (…, nv), and multipliers of the additional rows.
         """
         space = self.space(bodies)
         given = _matrices(self._steps @ relative)
@@ -160,7 +161,7 @@ class Elimination:
         return _matrices(self.moves @ (_flat(self.directions(bodies)) * velocities[:, None]))
 
     def of_joints(self, bodies: Bodies, force: Array, torque: Array) -> Array:
-        """Forces and moments of joints on their children (joints, 3), along the velocities, (nv,)."""
+        """Forces along the velocities, (nv,), from forces and moments of joints on their children, (joints, 3) each."""
         S = self.directions(bodies)
         turning = 0.5 * (S[:, :3, :3].reshape(-1, 9) @ SKEW.T) * torque[self.joint]
         return np.asarray(np.where(self.turns[:, None], turning, S[:, :3, 3] * force[self.joint]).sum(1))
@@ -178,11 +179,11 @@ class RowSplit:
     """Velocities that rows lock, and those they allow, in the metric of the mass matrix H.
 
     Attributes:
-        least: of the singular values that count the smallest, relative to the largest.
+        least: smallest relevant singular value of the rows, relative to the largest.
     """
 
     def __init__(self, H: Array, C: Array, rank: int) -> None:
-        from scipy.linalg.lapack import dgesdd, dpotrf, dtrtri  # here: whoever runs a ball need not wait for it
+        from scipy.linalg.lapack import dgesdd, dpotrf, dtrtri  # imported here, as balls do not need it
 
         upper, failed = dpotrf(H)
         if failed:
@@ -197,21 +198,21 @@ class RowSplit:
         self._locked, self._back = self._into @ Vt[:rank].T, U[:, :rank].T / values[:rank, None]
 
     def __call__(self, push: Array, wanted: Array) -> tuple[Array, Array]:
-        """H ν = push + Cᵀλ and C ν = wanted, for several right-hand sides (nv, …) and (rows, …): ν and λ."""
+        """Solution ν, λ of H ν = push + Cᵀλ and C ν = wanted, for several right-hand sides (nv, …) and (rows, …)."""
         free = self._into @ (self._into.T @ push)
         normal = self._back @ (wanted - self._C @ free)
         return free + self._locked @ normal, self._back.T @ normal
 
 
 def _without_loops(space: Space, _: Array, push: Array) -> tuple[Array, Array]:
-    if not push.size:  # fixed joints alone
+    if not push.size:  # only fixed joints
         return push, np.zeros(0)
     return solved(space.H, push.T).T, np.zeros(0)
 
 
 def solved(H: Array, push: Array) -> Array:
-    """ν of H ν = push, of one or several right-hand sides (nv, …); H, positive definite, by its upper triangle."""
-    from scipy.linalg.lapack import dposv  # here: whoever runs a ball need not wait for it
+    """Solution ν of H ν = push, for right-hand sides (nv, …); H, positive definite, by its upper triangle."""
+    from scipy.linalg.lapack import dposv  # imported here, as balls do not need it
 
     _, velocities, failed = dposv(H, push)
     if failed:

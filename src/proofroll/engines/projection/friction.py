@@ -1,10 +1,10 @@
-"""Coulomb friction in the projection method: what sticking needs, and what slipping does.
+"""Coulomb friction in the projection method, while sticking and while slipping.
 
-Sticking keeps both rows of the non-holonomic constraints, and the multipliers are the needed friction. Slipping has
-no such row; the friction -μ_k N d along the direction d of the slip is an applied force, and enters through D like
-gravity. The slip u = C v then changes at the rate u̇ = b - μ_k N (C M⁻¹ Cᵀ) d, where the *drive* b is what u̇ would be
-without friction. Both rows of C see the same inertia, so C M⁻¹ Cᵀ = (1/m + a²/J) 1, and b is the needed friction
-times that, reversed: the static cone and the drive say the same.
+While sticking, both rows of the non-holonomic constraints are active, and their multipliers are the needed friction.
+While slipping, no row is active; the friction -μ_k N d, with d the direction of the slip, is an applied force, and
+enters through D like gravity. The slip u = C v then changes at the rate u̇ = b - μ_k N (C M⁻¹ Cᵀ) d, where the *drive*
+b is u̇ without friction. Both rows of C have the same inertia, so C M⁻¹ Cᵀ = (1/m + a²/J) 1, and b is the needed
+friction times that, with the opposite sign: the static cone and the drive are equivalent.
 """
 
 import math
@@ -15,7 +15,7 @@ import numpy as np
 from proofroll.elements.ball_on_surface.model import Contact
 from proofroll.engines.projection.method import Kinematics, ProjectedBall, Response
 
-# Needed friction is compared with the cone to this part of both and of the weight: below lies round-off.
+# Round-off of the comparison of needed friction with the cone, relative to available friction plus weight.
 _ON_CONE = 1e-12
 
 
@@ -23,12 +23,12 @@ class SlidingForces(NamedTuple):
     """Equations solved at one state of slip.
 
     Attributes:
-        kin: where.
-        response: with the friction as an applied force.
+        kin: kinematics at the state.
+        response: solution with friction as an applied force.
         direction: d, unit vector along e2 and e3.
         drive: b [m/s²].
         growth: rate of |u| [m/s²].
-        across: component of u̇ at right angles to d [m/s²]; over |u|, the rate at which d turns.
+        across: component of u̇ perpendicular to d [m/s²]; divided by |u|, the rate at which d turns.
     """
 
     kin: Kinematics
@@ -40,7 +40,7 @@ class SlidingForces(NamedTuple):
 
     @property
     def strength(self) -> float:
-        """|b| [m/s²]; the direction of a slip u relaxes towards that of b within the time |u|/|b|."""
+        """Magnitude |b| [m/s²]; the direction of a slip u relaxes towards that of b within the time |u|/|b|."""
         return math.hypot(*self.drive)
 
 
@@ -54,9 +54,9 @@ class Friction:
 
     Attributes:
         rolling: the ball with both rows active.
-        sliding: the ball with none.
+        sliding: the ball with no row active.
         mu_static, mu_kinetic: coefficients [1].
-        bounded: whether there is a static cone to leave.
+        bounded: True if static friction is bounded.
     """
 
     def __init__(self, ball: ProjectedBall, contact: Contact) -> None:
@@ -66,9 +66,9 @@ class Friction:
         self._weight = float(ball.mass * np.linalg.norm(ball.gravity))
 
     def reserve(self, response: Response) -> float:
-        """Reserve of the static cone [N], from the reactions of sticking; negative where the ball must slip."""
+        """Available minus needed friction while sticking [N]; negative where the ball must slip."""
         if not self.bounded:
-            return math.inf  # whatever the sign of N
+            return math.inf  # even if N is negative
         available, needed = self.mu_static * response.N, math.hypot(response.F2, response.F3)
         return available - needed + _ON_CONE * (abs(available) + self._weight)
 
@@ -77,7 +77,7 @@ class Friction:
         return self.sliding.response(kin).slip_rate
 
     def slide(self, kin: Kinematics, direction: tuple[float, float]) -> SlidingForces:
-        """The ball slipping along ``direction``."""
+        """Equations solved for a slip in this direction."""
         d2, d3 = direction
         response = self.sliding.response(kin, (-self.mu_kinetic * d2, -self.mu_kinetic * d3))
         rate2, rate3 = response.slip_rate

@@ -1,4 +1,4 @@
-"""The surface as seen along the local axes e1, e2, e3: what the projection method needs to know of geometry.
+"""Geometry of the surface in local axes e1, e2, e3, as the projection method needs it.
 
 The frame F has the columns e1 (normal, towards the wall), e2 (along the first coordinate) and e3 = e1 × e2.
 """
@@ -17,12 +17,12 @@ Vector = tuple[float, float, float]
 
 
 class Shape(NamedTuple):
-    """Derivatives of the place and of the frame along e1, e2, e3, in plain numbers.
+    """Derivatives of the position and of the frame along e1, e2, e3, as plain numbers.
 
     Attributes:
-        tangents: Fᵀ ∂p/∂u [m/unit]: of e2 along both coordinates, then of e3; there is none of e1.
-        inverse: of the tangents as a matrix: of the first coordinate along e2 and e3, then of the second [unit/m].
-        second: Fᵀ ∂²p/∂u∂u as the factors of u̇², u̇v̇ and v̇² [m/unit²]: of e1, of e2, of e3.
+        tangents: Fᵀ ∂p/∂u [m/unit]: along e2 for both coordinates, then along e3; zero along e1.
+        inverse: inverse of the tangents as a matrix [unit/m]: first coordinate for e2 and e3, then the second.
+        second: Fᵀ ∂²p/∂u∂u as factors of u̇², u̇v̇ and v̇² [m/unit²]: along e1, e2, e3.
         turning: angular velocity of the frame per rate of the first coordinate, and of the second [1/unit].
     """
 
@@ -37,34 +37,34 @@ Frame = tuple[float, ...]
 
 
 def matrix(frame: Frame) -> FloatArray:
-    """The frame F, shape (3, 3)."""
+    """Frame F as a matrix, shape (3, 3)."""
     return np.array(frame).reshape(3, 3).T
 
 
 def along(frame: Frame, x: float, y: float, z: float) -> Vector:
-    """Components along e1, e2, e3 of a vector of the world."""
+    """Components along e1, e2, e3 of a vector in world axes."""
     x1, y1, z1, x2, y2, z2, x3, y3, z3 = frame
     return x1 * x + y1 * y + z1 * z, x2 * x + y2 * y + z2 * z, x3 * x + y3 * y + z3 * z
 
 
 def in_world(frame: Frame, a: float, b: float, c: float) -> Vector:
-    """Components in the world of a vector along e1, e2, e3."""
+    """Components in world axes of a vector along e1, e2, e3."""
     x1, y1, z1, x2, y2, z2, x3, y3, z3 = frame
     return x1 * a + x2 * b + x3 * c, y1 * a + y2 * b + y3 * c, z1 * a + z2 * b + z3 * c
 
 
 @dataclass(frozen=True)
 class GeneralSurface:
-    """Any surface, evaluated anew at each point, from its tangents and second derivatives.
+    """Any surface, evaluated at each point from its tangents and second derivatives.
 
-    Only the frame is taken from the surface as it is; how the frame turns follows from its definition: e2 goes along
-    the first tangent, and ∂e1 · t = -e1 · ∂t for every tangent t, because e1 · t stays zero.
+    The frame comes from the surface. Its rate of turning follows from the definition: e2 is along the first tangent,
+    and ∂e1 · t = -e1 · ∂t for every tangent t, because e1 · t = 0.
     """
 
     surface: Surface
 
     def at(self, place: Sequence[float]) -> tuple[Frame, Shape]:
-        """Frame at a place, whose first two numbers are the coordinates, and the shape seen along it."""
+        """Frame and shape at a position; the first two numbers of ``place`` are the coordinates."""
         u = np.array(place[:2])
         frame = self.surface.frame(u)
         tangents = frame.T @ self.surface.tangents(u)
@@ -74,23 +74,23 @@ class GeneralSurface:
         turning[2, 1] = second[2, 0] / tangents[1, 0]  # e3 component of ∂e2; its e1 component follows by skewness
         turning = turning - turning.swapaxes(0, 1)
         products = np.stack([second[:, 0, 0], second[:, 0, 1] + second[:, 1, 0], second[:, 1, 1]], axis=1)
-        axes = np.stack([turning[2, 1], turning[0, 2], turning[1, 0]], axis=1)  # of which these are skew matrices
+        axes = np.stack([turning[2, 1], turning[0, 2], turning[1, 0]], axis=1)  # axes of these skew matrices
         parts = tangents[1:], np.linalg.inv(tangents[1:]), products, axes
         return tuple(frame.T.ravel().tolist()), Shape(*(tuple(part.ravel().tolist()) for part in parts))
 
 
 class Uniform:
-    """A surface that two commuting rigid motions slide along itself: it looks the same from every point of it.
+    """A surface that two commuting rigid motions slide along itself, so that all its points are alike.
 
-    Then everything along the local axes is constant, and the frame at u is the one at u = 0 turned by the motions.
+    All geometry is then constant in local axes, and the frame at u is the one at u = 0 rotated by the motions.
 
     Attributes:
-        column: index of the coordinate that turns the frame; None: none does.
+        column: index of the coordinate that turns the frame; None: there is none.
     """
 
     def __init__(self, surface: Surface, generators: tuple[Generator, Generator]) -> None:
         self._start = GeneralSurface(surface).at((0.0, 0.0))
-        # Only one of two commuting motions of a surface turns.
+        # At most one of two commuting motions of a surface is a rotation.
         self.column = next((i for i, motion in enumerate(generators) if motion.kind == "rotation"), None)
         k1, k2, k3 = (0.0, 0.0, 0.0) if self.column is None else generators[self.column].axis
         cross = np.array([[0.0, -k3, k2], [k3, 0.0, -k1], [-k2, k1, 0.0]])
@@ -127,7 +127,7 @@ Geometry = GeneralSurface | Uniform
 
 
 def geometry_of(surface: Surface) -> Geometry:
-    """The cheapest description that is exact for this surface."""
+    """Cheapest description that is exact for this surface."""
     generators = surface.generators
     if generators is None:
         return GeneralSurface(surface)

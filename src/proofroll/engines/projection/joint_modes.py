@@ -1,8 +1,8 @@
-"""Dry friction, stops and limits of efforts: which law holds, when that ends, and what comes next.
+"""Dry friction, stops and effort limits: modes, their ends, and transitions.
 
-A joint that is held is locked: a row more of the constraints, whose multiplier is the force that holds it. Of joints at
-rest, those that hold follow from a quadratic program with bounds. Decisions and impacts are stated here again beside
-:mod:`proofroll.elements.mechanism.complementarity`, by which the truth decides: neither can hide an error of the other.
+A held joint is locked: one more constraint row, whose multiplier is the holding force. Which of the joints at rest are
+held follows from a quadratic program with bounds. Decisions and impacts are implemented here independently of
+:mod:`proofroll.elements.mechanism.complementarity`, which the truth uses: neither can hide an error of the other.
 """
 
 from collections.abc import Callable, Sequence
@@ -21,11 +21,11 @@ from proofroll.elements.mechanism.switches import HOLDING, REDUNDANT, STOPPED, M
 from proofroll.engines.projection.alternating import AlternatingMotion, Excess, ends_of_efforts
 from proofroll.engines.projection.dependent import DependentCoordinates, SolvedState
 
-_DEPENDENT = 1e-12  # of the largest response: directions that respond less hold one degree of freedom together
+_DEPENDENT = 1e-12  # Smallest over largest response below which joints hold one degree of freedom together.
 
 
 class SwitchedMotion(AlternatingMotion[Mode]):
-    """Motion of a mechanism with joints that rub or have stops, efforts that have limits, or drives with breaks.
+    """Motion of a mechanism with dry friction or stops in joints, effort limits, or drives with breaks.
 
     Attributes:
         mode: of each switched joint, then of each effort with a limit.
@@ -49,17 +49,17 @@ class SwitchedMotion(AlternatingMotion[Mode]):
         self.mode: Mode = ("free",) * len(self._joints)
         start = np.append(equations.start, 0.0)
         q, v = self._joint_state(start)
-        for k, joint in enumerate(self._joints):  # a start at a stop is known to digits of a file
+        for k, joint in enumerate(self._joints):  # a start at a stop is accurate to the digits of a file
             q[k] = np.clip(q[k], joint.low, joint.high)
         self._enter(0.0, start, self._decided(start, q, v))
 
     def solve(self, y: Array | None = None) -> SolvedState:
-        """Equations of motion in the present mode, now or at a state with its time."""
+        """Equations of motion solved in the present mode, now or at a state with its time."""
         x = self._at(self._stepper.x if y is None else y)
         return self._equations.solve(x, self._load(self.mode), held=self._held)
 
     def along_joints(self, count: int) -> dict[str, Array]:
-        """Forces of dry friction and of stops along the coordinates of all joints."""
+        """Forces of dry friction and of stops along the coordinates of all joints, N or N m."""
         forces = self._holding(self.solve())
         along = {"friction": np.full(count, np.nan), "stop": np.full(count, np.nan)}
         for k, joint in enumerate(self._joints):
@@ -69,7 +69,7 @@ class SwitchedMotion(AlternatingMotion[Mode]):
         return along
 
     def _holding(self, solved: SolvedState) -> dict[int, float]:
-        """Forces that hold joints, by their numbers among the switched ones."""
+        """Holding forces of joints, by their indices among the switched ones."""
         return dict(zip(held_by(self.mode), solved.multipliers[self._equations.coupled :].tolist(), strict=True))
 
     def _load(self, mode: Mode) -> Array:
@@ -89,7 +89,7 @@ class SwitchedMotion(AlternatingMotion[Mode]):
         return self._equations.rates(self._at(y), self._push, self._held)
 
     def _joint_state(self, y: Array) -> tuple[Array, Array]:
-        """Coordinates and velocities of the switched joints, where held exactly."""
+        """Coordinates and velocities of the switched joints, exact where held."""
         q, v = np.zeros((2, len(self._joints)))
         watched = self._equations.watched(self._at(y))
         for k, joint in enumerate(self._joints):
@@ -99,9 +99,9 @@ class SwitchedMotion(AlternatingMotion[Mode]):
         return q, v
 
     def _decided(self, y: Array, q: Array, v: Array) -> Mode:
-        """Mode that follows from the forces: a joint at rest is held where the force that this needs is within bounds.
+        """Mode that follows from the forces: a joint at rest is held if the force it needs is within bounds.
 
-        All at once, for they feel each other.
+        All joints are decided at once, as they are coupled.
         """
         x, equations = self._at(y), self._equations
         equations.applied.modes = {}
@@ -123,9 +123,12 @@ class SwitchedMotion(AlternatingMotion[Mode]):
         return (*mode, *motors)
 
     def _struck(self, y: Array, q: Array, v: Array, hit: int) -> Array:
-        """Change of all velocities ν by an impact of a joint on its stop, by Newton's law; ``v`` becomes that after it.
+        """Change of all velocities ν by an impact of a joint on its stop, by Newton's law; updates ``v``.
 
-        Other joints that rest at a stop are pressed or set free by it; friction is no impulse.
+        Other joints that rest at a stop are pressed on or leave; friction gives no impulse.
+
+        Raises:
+            NotUnique: the outcome depends on the order of several impacts.
         """
         rests = [k for k, joint in enumerate(self._joints) if not v[k] and joint.resting(q[k]) in STOPPED]
         at_stop = sorted({hit, *rests})
@@ -149,9 +152,9 @@ class SwitchedMotion(AlternatingMotion[Mode]):
     def _excess(self, y: Array) -> list[Excess]:
         """Excess of each mode over each of its ends.
 
-        ``up``, ``down``: the force that holds is beyond its bound, and the joint moves so; ``still``: a joint that
-        moves against friction has turned; ``low``, ``high``: it is beyond a stop; ``least``, ``linear``, ``greatest``:
-        an effort comes to be so.
+        ``up``, ``down``: the holding force exceeds its bound, and the joint moves in this direction; ``still``: a joint
+        that moves against friction has turned; ``low``, ``high``: a joint is beyond a stop; ``least``, ``greatest``: an
+        effort exceeds its limit; ``linear``: it is within its limits again.
         """
         q, v = self._joint_state(y)
         forces = self._holding(self.solve(y)) if self._held else {}
@@ -201,9 +204,13 @@ class SwitchedMotion(AlternatingMotion[Mode]):
 
 
 def _bounded(free: Array, G: Array, low: Array, high: Array) -> tuple[Array, NDArray[np.int_]]:
-    """Forces f between bounds that leave the least of ½ f·G f + free·f: free + G f is zero but where f is at a bound.
+    """Forces f within bounds that minimise ½ f·G f + free·f, so free + G f is zero unless f is at a bound.
 
-    With them of each -1, 0, 1: at its lower bound, between, at its upper one. A singular G is refused.
+    Returns:
+        Forces, and for each -1, 0 or 1: at its lower bound, between, at its upper bound.
+
+    Raises:
+        Refused: G is singular.
     """
     from scipy.optimize import lsq_linear
 

@@ -1,4 +1,4 @@
-"""Formulation ``dependent``: a mechanism by the projection method, and what is read back."""
+"""Formulation ``dependent``: run of a mechanism by the projection method, and its samples."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -49,13 +49,13 @@ PROVIDES = frozenset(
         MechanismCapability.CONTACT_REBOUNDS,
     }
 )
-# Regularity of the loops' rows over the largest on the way: accelerations lose as many digits as it has zeros. Loops
-# that pass a singular pose by a hundredth of a radian have some hundredth.
+# Regularity of the loops' rows, relative to the largest so far, that counts as singular: accelerations lose as many
+# digits as it has zeros. It is about a hundredth for loops that miss a singular pose by a hundredth of a radian.
 SINGULAR = 1e-6
 
 
 class ProjectionMechanism:
-    """See :class:`proofroll.core.engine.Engine` for the methods."""
+    """Run of a mechanism; see :class:`proofroll.core.engine.Engine` for the methods."""
 
     def __init__(self, scene: Any, settings: ProjectionSettings) -> None:
         mechanism = mechanism_of(scene)
@@ -93,7 +93,7 @@ class ProjectionMechanism:
             self._motion = self._switched = SwitchedMotion(self._equations, mechanism, stepper, self._accepted)
             return
         accepted: Accept = self._accepted
-        if self._timed:  # the time is the last component of the state: integrators hand on nothing else
+        if self._timed:  # the time is the last component of the state, as integrators pass on nothing else
             start, rates, accepted = np.append(start, 0.0), self._rates_in_time, self._accepted_in_time
         self._motion = stepper
         stepper.begin(0.0, start, rates, accepted, np.ones(len(start)))
@@ -107,7 +107,7 @@ class ProjectionMechanism:
 
     @property
     def _state(self) -> Array:
-        """State now, without the time."""
+        """Present state, without the time."""
         self._equations.applied.now = self._motion.t
         return self._motion.x[: len(self._equations.start)]
 
@@ -126,7 +126,7 @@ class ProjectionMechanism:
         """See :class:`proofroll.core.engine.Engine`."""
         start = self._motion.t
         try:
-            with np.errstate(over="ignore", invalid="ignore", divide="ignore"):  # found after the step
+            with np.errstate(over="ignore", invalid="ignore", divide="ignore"):  # detected after the step
                 self._motion.advance(t)
         except np.linalg.LinAlgError as error:
             raise Diverged(f"{error}, between t = {start:.6g} s and {t:.6g} s") from None
@@ -147,7 +147,7 @@ class ProjectionMechanism:
         """See :class:`proofroll.core.engine.Engine`."""
         equations, x = self._equations, self._state
         solved = self._solved()
-        # reactions beside forces of contact, which are no part of the matrices of the bodies' loads, are not told
+        # with contacts, joint reactions are not reported: contact forces are not among the loads from which they follow
         force, torque = unsaid(self._mechanism) if self._touching else equations.reactions(solved)
         r, q, v, _ = equations.parts(x)
         R, w = solved.bodies.rotation, solved.bodies.spin

@@ -1,22 +1,21 @@
 """Blajer's projection method: from Newton-Euler with constraints to the motion and the constraint reactions.
 
-The unconstrained ball has six velocities v = [v1 v2 v3 ω1 ω2 ω3], here along the local axes e1, e2, e3; a dot is a
-rate seen from the world, so that M v̇ = f without gyroscopic terms. (Blajer 2006 takes the translation along the
-world's axes and ω along the body's. A ball's mass matrix M is the same along all of them, and so is everything that
-follows by projection.) The constraints on v are C_h v = 0, the ball stays on the surface, and C v = 0, it does not
-slip.
+The unconstrained ball has six velocities v = [v1 v2 v3 ω1 ω2 ω3], here in the local axes e1, e2, e3; a dot is a rate in
+the world frame, so that M v̇ = f without gyroscopic terms. (Blajer 2006 takes the translation in world axes and ω in
+body axes. A ball's mass matrix M is the same in all of them, and so is everything that follows by projection.) The
+constraints on v are C_h v = 0, the ball stays on the surface, and C v = 0, it does not slip.
 
 With v = D s, which satisfies C_h v = 0, the projections onto D and C_h give
 
     [DᵀMD (CD)ᵀ; CD 0] [ṡ; λ] = [Dᵀ(f - M Ḋs); -ξ],    N = (C_h M⁻¹ C_hᵀ)⁻¹ C_h (M⁻¹ f - Ḋs).
 
-Below its first row D is square and regular, T of the place and A of the rotation, and C has no part along e1. So Dᵀ can
-be taken off the upper rows: S λ = C (M⁻¹ f - R v), v̇ = M⁻¹ (f - Cᵀ λ), ṡ = D⁻¹ (v̇ - Ḋs), with R v the rate that v
-has by the turning of the axes alone and S = C M⁻¹ Cᵀ, which is (1/m + a²/J) 1 for a ball. That leaves products of a few
-numbers, which cost less as plain floats than as arrays.
+Without its first row D is square and regular, with blocks T for the position and A for the rotation, and C is zero
+along e1. So Dᵀ cancels in the upper rows: S λ = C (M⁻¹ f - R v), v̇ = M⁻¹ (f - Cᵀ λ), ṡ = D⁻¹ (v̇ - Ḋs), with R v the
+rate of v due to the turning of the axes alone and S = C M⁻¹ Cᵀ, which is (1/m + a²/J) 1 for a ball. The remaining
+products have a few numbers each, and are faster in plain floats than in arrays.
 
-Sources: W. Blajer, Math. Comput. Model. Dyn. Syst. 12(6), 2006, 543-553, sections 2.1-2.4, for the projections;
-W. Blajer, Multibody Syst. Dyn. 7, 2002, 265-284, for the elimination of constraint violations.
+Sources: W. Blajer, Math. Comput. Model. Dyn. Syst. 12(6), 2006, 543-553, sections 2.1-2.4, for the projections; W.
+Blajer, Multibody Syst. Dyn. 7, 2002, 265-284, for the elimination of constraint violations.
 """
 
 from __future__ import annotations
@@ -40,16 +39,16 @@ class Kinematics(NamedTuple):
     """Kinematics of the ball in the velocities s: v = D s and v̇ = D ṡ + Ḋ s.
 
     Attributes:
-        frame, shape: geometry where the ball is.
-        rates: of the coordinates: u̇, and of the angles if there are any.
+        frame, shape: geometry at the ball's position.
+        rates: rates of the coordinates: u̇, and of the angles if there are any.
         r: velocities of the rotation.
-        pose: of the rotation, see :meth:`Orientation.pose`.
+        pose: numbers of the rotation, see :meth:`Orientation.pose`.
         v: D s, six numbers.
         drift: Ḋ s of the centre, along e1, e2, e3 [m/s²].
-        drawn: rate along e2, e3 that the centre must have, besides what its slip gains: by the turning of the axes, and
-            of the wall's velocity where it touches the ball [m/s²].
+        drawn: acceleration of the centre along e2, e3 that changes no slip: by the turning of the axes, and of the
+            wall's velocity at the contact [m/s²].
         turned: rate of ω' by the turning of the axes alone [rad/s²].
-        carried: velocity of the wall there, along e2 and e3 [m/s]; zero where the wall stands.
+        carried: velocity of the wall at the contact, along e2 and e3 [m/s]; zero for a wall at rest.
     """
 
     frame: Frame
@@ -84,7 +83,7 @@ class Response(NamedTuple):
 
 
 class ProjectedBall:
-    """The ball's equations of motion in the state x = [q, s]: coordinates q = [u, angles] and velocities s.
+    """Equations of motion of the ball in the state x = [q, s]: coordinates q = [u, angles] and velocities s.
 
     Attributes:
         mass, inertia: diagonal of M: m [kg] and J [kg m²].
@@ -92,8 +91,8 @@ class ProjectedBall:
         mobility: S, the same along e2 and e3 [1/kg].
         gravity: in the world [m/s²], shape (3,).
         rolling_resistance: f [m].
-        active: rows C of the non-holonomic constraints: both of the contact point, v2 + a ω3 and v3 - a ω2; these and
-            both of a centre that rests, ω2 and ω3; or none.
+        active: active rows of the non-holonomic constraints: "contact": the two of the contact point, v2 + a ω3 and v3
+            - a ω2; "centre": also the two of a centre at rest, ω2 and ω3; None: no rows.
     """
 
     def __init__(self, body: RollingBall, geometry: Geometry, orientation: Orientation) -> None:
@@ -109,7 +108,7 @@ class ProjectedBall:
         self._surface, self._wall_rate = body.surface, body.wall_rate
 
     def kinematics(self, x: FloatArray) -> Kinematics:
-        """The explicit form of the holonomic constraint at the state x."""
+        """Explicit form of the holonomic constraint at the state x."""
         n = self._coordinates
         state = x.tolist()
         angles, (first, second, *r) = state[2:n], state[n:]
@@ -134,7 +133,7 @@ class ProjectedBall:
     def _carried(
         self, F: FloatArray, place: Sequence[float], W: FloatArray, v: tuple[float, float], turning: Vector
     ) -> tuple[tuple[float, float], float, float]:
-        """Velocity W × (p + a e1) of a wall that turns at W along e2 and e3, and its rate along the turning axes."""
+        """Velocity W × (p + a e1) along e2 and e3 of a wall that turns at W, and its rate along the turning axes."""
         a, (_, o2, o3) = self.radius, turning
         W = W @ F
         velocity = cross(W, self._surface.position(np.array(place)) @ F + [a, 0.0, 0.0])
@@ -149,17 +148,17 @@ class ProjectedBall:
         return math.hypot(t2u * first + t2v * second, t3u * first + t3v * second)
 
     def weight(self, kin: Kinematics) -> Vector:
-        """Gravity along e1, e2, e3 [m/s²]: all of the applied force of a ball without resistance, over its mass."""
+        """Gravity along e1, e2, e3 [m/s²]: applied force of a ball without rolling resistance, divided by its mass."""
         return along(kin.frame, *self._g)
 
     def normal_force(self, kin: Kinematics) -> float:
-        """N = λ_h, the orthogonal projection; C_h = [1 0 0 0 0 0] picks e1, along which nothing but gravity acts."""
+        """Normal force N = λ_h [N] by the orthogonal projection; C_h = [1 0 0 0 0 0] selects e1: only gravity acts."""
         return self.mass * (self.weight(kin)[0] - kin.drift[0])
 
     def resistance(self, kin: Kinematics, N: float) -> tuple[float, float]:
-        """M_C along e2 and e3 [N m]: moment of the normal force N shifted by f along the centre's velocity.
+        """Moment M_C of rolling resistance along e2 and e3 [N m]: N is shifted by f along the centre's velocity.
 
-        At rest the direction does not exist and the moment is zero.
+        It is zero at rest, where it has no direction.
         """
         _, v2, v3, *_ = kin.v
         speed = math.hypot(v2, v3)
@@ -167,12 +166,13 @@ class ProjectedBall:
         return -lever * v3, lever * v2
 
     def response(self, kin: Kinematics, drag: tuple[float, float] = (0.0, 0.0)) -> Response:
-        """Accelerations and reactions: the tangential projection together with the non-holonomic constraints.
+        """Accelerations and reactions by the tangential projection and the active non-holonomic constraints.
 
-        ``drag`` is a friction on the ball per newton of normal force, along e2 and e3.
+        ``drag``: friction on the ball per newton of normal force, along e2 and e3.
         """
         a, m, J = self.radius, self.mass, self.inertia
-        g1, a2, a3 = self.weight(kin)  # M⁻¹ f along e2 and e3 of the centre; b is that of the rotation, zero along e1
+        # a2, a3: translational part of M⁻¹ f along e2 and e3; b2, b3: rotational part, zero along e1
+        g1, a2, a3 = self.weight(kin)
         (d1, d2, d3), (r2, r3), (_, q2, q3) = kin.drift, kin.drawn, kin.turned
         N, b2, b3 = m * (g1 - d1), 0.0, 0.0
         if self.active == "centre":
@@ -196,7 +196,7 @@ class ProjectedBall:
         return self.response(self.kinematics(x))
 
     def velocity_rate(self, kin: Kinematics, acceleration: Sequence[float]) -> FloatArray:
-        """v̇ = D ṡ + Ḋ s of accelerations ṡ, shape (6,)."""
+        """Rate v̇ = D ṡ + Ḋ s for accelerations ṡ, shape (6,)."""
         (t2u, t2v, t3u, t3v), (d1, d2, d3), (first, second, *spin) = kin.shape.tangents, kin.drift, acceleration
         still = self._orientation.acceleration(kin.pose, kin.r, (0.0, 0.0, 0.0), kin.turned, kin.frame)
         spin = [one - other for one, other in zip(spin, still, strict=True)]  # ω̇ = A (ṙ - ṙ where ω̇ = 0)
@@ -205,34 +205,34 @@ class ProjectedBall:
 
     @staticmethod
     def contact_force(response: Response) -> FloatArray:
-        """Force of the wall on the ball along the local axes, -C_hᵀ N - Cᵀ λ_nh = (-N, F2, F3) [N], shape (3,)."""
+        """Force of the wall on the ball in local axes, -C_hᵀ N - Cᵀ λ_nh = (-N, F2, F3) [N], shape (3,)."""
         return np.array((-response.N, response.F2, response.F3))
 
     def rates(self, x: FloatArray) -> FloatArray:
-        """ẋ: the angles, if there are any, follow the velocities s."""
+        """Time derivative ẋ; angles, if there are any, follow from the velocities s."""
         kin = self.kinematics(x)
         return self.derivative(kin, self.response(kin))
 
     def derivative(self, kin: Kinematics, response: Response) -> FloatArray:
-        """ẋ with the accelerations of ``response``."""
+        """Time derivative ẋ with the accelerations of ``response``."""
         return np.array((*kin.rates, *response.acceleration))
 
     def under(self, active: Active) -> ProjectedBall:
-        """The same ball with other active rows of the non-holonomic constraints."""
+        """Same ball with other active rows of the non-holonomic constraints."""
         other = copy.copy(self)
         other.active = active
         return other
 
     def slip(self, kin: Kinematics) -> tuple[float, float]:
-        """C v of the contact point along e2 and e3, less what the wall carries along [m/s]."""
+        """Slip velocity C v along e2 and e3, relative to the wall [m/s]."""
         (_, v2, v3, _, w2, w3), (carried2, carried3) = kin.v, kin.carried
         return v2 + self.radius * w3 - carried2, v3 - self.radius * w2 - carried3
 
     def eliminated(self, x: FloatArray, slip: tuple[float, float] = (0.0, 0.0)) -> FloatArray:
-        """The state x with the violation of C v = 0, or of C v = ``slip`` [m/s], removed from s (Blajer 2002).
+        """State x with the violation of C v = ``slip`` [m/s] removed from s (Blajer 2002).
 
-        s - M̄⁻¹C_nhᵀ(C_nh M̄⁻¹ C_nhᵀ)⁻¹ C_nh s is the nearest admissible s in the metric of M̄ = DᵀMD, where
-        C_nh = C D: M⁻¹ Cᵀ S⁻¹ C v in the velocities v.
+        s - M̄⁻¹C_nhᵀ(C_nh M̄⁻¹ C_nhᵀ)⁻¹ C_nh s is the nearest admissible s in the metric of M̄ = DᵀMD, where C_nh = C
+        D: M⁻¹ Cᵀ S⁻¹ C v in the velocities v.
         """
         kin = self.kinematics(x)
         if self.active == "centre":

@@ -1,17 +1,17 @@
-"""Modes of contact: by static friction, rolling or at rest, and by kinetic friction, with two descriptions of one slip.
+"""Contact modes: rolling or rest by static friction, and slip by kinetic friction in two descriptions.
 
-A slip is described by its size ρ = |u| and its direction, which are states of their own, because the difference
-C v would lose the digits of a small slip; elimination then holds C v to them. There are two descriptions, since the
-direction is stiff where ρ is small. It obeys ρ φ̇ = -|b| sin(φ - ψ), with ψ the direction of the drive b: it relaxes
-within ρ/|b|. A slip that starts grazing (ρ ~ t²) starts with no slip and infinite stiffness.
+A slip is described by its size ρ = |u| and its direction, as states of their own, because the difference C v would lose
+the digits of a small slip; elimination then makes C v consistent with them. There are two descriptions, since the
+direction is stiff for small ρ: it obeys ρ φ̇ = -|b| sin(φ - ψ), with ψ the direction of the drive b, and so relaxes
+within ρ/|b|. A slip that starts grazing (ρ ~ t²) starts with ρ = 0 and infinite stiffness.
 
-* :class:`SlavedSlip`, while ρ/|b| is below a small part ε of the time scale T of the motion: the direction follows
+* :class:`SlavedSlip`, while ρ/|b| is below a small fraction ε of the time scale T of the motion: the direction follows
   the drive. Its asymptotic value φ = ψ - ρ ψ̇ / (|b| + ρ̇) is exact to second order in ρ/|b|, and unlike an explicit
   start with some tiny ρ it needs neither ρ > 0 nor small steps: the slip starts at ρ = 0, where the cone was left.
 * :class:`FreeSlip`: φ is integrated.
 
-The angle between both at the change is of the order ε² (T ψ̇)², some 1e-9 rad, and dies out within ρ/|b| of it. So ε
-is no parameter of the result but of the cost: the steps that an explicit method needs fall like 1/√ε.
+At the transition the two directions differ by about ε² (T ψ̇)², some 1e-9 rad, which decays within ρ/|b|. So ε affects
+not the result but the cost: the steps that an explicit method needs decrease like 1/√ε.
 """
 
 import math
@@ -25,11 +25,12 @@ from proofroll.core.arrays import FloatArray
 from proofroll.engines.projection.friction import Friction, SlidingForces, along
 from proofroll.engines.projection.method import Kinematics, ProjectedBall
 
-# Slower than this part of the pace of the motion, a contact point or a centre stands still: 1e-14 s before it does.
+# Speed, relative to the pace of the motion, below which a contact point or a centre is at rest: 1e-14 s before it is.
 _STILL = 1e-13
-# Slower than this part of the pace, a ball that could rest where it is comes to rest: it has some 1e-11 m to go.
+# Speed, relative to the pace, below which a ball that could rest where it is comes to rest: it has some 1e-11 m to go.
 _SETTLED = 1e-5
-# Differences over this part of the time scale: 1e-12 of round-off and 1e-4 of curvature in the rate of a force.
+# Span of finite differences relative to the time scale: the rate of a force has 1e-12 of round-off and 1e-4 of
+# curvature.
 DIFFERENCE = 1e-4
 
 
@@ -37,21 +38,21 @@ class Exit(Enum):
     """Reason that a mode ends."""
 
     CONE = auto()  # sticking: the needed friction left the static cone
-    HALT = auto()  # sticking with rolling resistance: the centre stands still
-    STILL = auto()  # slipping: the contact point stands still
+    HALT = auto()  # sticking with rolling resistance: the centre stopped
+    STILL = auto()  # slipping: the contact point stopped
     LIFTOFF = auto()  # slipping: the normal force reached zero
-    CHANGE = auto()  # slipping: the other description is due
+    CHANGE = auto()  # slipping: the other description is needed
 
 
 class Survey(NamedTuple):
-    """Survey of a mode after a step.
+    """Margins of a mode after a step, and bounds on the next one.
 
     Attributes:
         margins: one per exit of the mode; the mode holds while none is negative.
-        trend: rate of the margin number ``dips``, the one that may turn negative and recover within one step; 0 where
-            it is too large for that.
+        trend: rate of the margin with index ``dips``, which may become negative and recover within one step; 0 where it
+            is too large for that.
         longest: bound on the next step [s].
-        slaved: whether the direction of the slip may be slaved from here on.
+        slaved: True if the slip may be slaved from here on.
     """
 
     margins: tuple[float, ...]
@@ -76,12 +77,12 @@ class Pace(NamedTuple):
 
     @property
     def still(self) -> float:
-        """Below this speed [m/s] a contact point, or a centre, stands still."""
+        """Speed [m/s] below which a contact point or a centre is at rest."""
         return _STILL * self.speed
 
     @property
     def settled(self) -> float:
-        """Below this speed [m/s] of the centre a ball that could rest where it is comes to rest."""
+        """Speed of the centre [m/s] below which a ball that could rest where it is comes to rest."""
         return _SETTLED * self.speed
 
 
@@ -89,8 +90,8 @@ class ContactMode(ABC):
     """One mode of contact: its own state y and equations, and the margins that end it.
 
     Attributes:
-        sticking: whether the contact holds by static friction.
-        exits: that can end it, in the order of :attr:`Survey.margins`.
+        sticking: True if the contact holds by static friction.
+        exits: possible ends, in the order of :attr:`Survey.margins`.
     """
 
     sticking: ClassVar[bool]
@@ -98,7 +99,7 @@ class ContactMode(ABC):
 
     @abstractmethod
     def rates(self, y: FloatArray) -> FloatArray:
-        """Rate of the mode's state."""
+        """Time derivative of the mode's state."""
 
     @abstractmethod
     def x(self, y: FloatArray) -> FloatArray:
@@ -106,24 +107,24 @@ class ContactMode(ABC):
 
     @abstractmethod
     def eliminated(self, y: FloatArray) -> FloatArray:
-        """The state with C v brought to the slip that y says."""
+        """State with velocities whose slip C v equals that described in y."""
 
     @abstractmethod
     def survey(self, y: FloatArray) -> Survey:
-        """Margins of the mode to its end."""
+        """Margins of the mode."""
 
     @abstractmethod
     def force(self, y: FloatArray) -> FloatArray:
-        """Force of the wall on the ball along the local axes [N], shape (3,)."""
+        """Force of the wall on the ball in local axes [N], shape (3,)."""
 
 
 def time_left(size: float, growth: float) -> float:
-    """Time until a size reaches zero at its present rate."""
+    """Time until a size reaches zero at its present rate; inf: it does not."""
     return size / -growth if growth < 0 else math.inf
 
 
-# While the cone leaves more than this part of itself, the needed friction cannot leave it and be back within one step:
-# a crest that high is many steps wide.
+# Reserve of the cone, relative to the available friction, above which the needed friction cannot exceed the cone and
+# return within one step: a peak that high is many steps wide.
 _CLEAR = 0.25
 
 
@@ -159,11 +160,11 @@ class Stick(_Held):
         super().__init__(friction.rolling, friction)
         self._pace = pace
         self.halts = friction.rolling.rolling_resistance > 0
-        # Where friction has no bound nobody looks for a slip.
+        # With unbounded friction no slip is searched for.
         self.exits = (*((Exit.CONE,) if friction.bounded else ()), *((Exit.HALT,) if self.halts else ()))
 
     def survey(self, y: FloatArray) -> Survey:
-        """See :class:`ContactMode`. Rolling resistance shortens steps towards where the centre stands still."""
+        """See :class:`ContactMode`. Rolling resistance shortens steps towards the point where the centre stops."""
         kin, trend = self._ball.kinematics(y), 0.0
         response = self._ball.response(kin)
         cone: tuple[float, ...] = ()
@@ -183,9 +184,9 @@ class Stick(_Held):
         return Survey((*cone, speed - self._pace.still), trend, longest=longest)
 
     def glance(self, y: FloatArray, before: Survey, elapsed: float) -> Survey:
-        """The survey of a ball that nothing but its own stop can end, from the one a step of ``elapsed`` [s] before.
+        """Margins of a ball that only standstill can end, from those a step of ``elapsed`` [s] before.
 
-        How fast the centre slows down is read off that step, which spares an evaluation of the equations.
+        The deceleration of the centre is estimated from that step, which saves an evaluation of the equations.
         """
         speed = self._ball.speed(y)
         margin = speed - self._pace.still
@@ -194,9 +195,10 @@ class Stick(_Held):
 
 
 class Rest(_Held):
-    """The centre stands still, held by friction and rolling resistance; the ball may spin about the normal.
+    """Rest of the centre, by friction and rolling resistance; the ball may spin about the normal.
 
-    Two more rows, ω2 = 0 and ω3 = 0, whose multipliers are the moment of the resistance: a bound, as friction is.
+    Two more rows, ω2 = 0 and ω3 = 0, are active. Their multipliers are the moment of rolling resistance, which is
+    bounded as friction is.
     """
 
     exits = ()
@@ -205,20 +207,20 @@ class Rest(_Held):
         super().__init__(friction.rolling.under("centre"), friction)
 
     def holds(self, x: FloatArray) -> bool:
-        """True if friction and resistance can both hold the ball at x."""
+        """True if friction and rolling resistance can both hold the ball at x."""
         response = self._ball.response_at(x)
-        moment = self._ball.radius * math.hypot(response.F2, response.F3)  # that holds the ball against the friction
+        moment = self._ball.radius * math.hypot(response.F2, response.F3)  # moment that friction exerts on the ball
         return self._friction.reserve(response) >= 0 and moment <= self._ball.rolling_resistance * response.N
 
     def released(self, x: FloatArray, speed: float) -> FloatArray:
-        """The state x with a speed of the centre [m/s], too small to matter, in the direction in which it sets off.
+        """State x with a negligible speed of the centre [m/s], in the direction in which it starts to move.
 
-        It gives the resistance a direction, which it has not at rest.
+        It gives the rolling resistance a direction, which is undefined at rest.
         """
         ball = self._ball.under("contact")
         ball.rolling_resistance = 0.0
         response = ball.response_at(x)
-        pull = math.hypot(*response.rate[1:3])  # nothing drifts where the centre stands still
+        pull = math.hypot(*response.rate[1:3])  # without drift, as the centre is at rest
         result = x.copy()
         result[-5:-3] += speed / pull * np.array(response.acceleration[:2])
         return ball.eliminated(result)
@@ -228,15 +230,15 @@ class Rest(_Held):
         return Survey(())
 
 
-# ε: the start of a slip ends where its direction relaxes more slowly than this part of T.
+# ε: the slip is slaved while its direction relaxes within this fraction of T.
 START = 1e-3
-# A slip that dies out this much faster than its direction relaxes (ρ̇ < -0.25 |b|) is not slaved: the asymptotic value
-# assumes that the relaxation wins, and fails altogether at -1.
+# A slip with ρ̇ < -_DYING |b| is not slaved: the asymptotic value assumes that relaxation is faster than the decay of
+# ρ, and is undefined at ρ̇ = -|b|.
 _DYING = 0.25
 
 
 class _Slip(ContactMode):
-    """Base of both descriptions of slip: ``size`` numbers of a slip behind x."""
+    """Base of both descriptions of slip; a state is x and ``size`` components of the slip."""
 
     sticking = False
     size: ClassVar[int]
@@ -246,7 +248,7 @@ class _Slip(ContactMode):
 
     @abstractmethod
     def look(self, y: FloatArray) -> SlidingForces:
-        """The slip at y."""
+        """Equations solved for the slip at y."""
 
     def x(self, y: FloatArray) -> FloatArray:
         """See :class:`ContactMode`."""
@@ -264,7 +266,7 @@ class SlavedSlip(_Slip):
     size = 1
 
     def look(self, y: FloatArray) -> SlidingForces:
-        """The slip at y."""
+        """Equations solved for the slip at y."""
         x, rho = y[:-1], float(y[-1])
         kin = self._ball.kinematics(x)
         drive = self._friction.drive(kin)
@@ -279,7 +281,7 @@ class SlavedSlip(_Slip):
         return self._friction.slide(kin, along(psi - lag))
 
     def _span(self, kin: Kinematics, sliding: SlidingForces) -> float:
-        """Time [s] over which to difference the drive, in which the resistance jumps where the centre stands still."""
+        """Span [s] of differences of the drive; short if the centre is about to stop, where resistance reverses."""
         span = DIFFERENCE * self._pace.time
         if not self._ball.rolling_resistance:
             return span
@@ -303,7 +305,7 @@ class SlavedSlip(_Slip):
         return Survey((rho, sliding.response.N, min(slow, dying)), longest=self._pace.time)
 
     def freed(self, y: FloatArray) -> FloatArray:
-        """The same slip as a state of :class:`FreeSlip`."""
+        """Same slip as a state of :class:`FreeSlip`."""
         d = self.look(y).direction
         return np.append(y, math.atan2(d[1], d[0]))
 
@@ -319,7 +321,7 @@ class FreeSlip(_Slip):
         self._slaved = SlavedSlip(friction, pace)
 
     def look(self, y: FloatArray) -> SlidingForces:
-        """The slip at y."""
+        """Equations solved for the slip at y."""
         return self._friction.slide(self._ball.kinematics(y[:-2]), along(float(y[-1])))
 
     def rates(self, y: FloatArray) -> FloatArray:
@@ -335,13 +337,13 @@ class FreeSlip(_Slip):
         return np.concatenate([x, y[-2:]])
 
     def survey(self, y: FloatArray) -> Survey:
-        """See :class:`ContactMode`. The stiff direction bounds a step before it would make the method unstable."""
+        """See :class:`ContactMode`. The stiff direction limits steps so that the method stays stable."""
         sliding, rho = self.look(y), float(y[-2])
         N, span = sliding.response.N, DIFFERENCE * self._pace.time
         ahead = self._ball.kinematics(y[:-2] + span * self._ball.derivative(sliding.kin, sliding.response))
         trend = (self._ball.normal_force(ahead) - N) / span
         relaxation = rho / sliding.strength if sliding.strength else math.inf
-        # Not at the same bounds at which a slaved slip ends, so that the two do not alternate.
+        # Bounds differ from those at which a slaved slip ends, so that the two do not alternate.
         slaved = relaxation < 0.5 * START * self._pace.time and sliding.growth > -0.5 * _DYING * sliding.strength
         if slaved:
             d = self._slaved.look(y[:-1]).direction

@@ -1,7 +1,7 @@
-"""Descriptions of the ball's rotation: the paper's Euler angles, a quaternion, or its velocity alone.
+"""Descriptions of the ball's rotation: the paper's Euler angles, a quaternion, or the angular velocity alone.
 
-The five velocities are s = [u̇1 u̇2 r1 r2 r3]; here r gives the angular velocity along the local axes,
-ω' = [ω1 ω2 ω3] = A r. A dot on A means its rate seen from the world.
+The five velocities are s = [u̇1 u̇2 r1 r2 r3]; here r gives the angular velocity in local axes, ω' = [ω1 ω2 ω3] = A r.
+A dot on A means its rate in the world frame.
 """
 
 from __future__ import annotations
@@ -20,22 +20,22 @@ from proofroll.engines.projection.geometry import Frame, Vector, along, in_world
 if TYPE_CHECKING:
     from scipy.spatial.transform import Rotation
 
-# The condition of M̄ grows like 1/sin²θ as θ nears 0 or π. Here, at 30 degrees, nothing is lost yet; the paper's own
-# run, where sin θ stays above 0.75, does not come so far.
+# sin θ below which angles are renewed. The condition number of M̄ grows like 1/sin²θ as θ nears 0 or π. Here, at 30
+# degrees, no digit is lost yet; in the paper's own run sin θ stays above 0.75.
 _RENEWED = 0.5
-# Where the axes are not renewed the run ends here, four digits later. With the tightest tolerance, a ball that passes
-# at this distance still has its reactions to 2e-11 N (weight 5 N); at 0.003 it is 2e-10 N (measured).
+# sin θ at which the run ends if angles are not renewed, four digits later. With the tightest tolerance, a ball that
+# passes at this distance still has its reactions accurate to 2e-11 N (weight 5 N); at 0.003 to 2e-10 N (measured).
 _SMALLEST_SINE = 0.01
-# A fixed step that turns the ball by more than this is too coarse anywhere, not only near the singularity.
+# sin θ above which a fixed step never fails: one that turns the ball by more is too coarse everywhere.
 _LARGEST_SINE = 0.5
 
 
 class Orientation(ABC):
-    """Description of the rotation: angles (none, or three, or a quaternion) and three velocities r.
+    """Description of the rotation: angles (none, three, or a quaternion) and three velocities r.
 
     Attributes:
         size: number of angles.
-        periodic: those that are the same after a whole turn.
+        periodic: True for angles that are the same after a whole turn.
     """
 
     size: ClassVar[int] = 0
@@ -47,34 +47,46 @@ class Orientation(ABC):
 
     @abstractmethod
     def pose(self, angles: Sequence[float]) -> tuple[float, ...]:
-        """Numbers on which A depends, besides the frame. Raises ArithmeticError if the angles are not finite."""
+        """Numbers on which A depends, apart from the frame.
+
+        Raises:
+            ArithmeticError: the angles are not finite.
+        """
 
     @abstractmethod
     def angular_velocity(self, pose: tuple[float, ...], r: Sequence[float], frame: Frame) -> Vector:
-        """A r [rad/s]."""
+        """Angular velocity ω' = A r [rad/s]."""
 
     @abstractmethod
     def solved(self, pose: tuple[float, ...], rate: Vector, frame: Frame) -> Vector:
-        """A⁻¹ of a vector along e1, e2, e3. Raises ArithmeticError if A is singular."""
+        """Product of A⁻¹ and a vector along e1, e2, e3.
+
+        Raises:
+            ArithmeticError: A is singular.
+        """
 
     @abstractmethod
     def acceleration(
         self, pose: tuple[float, ...], r: Sequence[float], rate: Vector, turned: Vector, frame: Frame
     ) -> Vector:
-        """ṙ = A⁻¹ (ω̇ - Ȧ r) [rad/s²], with ω̇ in ``rate``; ``turned`` is its part by the turning of the frame alone."""
+        """Acceleration ṙ = A⁻¹ (ω̇ - Ȧ r) [rad/s²]; ``rate``: ω̇; ``turned``: its part by the frame's turning alone."""
 
     def rates(self, angles: Sequence[float], r: Sequence[float], frame: Frame) -> Sequence[float]:  # noqa: ARG002 -- there may be none
         """Rates of the angles [1/s]."""
         return ()
 
     def check(self, t: float, angles: FloatArray, r: FloatArray, step: float) -> None:  # noqa: B027 -- most never fail
-        """Raises Diverged if the description fails at time ``t`` [s]; ``step`` [s] is a fixed step's size, else 0."""
+        """Checks the description at time ``t`` [s]; ``step``: size of a fixed step [s], else 0.
+
+        Raises:
+            Diverged: it fails.
+        """
 
     def renewed(self, t: float, angles: FloatArray, r: FloatArray) -> tuple[FloatArray, FloatArray] | None:  # noqa: ARG002 -- most never fail
-        """Other angles and velocities for the same rotation at time ``t`` [s], where these are about to fail; or None.
+        """Other angles and velocities for the same rotation at time ``t`` [s] if these are about to fail; else None.
 
-        Called once, in order of time, with each state from which the motion goes on; never with one that is only
-        looked at.
+        Called once, in order of time, with each state from which the motion goes on; never with a state that is only
+        sampled.
         """
         return None
 
@@ -86,30 +98,29 @@ class Orientation(ABC):
 class EulerAngles(Orientation):
     """Euler angles z-x-z [φ θ ψ]: rotation, nutation, precession (Blajer 2006), about the axes of the world.
 
-    Near the singularity at θ = 0 and π the body's axes, whose orientation the angles give, are chosen anew with
-    θ = π/2. To a ball all axes through its centre are principal ones with the same moment of inertia, so no equation
-    of the paper changes, nor does the formulation: only where the angles are counted from. A hand-over to coordinates
-    without a singularity would do as well for the motion, but it would leave the formulation that was asked for, and
-    two sets of equations behind one answer.
+    Near the singularity at θ = 0 and π the body axes, whose orientation the angles give, are renewed with θ = π/2. All
+    axes through a ball's centre are principal axes with the same moment of inertia, so no equation of the paper
+    changes, only the reference of the angles. Coordinates without a singularity would give the same motion, but by
+    another formulation than the one requested, with two sets of equations for one result.
 
     Attributes:
-        renewals: times [s] at which the axes were chosen anew.
+        renewals: times [s] at which the axes were renewed.
     """
 
     size: ClassVar[int] = 3
     periodic: ClassVar[tuple[bool, ...]] = (True, True, True)
 
     def __init__(self, *, renews: bool = True) -> None:
-        """Without ``renews`` the run ends at the singularity, as the paper's equations do by themselves."""
+        """Starts with renewal; without ``renews`` the run ends at the singularity, as the paper's equations do."""
         from scipy.spatial.transform import Rotation
 
         self.renewals: list[float] = []
         self._renews = renews
-        self._orientation_then = Rotation.identity()  # of the ball, where the present axes were chosen
+        self._orientation_then = Rotation.identity()  # of the ball, when the present axes were chosen
         self._axes_then = _body_axes(np.array([0.0, math.pi / 2, 0.0]))
 
     def start(self, frame: FloatArray, w: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """See :class:`Orientation`. θ = π/2 is as far from the singularity as can be."""
+        """See :class:`Orientation`. θ = π/2 is farthest from the singularity."""
         angles = [0.0, math.pi / 2, 0.0]
         return np.array(angles), np.array(_about_the_axes(self.pose(angles), *(frame @ w).tolist()))
 
@@ -149,7 +160,7 @@ class EulerAngles(Orientation):
         return r
 
     def check(self, t: float, angles: FloatArray, r: FloatArray, step: float) -> None:
-        """See :class:`Orientation`. Looks for the singularity at θ = 0 and π, where φ and ψ turn about one axis.
+        """See :class:`Orientation`. Detects the singularity at θ = 0 and π, where φ and ψ turn about one axis.
 
         One fixed step turns the ball by |ω| step. If the axis of φ is nearer to the vertical than that, φ and ψ turn by
         a radian or so in a step and the result is silently wrong (by as much as the weight in F3, measured).
@@ -167,7 +178,7 @@ class EulerAngles(Orientation):
             )
 
     def renewed(self, t: float, angles: FloatArray, r: FloatArray) -> tuple[FloatArray, FloatArray] | None:
-        """See :class:`Orientation`. The new axis of φ is horizontal, in line with the angular velocity: then θ̇ = 0."""
+        """See :class:`Orientation`. The new axis of φ is horizontal, along the angular velocity, so θ̇ = 0."""
         if not self._renews or abs(math.sin(angles[1])) >= _RENEWED:
             return None
         w = _turning(self.pose(angles.tolist()), r.tolist())
@@ -187,7 +198,7 @@ class EulerAngles(Orientation):
 
 
 def _turning(pose: tuple[float, ...], r: Sequence[float]) -> Vector:
-    """Angular velocity in the world of the rates r of φ, θ and ψ [rad/s]: the columns of A are their axes."""
+    """Angular velocity in the world from the rates r of φ, θ and ψ [rad/s]; the columns of A are their axes."""
     sin, cos, sin_psi, cos_psi = pose
     phi_rate, theta_rate, psi_rate = r
     level = phi_rate * sin
@@ -195,7 +206,7 @@ def _turning(pose: tuple[float, ...], r: Sequence[float]) -> Vector:
 
 
 def _about_the_axes(pose: tuple[float, ...], x: float, y: float, z: float) -> Vector:
-    """The rates of φ, θ and ψ of an angular velocity in the world: the inverse of :func:`_turning`."""
+    """Rates of φ, θ and ψ from an angular velocity in the world: inverse of :func:`_turning`."""
     sin, cos, sin_psi, cos_psi = pose
     if not sin:
         raise ArithmeticError("the equations of motion are singular")
@@ -204,7 +215,7 @@ def _about_the_axes(pose: tuple[float, ...], x: float, y: float, z: float) -> Ve
 
 
 def _body_axes(angles: FloatArray | Sequence[float]) -> Rotation:
-    """Orientation of the body's axes in the world."""
+    """Orientation of the body axes in the world."""
     from scipy.spatial.transform import Rotation
 
     phi, theta, psi = angles
@@ -212,9 +223,9 @@ def _body_axes(angles: FloatArray | Sequence[float]) -> Rotation:
 
 
 class RotatingFrame(Orientation):
-    """The angular velocity along the local axes itself, r = ω' (quasi-velocities): no angle, hence no singularity.
+    """Angular velocity in local axes, r = ω' (quasi-velocities): no angles, hence no singularity.
 
-    A ball's inertia does not depend on its orientation, so nothing in the equations asks for it.
+    A ball's inertia is the same in all orientations, so the equations do not need the orientation.
     """
 
     def start(self, frame: FloatArray, w: FloatArray) -> tuple[FloatArray, FloatArray]:  # noqa: ARG002 -- no angles
@@ -248,7 +259,7 @@ class RotatingFrame(Orientation):
 
 
 class FollowedFrame(RotatingFrame):
-    """The same, and besides the orientation: a quaternion in the world, a quadrature on which nothing depends."""
+    """:class:`RotatingFrame` with the orientation as a quaternion, by a quadrature that affects nothing else."""
 
     size: ClassVar[int] = 4
     periodic: ClassVar[tuple[bool, ...]] = (False,) * 4

@@ -1,7 +1,7 @@
-"""Elimination joint by joint, from the tips of the tree to the world and back, for single numbers; compiled by heyoka.
+"""Recursive elimination in scalars, from the tips of the tree to the world and back; compiled by heyoka.
 
-Its cost grows with the number of bodies and no faster, without a matrix of all velocities: so its formulas stay few
-enough for a compiler.
+Its cost is linear in the number of bodies, without a matrix of all velocities, so its formulas stay few enough for a
+compiler.
 """
 
 from collections.abc import Callable
@@ -17,12 +17,13 @@ from proofroll.engines.projection.connections import SKEW, Bodies, ProjectedConn
 from proofroll.engines.projection.dependent import DependentCoordinates
 from proofroll.engines.projection.elimination import Closing, Elimination, Loads
 
-# More bodies than these are compiled in parts: slower code, in a time that grows no faster than they do.
+# Number of bodies up to which code is compiled as a whole; larger trees are compiled in parts: slower code, but a
+# compile time linear in the number of bodies.
 _WHOLE = 10
 
 
 class Recursion(Elimination):
-    """Tree of a mechanism without loops; twists are six numbers, ω and the velocity at the origin."""
+    """Tree of a mechanism without loops; twists have six components: ω and the velocity at the origin."""
 
     def __init__(self, mechanism: Mechanism, connections: ProjectedConnections) -> None:
         super().__init__(mechanism, connections)
@@ -69,11 +70,11 @@ class Recursion(Elimination):
 
 
 def compiled(mechanism: Mechanism) -> tuple[Callable[[Array], Array], Callable[[Array], Array]]:
-    """Rates of the state, and the state without violations: :class:`DependentCoordinates` in machine code.
+    """Compiled rates of the state, and projection of the state onto the constraints, of :class:`DependentCoordinates`.
 
     Raises:
         Missing: heyoka is not installed.
-        Refused: the mechanism has what these formulas do not.
+        Refused: the mechanism has loops, couplings, or springs that depend on turns.
     """
     if mechanism.loops:
         raise Refused("singular values of loops are not compiled; choose preset=matched")
@@ -102,7 +103,7 @@ def compiled(mechanism: Mechanism) -> tuple[Callable[[Array], Array], Callable[[
 
 
 def _six(twists: Array) -> Array:
-    """(ω, v) of [ω× v; 0 0]."""
+    """Components (ω, v) of twists [ω× v; 0 0]."""
     flat = twists[..., :3, :3].reshape(*twists.shape[:-2], 9)
     return np.concatenate([0.5 * flat @ SKEW.T, twists[..., :3, 3]], axis=-1)
 
@@ -115,13 +116,13 @@ def _four(twists: Array) -> Array:
 
 
 def _moments(forces: Array) -> Array:
-    """(moment about the origin, force) of matrices f pᵀ."""
+    """Components (moment about the origin, force) of matrices f pᵀ."""
     flat = forces[..., :3, :3].reshape(*forces.shape[:-2], 9)
     return np.concatenate([flat @ SKEW.T, forces[..., :3, 3]], axis=-1)
 
 
 def _spatial(inertia: Array) -> Array:
-    """Inertia matrix of six rows from Σ of four."""
+    """Spatial inertia, shape (6, 6), from the matrix Σ, shape (4, 4)."""
     matrix = np.zeros((6, 6), dtype=inertia.dtype)
     matrix[:3, :3] = np.eye(3) * np.trace(inertia[:3, :3]) - inertia[:3, :3]
     matrix[:3, 3:] = (inertia[:3, 3] @ SKEW).reshape(3, 3)

@@ -54,7 +54,7 @@ class ProjectionSettings:
         taylor, dependent = self.integrator == "taylor", self.formulation == "dependent"
         tightest = library.TIGHTEST if taylor else TIGHTEST
         yield self.rtol < tightest, "rtol", f"double precision allows no less than {tightest:.3g}"
-        # A setting that would be ignored is an error: a user who writes dt=1e-4 believes that it does something.
+        # Settings without effect are errors: a user who writes dt=1e-4 believes that it does something.
         advice = f"{self.integrator} chooses its own steps; set rtol, or add integrator=rk4"
         yield self.resolution == "rtol" and self.dt != _DT, "dt", advice
         advice = f"{self.integrator} has a fixed step; set dt, or add integrator=dop853"
@@ -72,7 +72,7 @@ class ProjectionSettings:
 
     @property
     def resolution(self) -> Literal["dt", "rtol"]:
-        """The setting that trades speed for accuracy."""
+        """Name of the setting that trades speed for accuracy."""
         return "rtol" if self.integrator == "taylor" else INTEGRATORS[self.integrator].resolution
 
     @property
@@ -93,9 +93,8 @@ class ProjectionSettings:
         return Scheme.RK4 if self.integrator == "rk4" else self.integrator
 
 
-# default: what a reader of the paper writes down, a classical fixed-step method with elimination of violations.
-# matched: the same equations with nothing left of the integrator but round-off.
-# tuned: the same again, compiled.
+# default: what a reader of the paper would write, a classical fixed-step method with elimination of violations.
+# matched: the same equations, integrated to round-off. tuned: the same, compiled.
 PRESETS: Mapping[str, Mapping[str, ProjectionSettings]] = {
     "euler": {
         "default": ProjectionSettings("euler", "default", "rk4"),

@@ -1,4 +1,4 @@
-"""The sequence of sticking and slipping: which mode holds, when it ends, and which comes next."""
+"""Sequence of sticking and slipping of a ball: the present mode, its end, and the next mode."""
 
 import math
 from collections.abc import Callable
@@ -17,17 +17,17 @@ from proofroll.engines.projection.friction import Friction
 from proofroll.engines.projection.method import ProjectedBall
 from proofroll.engines.projection.modes import ContactMode, Exit, FreeSlip, Pace, Rest, SlavedSlip, Stick, Survey
 
-# Times are located to this part of the time scale of the motion, or to round-off of the time itself.
+# Accuracy of located times, relative to the time scale of the motion; at least the round-off of the time.
 _LOCATED = 1e-12
 
 
 class Switching:
-    """A ball under bounded friction.
+    """Motion of a ball under bounded friction or rolling resistance.
 
     Attributes:
-        friction: the law between ball and wall.
-        mode: the one that holds now.
-        stepper: where the motion is.
+        friction: friction law between ball and wall.
+        mode: present mode.
+        stepper: integrator, with the present state.
         events: so far.
     """
 
@@ -42,17 +42,18 @@ class Switching:
         renewed: Callable[[float, FloatArray], FloatArray | None],
         eliminate: bool,
     ) -> None:
-        """Starts at time 0 in the mode that the state x asks for.
+        """Starts at time 0 in the mode that follows from the state x.
 
         Args:
-            ball: its equations.
-            body: the ball that they belong to.
-            stepper: new.
+            ball: equations of motion.
+            body: the ball.
+            stepper: a new integrator.
             x: coordinates and velocities.
             scales: natural size of each component of x.
-            check: called with the time [s] and x after each step; raises Diverged if x is not to be trusted.
-            renewed: called with them where the motion goes on from there; the same state in other coordinates, or None.
-            eliminate: remove the violation of what C v shall be after each step.
+            check: called with time [s] and x after each step; raises Diverged if x is not reliable.
+            renewed: called with time and x where the motion goes on; returns the same state in other coordinates, or
+                None.
+            eliminate: make C v consistent with the slip after each step.
         """
         self.stepper = stepper
         self.events: list[Event] = []
@@ -77,7 +78,7 @@ class Switching:
 
     @property
     def x(self) -> FloatArray:
-        """Coordinates and velocities now."""
+        """Present coordinates and velocities."""
         return self.mode.x(self.stepper.x)
 
     @property
@@ -87,16 +88,20 @@ class Switching:
 
     @property
     def rates(self) -> FloatArray:
-        """Rates of the state now, those of x first."""
+        """Rates of the present state, those of x first."""
         return self.mode.rates(self.stepper.x)
 
     @property
     def force(self) -> FloatArray:
-        """Force of the wall on the ball now along the local axes [N], shape (3,)."""
+        """Present force of the wall on the ball in local axes [N], shape (3,)."""
         return self.mode.force(self.stepper.x)
 
     def advance(self, t: float) -> None:
-        """Moves to time t [s]; raises Diverged where the ball leaves the wall, or the integration gives up."""
+        """Moves to time t [s].
+
+        Raises:
+            Diverged: the ball leaves the wall, or the integration fails.
+        """
         if self._lost:
             raise Diverged(self._lost)
         stepper = self.stepper
@@ -115,7 +120,7 @@ class Switching:
                 self._survey, self._idle = survey, 0
 
     def _look(self) -> Survey:
-        """After a step."""
+        """Margins of the mode after a step."""
         stepper = self.stepper
         if self.mode is self._stick and self._stick.halts and not self.friction.bounded:
             return self._stick.glance(stepper.x, self._survey, stepper.t - stepper.t_before)
@@ -131,7 +136,7 @@ class Switching:
         self._survey = mode.survey(y)
 
     def _ended(self, survey: Survey) -> tuple[Exit, float, float] | None:
-        """The first exit within the last step and the times [s] between which it lies."""
+        """First exit within the last step, and the times [s] between which it lies; None: the mode goes on."""
         from scipy.optimize import brentq
 
         ends = [
@@ -150,7 +155,7 @@ class Switching:
         return exit_, low, high
 
     def _may_dip(self, survey: Survey) -> bool:
-        """True if a margin that was lowest within the last step could, were it a parabola, come anywhere near zero."""
+        """True if a margin with a minimum within the last step could, as a parabola, come near zero."""
         bend = (self.stepper.t - self.stepper.t_before) * (survey.trend - self._survey.trend)
         return min(self._survey.margins[survey.dips], survey.margins[survey.dips]) < bend
 
@@ -161,7 +166,7 @@ class Switching:
         return max(_LOCATED * self._pace.time, 4 * float(np.spacing(t)))
 
     def _crossing(self, index: int, high: float) -> tuple[float, float]:
-        """Times [s] within the last step before and after a margin became negative, which it is at ``high``."""
+        """Times [s] in the last step just before and after a margin became negative; at ``high`` it is negative."""
         return self.stepper.crossing(lambda y: self.mode.survey(y).margins[index], high, self._resolution(high))
 
     def _switch(self, exit_: Exit, low: float, high: float) -> None:
@@ -184,7 +189,7 @@ class Switching:
             self._settle(low, high, x, self.mode.sticking)
 
     def _settle(self, low: float, high: float, x: FloatArray, was_sticking: bool) -> None:
-        """Goes on from where the contact point stands still, at the state x: sticking if the static cone allows it."""
+        """Next mode at standstill of the contact point, in the state x: sticking if the static cone allows it."""
         ball = self.friction.rolling
         if high > 0:
             x = ball.eliminated(x)
@@ -202,5 +207,5 @@ class Switching:
         self._enter(mode, high, x if mode.sticking else np.append(x, 0.0))
 
     def _event(self, kind: EventKind, low: float, high: float) -> None:
-        bracket = self.stepper.bracket(low, high) if high > 0 else (0.0, 0.0)  # how it starts needs no search
+        bracket = self.stepper.bracket(low, high) if high > 0 else (0.0, 0.0)  # the initial mode needs no bracket
         self.events.append(Event(kind, 0.5 * (low + high), *bracket))

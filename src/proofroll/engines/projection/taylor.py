@@ -1,4 +1,4 @@
-"""The projection method's equations, solved in symbols, as compiled Taylor series (heyoka)."""
+"""Equations of the projection method, solved symbolically, as compiled Taylor series (heyoka)."""
 
 from collections.abc import Callable
 
@@ -14,10 +14,10 @@ from proofroll.elements.ball_on_surface.model import RollingBall
 
 
 class TaylorSeries(Series):
-    """A ball that rolls without slip, its state x = [q, s] by steps as long as the tolerance allows.
+    """Motion of a ball that rolls without slip, in the state x = [q, s], with steps as long as the tolerance allows.
 
-    A step is exact to the last digits, and the equations keep C v constant, so that round-off alone violates the
-    constraints. Over thousands of oscillations that adds up, and is removed like any other violation.
+    A step is exact to the last digits, and the equations keep C v constant, so only round-off violates the constraints.
+    It accumulates over thousands of oscillations, and is removed like any other violation.
     """
 
     def __init__(
@@ -31,12 +31,12 @@ class TaylorSeries(Series):
     ) -> None:
         """Starts at time 0 in the state x, with the relative tolerance ``rtol`` of a step [1].
 
-        After each step ``check`` is called with the time [s] and state, and raises Diverged if it is not to be trusted;
-        ``accepted`` is the state from which the motion goes on, see ``Renewed`` of :mod:`compiled.series`.
+        After each step ``check`` is called with time [s] and state, and raises Diverged if it is not reliable;
+        ``accepted`` gives the state from which the motion goes on, see ``Renewed`` of :mod:`compiled.series`.
 
         Raises:
             Missing: heyoka is not installed.
-            Refused: the scene is not one of its equations.
+            Refused: the compiled equations do not cover the scene.
         """
         if np.isfinite(body.contact.mu_static):
             raise Refused(
@@ -64,10 +64,10 @@ class TaylorSeries(Series):
 
     @property
     def rates(self) -> FloatArray:
-        """ẋ now."""
+        """Present time derivative ẋ."""
         return self._evaluate(self.x, self._pars)[:-3]
 
     @property
     def force(self) -> FloatArray:
-        """Force of the wall on the ball now along the local axes, (-N, -λ1, -λ2) [N], shape (3,)."""
+        """Present force of the wall on the ball in local axes, (-N, -λ1, -λ2) [N], shape (3,)."""
         return -self._mass * self._evaluate(self.x, self._pars)[-3:]
