@@ -68,7 +68,7 @@ class Projection:
 
     @staticmethod
     def version() -> str:
-        """Version of proofroll, of which the method is part, and of heyoka if installed."""
+        """Version of proofroll, which includes the method, and of heyoka if installed."""
         return with_heyoka(proofroll.__version__)
 
     @classmethod
