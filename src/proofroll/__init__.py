@@ -1,12 +1,12 @@
 """Cross-validation of multibody engines: which engine, formulation and time step to trust for a scene.
 
-The public names, loaded when they are first used, so that importing proofroll stays light: the command is ready for
-Ctrl-C before anything else is loaded.
+Public names are loaded at their first use, so that importing proofroll is quick and the command handles Ctrl-C before
+anything else is loaded.
 """
 
 from __future__ import annotations
 
-TYPE_CHECKING = False  # type checkers take it for true, and the module typing is not loaded
+TYPE_CHECKING = False  # type checkers assume True; so the module typing need not be loaded
 if TYPE_CHECKING:
     from typing import Any
 
@@ -47,4 +47,4 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    return sorted({*globals(), *__all__})  # so that help() finds what is loaded only when it is used
+    return sorted({*globals(), *__all__})  # so that help() finds names that are not loaded yet

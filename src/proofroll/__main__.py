@@ -1,8 +1,8 @@
-"""The command ``proofroll``; small, so that Ctrl-C finds it ready while the rest loads."""
+"""Command ``proofroll``; this module is small, so that Ctrl-C is handled while the rest is loaded."""
 
 
 def _leave(*_: object) -> None:
-    """Ends the process at once: nothing has been begun, and an exception could be lost in whatever is being loaded."""
+    """Ends the process at once: nothing has begun, and a module being loaded might swallow an exception."""
     import os
 
     os.write(2, b"proofroll: interrupted before anything was run\n")
@@ -14,7 +14,7 @@ def main() -> None:
     try:
         import signal
 
-        if signal.getsignal(signal.SIGINT) is signal.default_int_handler:  # a shell may have told us to ignore it
+        if signal.getsignal(signal.SIGINT) is signal.default_int_handler:  # a shell may have set it to be ignored
             signal.signal(signal.SIGINT, _leave)
         from proofroll.cli import main as command_line
 

@@ -1,4 +1,4 @@
-"""Fixture for pytest; it loads nothing before a test asks for it."""
+"""Pytest fixture; it loads proofroll only when a test uses it."""
 
 from collections.abc import Callable
 from typing import Any

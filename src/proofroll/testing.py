@@ -1,7 +1,7 @@
-"""Agreement with the truth as an assertion, for tests of engines and of what is built on them.
+"""Agreement with the truth as an assertion, for tests of engines and of packages that use them.
 
-The pytest plug-in of this package gives :func:`assert_agrees` as a fixture of that name; nothing of it is loaded before
-a test asks for it. pytest is not needed here.
+The pytest plug-in of this package offers :func:`assert_agrees` as a fixture of that name. This module does not need
+pytest.
 """
 
 import os
@@ -31,24 +31,27 @@ def assert_agrees(
 
     Args:
         scene: name, path of a folder, or :func:`proofroll.load_scene`.
-        engine: ``name[key=value,…]``; a class, which no package needs to announce; an engine that is built, at time 0;
-            or a trajectory, as for :func:`proofroll.judge`.
+        engine: ``name[key=value,…]``; a class, which no package needs to announce; an engine built by the caller, at
+            time
+            0; or a trajectory, as for :func:`proofroll.judge`.
         tolerance: allowed error, as for :func:`proofroll.judge`.
-        because: reason for which that is close enough.
-        until: last time [s]; of an engine.
-        every: interval between samples [s]; by default 0.01 s, or the nearest whole number of steps.
+        because: reason for this tolerance.
+        until: last time of an engine's run [s].
+        every: sampling interval [s]; by default 0.01 s, or the nearest whole number of steps.
         **settings: of the engine.
 
     Returns:
-        what was found, if it agrees.
+        The judgement, if it agrees.
 
     Raises:
-        AssertionError: it does not, or did not reach the end; the text says what is off, by how much and when, what is
-            allowed, and how well the truth is known.
-        InputError: something that was given does not exist or makes no sense.
+        AssertionError: it differs, or did not reach the end; the text has each error with its time, its tolerance and
+            the
+            error bar of the truth.
+        InputError: an argument names something unknown or makes no sense.
         Missing, Refused: the engine is not installed, or cannot represent the scene.
     """
-    __tracebackhide__ = True  # pytest then shows the line of the test and the sentence, not the frames in here
+    __tracebackhide__ = True  # pytest then shows the line of the test, not the frames of this function
+
     if not because.strip():
         raise InputError("because", because, "say why the tolerance is close enough")
     scene = load_scene(scene) if isinstance(scene, str) else scene

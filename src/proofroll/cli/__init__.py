@@ -1,4 +1,4 @@
-"""The command line. Data goes to standard output, progress and problems to standard error."""
+"""Command line. Data goes to standard output, progress and problems to standard error."""
 
 import io
 import os
@@ -47,8 +47,8 @@ app.add_typer(engines, name="engines")
 
 
 def _add_announced() -> None:
-    """Adds the commands of other packages, and of parts of this one; what is none is left out."""
-    with warnings.catch_warnings(action="ignore"):  # they are told at the end, a line each
+    """Adds the commands that other packages and parts of this one announce; invalid ones are left out."""
+    with warnings.catch_warnings(action="ignore"):  # main prints them at the end, a line each
         for point, added in loaded("proofroll.commands", object):
             if isinstance(added, typer.Typer):
                 app.add_typer(added, name=point.name)
@@ -62,7 +62,7 @@ def _add_command(point: EntryPoint, added: Any) -> None:
         return
     alone = typer.Typer()
     alone.command()(added)
-    try:  # or a parameter of which no option can be made would end all commands
+    try:  # a parameter that typer cannot turn into an option would otherwise break all commands
         typer.main.get_command(alone)
     except Exception as error:
         leave_out(point, f"is no command ({type(error).__name__}: {error})")
@@ -88,23 +88,26 @@ def start(
 
 
 def _told(error: typer.TyperException) -> str:
-    """Message of a usage error, with what typer leaves out: the wrong value, or the names to choose from."""
-    said = str(error.format_message())
-    lacking: Any = error  # typer tells no type of one that names its parameter
-    if said.startswith("Missing ") and getattr(error, "param", None) is not None:
+    """Message of a usage error, completed by the wrong value or the names to choose from, which typer leaves out."""
+    message = str(error.format_message())
+    lacking: Any = error  # typer has no public type for errors with a parameter
+    if message.startswith("Missing ") and getattr(error, "param", None) is not None:
         names = [item.value for item in lacking.param.shell_complete(lacking.ctx, "")]
-        return f"{said} Choose one of {choices(names)}." if names else said
+        return f"{message} Choose one of {choices(names)}." if names else message
     problems: list[dict[str, Any]] = getattr(error.__cause__, "errors", list)()
-    option = re.search(r"'([^']+)'", said)
+    option = re.search(r"'([^']+)'", message)
     if not problems or option is None:
-        return said
+        return message
     from proofroll.core.validation import advice
 
     return f"{option[1]} = {problems[0]['input']!r}: {advice(problems[0]['type'], problems[0]['msg'])}"
 
 
 def _interrupt(*_: object) -> None:
-    """Ends all workers, so that whatever waits for one goes on, and then this process; at once when asked again."""
+    """Signal handler: kills all workers, so that nothing waits for them, and interrupts.
+
+    The next signal ends the process at once.
+    """
     if "proofroll.running.process" in sys.modules:
         from proofroll.running.process import end_all
 
@@ -116,20 +119,20 @@ def _interrupt(*_: object) -> None:
 
 
 def _prepare_output() -> None:
-    """Standard output is there where a shell closed it (``>&-``), and one without our signs shows ? for them."""
+    """Opens standard output if a shell closed it (``>&-``), and replaces characters that it cannot encode by ``?``."""
     sys.stdout = sys.stdout or open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115 -- open to the end
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(errors="replace")
 
 
-# A call of ``app`` makes all of them again, which takes longer than many a command.
+# Cached: a call of ``app`` would make all commands again, which takes longer than many of them.
 @cache
 def _commands() -> Any:
     made: Any = typer.main.get_command(app)
     groups = [made]
-    for group in groups:  # which grows
+    for group in groups:  # the list grows meanwhile
         for command in group.commands.values():
-            command.short_help = (command.help or "").partition("\n\n")[0]  # else it is cut
+            command.short_help = (command.help or "").partition("\n\n")[0]  # or typer cuts it
             groups += [command] if hasattr(command, "commands") else []
     return made
 
@@ -138,18 +141,18 @@ def main() -> None:
     """Entry point: every problem is one line on standard error and an exit code."""
     _prepare_output()
     signal.signal(signal.SIGTERM, _interrupt)  # a time limit from outside also ends the workers
-    if signal.getsignal(signal.SIGHUP) is signal.SIG_DFL:  # so does the end of the terminal, but for nohup
+    if signal.getsignal(signal.SIGHUP) is signal.SIG_DFL:  # so does the end of the terminal, unless nohup ignores it
         signal.signal(signal.SIGHUP, _interrupt)
-    if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:  # as a shell may have told us
+    if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:  # a shell may have set it to be ignored
         signal.signal(signal.SIGINT, _interrupt)
-    warnings.simplefilter("ignore", RuntimeWarning)  # of numbers that overflow: what comes of them is told
+    warnings.simplefilter("ignore", RuntimeWarning)  # of overflows: their consequences are reported
     try:
         if not all(map(str.strip, sys.argv[1:])):
             raise InputError("argument", "", "this is empty; give a value, or leave the option out")
         code = _commands()(standalone_mode=False)
-        sys.stdout.flush()  # a full disk shows here, or nowhere
+        sys.stdout.flush()  # raises here if the disk is full
     except typer.TyperException as error:
-        if error.format_message().startswith("Usage:"):  # a group of commands without one
+        if error.format_message().startswith("Usage:"):  # a group of commands was called without a command
             sys.stdout.write(f"{error.format_message()}\n")
         else:
             complain(_told(error))
@@ -167,20 +170,20 @@ def main() -> None:
         code = INTERRUPTED
     except (OSError, SystemExit) as error:
         code = _unwritten(error)
-    for said in broken.values():
-        complain(said)
+    for warning in broken.values():
+        complain(warning)
     if code == INTERRUPTED:
         complain("interrupted; cases that were finished and stored will be reused")
     sys.exit(code or OK)
 
 
 def _unwritten(error: OSError | SystemExit) -> Any:
-    """Exit code if output cannot be written; a pipe that its reader closed is no error."""
+    """Exit code if output cannot be written; a pipe closed by its reader is no error."""
     if isinstance(error, SystemExit):
         if not isinstance(error.__context__, BrokenPipeError):
-            return error.code  # of a command
-        error = error.__context__  # typer tells that as a failure
-    # what is left in the buffers would be tried again at the end
+            return error.code  # exit code of a command
+        error = error.__context__  # typer turns a broken pipe into a failure
+    # Python would write the rest of its buffers at exit and fail again
     os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
     if isinstance(error, BrokenPipeError):
         return OK

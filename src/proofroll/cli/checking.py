@@ -1,4 +1,4 @@
-"""Check of the file of a scene, a comparison or another study without a run."""
+"""Checks the file of a scene, a comparison or another study without running anything."""
 
 from __future__ import annotations
 
@@ -11,25 +11,25 @@ from proofroll.core.announced import announced
 from proofroll.core.errors import InputError, choices, require_known
 from proofroll.core.number_format import counted
 
-# What reads the files of a study: the name of the entry point is the file's ``study``; it is given the path as text.
+# Group of entry points for functions that read the file of a study, given its path as text; the name is ``study``.
 READERS = "proofroll.study_readers"
 
 
 def is_text_check(name: Path) -> bool:
-    """True for the path or the name of a scene or of the file of a study."""
+    """True for the path or name of a scene or of the file of a study, False for robot files."""
     return name.suffix in {"", ".toml"} or name.is_dir()
 
 
 def check_text(name: str, as_json: bool, plot: Path | None = None) -> None:
-    """Says in one line what a scene or the file of a study holds, and below it how a scene starts.
+    """Prints one line on the content of a scene or of the file of a study, and below it how a scene starts.
 
     Args:
         name: of a scene or the file of a study, or a path.
-        as_json: one document instead.
+        as_json: True for one JSON document instead.
         plot: page to which a scene is drawn.
 
     Raises:
-        InputError: the first thing that is wrong with it.
+        InputError: the first mistake in it.
     """
     sound = checked(name)
     if plot is not None:
@@ -43,7 +43,7 @@ def check_text(name: str, as_json: bool, plot: Path | None = None) -> None:
 
 
 def _draw(file: SoundFile, plot: Path) -> None:
-    """Draws a scene at its start to a page."""
+    """Draws a scene at its start to an HTML page."""
     if file.kind != "scene":
         raise InputError("--plot", plot, f"{file.name} is no scene; name one")
     if plot.suffix.lower() != ".html":
@@ -73,7 +73,7 @@ def checked(name: str) -> SoundFile:
     """Content of a scene (a name, the path of its folder or of its ``scene.toml``) or of the file of a study.
 
     Raises:
-        InputError: there is no such thing, or the first thing that is wrong with it.
+        InputError: there is no such scene or file, or the first mistake in it.
     """
     from proofroll.files.comparison_file import comparison_names
     from proofroll.files.scene_file import scene_folder, scene_names

@@ -1,4 +1,4 @@
-"""Citations for a result."""
+"""Command ``cite``: references for a result."""
 
 import sys
 from typing import Annotated
@@ -19,13 +19,13 @@ def cite(
     """Print the references behind a result: engines with their versions, the scene, the truth, and proofroll itself."""
     from proofroll.studies.citing import cited, content, sentence
 
-    told = cited(subject or [])
+    citations = cited(subject or [])
     if as_json:
-        options.write_json({"cited": content(told)})
+        options.write_json({"cited": content(citations)})
         return
     shown: set[str] = set()
     lines = []
-    for item in told:
+    for item in citations:
         if bibtex:
             fresh = [entry for entry in item.references if entry not in shown]
             shown.update(fresh)

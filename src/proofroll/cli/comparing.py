@@ -1,4 +1,4 @@
-"""Comparison files: verdicts."""
+"""Command ``compare``, and the runs of comparisons for ``report``."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from proofroll.studies.comparison.planning import Plan
 
 
-# Processor time for the last page, whatever it holds, and for Python's own start [s].
+# Processor time that is reserved for the last page and for the start of Python [s].
 _PAGE = 8.0
 
 
@@ -68,17 +68,17 @@ def compare(
 def asked(
     name: str, parameters: Mapping[str, str], workers: Workers, budget: float | None, scheduler: str | None
 ) -> Comparison:
-    """The comparison of this name, or that of a scene about which no file says anything, within a budget.
+    """Comparison of this name, or the default comparison of a scene, within a budget.
 
     Args:
         name: of a comparison or a scene.
         parameters: of a scene, those that differ from the defaults.
-        workers: in which engines are asked.
-        budget: processor time of all runs of a scene [s]; None: the usual one, but on a cluster, which has none.
-        scheduler: of the cluster.
+        workers: pool for the questions to engines.
+        budget: processor time of all runs of a scene [s]; None: the default, or no limit on a cluster.
+        scheduler: of the cluster, or None.
 
     Raises:
-        InputError: there is neither, or something was given for a scene and this is a comparison, which has its own.
+        InputError: there is neither, or a budget or parameters were given for a comparison, which has its own.
     """
     from proofroll.core.errors import InputError
     from proofroll.files.comparison_file import load_comparison
@@ -98,7 +98,7 @@ def asked(
 
 
 def tell_of_scene(name: str, comparison: Comparison) -> None:
-    """Says on standard error that a name is a scene's, too, if its comparison lacks an engine that is installed."""
+    """Prints on standard error that a name is also a scene's, if its comparison lacks an installed engine."""
     from proofroll.core.plugins import engine_names, parse_engine
     from proofroll.files.scene_file import is_scene
 
@@ -109,17 +109,17 @@ def tell_of_scene(name: str, comparison: Comparison) -> None:
 
 
 def tell_left_out(comparisons: Sequence[Comparison], engines: Sequence[str]) -> None:
-    """Names on standard error each engine that is missing from some of the comparisons, one line each."""
+    """Prints a line on standard error for each engine that has no rows in some of the comparisons."""
     from proofroll.core.plugins import parse_engine, plain_name
 
     rows = {item.name: {parse_engine(row.engine).name for row in item.rows} for item in comparisons}
     asked_for = {name: {name, plain_name(name)} for name in engines}
-    wanted = set(chain(*asked_for.values()))  # a comparison that has none of them is refused elsewhere
+    wanted = set(chain(*asked_for.values()))  # a comparison without any of them is refused elsewhere
     for name, either in asked_for.items():
         without = [comparison for comparison, known in rows.items() if known & wanted and not known & either]
         if without:
-            said = f"{name} is left out of {', '.join(without)}: no row is of it"
-            options.complain(f"{said}; proofroll new comparison writes a file with one")
+            warning = f"{name} is left out of {', '.join(without)}: no row is of it"
+            options.complain(f"{warning}; proofroll new comparison writes a file with one")
 
 
 def outcomes_of(
@@ -133,17 +133,20 @@ def outcomes_of(
 ) -> list[Outcome]:
     """Runs all comparisons with one progress bar, one after the other as far as that leaves no worker idle.
 
-    Each is brief first; when all have been, they grow by their further combinations.
+    First the brief parts of all comparisons are run, then their further combinations.
 
     Args:
-        comparisons: in their order.
-        engines: to which they are restricted.
+        comparisons: in the order of running.
+        engines: to which they are restricted; empty: all.
         runner: runs their cases.
-        stage: is put before what the bar says.
-        finished: called when one has ended, briefly or whole, with all that have by their numbers; True: the last.
-        budget: processor time of all of them [s]; all runs then come before the first ladder, and each comparison has
-            an equal share of what is left, which those after it have if it takes less.
-        spent: what of the budget has been taken before [s].
+        stage: prefix of the bar's text.
+        finished: called when a comparison has ended, brief or whole, with all ended ones by number, and True if it is
+            the
+            last.
+        budget: processor time of all of them [s]. All runs then come before the first ladder, and each comparison has
+            an
+            equal share of the time left; what it does not use is for later ones.
+        spent: part of the budget that was used before [s].
     """
     from proofroll.running.process import processor_seconds
     from proofroll.running.time_budget import TimeBudget
@@ -181,9 +184,14 @@ def outcomes_of(
 
 
 class _Comparing:
-    """Comparisons whose cases are being run, a phase after the other; ``tell`` takes what a bar says after each case.
+    """Comparisons whose cases are being run in phases.
 
-    ``limit`` is the processor time of all of them; ``finished`` is as for :func:`outcomes_of`.
+    Args:
+        plans: of the comparisons.
+        runner: runs their cases.
+        limit: processor time of all of them, or None.
+        finished: see :func:`outcomes_of`.
+        tell: called with the bar's text after each case.
     """
 
     def __init__(
@@ -205,7 +213,7 @@ class _Comparing:
         self._budget = limit.left if limit else 0.0
 
     def judge(self, at: int) -> None:
-        """Judges a comparison by what has been run of it so far."""
+        """Judges a comparison by the cases that have been run so far."""
         from proofroll.running.case import Result, Status
         from proofroll.studies.comparison.compare import evaluate, left_out
 
@@ -213,15 +221,20 @@ class _Comparing:
         so_far = dict.fromkeys(self._keys, Result(Status.LEFT_OUT, "it has not been run yet")) | self.results
         outcome = evaluate(self.plans[at].ended(left_out(so_far)), so_far, self.runner)
         if self._judged[at] < len(self.plans[at].cases):
-            outcome = replace(outcome, beyond_budget=[])  # what is still to come does not lack time
+            outcome = replace(outcome, beyond_budget=[])  # missing cases are not left out yet
         self.ended[at] = outcome
 
     def _known(self, at: int) -> int:
-        """Number of a comparison's cases that have ended, also as cases of another comparison."""
+        """Number of a comparison's cases that have ended, also as cases of other comparisons."""
         return sum(case.key in self.results for case in self.plans[at].cases)
 
     def run(self, phase: list[tuple[int, list[Case]]], *, last: bool) -> None:
-        """Runs cases of comparisons, by number, in their order, and judges each when its cases have ended."""
+        """Runs the cases of one phase, in order, and judges each comparison when its cases have ended.
+
+        Args:
+            phase: number of a comparison, and its cases.
+            last: True if no phase follows.
+        """
         from proofroll.running.case import Status
 
         place = {
@@ -246,32 +259,32 @@ class _Comparing:
             for keys in missing.values():
                 keys.discard(key)
 
-        def told(case: Case, result: Result) -> None:
+        def arrived(case: Case, result: Result) -> None:
             self.results[case.key] = result
             self._tell(case)
             end(case.key)
 
         postponed: list[Case] = []
 
-        def told_first(case: Case, result: Result) -> None:
+        def arrived_first(case: Case, result: Result) -> None:
             if result.status is Status.LEFT_OUT:
                 postponed.append(case)
             else:
-                told(case, result)
+                arrived(case, result)
 
-        # What a comparison's share did not suffice for has a share of what the others left.
-        self.runner.run(cases.values(), told_first if self.limit else told, self.limit, place)
-        self.runner.run(postponed, told, self.limit, place)
+        # Cases beyond their comparison's share are tried again with the time that the others left.
+        self.runner.run(cases.values(), arrived_first if self.limit else arrived, self.limit, place)
+        self.runner.run(postponed, arrived, self.limit, place)
         end()
 
     def _keep_for_the_end(self) -> None:
-        """Keeps as much of the budget for judging and writing all once more as that took so far for each case."""
+        """Reserves time in the budget for judging and writing everything once more, by the time per case so far."""
         if self.limit and (judged := sum(self._judged.values())):
             self.limit.after = max(self.limit.after, self._judging / judged * len(self.results))
 
     def _tell(self, case: Case) -> None:
-        """Says how many comparisons have ended, about how long the rest takes, and which engine ran."""
-        # What is stored is counted as reused before it is judged.
+        """Updates the bar's text: comparisons that have ended, estimated time left, engine that ran."""
+        # Reused results are counted before their cases arrive here, so the difference may be negative.
         many, ran = len(self.plans), max(0, len(self.results) - (self.runner.reused - self._reused))
         left = (time.monotonic() - self._start) / ran * (len(self._keys) - len(self.results)) if ran else 0.0
         if self.limit and (used := self._budget - self.limit.left) > 0:
@@ -282,7 +295,7 @@ class _Comparing:
 
 
 def exit_code(outcomes: list[Outcome]) -> int:
-    """3 if an engine was lost, 1 if a verdict contradicts its file, else 0."""
+    """Exit code: 3 if an engine was lost, 1 if a verdict contradicts its file, else 0."""
     if any(outcome.lost for outcome in outcomes):
         return options.ENGINE
     return options.CONTRADICTED if any(outcome.contradictions for outcome in outcomes) else options.OK

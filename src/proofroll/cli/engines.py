@@ -1,4 +1,4 @@
-"""Engines: what there is, and environments of other versions."""
+"""Commands ``engines``: lists engines, and makes and removes environments of other versions."""
 
 import dataclasses
 import sys

@@ -1,4 +1,4 @@
-"""A scene as a file of an engine's own, for its viewer and its other tools."""
+"""Command ``export``: writes a scene in an engine's own file format."""
 
 import sys
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Findings about engines, run against the installed versions."""
+"""Command ``findings``: runs findings about engines against the installed versions."""
 
 from typing import Annotated, Any
 
@@ -32,10 +32,10 @@ def findings(
             rows.append(row)
             advance(row.finding.name)
     counts = {state.value: sum(row.state == state for row in rows) for state in FindingState}
-    told = [
+    records = [
         {**dataclasses.asdict(row.finding), "state": row.state.value, "version": row.version, "said": row.said}
         for row in rows
     ]
     shares = ", ".join(f"{name} {count}" for name, count in counts.items() if count)
-    content = {"counts": counts, "findings": told}
+    content = {"counts": counts, "findings": records}
     options.show(content, as_json, lambda: [findings_table(rows), f"Of {counted(len(rows), 'findings')}: {shares}."])

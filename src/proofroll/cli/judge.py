@@ -1,4 +1,4 @@
-"""A trajectory of anybody's against the truth of a scene."""
+"""Command ``judge``: compares a trajectory from any program with the truth of a scene."""
 
 import json
 from collections.abc import Mapping
@@ -51,13 +51,13 @@ def judge(
 
 
 def _told_by(run: Path) -> tuple[str, Mapping[str, object]]:
-    """Scene and parameters that `proofroll run --out` wrote into a file; no name where there are none."""
+    """Scene and parameters that `proofroll run --out` wrote into a file; an empty name if there are none."""
     from proofroll.files.trajectory_file import read
 
     try:
-        said = read(run).attrs
-        parameters = json.loads(str(said.get("parameters", "{}")))
+        attrs = read(run).attrs
+        parameters = json.loads(str(attrs.get("parameters", "{}")))
     except (OSError, ValueError):
         return "", {}
-    name = str(said.get("scene_path", said.get("scene", "")))
+    name = str(attrs.get("scene_path", attrs.get("scene", "")))
     return name, parameters if isinstance(parameters, dict) else {}

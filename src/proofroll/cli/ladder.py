@@ -1,4 +1,4 @@
-"""One quantity up the ladder of models, and what each optional term is worth."""
+"""Command ``ladder``: one quantity by ever fuller models, and the value of each optional term."""
 
 from pathlib import Path
 from typing import Annotated

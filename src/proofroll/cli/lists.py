@@ -1,4 +1,4 @@
-"""List of the scenes."""
+"""Command ``scenes``: lists the scenes."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ _LINE = 80  # characters
 
 
 def _titles(files: Mapping[str, SceneFile]) -> Iterator[str]:
-    """A line for each scene; of a title that is longer its beginning."""
+    """Lines of name and title for each scene; a title that is too long is cut at a comma or colon."""
     wide = max(map(len, files))
     for name, file in files.items():
         line = f"{name:{wide}}  {file.title}"

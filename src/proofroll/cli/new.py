@@ -1,4 +1,4 @@
-"""Working starts: a scene, a comparison, a package with an engine."""
+"""Commands ``new``: write a working example of a scene, a comparison, or a package with an engine."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ new = typer.Typer(help="Write a working start: a scene, a comparison, or an engi
 Name = Annotated[str, typer.Argument(help="Its name: letters, digits and _; the folder or file is named so.")]
 _TEMPLATES = Path(__file__).parent / "templates"
 _ANOTHER = "choose another name"
-# For --for: the example that the engine begins as, the name of its class, a scene that it runs, what it does.
+# Value of --for -> example in docs/examples to copy, name of its class, a scene that it runs, description.
 _EXAMPLES = {
     "ball": (
         "semi_implicit",
@@ -91,7 +91,7 @@ def engine(
         "does": does,
     }
     for template in sorted((_TEMPLATES / "engine").rglob("*")):
-        if template.is_file():  # those end in .txt of which tools would think that they are files of this project
+        if template.is_file():  # some end in .txt, so that tools do not take them for files of this project
             target = folder / template.relative_to(_TEMPLATES / "engine")
             _write(target.with_suffix("") if target.suffix == ".txt" else target, _filled(template, names))
     example = (data_folder("docs/examples") / f"{file}.py").read_text(encoding="utf-8")
@@ -101,7 +101,7 @@ def engine(
 
 
 def _fresh(name: str, path: str) -> Path:
-    """Path of a new file or folder."""
+    """Path of a new file or folder. Raises InputError if it exists or the name is no identifier."""
     if not re.fullmatch(r"[a-z][a-z0-9_]*", name):
         raise InputError("name", name, "write small letters, digits and _, a letter first")
     if keyword.iskeyword(name):
@@ -128,7 +128,7 @@ def _say(path: Path, *commands: str) -> None:
 
 
 def _comparison(name: str, where: str, loaded: Scene) -> str:
-    """Text of a comparison file: each engine that can run the scene, held to one percent of what moves."""
+    """Text of a comparison file: each engine that can run the scene, allowed one per cent of each motion."""
     from proofroll.files.scene_file import read_scene_file
     from proofroll.studies.comparison.default_comparison import able, bounds, times_of
 

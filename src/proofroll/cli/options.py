@@ -1,4 +1,4 @@
-"""Options, exit codes, progress and printing shared by all commands."""
+"""Options, exit codes, progress and output that all commands share."""
 
 from __future__ import annotations
 
@@ -24,19 +24,19 @@ if TYPE_CHECKING:
     from proofroll.running.runner import Runner
     from proofroll.running.worker_pool import Workers
 
-_SAID_EVERY = 10.0  # seconds between lines of progress where no bar can be shown
+_SAID_EVERY = 10.0  # interval between lines of progress if no bar can be shown [s]
 OK, CONTRADICTED, USAGE, ENGINE, INTERRUPTED = 0, 1, 2, 3, 130
 
 
 def scenes_like(incomplete: str) -> list[str]:
-    """Names of scenes that begin so, for the completion of a shell."""
+    """Names of scenes with this beginning, for completion in a shell."""
     from proofroll.files.scene_file import scene_names
 
     return [name for name in scene_names() if name.startswith(incomplete)]
 
 
 def compared_like(incomplete: str) -> list[str]:
-    """Names of comparisons and scenes that begin so, for the completion of a shell."""
+    """Names of comparisons and scenes with this beginning, for completion in a shell."""
     from proofroll.files.comparison_file import comparison_names, further_comparison_names
 
     named = {*comparison_names(), *further_comparison_names(), *scenes_like(incomplete)}
@@ -44,14 +44,14 @@ def compared_like(incomplete: str) -> list[str]:
 
 
 def engines_like(incomplete: str) -> list[str]:
-    """Names of engines that begin so, for the completion of a shell."""
+    """Names of engines with this beginning, for completion in a shell."""
     from proofroll.core.plugins import engine_names
 
     return [name for name in engine_names() if name.startswith(incomplete)]
 
 
 def runs_like(incomplete: str) -> list[str]:
-    """Names of what runs a scene: engines, and the truth."""
+    """Names of engines, and ``truth``, with this beginning, for completion in a shell."""
     return [*(["truth"] if "truth".startswith(incomplete) else []), *engines_like(incomplete)]
 
 
@@ -87,16 +87,16 @@ Set = Annotated[list[str] | None, typer.Option("--set", help="parameter=value in
 def new_runner(
     out: Path, fresh: bool, jobs: int | None, scheduler: str | None = None, workers: Workers | None = None
 ) -> Runner:
-    """Runs cases in worker processes, here or on a cluster, and keeps their results under ``out``."""
+    """Runner in worker processes, on this machine or on a cluster, that keeps results under ``out``."""
     from proofroll.running.runner import Runner
     from proofroll.running.store import Store
 
-    store = Store(out / "cases")  # a folder that cannot be written is told before a cluster is started
+    store = Store(out / "cases")  # raises for a folder that cannot be written, before a cluster is started
     return Runner(store, jobs=jobs, fresh=fresh, cluster=new_cluster(scheduler), workers=workers)
 
 
 def new_cluster(scheduler: str | None) -> Cluster | None:
-    """The Dask cluster of ``--scheduler``; None where the option is not given."""
+    """Dask cluster of ``--scheduler``, or None if the option is not given."""
     if scheduler is None:
         return None
     from proofroll.running.cluster import Cluster
@@ -106,9 +106,9 @@ def new_cluster(scheduler: str | None) -> Cluster | None:
 
 @contextmanager
 def progress_bar(what: str, total: int | None = None) -> Iterator[Callable[..., None]]:
-    """A progress bar on standard error; call what it gives with a description and, if not 1, a count.
+    """Context manager with a progress bar on standard error, which yields a function of a description and a count (1).
 
-    Where standard error is no terminal, or nothing may move there, it is a line now and then.
+    If standard error is no terminal, or nothing may move there, it prints a line every few seconds instead.
     """
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, Task, TextColumn, TimeElapsedColumn
     from rich.text import Text
@@ -132,7 +132,7 @@ def progress_bar(what: str, total: int | None = None) -> Iterator[Callable[..., 
 
 @contextmanager
 def _now_and_then(line: Callable[[], str]) -> Iterator[None]:
-    """A line on standard error every few seconds, with the seconds that have passed."""
+    """Context manager that prints a line on standard error every few seconds, with the time that has passed."""
     start, ended = time.monotonic(), threading.Event()
 
     def say() -> None:
@@ -149,15 +149,15 @@ def _now_and_then(line: Callable[[], str]) -> Iterator[None]:
 
 
 def _waited_for() -> str:
-    """Names of engines whose answer is still awaited, for the end of a line of progress."""
-    asking = sys.modules.get("proofroll.running.asking")  # if nothing has imported it nobody was asked
+    """End of a line of progress with the engines that have not answered yet."""
+    asking = sys.modules.get("proofroll.running.asking")  # not imported: no engine was asked
     names = dict.fromkeys(asking.waited_for) if asking else ()
     what = "what they are" if len(names) > 1 else "what it is"
     return f": waiting for {', '.join(names)} to say {what}" if names else ""
 
 
 def _standard_error() -> tuple[Console, bool]:
-    """The console on standard error, and whether signs may move on it: not in a pipe, nor under NO_COLOR."""
+    """Console on standard error, and True if a bar may move on it: not in a pipe, nor under NO_COLOR."""
     from proofroll.report.terminal.screen import Screen
 
     console = Screen(stderr=True)
@@ -165,7 +165,7 @@ def _standard_error() -> tuple[Console, bool]:
 
 
 def assignments(texts: list[str] | None, option: str = "--set") -> dict[str, str]:
-    """Reads ``name=value``, as given to an option, or not."""
+    """Reads ``name=value`` texts of an option. Raises InputError for another form or a repeated name."""
     values: dict[str, str] = {}
     for text in texts or ():
         name, equals, value = text.partition("=")
@@ -178,7 +178,7 @@ def assignments(texts: list[str] | None, option: str = "--set") -> dict[str, str
 
 
 def require_writable(path: Path, option: str = "--out") -> None:
-    """Fails before the run rather than after it."""
+    """Raises InputError before the run if a file cannot be written."""
     from proofroll.running.store import Store
 
     if path.is_dir():
@@ -191,15 +191,15 @@ def require_writable(path: Path, option: str = "--out") -> None:
 
 @contextmanager
 def spinner(text: str) -> Iterator[Callable[[str], None]]:
-    """A sign on standard error that something is under way, whose text what it gives changes; as a progress bar."""
+    """Context manager with a sign of activity on standard error; it yields a function that changes its text."""
     console, moves = _standard_error()
-    said = [text]
-    with console.status(text) if moves else _now_and_then(lambda: said[-1]) as sign:
-        yield said.append if sign is None else sign.update
+    texts = [text]
+    with console.status(text) if moves else _now_and_then(lambda: texts[-1]) as sign:
+        yield texts.append if sign is None else sign.update
 
 
 def json_text(content: object) -> str:
-    """A JSON document."""
+    """Text of a JSON document."""
     from proofroll.files.json_data import plain
     from proofroll.report.terminal.screen import escaped
 
@@ -207,14 +207,14 @@ def json_text(content: object) -> str:
 
 
 def write_json(content: object) -> None:
-    """One JSON document on standard output."""
+    """Writes one JSON document to standard output."""
     sys.stdout.write(json_text(content))
 
 
 def show(
     content: object, as_json: bool, parts: Callable[[], Iterable[RenderableType]], *, widest: int | None = None
 ) -> None:
-    """The content of a command as one JSON document, or else on the terminal the tables and lines it is shown by.
+    """Prints the content of a command: one JSON document, or tables and lines.
 
     Args:
         content: records, or plain data.
@@ -234,7 +234,7 @@ def show(
 
 
 def show_lines(lines: Iterable[str]) -> None:
-    """Lines on the terminal, within its width: the rest of a line that is longer is indented by two more."""
+    """Prints lines within the width of the terminal; the continuation of a longer line is indented by two more."""
     from proofroll.report.terminal.tables import console
 
     out = console()
@@ -245,7 +245,7 @@ def show_lines(lines: Iterable[str]) -> None:
 
 
 def require_pages() -> None:
-    """Checks, before any work, that the libraries for pages and pictures are installed.
+    """Checks before any work that the libraries for pages and pictures are installed.
 
     Raises:
         Missing: one is not.
@@ -260,7 +260,7 @@ def require_pages() -> None:
 
 
 def complain(text: str) -> None:
-    """One line on standard error."""
+    """Prints one line on standard error."""
     from proofroll.report.terminal.screen import printable
 
     sys.stderr.write(f"proofroll: {printable(' '.join(text.split()))}\n")

@@ -1,4 +1,4 @@
-"""A person's own run as a picture, and in motion."""
+"""Commands ``plot`` and ``replay``: a run as a picture, and in motion."""
 
 import sys
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""The cheapest choice that holds a tolerance, from curves that have been measured."""
+"""Command ``recommend``: the cheapest choice that holds a tolerance, from measured curves."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from proofroll.studies.tradeoff.curve import Question
     from proofroll.studies.tradeoff.records import TradeoffStudy
 
-# Of SI, before the unit of a tolerance; the second µ is the Greek letter.
+# SI prefixes before the unit of a tolerance; the second µ is the Greek letter.
 _PREFIXES = {"k": 1e3, "m": 1e-3, "µ": 1e-6, "\u03bc": 1e-6, "u": 1e-6, "n": 1e-9}
 
 
@@ -93,7 +93,7 @@ def recommend(
 def _from_report(
     names: list[str], tolerance: str, engines: list[str], path: Path, *, forces: bool, as_json: bool
 ) -> None:
-    """Advice for several scenes from the runs of a report; exits with 1 if nothing holds the tolerance in one."""
+    """Prints advice for several scenes from the runs of a report; exit code 1 if some scene has no choice."""
     from proofroll.report.against import EarlierReport
     from proofroll.report.page.advice import advice
     from proofroll.report.page.choice_matrix import ChoiceStudy, choice_matrix
@@ -120,7 +120,7 @@ def _from_report(
 
 
 def _tolerance(text: str, unit: str) -> Any:
-    """Reads ``1e-3``, ``1e-3 m``, ``1 mm`` or ``1 %``."""
+    """Reads ``1e-3``, ``1e-3 m``, ``1 mm`` or ``1 %``. Raises InputError for another form or unit."""
     from proofroll.core.comparison import Tolerance
 
     if not text:
@@ -156,9 +156,9 @@ def _stored_study(
     *,
     measure_first: bool,
 ) -> TradeoffStudy:
-    """Stored curves of all engines, or of some that include the engines asked for; new ones if the user agrees.
+    """Stored curves that contain the engines asked for, or new ones if the user agrees.
 
-    With ``ranges`` of parameters they must have been checked over these.
+    With ``ranges`` of parameters they must have been checked over these. Raises InputError if there are none.
     """
     from proofroll.studies.study_store import kept
     from proofroll.studies.tradeoff.recommend import covers

@@ -1,4 +1,4 @@
-"""The report: comparisons, and whatever further studies there are."""
+"""Command ``report``: comparisons and further studies on pages."""
 
 from __future__ import annotations
 
@@ -101,7 +101,7 @@ def report(
     if budget or not studies:
         loaded = [replace(item, budget=None) if budget else item.briefly() for item in loaded]
     options.require_pages()
-    templates()  # read before the work, while which the code may change
+    templates()  # read before the work, during which the files may change
     runner = options.new_runner(out, fresh, jobs, scheduler, workers)
     tell_left_out(loaded, engine or [])
     keys = {part.key: part.words for part in parts}
@@ -134,7 +134,7 @@ def _processor_seconds() -> float:
 
 
 def _show_history(folder: Path, out: Path, *, as_json: bool) -> None:
-    """Writes the history of the reports in a folder, and says what changed when."""
+    """Writes the history of the reports in a folder, and prints its changes."""
     from proofroll.report.history import read_history, write_history
 
     history = read_history(folder)
@@ -144,7 +144,7 @@ def _show_history(folder: Path, out: Path, *, as_json: bool) -> None:
 
 
 class _Growing:
-    """The page of a report whose comparisons are being run: written when the first has ended, and now and then."""
+    """Page of a report while its comparisons run: written when the first has ended, and repeatedly after that."""
 
     def __init__(
         self,
@@ -158,7 +158,7 @@ class _Growing:
         self._start, self._spent = _processor_seconds(), 0.0
 
     def add(self, ended: dict[int, Outcome], last: bool) -> None:
-        """Writes the page if something is awaited, and writing has taken little time so far."""
+        """Writes the page unless this was the last comparison or writing has taken too large a part of the time."""
         self._ended = ended
         if last or self._spent > _WRITING * (_processor_seconds() - self._start):
             return
@@ -170,7 +170,7 @@ class _Growing:
 
     @contextmanager
     def told_if_stopped(self) -> Iterator[None]:
-        """Writes the comparisons that have ended if the rest is stopped, and says how to go on."""
+        """Context manager that, if interrupted, writes the comparisons that have ended and prints how to continue."""
         try:
             yield
         except KeyboardInterrupt:
@@ -189,7 +189,7 @@ class _Growing:
 
 
 def _of_groups(names: list[str], only: str) -> list[str]:
-    """Comparisons whose scene belongs to one of the groups: each by its name, or by a word of it."""
+    """Comparisons whose scene belongs to one of the groups, each given by its name or a word of it."""
     from proofroll.core.errors import InputError
     from proofroll.files.comparison_file import load_comparison
     from proofroll.report.kinds import group_of
@@ -211,7 +211,7 @@ def _of_groups(names: list[str], only: str) -> list[str]:
 def _command(
     studies: list[str], engines: list[str], settings: list[str], budget: float | None, out: Path, only: str | None
 ) -> str:
-    """The command that makes the report again."""
+    """Command that makes the report again."""
     words = ["proofroll", "report", *studies]
     for name in engines:
         words += ["--engine", name]
@@ -223,21 +223,21 @@ def _command(
 
 
 def _begin(number: int, total: int, words: str) -> str:
-    """Says on standard error which stage begins; returns what its progress bar puts before its own words."""
+    """Prints on standard error which stage begins; returns the prefix of its progress bar."""
     options.complain(f"{number} of {total}, {words}")
     return f"{number} of {total}: "
 
 
 def _make(made: Report, part: Part, runner: Runner, out: Path, stage: str) -> None:
-    """Makes one further study with a progress bar; a sentence on standard error says if that failed."""
+    """Makes one further study with a progress bar; prints a sentence on standard error if that failed."""
     with options.progress_bar(f"{stage}{part.words}") as advance:
-        said = made.make(part, lambda: part.make(runner, out, lambda text, count: advance(f"{stage}{text}", count)))
-    if said.missing:
-        options.complain(f"{part.head['title']}: {said.missing}")
+        entry = made.make(part, lambda: part.make(runner, out, lambda text, count: advance(f"{stage}{text}", count)))
+    if entry.missing:
+        options.complain(f"{part.head['title']}: {entry.missing}")
 
 
 def _exit_code(content: ReportContent, compared: int) -> int:
-    """Exit code of the report; a lost engine or a false statement of a further study counts as one of a comparison."""
+    """Exit code of the report, from those of its comparisons and the results of its further studies."""
     entries = content.further
     if compared == options.ENGINE or any(entry.missing or entry.lost for entry in entries):
         return options.ENGINE
@@ -247,7 +247,7 @@ def _exit_code(content: ReportContent, compared: int) -> int:
 
 
 def _shown(content: ReportContent, out: Path) -> Iterator[Table | str]:
-    """The verdicts, what came of the further studies, what to look at first, and where the report is."""
+    """Tables and lines for the terminal: verdicts, further studies, what to look at first, path of the report."""
     from proofroll.report.terminal.tables import change_lines, first_lines, part_lines, verdict_parts
 
     for item in content.comparisons:

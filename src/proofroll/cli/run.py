@@ -1,4 +1,4 @@
-"""One run of one scene."""
+"""Command ``run``: one run of one scene."""
 
 from __future__ import annotations
 
@@ -47,8 +47,8 @@ def run(
     from proofroll.running.asking import prepare
     from proofroll.running.worker_pool import Workers
 
-    workers = Workers()  # the process that tells the settings also makes the run
-    # It imports the engine while this process imports what reads scenes and results.
+    workers = Workers()  # one process resolves the settings and makes the run
+    # It imports the engine while this process imports the modules that read scenes and results.
     preparing = threading.Thread(target=prepare, args=(engine, workers), daemon=True)
     preparing.start()
 
@@ -108,7 +108,7 @@ def run(
 
 
 def _shorter_step(scene: str, engine: str, case: Case) -> str:
-    """Advice to use the step of the scene's file, if the run had a longer one; else empty."""
+    """Advice to use the step that the scene's file recommends, if the run had a longer one; else empty."""
     from proofroll.core.plugins import parse_engine
     from proofroll.files.scene_file import read_scene_file
 

@@ -1,4 +1,4 @@
-"""Stability map: where engines stop being right."""
+"""Command ``stability``: a map of the steps up to which engines are stable and accurate."""
 
 from pathlib import Path
 from typing import Annotated

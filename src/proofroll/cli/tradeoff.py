@@ -1,4 +1,4 @@
-"""Speed against accuracy: the curves of error against cost."""
+"""Command ``tradeoff``: curves of error against cost."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ def tradeoff(
 def question_of(
     scene: str, settings: list[str] | None, quantities: list[str] | None, until: float | None
 ) -> tuple[TradeoffClaims | None, Question]:
-    """Claims and question of the file; another question about its scene has no claims."""
+    """Claims and question of a file about a trade-off; with other parameters or times there are no claims (None)."""
     from proofroll.core.time_grid import time_grid
     from proofroll.files.scene_file import is_scene, load_scene
     from proofroll.studies.cases import usual_length
@@ -94,14 +94,14 @@ def question_of(
 
 
 def require_observables(question: Question, names: list[str]) -> None:
-    """Refuses what no run of the scene can be asked for."""
+    """Raises InputError for a name that is no observable of a run of the scene."""
     scene = question.loaded
     for name in names:
         scene.observable(name)
 
 
 def ranges_of(question: Question, texts: list[str]) -> dict[str, list[float]]:
-    """Reads ``parameter=low:high``; each end must be one that the scene can have."""
+    """Reads ``parameter=low:high``. Raises InputError for another form, or an end that the scene cannot have."""
     from proofroll.files.scene_file import load_scene
 
     ranges = {}
@@ -127,7 +127,7 @@ def measure(
     out: Path,
     budget: float | None = None,
 ) -> tuple[TradeoffStudy, Path]:
-    """Measures and keeps the curves that a recommendation can be made from, with a progress bar."""
+    """Measures and stores the curves of a trade-off, with a progress bar."""
     from proofroll.studies.comparison.default_comparison import BUDGET
     from proofroll.studies.tradeoff.study import make_tradeoff
 

@@ -1,4 +1,4 @@
-"""One engine in two versions."""
+"""Command ``versions``: one engine in two versions."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ from proofroll.core.errors import InputError, ProofrollError
 if TYPE_CHECKING:
     from proofroll.studies.versions.versions import VersionsStudy
 
-# What else than a scene or a comparison can be held against two versions, by the ending of its file.
+# Group of entry points for other subjects than scenes and comparisons; the name is the ending of their files.
 SUBJECTS = "proofroll.version_subjects"
-# Of timing: with twelve one estimate moved by 5 % between series, with twenty the interval is some 4 % wide.
+# Default rounds of timing: with twelve, estimates varied by 5 %; with twenty the interval is some 4 % wide.
 _ROUNDS = 20
 
 
@@ -76,7 +76,7 @@ def versions(
 
 
 def _spelled(engine: str, old: str, new: str, subject: str) -> tuple[str, str, str, str]:
-    """Engine, two versions and subject, also where they are written as other commands do: NAME@OLD NAME@NEW SUBJECT."""
+    """Engine, two versions and subject; also from arguments in the form NAME@OLD NAME@NEW SUBJECT."""
     from proofroll.core.plugins import place_of, plain_name
 
     name = plain_name(engine)
@@ -93,7 +93,7 @@ def _spelled(engine: str, old: str, new: str, subject: str) -> tuple[str, str, s
 
 
 def _keep(content: VersionsStudy, page: str, out: Path) -> Path:
-    """Writes page and document; their file, without an ending."""
+    """Writes page and JSON document; returns their path without ending."""
     from proofroll.running.store import write_text
 
     out.mkdir(parents=True, exist_ok=True)
@@ -105,26 +105,26 @@ def _keep(content: VersionsStudy, page: str, out: Path) -> Path:
 
 
 def _place(engine: str, text: str) -> str:
-    """The engine ``NAME`` or ``NAME@PLACE`` that a person means by a version, a label or a path; made if need be."""
+    """Engine ``NAME`` or ``NAME@PLACE`` for a version, a label or a path; its environment is made if necessary."""
     from proofroll.core.plugins import engine_names
     from proofroll.running import environments
     from proofroll.running.asking import describe
 
     if text == engine:
-        return engine  # as it is installed here
+        return engine  # the installed one
     if os.sep in text or text.startswith(("~", ".")) or environments.find(engine, text) is not None:
         return f"{engine}@{text}"
     if not re.fullmatch(r"\d[\w.+]*", text):
         raise InputError("version", text, f"no environment of {engine} has this label; see proofroll engines")
     if engine in engine_names():
         with contextlib.suppress(ProofrollError):  # it is not installed here
-            if f"{describe(engine).version}.".startswith(f"{text}."):  # 1.13 means 1.13.6 if that is what is here
+            if f"{describe(engine).version}.".startswith(f"{text}."):  # 1.13 means 1.13.6 if that is installed
                 return engine
     return _made(engine, text)
 
 
 def _made(engine: str, version: str) -> str:
-    """The environment of a version, made now."""
+    """Makes the environment of a version; returns its engine ``NAME@VERSION``."""
     from proofroll.running.make_environment import add, package_of
 
     package = package_of(engine)
@@ -135,7 +135,7 @@ def _made(engine: str, version: str) -> str:
     try:
         with options.spinner(f"{engine} {version}") as say:
             add(engine, [f"{package}=={version}"], tell=lambda text: say(f"{engine} {version}: {text}"))
-    except InputError:  # what was asked for is wrong, by hand too
+    except InputError:  # a wrong argument, which is wrong by hand, too
         raise
     except ProofrollError as error:
         raise ProofrollError(f"{error}; when that is mended, or with more requirements: {by_hand}") from None

@@ -7,8 +7,8 @@
     def test_engine(check):
         check()
 
-A check that fails says what is wrong and prints the command that runs it alone. pytest is not needed: each check is
-a plain callable that raises ``AssertionError``, or ``unittest.SkipTest`` where it has nothing to look at.
+A failing check says what is wrong and prints the command that runs it alone. pytest is not needed: each check is a
+plain callable that raises ``AssertionError``, or ``unittest.SkipTest`` if it does not apply.
 """  # noqa: D415 -- the code is part of the sentence
 
 from proofroll.conformance.checks import Check, checks, run_check

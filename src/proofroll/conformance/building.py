@@ -1,4 +1,4 @@
-"""Checks of what an engine builds and samples at time 0."""
+"""Checks of the model that an engine builds and of its sample at time 0."""
 
 import dataclasses
 from collections.abc import Iterable
@@ -20,7 +20,7 @@ from proofroll.core.scene import Scene
 
 
 def builds_or_refuses(subject: Subject) -> None:
-    """The engine builds the scene, or refuses it in one line that says why."""
+    """Check: the engine builds the scene, or refuses it in one line that says why."""
     try:
         subject.engine.build(subject.scene.for_an_engine, subject.settings)
     except (Refused, Missing) as refusal:
@@ -31,26 +31,28 @@ def builds_or_refuses(subject: Subject) -> None:
 
 
 def provides_what_it_says(engine: Any) -> None:
-    """Check: for each capability, some preset builds some scene that needs it."""
+    """Check: for each capability that a formulation provides, some preset builds some scene that needs it."""
     for formulation, provides in engine.provides.items():
         for capability in sorted(provides):
             needing = [scene for scene in scenes().values() if capability in scene.requires <= provides]
             refusals = [_refusal(engine, formulation, scene) for scene in needing]
             if needing and all(refusals):
-                said = "; ".join(f"{scene.name}: {why}" for scene, why in zip(needing, refusals, strict=True))
-                raise AssertionError(f"{formulation} provides {capability}, but builds no scene that needs it: {said}")
+                refused = "; ".join(f"{scene.name}: {why}" for scene, why in zip(needing, refusals, strict=True))
+                raise AssertionError(
+                    f"{formulation} provides {capability}, but builds no scene that needs it: {refused}"
+                )
 
 
 def provides_for_some_scene(engine: Any) -> None:
-    """Each formulation provides all that some scene requires, or nothing would be checked of it."""
+    """Check: each formulation provides all that some scene requires; otherwise nothing of it would be checked."""
     for formulation in engine.presets:
         missing = {name: lacking(engine, formulation, scene) for name, scene in scenes().items()}
-        said = "; ".join(f"{name}: {_listed(items)}" for name, items in missing.items())
-        require(not all(missing.values()), f"{formulation} can represent no scene; each requires more: {said}")
+        needs = "; ".join(f"{name}: {_listed(items)}" for name, items in missing.items())
+        require(not all(missing.values()), f"{formulation} can represent no scene; each requires more: {needs}")
 
 
 def _refusal(engine: Any, formulation: str, scene: Scene) -> str:
-    """Reason of the last preset that refuses the scene; empty if one builds it."""
+    """Reason with which all presets refuse the scene (that of the last); empty if one builds it."""
     why = "it has no preset"
     for settings in engine.presets.get(formulation, {}).values():
         try:
@@ -64,16 +66,16 @@ def _refusal(engine: Any, formulation: str, scene: Scene) -> str:
 
 
 def certificate_holds(subject: Subject) -> None:
-    """Check: the engine built the scene: mass, inertia, gravity, radius, start, first accelerations and forces."""
+    """Check: the engine's mass, inertia, gravity, radius, start, first accelerations and forces are the scene's."""
     difference = first_difference(certify(subject.build(), subject.scene, subject.settings))
     if difference is not None:
         raise UnlikeSceneError(subject, str(difference))
 
 
 def builds_only_what_is_required(subject: Subject) -> None:
-    """Check: the model holds the required terms, and no others unless a setting or the engine gives a reason.
+    """Check: the model holds all required terms, and no others without a reason.
 
-    The setting is one named as what can be asked for, ``orientation=true``; the engine's reasons are
+    A reason is a setting with the name of a question, ``orientation=true``, or an entry in the engine's
     :class:`proofroll.core.engine_abilities.CannotLeaveOut`.
     """
     engine = subject.build()
@@ -92,8 +94,10 @@ def builds_only_what_is_required(subject: Subject) -> None:
     wasted = terms - subject.scene.requires - excused
     require(not wasted, f"{_listed(wasted)} is in the model, which the scene does not require")
     follows = engine.sample().q_WB is not None
-    told = bool(terms & {item.askable.get("orientation") for item in elements})
-    require(follows == told, f"the orientation is {'' if told else 'not '}in the model, yet a sample tells otherwise")
+    listed = bool(terms & {item.askable.get("orientation") for item in elements})
+    require(
+        follows == listed, f"the orientation is {'' if listed else 'not '}in the model, yet a sample tells otherwise"
+    )
 
 
 def _listed(capabilities: Iterable[str]) -> str:
@@ -101,13 +105,13 @@ def _listed(capabilities: Iterable[str]) -> str:
 
 
 def samples_are_well_formed(subject: Subject) -> None:
-    """Samples hold finite arrays of the right shapes, in the declared precision; orientations start as identity."""
+    """Check: samples hold finite arrays of the right shapes and declared precision; orientations start as identity."""
     start = subject.build()
     (element,) = subject.scene.elements
     first = start.sample()
     _well_formed(first, element, "at time 0")
     orientation = first.q_WB
-    # One that can be asked for counts from the start; any other is part of the scene, and the certificate holds it.
+    # An orientation that can be asked for is relative to the start; any other is checked by the certificate.
     if orientation is not None and "orientation" in element.askable:
         identity = float(np.max(np.abs(np.abs(orientation) - [1, 0, 0, 0])))
         require(
@@ -130,7 +134,7 @@ def samples_are_well_formed(subject: Subject) -> None:
 def _well_formed(sample: Sample, element: Element, when: str) -> None:
     wanted, bodies = element.sample_type, len(element.bodies)
     require(isinstance(sample, wanted), f"sample() gave {type(sample).__name__} instead of {wanted.__name__} {when}")
-    one = bodies == 1 and np.ndim(sample.p_WB) == np.ndim(sample.v_WB) == 1  # of one body the index may be left out
+    one = bodies == 1 and np.ndim(sample.p_WB) == np.ndim(sample.v_WB) == 1  # one body needs no axis of bodies
     for name, size in wanted.widths.items():
         value = getattr(sample, name)
         if value is None and name not in REQUIRED:
@@ -146,7 +150,7 @@ def _well_formed(sample: Sample, element: Element, when: str) -> None:
 
 
 def reading_back_changes_nothing(subject: Subject) -> None:
-    """``built()`` and ``sample()`` give the same twice, leave the state alone, and no later step changes a sample."""
+    """Check: ``built()`` and ``sample()`` are repeatable and change nothing, and later steps change no sample."""
     engine = subject.build()
     first = engine.sample()
     before = bits(first)
@@ -155,7 +159,7 @@ def reading_back_changes_nothing(subject: Subject) -> None:
     require(bits(engine.sample()) == before, "sample() gives other numbers after built()")
     t = subject.span(1)
     engine.advance(t)
-    # The buffer may be filled by the next sample only, of this engine or of another one.
+    # A shared buffer may be overwritten only by the next sample, of this engine or of another one.
     moved, alone = bits(engine.sample()), bits(subject.at(t).sample())
     require(bits(first) == before, "the arrays of a sample change with later steps: return copies")
     require(moved == alone, "a run whose engine was sampled at time 0 ends elsewhere than one that was not")

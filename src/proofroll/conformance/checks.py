@@ -1,4 +1,4 @@
-"""The list of checks for an engine, each a callable with a name and a command that runs it alone."""
+"""Checks of an engine, each a callable with a name and a command that runs it alone."""
 
 import atexit
 import itertools
@@ -16,12 +16,12 @@ from unittest import SkipTest
 from proofroll.conformance import building, declarations, motion, response
 from proofroll.conformance.subject import Subject, UnlikeSceneError, checked_on, explained, scenes, truth_scenes
 
-# What a check in a process of its own ends with, and those processes: one for each formulation and preset of an engine.
+# Outcome of a check in a separate process; these processes, one for each formulation and preset of an engine.
 _PASSED, _SKIPPED, _FAILED = "passed", "skipped", "failed"
 _processes: dict[str, ProcessPoolExecutor] = {}
 
 
-# One per engine.
+# Checks that run once per engine.
 _OF_ENGINES: tuple[Callable[[Any], None], ...] = (
     declarations.name_is_the_entry_point,
     declarations.version_is_told,
@@ -34,18 +34,18 @@ _OF_ENGINES: tuple[Callable[[Any], None], ...] = (
     building.provides_what_it_says,
     building.provides_for_some_scene,
 )
-# One per formulation, preset and scene that requires nothing which the formulation does not provide.
+# Checks that run once per formulation, preset and scene whose requirements the formulation provides.
 _OF_SCENES: tuple[Callable[[Subject], None], ...] = (
     building.builds_or_refuses,
     building.certificate_holds,
     building.builds_only_what_is_required,
 )
-# One per formulation, preset and such a scene that has a truth.
+# Checks that run once per formulation, preset and such a scene with a truth.
 _OF_TRUTHS: tuple[Callable[[Subject], None], ...] = (
     response.first_steps_fit_the_scene,
     response.moves_as_the_truth,
 )
-# One per formulation and preset, on the first scene that is not refused.
+# Checks that run once per formulation and preset, on the first scene that is not refused.
 _OF_PRESETS: tuple[Callable[[Subject], None], ...] = (
     building.samples_are_well_formed,
     building.reading_back_changes_nothing,
@@ -67,7 +67,7 @@ class Check:
     Attributes:
         engine: the engine's class.
         name: e.g. ``certificate_holds[free-matched-plane]``.
-        known: reason of a known failure, which must not pass; empty: the check should pass.
+        known: reason of a known failure; then the check must not pass. Empty: the check should pass.
         run: the check itself.
     """
 
@@ -85,7 +85,7 @@ class Check:
 
         Raises:
             AssertionError: it failed; the text says why and how to run it alone.
-            SkipTest: there is nothing to look at, or the failure is known.
+            SkipTest: it does not apply, or the failure is known.
         """
         try:
             self.run()
@@ -100,7 +100,7 @@ class Check:
 
     @property
     def reproducer(self) -> str:
-        """A command for the shell that runs this check alone."""
+        """Shell command that runs this check alone."""
         module, name = self.engine.__module__, self.engine.__qualname__
         imports = f"from {module} import {name}; from proofroll.conformance import run_check"
         return f"python -c \"{imports}; run_check({name}, '{self.name}')\""
@@ -114,14 +114,17 @@ def failure_text(error: Exception) -> str:
 
 
 def checks(engine: Any, known: Mapping[str, str] | None = None, *, apart: bool = False) -> list[Check]:
-    """All checks of an engine: of each formulation, on the scenes that require nothing which it does not provide.
+    """All checks of an engine: those of each formulation on all scenes whose requirements it provides.
 
     Args:
         engine: the engine's class.
-        known: names of checks that are known to fail, ``*`` for any text as in ``order_is_as_declared[free-*]``, with
-            the reason. A name that fits no check, or whose check passes, is a failure.
-        apart: runs those of each formulation and preset in a process of their own, for an engine that sets something
-            for its whole process, as JAX its precision; the class must be one that a module has by its name.
+        known: names of checks that are known to fail -> reason; ``*`` stands for any text, as in
+            ``order_is_as_declared[free-*]``. A name that fits no check, or whose check passes, is an error.
+        apart: True to run the checks of each formulation and preset in a separate process, for an engine that changes
+            settings of its whole process, as JAX its precision; the class must be importable by its name.
+
+    Raises:
+        ValueError: a name in ``known`` fits no check.
     """
     patterns = dict(known or {})
     all_runs = runs(engine)
@@ -138,7 +141,7 @@ def checks(engine: Any, known: Mapping[str, str] | None = None, *, apart: bool =
 
 
 def _run_apart(engine: Any, name: str) -> None:
-    """Runs the check of this name in the process of its formulation and preset, which stays for the next one."""
+    """Runs the check of this name in the process of its formulation and preset, which is kept for the next check."""
     place = f"{engine.__module__}.{engine.__qualname__}: {_of_one_process(engine, name)}"
     if place not in _processes:
         _processes[place] = ProcessPoolExecutor(1, mp_context=multiprocessing.get_context("spawn"))
@@ -155,7 +158,7 @@ def _run_apart(engine: Any, name: str) -> None:
 
 
 def _outcome(engine: Any, name: str) -> tuple[str, str]:
-    """Outcome of a check with its text, in the process that runs it."""
+    """Outcome of a check and its text; runs in the separate process."""
     try:
         dict(runs(engine))[name]()
     except SkipTest as why:
@@ -170,7 +173,7 @@ def _fits(name: str, pattern: str) -> bool:
 
 
 def run_check(engine: Any, name: str) -> None:
-    """Runs the check of this name alone."""
+    """Runs the check of this name alone. Raises ValueError if there is none."""
     for check in checks(engine):
         if check.name == name:
             check()
@@ -179,31 +182,31 @@ def run_check(engine: Any, name: str) -> None:
 
 
 def _of_one_process(engine: Any, name: str) -> str:
-    """Formulation and preset that a check is of; empty: of the whole engine."""
+    """Formulation and preset of a check; empty for a check of the whole engine."""
     keys = (f"{formulation}-{preset}" for formulation, presets in engine.presets.items() for preset in presets)
     return next((key for key in keys if name.partition("[")[2].removesuffix("]").startswith(key)), "")
 
 
 def runs(engine: Any) -> Iterator[tuple[str, Callable[[], None]]]:
-    """Every check of an engine by its name."""
+    """Name and callable of every check of an engine."""
     for check in _OF_ENGINES:
         yield check.__name__, partial(check, engine)
     for formulation, presets in engine.presets.items():
         for preset, settings in presets.items():
-            # What hangs on the adapter alone comes first: it is the cause where the motion is wrong too.
+            # Checks of the adapter come first: their failures may cause those of the motion.
             first = cache(partial(_first, engine, settings))
             for check in _OF_PRESETS:
                 yield f"{check.__name__}[{formulation}-{preset}]", partial(_on_first, first, check)
             for own_scenes, of_found in ((scenes(), _OF_SCENES), (truth_scenes(), _OF_TRUTHS)):
                 for (name, scene), check in itertools.product(own_scenes.items(), of_found):
                     if not checked_on(engine, formulation, scene):
-                        continue  # refused before it is built; that something is left `provides_for_some_scene` holds
+                        continue  # `provides_for_some_scene` checks that some scene is left
                     subject = Subject(engine, settings, scene)
                     yield f"{check.__name__}[{formulation}-{preset}-{name}]", partial(check, subject)
 
 
 def _first(engine: Any, settings: Any) -> Subject | None:
-    """The engine on the most demanding scene that it builds with these settings."""
+    """The engine on the most demanding scene that it builds with these settings, or None."""
     for scene in scenes().values():
         if not checked_on(engine, settings.formulation, scene):
             continue

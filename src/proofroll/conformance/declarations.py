@@ -1,4 +1,4 @@
-"""Checks of what an engine says of itself. Nothing is built."""
+"""Checks of an engine's declarations; nothing is built."""
 
 import dataclasses
 import json
@@ -14,7 +14,7 @@ from proofroll.core.plugins import GROUP, resolve_settings
 
 
 def name_is_the_entry_point(engine: Any) -> None:
-    """An installed package announces the engine under its own name."""
+    """Check: an installed package announces the engine under its own name."""
     points = [point for point in announced(GROUP) if point.name == engine.name]
     require(points, f"no installed package has the entry point {GROUP}: {engine.name}; add it and install the package")
     kind = points[0].load()
@@ -22,13 +22,13 @@ def name_is_the_entry_point(engine: Any) -> None:
 
 
 def version_is_told(engine: Any) -> None:
-    """The engine tells its version as text."""
+    """Check: the engine's version is a text."""
     version = engine.version()
     require(isinstance(version, str) and version.strip(), f"version() gave {version!r} instead of text")
 
 
 def provides_capabilities(engine: Any) -> None:
-    """Each formulation says what it provides: a frozen set of texts, none of them empty."""
+    """Check: each formulation declares its capabilities, a frozen set of texts, none of them empty."""
     require(
         isinstance(engine.provides, Mapping), "provides must be a mapping: formulation -> frozenset of capabilities"
     )
@@ -44,7 +44,7 @@ def provides_capabilities(engine: Any) -> None:
 
 
 def settings_are_a_frozen_dataclass(engine: Any) -> None:
-    """The settings are a frozen dataclass in which every field has a default, formulation and preset among them."""
+    """Check: the settings are a frozen dataclass with defaults for all fields, and have formulation and preset."""
     kind = engine.settings
     require(dataclasses.is_dataclass(kind), "settings must be a dataclass")
     require(kind.__dataclass_params__.frozen, "settings must be frozen: @dataclass(frozen=True)")
@@ -57,7 +57,7 @@ def settings_are_a_frozen_dataclass(engine: Any) -> None:
 
 
 def presets_are_complete(engine: Any) -> None:
-    """Each formulation has a preset matched or default, and each preset says which it is and survives JSON."""
+    """Check: each formulation has a preset matched or default; each preset has its own names and survives JSON."""
     require(engine.presets, "presets are empty; give each formulation its settings")
     for formulation, presets in engine.presets.items():
         require({"matched", "default"} & set(presets), f"{formulation} needs a preset matched or default")
@@ -72,7 +72,7 @@ def presets_are_complete(engine: Any) -> None:
 
 
 def resolution_and_order_are_told(engine: Any) -> None:
-    """Each preset names the setting that trades speed for accuracy, if any, and an order only if that is a step."""
+    """Check: each preset names the setting that trades speed for accuracy, if any; only a step has an order."""
     for formulation, presets in engine.presets.items():
         for preset, settings in presets.items():
             where = f"presets[{formulation!r}][{preset!r}]"
@@ -94,17 +94,16 @@ def resolution_and_order_are_told(engine: Any) -> None:
 
 
 def precision_is_told(engine: Any) -> None:
-    """Each preset computes in double precision, or says that it computes in single precision."""
+    """Check: each preset declares double or single precision, or none, which means double."""
     for formulation, presets in engine.presets.items():
         for preset, settings in presets.items():
-            said = getattr(settings, "precision", "double")
-            require(
-                said in EPSILON, f"presets[{formulation!r}][{preset!r}].precision is {said!r}, not single or double"
-            )
+            declared = getattr(settings, "precision", "double")
+            where = f"presets[{formulation!r}][{preset!r}].precision"
+            require(declared in EPSILON, f"{where} is {declared!r}, not single or double")
 
 
 def bad_settings_give_one_line(engine: Any) -> None:
-    """A setting that does not exist or makes no sense gives one line with its name and value, not a traceback."""
+    """Check: an unknown or invalid setting gives one line with its name, not a traceback."""
     first = next(iter(next(iter(engine.presets.values())).values()))
     chosen, resolution = {"formulation": first.formulation, "preset": first.preset}, first.resolution
     bad: list[tuple[str, object]] = [("no_such_setting", 1), ("formulation", "no_such"), ("preset", "no_such")]

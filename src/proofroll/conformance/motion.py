@@ -1,4 +1,4 @@
-"""Checks of how an engine moves: the runner may cut a run where it likes, and the step has the order it should."""
+"""Checks of an engine's motion: runs may be cut anywhere, and the step has its declared order."""
 
 import math
 from collections.abc import Callable
@@ -19,34 +19,34 @@ from proofroll.core.engine import precision_of
 from proofroll.core.engine_abilities import declared_order
 from proofroll.core.errors import Diverged, InputError
 
-# Below this relative difference two states differ by little more than accumulated round-off, in each precision.
+# Precision -> relative difference of two states below which it is little more than accumulated round-off.
 _ROUND_OFF = {"double": 1e-9, "single": 1e-4}
-# The next term of the error's expansion shifts the observed order by about (h/τ)/ln 2, with τ a time of the motion, and
-# half as much at half the step: two observations are as near to the order as they are to each other.
+# Largest difference of the orders observed with h and h/2. The next term of the error's expansion shifts them by about
+# (h/τ)/ln 2 and half of that, with τ a time of the motion: they are as near to the true order as to each other.
 _SETTLED = 0.1
 _ORDER_TOLERANCE = 0.2
 _ORDER_SPAN = 0.1
-# Of the preset's step: where the search begins, so that this step is the finest of those that are judged, and how far
-# it goes. Most orders are seen at the beginning, at a quarter of what finer steps cost.
+# Multiples of the preset's step: the first of the search, for which the preset's step is the finest one used, and the
+# bounds of the search. Most orders show at the first, at a quarter of the cost of finer steps.
 _FIRST = 4.0
 _FINEST, _COARSEST = 2.0**-5, 2.0**5
-# Long enough that a loose tolerance is not met by a single step of a method of high order.
+# Length of a run [s] that a method of high order does not make in a single step at a loose tolerance.
 _TOLERANCE_SPAN = 0.5
-# A short advance [s] or step, and how many of it are long: more of them until it costs clearly more than handing work
-# over and a sample do. Of so many rounds the least counts, as others on the machine may make one many times as long.
+# A short advance [s] (or one step), and the numbers of them in a long one, which grow until it costs clearly more than
+# the short one and a sample. The least of _ROUNDS counts, as other processes may lengthen a round many times.
 _SHORT, _LONG, _ROUNDS = 1e-3, (100, 1000, 10000), 3
 _DEARER = 10.0
 
 
 def advance_is_repeatable(subject: Subject) -> None:
-    """The same scene built twice moves the same, to the last bit."""
+    """Check: the same scene built twice moves the same, to the last bit."""
     t = subject.span(1)
     first, second = subject.at(t).sample(), subject.at(t).sample()
     require(bits(first) == bits(second), f"two runs of one scene differ by {subject.distance(first, second):.2g}")
 
 
 def advance_in_two_parts(subject: Subject) -> None:
-    """Advancing to t by way of t/2 is advancing to t; advancing to the present time does nothing."""
+    """Check: advancing to t/2 and then to t is the same as to t at once; to the present time it does nothing."""
     t = subject.span(2)
     engine = subject.at(t / 2)
     engine.advance(t / 2)
@@ -60,7 +60,7 @@ def advance_in_two_parts(subject: Subject) -> None:
 
 
 def sampling_changes_nothing(subject: Subject) -> None:
-    """A run that is sampled on the way ends where one ends that is not, to the last bit."""
+    """Check: a run that is sampled on the way ends as one that is not, to the last bit."""
     t = subject.span(4)
     watched, alone = subject.build(), subject.build()
     for part in range(1, 5):
@@ -73,7 +73,7 @@ def sampling_changes_nothing(subject: Subject) -> None:
 
 
 def samples_cost_the_same(subject: Subject) -> None:
-    """A sample costs no more after a long ``advance`` than after a short one: when that returns, the state is there."""
+    """Check: a sample costs no more after a long ``advance`` than after a short one: the work is done before."""
     short = subject.span(1, at_least=_SHORT)
     for steps in _LONG:
         long = short + subject.span(steps, at_least=steps * _SHORT)
@@ -93,7 +93,7 @@ def samples_cost_the_same(subject: Subject) -> None:
 
 
 def _seconds(subject: Subject, short: float, long: float) -> tuple[float, ...]:
-    """Seconds of a short advance, of a sample after it, of a long advance, and of a sample after that [s]."""
+    """Times [s] of a short advance, a sample after it, a long advance, and a sample after that."""
     engine = subject.build()
     engine.sample()
     times = [perf_counter()]
@@ -104,7 +104,7 @@ def _seconds(subject: Subject, short: float, long: float) -> tuple[float, ...]:
 
 
 def engines_do_not_disturb_each_other(subject: Subject) -> None:
-    """Two engines that are alive at once, with different scenes where it represents several, move as they do alone."""
+    """Check: two engines alive at once, if possible with different scenes, move as they do alone."""
     t = subject.span(2)
     other = _other(subject)
     alone = [bits(each.at(t).sample()) for each in (subject, other)]
@@ -116,7 +116,7 @@ def engines_do_not_disturb_each_other(subject: Subject) -> None:
 
 
 def _other(subject: Subject) -> Subject:
-    """The engine on a scene that differs from the subject's, also in its numbers where there is such a one."""
+    """The engine on another scene that it represents; if there is none, the same subject."""
     for scene in [*truth_scenes().values(), *scenes().values()]:
         other = replace(subject, scene=scene)
         if scene.digest != subject.scene.digest and checked_on(subject.engine, subject.settings.formulation, scene):
@@ -127,14 +127,14 @@ def _other(subject: Subject) -> Subject:
 
 
 def velocities_are_the_rates(subject: Subject) -> None:
-    """v_WB is the rate of p_WB and w_WB, in the world, that of q_WB."""
+    """Check: v_WB is the rate of p_WB, and w_WB, in the world, that of q_WB."""
     start = subject.span(1)
     h = subject.span(1, at_least=1e-4)
     engine = subject.at(start)
     before = engine.sample()
     engine.advance(start + h)
     after = engine.sample()
-    # two places and orientations, each rounded, over a short time
+    # differences of two rounded positions and orientations over a short time
     roundings = ROUNDINGS * subject.epsilon / h
     rounding = {"v_WB": roundings * max(1.0, float(np.max(np.abs(after.p_WB)))), "w_WB": roundings}
     for name, rate, one, other in (
@@ -144,15 +144,15 @@ def velocities_are_the_rates(subject: Subject) -> None:
         if rate is None:
             continue
         mean = (one + other) / 2
-        # A semi-implicit step moves with the velocity at one of its ends; the trapezoidal rule is off by (ω h)²/12, and
-        # a soft contact may vibrate with its step.
+        # A semi-implicit step moves with the velocity at one of its ends, the trapezoidal rule has an error of
+        # (ω h)²/12, and a soft contact may vibrate with its step.
         allowed = float(np.linalg.norm(other - one)) / 2 + 1e-2 * float(np.linalg.norm(mean)) + rounding[name]
         difference = float(np.linalg.norm(rate - mean))
         require(difference <= allowed, f"{name} is {mean}, but the state changes at the rate {rate}")
 
 
 def _spin(before: object, after: object, h: float) -> np.ndarray | None:
-    """Angular velocity in the world between two orientations."""
+    """Mean angular velocity in the world [rad/s] between orientations ``h`` [s] apart, or None without any."""
     if before is None or after is None:
         return None
     one, other = (Rotation.from_quat(np.asarray(q), scalar_first=True) for q in (before, after))
@@ -160,15 +160,15 @@ def _spin(before: object, after: object, h: float) -> np.ndarray | None:
 
 
 def order_is_as_declared(subject: Subject) -> None:
-    """Halving the step divides the error by 2 to the declared order."""
+    """Check: halving the step divides the error by 2 to the declared order."""
     if not subject.fixed_step:
         raise SkipTest("there is no fixed step")
     declared = declared_order(subject.engine, subject.settings, subject.scene)
     if declared is None:
         raise SkipTest("no order is declared")
     end, factor, seen, exact = cache(partial(_end, subject)), _FIRST, dict[float, str](), True
-    # The step may be so small that only round-off is left, or so large that the order is not yet seen; which, is
-    # decided without a look at what was declared.
+    # A step may be so short that only round-off is left, or so long that no order shows yet. The search decides that
+    # without using the declared order.
     while _FINEST <= factor <= _COARSEST and factor not in seen:
         first, second = _orders(subject, end, factor)
         dt = subject.settings.dt * factor
@@ -191,7 +191,7 @@ def order_is_as_declared(subject: Subject) -> None:
 
 
 def _orders(subject: Subject, end: Callable[[float, float], FloatArray | None], factor: float) -> tuple[float, float]:
-    """Orders from the steps 2h, h, h/2 and h, h/2, h/4, h being ``factor`` preset's steps; NaN below round-off."""
+    """Orders from steps 2h, h, h/2 and h, h/2, h/4, with h of ``factor`` preset's steps; NaN within round-off."""
     coarsest = 2 * factor * subject.settings.dt
     t = math.ceil(_ORDER_SPAN / coarsest) * coarsest
     states = []
@@ -207,12 +207,12 @@ def _orders(subject: Subject, end: Callable[[float, float], FloatArray | None], 
 
 
 def _end(subject: Subject, factor: float, t: float) -> FloatArray | None:
-    """The state at time ``t`` [s]; none where it is not finite, or the engine takes no step so coarse."""
+    """Scaled state at time ``t`` [s]; None if it is not finite, or the engine refuses so long a step."""
     try:
         state = subject.scaled(subject.finer(factor).at(t).sample())
     except Diverged:
         return None
-    except (InputError, SkipTest):  # its settings refuse the step, or it refuses to build with it
+    except (InputError, SkipTest):  # the step does not suit the settings or the engine
         if factor <= 1:
             raise
         return None
@@ -220,7 +220,7 @@ def _end(subject: Subject, factor: float, t: float) -> FloatArray | None:
 
 
 def tolerance_has_an_effect(subject: Subject) -> None:
-    """Loosening the tolerance a hundredfold, and once more, moves the answer further and further from the tight one."""
+    """Check: a tolerance 1e4 times looser changes the answer, and one 1e8 times looser changes it more."""
     if subject.settings.resolution is None:
         raise SkipTest("a closed form has no tolerance")
     if subject.fixed_step:

@@ -1,4 +1,4 @@
-"""Checks of an engine's motion against the scene and its truth; nothing that the adapter says of itself is believed."""
+"""Checks of an engine's motion against the scene and its truth, independent of the adapter's reports on its model."""
 
 from __future__ import annotations
 
@@ -25,22 +25,22 @@ from proofroll.core.verdict import round_off_of
 if TYPE_CHECKING:
     import xarray as xr
 
-# Length of the run [s], and parts of it that are no whole number of any interval at which somebody samples.
+# Length of the run [s], and its parts at which it is sampled: no multiples of common sampling intervals.
 _LENGTH = 0.1
 _PARTS = (2**0.5 - 1, (5**0.5 - 1) / 2, np.pi / 4, 1.0)
-# On the grid of this step [s] they are whole numbers of most steps that engines make, so that one truth serves these.
+# The times are rounded up to multiples of this step [s], of which most engines' steps are divisors: they share a truth.
 _STEP = 2e-3
-# Largest difference, relative to what accelerations as at the start make of it: more, and it goes somewhere else.
+# Largest tolerance, relative to the change of a variable by accelerations as at the start.
 _MOST = 0.1
-# An error is at most twice the change from a step to its half; as much again is spared for the terms beyond the first.
+# Tolerance in changes by halving the step: an error of first order is twice that, and as much again is for other terms.
 _MARGIN = 4.0
 _ROUND_OFF = 1e-8
-# So long before and after an event [s] all but what jumps is the same.
+# Time before and after an event [s] between which only jumps change the state.
 _MOMENT = 1e-7
 
 
 def first_steps_fit_the_scene(subject: Subject) -> None:
-    """The first acceleration, derived from the first steps, is the scene's, whatever the adapter says or does not."""
+    """Check: the initial acceleration, derived from the first steps, is the scene's."""
     subject.build()
     lines = first_steps(subject.engine, subject.scene, subject.settings)
     if not lines:
@@ -51,7 +51,7 @@ def first_steps_fit_the_scene(subject: Subject) -> None:
 
 
 def moves_as_the_truth(subject: Subject) -> None:
-    """A short run ends where the truth does, with its velocities and forces; so it does between any two samples."""
+    """Check: a short run has the positions, velocities and forces of the truth at all its samples."""
     step = subject.settings.dt if subject.fixed_step else None
     times = _times(step)
     true = _trajectory(subject.scene.digest, tuple(times.tolist()))
@@ -64,7 +64,7 @@ def moves_as_the_truth(subject: Subject) -> None:
         error, change = (
             float(np.max(np.abs(values - other))) / sizes[name] for other in (true[name].to_numpy()[1:], finer[name])
         )
-        # The speed may be many times what gravity adds to it; a tolerance is relative to it.
+        # Round-off is relative to the value, which may be many times its change by gravity.
         size = float(np.max(np.abs(true[name].to_numpy()))) / sizes[name]
         rough = max(_ROUND_OFF, 10 * subject.closeness, round_off_of(precision_of(subject.settings), size))
         allowed = min(_MOST, _MARGIN * change + soft + rough + beside.get(name, 0.0) / sizes[name])
@@ -78,7 +78,7 @@ def moves_as_the_truth(subject: Subject) -> None:
 
 
 def _times(step: float | None) -> FloatArray:
-    """Times of the samples [s]; whole numbers of steps, if the engine has any."""
+    """Times of the samples [s]; after whole steps, if the engine has a fixed step."""
     times = np.array([0.0, *(part * _LENGTH for part in _PARTS)])
     if step is None:
         return times
@@ -89,17 +89,17 @@ def _times(step: float | None) -> FloatArray:
 
 
 def _moved(subject: Subject, times: FloatArray, true: xr.Dataset) -> dict[str, FloatArray]:
-    """State and first reactions of the engine at all times but the first."""
+    """State and reactions of the engine at all times but the first."""
     columns = columns_of(subject.scene, times, subject.samples(times))
     moved = {name: columns[name].to_numpy()[1:] for name in _sizes(subject.scene, times[-1], true) if name in columns}
     reactions = {name for name, item in subject.scene.observables.items() if item.role == Role.REACTION}
-    return {  # what an engine does not say of reactions is no error
+    return {  # reactions that an engine does not report are no error
         name: values for name, values in moved.items() if name not in reactions or not np.any(np.isnan(values))
     }
 
 
 def _sizes(scene: Scene, length: float, true: xr.Dataset) -> dict[str, float]:
-    """Size of each compared variable: its change by gravity and similar loads over a time [s]."""
+    """Size of each compared variable: its change by the loads over the time ``length`` [s]; of a reaction its scale."""
     responses: dict[str, float] = {}
     for element in scene.elements:
         start = element.first_motion
@@ -113,9 +113,10 @@ def _sizes(scene: Scene, length: float, true: xr.Dataset) -> dict[str, float]:
 
 
 def _beside_events(scene: Scene, step: float, true: xr.Dataset) -> dict[str, float]:
-    """Error of what jumps one step [s] beside an event, which half a step may share; nothing where nothing jumps.
+    """Error of each variable if an event is one step [s] late, which the change by halving the step may not show.
 
-    The place is off by the jump's way; the jump itself by how far a step turns what meets.
+    A position is wrong by the jump of the velocity times the step; a velocity by the jump times the angle by which the
+    contact turns within the step. Empty without events or without a fixed step.
     """
     distances: dict[str, float] = {}
     for element in scene.elements:
@@ -136,7 +137,7 @@ def _beside_events(scene: Scene, step: float, true: xr.Dataset) -> dict[str, flo
 
 @cache
 def _trajectory(digest: str, times: tuple[float, ...]) -> xr.Dataset:
-    """The truth of one of :func:`truth_scenes`, which many engines and presets are held against."""
+    """Truth of the scene with this digest at these times, cached for all engines and presets."""
     from proofroll.core.truth import truth
 
     return truth(next(scene for scene in truth_scenes().values() if scene.digest == digest), np.array(times))

@@ -1,4 +1,4 @@
-"""Subject of a check: an engine on a scene, the distance of two of its states, and causes of a wrong motion."""
+"""Subject of a check: an engine on a scene; distance of two states; causes of a wrong motion."""
 
 from __future__ import annotations
 
@@ -25,17 +25,17 @@ from proofroll.core.scene import Scene
 
 # Simulated time of a check of the motion [s]: the ball goes a sixth of a turn round the cylinder.
 _SPAN = 0.05
-# Samples of a run that is to tell a cause, a hundredth of the natural time apart: splines through them resolve it.
+# Number of samples of a run for the diagnosis, and their number per natural time: splines through them resolve it.
 _SAMPLES, _PART = 36, 100
 
 
 def scenes() -> dict[str, Scene]:
-    """The scenes on which every kind of element has its engines checked; of each kind the most demanding first."""
+    """Conformance scenes of all kinds of elements, by name; those of each kind start with the most demanding."""
     return {name: scene for kind in load_element_kinds() for name, scene in _made(kind.conformance_scenes).items()}
 
 
 def truth_scenes() -> dict[str, Scene]:
-    """Scenes of every kind of element that show a frame taken for another."""
+    """Scenes of all kinds of elements that reveal confused reference frames, by name."""
     return {name: scene for kind in load_element_kinds() for name, scene in _made(kind.truth_scenes).items()}
 
 
@@ -57,7 +57,7 @@ def checked_on(engine: Any, formulation: str, scene: Scene) -> bool:
 
 
 def require(condition: object, message: str) -> None:
-    """The check fails with this sentence unless the condition holds."""
+    """Raises AssertionError with this message unless the condition holds."""
     if not condition:
         raise AssertionError(message)
 
@@ -77,14 +77,14 @@ class Subject:
     scene: Scene
 
     def build(self) -> Any:
-        """The engine at time 0; the check has nothing to look at if it refuses."""
+        """Engine with the scene at time 0; raises SkipTest if it refuses the scene."""
         try:
             return build(self.engine, self.scene, self.settings)
         except (Refused, Missing) as refusal:
             raise SkipTest(f"refused: {refusal}") from None
 
     def at(self, t: float) -> Any:
-        """The engine built and advanced to time ``t`` [s] at once."""
+        """Engine newly built and advanced to time ``t`` [s] at once."""
         engine = self.build()
         engine.advance(t)
         return engine
@@ -99,7 +99,7 @@ class Subject:
         return samples
 
     def finer(self, factor: float) -> Subject:
-        """The same with the resolution (step or tolerance) times ``factor``."""
+        """Subject with its resolution (step or tolerance) multiplied by ``factor``."""
         name = self.settings.resolution
         value = getattr(self.settings, name) * factor
         return dataclasses.replace(self, settings=dataclasses.replace(self.settings, **{name: value}))
@@ -110,7 +110,7 @@ class Subject:
         return bool(self.settings.resolution == "dt")
 
     def span(self, parts: int, at_least: float = _SPAN) -> float:
-        """A time [s] that a whole number of steps reaches, also when it is divided into equal parts."""
+        """Time [s] of at least ``at_least`` [s] that is ``parts`` equal numbers of whole steps."""
         if not self.fixed_step:
             return at_least
         step = float(self.settings.dt)
@@ -123,10 +123,11 @@ class Subject:
 
     @property
     def closeness(self) -> float:
-        """Largest distance of two runs of one motion that were made with other steps (see :meth:`distance`).
+        """Largest :meth:`distance` of two runs of one motion, made with different calls of ``advance``.
 
-        With a fixed step the steps are the same; what an implicit one is solved to is hardly worse than 1e-8, while a
-        step lost or doubled shows as 1e-2. With a tolerance, some hundred steps each contribute about the tolerance.
+        With a fixed step both make the same steps: solvers of implicit steps leave about 1e-8, a lost or doubled step
+        1e-2.
+        With a tolerance, some hundred steps each contribute about the tolerance.
         """
         if self.settings.resolution is None:
             distance = 1e-9
@@ -137,11 +138,11 @@ class Subject:
         return max(distance, ROUNDINGS * self.epsilon)
 
     def distance(self, one: Sample, other: Sample) -> float:
-        """Largest difference of two states, relative to the size of each quantity in the scene."""
+        """Largest difference of two states, in units of the scene (:meth:`scaled`)."""
         return float(np.max(np.abs(self.scaled(one) - self.scaled(other))))
 
     def scaled(self, sample: Sample) -> FloatArray:
-        """Position, velocity and spin of a sample in units of the scene."""
+        """Position, velocity and angular velocity of a sample in units of the scene, shape (numbers,)."""
         length = max(element.length for element in self.scene.elements)
         start = float(np.max(np.abs(self.start.v_WB)))
         speed = start or length / self.scene.natural_time
@@ -150,19 +151,19 @@ class Subject:
 
     @cached_property
     def start(self) -> Sample:
-        """The sample at time 0."""
+        """Sample at time 0."""
         sample: Sample = self.build().sample()
         return sample
 
 
 def bits(sample: Sample) -> bytes:
-    """All numbers of a sample, exactly."""
+    """All numbers of a sample as bytes, for an exact comparison."""
     parts = (getattr(sample, item.name) for item in dataclasses.fields(sample))
     return b"".join(np.asarray(part, dtype=np.float64).tobytes() for part in parts if part is not None)
 
 
 class UnlikeSceneError(AssertionError):
-    """Difference between the scene and an engine's model or motion; its causes are looked for where it is shown."""
+    """Difference between the scene and an engine's model or motion; :func:`explained` adds its causes."""
 
     def __init__(self, subject: Subject, sentence: str) -> None:
         super().__init__(sentence)
@@ -170,7 +171,7 @@ class UnlikeSceneError(AssertionError):
 
 
 def explained(error: UnlikeSceneError) -> str:
-    """The sentence of a failed check, with the proven causes of the difference behind it, if there are any."""
+    """Message of a failed check, with the proven causes of the difference, if there are any."""
     from proofroll.core.truth import truth
 
     subject, sentence = error.subject, str(error)
@@ -186,7 +187,7 @@ def explained(error: UnlikeSceneError) -> str:
             run = from_samples(scene, times, subject.samples(times))
             causes = diagnosed(scene, lines, run, truth(scene, times), step)
     except (Diverged, Missing, Refused, InputError):
-        return sentence  # the check has said what it found; there is no run that tells more
-    except Exception as behind:  # anybody's engine, on a longer run than the check made
+        return sentence  # there is no run to diagnose
+    except Exception as behind:  # any error of the engine, on a longer run than the check made
         return f"{sentence}\nno cause was found: {type(behind).__name__}: {behind}"
     return "\n".join([sentence, *(f"cause: {item.sentence}: {item.cause.remedy}" for item in causes)])

@@ -1,4 +1,4 @@
-"""Announcements of installed packages, by entry points."""
+"""Entry points by which installed packages announce engines, elements and other plug-ins."""
 
 import contextlib
 import sys
@@ -6,21 +6,22 @@ import warnings
 from importlib.metadata import EntryPoint, EntryPoints, distributions
 from typing import Any
 
-_LONGEST = 200  # characters of what a package says why it cannot be loaded
-# Entry points that could not be loaded -> a sentence that names the package; the command line tells them.
+_LONGEST = 200  # characters shown of the error with which a package fails to load
+# Entry points that are not used -> a sentence that names the package and the reason; commands print it.
 broken: dict[EntryPoint, str] = {}
 
 
 def announced(group: str) -> tuple[EntryPoint, ...]:
-    """The entry points of a group, by name; nothing is loaded."""
+    """Entry points of a group, sorted by name, without loading them."""
     return tuple(sorted(_everything().select(group=group), key=lambda point: point.name))
 
 
 def loaded(group: str, of: type = type, like: Any = None) -> list[tuple[EntryPoint, Any]]:
-    """The entry points of a group with what they name.
+    """Entry points of a group, each with the object that it names.
 
-    One that cannot be loaded, names no instance of ``of`` (by default a class), or lacks what a class that follows the
-    protocol ``like`` has, is left out, with a warning.
+    An entry point is left out, with a warning, if it cannot be loaded, if its object is no instance of ``of`` (by
+    default
+    a class), or if the object lacks a member of the protocol ``like``.
     """
     loaded_points = []
     for point in announced(group):
@@ -43,7 +44,7 @@ def loaded(group: str, of: type = type, like: Any = None) -> list[tuple[EntryPoi
 
 
 def _members(protocol: Any) -> list[str]:
-    """Names that every class has which follows a protocol."""
+    """Names of the members that a class needs to follow a protocol."""
     if protocol is None:
         return []
     declared = [name for name, kind in protocol.__annotations__.items() if "ClassVar" in str(kind)]
@@ -51,15 +52,15 @@ def _members(protocol: Any) -> list[str]:
 
 
 def leave_out(point: EntryPoint, why: str) -> None:
-    """Notes that an entry point is not used, and why; once."""
+    """Records why an entry point is not used, and warns; only the first time."""
     if point not in broken:
         package = point.dist.name if point.dist else "a package"
-        said = f"{package} announces {point.value} as {point.name} ({point.group}), which {why}"
-        broken[point] = f"{said}; it is left out: update or uninstall {package}"
+        fault = f"{package} announces {point.value} as {point.name} ({point.group}), which {why}"
+        broken[point] = f"{fault}; it is left out: update or uninstall {package}"
         warnings.warn(broken[point], RuntimeWarning, stacklevel=2)
 
 
-# Entry points by the ``sys.path`` that they were looked up for: a file of every installed package is read for them.
+# Cache: ``sys.path`` -> entry points; a look-up reads a file of every installed package.
 _known: dict[tuple[str, ...], EntryPoints] = {}
 
 

@@ -16,9 +16,9 @@ _NEXT, _LAST = np.array([1, 2, 0]), np.array([2, 0, 1])
 
 
 def read_only(item: T) -> T:
-    """The item itself; its arrays, in dataclasses, tuples, lists and mappings at any depth, can no longer be written.
+    """Makes all arrays of an item read-only, and returns the item.
 
-    What a dataclass has cached counts too.
+    It descends into dataclasses (with their cached properties), tuples, lists and mappings to any depth.
     """
     inside: Iterable[Any] = ()
     if isinstance(item, np.ndarray):
@@ -36,7 +36,7 @@ def read_only(item: T) -> T:
 
 
 def in_single_precision(values: FloatArray) -> bool:
-    """True if each number is exactly one of 24 bits (float32), and some are not whole; few doubles are by chance."""
+    """True if every number is a float32 exactly and some are not whole; doubles are so only by rare chance."""
     return bool(np.any(values % 1) and np.array_equal(values, values.astype(np.float32)))
 
 
@@ -53,9 +53,9 @@ def slices(counts: Iterable[int]) -> tuple[slice, ...]:
 
 
 def on_turns(time: FloatArray, u: FloatArray, rate: FloatArray, start: float, period: float) -> FloatArray:
-    """A periodic coordinate on the branches that its rates predict, from that of the start on, shape (time,).
+    """Unwraps a periodic coordinate along its rates, beginning on the branch of ``start``; shape (time,).
 
-    Prediction by the rates, rather than a plain unwrapping, stays right when samples are a turn or more apart.
+    Unlike plain unwrapping it stays right when samples are a turn or more apart.
     """
     predicted = np.diff(time) * (rate[1:] + rate[:-1]) / 2
     turns = np.concatenate([[0.0], np.cumsum(np.round((predicted - np.diff(u)) / period))])
@@ -63,7 +63,7 @@ def on_turns(time: FloatArray, u: FloatArray, rate: FloatArray, start: float, pe
 
 
 def largest_difference(one: FloatArray, other: FloatArray) -> float:
-    """Largest difference of two curves; inf where one has what the other has not, or something is not finite."""
+    """Largest difference of two curves; infinite if their shapes differ or a difference is not finite."""
     if one.shape != other.shape:
         return float("inf")
     difference = float(np.max(np.abs(one - other), initial=0.0))

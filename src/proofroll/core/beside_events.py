@@ -1,7 +1,7 @@
-"""Change of a curve by an event that comes up to one step late, as in engines whose events fall on ends of steps.
+"""Error of a curve whose events come up to one step late, as in engines with events at the ends of steps only.
 
-Steps of a ladder share many of their ends, so an event may be as late in each of its runs: these then differ by less
-than each is off, and their differences say nothing of that.
+The steps of a ladder share many of their ends. So all its runs may be late alike: they differ from each other by less
+than each differs from the truth, and their differences do not show this error.
 """
 
 from collections.abc import Sequence
@@ -15,16 +15,18 @@ _SIDE = 3
 
 
 def beside_events(times: FloatArray, curve: FloatArray, events: Sequence[float], late: float) -> float:
-    """Largest error of a curve whose events are each late by a given time.
+    """Largest error of a curve if each of its events is late by a given time.
 
-    At an event a curve jumps in its value, slope or curvature (places, velocities and forces where friction switches);
-    a sample in between is off by the jump itself, and what follows by what the jumps make of the delay until the end.
+    At an event a curve jumps in value, slope or curvature (position, velocity, force where friction switches). A sample
+    between the true event and the late one is wrong by the jump of the value. Later samples are wrong by what the jumps
+    of
+    slope and curvature make of the delay.
 
     Args:
-        times: of the curve [s], shape (time,).
-        curve: shape (time, …).
-        events: when they happened [s].
-        late: by how much each may be [s].
+        times: times of the curve [s], shape (time,).
+        curve: values, shape (time, …).
+        events: times of the events [s].
+        late: largest delay of an event [s].
     """
     error = 0.0
     for event in events:

@@ -7,7 +7,7 @@ from proofroll.core.errors import InputError
 
 
 class OutOfBounds(InputError, ValueError):  # noqa: N818 -- says what is wrong, as the other errors do
-    """A number that a model cannot have; a ValueError too, so that pydantic says where in a file it stands."""
+    """A number outside the bounds of a model; a ValueError too, so that pydantic adds its place in the file."""
 
 
 def bounded(
@@ -23,6 +23,6 @@ def bounded(
 
 
 def require_pair(field: str, pair: Sequence[float]) -> None:
-    """Raises InputError unless these are a lowest and a highest number."""
+    """Raises InputError unless the pair is [low, high] with low <= high."""
     if len(pair) != 2 or not pair[0] <= pair[1]:
         raise InputError(field, list(pair), "write [low, high]")

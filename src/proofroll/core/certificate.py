@@ -1,4 +1,4 @@
-"""Equivalence first: what the engine really built, held against the scene before anything is stepped."""
+"""Certificate: the engine's model and its start, read back and compared with the scene before the first step."""
 
 import dataclasses
 from collections.abc import Iterable, Mapping
@@ -16,11 +16,11 @@ from proofroll.core.scene import Scene
 
 # Engines that compute in double precision reproduce the scene's numbers to this relative difference.
 EXACT = 1e-12
-# What an engine that computes in single precision may lose of a quantity, in roundings of the quantity's scale.
+# Largest difference allowed to an engine in single precision, in roundings of the quantity's scale.
 ROUNDINGS = 64.0
-# How the reason of a line ends that allows the roundings of such an engine.
+# End of the reason (``because``) of a line whose tolerance was raised to those roundings.
 ROUNDED = "single precision"
-# So many times the largest expected number, the scale of a difference is named.
+# A message names the scale of a difference if it exceeds the largest expected number by this factor.
 _OTHER = 1.2
 SAY_SINGLE = 'settings of the engine must say precision = "single"'
 # Numbers of one quantity that fit into a sentence: an inertia has nine.
@@ -28,7 +28,7 @@ _SHOWN = 9
 
 
 class Standing(StrEnum):
-    """Standing of one quantity of an engine against the scene."""
+    """Result of comparing one quantity of an engine with the scene."""
 
     HOLDS = "holds"
     DIFFERS = "differs"
@@ -42,11 +42,12 @@ class Line:
     Attributes:
         quantity: name of the compared quantity.
         unit: its unit.
-        expected, found: from the scene, and read back from the engine; nothing is found where the engine is silent.
-        difference: relative to the quantity's scale; None where the engine is silent.
+        expected: numbers of the scene.
+        found: numbers read back from the engine; empty if it does not report them.
+        difference: relative to the quantity's scale; None if the engine does not report it.
         tolerance: largest difference that is accepted.
-        because: reason for a tolerance above round-off; empty: it is round-off.
-        roundings: roundings of the scale that an honest engine may lose, in whatever precision.
+        because: reason for a tolerance above round-off; empty: the tolerance is round-off.
+        roundings: roundings of the scale, in the engine's precision, that an honest engine may lose.
     """
 
     quantity: str
@@ -60,14 +61,14 @@ class Line:
 
     @property
     def standing(self) -> Standing:
-        """Standing of the engine's number against the scene's."""
+        """Result of comparing the engine's numbers with the scene's."""
         if self.difference is None:
             return Standing.NOT_REPORTED
         return Standing.HOLDS if self.difference <= self.tolerance else Standing.DIFFERS
 
     @property
     def holds(self) -> bool:
-        """True unless the engine's number contradicts the scene; an engine may be silent (:attr:`standing`)."""
+        """True unless the engine's numbers contradict the scene; a quantity that is not reported holds, too."""
         return self.standing is not Standing.DIFFERS
 
     def as_dict(self) -> dict[str, Any]:
@@ -78,7 +79,10 @@ class Line:
 def certify(engine: Any, scene: Scene, settings: Any = None) -> list[Line]:
     """Compares a freshly built engine with the scene: the lines of all its elements.
 
-    ``settings`` are those with which it was built; in single precision each line allows its roundings.
+    Args:
+        engine: just built.
+        scene: the scene it was built from.
+        settings: those it was built with; in single precision each line allows its roundings.
 
     Raises:
         Diverged: a sample, or a field of what was built, has another shape than the scene's bodies.
@@ -93,7 +97,7 @@ def certify(engine: Any, scene: Scene, settings: Any = None) -> list[Line]:
 
 
 def _rounded(line: Line, precision: str) -> Line:
-    """The line with room for the roundings of a precision less than double."""
+    """The line, with a tolerance that allows the roundings of a precision below double."""
     room = line.roundings * EPSILON[precision]
     if precision == "double" or room <= line.tolerance:
         return line
@@ -101,13 +105,13 @@ def _rounded(line: Line, precision: str) -> Line:
 
 
 def tolerated(soft: Regularised | None, cap: Regularised | None, tolerance: float, because: str) -> tuple[float, str]:
-    """Tolerance of a quantity and its reason.
+    """Tolerance of a quantity that an engine may soften, and its reason.
 
     Args:
         soft: softening that the engine declares, or None.
         cap: largest softening that is accepted; None: none is.
-        tolerance: of what is not softened.
-        because: its reason.
+        tolerance: tolerance without softening.
+        because: reason for that tolerance.
     """
     if soft is None:
         return tolerance, because
@@ -120,12 +124,14 @@ def tolerated(soft: Regularised | None, cap: Regularised | None, tolerance: floa
 
 
 def require_shapes(built: Any, shapes: Mapping[str, tuple[tuple[int, ...], ...]]) -> None:
-    """Looks at the numbers that an engine says it built, before they are compared; fields that are None are no matter.
+    """Checks type and shape of the numbers in an engine's ``built()`` before they are compared; None is allowed.
 
-    ``shapes`` are those that a field may have, by its name; -1 is any length.
+    Args:
+        built: the engine's account of its model.
+        shapes: field -> allowed shapes; -1 is any length.
 
     Raises:
-        Diverged: one is lacking, is not of numbers, or has another shape.
+        Diverged: a field is missing, is not numeric, or has another shape.
     """
     for name, allowed in shapes.items():
         if not hasattr(built, name):
@@ -163,12 +169,12 @@ def first_difference(lines: list[Line]) -> str | None:
 
 
 def not_reported(lines: Iterable[Mapping[str, Any]]) -> list[str]:
-    """Quantities about which the engine is silent, of a stored certificate (:meth:`Line.as_dict`)."""
+    """Quantities of a stored certificate (:meth:`Line.as_dict`) that the engine does not report."""
     return [str(line["quantity"]) for line in lines if line["standing"] == Standing.NOT_REPORTED]
 
 
 def worst_numbers(line: Line, most: int = _SHOWN) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    """Found and expected numbers; of more than ``most`` only those that are furthest from each other."""
+    """Found and expected numbers of a line; of more than ``most`` only the pair that differs most."""
     if len(line.found) <= most or len(line.found) != len(line.expected):
         return line.found, line.expected
     apart = np.abs(np.array(line.found) - np.array(line.expected))
@@ -186,7 +192,7 @@ def told_apart(found: tuple[float, ...], expected: tuple[float, ...]) -> tuple[s
 
 
 def _scale(line: Line) -> str:
-    """Clause with the scale of a difference that is not relative to the numbers beside it; empty: it is."""
+    """Clause with the scale of the difference if it is not the size of the shown numbers; otherwise empty."""
     if len(line.found) != len(line.expected) or not line.difference:
         return ""
     expected = np.array(line.expected)
@@ -195,7 +201,7 @@ def _scale(line: Line) -> str:
 
 
 def _single(line: Line) -> str:
-    """Note that built numbers are the scene's rounded to single precision; empty: they are not."""
+    """Note that the engine's numbers are the scene's rounded to single precision; empty if they are not."""
     if len(line.found) != len(line.expected) or line.found == line.expected:
         return ""
     one, other = np.array(line.found), np.array(line.expected, dtype=np.float32).astype(float)

@@ -1,4 +1,4 @@
-"""The variables of a run as plain arrays: to import xarray for them is half of what a short run costs."""
+"""The variables of a run as plain arrays, without xarray, whose import takes half the time of a short run."""
 
 from __future__ import annotations
 
@@ -12,20 +12,20 @@ import numpy.typing as npt
 if TYPE_CHECKING:
     import xarray as xr
 
-# Beginning of an attribute of all: the least value of the variable named after it, where that tells something.
+# Prefix of an attribute of the whole dataset: ``smallest_<variable>`` is the least value of that variable.
 SMALLEST = "smallest_"
-# Attribute of a variable whose values may be off for a reason that is no engine's: the reason, in a clause. Those of an
-# angle may be off by whole turns, each as large as the attribute PERIOD says, in its unit.
+# Attribute UNCERTAIN of a variable: why its values may be wrong through no fault of an engine, as a clause. An angle
+# with the attribute PERIOD (in its unit) may be wrong by whole periods.
 UNCERTAIN, PERIOD = "uncertain", "period"
 
 
 class Variable(NamedTuple):
-    """One variable, in the order in which xarray takes one.
+    """One variable; its fields have the order of xarray's constructor.
 
     Attributes:
-        dims: names of the dimensions; a variable named as its only dimension is that dimension's coordinate.
+        dims: names of the dimensions; a variable with the name of its only dimension is that dimension's coordinate.
         values: in the unit ``attrs["units"]``.
-        attrs: ``units``, ``long_name`` and what else there is to say.
+        attrs: ``units``, ``long_name`` and further attributes.
     """
 
     dims: tuple[str, ...]
@@ -42,11 +42,12 @@ class Columns:
     """Content of an ``xarray.Dataset``.
 
     Attributes:
-        variables: by name, those of the dimensions among them.
+        variables: by name, with those of the dimensions.
         attrs: attributes of the whole dataset.
 
     Raises:
-        ValueError: variables have other lengths along one dimension, which a file would hide where one of them is 1.
+        ValueError: the number of dimensions does not fit a variable's shape, or two variables have different lengths
+        along one dimension; a file would hide that where one length is 1.
     """
 
     variables: Mapping[str, Variable]
@@ -57,8 +58,8 @@ class Columns:
         for name, (dims, values, _) in self.variables.items():
             shape = np.shape(values)
             if len(shape) != len(dims):
-                said = f"the dimensions {', '.join(dims)}" if dims else "no dimension"
-                raise ValueError(f"{name} has the shape {shape}, and {said}")
+                declared = f"the dimensions {', '.join(dims)}" if dims else "no dimension"
+                raise ValueError(f"{name} has the shape {shape}, and {declared}")
             for dim, length in zip(dims, shape, strict=True):
                 if lengths.setdefault(dim, length) != length:
                     raise ValueError(f"{name} has {length} values along {dim}, and others have {lengths[dim]}")
@@ -76,12 +77,12 @@ class Columns:
     def __getitem__(self, name: str) -> Variable:
         return self.variables[name]
 
-    def assign(self, **said: Any) -> Columns:
+    def assign(self, **attrs: Any) -> Columns:
         """Copy with further attributes."""
-        return Columns(self.variables, {**self.attrs, **said})
+        return Columns(self.variables, {**self.attrs, **attrs})
 
     def at(self, dim: str, chosen: npt.NDArray[np.bool_]) -> Columns:
-        """Columns at the chosen places along one dimension."""
+        """Columns restricted to the places along ``dim`` at which ``chosen`` is True."""
         variables = {
             name: item._replace(values=np.compress(chosen, item.values, item.dims.index(dim)))
             if dim in item.dims
@@ -98,6 +99,6 @@ class Columns:
 
 
 def axes(times: npt.NDArray[np.float64]) -> dict[str, Variable]:
-    """The coordinates of what depends on the time [s] and on components in the world."""
+    """Coordinate variables ``time`` [s], ``xyz`` and ``wxyz`` of quantities that depend on time and world axes."""
     components = {name: Variable((name,), np.array(list(name))) for name in ("xyz", "wxyz")}
     return {"time": Variable(("time",), times, {"units": "s"})} | components

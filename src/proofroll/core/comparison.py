@@ -1,4 +1,4 @@
-"""A claim about engines on a scene: what is run, what is compared, how closely, and what is expected."""
+"""A claim about engines on a scene: the runs, the compared observables, their tolerances and the expected verdicts."""
 
 from __future__ import annotations
 
@@ -53,10 +53,10 @@ class Band:
 
 @dataclass(frozen=True)
 class ExceptAt:
-    """Points at which something else is expected of a row.
+    """Points of the parameters at which a row has other expected verdicts.
 
     Attributes:
-        where: parameter -> values; the points that have one of them for each.
+        where: parameter -> values; a point matches if it has one of the values of each parameter.
         expect: expected verdicts there.
     """
 
@@ -96,7 +96,7 @@ class Row:
     bound: dict[str, Tolerance] = field(default_factory=dict)
 
     def expected(self, point: dict[str, float]) -> list[Verdict]:
-        """Verdicts that do not contradict the claim at a point of the parameters."""
+        """Expected verdicts at a point of the parameters."""
         for exception in self.except_at:
             if _fits(point, exception.where):
                 return exception.expect
@@ -105,7 +105,7 @@ class Row:
 
 @dataclass(frozen=True)
 class Edge:
-    """A value of a parameter at which the time of an event jumps, to be found between two others.
+    """Parameter value at which the time of an event jumps, to be searched for between two other values.
 
     Attributes:
         edge_between: the two values.
@@ -133,9 +133,9 @@ class Comparison:
         timed: whether the speed of every run is measured, in clean runs of its own.
         order: place in a report, the smallest first; those without come last, by name.
         brief: parameter -> values; a report without names has only the combinations that have one of them for each.
-        left_out: number of combinations left out for that.
-        budget: processor time that all cases may take together, what is beyond it being left out [s]; None: any.
-        spent: those of them that asking the engines has taken [s].
+        left_out: number of combinations left out of a report without names.
+        budget: processor time that all cases may take together [s]; cases beyond it are left out; None: no limit.
+        spent: part of the budget that was spent on asking the engines [s].
     """
 
     name: str
@@ -164,12 +164,12 @@ class Comparison:
         return replace(kept, left_out=len(self.combinations()) - len(kept.combinations()))
 
     def at(self, points: list[dict[str, float | Edge]]) -> Comparison:
-        """The comparison at some of its combinations."""
+        """The comparison with only the given combinations."""
         left_out = len(self.combinations()) - len(points)
         return replace(self, vary={}, points=points, left_out=left_out) if left_out else self
 
     def combinations(self, only: Mapping[str, list[float]] | None = None) -> list[dict[str, float | Edge]]:
-        """Every combination of parameters, or those that fit ``only``; the scene as it is if nothing varies."""
+        """All combinations of parameter values, or those that fit ``only``; one empty combination if nothing varies."""
         points: list[dict[str, float | Edge]] = [*self.points]
         if self.vary or not points:
             for values in itertools.product(*self.vary.values()):

@@ -1,4 +1,4 @@
-"""Observed order of a ladder of steps, and its limit for small steps with the uncertainty."""
+"""Observed order of convergence of a ladder of steps, and its limit for small steps with an error bar."""
 
 import itertools
 import sys
@@ -11,27 +11,28 @@ from proofroll.core.arrays import FloatArray
 from proofroll.core.engine import EPSILON
 from proofroll.core.number_format import number
 
-# A ladder is asymptotic if its observed order is the scheme's to this much.
+# A ladder is asymptotic if its observed order differs from the scheme's by at most this.
 _ASYMPTOTIC = 0.1
-# Orders among which the observed one is looked for
+# Range of orders in which the observed one is searched.
 _ORDERS = (1e-3, 20.0)
-# A tightening that changes less than this part of what another one does changes round-off alone.
+# A tightening of the tolerance that changes less than this fraction of another tightening changes round-off alone.
 _SAME = 1e-6
-# Epsilons of a value that round-off scatters over a run.
+# Round-off accumulated over a run, in machine epsilons of the value.
 _SCATTER = 1e3
-# Two changes of a power law of the step have one shape but for this part; those of round-off have not.
+# Two changes of a power law of the step, normalised, differ by at most this; those of round-off differ by more.
 _ONE_SHAPE = 0.3
-# Changes that grow by more are no law's: halving the step makes four of h^-2. Times that are told in whole steps change
-# by ratios of small integers, 9/2 among them, which this is none of.
+# Growth of changes from one refinement to the next above which no power law explains them: halving the step makes a
+# change by h^-2 four times larger. It is no ratio of small integers (9/2 is one), by which times in whole steps change.
 _GROWS = 22**0.5
-# A floor of single precision is below this part of the motion, and shorter steps are so many times worse. Seen are
-# floors of 3e-8 to 2e-6 of it, with 2 to 18 times as much at steps 8 to 256 times shorter (float32; a pendulum, a
-# double one, a free body); where no order shows yet, as of Euler on a top, 0.5 of it and 1.05 times as much.
+# Single precision sets a floor if the least error is below _LARGE of the motion and a shorter step has more than _WORSE
+# times that error. Measured in float32 (pendulum, double pendulum, free body): least errors of 3e-8 to 2e-6 of the
+# motion, 2 to 18 times more at steps 8 to 256 times shorter; with steps too long to show an order (Euler on a top),
+# 0.5 of the motion and 1.05 times more.
 _LARGE, _WORSE = 0.1, 1.5
-# Runs that differ by more than this many times their round-off show orders as in doubles: seen are 0.6 of it, and 50
-# where each of 40,000 steps rounds the same way.
+# Runs that differ by more than this many times their round-off show orders as in doubles. Measured where no order
+# shows: 0.6 times, and 50 times where each of 40,000 steps rounds the same way.
 _FAR_ABOVE = 100.0
-# Differences that shrink more slowly than this say nothing about a limit.
+# Observed orders below this show no limit.
 _NO_CONVERGENCE = 0.25
 
 
@@ -40,16 +41,16 @@ class Limit:
     """Limit of a curve for small steps.
 
     Attributes:
-        values: Richardson's extrapolation, shape (time,).
-        error_bar: its uncertainty, largest over time: how far extrapolations differ, or, where nothing is extrapolated,
-            what a further refinement may still change.
+        values: Richardson's extrapolation, or the finest curve, shape (time,).
+        error_bar: its uncertainty, largest over time: the difference of extrapolations, or, without extrapolation, the
+            change that further refinement may still make.
         order: observed order of convergence, NaN where there is none in (0, 20].
-        shown: whether the differences shrink, so that there is a limit to speak of.
-        saturated: whether two tolerances gave the same run: something else limits its steps, as samples at which they
-            end, and no limit of small ones follows.
-        beside: effect of one step beside its events on the finest curve (:mod:`proofroll.core.beside_events`).
-        rounded: whether the differences are so near to the round-off of single precision that no order shows.
-        floor: of single precision that ends the refinement, as a clause; empty: none does.
+        shown: True if the differences shrink, so that there is a limit to speak of.
+        saturated: True if two tolerances gave the same run: something else (samples at which steps end) limits the
+            steps, so that no limit of small steps follows.
+        beside: effect on the finest curve of events that are one step late (:mod:`proofroll.core.beside_events`).
+        rounded: True if the differences are so near to the round-off of single precision that no order shows.
+        floor: clause about the error floor of single precision that ends the refinement; empty: there is none.
     """
 
     values: FloatArray
@@ -67,31 +68,37 @@ def richardson(
 ) -> Limit:
     """Extrapolates three curves computed with three steps, coarse first.
 
-    The observed order p follows from the size of the two differences (Roache 1998, section 5.9). Where it is that of
-    the scheme the ladder is asymptotic: the extrapolation removes the term h^p, then h^(p+1), and is trusted to twice
-    its last change, or to what removing a term h^(p-1), which may hide beside h^p, would have made of it. So it is
-    where curves show another whole order and differ by one shape, which scatter does not; the bar then has what the
-    rounding of that order changes, too. Elsewhere extrapolating would spread the error of the coarse curves; the finest
-    curve stands for the limit, trusted to twice what the last refinement changed (more, where the order is below one).
+    The observed order p follows from the sizes of the two differences (Roache 1998, section 5.9). The ladder is
+    asymptotic
+    if p is the order of the scheme, or another whole order while both differences have the same shape over time (those
+    of
+    round-off do not). Then the extrapolation removes the term h^p and after it h^(p+1). Its error bar is twice the last
+    change, or the change from removing a term h^(p-1) instead, which h^p may hide, if that is larger; where the order
+    was
+    rounded to a whole one, the bar includes the effect of rounding it. In any other ladder extrapolation would spread
+    the
+    error of the coarse curves: the limit is the finest curve, with twice the change of the last refinement (more if the
+    order is below one) as its bar.
 
-    In single precision each step rounds the state, so that smaller steps may be worse. Unless the differences are far
-    above that scatter, an order is that of an asymptotic ladder of one shape; any other shows neither order nor limit,
-    nor does one below the first, which no scheme has.
+    In single precision each step rounds the state, so that shorter steps may be worse. Unless the differences are far
+    above that scatter, an order counts only if the ladder is asymptotic with differences of one shape; otherwise, and
+    for
+    orders below one, which no scheme has, the result shows neither order nor limit.
 
     Args:
         curves: three arrays of one shape.
         steps: their steps, falling; only the ratios matter.
         declared: order of the scheme; None: the nearest integer to the observed one.
-        scatter: of one run, see :func:`scatter_of`.
+        scatter: round-off of one run, see :func:`scatter_of`.
     """
     coarse, middle, fine = curves
     h = np.asarray(steps, dtype=np.float64) / steps[-1]
     first, last = size(middle - coarse), size(fine - middle)
-    if last == 0:  # exact, or told in steps that are coarser than what the refinement changed
+    if last == 0:  # exact, or reported in increments coarser than the change by the refinement
         return Limit(fine, first, float("nan"))
     order = observed_order(first, last, h)
     one_law = _one_law(order, declared, (middle - coarse) / first, (fine - middle) / last) if first else False
-    below_any = order < 1 - _ASYMPTOTIC  # where the motion is unstable it enlarges round-off beyond what it was
+    below_any = order < 1 - _ASYMPTOTIC  # an unstable motion amplifies round-off beyond the estimated scatter
     if scatter and not one_law and (min(first, last) <= _FAR_ABOVE * scatter or below_any):
         bar = max(first, last, _walked(middle - coarse, fine - middle))
         return Limit(fine, bar, float("nan"), shown=False, rounded=True)
@@ -116,15 +123,15 @@ def richardson(
 
 
 def _one_law(order: float, declared: int | None, before: FloatArray, after: FloatArray) -> bool:
-    """True if two changes, over their sizes, follow one power law of the step, with the declared or a whole order."""
+    """True if two normalised changes follow one power law of the step, of the declared or a whole order."""
     whole = declared or (round(order) if np.isfinite(order) else 0)
     return abs(order - whole) <= _ASYMPTOTIC and whole > 0 and size(after - before) <= _ONE_SHAPE
 
 
 def _walked(first: FloatArray, last: FloatArray) -> float:
-    """Estimated sum of three further changes, on average, if these two grow in one direction; else zero.
+    """Estimated sum of three further changes if these two grow in one direction; otherwise 0.
 
-    By more than a factor of four, what halving does to h^-2, no law grows: that is a jump of one of the runs.
+    Growth by more than a factor of four, which halving the step makes of h^-2, is a jump of one of the runs: 0.
     """
     growth = size(last) / max(size(first), sys.float_info.min)
     if not 1 < growth <= _GROWS or size(last - growth * first) > size(last) / 2:
@@ -133,11 +140,11 @@ def _walked(first: FloatArray, last: FloatArray) -> float:
 
 
 def observed_order(first: float, last: float, steps: Sequence[float] | FloatArray) -> float:
-    """The p with which h1^p - h2^p stands to h2^p - h3^p as the two differences do; NaN if there is none in (0, 20].
+    """Order p with (h1^p - h2^p) / (h2^p - h3^p) equal to the ratio of the two differences; NaN if none is in (0, 20].
 
     Args:
         first: size of the difference between the coarse and the middle curve.
-        last: of that between the middle and the fine one.
+        last: size of the difference between the middle and the fine curve.
         steps: the three steps h1 > h2 > h3.
     """
     from scipy.optimize import brentq
@@ -154,7 +161,7 @@ def observed_order(first: float, last: float, steps: Sequence[float] | FloatArra
 
 
 def _removes(term: int, h: FloatArray, power: int) -> float:
-    """Factor by which the change between two extrapolations is added again to remove a term h^term."""
+    """Multiple of the change between two extrapolations that, added to the second, removes a term h^term."""
     before, after = (
         float(fine**term - (coarse**term - fine**term) / ((coarse / fine) ** power - 1))
         for coarse, fine in itertools.pairwise(h)
@@ -163,11 +170,12 @@ def _removes(term: int, h: FloatArray, power: int) -> float:
 
 
 def tightest(curves: Sequence[FloatArray]) -> Limit:
-    """Limit of an adaptive method: its tightest curve.
+    """Limit of a method with adaptive steps: the curve of its tightest tolerance.
 
-    It is as uncertain as what the last tightening changed, or as all further ones would if each shrank as that one did;
-    where one changed nothing, or all changed round-off, as what all did: two such changes that are nearly alike would
-    otherwise be extrapolated as a slow convergence.
+    The error bar is the change by the last tightening, or the sum of all further changes if each shrinks as the last
+    one
+    did, whichever is larger. Where one tightening changed nothing, or all changed round-off only, it is the largest
+    change: two nearly equal changes of that kind would be extrapolated as slow convergence.
     """
     changes = [size(after - before) for before, after in itertools.pairwise(curves)]
     if min(changes) <= _SAME * max(changes):
@@ -180,9 +188,12 @@ def tightest(curves: Sequence[FloatArray]) -> Limit:
 
 
 def scatter_of(precision: str, size: float, steps: float) -> float:
-    """Round-off that single precision scatters over a run of so many steps, a random walk; zero in doubles.
+    """Round-off that single precision scatters over a run, a random walk over its steps; 0 in double precision.
 
-    ``size`` is that of the numbers, :meth:`proofroll.studies.judging.reference.Reference.magnitude`.
+    Args:
+        precision: key of :data:`EPSILON`.
+        size: magnitude of the numbers, :meth:`proofroll.studies.judging.reference.Reference.magnitude`.
+        steps: number of steps.
     """
     return EPSILON[precision] * size * steps**0.5 if precision == "single" else 0.0
 
@@ -190,8 +201,10 @@ def scatter_of(precision: str, size: float, steps: float) -> float:
 def is_floor(errors: Sequence[float], scale: float | None) -> bool:
     """True if the errors of ever shorter steps reach a floor of single precision.
 
-    The least is small against the scale of the observable, should it have one, and some step is clearly worse than a
-    longer one: before the order of a scheme shows, errors may be as large as the motion and rise a little, too.
+    The least error must be small against the scale of the observable, if it has one, and some step must be clearly
+    worse
+    than a longer one: while steps are too long to show an order, errors are as large as the motion and may rise a
+    little.
     """
     rises = any(later > _WORSE * earlier for earlier, later in itertools.combinations(errors, 2))
     return rises and (not scale or min(errors) <= _LARGE * scale)

@@ -1,4 +1,4 @@
-"""First rise of a smooth function through zero: also when it rises and falls within one step."""
+"""First rise of a smooth function through zero within a step, even if it falls again in the same step."""
 
 from collections.abc import Callable
 
@@ -16,15 +16,17 @@ _OF_FEW = np.linalg.inv(chebyshev.chebvander(_FEW, len(_FEW) - 1))
 
 
 def stays_negative(function: Callable[[FloatArray], FloatArray], start: float, end: float) -> NDArray[np.bool_]:
-    """True for each function that is surely negative in a step that an integrator of high order resolves.
+    """True for each function that is certainly negative throughout a step; shape (functions,).
 
-    A polynomial through 6 Chebyshev points bounds each function; its last two terms count ten times for those that
-    are left out, which spares :func:`first_rise` most steps.
+    Each function is bounded by a polynomial through 6 Chebyshev points; ten times its last two terms stand for those
+    that
+    are left out. The functions must be as smooth as in a step of an integrator of high order. It spares
+    :func:`first_rise` most steps.
 
     Args:
         function: of times, shape (times, functions).
-        start: of the step.
-        end: of the step.
+        start: of the step [s].
+        end: of the step [s].
     """
     coefficients = _OF_FEW @ function((end + start) / 2 + (end - start) / 2 * _FEW)
     sizes = np.abs(coefficients)
@@ -45,7 +47,7 @@ def first_rise(function: Callable[[FloatArray], FloatArray], start: float, end: 
     bound = float(np.sum(np.abs(coefficients[1:])))
     if coefficients[0] + bound < 0:
         return None
-    if values[0] > 0:  # round-off at the start: on its way out already
+    if values[0] > 0:  # above zero by round-off at the start: it rises now, or falls back
         return start if chebyshev.chebval(-1.0, slope) > 0 else None
     roots = chebyshev.chebroots(np.trim_zeros(coefficients, "b")) if np.any(coefficients) else np.empty(0)
     real = np.sort(np.real(roots[np.abs(np.imag(roots)) < 1e-9]))
@@ -55,6 +57,6 @@ def first_rise(function: Callable[[FloatArray], FloatArray], start: float, end: 
     x = rising[0]
     for _ in range(2):
         steepness = float(chebyshev.chebval(x, slope))
-        here = float(function(np.array([middle + half * x]))[0])
-        x = min(max(x - here / steepness, -1.0), 1.0) if abs(here) < abs(steepness) else x
+        value = float(function(np.array([middle + half * x]))[0])
+        x = min(max(x - value / steepness, -1.0), 1.0) if abs(value) < abs(steepness) else x
     return float(middle + half * x)

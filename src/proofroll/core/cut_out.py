@@ -1,4 +1,4 @@
-"""Source of a part of proofroll that runs without it: definitions of several modules, cut to what a program uses."""
+"""Source code cut from proofroll that runs without it: the definitions, of several modules, that a program uses."""
 
 import ast
 import dataclasses
@@ -15,7 +15,7 @@ import numpy as np
 
 _OURS = __name__.partition(".")[0]
 _COMMENT = re.compile(r"  # (noqa|type: ignore).*$")
-# What stands in a program for definitions that check input or would bring others with them.
+# Short replacements for definitions that check input or need many others.
 _INSTEAD = {
     "Diverged": "class Diverged(RuntimeError):\n    pass",
     "Refused": "class Refused(RuntimeError):\n    pass",
@@ -35,20 +35,29 @@ class _Module(NamedTuple):
 
 
 class CutOut:
-    """Definitions with all that they need from the package, each once, in an executable order.
+    """Definitions with everything that they need from the package, each once, in executable order.
 
-    Methods and fields of classes that nothing calls are left out: a name counts as called where it is an attribute
-    somewhere, or a text. Annotations are kept, and need nothing.
+    Methods and fields of classes are left out unless they are used: a name counts as used if it occurs somewhere as an
+    attribute or as a text. Annotations are kept, but what they name is not.
 
     Attributes:
-        head: lines of imports, all of packages besides this one.
-        text: the definitions.
-        names: of the definitions.
-        attributes: names by which the definitions ask for attributes.
+        head: import statements, none of proofroll.
+        text: source of the definitions.
+        names: names of the definitions.
+        attributes: names of the attributes that the definitions use.
     """
 
     def __init__(self, wanted: Sequence[object], uses: Iterable[str], instead: Mapping[str, str] = {}) -> None:
-        """Takes functions and classes, attributes that the program asks for, and texts in place of definitions."""
+        """Cuts out the definitions.
+
+        Args:
+            wanted: functions and classes of the package.
+            uses: attributes that the program uses.
+            instead: name -> text that replaces its definition.
+
+        Raises:
+            ValueError: two definitions have one name, or one cannot be cut out.
+        """
         self.attributes = set(uses)
         self._instead = _INSTEAD | dict(instead)
         self._kept: dict[_Place, ast.stmt] = {}
@@ -76,7 +85,7 @@ class CutOut:
             raise ValueError(f"an import of {_OURS} is inside a definition among {', '.join(self.names)}")
 
     def literal(self, value: Any) -> str:
-        """A value as a program writes it: of an object of no class among these, the attributes that they ask for."""
+        """Expression for a value; an object of a foreign class becomes a namespace of the attributes in use."""
         value = value.item() if isinstance(value, np.generic) else value
         if isinstance(value, np.ndarray):
             return f"np.array({self.literal(value.tolist())})"
@@ -96,7 +105,7 @@ class CutOut:
         return f"{kind}({', '.join(f'{name}={self.literal(one)}' for name, one in given.items())})"
 
     def _take(self, place: _Place) -> _Place | None:
-        """Keeps a definition with all that it needs; where it is, or None for what is imported."""
+        """Keeps a definition with all that it needs; returns its place, or None if it is imported or a builtin."""
         module, name = place
         if name in self._instead:
             place = "", name
@@ -130,7 +139,7 @@ class CutOut:
         return place
 
     def _drops(self, node: ast.stmt) -> list[ast.stmt]:
-        """Statements of a class that nothing calls."""
+        """Statements of a class body that nothing uses."""
         if not isinstance(node, ast.ClassDef):
             return []
         return [part for part in node.body if (name := _optional(part)) and name not in self.attributes]
@@ -145,7 +154,7 @@ class CutOut:
         ordered[place] = None
 
     def _source(self, place: _Place) -> str:
-        """Text of a definition, without what is left out of it and what only we read: of docstrings, all but a line."""
+        """Text of a definition without unused members and lint comments; of docstrings only the first line."""
         module, name = place
         if not module:
             return self._instead[name].strip("\n") + "\n"
@@ -156,12 +165,12 @@ class CutOut:
             while lines[first - 2].lstrip().startswith("#"):
                 first -= 1
             gone |= set(range(first - (not lines[first - 2].strip()), (dropped.end_lineno or first) + 1))
-        said = _docstrings(node, gone)
-        for first, last in said:
+        docstrings = _docstrings(node, gone)
+        for first, last in docstrings:
             gone |= set(range(first + 1, last + 1))
-        short = {first: text for (first, _), text in said.items()}
+        short = {first: text for (first, _), text in docstrings.items()}
         kept, begin = list[str](), _first(node)
-        while lines[begin - 2].startswith("#"):  # of a constant, what it is
+        while lines[begin - 2].startswith("#"):  # comment above a constant
             begin -= 1
         for number in range(begin, (node.end_lineno or 0) + 1):
             if number not in gone and short.get(number, "-"):
@@ -173,7 +182,7 @@ class CutOut:
 
 
 def _docstrings(node: ast.stmt, gone: set[int]) -> dict[tuple[int, int], str]:
-    """First and last line of each docstring of a definition -> its first line; empty where that leads elsewhere."""
+    """First and last line of each docstring -> its first line as code; empty if that line refers to proofroll."""
     first_lines = {}
     for part in ast.walk(node):
         words = ast.get_docstring(part) if isinstance(part, (_Function, ast.ClassDef)) else None
@@ -214,9 +223,9 @@ def _first(node: ast.stmt) -> int:
 
 
 def _optional(part: ast.stmt) -> str:
-    """Name of a method or of a fact of a class that may be left out; empty: it stays."""
+    """Name of a method or class variable that may be left out; empty: it stays."""
     if isinstance(part, _Function):
-        # what a dataclass checks of its values was checked of those that a program has
+        # checks in __post_init__ have passed already for the values in the program
         return "" if part.name.startswith("__") and part.name != "__post_init__" else part.name
     declared = isinstance(part, ast.AnnAssign) and isinstance(part.target, ast.Name)
     if declared and ast.unparse(part.annotation).startswith("ClassVar"):  # type: ignore[attr-defined]  # it is an AnnAssign
@@ -225,7 +234,7 @@ def _optional(part: ast.stmt) -> str:
 
 
 def _asked(node: ast.AST, drops: Sequence[ast.AST]) -> tuple[list[str], set[str]]:
-    """Names that a statement needs to be executed and called, and its attributes."""
+    """Names that a statement needs to be executed and called, and attributes that it uses."""
     names, attributes, bound = dict[str, None](), set[str](), set[str]()
     for part in _parts(node, drops):
         if isinstance(part, ast.Name) and isinstance(part.ctx, ast.Load):
@@ -238,12 +247,12 @@ def _asked(node: ast.AST, drops: Sequence[ast.AST]) -> tuple[list[str], set[str]
             attributes.add(part.attr)
         elif isinstance(part, ast.Constant) and isinstance(part.value, str) and part.value.isidentifier():
             attributes.add(part.value)
-    # within a function another thing may have the name of one at the top; a class has such names, too
+    # a local variable of a function may have the name of a definition; in a class body such a name is needed
     return [name for name in names if name not in bound or isinstance(node, ast.ClassDef)], attributes
 
 
 def _parts(node: ast.AST, drops: Sequence[ast.AST]) -> Iterator[ast.AST]:
-    """All parts of a statement besides annotations and those that are left out."""
+    """All nodes of a statement except annotations and the dropped ones."""
     yield node
     for field, value in ast.iter_fields(node):
         if field in {"annotation", "returns"}:

@@ -1,4 +1,4 @@
-"""Result of a run: the variables of all its elements with units."""
+"""Result of a run: the variables of all its elements, with units, as one dataset."""
 
 from __future__ import annotations
 
@@ -22,17 +22,23 @@ Key = TypeVar("Key", bound=Hashable)
 
 # Dimensions that the variables of all elements share; every other is an element's own.
 _SHARED = frozenset({"time", "xyz", "wxyz", "between"})
-# Dimension of the samples off the grid, and the beginning of the names of what they hold.
+# Dimension of the samples off the grid of times, and prefix of the names of their variables.
 BETWEEN = "between"
 
 
 def from_samples(scene: Scene, times: FloatArray, samples: Sequence[AnySample]) -> xr.Dataset:
-    """The trajectory of a run, see :func:`columns_of`, as a dataset."""
+    """Trajectory of a run as an xarray dataset, see :func:`columns_of`."""
     return columns_of(scene, times, samples).dataset()
 
 
 def columns_of(scene: Scene, times: FloatArray, samples: Sequence[AnySample]) -> Columns:
-    """The trajectory of a run, of one sample per time [s], shape (time,), or fewer if the run ended early."""
+    """Trajectory of a run.
+
+    Args:
+        scene: of the run.
+        times: [s], shape (time,).
+        samples: one for each time; fewer if the run ended early.
+    """
     reached = np.asarray(times[: len(samples)], dtype=np.float64)
     parts = {
         element.name: element.variables(reached, [sample_of(scene, element, sample) for sample in samples])
@@ -42,22 +48,26 @@ def columns_of(scene: Scene, times: FloatArray, samples: Sequence[AnySample]) ->
 
 
 def joined(scene: Scene, parts: Mapping[str, Columns]) -> Columns:
-    """Variables of all elements by the elements' names; attributes on which no two elements disagree."""
+    """Variables of all elements under their names in the scene; of the attributes those on which the elements agree."""
     variables: dict[str, Variable] = {}
-    said: dict[str, Any] = {}
+    attrs: dict[str, Any] = {}
     for element in scene.elements:
         variables |= _labelled(scene, element, parts[element.name].variables)
     for key in dict.fromkeys(key for part in parts.values() for key in part.attrs):
         values = [part.attrs[key] for part in parts.values() if key in part.attrs]
         if all(np.array_equal(value, values[0]) for value in values):
-            said[key] = values[0]
-    return Columns(variables, {**said, "scene": scene.name, "scene_digest": scene.digest})
+            attrs[key] = values[0]
+    return Columns(variables, {**attrs, "scene": scene.name, "scene_digest": scene.digest})
 
 
 def off_grid_apart(scene: Scene, columns: Columns, asked: FloatArray, between: FloatArray) -> Columns:
-    """The variables at the times that were asked for, and, as ``between.<name>``, the observables and states between.
+    """Columns with samples off the grid moved to variables ``between.<name>``, for observables and states only.
 
-    Times of neither [s] are left out.
+    Args:
+        scene: of the run.
+        columns: all samples.
+        asked: times of the grid [s].
+        between: times off the grid that are kept [s]; all other times are left out.
     """
     times = columns["time"].values
     off = np.isin(times, between) & ~np.isin(times, asked)
@@ -76,7 +86,7 @@ def off_grid_apart(scene: Scene, columns: Columns, asked: FloatArray, between: F
 
 
 def _labelled(scene: Scene, element: Element, variables: Mapping[str, Variable]) -> dict[str, Variable]:
-    """The variables, and their dimensions, under their names in the scene."""
+    """The variables of an element, and their dimensions, under their names in the scene."""
 
     def name(own: str) -> str:
         return own if own in _SHARED else scene.label(element, own)
@@ -90,7 +100,7 @@ def add_events(scene: Scene, element: Element, columns: Columns, events: Sequenc
 
 
 def part(scene: Scene, element: Element, dataset: xr.Dataset) -> xr.Dataset:
-    """The variables of one element, under the names that it gave them."""
+    """The variables of one element under the element's own names."""
     if len(scene.elements) == 1:
         return dataset
     ending = f".{element.name}"
@@ -102,7 +112,7 @@ def part(scene: Scene, element: Element, dataset: xr.Dataset) -> xr.Dataset:
 
 
 def with_part(scene: Scene, element: Element, dataset: xr.Dataset, own: xr.Dataset) -> xr.Dataset:
-    """The dataset with the variables of one element as they are in ``own``, which is of :func:`part`."""
+    """The dataset with the variables of one element replaced by those of ``own``, the result of :func:`part`."""
     if len(scene.elements) == 1:
         return own
     names = [*own.data_vars, *own.dims]
@@ -111,7 +121,7 @@ def with_part(scene: Scene, element: Element, dataset: xr.Dataset, own: xr.Datas
 
 
 def observe(scene: Scene, dataset: xr.Dataset) -> dict[str, FloatArray]:
-    """Values of every observable that the run allows, by name in the scene."""
+    """Values of every observable that the run determines, by name in the scene."""
     return {
         scene.label(element, name): values
         for element in scene.elements
@@ -120,7 +130,7 @@ def observe(scene: Scene, dataset: xr.Dataset) -> dict[str, FloatArray]:
 
 
 def scales(scene: Scene, truth: xr.Dataset) -> dict[str, float]:
-    """Size of each observable in the truth, never below its floor, to which a relative tolerance refers."""
+    """Size of each observable in the truth, but at least its floor; relative tolerances refer to it."""
     sizes = {
         scene.label(element, name): size
         for element in scene.elements
@@ -133,10 +143,11 @@ def scales(scene: Scene, truth: xr.Dataset) -> dict[str, float]:
 def common_span(
     scene: Scene, truth: xr.Dataset, runs: Mapping[Key, xr.Dataset]
 ) -> tuple[xr.Dataset, dict[Key, xr.Dataset]]:
-    """The truth and runs of it as far as they are comparable for every element (:class:`WatchesRuns`).
+    """Truth and runs cut to the time in which they are comparable for every element (:class:`WatchesRuns`).
 
-    A run ends for all elements where one of them ends it, with an event of its own after the last sample; of the others
-    what happens later is then not compared.
+    The element whose comparable time ends first ends it for all. Only that element keeps its events after the last
+    sample;
+    later events of the other elements are dropped.
     """
     spans = {}
     for element in scene.elements:

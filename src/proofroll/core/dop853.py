@@ -1,4 +1,4 @@
-"""Single steps of DOP853 (scipy) that can be looked into, for our own integrators and for truths."""
+"""Single steps of scipy's DOP853, with the state at any time inside a step; for our integrators and for truths."""
 
 import math
 from collections.abc import Callable
@@ -14,7 +14,7 @@ from proofroll.core.errors import Diverged
 Accept = Callable[[float, FloatArray], FloatArray]
 Guards = Callable[[FloatArray], FloatArray]
 
-# scipy accepts no relative tolerance below 100 machine epsilons, which is its caution, not the method's limit.
+# Smallest relative tolerance that scipy accepts; the method itself could go lower.
 TIGHTEST = 100 * float(np.finfo(float).eps)
 
 
@@ -22,10 +22,10 @@ class Rise(NamedTuple):
     """First rise of a guard through zero within a step.
 
     Attributes:
-        time: [s].
+        time: time of the rise [s].
         width: half the width of its bracket [s].
-        state: there.
-        guard: its number.
+        state: state at that time.
+        guard: index of the guard.
     """
 
     time: float
@@ -42,7 +42,7 @@ def solver_from(
     atol: FloatArray | float,
     first_step: float | None = None,
 ) -> Any:
-    """A solver of scipy without an end, which :func:`controlled_step` moves."""
+    """Solver of scipy without an end time, to be moved by :func:`controlled_step`; it may be tighter than TIGHTEST."""
     from scipy.integrate import DOP853
 
     solver = DOP853(rates, t, y, math.inf, rtol=max(rtol, TIGHTEST), atol=atol, first_step=first_step)
@@ -51,15 +51,21 @@ def solver_from(
 
 
 def go_on_from(solver: Any, y: FloatArray) -> None:
-    """Lets a solver go on from a state: rates that open a step must belong to it, or the error control collapses."""
+    """Sets the state of a solver and the rates that belong to it; with stale rates the error control collapses."""
     if y is not solver.y:
         solver.y, solver.f = y, solver.fun(solver.t, y)
 
 
 def controlled_step(solver: Any, accept: Accept | None, until: float, longest: float = math.inf) -> None:
-    """One step of a solver of scipy, at most of a length [s] and at most to the time ``until`` [s].
+    """One step of a solver of scipy.
 
-    The step size that the error control wants survives a step that was shortened to end there.
+    A step that is shortened to end at ``until`` does not shrink the size of the next one.
+
+    Args:
+        solver: of :func:`solver_from`.
+        accept: called with time and state after the step; returns the state to go on from; None: the state stays.
+        until: latest end of the step [s].
+        longest: longest step [s].
 
     Raises:
         Diverged: no step is small enough.
@@ -75,7 +81,7 @@ def controlled_step(solver: Any, accept: Accept | None, until: float, longest: f
 
 
 def corrected_by(corrected: Callable[[FloatArray], FloatArray]) -> Accept:
-    """Acceptance that puts a state back on its constraints; where that fails the message has the time."""
+    """Acceptance that projects a state onto its constraints; if that fails the error names the time."""
 
     def accept(t: float, y: FloatArray) -> FloatArray:
         try:
@@ -87,7 +93,7 @@ def corrected_by(corrected: Callable[[FloatArray], FloatArray]) -> Accept:
 
 
 def inside_last_step(solver: Any, t: float) -> FloatArray:
-    """The state at a time [s] within the last step, integrated from where that began; earlier, in a straight line.
+    """State at a time [s] within the last step, integrated from its start; before the start, extrapolated linearly.
 
     Raises:
         Diverged: no step is small enough.
@@ -103,9 +109,10 @@ def integrated_to(
     rtol: float,
     atol: FloatArray | float,
 ) -> FloatArray:
-    """The state at the end of a part of a step, which takes one step unless its error is too large.
+    """State at time ``t`` [s], integrated from ``start`` [s] in one step unless its error is too large.
 
-    A guard that rose just before the step, by less than its round-off, is a moment before it: in a straight line.
+    A guard that rose just before the step, within round-off, gives a ``t`` before ``start``: it is extrapolated
+    linearly.
     """
     if t <= start:
         return y if t == start else np.asarray(y + (t - start) * rates(start, y))
@@ -116,16 +123,16 @@ def integrated_to(
 
 
 def located(solver: Any, guards: Guards, noise: FloatArray | float = 0.0, leaving: bool = False) -> Rise | None:
-    """First rise of a guard through zero in the last step of a solver, also under a crest; None: there is none.
+    """First rise of a guard through zero in the last step, even if it falls again in that step; None: there is none.
 
-    A dense output has fewer digits than a step: it tells about when, and Newton's method on states that are integrated
-    afresh from the start of the step does the rest.
+    The dense output is less accurate than a step: it gives a first guess, which Newton's method refines with states
+    integrated afresh from the start of the step.
 
     Args:
         solver: after a step.
-        guards: values of a state, shape (guards,).
-        noise: by which guards must rise above zero to be seen.
-        leaving: at the start of the step no guard has risen yet.
+        guards: state -> values, shape (guards,).
+        noise: a guard counts as risen when it exceeds this.
+        leaving: True if guards that are positive at the start of the step count as zero there.
     """
     dense, start, end = solver.dense_output(), float(solver.t_old), float(solver.t)
     known: dict[float, FloatArray] = {}

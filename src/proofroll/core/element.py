@@ -1,8 +1,8 @@
 """Protocols of the parts of a scene. Each kind of element is a plug-in, as engines are.
 
 An element is a part of a scene that no force couples to the rest: a ball on a surface, a mechanism. It brings its data
-and their bounds, what a formulation must provide to represent it, its observables with their scales, the lines of its
-certificate and its signs of failure. The harness holds nothing of that, so a new kind of element needs no line there.
+with their bounds, the capabilities that a formulation needs to represent it, its observables with their scales, the
+lines of its certificate and its signs of failure. The harness knows none of these, so a new kind changes no line there.
 """
 
 from __future__ import annotations
@@ -31,11 +31,11 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Sign:
-    """A way in which a run of such an element fails, and where a run shows it.
+    """A sign of failure of a run, and the samples that show it.
 
     Attributes:
         name: as people and files write it, e.g. ``left the surface``.
-        shown: for each sample of the run whether it shows, shape (time,).
+        shown: True for each sample that shows it, shape (time,).
     """
 
     name: str
@@ -44,12 +44,12 @@ class Sign:
 
 @dataclass(frozen=True)
 class StepNumber:
-    """A dimensionless number of a step, which may explain where it breaks.
+    """A dimensionless number of a step size that may explain where steps become too long.
 
     Attributes:
         name: as claims write it.
         symbol, meaning: for a person.
-        value: None or 0 where it is not known or does not exist.
+        value: None or 0 if it is unknown or does not exist.
     """
 
     name: str
@@ -60,16 +60,16 @@ class StepNumber:
 
 @dataclass(frozen=True)
 class FirstMotion:
-    """True start of an element's bodies, compared with an engine's first steps.
+    """True initial accelerations of an element's bodies, compared with an engine's first steps.
 
     Attributes:
         acceleration: of the bodies at time 0 in the world [m/s²], shape (bodies, 3).
-        angular_acceleration: likewise [rad/s²].
+        angular_acceleration: of the bodies at time 0 in the world [rad/s²], shape (bodies, 3).
         scale: size that accelerations are relative to, never zero [m/s²].
-        moment: a time in which little happens: when an engine without a step is looked at first [s].
-        pull: acceleration by the loads alone [m/s²], in whose units errors of short runs are counted: beside the
-            many times larger acceleration of a fast start an error of the loads would be small. None: the scale.
-        lasts: before this time nothing that moves can have stopped [s]; later the acceleration may be another.
+        moment: short time after which an engine without a step is sampled first [s].
+        pull: acceleration by the loads alone [m/s²], the unit of errors of short runs; None: ``scale``. Relative to the
+            many times larger acceleration of a fast start an error of the loads would look small.
+        lasts: no body can come to rest before this time [s]; then the acceleration may change.
     """
 
     acceleration: FloatArray
@@ -92,7 +92,7 @@ class OptionalTerm:
         because: purpose, or the numbers with which it is tried.
         put, taken: parameters of the scene that switch the term on and off.
         asks: results wanted with it, besides the motion.
-        capability: name under which an engine says that it cannot leave it out
+        capability: name under which an engine declares that it cannot leave the term out
             (:class:`proofroll.core.engine_abilities.CannotLeaveOut`).
     """
 
@@ -108,9 +108,9 @@ class Element(Protocol):
     """A part of a scene, as the harness sees it: a frozen dataclass that validates itself.
 
     Attributes:
-        name: unique in the scene; it tells the variables of several elements apart.
+        name: unique in the scene; it distinguishes the variables of several elements.
         bodies: names of its rigid bodies, in the order in which a sample holds them.
-        sample_type: record that an engine returns of it at a time.
+        sample_type: class of the sample that an engine returns for it.
     """
 
     @property
@@ -124,11 +124,11 @@ class Element(Protocol):
 
     @property
     def requires(self) -> frozenset[str]:
-        """Capabilities that a formulation must provide for these numbers; each is a text for a person."""
+        """Capabilities that a formulation must provide to represent this element; each is a text for a person."""
 
     @property
     def askable(self) -> Mapping[str, str]:
-        """Names of what a scene may ask for besides the motion, each with the capability that it needs."""
+        """Results that a scene may ask for besides the motion -> the capability that each needs."""
 
     @property
     def observables(self) -> tuple[Observable, ...]:
@@ -140,18 +140,18 @@ class Element(Protocol):
 
     @property
     def natural_time(self) -> float:
-        """Period of its slowest motion [s]: what the length of a run and a step are measured by."""
+        """Period of its slowest motion [s], the unit in which lengths of runs and steps are chosen."""
 
     def step_numbers(self, h: float, truth: xr.Dataset | None) -> Sequence[StepNumber]:
-        """Dimensionless numbers of a step ``h`` [s]; always the same names."""
+        """Dimensionless numbers of a step ``h`` [s]; the names do not depend on the arguments."""
 
     @property
     def first_motion(self) -> FirstMotion | None:
-        """Start of its motion; None where that has no direction yet."""
+        """Its initial accelerations; None if they have no direction yet."""
 
     @property
     def softened(self) -> frozenset[str]:
-        """Quantities of the certificate by whose softness an engine's first steps may differ."""
+        """Quantities of the certificate whose softening excuses a difference in an engine's first steps."""
 
     def variables(self, times: FloatArray, samples: Sequence[Any]) -> Columns:
         """All variables of a run, with ``units`` and ``long_name``.
@@ -162,43 +162,45 @@ class Element(Protocol):
         """
 
     def lacks(self, samples: Sequence[Any], asks: Sequence[str]) -> str | None:
-        """One sentence about what samples do not say though the scene requires it, or None."""
+        """One sentence about a value that the scene requires and the samples lack, or None."""
 
     def observe(self, dataset: xr.Dataset) -> dict[str, FloatArray]:
-        """Values of each observable that a run allows; a reaction without time 0.
+        """Values of each observable that a run determines; a reaction without time 0.
 
-        Those of samples off the grid are ``between.<name>`` along ``between`` [s]; what is a variable itself the
-        harness compares there, too, what is made of several samples is for the element to look at.
+        Observables of samples off the grid are ``between.<name>`` along ``between`` [s]. The harness computes those
+        that are
+        variables themselves; the element computes those that need several samples.
         """
 
     def scales(self, truth: xr.Dataset) -> dict[str, float]:
         """Size of each observable in the truth, to which a relative tolerance refers."""
 
     def certify(self, built: Any, sample: Any) -> list[Line]:
-        """Lines of the certificate: the engine's model and its start, held against the element."""
+        """Lines of the certificate: the engine's model and its initial sample compared with the element."""
 
     @property
     def failures(self) -> Mapping[str, str]:
-        """Names of its signs of failure, and of causes of errors, with their meaning: threshold and reason."""
+        """Names of its signs of failure, and of causes of errors -> meaning: threshold and reason."""
 
     @property
     def failing_events(self) -> Mapping[str, str]:
-        """Kinds of events -> the sign of failure that each stands for in a run that ends early."""
+        """Kinds of events that end a run early -> the sign of failure that each stands for."""
 
     def signs(self, dataset: xr.Dataset, truth: xr.Dataset | None) -> list[Sign]:
-        """Signs of failure besides a wrong path."""
+        """Signs of failure other than a wrong path."""
 
     def optional_terms(self, parameters: Mapping[str, float], truth: xr.Dataset) -> list[OptionalTerm]:
-        """Parts of the model that the scene's parameters put in or take out."""
+        """Parts of the model that parameters of the scene switch on or off."""
 
 
 class ElementKind(Protocol):
-    """A kind of element: how a scene file holds it, and on which scenes engines are checked.
+    """A kind of element: how a scene file describes it, and on which scenes engines are checked.
 
     Attributes:
         name: of the entry point.
-        tables: names of the tables of a scene file that it reads; of one that another kind reads, too, the rows that
-            name a thing of its own tables.
+        tables: names of the tables of a scene file that it reads. Of a table that another kind reads, too, it gets the
+            rows
+            that refer to things in its own tables.
         units: unit of each number in them, by its key.
     """
 
@@ -208,16 +210,16 @@ class ElementKind(Protocol):
 
     @staticmethod
     def read(tables: Mapping[str, Any], gravity: Gravity, numbers: Parameters, where: str) -> Sequence[Element]:
-        """The elements that the tables of a scene file hold.
+        """The elements in the tables of a scene file.
 
         Args:
             tables: the file's tables of this kind.
             gravity: of the scene.
-            numbers: the parameters, with which the tables are to be filled.
+            numbers: parameters with which formulas in the tables are evaluated.
             where: the file, for messages.
 
         Raises:
-            InputError: the first thing that is wrong, with its place.
+            InputError: the first mistake, with its place.
         """
 
     @staticmethod
@@ -226,4 +228,4 @@ class ElementKind(Protocol):
 
     @staticmethod
     def truth_scenes() -> Mapping[str, Scene]:
-        """Short scenes held against the truth, which reveal confused reference frames."""
+        """Short scenes that are compared with the truth and reveal confused reference frames."""

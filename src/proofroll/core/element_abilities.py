@@ -16,11 +16,11 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class SeenInRun:
-    """Result of a watch over a run.
+    """Result of watching a run.
 
     Attributes:
-        samples: number of samples that belong to the scene.
-        events: in order; None: it has nothing to say of events.
+        samples: number of samples before the run left the scene.
+        events: in order; None: the watch does not look for events.
         ended: reason of an end without a failure, or None.
     """
 
@@ -31,25 +31,25 @@ class SeenInRun:
 
 @runtime_checkable
 class TellsStart(Protocol):
-    """Optional ability of an element: tells in words how it starts, for a person who wrote a scene."""
+    """Ability of an element that describes its start in words, for the author of a scene."""
 
     @property
     def start_facts(self) -> Sequence[str]:
-        """Short sentences: where its bodies are, how they move, what holds them, how many ways they can move."""
+        """Short sentences: its bodies' positions and velocities, what holds them, its degrees of freedom."""
 
 
 class RunWatch(Protocol):
-    """Follows one run."""
+    """Watches one run for events and for its end."""
 
     def over(self, sample: Any) -> bool:
-        """True if the model is no longer that of the scene, so that the run ends here."""
+        """True if the run ends at this sample because it has left the scene's model."""
 
     def conclude(self, times: FloatArray, samples: Sequence[Any], located: Sequence[Event] | None) -> SeenInRun:
         """Result of the watch.
 
         Args:
-            times: of the samples [s]; there may be fewer samples.
-            samples: of the element.
+            times: planned times of samples [s].
+            samples: of the element; fewer than times if the run ended early.
             located: the engine's own events (:class:`proofroll.core.engine_abilities.LocatesEvents`), or None.
         """
 
@@ -59,17 +59,17 @@ class WatchesRuns(Protocol):
     """Ability of an element that has events, or whose runs can leave the scene."""
 
     def watch(self, asks: Sequence[str]) -> RunWatch:
-        """A watch over a run that is about to begin."""
+        """Watch over a run that is about to begin; ``asks`` are the results that the scene asks for."""
 
     def common_span(
         self, truth: xr.Dataset, runs: Mapping[Any, xr.Dataset]
     ) -> tuple[xr.Dataset, dict[Any, xr.Dataset]]:
-        """The truth and runs of it as far as they are comparable."""
+        """Truth and runs cut to the time in which they are comparable."""
 
 
 @runtime_checkable
 class CountsTurns(Protocol):
-    """Ability of an element whose angles go on beyond a turn."""
+    """Ability of an element whose angles exceed a full turn."""
 
     @property
     def turn_interval(self) -> float | None:
@@ -81,19 +81,19 @@ class CountsTurns(Protocol):
 
 @runtime_checkable
 class HasOptionalCapabilities(Protocol):
-    """Ability of an element whose scenes may do without some capability of a formulation."""
+    """Ability of an element with capabilities that not every scene needs."""
 
     @property
     def optional(self) -> frozenset[str]:
-        """Capabilities that are in an engine's model only where :attr:`Element.requires` or a question names them."""
+        """Capabilities that an engine models only if :attr:`Element.requires` or a question names them."""
 
 
 @runtime_checkable
 class KnowsAnotherScene(Protocol):
-    """Ability of an element whose model can be of another kind though each of its numbers is allowed."""
+    """Ability of an element that can tell when an engine built a different kind of model with admissible numbers."""
 
     def another_scene(self, lines: Sequence[Mapping[str, Any]], truth: xr.Dataset) -> str | None:
-        """Reason that the model is of another kind, as one clause; None: it is of the same.
+        """Reason why the engine's model is of a different kind, as one clause; None: it is of the same kind.
 
         Args:
             lines: of a stored certificate (:meth:`proofroll.core.certificate.Line.as_dict`).
@@ -106,9 +106,11 @@ class ExplainsErrors(Protocol):
     """Ability of an element that can explain a bounded error of the path."""
 
     def cause(self, dataset: xr.Dataset, error: float) -> str | None:
-        """Cause of an ``error`` of the deciding observable, in its unit, at the end of a run.
+        """Cause of an error of the path at the end of a run: a name in :attr:`Element.failures`, or None if unknown.
 
-        A name that ``meanings`` has; None: nothing that the element knows of.
+        Args:
+            dataset: the run.
+            error: of the deciding observable, in its unit.
         """
 
 
@@ -121,5 +123,6 @@ class WritesPrograms(Protocol):
 
         Args:
             failed: the run.
-            engine: its part (:class:`proofroll.core.engine_abilities.Reproduces`); None: the program asks proofroll.
+            engine: the engine's part of the program (:class:`proofroll.core.engine_abilities.Reproduces`); None: the
+                program runs the engine by proofroll.
         """

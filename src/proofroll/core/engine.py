@@ -17,12 +17,12 @@ from proofroll.core.scene import Scene
 
 @dataclass(frozen=True, slots=True)
 class Sample:
-    """State of one element now, in the world frame W; kinds of elements add reactions. None: the engine cannot say.
+    """State of one element at one time, in the world frame W; kinds of elements add reactions. None: not available.
 
-    Of an element of several bodies each array of a body has one axis more in front: (bodies, 3).
+    For an element of several bodies each array of a body has one more axis in front: (bodies, 3).
 
     Attributes:
-        widths: the arrays of a body, which the harness looks at, and how many finite numbers each has for a body.
+        widths: array of a body -> count of its numbers, which the harness checks to be finite.
         p_WB: origin of the body's frame [m], shape (3,).
         v_WB: velocity of that point [m/s], shape (3,).
         w_WB: angular velocity [rad/s], shape (3,).
@@ -42,8 +42,8 @@ class Regularised:
     """A quantity that the engine softens on purpose, so that it holds only within a tolerance.
 
     Attributes:
-        tolerance: largest relative difference that the model explains.
-        because: why.
+        tolerance: largest relative difference that the softening explains.
+        because: reason for the softening.
     """
 
     tolerance: float
@@ -53,9 +53,10 @@ class Regularised:
 class Settings(Protocol):
     """A frozen dataclass with at least these fields; every field has a default.
 
-    One of an engine that computes in single precision has ``precision = "single"`` besides, see :func:`precision_of`;
-    ``scheme`` names the rule of its steps, see :class:`Scheme`.
-    Names in ``unused``, if there is that, are fields that the formulation does not have: a run does not list them.
+    Further fields are optional. ``precision = "single"`` marks an engine that computes in single precision, see
+    :func:`precision_of`; ``scheme`` names the integration rule, see :class:`Scheme`; ``unused`` lists fields that have
+    no
+    meaning for the formulation, which a run does not show.
     """
 
     @property
@@ -72,9 +73,9 @@ class Settings(Protocol):
 
     @property
     def order(self) -> int | None:
-        """Order of convergence in ``dt`` that conformance holds it to; None: none is declared, or the step adapts.
+        """Order of convergence in ``dt``, which conformance checks; None: none is declared, or the step adapts.
 
-        It may hang on the engine's version; what in a scene lowers it, :class:`engine_abilities.LowersOrder` says.
+        It may depend on the engine's version. Parts of a scene that lower it: :class:`engine_abilities.LowersOrder`.
         """
 
 
@@ -83,7 +84,7 @@ class Engine(Protocol):
 
     Attributes:
         name: equal to the name of the entry point.
-        provides: formulation -> what it can represent honestly, as elements name it.
+        provides: formulation -> capabilities that it represents honestly, as elements name them.
         settings: frozen dataclass, see :class:`Settings`.
         presets: formulation -> preset -> complete settings; each formulation has at least ``matched`` or ``default``.
     """
@@ -99,28 +100,28 @@ class Engine(Protocol):
 
     @classmethod
     def build(cls, scene: Scene, settings: Any) -> Self:
-        """The scene in the engine, at time 0. Untimed.
+        """Builds the scene in the engine, at time 0. Untimed.
 
         Raises:
             Refused: the engine cannot represent the scene with these settings; the text says why.
         """
 
     def advance(self, t: float) -> None:
-        """Move the state to time ``t`` [s], not before the present one; timed. It returns when the state is there.
+        """Moves the state to time ``t`` [s], not before the present one. Timed; returns when the state is complete.
 
         Raises:
             Diverged: the engine gave up; the text says when and why.
         """
 
     def sample(self) -> Sample:
-        """State and reactions now, as its kind of element has them. Untimed; changes nothing."""
+        """State and reactions now, as a sample of the kind of element. Untimed; changes nothing."""
 
     def built(self) -> Any:
-        """Model read back from the engine, in the form of its kind of element. At time 0; changes nothing."""
+        """Model read back from the engine at time 0, as a record of the kind of element; changes nothing."""
 
 
 class Scheme(StrEnum):
-    """Rules of fixed steps that several engines have; settings declare one, or another in a text, as ``scheme``."""
+    """Common integration rules with fixed steps, for the field ``scheme`` of settings; another rule may be any text."""
 
     SEMI_IMPLICIT_EULER = "semi-implicit Euler"
     LEAPFROG = "leapfrog"
@@ -128,7 +129,7 @@ class Scheme(StrEnum):
 
 
 def scheme_of(settings: Any) -> str:
-    """Rule of the steps that some settings declare; empty: none."""
+    """Integration rule that settings declare; empty: none."""
     return str(getattr(settings, "scheme", ""))
 
 
@@ -137,10 +138,10 @@ EPSILON: Mapping[str, float] = {"double": 2.0**-52, "single": 2.0**-23}
 
 
 def precision_of(settings: Any) -> str:
-    """The precision in which an engine computes with some settings, a key of :data:`EPSILON`; double if they say none.
+    """Precision in which an engine computes with these settings, a key of :data:`EPSILON`; double by default.
 
     Raises:
-        InputError: they say another one.
+        InputError: the settings name an unknown precision.
     """
     precision = getattr(settings, "precision", "double")
     if precision not in EPSILON:
@@ -149,19 +150,19 @@ def precision_of(settings: Any) -> str:
 
 
 def fixed_step(settings: Settings) -> float | None:
-    """The step of settings with a fixed one [s], or None."""
+    """Fixed step of settings [s], or None if the step adapts."""
     step: float | None = getattr(settings, settings.resolution) if settings.resolution == "dt" else None
     return step
 
 
-_MOST_STEPS = 2**31 - 1  # between two samples: engines count them in C
+_MOST_STEPS = 2**31 - 1  # between two samples: engines count steps in 32-bit integers
 
 
 def whole_steps(start: float, end: float, dt: float) -> int:
     """Number of steps of size ``dt`` [s] from ``start`` to ``end`` [s].
 
     Raises:
-        InputError: the interval is not a whole number of steps, or one of more than engines can count.
+        InputError: the interval is not a whole number of steps, or has more of them than engines can count.
     """
     exact = (end - start) / dt
     if exact > _MOST_STEPS:

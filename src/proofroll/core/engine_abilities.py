@@ -20,14 +20,14 @@ class LocatesEvents(Protocol):
 
 @runtime_checkable
 class TellsRemarks(Protocol):
-    """Ability of an engine that makes remarks on a run that went well."""
+    """Ability of an engine that comments on a successful run."""
 
     def remarks(self) -> Sequence[str]:
-        """One clause each, without a full stop; none if there is nothing to say."""
+        """Remarks, each a clause without a full stop."""
 
 
 class Level(StrEnum):
-    """Share of the scene that a formulation models, from the least to the most: the rungs of the ladder."""
+    """Amount of a scene that a formulation models, from the least to the most: the rungs of the ladder."""
 
     CLOSED_FORM = "closed form"
     REDUCED = "reduced equations"
@@ -39,14 +39,14 @@ class Level(StrEnum):
 
 @dataclass(frozen=True)
 class Term:
-    """A part of a model that can be switched on and off by a setting.
+    """A part of a model that a setting switches on and off.
 
     Attributes:
         name: for a person, e.g. ``elimination of violations``.
         formulations: those that have it.
-        on, off: settings with and without it, put over a preset.
+        on, off: settings with and without it, which override a preset.
         because: purpose of the term.
-        rung: whether a model with it is a rung of the ladder by itself, as a contact of more dimensions is.
+        rung: True if a model with it is a rung of the ladder by itself, as a contact of more dimensions is.
     """
 
     name: str
@@ -72,9 +72,9 @@ class TellsLevels(Protocol):
 
 @runtime_checkable
 class TellsCaveats(Protocol):
-    """Ability of an engine with settings that are not what the engine alone would do.
+    """Ability of an engine with settings that the engine alone would not have.
 
-    An integrator of proofroll's around an engine's terms, say: whoever reads a verdict must not blame the engine.
+    An example is proofroll's own integrator around an engine's equations: the engine is not to blame for its errors.
     """
 
     @staticmethod
@@ -84,20 +84,20 @@ class TellsCaveats(Protocol):
 
 @runtime_checkable
 class TellsFamily(Protocol):
-    """Ability of an engine whose formulations solve laws of different families, which have limits of their own.
+    """Ability of an engine whose formulations solve different laws (of contact, say), each with a limit of its own.
 
-    As short steps do not bring one family to another, whoever reads a verdict must know which it is.
+    No step makes such laws agree, so verdicts name the law.
     """
 
     @staticmethod
     def family(settings: Any) -> Mapping[str, str]:
-        """Clause on the law that a model with these settings follows, by the capability that it is of."""
+        """Capability -> clause on the law that a model with these settings follows for it."""
 
 
 def laws(engine: Any, settings: Any) -> dict[str, str]:
-    """Clauses on the laws of what a formulation provides, by capability; none where the engine tells none."""
-    told = engine.family(settings) if isinstance(engine, TellsFamily) else {}
-    return {need: clause for need, clause in told.items() if need in engine.provides[settings.formulation]}
+    """Capability that a formulation provides -> clause on its law; empty if the engine names none."""
+    clauses = engine.family(settings) if isinstance(engine, TellsFamily) else {}
+    return {need: clause for need, clause in clauses.items() if need in engine.provides[settings.formulation]}
 
 
 @runtime_checkable
@@ -110,7 +110,13 @@ class LowersOrder(Protocol):
 
 
 def lowest(order: int | None, lowered: Mapping[str, int], requires: Collection[str]) -> int | None:
-    """Order of convergence for a scene with these requirements, the lowest of those declared; None: none is."""
+    """Order of convergence for a scene: the declared one, or the lowest that a required capability causes.
+
+    Args:
+        order: declared by the settings; None: none is, and so the result is None.
+        lowered: capability -> lower order.
+        requires: capabilities that the scene requires.
+    """
     return None if order is None else min([order, *(lowered[name] for name in lowered.keys() & set(requires))])
 
 
@@ -122,19 +128,19 @@ def declared_order(engine: Any, settings: Any, scene: Scene) -> int | None:
 
 @runtime_checkable
 class TellsDefaults(Protocol):
-    """Ability of an engine that tells its default values: for comparing its versions."""
+    """Ability of an engine that lists its default values, to compare versions of it."""
 
     @staticmethod
     def defaults() -> Mapping[str, Any]:
-        """Read from the engine itself: name -> number, text or list of numbers."""
+        """Default values read from the engine itself: name -> number, text or list of numbers."""
 
 
 @runtime_checkable
 class SupportsFrom(Protocol):
-    """Ability of an engine whose adapter does not run on every version of it.
+    """Ability of an engine whose adapter does not run with old versions.
 
     Attributes:
-        oldest: version of the engine from which on it does; an older one is refused with both versions.
+        oldest: oldest version of the engine that the adapter supports; an older one is refused.
     """
 
     oldest: ClassVar[str]
@@ -142,7 +148,7 @@ class SupportsFrom(Protocol):
 
 @runtime_checkable
 class WritesModels(Protocol):
-    """Ability of an engine whose own tools read a file of the model."""
+    """Ability of an engine that has a file format for models, which its own tools read."""
 
     @classmethod
     def model_file(cls, scene: Scene, settings: Any) -> str:
@@ -155,12 +161,13 @@ class Reproduces(Protocol):
 
     @classmethod
     def reproducer(cls, scene: Scene, settings: Any) -> str:
-        """Source of a program with numpy and the engine's own interface alone.
+        """Source of a program that uses only numpy and the engine's own interface.
 
-        Of a ball it assigns RADIUS [m], MASS [kg], INERTIA [kg m²], GRAVITY [m/s²] and the start, and defines
+        For a ball it assigns RADIUS [m], MASS [kg], INERTIA [kg m²], GRAVITY [m/s²] and the initial state, and defines
         ``frame(p)``, ``gap(p)`` (:func:`proofroll.elements.ball_on_surface.reproducer_source.cut_program`) and
-        ``run(times)``, a generator of its centre, velocity and angular velocity in the world at each of the times [s];
-        where the engine says that it has failed, ``run`` raises RuntimeError with its words.
+        ``run(times)``. That is a generator of the ball's centre, velocity and angular velocity in the world at each
+        time [s];
+        if the engine reports a failure, it raises RuntimeError with the engine's text.
 
         Raises:
             Refused: there is no program for this; the text says why.
@@ -169,10 +176,10 @@ class Reproduces(Protocol):
 
 @runtime_checkable
 class CannotLeaveOut(Protocol):
-    """Ability of an engine with models that hold terms no scene asked for and no setting removes.
+    """Ability of an engine whose models hold terms that a scene may not ask for and no setting removes.
 
     Attributes:
-        inherent: formulation -> what is always in its model -> why.
+        inherent: formulation -> term that is always in its model -> reason.
     """
 
     inherent: ClassVar[Mapping[str, Mapping[str, str]]]
@@ -180,11 +187,12 @@ class CannotLeaveOut(Protocol):
 
 @runtime_checkable
 class SharesEquations(Protocol):
-    """Ability of an engine with formulations that rest on the equations of a route of the truth.
+    """Ability of an engine with formulations that use the same equations as a route of the truth.
+
+    Agreement with such a route proves little: it counts only as far as the other route agrees, too, and is marked.
 
     Attributes:
-        shares: formulation -> routes (the part of a route's name before the comma or bracket). Where the truth takes
-            such a route, agreement with it is news only as far as the other route agrees too, and is marked.
+        shares: formulation -> routes (the part of a route's name before the comma or bracket).
     """
 
     shares: ClassVar[Mapping[str, Sequence[str]]]
@@ -192,10 +200,10 @@ class SharesEquations(Protocol):
 
 @runtime_checkable
 class SaysWhyNot(Protocol):
-    """Ability of an engine that gives reasons for what a formulation does not provide.
+    """Ability of an engine that gives reasons for the capabilities that a formulation lacks.
 
     Attributes:
-        lacking: formulation -> what it does not provide -> why, as the end of a sentence.
+        lacking: formulation -> capability that it does not provide -> reason, as the end of a sentence.
     """
 
     lacking: ClassVar[Mapping[str, Mapping[str, str]]]
@@ -205,7 +213,7 @@ class SaysWhyNot(Protocol):
 class MadeFor(Protocol):
     """Ability of an engine to offer a formulation for certain scenes only.
 
-    Without what it is made for such a formulation is the same model as another one; asked for by name it builds it.
+    For other scenes such a formulation is the same model as another one; it can still be asked for by name.
 
     Attributes:
         made_for: formulation -> capabilities; a scene has to require one of them.
@@ -220,10 +228,10 @@ def offered(formulation: str, requires: Collection[str], made_for: Mapping[str, 
 
 
 def require_provided(engine: Any, formulation: str, scene: Scene) -> None:
-    """Compares what a scene requires with what a formulation provides.
+    """Checks that a formulation provides all that a scene requires.
 
     Raises:
-        Refused: it lacks something; the text says what, and why if the engine says it.
+        Refused: it lacks a capability; the text names it, the reason if the engine gives one, and able formulations.
     """
     reasons = engine.lacking.get(formulation, {}) if isinstance(engine, SaysWhyNot) else {}
     missing = sorted(scene.requires - engine.provides[formulation])

@@ -1,4 +1,4 @@
-"""Errors, each with one sentence that a person can act on."""
+"""Exceptions whose text is one sentence that a person can act on."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ class ProofrollError(Exception):
 
 
 class InputError(ProofrollError):
-    """Something the user gave is wrong.
+    """A wrong value given by the user.
 
     Attributes:
         field: name of the offending field as the user writes it, e.g. ``radius``.
@@ -32,11 +32,11 @@ class InputError(ProofrollError):
         super().__init__(f"{self.field} = {_shown(value)}: {advice}")
 
     def within(self, field: str, value: object) -> InputError:
-        """The same error, of a larger thing that holds this one."""
+        """The same error, reported for a larger field that contains this one."""
         return InputError(field, value, str(self))
 
     def of(self, place: str) -> InputError:
-        """The same problem with the name of the file, or the part of one, before the field."""
+        """The same error with the name of a file, or of a part of it, before the field."""
         known = self.field.startswith(place) or self.field == "file"
         return self if known else InputError(f"{place}: {self.field}", self.value, self.advice)
 
@@ -49,7 +49,7 @@ class NotUnique(Refused):
     """The laws of the scene have no unique answer, by whatever method; the text says where."""
 
 
-class Missing(ProofrollError):  # noqa: N818 -- likewise: the engine is not installed
+class Missing(ProofrollError):  # noqa: N818 -- a state of the machine: the engine is not installed
     """The engine cannot be loaded here; the text says why and how to get it."""
 
 
@@ -59,7 +59,7 @@ class Diverged(ProofrollError):  # noqa: N818 -- a finding about the engine
 
 @contextmanager
 def told_of(place: str) -> Iterator[None]:
-    """Context that adds a file's name to an InputError, see :meth:`InputError.of`."""
+    """Context manager that adds the name of a file to an InputError, see :meth:`InputError.of`."""
     try:
         yield
     except InputError as error:
@@ -74,12 +74,17 @@ def no_such_key(field: str, value: object, known: Iterable[str]) -> InputError:
 def require_known(
     field: str, name: object, known: Iterable[str], advice: str = "choose one of", given: object = None
 ) -> None:
-    """Raises an error unless the name is known; it lists the first twenty known names.
+    """Raises an error that lists the first twenty known names, unless ``name`` is known.
 
-    ``given`` is what was written, where that is more than the name.
+    Args:
+        field: for the message.
+        name: the name to look for.
+        known: known names.
+        advice: beginning of the advice, before the list.
+        given: text to show instead of the name, if the user wrote more than the name.
 
     Raises:
-        InputError: there is no such name.
+        InputError: the name is unknown.
     """
     names = list(known)
     if name not in names:
@@ -87,9 +92,12 @@ def require_known(
 
 
 def refuse_first(engine: str, settings: object, rules: Iterable[tuple[bool, str, str]]) -> None:
-    """Refuses settings of an engine for the first rule that they break.
+    """Raises an error for the first rule that settings of an engine break.
 
-    A rule is whether it is broken, the name of the setting, and what is wrong and what to do instead.
+    Args:
+        engine: its name.
+        settings: of the engine.
+        rules: True if the rule is broken, name of the setting, advice.
 
     Raises:
         InputError: a rule is broken.
@@ -100,9 +108,9 @@ def refuse_first(engine: str, settings: object, rules: Iterable[tuple[bool, str,
 
 
 def raised_at(error: BaseException) -> str:
-    """Line of an adapter that raised an exception, as ``file:line in function``; empty if none did.
+    """Line of an adapter that raised an exception, as ``file:line in function``; empty if no adapter did.
 
-    It is the last line of the first package outside the harness: what that package calls knows no better.
+    It is the innermost line in the first package outside the harness; lines of libraries that it calls are skipped.
     """
     frames = [frame for frame in traceback.extract_tb(error.__traceback__) if "importlib" not in frame.filename]
     places = [(frame, Path(frame.filename)) for frame in frames]
@@ -115,7 +123,7 @@ def raised_at(error: BaseException) -> str:
 
 
 def lack_behind(error: BaseException) -> BaseException | None:
-    """Lack of the machine behind an error: memory, a file, or time (Ctrl-C); None: the engine failed."""
+    """Lack of memory, a file or time (Ctrl-C) that caused an error; None: the engine itself failed."""
     cause: BaseException | None = error
     while cause is not None and not isinstance(cause, (MemoryError, OSError, KeyboardInterrupt)):
         cause = cause.__cause__ or cause.__context__
@@ -123,14 +131,14 @@ def lack_behind(error: BaseException) -> BaseException | None:
 
 
 def choices(names: Iterable[str]) -> str:
-    """Names to choose from, of many the first twenty."""
+    """List of names to choose from; of more than twenty the first twenty."""
     shown = list(names)
     return ", ".join(shown[:20] + ["…"] * (len(shown) > 20)) or "none"
 
 
 def _shown(value: object) -> str:
     if isinstance(value, Path):
-        return repr(str(value))  # whole, or nobody finds the file
+        return repr(str(value))  # a shortened path would be useless
     return _short(repr(value) if isinstance(value, str) else str(value), 60)
 
 

@@ -13,20 +13,20 @@ from proofroll.core.columns import Columns, Variable
 if TYPE_CHECKING:
     import xarray as xr
 
-# Name of an observable that any kind of element may declare whose runs have events: how many of these are of another
-# kind than the truth's, missing or too many.
+# Name of an observable for kinds of elements with events: how many events differ in kind from the truth's, are missing
+# or are too many.
 EVENT_ORDER = "event_order"
 
 
 @dataclass(frozen=True)
 class Event:
-    """One change of what acts in a run.
+    """One change of what acts in a run: a contact, friction, a stop.
 
     Attributes:
         kind: as its kind of element names it, e.g. ``slip``.
-        time: best value [s].
-        time_low, time_high: the event lies between these [s].
-        name: of what it happens to, where an element has several; may be empty.
+        time: best estimate [s].
+        time_low, time_high: bracket of the event [s].
+        name: of the part of the element that it happens to; empty if there is only one.
     """
 
     kind: str
@@ -37,7 +37,7 @@ class Event:
 
 
 def event_columns(events: Sequence[Event]) -> dict[str, Variable]:
-    """``event_kind`` and ``event_time``, ``event_low``, ``event_high`` [s] along ``event``."""
+    """Variables ``event_kind``, ``event_name``, ``event_time``, ``event_low``, ``event_high`` [s] along ``event``."""
     columns = {
         "event_time": ("when it happened", [event.time for event in events]),
         "event_low": ("not before", [event.time_low for event in events]),
@@ -57,18 +57,18 @@ def event_columns(events: Sequence[Event]) -> dict[str, Variable]:
 
 
 def with_events(dataset: xr.Dataset, events: Sequence[Event]) -> xr.Dataset:
-    """The dataset with the events, see :func:`event_columns`."""
+    """The dataset with variables for the events, see :func:`event_columns`."""
     return dataset.assign(event_columns(events))
 
 
 def events_of(dataset: xr.Dataset | Columns) -> list[Event]:
-    """The events that :func:`with_events` stored; none if there are no such variables."""
+    """Events stored by :func:`with_events`; none if there are no such variables."""
     if "event_kind" not in dataset:
         return []
-    said = dataset.variables  # xarray makes a new array of each item, which takes longer than all the rest
-    columns = [said[f"event_{name}"].values.tolist() for name in ("kind", "time", "low", "high")]
+    variables = dataset.variables  # indexing the dataset makes a new array of each item, which is slow
+    columns = [variables[f"event_{name}"].values.tolist() for name in ("kind", "time", "low", "high")]
     named = "event_name" in dataset  # files of earlier runs have none
-    names = said["event_name"].values.tolist() if named else [""] * len(columns[0])
+    names = variables["event_name"].values.tolist() if named else [""] * len(columns[0])
     return [Event(*row) for row in zip(*columns, names, strict=True)]
 
 

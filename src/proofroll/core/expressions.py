@@ -19,13 +19,13 @@ _OPERATORS = {
     ast.USub: operator.neg,
     ast.UAdd: operator.pos,
 }
-LONGEST = 500  # characters: what a person writes is far shorter, and nesting stays shallow enough to be parsed
+LONGEST = 500  # characters: far more than a person writes, and few enough that nesting cannot overflow the parser
 
 
 def evaluator(
     names: Mapping[str, Any], functions: Mapping[str, Callable[[Any], Any]], power: Callable[[Any, Any], Any]
 ) -> SimpleEval:
-    """Evaluator of formulas with + - * / ^ ** ( ), these names and functions, and no attributes."""
+    """Evaluator of formulas with + - * / ^ ** ( ) and the given names and functions; attributes are not allowed."""
     made = SimpleEval(operators={**_OPERATORS, ast.Pow: power}, functions=dict(functions), names=dict(names))
     del made.nodes[ast.Attribute]
     return made
@@ -45,16 +45,16 @@ def evaluated(
     """The number of an expression of parameters with + - * / ^ ** ( ) and ``pi``.
 
     Args:
-        field: where it stands, for the message.
+        field: its place, for the message.
         text: the expression.
         names: the parameters, with their units.
-        unit: that its result must have, as scene files write it; "": not checked. A formula of plain numbers alone is
-            a plain number, as one that stands there itself.
-        functions: that it can call, of ratios; what they give is a plain number.
+        unit: required unit of the result, as scene files write it; "": not checked. A formula of plain numbers is
+            accepted for any unit, as a plain number is.
+        functions: functions of a dimensionless number that the expression may call.
 
     Raises:
-        InputError: it cannot be read, names an unknown parameter, calls a function, divides by zero, overflows, adds
-            what has different units, or its result has another unit.
+        InputError: the expression cannot be read, has an unknown name or function, divides by zero, overflows, adds
+            different units, or its result has another unit.
     """
     if len(text) > LONGEST:
         raise InputError(field, text, f"an expression may have at most {LONGEST} characters")
@@ -85,7 +85,7 @@ def evaluated(
 
 
 def _of_ratio(name: str, function: Callable[[float], float]) -> Callable[[Quantity | float], Quantity]:
-    """A function for numbers without a unit."""
+    """Function of quantities that raises UnitsDiffer for an argument with a unit."""
 
     def called(argument: Quantity | float) -> Quantity:
         given = Quantity(0.0) + argument

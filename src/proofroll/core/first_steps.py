@@ -1,4 +1,4 @@
-"""The first acceleration of an engine from its own first steps: nothing that an adapter says can hide it."""
+"""Initial acceleration of an engine derived from its own first steps, which no report of an adapter can falsify."""
 
 import contextlib
 from dataclasses import replace
@@ -16,34 +16,37 @@ from proofroll.core.multi_element import build, sample_of, shaped
 from proofroll.core.number_format import number
 from proofroll.core.scene import Scene
 
-# Derivative at the first of equally spaced values, over the spacing: by a parabola, by a cubic.
+# Weights of equally spaced values for the derivative at the first of them, times the spacing: parabola, cubic.
 _PARABOLA = np.array([-3.0, 4.0, -1.0, 0.0]) / 2
 _CUBIC = np.array([-11.0, 18.0, -9.0, 2.0]) / 6
-# What may stop within so many steps, one more than are looked at, tells nothing of the first acceleration.
+# A body that may come to rest within this many steps (one more than are used) is left out.
 _STEPS = 4
-# Three times the observed differences, as for every error bar; the rest is what a cubic misses in the part above.
+# Factor on the observed differences, as for every error bar, and an addend for what the cubic misses.
 _MARGIN = 3.0
 _FLOOR = 1e-6
-# Largest relative tolerance: more would excuse a rolling resistance or a damping that was left out or in.
+# Largest useful relative tolerance: a larger one would hide a rolling resistance or damping left out by mistake.
 MOST = 0.03
-# A contact softened by more than this part moves by its springs at first, whatever its force at time 0.
+# A contact softened by more than this relative tolerance moves by its springs at first, whatever its force at time 0.
 _SPRINGS = 0.01
-# Of an engine that says its acceleration: steps of a spring that holds a loop at a time constant of two steps set off
-# otherwise by up to a thousandth, however short they are. This leaves them room.
+# Relative tolerance for an engine that also reports its acceleration: where springs with a time constant of two steps
+# hold a loop, the first steps are wrong by up to a thousandth, however short.
 _STIFF = 5e-3
-OF_FIRST_STEPS = " of the first steps"  # ends the names of their lines
+OF_FIRST_STEPS = " of the first steps"  # end of the quantity of such lines
 
 
 def first_steps(kind: Any, scene: Scene, settings: Any) -> list[Line]:
     """Certificate lines of the acceleration and angular acceleration at time 0, derived from the first steps.
 
-    Velocities after one, two and three steps give the derivative at time 0 by a parabola and by a cubic; half the step
-    gives it again. Half a step's error of a method of order p is the change over 2^p - 1: that is taken off. What the
-    two polynomials and the two steps differ by is what the derivation does not know, and what rounding each velocity
-    makes of a derivative over so short a step; the tolerance is three times that.
-    An engine without a step is looked at after small times. Empty for a ball at rest under rolling resistance, which
-    has no direction yet, for one that may stop within these steps, and for a contact so soft that its springs move
-    first.
+    A parabola and a cubic through the velocities after zero to three steps give the derivative at time 0; runs with
+    half
+    the step give it again. For a method of order p the change by halving over 2^p - 1 is the remaining error, which is
+    subtracted. The uncertainty is the difference of the two polynomials, plus that of the two steps, plus the effect of
+    rounding the velocities; the tolerance is three times the uncertainty.
+
+    An engine without a step is sampled after short times. There are no lines for an element whose motion has no
+    direction
+    yet (a ball at rest under rolling resistance), one that may come to rest within these steps, and a contact so soft
+    that its springs move first.
 
     Raises:
         Diverged, Refused: by the engine.
@@ -60,7 +63,7 @@ def first_steps(kind: Any, scene: Scene, settings: Any) -> list[Line]:
 
 
 def _lines(kind: Any, scene: Scene, settings: Any, index: int, start: FirstMotion, soft: float) -> list[Line]:
-    """Both lines of one element."""
+    """Lines of one element: acceleration and angular acceleration."""
     element, step = scene.elements[index], fixed_step(settings)
     h = step or start.moment
     finer = replace(settings, dt=h / 2) if step else settings
@@ -70,7 +73,7 @@ def _lines(kind: Any, scene: Scene, settings: Any, index: int, start: FirstMotio
     order = declared_order(kind, settings, scene) if step else None
     limit = fine + ((fine - coarse) / (2**order - 1) if order else 0.0)
     epsilon = EPSILON[precision_of(settings)]
-    # a velocity of a point at rest is rounded as that of one at its body's end
+    # the velocity of a point at rest has the rounding error of a point at the end of its body
     unknown = np.abs(fine - coarse) + np.abs(fine - parabola) + epsilon * rounding
     turning = max(start.scale / element.length, float(np.max(np.abs(start.angular_acceleration))))
     lines = []
@@ -96,7 +99,7 @@ def _lines(kind: Any, scene: Scene, settings: Any, index: int, start: FirstMotio
 
 
 def softness(engine: Any, scene: Scene) -> float:
-    """Largest softening that a freshly built engine declares, among the quantities that may be soft."""
+    """Largest softening that a freshly built engine declares for the quantities in :attr:`Element.softened`."""
     built = engine.built()
     each = [built] if len(scene.elements) == 1 else [built[element.name] for element in scene.elements]
     tolerances = [0.0]
@@ -107,30 +110,31 @@ def softness(engine: Any, scene: Scene) -> float:
 
 
 def certificate(kind: Any, engine: Any, scene: Scene, settings: Any) -> list[Line]:
-    """Certificate of a freshly built engine: its own account, its laws, and the acceleration of its first steps.
+    """Certificate of a freshly built engine: its report, its laws of contact, and the acceleration of its first steps.
 
-    Numbers that only repeat the scene's prove nothing. An acceleration that an engine reports is held to the
-    scene exactly; its steps may differ by :data:`_STIFF`, and by what is granted to a softened one.
+    A report that only repeats the scene's numbers proves nothing, so the first steps are compared, too. If the engine
+    reports the acceleration, the tolerance of the first steps is at least :data:`_STIFF`, plus that of the reported
+    one.
     """
     lines = certify(engine, scene, settings)
     granted = {line.quantity: line.tolerance for line in lines if line.standing is not Standing.NOT_REPORTED}
     derived = []
     for line in derivable(kind, scene, settings):
-        said = granted.get(line.quantity.replace(OF_FIRST_STEPS, ""))
-        derived.append(line if said is None else replace(line, tolerance=max(line.tolerance, _STIFF) + said))
-    told = [
+        more = granted.get(line.quantity.replace(OF_FIRST_STEPS, ""))
+        derived.append(line if more is None else replace(line, tolerance=max(line.tolerance, _STIFF) + more))
+    contact_laws = [
         Line(scene.label(element, f"law of contact: {clause}"), "", (), (), 0.0, EXACT)
         for element in scene.elements
         for need, clause in laws(kind, settings).items()
         if need in element.requires
     ]
-    return [*lines, *told, *derived]
+    return [*lines, *contact_laws, *derived]
 
 
 def derivable(kind: Any, scene: Scene, settings: Any) -> list[Line]:
-    """:func:`first_steps` as far as they tell anything at this step: those with a tolerance of at most :data:`MOST`.
+    """Lines of :func:`first_steps` that are precise enough: with a tolerance of at most :data:`MOST`.
 
-    Empty where the engine fails, and so will its run, or takes no finer step.
+    Empty if the engine fails (as its run will) or takes no finer step.
     """
     with contextlib.suppress(Diverged, Refused, InputError):
         return [line for line in first_steps(kind, scene, settings) if line.tolerance <= MOST]
@@ -140,9 +144,10 @@ def derivable(kind: Any, scene: Scene, settings: Any) -> list[Line]:
 def _derivatives(
     kind: Any, scene: Scene, element: Element, settings: Any, h: float
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Accelerations of all bodies' centres and turning at time 0, by a parabola and a cubic; (2, bodies, 3).
+    """Linear and angular accelerations of all bodies at time 0 by a parabola, by a cubic, and the effect of rounding.
 
-    Besides what rounding each velocity by its natural size makes of them, over the machine epsilon; (2, 1, 1).
+    The accelerations have shape (2, bodies, 3), linear ones first; the effect of rounding the velocities has shape
+    (2, 1, 1) and is divided by the machine epsilon.
     """
     engine = build(kind, scene, settings)
     samples = []

@@ -1,7 +1,7 @@
-"""Integrators of ẋ = rates(x): one class each, added to INTEGRATORS. None uses values interpolated inside a step.
+"""Integrators of ẋ = rates(x), a class each, in INTEGRATORS. The state at any time inside a step is available.
 
-A step can be looked into. The state inside it comes from a shorter step of the same method from the same start, so that
-a located event is as accurate as the steps are.
+It is computed by a shorter step of the same method from the same start, not interpolated, so that a located event is as
+accurate as the steps.
 """
 
 import math
@@ -18,12 +18,12 @@ from proofroll.core.errors import Diverged
 from proofroll.core.stalling import StepWatch
 
 Rates = Callable[[FloatArray], FloatArray]
-# Part of a fixed step that is not worth a step of its own.
+# A remainder of a fixed step below this part of it is not taken as a step of its own.
 _SLIVER = 1e-9
 
 
 def classical_step(rates: Rates, x: FloatArray, h: float) -> FloatArray:
-    """One step [s] of the classical Runge-Kutta method."""
+    """One step of length h [s] by the classical Runge-Kutta method."""
     k1 = rates(x)
     k2 = rates(x + h / 2 * k1)
     k3 = rates(x + h / 2 * k2)
@@ -38,9 +38,9 @@ class Integrator(ABC):
         resolution: the setting that trades speed for accuracy.
         order: of convergence in ``dt``; None with an adaptive step.
         stability: largest h λ with which a component that decays like exp(-λ t) still decays.
-        reach: part of the time in which a slip vanishes, doubles or turns by a radian that one step may take.
+        reach: longest step, as a part of the time in which a slip vanishes, doubles or turns by a radian.
         t, x: present time [s] and state.
-        t_before, x_before: where the last single step started.
+        t_before, x_before: time [s] and state at the start of the last single step.
     """
 
     resolution: ClassVar[Literal["dt", "rtol"]]
@@ -49,16 +49,16 @@ class Integrator(ABC):
     reach: ClassVar[float]
 
     def __init__(self, resolution: float) -> None:
-        """Takes the value of the setting of that name."""
+        """Takes the value of ``dt`` [s] or ``rtol`` [1], as :attr:`resolution` says."""
         self._resolution = resolution
 
     def begin(self, t: float, x: FloatArray, rates: Rates, accept: Accept, scales: FloatArray) -> None:  # noqa: ARG002 -- a fixed step needs no measure of error
-        """Starts, or goes on with another state or other equations.
+        """Starts, or restarts with a new state or new equations.
 
         Args:
             t: present time [s].
             x: the state.
-            rates: ẋ of x.
+            rates: state -> its time derivative.
             accept: see :data:`proofroll.core.dop853.Accept`.
             scales: natural size of each component of x.
         """
@@ -67,10 +67,10 @@ class Integrator(ABC):
 
     @abstractmethod
     def advance(self, t: float) -> None:
-        """Moves to time t [s]; the last step ends there. Raises Diverged if it gave up."""
+        """Moves to time t [s]; the last step ends there. Raises Diverged if no step succeeds."""
 
     def aim(self, t: float) -> None:  # noqa: B027 -- the steps of most methods end anywhere
-        """Says that single steps will have to end at the time t [s].
+        """Announces that single steps will have to end at the time t [s].
 
         Raises:
             InputError: the method's own steps do not end there.
@@ -78,20 +78,23 @@ class Integrator(ABC):
 
     @abstractmethod
     def step(self, until: float, longest: float) -> None:
-        """One step, at most of this length [s] and at most to the time ``until`` [s]. Raises Diverged if it gave up."""
+        """Takes one step, at most ``longest`` [s] long and ending at ``until`` [s] at the latest.
+
+        May raise Diverged.
+        """
 
     @abstractmethod
     def inside(self, t: float) -> FloatArray:
         """The state at a time [s] within the last step."""
 
     def crossing(self, margin: Callable[[FloatArray], float], high: float, width: float) -> tuple[float, float]:
-        """Times [s] within the last step before and after a margin of the state became negative.
+        """Times [s] within the last step just before and just after a margin of the state becomes negative.
 
         Args:
-            margin: negative at the time ``high``. One that starts at zero and rises first (a slip starts with none, a
-                rebound at its stop) is followed to where it comes back.
-            high: [s].
-            width: to which the time is located [s].
+            margin: function of the state, negative at the time ``high``. If it starts at zero and first rises (a slip
+                begins with speed zero, a rebound at its stop), its later fall through zero is found.
+            high: end of the search [s].
+            width: accuracy of the times [s].
         """
         from scipy.optimize import brentq
 
@@ -106,19 +109,19 @@ class Integrator(ABC):
             if low - start <= width:
                 return start, start
         root = float(brentq(at, low, high, xtol=width, rtol=4 * np.finfo(float).eps))
-        while True:  # what the root search says, with a state on either side
+        while True:  # widen around the root until the margin has different signs at both ends
             before, after = max(low, root - width), min(high, root + width)
             if (at(before) > 0 or before == low) and (at(after) < 0 or after == high):
                 return before, after
             width *= 4
 
     def bracket(self, low: float, high: float) -> tuple[float, float]:
-        """Bracket of an event located between two times [s]: as tight as it was located."""
+        """Error bracket [s] of an event located between two times [s]: by default these times."""
         return low, high
 
 
 class RungeKutta4(Integrator):
-    """The classical Runge-Kutta method on a grid of times; after an event it goes to the next point of the grid."""
+    """The classical Runge-Kutta method on a fixed grid of times; after an event a shorter step returns to the grid."""
 
     resolution = "dt"
     order = 4
@@ -156,7 +159,7 @@ class RungeKutta4(Integrator):
         return self._accept(t, classical_step(self._rates, self.x_before, t - self.t_before))
 
     def bracket(self, low: float, high: float) -> tuple[float, float]:
-        """See :class:`Integrator`. The step of the grid: a narrower one would trust the step's own error."""
+        """The whole step of the grid around the event, since within it the step's own error is unknown."""
         start = math.floor(low / self._resolution + _SLIVER) * self._resolution
         return min(start, low), max(start + self._resolution, high)
 
@@ -164,8 +167,7 @@ class RungeKutta4(Integrator):
 class DormandPrince853(Integrator):
     """Dormand and Prince's method of order 8 with error control, from scipy.
 
-    One solver lives from :meth:`begin` on. Its bound moves from sample to sample, so that a step ends at each: scipy's
-    interpolant is of order 7 only.
+    One solver is used from :meth:`begin` on. A step ends at each sample, as scipy's interpolant is only of order 7.
     """
 
     resolution = "rtol"

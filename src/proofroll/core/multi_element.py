@@ -1,4 +1,4 @@
-"""An engine on a scene: one model of a scene of one element, or, as no force couples elements, a model of each."""
+"""An engine on a scene of several elements: one independent model for each, as no force couples elements."""
 
 import dataclasses
 from collections.abc import Collection, Iterator, Mapping, Sequence
@@ -17,7 +17,7 @@ from proofroll.core.plugins import resolve_settings
 from proofroll.core.scene import Scene
 
 AnySample = Sample | Mapping[str, Sample]
-"""What an engine samples: of a scene of several elements one sample for each, by its name."""
+"""Sample of a scene; with several elements one sample for each, by the element's name."""
 
 # Arrays of a sample that every engine gives.
 REQUIRED = ("p_WB", "v_WB", "w_WB")
@@ -45,11 +45,11 @@ class IndependentElements:
             part.advance(t)
 
     def sample(self) -> Mapping[str, Sample]:
-        """One for each element."""
+        """One sample for each element, by its name."""
         return {name: part.sample() for name, part in self.parts.items()}
 
     def built(self) -> Mapping[str, Any]:
-        """One for each element."""
+        """The engine's account of each element's model, by the element's name."""
         return {name: part.built() for name, part in self.parts.items()}
 
     def remarks(self) -> Sequence[str]:
@@ -59,7 +59,7 @@ class IndependentElements:
 
 
 def each_alone(scene: Scene) -> list[Scene]:
-    """One scene for each element, which holds it alone with what is asked of it."""
+    """Scenes of one element each, with the questions that concern it."""
     return [
         dataclasses.replace(scene, elements=(element,), asks=tuple(filter(element.askable.get, scene.asks)))
         for element in scene.elements
@@ -69,15 +69,17 @@ def each_alone(scene: Scene) -> list[Scene]:
 def formulation_for(requires: Collection[str], formulation: str, provides: Mapping[str, Collection[str]]) -> str | None:
     """Formulation that builds an element in a run of the given formulation.
 
-    It is that of the run, or, of a kind of element that it knows nothing of, the first one that provides all.
+    It is the run's own if that provides all. If the run's formulation knows no capability of this kind of element at
+    all,
+    it is the first formulation of the engine that provides all.
 
     Args:
-        requires: by the element alone.
+        requires: capabilities that the element alone requires.
         formulation: of the run.
         provides: capabilities of each formulation of the engine.
 
     Returns:
-        None where there is none.
+        None if there is none.
     """
     if set(requires) <= set(provides[formulation]):
         return formulation
@@ -88,13 +90,13 @@ def formulation_for(requires: Collection[str], formulation: str, provides: Mappi
 
 
 def represents(scene: Scene, formulation: str, provides: Mapping[str, Collection[str]]) -> bool:
-    """True if every element has a model in such a run, and at least one has it in the formulation itself."""
+    """True if every element can be built in a run of the formulation, and at least one in the formulation itself."""
     formulations = [formulation_for(alone.requires, formulation, provides) for alone in each_alone(scene)]
     return None not in formulations and formulation in formulations
 
 
 def build(kind: Any, scene: Scene, settings: Any) -> Any:
-    """The scene, in a copy of its own, in an engine at time 0.
+    """Engine at time 0 with a copy of the scene.
 
     Raises:
         Refused: the formulation does not provide what the scene requires, or cannot represent it.
@@ -106,18 +108,15 @@ def build(kind: Any, scene: Scene, settings: Any) -> Any:
 
 
 def step_of(engine: Any, settings: Any) -> float | None:
-    """The fixed step of what was built with some settings [s], the largest of several elements; None: none has any.
-
-    Beside an element that adapts its steps there may be one in a formulation that has a fixed one.
-    """
+    """Largest fixed step of the models of an engine [s]; None: all adapt their steps."""
     steps = engine.steps if isinstance(engine, IndependentElements) else [fixed_step(settings)]
     return max((step for step in steps if step is not None), default=None)
 
 
 def _settings_for(kind: Any, alone: Scene, settings: Any) -> Any:
-    """The settings themselves, or, for a kind of element that their formulation knows nothing of, those of the first.
+    """Settings for one element: the given ones, or those of the formulation that :func:`formulation_for` chooses.
 
-    That is the first formulation that provides what the element requires, with the same preset, if it has it, and step.
+    The latter have the same preset, if the formulation has it, and the same step.
     """
     provides = {name: kind.provides[name] for name in kind.presets}
     name = formulation_for(alone.requires, settings.formulation, provides)
@@ -131,7 +130,7 @@ def _settings_for(kind: Any, alone: Scene, settings: Any) -> Any:
 
 
 def sample_of(scene: Scene, element: Element, sample: AnySample) -> Sample:
-    """The part of a sample that belongs to one element. Raises Diverged if there is none."""
+    """Part of a sample that belongs to one element. Raises Diverged if it is missing or of the wrong type."""
     own = sample.get(element.name, sample) if isinstance(sample, Mapping) else sample
     if not isinstance(own, element.sample_type) or (own is sample and len(scene.elements) > 1):
         each = " for each element, by its name" if len(scene.elements) > 1 else ""
@@ -144,7 +143,7 @@ def arrays(scene: Scene, sample: AnySample, t: float) -> Iterator[tuple[str, Flo
     """Every array of a sample at time ``t`` [s] with its name.
 
     Raises:
-        Diverged: one is lacking, is not of numbers, or has another shape than the scene's bodies.
+        Diverged: one is missing, is not numeric, or does not have the shape for the scene's bodies.
     """
     for element in scene.elements:
         own, bodies = sample_of(scene, element, sample), len(element.bodies)
@@ -163,7 +162,7 @@ def arrays(scene: Scene, sample: AnySample, t: float) -> Iterator[tuple[str, Flo
 
 
 def shaped(scene: Scene, sample: AnySample, t: float) -> AnySample:
-    """The sample itself, after a look at its shapes; raises as :func:`arrays`."""
+    """The sample itself, after its shapes were checked; raises as :func:`arrays`."""
     for _ in arrays(scene, sample, t):
         pass
     return sample

@@ -1,6 +1,6 @@
-"""Text of computed numbers for people: errors, costs, steps that hold.
+"""Text of computed numbers for people: errors, costs, steps.
 
-A given number, as a parameter or the length of a run, is written as it was given, by ``:g``.
+Numbers that the user gave (parameters, lengths of runs) are written with ``:g`` instead.
 """
 
 from __future__ import annotations
@@ -14,10 +14,10 @@ if TYPE_CHECKING:
 
 
 def number(value: float | None, digits: int = 2, none: str = "–") -> str:
-    """A number in few characters, e.g. ``3.4e-7``; ``none`` where there is none, or none that is finite."""
+    """A number in few characters, e.g. ``3.4e-7``; ``none`` if it is missing or not finite."""
     if value is None or not math.isfinite(value):
         return none
-    if 0 < abs(value) < 0.01:  # one form for all small numbers: 5.4e-4 below 3.0e-5 is read at a glance
+    if 0 < abs(value) < 0.01:  # one form for all small numbers, which makes columns comparable at a glance
         mantissa, _, power = f"{value:.{digits - 1}e}".partition("e")
         return f"{mantissa.rstrip('0').rstrip('.') if '.' in mantissa else mantissa}e{int(power)}"
     mantissa, exponent, power = f"{value:.{digits}g}".partition("e")
@@ -30,13 +30,13 @@ def error(value: float | None, digits: int = 2) -> str:
 
 
 def vector(values: Sequence[float] | FloatArray) -> str:
-    """Components of a vector; those that are round-off of the others are zero."""
+    """Text of a vector; components that are round-off of the largest one become zero."""
     given = [float(value) for value in values]
     size = max(map(abs, given), default=0.0) or 1.0
     return f"({', '.join(f'{round(value / size, 9) * size + 0.0:.4g}' for value in given)})"
 
 
 def counted(count: int, many: str) -> str:
-    """Count with its noun, given in the plural: ``1 velocity``, ``2 velocities``."""
+    """A count with its noun; ``many`` is the plural: ``1 velocity``, ``2 velocities``."""
     one = f"{many.removesuffix('ies')}y" if many.endswith("ies") else many.removesuffix("s")
     return f"{count} {one if count == 1 else many}"

@@ -5,17 +5,17 @@ from enum import StrEnum
 
 
 class Role(StrEnum):
-    """Role of an observable, which decides how it is held against the truth."""
+    """Role of an observable, which decides how it is compared with the truth."""
 
     MOTION = "motion"  # a variable of the dataset, true to its error bar
     REACTION = "reaction"  # as motion, but without time 0, where the certificate judges it
-    RESIDUAL = "residual"  # zero for a perfect run; what the truth leaves is what the measurement cannot resolve
+    RESIDUAL = "residual"  # zero for a perfect run; the truth's own residual is the resolution of the measurement
     EVENT = "event"  # times or kinds of events, with the brackets of the truth as error bar
 
 
 @dataclass(frozen=True)
 class Observable:
-    """A quantity of a run that can be held against the truth.
+    """A quantity of a run that can be compared with the truth.
 
     Attributes:
         name: as files and commands write it.
@@ -25,16 +25,16 @@ class Observable:
         symbol: as an equation writes it; by default the name.
         floor: least size to which a relative tolerance refers, in its unit; None: it has no size of its own, so that a
             tolerance must be absolute.
-        headline: whether summaries show it: the motion, and the forces that a person asks for first.
-        watched: whether a first look judges it though no summary shows it.
-        always: whether it is judged without a tolerance, too: by half of its size, events by their number.
+        headline: True if summaries show it: the motion, and the forces that a person asks for first.
+        watched: True if a first look judges it though no summary shows it.
+        always: True if it is judged without a tolerance, too: against half of its size, events by their number.
         asked_as: word in a scene's ``asks`` for which a first look judges it, e.g. ``orientation``; empty: none.
-        decides: whether a trade-off, a stability map and a recommendation go by it by default.
-        asked_for: whether a person may ask for a recommendation by it.
-        column: whether a trade-off shows it beside what decides, by default.
-        audit: whether it holds the reactions that an engine reports against the motion that it made.
-        hangs_on_events: whether it is a matter of luck where the time of an event is ill-posed.
-        difference_of: variable that it is a small difference of, and whose round-off it has; empty: none.
+        decides: True if trade-offs, stability maps and recommendations use it by default.
+        asked_for: True if a person may ask for a recommendation by it.
+        column: True if a trade-off shows it by default beside the deciding one.
+        audit: True if it compares the reactions that an engine reports with the motion that it computed.
+        hangs_on_events: True if it is unpredictable once the time of an event is ill-posed.
+        difference_of: larger variable whose small difference, with its round-off, it is; empty: none.
         absent: reason for which no run of the scene has it, and the remedy; empty: runs have it.
     """
 

@@ -1,4 +1,4 @@
-"""The numbers of a scene file: ``"$name"`` is the value of a parameter, ``"= mass*length^2/12"`` that of a formula."""
+"""Numbers of a scene file: ``"$name"`` is the value of a parameter, ``"= mass*length^2/12"`` that of a formula."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from proofroll.core.errors import InputError, require_known
 from proofroll.core.expressions import evaluated
 from proofroll.core.quantity import Quantity, powers_of
 
-# Of a number, or of each number of a list; "": not checked.
+# Unit of a number, or of each number of a list; "": not checked.
 Unit = str | tuple[str, ...]
 _NUMBERED = re.compile(r"\{([^{}]*)\}")
 
@@ -30,16 +30,16 @@ class Parameters:
     units: Mapping[str, str]
 
     def filled(self, content: Any, where: str, units: Mapping[str, Unit], unit: Unit = "") -> Any:
-        """The content of a table with its parameters and formulas replaced by numbers, each of the unit of its place.
+        """Content of a table with its parameters and formulas replaced by numbers, each checked for its unit.
 
         Args:
             content: of a file: ``"$name"`` is a parameter, ``"= ..."`` a formula, ``{i}`` in a text a number.
             where: its place, for messages.
-            units: of numbers by their keys.
+            units: key -> unit of its number.
             unit: of the content itself, if it is a number or a list of numbers.
 
         Raises:
-            InputError: no such parameter, another unit, a formula that is none, or a truth value instead of a number.
+            InputError: unknown parameter, wrong unit, invalid formula, or a truth value instead of a number.
         """
         if isinstance(content, dict):
             return {
@@ -67,12 +67,12 @@ class Parameters:
         return _NUMBERED.sub(lambda index: f"{evaluated(where, index[1], self.quantities):g}", content)
 
     def beside(self, name: str, value: float) -> Parameters:
-        """Numbers extended by one plain number of this name."""
+        """Parameters extended by one plain number of this name."""
         return Parameters({**self.values, name: value}, self.units)
 
     @cached_property
     def quantities(self) -> dict[str, Quantity]:
-        """The parameters with their units."""
+        """Parameters as quantities with units."""
         units = {name: self.units.get(name, "1") for name in self.values}
         return {
             name: Quantity(float(value), None if units[name] == "1" else powers_of(units[name]))
@@ -81,7 +81,7 @@ class Parameters:
 
 
 def unit_at(unit: Unit, index: int) -> str:
-    """The unit of one number of a list of numbers; of a list beyond its end it is not checked."""
+    """Unit of one number of a list; "" (not checked) beyond the end of the list of units."""
     if isinstance(unit, str):
         return unit
     return unit[index] if index < len(unit) else ""

@@ -1,4 +1,4 @@
-"""Engines are plug-ins: entry points of the group ``proofroll.engines``, loaded when they are needed."""
+"""Plug-ins: engines and kinds of elements as entry points, loaded when they are needed."""
 
 import dataclasses
 import re
@@ -16,32 +16,32 @@ from proofroll.core.errors import InputError, Missing, ProofrollError, raised_at
 
 GROUP = "proofroll.engines"
 ELEMENTS = "proofroll.elements"
-# Members of an engine's class, whose `build` gives what has the others; see proofroll.core.engine.Engine.
+# Members required of an engine's class; the others belong to the object that `build` returns.
 _OF_AN_ENGINE = ("name", "provides", "settings", "presets", "version", "build")
 
 
 def engine_names() -> list[str]:
-    """Names of all engines that some installed package announces, sorted."""
+    """Sorted names of all engines that installed packages announce."""
     return sorted({point.name for point in announced(GROUP)})
 
 
 def plain_name(name: str) -> str:
-    """``mujoco`` of ``mujoco`` and of ``mujoco@3.8.1``."""
+    """Name of an engine without its place: ``mujoco`` for ``mujoco`` and ``mujoco@3.8.1``."""
     return name.partition("@")[0]
 
 
 def place_of(name: str) -> str:
-    """The part after ``@``: the other interpreter in which an engine runs; empty: this one."""
+    """Place of an engine, the part after ``@``: another interpreter or a program; empty: this interpreter."""
     return name.partition("@")[2]
 
 
 def load_engine(name: str) -> Any:
-    """The engine's class, in this process.
+    """Class of an engine, loaded into this process.
 
     Raises:
-        InputError: no installed package announces such an engine, or it is one of another interpreter.
-        Missing: it is announced, but what it needs is not installed, or older than its adapter supports.
-        ProofrollError: it is announced, but what the entry point or an import names does not exist, or is no engine.
+        InputError: no installed package announces such an engine, or it belongs to another interpreter.
+        Missing: a package that it needs is not installed, or is older than its adapter supports.
+        ProofrollError: its entry point or an import names something that does not exist or is no engine.
     """
     if place_of(name):
         advice = "an engine of another interpreter cannot be loaded into this one; use the command line, or leave @ out"
@@ -61,18 +61,18 @@ def load_engine(name: str) -> Any:
         )
     oldest = kind.oldest if isinstance(kind, SupportsFrom) else ""
     if oldest and release(kind.version()) < release(oldest):
-        said = f"{name} {kind.version()} is older than its adapter supports, {oldest}"
-        raise Missing(f"{said}; install a later {name}")
+        fault = f"{name} {kind.version()} is older than its adapter supports, {oldest}"
+        raise Missing(f"{fault}; install a later {name}")
     return kind
 
 
 def lacking_of(kind: object, *besides: str) -> list[str]:
-    """Names of the members of an engine's class, and of those ``besides``, that an object lacks."""
+    """Required members of an engine's class, and of those in ``besides``, that an object lacks."""
     return [name for name in (*_OF_AN_ENGINE, *besides) if not hasattr(kind, name)]
 
 
 def release(version: str) -> tuple[int, ...]:
-    """The numbers of a version, ``1.13.6.dev1`` -> (1, 13, 6), without zeros at the end; for comparing."""
+    """Numbers of a version without trailing zeros, for comparison: ``1.13.6.dev1`` -> (1, 13, 6)."""
     numbers = [int(part) for part in re.match(r"[\d.]*", version)[0].split(".") if part]  # type: ignore[index]  # matches ""
     while numbers and numbers[-1] == 0:
         numbers.pop()
@@ -111,12 +111,12 @@ def _installed(requirement: str) -> bool:
 
 @cache
 def load_element_kinds() -> tuple[type[ElementKind], ...]:
-    """Every kind of element that some installed package announces, by name."""
+    """Every kind of element that installed packages announce, by name."""
     return tuple(kind for _, kind in loaded(ELEMENTS, like=ElementKind))
 
 
 def require_engine(name: str) -> None:
-    """Raises InputError if no installed package announces an engine of this name; loads none.
+    """Raises InputError unless an installed package announces an engine of this name; loads none.
 
     Engines of other interpreters are not checked.
     """
@@ -136,15 +136,15 @@ class EngineSpec:
     """An engine as the user writes it, ``mujoco[formulation=chart,dt=1e-4]``.
 
     Attributes:
-        name: of the engine, with the place of another interpreter, ``mujoco@3.8.1``.
-        options: the settings that were given, as text or numbers.
+        name: of the engine, perhaps with a place, ``mujoco@3.8.1``.
+        options: the given settings, as text or numbers.
     """
 
     name: str
     options: Mapping[str, Any]
 
     def __str__(self) -> str:
-        """The same text again."""
+        """Text of the engine as the user writes it."""
         inner = ",".join(f"{key}={value}" for key, value in self.options.items())
         return f"{self.name}[{inner}]" if inner else self.name
 
@@ -175,10 +175,10 @@ def parse_engine(text: str) -> EngineSpec:
 
 
 def resolve_settings(engine: Any, options: Mapping[str, Any], requires: Collection[str] = ()) -> Any:
-    """Complete settings of an engine: the preset of its formulation, overridden by the given options.
+    """Complete settings of an engine: a preset of a formulation, overridden by the given options.
 
-    Where no formulation is given it is the first that provides what the scene ``requires``, of those that are made for
-    such scenes if there is one.
+    Without a given formulation it is the first that provides all that the scene ``requires``; one that is made for such
+    scenes goes first.
 
     Raises:
         InputError: unknown or ill-typed option.

@@ -1,4 +1,4 @@
-"""The text of programs that show a failure by themselves: what every kind of element and every engine writes alike."""
+"""Common parts of programs that show a failure of an engine, for all kinds of elements and engines."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class FailedRun:
-    """A run beyond a boundary of a stability map, for a program that shows its failure.
+    """A run just beyond a boundary of a stability map, whose failure a program is to show.
 
     Attributes:
         scene, parameters, engine, version, settings, resolution, until, every: the case.
         where: the point of the map, for a person.
         boundary: ``stable`` or ``accurate``.
-        failure: its name.
-        silent: whether the engine does not say so.
+        failure: name of the sign of failure.
+        silent: True if the engine does not report the failure.
         truth: the true run, or None.
-        scale, allowed: range of the deciding observable, and part of it that its error may be.
-        note: reason for which the program asks proofroll; empty: it does not.
+        scale, allowed: range of the deciding observable, and the part of it that its error may be.
+        note: reason for which the program imports proofroll; empty: it does not.
     """
 
     scene: str
@@ -83,20 +83,20 @@ def run(times):
 
 
 def assigned(**values: Any) -> str:
-    """One line ``NAME = value`` for each: plain data, or a number or an array of numpy's, with every digit."""
+    """Lines ``NAME = value``, of plain data or numpy numbers and arrays, with all digits."""
     plain = {name: value.tolist() if hasattr(value, "tolist") else value for name, value in values.items()}
     return "".join(f"{name} = {value!r}\n" for name, value in plain.items())
 
 
 def imported(head: str) -> list[str]:
-    """Packages that lines of imports name, besides Python's own."""
+    """Packages named by import lines, except Python's standard library."""
     lines = [line.split() for line in head.splitlines() if line.startswith(("import ", "from "))]
     names = dict.fromkeys(words[1].partition(".")[0] for words in lines)
     return [name for name in names if name not in sys.stdlib_module_names]
 
 
 def asking(failed: FailedRun, *names: str) -> str:
-    """``SCENE``, and ``run(times)`` with these variables of a run, for a program that imports proofroll."""
+    """Source of ``SCENE`` and ``run(times)``, which yields these variables of a run by proofroll."""
     parameters, settings = dict(failed.parameters), dict(failed.settings)
     return _ASKING.format(
         scene=failed.scene, parameters=parameters, engine=failed.engine, settings=settings, names=names
@@ -108,11 +108,11 @@ def program(failed: FailedRun, what: str, part: str, numbers: Mapping[str, Any],
 
     Args:
         failed: the failed run that it shows.
-        what: is moved, as a sentence without its end.
-        part: of the engine: imports, and ``run(times)``, which yields what ``signs`` takes at each time.
-        numbers: that ``signs`` uses.
-        signs: function ``signs(stopped, …)`` of arrays over the samples: prints, and says of each failure whether it
-            shows.
+        what: sentence about what moves, without its end.
+        part: part of the engine: imports, and ``run(times)``, which yields the arguments of ``signs`` at each time.
+        numbers: constants that ``signs`` uses.
+        signs: source of the function ``signs(stopped, …)`` of arrays over the samples; it prints numbers and returns
+            name of a failure -> True if it shows.
     """
     head, _, rest = part.partition("\n\n")
     own = {
@@ -129,7 +129,7 @@ def program(failed: FailedRun, what: str, part: str, numbers: Mapping[str, Any],
 
 
 def _said(failed: FailedRun, what: str, needs: list[str]) -> list[str]:
-    """The first words of a program: ``what`` fails where, and which packages it needs."""
+    """Lines of the program's docstring: the failure, the case, and the packages that it needs."""
     numbers = ", ".join(f"{name} = {value:g}" for name, value in failed.parameters.items()) or "default parameters"
     settings = ", ".join(f"{key}={value}" for key, value in failed.settings.items())
     return [

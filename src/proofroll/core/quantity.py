@@ -1,4 +1,4 @@
-"""Numbers with units, as far as a formula in a scene file needs them to be checked."""
+"""Numbers with units, to check the units of formulas in scene files."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ _POWER = re.compile(r"([^^]+)\^(-?\d+)")
 
 
 class UnitsDiffer(Exception):  # noqa: N818 -- says what is wrong; the reader of the formula makes an error of it
-    """A sum or a power of quantities that has no unit; the text says why."""
+    """A sum of different units or a power that is not a plain number; the text says which."""
 
 
 @cache
 def powers_of(unit: str) -> Powers:
-    """Powers of base units in a unit as scene files write it, e.g. ``N m s/rad``; a name of no other unit is a base."""
+    """Powers of base units in a unit as scene files write it, e.g. ``N m s/rad``; an unknown name is a base unit."""
     powers: Powers = {}
     for place, part in enumerate(unit.split("/")):
         for factor in part.split():
@@ -37,7 +37,7 @@ def powers_of(unit: str) -> Powers:
 
 
 def _product(one: Powers, two: Powers, power: float) -> Powers:
-    """Powers of base units of a product: one unit times a power of another."""
+    """Powers of base units of the product of one unit and a power of another."""
     powers = {name: one.get(name, 0.0) + power * two.get(name, 0.0) for name in [*one, *two]}
     return {name: value for name, value in sorted(powers.items()) if value}
 
@@ -48,7 +48,7 @@ class Quantity:
 
     Attributes:
         value: in SI units.
-        powers: of base units; None: a plain number, which takes the unit of what it is added to.
+        powers: base unit -> power; None: a plain number, which takes the unit of its partner in a sum.
     """
 
     value: float
@@ -56,7 +56,7 @@ class Quantity:
 
     @property
     def unit(self) -> str:
-        """The unit as a person writes it in base units, ``1`` for a ratio."""
+        """The unit in base units as a person writes it; ``1`` for a ratio."""
         powers = self.powers or {}
         over = " ".join(_written(name, power) for name, power in powers.items() if power > 0)
         under = " ".join(_written(name, -power) for name, power in powers.items() if power < 0)

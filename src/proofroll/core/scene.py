@@ -1,7 +1,7 @@
 """Scene: elements, parameters and questions, frozen and typed.
 
-A scene knows nothing of engines, and nothing of what its elements are: :mod:`proofroll.core.element` says what all of
-them have. Engines compare :attr:`Scene.requires` with what their formulations provide.
+A scene knows no engine and no kind of element: :mod:`proofroll.core.element` has the protocol of elements. Engines
+compare :attr:`Scene.requires` with the capabilities of their formulations.
 """
 
 import copy
@@ -31,12 +31,12 @@ class Scene:
         title: one line for a person.
         elements: its parts, each of one kind.
         parameters: the numbers a user can set by name, SI units.
-        folder: where the scene's file and its engine-native models lie.
+        folder: folder of the scene's file and its engine-native models.
         asks: results wanted besides the motion; others need not be modelled.
-        files: names of the engine-native models in the folder, and of what these read.
+        files: names of the engine-native models in the folder, and of files that these read.
 
     Raises:
-        InputError: no elements, two of one name, or something is asked that no element has.
+        InputError: no elements, two elements of one name, or a question that no element can answer.
     """
 
     name: str
@@ -48,7 +48,7 @@ class Scene:
     files: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        """Checks what concerns the scene as a whole, and makes the arrays of its elements read-only."""
+        """Checks names and questions, and makes the arrays of its elements read-only."""
         read_only(self.elements)
         names = [element.name for element in self.elements]
         if not names:
@@ -66,29 +66,29 @@ class Scene:
 
     @property
     def fully_asked(self) -> Self:
-        """The scene with all that can be asked for besides the motion, as of its truth."""
+        """The scene with every possible question besides the motion, as a truth needs it."""
         asks = dict.fromkeys(ask for element in self.elements for ask in element.askable)
         return replace(self, asks=tuple(asks))
 
     @property
     def for_an_engine(self) -> Self:
-        """A copy that shares no array with this scene: whatever an engine does to it, the scene stays what it is."""
+        """Deep copy of the scene, which an engine may change without harm."""
         return replace(copy.deepcopy(self))
 
     @cached_property
     def requires(self) -> frozenset[str]:
-        """Capabilities that a formulation must provide; no more than the scene needs."""
+        """Capabilities that a formulation must provide for its elements and questions."""
         needs = {need for element in self.elements for need in element.requires}
         asked = {element.askable[name] for element in self.elements for name in self.asks if name in element.askable}
         return frozenset(needs | asked)
 
     def label(self, element: Element, name: str) -> str:
-        """Name of an element's variable or observable in the scene: with the element's where there are several."""
+        """Name in the scene of an element's variable or observable; with several elements, ``name.element``."""
         return f"{name}.{element.name}" if len(self.elements) > 1 else name
 
     @cached_property
     def observables(self) -> dict[str, Observable]:
-        """The tables of all elements, by name in the scene."""
+        """Observables of all elements, by name in the scene."""
         return {self.label(element, item.name): item for element in self.elements for item in element.observables}
 
     @property
@@ -99,8 +99,12 @@ class Scene:
     def observable(self, name: str, field: str = "quantity") -> Observable:
         """The observable of this name.
 
+        Args:
+            name: in the scene.
+            field: where the name was written, for the message.
+
         Raises:
-            InputError: no element has it, or no run of these numbers; ``field`` says where it was named.
+            InputError: no element has it, or no run of this scene determines it.
         """
         require_known(field, name, self.observables, "there is no such observable; choose from")
         item = self.observables[name]
@@ -115,9 +119,10 @@ class Scene:
 
     @cached_property
     def digest(self) -> str:
-        """Hash of everything that decides the result: the elements, what is asked, and the engine-native files.
+        """Hash of everything in the scene that decides a result: elements, questions and engine-native files.
 
-        What other packages bring of the elements counts with its code; that of this package counts for every engine.
+        The code of elements from other packages is included; that of this package is part of every engine's hash
+        instead.
         """
         content = [[type(element).__name__, asdict(element)] for element in self.elements]  # type: ignore[call-overload]
         code = code_of(self.elements)

@@ -1,4 +1,4 @@
-"""Source code that a result rests on, so that none outlives a change of it."""
+"""Hashes of the source code that a stored result depends on: a change of the code makes the result invalid."""
 
 import ast
 import dataclasses
@@ -13,7 +13,10 @@ OWN = Path(__file__).resolve().parents[1]
 
 
 def package_of(kind: type) -> Path | None:
-    """Folder of the whole package that brings a class, or file of a module in none; None: it was typed at a prompt."""
+    """Folder of the outermost package of a class, or file of its module outside packages.
+
+    None for a class that was typed at a prompt.
+    """
     name = getattr(sys.modules.get(kind.__module__), "__file__", None)
     if name is None:
         return None
@@ -24,27 +27,27 @@ def package_of(kind: type) -> Path | None:
 
 
 def code_of(item: Any) -> list[str]:
-    """Hash of each package whose dataclasses ``item`` holds, at any depth; of other packages than this one alone."""
+    """Hashes of the other packages that define dataclasses found in ``item`` at any depth; this package is left out."""
     places = {package_of(kind) for kind in set(_kinds(item))}
     return sorted(hash_of(with_imports(place)) for place in places - {None, OWN} if place is not None)
 
 
 def with_imports(place: Path) -> list[Path]:
-    """A module or package of others and, at any depth, the modules and packages that it imports, sorted.
+    """A module or package outside this one and, at any depth, the modules and packages that it imports, sorted.
 
-    Python's own modules, this package, and other packages that are installed are left out.
+    The standard library, this package and other installed packages are left out.
     """
     sources, waiting = set[Path](), [place]
     while waiting:
-        sources.add(here := waiting.pop())
-        files = here.rglob("*.py") if here.is_dir() else [here]
+        sources.add(source := waiting.pop())
+        files = source.rglob("*.py") if source.is_dir() else [source]
         names = {name for file in files for name in _imported(file)} - sys.stdlib_module_names
-        waiting += {source for name in names if (source := _source(name)) is not None} - sources - {OWN}
+        waiting += {found for name in names if (found := _source(name)) is not None} - sources - {OWN}
     return sorted(sources)
 
 
 def _imported(file: Path) -> Iterator[str]:
-    """Names of the outermost packages or modules that a file imports, also inside functions."""
+    """Top-level names of the modules that a file imports, also inside functions."""
     for node in ast.walk(ast.parse(file.read_bytes())):
         names = [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
         if isinstance(node, ast.ImportFrom) and node.module and not node.level:
@@ -53,7 +56,7 @@ def _imported(file: Path) -> Iterator[str]:
 
 
 def _source(name: str) -> Path | None:
-    """File of a module, or folder of a package that is not installed; None: there is none."""
+    """File of a module, or folder of a package that is not installed; None if there is neither."""
     try:
         spec = find_spec(name)
     except (ImportError, ValueError):  # a module that was made without a file
@@ -80,10 +83,11 @@ def _kinds(item: Any) -> Iterator[type]:
 
 
 def hash_of(places: Iterable[Path], aside: frozenset[str] = frozenset()) -> str:
-    """Hash of Python files, and of all that lie in folders.
+    """Hash of Python files and of all Python files in folders.
 
-    Modules and folders called as one of ``aside``, wherever they lie, are left out, and so are modules ``robot_…``,
-    which read robot files: no result hangs on them.
+    Modules and folders whose name is in ``aside`` are left out at any depth. So are modules ``robot_…``, which read
+    robot
+    files and affect no result.
     """
     content = hashlib.sha256()
     for place in places:

@@ -9,18 +9,18 @@ from proofroll.core.arrays import FloatArray
 from proofroll.core.engine import whole_steps
 from proofroll.core.errors import InputError
 
-# How far apart samples are where nobody says it [s].
+# Default sampling interval [s].
 EVERY = 0.01
-# The most even way to spread parts of an interval: none is near a simple fraction.
+# Multiples of it modulo 1 spread most evenly over an interval, and are far from simple fractions.
 _GOLDEN = (5**0.5 - 1) / 2
-# So many samples off the grid, no more than one in so many intervals: an adaptive step ends at each.
+# Most samples off the grid, and fewest intervals for each: few, as an adaptive step ends at each.
 _OFF_GRID, _INTERVALS = 8, 4
-# Parts of an interval at which they lie, where its steps allow: so most engines have them at the same times.
+# They lie at multiples of this part of an interval if the step allows, so that most engines share their times.
 _PARTS = 10
 
 
 def sampling_interval(step: float | None) -> float:
-    """Default interval between samples: :data:`EVERY`, or the nearest whole number of steps [s]."""
+    """Default sampling interval [s]: the multiple of the step nearest to :data:`EVERY`; without a step EVERY."""
     if step is None or abs(EVERY / step - round(EVERY / step)) <= 1e-6 * EVERY / step:
         return EVERY
     return max(1, round(EVERY / step)) * step
@@ -51,16 +51,25 @@ def time_grid(until: float, every: float) -> FloatArray:
 
 
 def require_whole_steps(times: FloatArray, step: float | None) -> None:
-    """Raises InputError if a fixed ``step`` [s] does not divide the intervals of a grid [s]; None: there is none."""
+    """Raises InputError if a fixed step does not divide the sampling intervals.
+
+    Args:
+        times: of the samples [s].
+        step: fixed step [s]; None: the engine adapts its steps.
+    """
     if step is not None and len(times) > 1:
-        for start, end in (times[:2].tolist(), times[-2:].tolist()):  # all others are as the first
+        for start, end in (times[:2].tolist(), times[-2:].tolist()):  # all intervals but the last are equal
             whole_steps(start, end, step)
 
 
 def off_grid(times: FloatArray, step: float | None) -> FloatArray:
-    """A few times [s] between those of the grid, none at the same part of its interval, each a whole number of steps.
+    """A few times [s] between those of the grid, at different parts of their intervals and after whole steps.
 
-    An error that repeats with the grid is zero on it, and seen here. ``step``: the engine's [s]; None: it has none.
+    There an error shows that vanishes periodically at the times of the grid.
+
+    Args:
+        times: the grid [s].
+        step: fixed step of the engine [s]; None: it has none.
     """
     between: list[float] = []
     count = min(_OFF_GRID, (len(times) - 1) // _INTERVALS)
@@ -76,5 +85,5 @@ def off_grid(times: FloatArray, step: float | None) -> FloatArray:
 
 
 def off_grids(times: FloatArray, steps: Iterable[float | None]) -> tuple[float, ...]:
-    """Times [s] between those of the grid at which engines with these steps [s] are sampled (:func:`off_grid`)."""
+    """Times of :func:`off_grid` [s] for engines with these steps [s], together."""
     return tuple(sorted({t for step in set(steps) for t in off_grid(times, step).tolist()}))

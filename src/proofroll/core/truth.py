@@ -1,4 +1,4 @@
-"""The truth of a scene: that of each of its elements, by the plug-in that covers it."""
+"""Truth of a scene: the true motion of each of its elements, from the plug-in that covers it."""
 
 from __future__ import annotations
 
@@ -23,18 +23,19 @@ TRUTHS = "proofroll.truths"
 
 
 class ElementTruth(Protocol):
-    """Knows the truth of a kind of element by two independent routes."""
+    """Truth of a kind of element, found by two independent routes."""
 
     @staticmethod
     def covers(element: Element) -> bool:
-        """True if the truth of this element is known to it."""
+        """True if this plug-in has the truth of the element."""
 
     @staticmethod
     def truth(element: Element, times: FloatArray, asks: Sequence[str]) -> xr.Dataset:
-        """The true run: the element's variables, each with the attribute ``error_bar`` in its own unit.
+        """True run of an element: its variables, each with the attribute ``error_bar`` in its own unit.
 
-        The attributes ``route`` and ``second_route`` name the two ways to it; ``ill_posed``, where there is one, says
-        in a sentence why the answer hangs on less than the parameters are known to.
+        The attributes ``route`` and ``second_route`` name the two methods; ``ill_posed``, if present, says in a
+        sentence why
+        the motion depends on less than the accuracy of the parameters.
 
         Args:
             element: one that it covers.
@@ -49,17 +50,17 @@ class ElementTruth(Protocol):
 
 @runtime_checkable
 class FindsEdges(Protocol):
-    """Ability of a truth to find where the time of an event jumps as a parameter of the scene changes."""
+    """Ability of a truth to find the parameter value at which the time of an event jumps."""
 
     @staticmethod
     def edge_between(element: Element, parameter: str, low: float, high: float, until: float) -> float | None:
-        """A value of the parameter between ``low`` and ``high`` at which the time jumps; None: there is none.
+        """Value of the parameter between ``low`` and ``high`` at which the time of an event jumps; None: there is none.
 
         Args:
             element: one that it covers, with any value of the parameter.
-            parameter: of the scene.
-            low: one of the values, in the parameter's unit.
-            high: the other.
+            parameter: name of the parameter in the scene.
+            low: lower end of the search, in the parameter's unit.
+            high: upper end of the search.
             until: last time at which the event is looked for [s].
 
         Raises:
@@ -77,16 +78,18 @@ _NONE = np.zeros(0)
 
 
 def truth(scene: Scene, asked: FloatArray, counting: FloatArray = _NONE, between: FloatArray = _NONE) -> xr.Dataset:
-    """The true run of a scene, see :class:`ElementTruth`. No force couples its elements, so each is solved alone.
+    """True run of a scene, see :class:`ElementTruth`, with read-only arrays.
 
-    Its arrays are read-only; ``copy(deep=True)`` gives others.
+    No force couples the elements, so each is solved alone.
 
-    It is given at the times that are ``asked`` [s], and off that grid at those ``between``
-    (:func:`proofroll.core.dataset.off_grid_apart`); turns are counted at those for ``counting`` too
-    (:func:`proofroll.core.turns.samples_between`).
+    Args:
+        scene: the scene.
+        asked: times of the samples [s].
+        counting: further times at which turns are counted [s] (:func:`proofroll.core.turns.samples_between`).
+        between: times of samples off the grid [s] (:func:`proofroll.core.dataset.off_grid_apart`).
 
     Raises:
-        Refused: an element that nothing covers.
+        Refused: no truth covers an element.
         Diverged: two routes disagree.
     """
     times = np.union1d(asked, np.concatenate([counting, between])) if len(counting) or len(between) else asked
@@ -94,18 +97,18 @@ def truth(scene: Scene, asked: FloatArray, counting: FloatArray = _NONE, between
     columns = joined(scene, {name: Columns.of(part) for name, part in parts.items()})
     whole = (columns if times is asked else off_grid_apart(scene, columns, asked, between)).dataset()
     for name in ("route", "second_route", "ill_posed"):
-        said = dict.fromkeys(str(part.attrs[name]) for part in parts.values() if part.attrs.get(name))
-        if said:
-            whole.attrs[name] = "; ".join(said)
+        texts = dict.fromkeys(str(part.attrs[name]) for part in parts.values() if part.attrs.get(name))
+        if texts:
+            whole.attrs[name] = "; ".join(texts)
     read_only([variable.values for variable in whole.variables.values()])
     return whole
 
 
 def edge_between(scene: Scene, parameter: str, low: float, high: float, until: float) -> float | None:
-    """An edge of the first element whose truth finds edges, see :class:`FindsEdges`.
+    """Parameter value of an edge for the first element whose truth finds edges, see :class:`FindsEdges`.
 
     Raises:
-        InputError: no truth does, or not of this parameter.
+        InputError: no truth finds edges, or not of this parameter.
     """
     for element in scene.elements:
         for known in load_truths():

@@ -1,7 +1,7 @@
-"""Turns of angles: an engine gives orientations, in which a whole turn does not show, so that samples count the turns.
+"""Counts whole turns of angles over the samples of a run, since an orientation does not show them.
 
-The rates of two samples predict how far an angle goes between them. Where samples lie so far apart that the prediction
-may be half a turn off, samples between them count; where there are none, the number of turns is not known.
+The rates of two samples predict the change of an angle between them. Where the prediction may be wrong by half a turn,
+because samples are far apart, further samples between them are needed; without these the number of turns is unknown.
 """
 
 from __future__ import annotations
@@ -20,22 +20,28 @@ from proofroll.core.time_grid import EVERY
 if TYPE_CHECKING:
     import xarray as xr
 
-# Intervals between samples, in parts of a natural time: over a double pendulum and a chain of ten rods the prediction
-# is then 0.4 rad off at most, over an eighth of it up to three.
+# Longest sampling interval to count turns, in natural times. For a double pendulum and a chain of ten rods the
+# prediction is then wrong by 0.4 rad at most, but by up to 3 rad with an interval of an eighth.
 PART = 1 / 40
-# Turns are sure where the prediction is off by no more than this part of a turn; at a half the next turn begins.
+# Turns are certain if the prediction is wrong by at most this part of a turn; at a half the count would be wrong.
 _SURE = 0.25
-# Of the longest interval between samples: up to here it is left to their rates to tell.
+# Up to this multiple of the longest interval, the rates of the samples decide if the count is certain.
 _FARTHEST = 2.0
-# Samples for turns cost no run more than what it costs by itself: they are as many as a run has where nobody says how
-# often it is sampled, in a short run a thousand, and never more than this.
+# Samples to count turns must not dominate the cost of a run: their interval is at least EVERY (in a short run a
+# thousandth of the run), and there are never more than _MOST.
 _FEW, _MOST = 1_000, 100_000
 
 
 def samples_between(scene: Scene, times: FloatArray, step: float | None = None) -> FloatArray:
-    """Times between those of the samples [s] at which turns have to be counted, each a whole number of steps.
+    """Times between the samples [s] at which turns have to be counted, each after a whole number of steps.
 
-    ``step``: the engine's [s]; None: it has none. Empty where samples are near enough, or the scene has no angles.
+    Args:
+        scene: of the run.
+        times: of the samples [s].
+        step: fixed step of the engine [s]; None: it has none.
+
+    Returns:
+        Empty if the samples are close enough or the scene has no such angles.
     """
     intervals = [element.turn_interval for element in scene.elements if isinstance(element, CountsTurns)]
     known = [interval for interval in intervals if interval is not None]
@@ -61,12 +67,12 @@ def samples_between(scene: Scene, times: FloatArray, step: float | None = None) 
 def doubt(
     time: FloatArray, angle: FloatArray, rate: FloatArray, period: float, interval: float | None
 ) -> dict[str, Any]:
-    """Attributes that say why counted turns of an angle are uncertain; empty if they are sure.
+    """Attributes that say why the counted turns of an angle are uncertain; empty if they are certain.
 
     Args:
         time: [s], shape (time,).
-        angle: counted in turns, shape (time,), in the unit of the period.
-        rate: likewise, per second.
+        angle: with counted turns, shape (time,), in the unit of the period.
+        rate: its rate, in that unit per second, shape (time,).
         period: a turn.
         interval: longest between two samples over which turns are counted [s] (:class:`CountsTurns`).
     """
@@ -87,10 +93,11 @@ def doubt(
 def on_turns_of(
     other: FloatArray | None, values: FloatArray, name: str, datasets: Iterable[xr.Dataset]
 ) -> FloatArray | None:
-    """The values of an observable without what is no engine's: an angle on the turns of another run of the same.
+    """Values of an observable shifted by whole turns to those of another run, if a run cannot count turns itself.
 
-    Only where the samples of one of the runs do not tell them (``UNCERTAIN``). None: nothing is left, as of the energy
-    of a spring that turns wind up.
+    A run that cannot has the attribute ``UNCERTAIN``. None if no comparison is left: the observable depends on turns,
+    but
+    not by a period (the energy of a spring that turns wind up).
     """
     said = [run[name].attrs for run in datasets if name in run and UNCERTAIN in run[name].attrs]
     if not said or other is None or values.shape != other.shape:

@@ -1,4 +1,4 @@
-"""Checks what files and settings say against typed dataclasses, with one line about the first thing that is wrong."""
+"""Checks the content of files and settings against typed dataclasses, with one line about the first mistake."""
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -13,9 +13,9 @@ from proofroll.core.errors import InputError, no_such_key
 from proofroll.core.parameters import Unit
 
 _T = TypeVar("_T")
-# JSON has no infinity, which a parameter may be (friction without a bound): there it is null.
+# Number that may be infinite (friction without a bound); JSON writes null for infinity.
 FloatOrInf = Annotated[float, BeforeValidator(lambda value: math.inf if value is None else value)]
-# The beginning of a type of error in pydantic -> what a person is told, where pydantic's own words say less.
+# Beginning of a type of error in pydantic -> advice to the user, if it is better than pydantic's own.
 _WORDS = {
     "int": "give a whole number",
     "float": "give a number",
@@ -34,19 +34,23 @@ _UNKNOWN = ("unexpected_keyword_argument", "extra_forbidden")
 
 
 def strict(*types: type, finite: bool = False) -> None:
-    """Makes unknown keys of these dataclasses an error, with ``finite`` also inf and NaN, for pydantic."""
+    """Makes unknown keys of these dataclasses an error for pydantic, and with ``finite`` also inf and NaN."""
     for kind in types:
         config = ConfigDict(extra="forbid", allow_inf_nan=not finite)
         setattr(kind, "__pydantic_config__", config)  # noqa: B010 -- the name is pydantic's
 
 
 def validated(kind: type[_T], content: Mapping[str, Any], where: str, **own: object) -> _T:
-    """The content of a file, called ``where`` in messages, or of a table in it as this dataclass.
+    """A dataclass filled with the content of a file, or of a table in it.
 
-    ``own`` are fields that no file has, for they are known otherwise.
+    Args:
+        kind: the dataclass.
+        content: key -> value.
+        where: name of the file, for messages.
+        own: fields whose values the program knows; the file must not have them.
 
     Raises:
-        InputError: the first problem, with its place in ``where``.
+        InputError: the first mistake, with its place.
     """
     for name in (name for name in content if name in own):
         raise no_such_key(f"{where}: {name}", content[name], _keys(kind, (), own))
@@ -62,7 +66,7 @@ def validated(kind: type[_T], content: Mapping[str, Any], where: str, **own: obj
 
 
 def _turned(content: Any, read: Any, place: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], bool]]:
-    """Every true and false that was taken for a number, with its place."""
+    """Places of every true and false that pydantic took for a number."""
     if isinstance(content, bool) and not isinstance(read, bool):
         yield place, content
     parts = content if isinstance(content, Mapping) else dict(enumerate(content if isinstance(content, list) else ()))
@@ -73,17 +77,17 @@ def _turned(content: Any, read: Any, place: tuple[str, ...] = ()) -> Iterator[tu
 
 @cache
 def _adapter(kind: type) -> TypeAdapter[Any]:
-    """Pydantic's adapter of a type, made once: making it costs a hundred times what a check does."""
+    """Pydantic's adapter of a type, cached: to make it costs a hundred times as much as a check."""
     return TypeAdapter(kind)
 
 
 def _tables(kind: Any) -> list[Any]:
-    """Dataclasses that a type is, or is a list or a choice of."""
+    """Dataclasses in a type: the type itself, or the members of a list or a union."""
     return [kind] if is_dataclass(kind) else [table for part in get_args(kind) for table in _tables(part)]
 
 
 def _keys(kind: Any, place: Sequence[str | int], own: Iterable[str]) -> list[str]:
-    """Allowed keys of the tables at a place in a type, in the spelling of files."""
+    """Allowed keys of the tables at a place in a type, as files spell them."""
     tables = _tables(kind)
     for part in place:
         hints = [get_type_hints(table, include_extras=True) for table in tables]
@@ -94,7 +98,7 @@ def _keys(kind: Any, place: Sequence[str | int], own: Iterable[str]) -> list[str
 
 
 def _place(location: Iterable[str | int], content: Any) -> list[str]:
-    """Place of a problem as the file has it, without the names of types that pydantic puts in between."""
+    """Place of a mistake in a file, without the names of types that pydantic inserts."""
     places = []
     for part in location:
         inside = isinstance(content, Mapping) and part in content
@@ -107,8 +111,8 @@ def _place(location: Iterable[str | int], content: Any) -> list[str]:
 def _first_problem(
     error: ValidationError, where: str, kind: type, content: Mapping[str, Any], own: Iterable[str]
 ) -> InputError:
-    """One line about the first thing that pydantic found wrong in ``where``."""
-    # A misspelt key is told rather than the one that lacks then.
+    """Error for the first mistake that pydantic found."""
+    # An unknown key goes before a missing one, as it may be the missing one misspelt.
     problem = min(error.errors(), key=lambda one: one["type"] not in _UNKNOWN)
     absent = problem["type"] in {"missing", "missing_argument"} and not isinstance(problem["loc"][-1], int)
     location = ".".join(_place(problem["loc"], content) + [str(part) for part in problem["loc"][-1:]] * absent)
@@ -131,25 +135,25 @@ def _first_problem(
 
 
 def advice(kind: str, said: str) -> str:
-    """Advice in our words for a problem of pydantic's, from its type and its message."""
+    """Advice for an error of pydantic, from its type and its message."""
     words = said.removeprefix("Value error, ").replace("Input should", "it must").replace(" after validation", "")
     words = words.replace("Tuple ", "the list ").replace("List ", "the list ")
     return _WORDS.get(kind.partition("_")[0], words[0].lower() + words[1:])
 
 
 def units_of(*types: type) -> dict[str, str]:
-    """Unit of each number of dataclasses whose fields carry one."""
+    """Key -> unit, for the fields of dataclasses that carry a unit."""
     return {item.name: item.metadata["unit"] for kind in types for item in fields(kind) if "unit" in item.metadata}
 
 
 def units_of_kind(table: type, kind: object) -> dict[str, Unit]:
-    """Unit of each number of a dataclass, whose fields may carry one for each ``kind`` that a file can name."""
+    """Key -> unit of each number of a dataclass whose units may depend on the ``kind`` that the file names."""
     units = {item.name: item.metadata.get("unit", "") for item in fields(table)}
     return {name: unit.get(str(kind), "") if isinstance(unit, Mapping) else unit for name, unit in units.items()}
 
 
 def all_units_of(*types: type) -> dict[str, str]:
-    """Every unit that a number of these dataclasses may have, by its key, and by kind and place where these decide."""
+    """Every unit that a number of these dataclasses may have, by ``key``, ``key.kind`` or ``key.kind.place``."""
     units: dict[str, str] = {}
     for each in types:
         for item in fields(each):

@@ -1,4 +1,4 @@
-"""The verdict: how an observable of one run stands to the truth, both with their error bars."""
+"""The verdict: an observable of one run compared with the truth, within the error bars of both."""
 
 from dataclasses import dataclass, replace
 from enum import StrEnum
@@ -10,56 +10,56 @@ from proofroll.core.convergence import Limit
 from proofroll.core.engine import EPSILON
 from proofroll.core.number_format import number
 
-# A ladder whose rungs differ by less than this part of the tolerance needs no order: were the differences never to
-# shrink, twenty further halvings, a step a million times finer, would move the curve by the tolerance at most.
+# A ladder whose rungs differ by less than this part of the tolerance needs no order: even if the differences never
+# shrank, twenty further halvings (a step a million times smaller) would move the curve by the tolerance at most.
 _FLAT = 1 / 20
-# Scatter that may be this many times as large without leaving the tolerance is no doubt.
+# A limit is within tolerance if it stays so with an error bar this many times as large.
 _SEVERAL = 3
-# A limit is shown to be wrong by this many of its error bars: extrapolations of engines that solve the scene's own
-# equations were off by up to 8 of theirs where the motion ends abruptly, those of softened contacts by up to 20,000.
+# A limit is proven wrong if it misses the truth by this many of its error bars. Measured: up to 8 for engines that
+# solve the scene's equations, where the motion ends abruptly; up to 20,000 for softened contacts.
 _SHOWN_WRONG = 10
-# Between its samples a run may be off by this many times what it is at the samples: more is hidden from them, and then
-# the limit of small steps, which is that of the samples, excuses nothing.
+# A larger ratio of the error off the grid to that at the samples means an error hidden between samples; then the limit
+# of small steps, which is known at the samples only, does not count.
 _BETWEEN = 10
 # Round-off of a curve, relative to its size: a thousand operations, each off by one machine epsilon.
 _ROUNDINGS = 1e3
 
 
 class Verdict(StrEnum):
-    """Standing of a run against the truth, from best to worst."""
+    """Result of comparing a run with the truth, from best to worst."""
 
     AGREES = "agrees"  # within tolerance at this step, and the ladder of steps, if there is one, confirms it
     UNCONFIRMED = "unconfirmed"  # within tolerance at this step, but the ladder does not confirm the limit
-    INCOMPLETE = "incomplete"  # all that is reported agrees, but not all that is to be judged is reported
-    CONVERGES = "converges"  # not yet, but the limit of small steps is within tolerance
-    ILL_POSED = "ill-posed"  # here the answer hangs on less than the parameters are known to; nobody can be judged
-    NOT_JUDGED = "not-judged"  # there is no truth, or its own error bar exceeds the tolerance; nobody can be judged
-    ANOTHER_SCENE = "another-scene"  # what was run is of another kind than the scene; it is shown and not judged
-    REFUSED = "refused"  # the engine says that it cannot do this scene, or not with these settings: it has not failed
-    DIFFERS = "differs"  # not this model at this step; what the ladder says is in LimitResult
+    INCOMPLETE = "incomplete"  # all reported observables agree, but some that should be judged are not reported
+    CONVERGES = "converges"  # beyond tolerance at this step, but the limit of small steps is within it
+    ILL_POSED = "ill-posed"  # the motion depends on less than the accuracy of the parameters: no run can be judged
+    NOT_JUDGED = "not-judged"  # there is no truth, or its own error bar exceeds the tolerance: no run can be judged
+    ANOTHER_SCENE = "another-scene"  # the engine's model is of a different kind; it is shown and not judged
+    REFUSED = "refused"  # the engine declares that it cannot represent this scene with these settings; no failure
+    DIFFERS = "differs"  # beyond tolerance at this step, and the limit is not within; see LimitResult
     FAILED = "failed"  # there is no result
 
 
 class LimitResult(StrEnum):
-    """Finding of a ladder of steps about the limit of small steps."""
+    """Result of a ladder of steps for the limit of small steps."""
 
     NO_LADDER = "no ladder"  # only one step was run
-    WITHIN = "within tolerance"  # of the truth, and known to within the tolerance
-    ANOTHER = "another limit"  # it is beyond the tolerance by more than its error bar
+    WITHIN = "within tolerance"  # the limit is within tolerance of the truth, and so is its error bar
+    ANOTHER = "another limit"  # the limit is beyond the tolerance by more than its error bar
     NOT_SHOWN = "no limit shown"  # the runs do not settle, or too slowly to tell
 
 
 class Doubt(StrEnum):
-    """Part of an ill-posed question that cannot be judged."""
+    """Verdicts that an ill-posed question does not allow."""
 
     NONE = "none"  # the question is well posed
-    DIFFERENCES = "differences"  # who differs is not judged
-    EVERYTHING = "everything"  # nor who agrees, which would be luck
+    DIFFERENCES = "differences"  # a difference proves nothing
+    EVERYTHING = "everything"  # neither does agreement, which would be luck
 
 
 @dataclass(frozen=True)
 class Judgement:
-    """One observable of one run.
+    """Verdict on one observable of one run.
 
     Attributes:
         observable, unit: the compared quantity and its unit.
@@ -74,7 +74,7 @@ class Judgement:
         limit: result of the ladder of steps, see :class:`LimitResult`.
         reason: ground of the verdict, as a clause with numbers.
         remarks: further facts for a reader that do not change the verdict, one clause each.
-        floor: of single precision that ends the refinement, as a clause; empty: none does.
+        floor: clause about the error floor of single precision that ends the refinement; empty: there is none.
     """
 
     observable: str
@@ -112,25 +112,25 @@ def judge_curve(
     magnitude: float = 0.0,
     precision: str = "double",
 ) -> Judgement:
-    """Holds a curve and its limit of small steps against the true curve. The only place that gives a verdict.
+    """Compares a curve and its limit of small steps with the true curve. Every verdict on a curve is given here.
 
     Args:
         name: of the observable.
-        unit: of everything below.
+        unit: of all values below.
         values: the curve.
         true: the true curve.
         truth_error_bar: of the true curve.
         tolerance: largest error that counts as agreement.
         scale: size of the observable in this case.
         limit: of small steps, or None if there is none.
-        ladder: whether several steps were asked for; without a limit they then confirm nothing.
+        ladder: True if several steps were run; without a limit they then confirm nothing.
         lost: the first of these steps that has no curve, and why, as a clause; empty if each has one.
-        doubt: part of an ill-posed question that can still be judged.
-        own_bar: uncertainty of the run's own value, e.g. where an event lies between two of its samples;
-            an error that may come of this alone is no difference.
-        sampled_bar: part of that which its samples explain; no run excuses itself by more.
+        doubt: verdicts that an ill-posed question does not allow.
+        own_bar: uncertainty of the run's own value (an event between two of its samples); an error that this alone may
+            explain is no difference.
+        sampled_bar: part of ``own_bar`` that the sampling explains, the most that excuses an error.
         between: values of the run at a few times off the grid, and the true ones; None: there are none.
-        magnitude: of the numbers whose round-off the curve has, if more than ``scale``: positions for a gap.
+        magnitude: of the numbers whose round-off the curve has, if larger than ``scale``: of positions, for a gap.
         precision: in which the run was computed, see :func:`proofroll.core.engine.precision_of`.
     """
     error = largest_difference(values, true)
@@ -184,12 +184,12 @@ class _Ladder:
     """Summary of a ladder of steps.
 
     Attributes:
-        finding: in one word.
+        finding: result for the limit of small steps.
         error, bar, order: of the limit; None without one.
-        leaves: whether finer steps leave the tolerance, with or without an order.
-        wrong_within: whether the limit is within tolerance and yet shown not to be the truth.
+        leaves: True if finer steps leave the tolerance, with or without an order.
+        wrong_within: True if the limit is within tolerance, but proven not to be the truth.
         text: the numbers, for a person.
-        lost: without a limit, which step has no curve, and why.
+        lost: without a limit, the step that has no curve, and why.
     """
 
     finding: LimitResult
@@ -203,12 +203,21 @@ class _Ladder:
 
 
 def _read(limit: Limit, error: float, tolerance: float, truth_bar: float, round_off: float, unit: str) -> _Ladder:
-    """Reads a limit that is off by ``error``. Rungs that differ by as much as their error show no limit."""
+    """Summary of a ladder whose limit has this error.
+
+    Args:
+        limit: of small steps.
+        error: of the limit.
+        tolerance: largest error that counts as agreement.
+        truth_bar: error bar of the truth.
+        round_off: of the curve.
+        unit: for the text, with a space in front.
+    """
     bar, order = limit.error_bar + truth_bar, limit.order if np.isfinite(limit.order) else None
     settled = limit.shown or limit.error_bar <= _FLAT * tolerance
-    far_inside = error + _SEVERAL * bar <= tolerance  # scatter, but none that could leave the tolerance
+    far_inside = error + _SEVERAL * bar <= tolerance
     doubted = bar + limit.beside + round_off
-    drifted = doubted - limit.error_bar + limit.error_bar / _FLAT  # twenty further halvings that change as much
+    drifted = doubted - limit.error_bar + limit.error_bar / _FLAT  # if twenty further halvings each change as much
     finding, leaves = LimitResult.NOT_SHOWN, error - doubted > tolerance
     if far_inside or (settled and error <= tolerance and bar <= tolerance):
         finding = LimitResult.WITHIN
@@ -230,7 +239,7 @@ def _read(limit: Limit, error: float, tolerance: float, truth_bar: float, round_
 
 
 def _verdict(error: float, tolerance: float, rungs: _Ladder, doubt: Doubt) -> Verdict:
-    """The verdict where the truth is known well enough for one."""
+    """Verdict if the truth is known well enough to give one."""
     if doubt == Doubt.EVERYTHING:
         return Verdict.ILL_POSED
     if error <= tolerance and not rungs.leaves:
@@ -269,6 +278,6 @@ def _reason(
 
 
 def _told_apart(one: float, other: float) -> tuple[str, str]:
-    """Two numbers with two digits, or as many as show that they are not the same."""
+    """Texts of two numbers with two digits, or as many as they need to differ."""
     texts = ((number(one, digits), number(other, digits)) for digits in range(2, 18))
     return next((pair for pair in texts if one == other or pair[0] != pair[1]), (repr(one), repr(other)))

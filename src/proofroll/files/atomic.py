@@ -1,4 +1,4 @@
-"""Files that are either whole or not there."""
+"""Files that are written atomically: completely or not at all."""
 
 import contextlib
 import os
@@ -12,7 +12,7 @@ from proofroll.core.errors import ProofrollError
 
 @contextlib.contextmanager
 def replacing(path: Path) -> Iterator[Path]:
-    """A name beside ``path`` to write to: the file takes the place of ``path`` at the end, or is gone.
+    """Context manager with a temporary path; its file replaces ``path`` at the end, or is removed after an error.
 
     Raises:
         ProofrollError: the place cannot be written.
@@ -30,7 +30,7 @@ def replacing(path: Path) -> Iterator[Path]:
 
 
 def ordinary_content(path: Path) -> bytes:
-    """Content of an ordinary file; no pipe, which would block, and no device, which may have no end.
+    """Content of an ordinary file. A pipe would block, and a device may have no end.
 
     Raises:
         OSError: it cannot be read, or is no ordinary file.

@@ -1,4 +1,4 @@
-"""Reads ``comparisons/*.toml``: what is claimed about engines on a scene, with a reason for every tolerance."""
+"""Reads ``comparisons/*.toml``: claims about engines on a scene, with a reason for every tolerance."""
 
 import itertools
 import math
@@ -19,25 +19,25 @@ from proofroll.files.scene_file import load_scene
 from proofroll.files.toml import named_file, read_toml, study_of
 
 _LADDER_RUNGS = 3
-# A run for each combination of parameters takes a second: more than these are a mistake.
+# Most combinations of parameters; a run takes about a second, so more are a mistake.
 _MOST_POINTS = 10_000
 
 
 def comparison_names() -> list[str]:
-    """Names of all comparisons in the order of a report; files of other studies say which with ``study = "…"``."""
+    """Names of all comparisons in the order of a report, without files of other studies (``study = "…"``)."""
     paths = [path for folder in study_folders() for path in folder.glob("*.toml") if study_of(path) is None]
     return [path.stem for path in sorted(paths, key=lambda path: (_order(path), path.stem))]
 
 
 def further_comparison_names() -> list[str]:
-    """Names, with their folder, of the comparisons that a report without names leaves out, sorted."""
+    """Sorted names, with their folder, of the comparisons in subfolders, which a report without names leaves out."""
     folders = {path: folder for folder in study_folders() for path in folder.glob("*/*.toml")}
     comparisons = [path for path in folders if path.name != "scene.toml" and study_of(path) is None]
     return sorted(path.relative_to(folders[path]).with_suffix("").as_posix() for path in comparisons)
 
 
 def _order(path: Path) -> float:
-    """Place that a file asks for; a broken file has none here, and its reader reports it."""
+    """Order that a file declares for a report; infinite if there is none or the file is broken."""
     try:
         order = read_toml(path).get("order", math.inf)
     except InputError:
@@ -46,10 +46,10 @@ def _order(path: Path) -> float:
 
 
 def load_comparison(name: str) -> Comparison:
-    """Reads the comparison at a path, or the one of this name, with or without ``.toml``, in a folder of studies.
+    """Reads a comparison by its path, or by its name in a folder of studies, with or without ``.toml``.
 
     Raises:
-        InputError: no such file, or it is broken.
+        InputError: there is no such file, or it is broken.
     """
     path = named_file(name)
     if path is None:
@@ -126,7 +126,7 @@ def _band(where: str, content: object) -> Band:
 
 
 def _prepared(where: str, content: object) -> dict[str, Any]:
-    """The row's table in the form that the typed check wants."""
+    """Table of a row in the form that :func:`validated` expects: texts become tolerances and lists."""
     row = _table(where, content)
     for key in ("limit", "bound"):
         if key in row:
@@ -145,7 +145,7 @@ def _prepared(where: str, content: object) -> dict[str, Any]:
 
 
 def _check(where: str, row: Row, comparison: Comparison, known: Mapping[str, Observable]) -> None:
-    """Checks beyond the types."""
+    """Checks of a row that its types do not express."""
     _check_engine(where, row)
     require_known(f"{where}.tolerance", row.tolerance, comparison.bands)
     if row.ladder != [1.0]:
@@ -185,7 +185,7 @@ def _check_expectations(where: str, row: Row) -> None:
 
 
 def _check_points(where: str, comparison: Comparison, chosen: Mapping[str, list[float]]) -> None:
-    """Every value that is chosen is one that the comparison has."""
+    """Raises InputError unless the comparison has every chosen value."""
     given: dict[str, list[float]] = {}
     for point in comparison.combinations():
         for key, value in point.items():
@@ -209,7 +209,7 @@ def _check_ladder(where: str, ladder: list[float]) -> None:
 
 
 def _check_bounds(where: str, known: Mapping[str, Observable], bounds: Mapping[str, Tolerance | None]) -> None:
-    """Every name is an observable of the scene, and every tolerance is in its unit."""
+    """Raises InputError unless every name is an observable of the scene, and every tolerance has its unit."""
     for name, bound in bounds.items():
         require_known(f"{where}: observable", name, known, "there is no such observable; choose from")
         if bound is not None and bound.relative and known[name].floor is None:

@@ -1,7 +1,7 @@
-"""Trajectories as CSV: a column for each number over time, with its unit in the header, for any other program.
+"""Trajectories as CSV for any other program: a column for each number over time, with its unit in the header.
 
 The header names each column as ``q.pivot [rad]``. An array has a column for each of its numbers, whose labels
-follow its name: ``p_WB/rod/x [m]``. Attributes, and what is not along time, are left out.
+follow its name: ``p_WB/rod/x [m]``. Attributes, and variables without the dimension time, are left out.
 """
 
 import csv
@@ -19,7 +19,7 @@ _AXES = ("xyz", "wxyz")
 
 
 def csv_text(trajectory: xr.Dataset) -> str:
-    """All numbers of a trajectory over time, to the last bit."""
+    """CSV of all numbers of a trajectory over time, to the last bit."""
     columns = [trajectory["time"], *trajectory.data_vars.values()]
     header, values = [], []
     for item in columns:
@@ -36,21 +36,21 @@ def csv_text(trajectory: xr.Dataset) -> str:
 
 
 def column_names(item: xr.DataArray) -> list[str]:
-    """Names of the numbers that a variable has at each time: ``p_WB/rod/x``."""
+    """Names of the columns of a variable, one for each of its numbers at a time: ``p_WB/rod/x``."""
     labels = [item[dim].to_numpy().tolist() if dim in item.coords else range(item.sizes[dim]) for dim in item.dims[1:]]
     return ["/".join(map(str, (item.name, *at))) for at in itertools.product(*labels)]
 
 
 def read_csv(text: str) -> xr.Dataset:
-    """The trajectory that a CSV file holds.
+    """Trajectory in a CSV file.
 
     Raises:
-        ValueError: it is no table of numbers under names, one of them time.
+        ValueError: it is no table of numbers with a header, or lacks the column time.
     """
     reader = csv.reader(io.StringIO(text.removeprefix("\ufeff")), strict=True)
     try:
         rows = list(reader)
-    except csv.Error as error:  # as a quote without an end
+    except csv.Error as error:  # for example an unclosed quote
         raise ValueError(f"line {reader.line_num}: {error}") from None
     header = [field.strip() for field in rows[0]] if rows else []
     numbers = _numbers(header, rows[1:])
@@ -87,7 +87,7 @@ def read_csv(text: str) -> xr.Dataset:
 
 
 def _dimension(name: str, level: int, labels: Sequence[str]) -> str:
-    """The name of an array's axis, as in a run: of space, of bodies, or its own."""
+    """Name of a dimension of an array: ``xyz``, ``wxyz``, ``body``, or one of its own."""
     axes = "".join(labels)
     if axes in _AXES:
         return axes
@@ -113,7 +113,7 @@ def _number(field: str, line: int) -> float:
 
 
 def _array(name: str, columns: Mapping[tuple[str, ...], Any]) -> tuple[Any, list[tuple[str, ...]]]:
-    """Values with time first, and the labels of each further axis; axes of space in their usual order."""
+    """Values with time first, and the labels of each further dimension; ``xyz`` and ``wxyz`` in their usual order."""
     depth = {len(labels) for labels in columns}
     labels = [tuple(dict.fromkeys(level)) for level in zip(*columns, strict=len(depth) == 1)]
     labels = [next((tuple(axes) for axes in _AXES if set(axes) == set(level)), level) for level in labels]

@@ -1,4 +1,4 @@
-"""Folders of models and files of studies: in an installed wheel, at the top of the repository, or in other packages."""
+"""Folders of models and studies: in an installed wheel, at the top of the repository, or in other packages."""
 
 from functools import cache
 from pathlib import Path
@@ -12,10 +12,10 @@ STUDY_FOLDERS = "proofroll.study_folders"
 
 
 def data_folder(kind: str) -> Path:
-    """The folder ``models``, ``comparisons`` or ``findings``.
+    """Path of the folder ``models``, ``comparisons`` or ``findings``.
 
     Raises:
-        ProofrollError: neither the installed package nor a repository around it holds the folder.
+        ProofrollError: neither the installed package nor a repository around it has the folder.
     """
     for candidate in (OWN / kind, OWN.parents[1] / kind):
         if candidate.is_dir():
@@ -25,6 +25,6 @@ def data_folder(kind: str) -> Path:
 
 @cache
 def study_folders() -> tuple[Path, ...]:
-    """The folders of comparisons and other studies: ``comparisons``, and those of modules that packages announce."""
+    """Folders with files of comparisons and other studies: ``comparisons``, and those of announced modules."""
     modules = (module for _, module in loaded(STUDY_FOLDERS, ModuleType))
     return (data_folder("comparisons"), *(Path(module.__file__).parent for module in modules))

@@ -1,4 +1,4 @@
-"""Plain data, as JSON can hold it: the one place where records become dictionaries."""
+"""Conversion of records to plain data for JSON, and back."""
 
 import math
 from collections.abc import Mapping
@@ -7,15 +7,15 @@ from typing import Any, TypeVar
 
 _Record = TypeVar("_Record")
 
-# How a field of a record stands in JSON, where not under its own name: with its own fields among those around it; or
-# not at all where it is None.
+# Metadata of a record's field. MERGED: its own fields become fields of the record around it. OPTIONAL: it is left out
+# if it is None.
 MERGED, OPTIONAL = {"json": "merged"}, {"json": "optional"}
 
 
 def plain(value: Any) -> Any:
-    """The value with everything that JSON cannot hold replaced.
+    """Plain data for JSON.
 
-    Records become dictionaries, by their own ``as_dict`` where they have one; numbers that are not finite become None.
+    Records become dictionaries, by their own ``as_dict`` if they have one; numbers that are not finite become None.
     """
     if isinstance(value, float):
         return value if math.isfinite(value) else None
@@ -25,27 +25,27 @@ def plain(value: Any) -> Any:
         return [plain(item) for item in value]
     if is_dataclass(value):
         return _plain_record(value)
-    return plain(value.tolist()) if hasattr(value, "tolist") else value  # of numpy
+    return plain(value.tolist()) if hasattr(value, "tolist") else value  # numpy arrays and numbers
 
 
 def _plain_record(record: Any) -> Any:
     if hasattr(record, "as_dict"):
         return plain(record.as_dict())
-    told: dict[str, Any] = {}
+    content: dict[str, Any] = {}
     for field in fields(record):
         value, how = getattr(record, field.name), field.metadata.get("json")
         if how == "merged":
-            told |= plain(value) or {}
+            content |= plain(value) or {}
         elif value is not None or how != "optional":
-            told[field.name] = plain(value)
-    return told
+            content[field.name] = plain(value)
+    return content
 
 
 def record(kind: type[_Record], content: object) -> _Record:
-    """Record from the content that :func:`plain` made of it; keys without a field are left out.
+    """Record from content made by :func:`plain`; keys without a field are ignored.
 
     Raises:
-        ValueError: it is of something else.
+        ValueError: the content does not fit the record.
     """
     from pydantic import TypeAdapter  # takes a while to import, and few commands read records
 

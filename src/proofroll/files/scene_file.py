@@ -1,6 +1,6 @@
 """Reads ``models/<scene>/scene.toml`` into a :class:`~proofroll.core.scene.Scene`, with the user's parameters set.
 
-A file of another format that somebody reads (:mod:`proofroll.files.scene_sources`), a robot's, is a scene likewise.
+Files of other formats with a reader (:mod:`proofroll.files.scene_sources`), for example robot files, are scenes, too.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from proofroll.files.toml import named_file, read_toml
 
 @dataclass(frozen=True)
 class SceneFile:
-    """The contents of a ``scene.toml`` before parameters are set.
+    """Contents of a ``scene.toml`` before parameters are set.
 
     Attributes:
         title: description in one line.
@@ -38,9 +38,10 @@ class SceneFile:
         parameters: numbers that a user sets by name.
         asks: results wanted besides the motion, e.g. ``orientation``.
         reason: purpose of the scene, for a person.
-        duration: length of a run that shows what it is about [s].
-        dt: step that is short enough for engines with a fixed one [s]; shown where a run with a longer one fails, and
-            taken by a first look.
+        duration: length of a run that shows the purpose of the scene [s].
+        dt: step that is short enough for engines with a fixed one [s]; recommended if a run with a longer one fails,
+            and
+            used by a first look.
         files: models beside it in the formats of engines, e.g. ``mujoco_free.xml``, with the meshes that these read.
         tables: all others, which kinds of elements read.
     """
@@ -59,7 +60,7 @@ class SceneFile:
 
 @dataclass(frozen=True)
 class _GravityTable:
-    """The table that all kinds of elements share."""
+    """Table of gravity, which all kinds of elements share."""
 
     gravity: Gravity
 
@@ -70,7 +71,7 @@ _OWN = frozenset(item.name for item in dataclasses.fields(SceneFile)) - {"tables
 
 @cache
 def _units() -> tuple[str, ...]:
-    """Every unit that some number of a scene has; nothing is converted."""
+    """All units that a number of a scene may have; nothing is converted."""
     kinds = (kind.units.values() for kind in load_element_kinds())
     return tuple(dict.fromkeys([*units_of(Gravity).values(), *itertools.chain.from_iterable(kinds), "s", "N"]))
 
@@ -81,7 +82,7 @@ def scene_names() -> list[str]:
 
 
 def read_scene_file(name: str) -> SceneFile:
-    """The scene's file, checked against the vocabulary.
+    """File of a scene, with its keys checked.
 
     Args:
         name: a folder under ``models/``, or the path of a folder that holds a ``scene.toml``, or of a robot's file.
@@ -93,7 +94,7 @@ def read_scene_file(name: str) -> SceneFile:
 
 
 def _read(name: str, given: Mapping[str, object]) -> tuple[SceneFile, dict[str, float], Path]:
-    """The scene's file, the value of each parameter, and where the file is."""
+    """File of a scene, the value of each parameter, and the path of the file."""
     other = source_of(name)
     if other is None:
         path = scene_folder(name) / "scene.toml"
@@ -107,7 +108,7 @@ def _read(name: str, given: Mapping[str, object]) -> tuple[SceneFile, dict[str, 
 
 
 def scene_folder(name: str) -> Path:
-    """Folder of the scene. Raises InputError if there is no such scene."""
+    """Folder of a scene. Raises InputError if there is no such scene."""
     missing = "there is no such scene"
     own = Path(name).parent if Path(name).name == "scene.toml" else Path(name)
     for folder in (data_folder("models") / name, own):
@@ -116,22 +117,24 @@ def scene_folder(name: str) -> Path:
                 return folder
             if name and folder.is_dir():
                 missing = "this folder has no scene.toml; proofroll new scene writes one"
-        except (OSError, ValueError):  # too long for a file system, or a zero byte
+        except (OSError, ValueError):  # the name is too long for the file system, or has a zero byte
             break
     raise InputError("scene", name, f"{missing}; choose one of {', '.join(scene_names())}")
 
 
 def means_scene(name: str, *, alone: bool = False) -> bool:
-    """True if a name means a scene; where a comparison has the name too, it means the comparison.
+    """True if a name means a scene. A name of both a scene and a comparison means the comparison unless ``alone``.
 
-    ``alone``: something was given that is for scenes alone, which decides for the scene.
+    Args:
+        name: name or path.
+        alone: True if the user gave an option that is for scenes only.
     """
     shared = not alone and named_file(name) is not None
     return source_of(name) is not None or (not shared and (is_scene(name) or Path(name).is_dir()))
 
 
 def is_scene(name: str) -> bool:
-    """True if a scene, or a file that holds one, has this name; it may be broken."""
+    """True if there is a scene, or a file with a scene, of this name; it may be broken."""
     try:
         return source_of(name) is not None or bool(scene_folder(name))
     except InputError:
@@ -139,16 +142,16 @@ def is_scene(name: str) -> bool:
 
 
 def load_scene(name: str, /, *, asks: Any = (), **parameters: float) -> Scene:
-    """The scene with some of its parameters set, SI units.
+    """Scene with some of its parameters set, in SI units.
 
     Args:
-        name: a folder under ``models/``, e.g. ``sphere_in_cylinder``, or a path: of such a folder, of a robot's file.
-        asks: names of what is wanted besides the motion and what the scene's own file asks for, e.g.
-            ``("orientation",)``. (Typed as Any, for type checkers would not let numbers be unpacked beside it.)
+        name: a folder under ``models/``, e.g. ``sphere_in_cylinder``, or the path of such a folder or of a robot file.
+        asks: results wanted besides the motion and those that the scene's own file asks for, e.g. ``("orientation",)``.
+            (Typed as Any: otherwise type checkers reject ``**numbers`` in the same call.)
         **parameters: e.g. ``speed=3.3``; see ``proofroll scenes``.
 
     Raises:
-        InputError: unknown scene or parameter, or a value that makes no sense; or nothing of that name can be asked.
+        InputError: unknown scene, parameter or question, or a value that makes no sense.
     """
     file, values, path = _read(name, parameters)
     own = path.name == "scene.toml"
@@ -171,7 +174,7 @@ def load_scene(name: str, /, *, asks: Any = (), **parameters: float) -> Scene:
 
 
 def _elements(tables: Mapping[str, Any], gravity: Gravity, numbers: Parameters, where: str) -> tuple[Element, ...]:
-    """Elements of the tables of a file, each read by its kind of element."""
+    """Elements in the tables of a file, each read by its kind of element."""
     kinds = load_element_kinds()
     elements: list[Element] = []
     for kind, own in zip(kinds, _of_each([kind.tables for kind in kinds], tables, where), strict=True):
@@ -181,10 +184,10 @@ def _elements(tables: Mapping[str, Any], gravity: Gravity, numbers: Parameters, 
 
 
 def _of_each(known: Sequence[Sequence[str]], tables: Mapping[str, Any], where: str) -> list[dict[str, Any]]:
-    """Tables of each kind of element; of a table that several read, each row goes where the names are that it says.
+    """Tables of each kind of element. A row of a table that several kinds read goes to the kind whose things it names.
 
     Raises:
-        InputError: the table is no list of rows, or a row says no name that one of these kinds alone has.
+        InputError: such a table is no list of rows, or a row does not name things of exactly one kind.
     """
     shared = {name for name in tables if sum(name in own for own in known) > 1}
     own_tables = [{name: tables[name] for name in own if name in tables and name not in shared} for own in known]
@@ -193,9 +196,9 @@ def _of_each(known: Sequence[Sequence[str]], tables: Mapping[str, Any], where: s
         if not isinstance(tables[table], list) or len(_rows(tables[table])) < len(tables[table]):
             raise InputError(f"{where}: {table}", tables[table], f"write each row as a table [[{table}]]")
         for index, row in enumerate(_rows(tables[table])):
-            said = [text for value in row.values() for text in (value if isinstance(value, list) else [value])]
+            texts = [text for value in row.values() for text in (value if isinstance(value, list) else [value])]
             homes = [
-                k for k, names in enumerate(named) if table in known[k] and any(str(text) in names for text in said)
+                k for k, names in enumerate(named) if table in known[k] and any(str(text) in names for text in texts)
             ]
             if len(homes) != 1:
                 advice = "several kinds of elements have such rows; name a thing of one of them, which another has not"
@@ -209,7 +212,7 @@ def _rows(table: Any) -> list[Mapping[str, Any]]:
 
 
 def _names(asks: object) -> list[str]:
-    """Names that a scene asks for, as a list."""
+    """List of the results that a scene is asked for."""
     if isinstance(asks, str):
         return [asks]
     if not isinstance(asks, Sequence):
@@ -218,7 +221,7 @@ def _names(asks: object) -> list[str]:
 
 
 def _checked(content: Mapping[str, Any], path: Path) -> SceneFile:
-    """The content of a file with all that can be said without the values of parameters."""
+    """Content of a file, with all checks that do not need values of parameters."""
     own = {key: value for key, value in content.items() if key in _OWN}
     tables = {key: value for key, value in content.items() if key not in _OWN}
     known = [name for kind in load_element_kinds() for name in kind.tables]

@@ -1,4 +1,4 @@
-"""Parameters of a scene: what a file may say of each, and the numbers that they take."""
+"""Parameters of a scene: their declarations in a file, and their values."""
 
 from __future__ import annotations
 
@@ -42,10 +42,10 @@ class Parameter:
 
 
 def check_parameters(parameters: Mapping[str, Parameter], units: Iterable[str], path: Path) -> None:
-    """Checks a scene's parameters without their values.
+    """Checks the declarations of a scene's parameters, and their defaults.
 
     Raises:
-        InputError: an unknown unit, or what a value or a bound refers to is not there.
+        InputError: an unknown unit, a reference to an unknown parameter, or a default out of its bounds.
     """
     known_units = dict.fromkeys(units)
     for name, parameter in parameters.items():
@@ -73,7 +73,7 @@ def check_parameters(parameters: Mapping[str, Parameter], units: Iterable[str], 
 
 
 def _check_end(parameters: Mapping[str, Parameter], name: str, where: str) -> None:
-    """The defaults that follow one another end at a number."""
+    """Raises InputError if defaults that refer to other parameters form a circle."""
     passed = [name]
     while isinstance(following := parameters[passed[-1]].value, str) and following in parameters:
         if following in passed:
@@ -82,7 +82,7 @@ def _check_end(parameters: Mapping[str, Parameter], name: str, where: str) -> No
 
 
 def values_of(parameters: Mapping[str, Parameter], given: Mapping[str, object]) -> dict[str, float]:
-    """Every parameter's number: given, or default, or that of the parameter it follows.
+    """Value of every parameter: the given one, the default, or that of the parameter to which the default refers.
 
     Raises:
         InputError: there is no such parameter, or a value is no number or out of its bounds.
@@ -95,7 +95,7 @@ def values_of(parameters: Mapping[str, Parameter], given: Mapping[str, object]) 
         while source not in given and isinstance(following := parameters[source].value, str):
             source = following
         values[name] = _number(name, given.get(source, parameters[source].value), parameter)
-    # Numbers first, then other parameters: a parameter is never blamed for the bad value of another.
+    # Bounds that are numbers come first, so that a parameter is not blamed for the bad value of another.
     for kind in (float, str):
         for name, parameter in parameters.items():
             _check_bounds(name, parameter, values, kind)

@@ -1,4 +1,4 @@
-"""Files of other formats that hold a scene; who reads them is announced by entry points ``proofroll.scene_sources``."""
+"""Files of other formats that hold a scene; entry points ``proofroll.scene_sources`` announce their readers."""
 
 from collections.abc import Mapping
 from functools import cache
@@ -11,7 +11,7 @@ GROUP = "proofroll.scene_sources"
 
 
 class SceneSource(Protocol):
-    """Reads files of a format as scenes.
+    """Reader of scenes in files of other formats.
 
     Attributes:
         endings: of the files that it reads, with the dot, in small letters.
@@ -24,29 +24,29 @@ class SceneSource(Protocol):
         """Content of the scene as in a ``scene.toml``: title, source, parameters, reason, duration.
 
         Raises:
-            InputError: the file is broken; the first thing that is wrong with it.
+            InputError: the file is broken; the first mistake in it.
         """
 
     @staticmethod
     def tables(path: Path, values: Mapping[str, float]) -> Mapping[str, Any]:
-        """The tables of a ``scene.toml``, gravity among them, with numbers in place of parameters.
+        """Tables as in a ``scene.toml``, gravity among them, with numbers instead of parameters.
 
         Args:
             path: of the file.
             values: of its parameters.
 
         Raises:
-            InputError: no scene has what the file says with these parameters.
+            InputError: the file with these parameters is no scene.
         """
 
 
 def source_of(name: str) -> tuple[type[SceneSource], Path] | None:
-    """Source that reads a file of another format, with its path; None: the file is not of another format."""
+    """Reader of a file of another format, and its path; None: the file is none."""
     path = Path(name)
     try:
         if not path.suffix or not path.is_file():
-            return None  # without loading those who read files: most names are of folders
-    except (OSError, ValueError):  # too long for a file system, or a zero byte
+            return None  # most names are those of folders, so the readers need not be loaded
+    except (OSError, ValueError):  # the name is too long for the file system, or has a zero byte
         return None
     source = _sources().get(path.suffix.lower())
     return None if source is None else (source, path)

@@ -1,4 +1,4 @@
-"""TOML files: read with one clear line about what is wrong, and found by what they are for."""
+"""TOML files: reading them with one clear line about the first mistake, and finding those of a study."""
 
 import tomllib
 from collections.abc import Iterator
@@ -8,16 +8,15 @@ from typing import Any
 from proofroll.core.errors import InputError
 from proofroll.files.data_folders import study_folders
 
-# Files of scenes and comparisons have some kB and tables some levels deep: what has more is a mistake, and would take
-# long to read or end what reads it.
+# Limits on a file's size and nesting, far above those of real files: beyond them reading is slow or recurses too deep.
 _MOST_BYTES = 1 << 18
 _DEEPEST = 16
 
 
 def read_toml(path: Path) -> dict[str, Any]:
-    """The content of a file. Raises InputError if it is broken, far too large or cannot be read."""
+    """Content of a file. Raises InputError if it is broken, too large or unreadable."""
     try:
-        if path.exists() and not path.is_file():  # a pipe would be waited for without end
+        if path.exists() and not path.is_file():  # reading a pipe would block
             raise InputError("file", path, "this is no ordinary file")
         with path.open("rb") as file:
             text = file.read(_MOST_BYTES + 1)
@@ -33,7 +32,7 @@ def read_toml(path: Path) -> dict[str, Any]:
     except OSError as error:
         raise InputError("file", path, f"the file cannot be read: {error.strerror}") from None
     level: list[Any] = [content]
-    for _ in range(_DEEPEST):  # without recursion, which has an end of its own
+    for _ in range(_DEEPEST):  # a loop, as recursion is limited
         inside = (list(item.values()) if isinstance(item, dict) else item for item in level)
         level = [value for values in inside for value in values if isinstance(value, (dict, list))]
     if level:
@@ -46,16 +45,16 @@ def _too_deep(path: Path) -> InputError:
 
 
 def study_of(path: Path) -> str | None:
-    """Study of a file; None: a comparison, or a file that cannot be read."""
+    """Name of the study that a file belongs to; None: it is a comparison, or cannot be read."""
     try:
         study = read_toml(path).get("study")
     except InputError:
-        return None  # whoever asks for that file is told what is wrong with it
+        return None  # the error is reported when the file itself is read
     return None if study is None else str(study)
 
 
 def study_files(study: str) -> Iterator[tuple[Path, dict[str, Any]]]:
-    """The files for a study with the rest of their content, each folder's sorted by name."""
+    """Path and content of the files of a study, sorted by name within each folder."""
     for folder in study_folders():
         for path in sorted(folder.glob("*.toml")):
             if study_of(path) == study:
@@ -63,10 +62,10 @@ def study_files(study: str) -> Iterator[tuple[Path, dict[str, Any]]]:
 
 
 def study_content(path: Path, study: str) -> dict[str, Any]:
-    """Content of a file for a study, without the name of the study.
+    """Content of a file of a study, without the key ``study``.
 
     Raises:
-        InputError: it is broken, or for something else.
+        InputError: it is broken, or belongs to another study.
     """
     content = read_toml(path)
     given = content.pop("study", "nothing")
@@ -76,16 +75,16 @@ def study_content(path: Path, study: str) -> dict[str, Any]:
 
 
 def named_file(name: str) -> Path | None:
-    """File of a study: at a path, or by its name in a folder of studies, with or without ``.toml``."""
+    """Path of the file of a study or comparison, from a path or from its name with or without ``.toml``; or None."""
     places = [Path(name), *(folder / file for folder in study_folders() for file in (f"{name}.toml", name))]
     return next((place for place in places if place.is_file() and place.name != "scene.toml"), None)
 
 
 def study_file(name: str, study: str) -> tuple[Path, dict[str, Any]]:
-    """A file for a study with the rest of its content, by its path, its name, or the scene that it is about.
+    """Path and content of a file of a study, by its path, its name, or its scene.
 
     Raises:
-        InputError: there is none, it is broken, or it is for something else.
+        InputError: there is none, it is broken, or it belongs to another study.
     """
     path = named_file(name)
     if path is None:

@@ -1,6 +1,6 @@
-"""Trajectories in files: numpy's ``.npz`` between processes and in the store, netCDF and CSV for people and programs.
+"""Trajectories in files: ``.npz`` for the store and between processes; netCDF and CSV for users and other programs.
 
-numpy is imported anyway; what reads and writes netCDF takes longer to import than a short run to make.
+numpy is imported anyway, while importing the libraries for netCDF takes longer than a short run.
 """
 
 from __future__ import annotations
@@ -29,22 +29,22 @@ from proofroll.files.atomic import ordinary_content, replacing
 if TYPE_CHECKING:
     import xarray as xr
 
-# Endings of the files in which trajectories are stored, and in which a person is given one.
+# Endings of files: of the store, and of those written for users.
 STORED, NETCDF, CSV = ".npz", ".nc", ".csv"
-# Trajectories that were read stay in memory up to this size together [bytes]: those of a few comparisons.
+# Largest total size of the trajectories that are kept in memory [bytes]: those of a few comparisons.
 MOST_HELD = 128 * 2**20
-# What is in such a file beside an array for each variable: their dimensions and all attributes.
+# Entry of a stored file with the dimensions of its variables and all attributes.
 _ABOUT = "about.json"
-# Whether xarray was imported without dask, so that it may go on without: it asks for a scheduler when it writes.
+# True if xarray was imported without dask; then dask is hidden, too, when xarray asks for a scheduler to write.
 _without_dask = False
-# What numpy raises where a file is another, or damaged.
+# Exceptions of numpy for a file of another format, or a damaged one.
 _NO_SUCH_FILE = (zipfile.BadZipFile, zlib.error, EOFError, KeyError, RecursionError, TypeError, ValueError)
 
 
 def import_xarray() -> None:
-    """Import xarray without dask, in a process that uses no array of dask's.
+    """Imports xarray without dask, unless one of them is imported already.
 
-    At its first array xarray imports all of dask, half of what a run of a second costs; no array of ours is dask's.
+    xarray would import all of dask at its first array, which takes half as long as a run of a second; we do not use it.
     """
     global _without_dask  # noqa: PLW0603 -- of the process, as xarray's own memory of dask is
     first = not {"xarray", "dask"} & set(sys.modules)
@@ -57,7 +57,7 @@ def import_xarray() -> None:
 
 @contextlib.contextmanager
 def _dask_aside() -> Iterator[None]:
-    """Context in which xarray does not find dask, unless dask is imported already."""
+    """Context manager in which xarray does not find dask, unless dask is imported already."""
     hidden = "dask" not in sys.modules
     if hidden:
         sys.modules["dask"] = None  # type: ignore[assignment]  # what Python documents to make an import fail
@@ -69,15 +69,15 @@ def _dask_aside() -> Iterator[None]:
 
 
 def write(trajectory: xr.Dataset | Columns, path: Path) -> None:
-    """Writes a file, by its ending, so that it is either whole or not there.
+    """Writes a trajectory atomically, in the format of the file's ending.
 
-    netCDF-3 has no integers beyond 32 bits: a number that does not fit is refused. All others stay as they are.
+    netCDF-3 has no integers beyond 32 bits: a larger number is refused. Other numbers are kept exactly.
 
     Raises:
         ProofrollError: the place cannot be written.
         ValueError: the format cannot hold a number.
     """
-    # Made in memory first: a disk that fills meanwhile gives one reason, and no half of a file.
+    # Made in memory first, so that a full disk gives one clear error.
     made = (
         _csv(trajectory)
         if path.suffix == CSV
@@ -91,11 +91,11 @@ def write(trajectory: xr.Dataset | Columns, path: Path) -> None:
 
 def _stored(trajectory: xr.Dataset | Columns) -> bytes:
     columns = trajectory if isinstance(trajectory, Columns) else Columns.of(trajectory)
-    said = {name: [item.dims, dict(item.attrs)] for name, item in columns.variables.items()}
-    about = json.dumps([said, dict(columns.attrs)], default=lambda value: value.tolist())  # an array, or one number
+    own = {name: [item.dims, dict(item.attrs)] for name, item in columns.variables.items()}
+    about = json.dumps([own, dict(columns.attrs)], default=lambda value: value.tolist())  # numpy arrays and numbers
     buffer = io.BytesIO()
     with zipfile.ZipFile(buffer, "w") as archive:
-        archive.writestr(zipfile.ZipInfo(_ABOUT), about)  # of no date: the same trajectory gives the same file
+        archive.writestr(zipfile.ZipInfo(_ABOUT), about)  # without a date: equal trajectories give equal files
         for name, item in columns.variables.items():
             with archive.open(f"{name}.npy", "w") as entry:
                 np.lib.format.write_array(entry, item.values, allow_pickle=False)
@@ -110,17 +110,17 @@ def _csv(trajectory: xr.Dataset | Columns) -> bytes:
 
 def _netcdf(trajectory: xr.Dataset | Columns) -> bytes:
     dataset = trajectory.dataset() if isinstance(trajectory, Columns) else trajectory
-    # No number stands for an absent one.
+    # No number is a mark for missing values.
     plain = {name: {"_FillValue": None} for name in dataset.variables}
     with _dask_aside() if _without_dask else contextlib.nullcontext():
         return bytes(dataset.to_netcdf(None, engine="scipy", encoding=plain))
 
 
 def read(path: Path) -> xr.Dataset:
-    """A trajectory from a file that :func:`write` made, wholly in memory; of CSV without attributes.
+    """Trajectory from a file made by :func:`write`, read into memory; one from CSV has no attributes but units.
 
     Raises:
-        OSError, ValueError: it cannot be read, or is of another kind than its ending says.
+        OSError, ValueError: it cannot be read, or does not have the format of its ending.
     """
     if path.suffix == STORED:
         return read_columns(path).dataset()
@@ -130,7 +130,7 @@ def read(path: Path) -> xr.Dataset:
         return read_csv(ordinary_content(path).decode())
     import xarray as xr
 
-    # Times stay numbers of seconds, and no number stands for an absent one.
+    # Times stay numbers of seconds, and no number is a mark for missing values.
     try:
         dataset = xr.load_dataset(
             io.BytesIO(ordinary_content(path)), engine="scipy", decode_times=False, mask_and_scale=False
@@ -142,7 +142,7 @@ def read(path: Path) -> xr.Dataset:
 
 @dataclass(frozen=True)
 class StoredTrajectory:
-    """A trajectory in a file, read when it is first asked for and held while there is room for it."""
+    """Trajectory in a file, read at the first access and kept in memory while there is room."""
 
     file: Path
     _held: ClassVar[deque[tuple[weakref.ref[StoredTrajectory], int]]] = deque()
@@ -150,7 +150,7 @@ class StoredTrajectory:
 
     @cached_property
     def dataset(self) -> xr.Dataset:
-        """The trajectory; raises as :func:`read` does. What was read longest ago makes room for it."""
+        """The trajectory; raises as :func:`read` does. The trajectories read longest ago are dropped to make room."""
         made = read(self.file)
         with self._one_at_a_time:
             self._held.append((weakref.ref(self), made.nbytes))
@@ -162,12 +162,12 @@ class StoredTrajectory:
 
     @property
     def shown(self) -> str:
-        """Path of the file from the folder of a report, in which that of the results lies."""
+        """Path of the file, relative to the folder of a report, which contains the folder of results."""
         return f"{self.file.parent.name}/{self.file.name}"
 
 
 def read_columns(path: Path) -> Columns:
-    """A stored trajectory, without xarray.
+    """Trajectory from a ``.npz`` file made by :func:`write`, without xarray.
 
     Raises:
         OSError, ValueError: it cannot be read, or is no such file.
@@ -175,15 +175,15 @@ def read_columns(path: Path) -> Columns:
     content = ordinary_content(path)
     try:
         with np.load(io.BytesIO(content), allow_pickle=False) as file:
-            said, attrs = map(dict, json.loads(file[_ABOUT]))
-            variables = {name: Variable(tuple(dims), file[name], dict(own)) for name, (dims, own) in said.items()}
+            own, attrs = map(dict, json.loads(file[_ABOUT]))
+            variables = {name: Variable(tuple(dims), file[name], dict(its)) for name, (dims, its) in own.items()}
     except _NO_SUCH_FILE as error:
         raise ValueError(f"{path} is no stored trajectory") from error
     return Columns(variables, attrs)
 
 
 def read_arrays(path: Path) -> dict[str, npt.NDArray[Any]]:
-    """The arrays of a file that ``numpy.savez`` made.
+    """Arrays from a file made by ``numpy.savez``, by name.
 
     Raises:
         OSError, ValueError: it cannot be read, or is no such file.

@@ -1,4 +1,4 @@
-"""Descriptions of engines and facts of cases, each asked in a worker process."""
+"""Questions to engines, each answered in a worker process: descriptions, settings, programs."""
 
 import contextlib
 import dataclasses
@@ -15,7 +15,7 @@ from proofroll.running.worker_pool import Workers
 
 _START_UP_SECONDS = 60.0
 _WRITING_SECONDS = 300.0
-# Engines that have been asked something and have not answered yet, for whoever tells what is waited for.
+# Engines that have not answered yet, for displays of progress.
 waited_for: list[str] = []
 
 
@@ -31,7 +31,7 @@ def _waiting_for(engine: str) -> Iterator[None]:
 def _answers(
     requests: Sequence[tuple[str, Mapping[str, Any]]], workers: Workers | None, seconds: float = _START_UP_SECONDS
 ) -> list[dict[str, Any] | ProofrollError]:
-    """Answers of engines to requests, or their errors, in the order given; their processes start together."""
+    """Answers of engines to requests, or errors, in the order of the requests; engines start and answer in parallel."""
     answers: dict[int, dict[str, Any] | ProofrollError] = {}
 
     def ask(engine: str, lent: Workers) -> None:
@@ -44,26 +44,26 @@ def _answers(
             except ProofrollError as error:
                 answers[index] = error
 
-    # Most of it is the start of the processes and the import of the engines.
+    # Most of the time goes into starting processes and importing engines.
     with lent_workers(workers) as lent, ThreadPoolExecutor(os.cpu_count() or 1) as pool:
         list(pool.map(lambda engine: ask(engine, lent), dict.fromkeys(name for name, _ in requests)))
     return [answers[index] for index in range(len(requests))]
 
 
 def describe(engine: str, workers: Workers | None = None) -> EngineDescription:
-    """Description of an engine with what it provides and its presets; asked in a process of its own.
+    """Description of an engine with its capabilities and presets, asked in a process of its own.
 
     Raises:
-        InputError, Missing, WorkerDied: it cannot be asked.
+        InputError, Missing, WorkerDied: the engine cannot be asked.
     """
-    told = described([engine], workers)[engine]
-    if isinstance(told, ProofrollError):
-        raise told
-    return told
+    description = described([engine], workers)[engine]
+    if isinstance(description, ProofrollError):
+        raise description
+    return description
 
 
 def described(engines: Iterable[str], workers: Workers | None = None) -> dict[str, EngineDescription | ProofrollError]:
-    """Description of each engine, or the error in asking it."""
+    """Description of each engine, or the error that prevented it."""
     names = list(dict.fromkeys(engines))
     descriptions: dict[str, EngineDescription | ProofrollError] = {}
     for name, told in zip(names, _answers([(n, {"do": "describe", "engine": n}) for n in names], workers), strict=True):
@@ -79,9 +79,9 @@ def resolve(
     workers: Workers | None = None,
     requires: Collection[str] = (),
 ) -> list[EngineFacts | ProofrollError]:
-    """Complete settings for engines with options, each or the reason why not, in the order given.
+    """Complete settings and facts for engines with options, or an error for each, in the order given.
 
-    What the scene ``requires`` decides the formulation where none is given.
+    Without a given formulation, what the scene ``requires`` decides it.
     """
     common = {"do": "resolve", "requires": sorted(requires)}
     requests = [(name, {**common, "engine": name, "options": dict(options)}) for name, options in engines]
@@ -94,7 +94,7 @@ def resolve_with_truth(
     workers: Workers | None = None,
     requires: Collection[str] = (),
 ) -> tuple[list[EngineFacts | ProofrollError], EngineFacts]:
-    """Facts as by :func:`resolve`, and those of the truth. Raises ProofrollError if the truth cannot be asked."""
+    """Facts of engines as by :func:`resolve`, and of the truth. Raises ProofrollError if the truth cannot be asked."""
     *facts, truth = resolve([*engines, ("truth", {})], workers, requires)
     if not isinstance(truth, EngineFacts):
         raise truth
@@ -102,7 +102,7 @@ def resolve_with_truth(
 
 
 def prepare(engine: str, workers: Workers) -> None:
-    """Starts an engine's process and lets it import what a run needs, while the caller has other things to do.
+    """Starts an engine's process and imports what a run needs, so that the next request need not wait.
 
     An error of the engine is left to the next request.
     """
@@ -116,23 +116,27 @@ def prepare(engine: str, workers: Workers) -> None:
 
 
 def programs(cases: Sequence[Case], workers: Workers | None = None) -> list[tuple[str | None, str]]:
-    """Engines' programs for cases (:class:`proofroll.core.engine_abilities.Reproduces`), each or None and why not."""
+    """Programs that show the engines' behaviour in these cases (:class:`proofroll.core.engine_abilities.Reproduces`).
+
+    Returns:
+        For each case the text, or None and the reason.
+    """
     told = _answers([_to_write(case, "reproducer") for case in cases], workers)
     return [(None, str(a)) if isinstance(a, ProofrollError) else (a.get("text"), a.get("message", "")) for a in told]
 
 
 def model_file(case: Case) -> str:
-    """The text of the file of a model that an engine's own tools read.
+    """Text of the model file of a case, in the engine's own format.
 
     Raises:
-        Refused: the engine writes none, or none of this scene.
+        Refused: the engine writes no model files, or none of this scene.
     """
-    (told,) = _answers([_to_write(case, "model_file")], None, _WRITING_SECONDS)
-    if isinstance(told, ProofrollError):
-        raise told
-    if "text" not in told:
-        raise Refused(f"{case.engine.name}: {told['message']}")
-    return str(told["text"])
+    (answer,) = _answers([_to_write(case, "model_file")], None, _WRITING_SECONDS)
+    if isinstance(answer, ProofrollError):
+        raise answer
+    if "text" not in answer:
+        raise Refused(f"{case.engine.name}: {answer['message']}")
+    return str(answer["text"])
 
 
 def _to_write(case: Case, what: str) -> tuple[str, dict[str, Any]]:
@@ -141,7 +145,7 @@ def _to_write(case: Case, what: str) -> tuple[str, dict[str, Any]]:
 
 @contextlib.contextmanager
 def lent_workers(workers: Workers | None) -> Iterator[Workers]:
-    """Context with the given workers, or with new ones that end with it."""
+    """Context manager that gives the workers passed in, or new ones that it closes at its end."""
     if workers is not None:
         yield workers
         return

@@ -1,4 +1,4 @@
-"""One case: a scene with numbers, in an engine with settings, over a time grid; and what came of it."""
+"""Case: a scene with parameters, in an engine with settings, over a time grid; and its result."""
 
 from __future__ import annotations
 
@@ -25,16 +25,16 @@ class Status(StrEnum):
     DONE = "done"
     DIVERGED = "diverged"
     REFUSED = "refused"  # the engine says that it cannot represent the scene
-    WRONG_MODEL = "wrong model"  # what the engine built is not the scene, so it was not run (certificate)
-    ANOTHER_SCENE = "another scene"  # it ran, but what it ran is not this scene (KnowsAnotherScene)
-    NO_TRUTH = "no truth"  # it ran, but there is no truth to hold it against
+    WRONG_MODEL = "wrong model"  # the engine's model contradicts the scene (certificate), so it was not run
+    ANOTHER_SCENE = "another scene"  # it ran, but with a model of a different kind (KnowsAnotherScene)
+    NO_TRUTH = "no truth"  # it ran, but there is no truth to compare it with
     MISSING = "missing"
     CRASHED = "crashed"
     TIMEOUT = "timeout"
     LEFT_OUT = "left out"  # the processor time of a study did not suffice (TimeBudget)
 
 
-# A crash, a hang or a missing engine may be gone next time; these are the engine's answer and stay.
+# Results that are stored for good; a crash, a hang or a missing engine may not occur next time.
 LASTING = frozenset({Status.DONE, Status.DIVERGED, Status.REFUSED, Status.WRONG_MODEL})
 
 
@@ -46,15 +46,17 @@ class EngineDescription:
         name: of the engine, with the place of another interpreter in which it runs, ``mujoco@3.8.1``.
         version: of the engine.
         interpreter: path of the Python that it runs in.
-        provides: formulation -> what it can represent, sorted.
+        provides: formulation -> its capabilities, sorted.
         presets: formulation -> preset -> complete settings.
         summary: one line for a person.
         levels: formulation -> rung of the ladder of models; empty if not declared.
         terms: parts of the model that can be switched on and off.
-        inherent: formulation -> what is always in its model -> why.
+        inherent: formulation -> term that is always in its model -> reason.
         defaults: its default values.
-        oldest: version from which on its adapter supports it; empty: not declared.
-        made_for: formulation -> capabilities, sorted; it is offered to scenes that require one of them. None: to all.
+        oldest: oldest version that its adapter supports; empty: not declared.
+        made_for: formulation -> capabilities, sorted; it is offered only to scenes that require one of them. A
+            formulation
+            that is missing here is offered to all.
     """
 
     name: str
@@ -73,26 +75,27 @@ class EngineDescription:
 
 @dataclass(frozen=True)
 class EngineFacts:
-    """Facts of an engine with some settings.
+    """Facts of an engine with some settings, which decide its results.
 
     Attributes:
         name: of the engine, with the place of another interpreter in which it runs, ``mujoco@3.8.1``.
         version: of the engine.
-        code: hash of the adapter and of everything that it runs on, so that stored results never outlive a change.
+        code: hash of the adapter and of all code that it runs on; a change invalidates stored results.
         settings: complete settings of the formulation, by name.
         resolution: name of the setting that trades speed for accuracy, ``dt`` or ``rtol``.
         order: declared order of convergence, or None.
-        highest: order where the scene does not lower it; None: as declared.
+        highest: declared order before a scene lowered it; None: not yet asked for a scene.
         lowered: requirement of a scene -> order of convergence with it, see
             :class:`proofroll.core.engine_abilities.LowersOrder`.
         shares: routes of the truth that it shares, see :class:`proofroll.core.engine_abilities.SharesEquations`.
         caveat: part of these settings that is not the engine's own, shown beside its verdicts; empty: none.
-        families: of the laws that it solves, see :class:`proofroll.core.engine_abilities.TellsFamily`.
-        family: those of them that a scene asks for; empty: none.
-        precision: in which it computes, see :func:`proofroll.core.engine.precision_of`.
-        scheme: rule of its steps, see :class:`proofroll.core.engine.Scheme`; empty: it declares none.
-        libraries: versions of Python, numpy and scipy, on which the last digits hang; in another interpreter also a
-            hash of all its packages.
+        families: capability -> law that it solves, see :class:`proofroll.core.engine_abilities.TellsFamily`.
+        family: those laws that the scene requires, in one text; empty: none.
+        precision: of its arithmetic, see :func:`proofroll.core.engine.precision_of`.
+        scheme: integration rule, see :class:`proofroll.core.engine.Scheme`; empty: it declares none.
+        libraries: versions of Python, numpy and scipy, which decide the last digits; in another interpreter also a hash
+            of
+            all its packages.
     """
 
     name: str
@@ -117,7 +120,7 @@ class EngineFacts:
         return float(self.settings["dt"]) if self.resolution == "dt" else None
 
     def on(self, requires: Collection[str]) -> EngineFacts:
-        """Facts with the order of convergence and the laws for a scene with these requirements."""
+        """Facts for a scene with these requirements: its order of convergence and its laws."""
         laws = dict.fromkeys(clause for need, clause in self.families.items() if need in requires)
         order = lowest(self.order, self.lowered, requires)
         return replace(
@@ -135,13 +138,13 @@ class Case:
         scene_digest: hash of the scene with these parameters.
         engine: the engine with complete settings.
         until, every: last time and sampling interval [s].
-        timed: whether a second, clean run that only advances is timed.
-        time_limit: seconds after which the case is ended, but for those in which others had the processor [s].
+        timed: True if the speed is measured in further, clean runs that only advance.
+        time_limit: wall time after which the case is ended, without time in which others had the processor [s].
         asks: results wanted besides the motion; see :class:`proofroll.core.scene.Scene`.
-        turns: whether samples are taken between those every ``every`` where turns of angles have to be counted
-            (:func:`proofroll.core.turns.samples_between`); no study needs that, and an adaptive step ends at each.
-        between: of the truth, times off the grid at which some engine is sampled [s]
-            (:func:`proofroll.core.time_grid.off_grid`); an engine's follow from its step.
+        turns: True if further samples are taken where turns of angles have to be counted
+            (:func:`proofroll.core.turns.samples_between`). Studies do without, as an adaptive step ends at each.
+        between: for the truth, times off the grid at which some engine is sampled [s]
+            (:func:`proofroll.core.time_grid.off_grid`); those of an engine follow from its step.
     """
 
     scene: str
@@ -158,7 +161,7 @@ class Case:
 
     @cached_property
     def key(self) -> str:
-        """Hash of all that decides the result; where an interpreter lies does not, what it has does."""
+        """Hash of everything that decides the result; the path of an interpreter is left out, its packages are not."""
         left_out = {"time_limit", *(name for name in ("asks", "turns", "between") if not getattr(self, name))}
         content = {name: value for name, value in asdict(self).items() if name not in left_out}
         content["engine"]["name"] = plain_name(self.engine.name)
@@ -166,7 +169,7 @@ class Case:
 
     @classmethod
     def from_dict(cls, content: dict[str, Any]) -> Case:
-        """The case again from ``asdict``."""
+        """Inverse of ``dataclasses.asdict``."""
         some = {name: tuple(content.get(name, ())) for name in ("asks", "between")}
         return cls(**{**content, "engine": EngineFacts(**content["engine"]), **some})
 
@@ -179,18 +182,18 @@ class Result:
         status: success, or the way in which it failed.
         message: one sentence about it.
         wall_seconds: inside ``advance`` during the sampled run [s].
-        build_seconds: before the first step: one ``build`` with what it compiles [s], or None.
+        build_seconds: of one ``build``, with its compilation [s], or None.
         seconds_per_second: median wall seconds per simulated second of clean runs that only advance, or None.
         timings: of the single clean runs, wall seconds per simulated second.
         certificate: lines of the certificate, as dictionaries.
-        versions: of the engine, of proofroll, Python, numpy and scipy, as the process that ran it has them.
+        versions: of the engine, proofroll, Python, numpy and scipy in the process that ran it.
         trajectory: file of the trajectory in the store, or None if there is none.
         checksum: sha256 of that file.
-        spent: where the wall time of the case went, by cause [s]; ``advance`` and ``clean runs`` are the engine's.
-            Empty in records from before it was measured.
-        processor: the same in seconds of the worker's processor, which others on the machine do not lengthen [s].
+        spent: wall time of the case by activity [s]; ``advance`` and ``clean runs`` are the engine's. Empty in old
+            records.
+        processor: processor time of the worker by activity [s], which other processes do not lengthen.
         interpreter: path of the Python that ran it.
-        host: name of the machine of a cluster on which it ran, where no speed is measured; empty: it ran at home.
+        host: name of the machine of a cluster that ran it, where no speed is measured; empty: this machine.
     """
 
     status: Status
@@ -210,17 +213,17 @@ class Result:
 
     @classmethod
     def from_dict(cls, content: dict[str, Any]) -> Result:
-        """The result again from ``asdict``."""
+        """Inverse of ``dataclasses.asdict``."""
         return cls(**{**content, "status": Status(content["status"])})
 
 
 def hosts(results: Iterable[Result]) -> dict[str, int]:
-    """Machine of a cluster -> how many of the results it made; empty where all were made here."""
+    """Machine of a cluster -> number of results that it made; empty if all were made on this machine."""
     return dict(sorted(Counter(result.host for result in results if result.host).items()))
 
 
 def told_hosts(counts: Mapping[str, int]) -> list[str]:
-    """A sentence about results from other machines, see :func:`hosts`; none where there are none."""
+    """Sentence about results from other machines, see :func:`hosts`; no sentence if there are none."""
     if not counts:
         return []
     names = ", ".join(f"{count} on {name}" for name, count in counts.items())

@@ -1,7 +1,7 @@
-"""Cases on other machines, through a Dask cluster: what runs there, and how it comes back.
+"""Runs cases on other machines, through a Dask cluster.
 
-The runner stays the only planner. It asks a cluster instead of its own threads; the cluster never holds more cases than
-keep its workers busy, and gives back each result as the runner's own worker process would have.
+The runner stays the only planner: it sends cases to the cluster instead of its own threads. The cluster never holds
+more cases than keep its workers busy, and returns each result as the runner's own worker process would.
 """
 
 import contextlib
@@ -31,16 +31,16 @@ from proofroll.running.ending import interrupt_held
 from proofroll.running.memory import VARIABLE, memory_limit
 from proofroll.running.process import WorkerDied
 
-# Cases that are sent ahead: one waits at each thread while another runs, and a few more, so that a cluster that grows
-# with its work sees some. No more than these are ever known to the scheduler.
+# Most cases that the scheduler holds: _AHEAD per thread (one runs, one waits) plus _AT_LEAST, so that a cluster that
+# grows with its load sees waiting work.
 _AHEAD, _AT_LEAST = 2, 64
-# Results that are fetched together.
+# Most results that are fetched together.
 _TOGETHER = 64
-# How often the threads of a cluster are counted, for workers come and go [s].
+# Interval at which the threads of a cluster are counted, as workers come and go [s].
 _COUNTED = 2.0
-# How long a scheduler may take to answer [s].
+# Time limit for an answer of a scheduler [s].
 _PATIENCE = 30.0
-# How long one of our own may take, on a machine that has much else to do [s].
+# Time limit for the start of a scheduler on this machine, which may be busy [s].
 _STARTS = 300.0
 
 Item = TypeVar("Item")
@@ -53,11 +53,11 @@ class Cluster:
     """A Dask cluster on which cases run.
 
     Args:
-        address: of a scheduler, ``tcp://…`` or ``tls://…``; or ``local``, ``local:4``: so many workers on this machine.
-        task: function that a worker calls for a case; replaced only to measure the cost of all around it.
+        address: of a scheduler, ``tcp://…`` or ``tls://…``; or ``local``, ``local:4`` for 4 workers on this machine.
+        task: function that a worker calls for a case; tests replace it to measure the overhead.
 
     Raises:
-        InputError: the address is none, or nothing answers there.
+        InputError: the address is invalid, or no scheduler answers there.
         Missing: Dask is not installed.
     """
 
@@ -75,7 +75,7 @@ class Cluster:
 
     @property
     def threads(self) -> int:
-        """Number of cases it runs at once, as counted a moment ago."""
+        """Number of cases that it runs at once, counted at most two seconds ago."""
         self._most()
         return self._threads
 
@@ -85,12 +85,13 @@ class Cluster:
         arrived: Arrived,
         failed: Callable[[Exception], None],
     ) -> None:
-        """Runs cases until there are none, for a runner.
+        """Runs cases for a runner until there are no more.
 
         Args:
-            take: the next case, if possible of the engine that is named; None: there are no more.
-            arrived: called, in a thread of Dask's, with a case and what writes its trajectory and gives its result.
-            failed: called with what ends the whole run.
+            take: gives the next case, preferably of the named engine; None: there are no more.
+            arrived: called in a thread of Dask's with a case and a function that writes its trajectory and returns its
+                result.
+            failed: called with an error that ends the whole run.
         """
         self._stopped = False
         engine = None
@@ -100,9 +101,9 @@ class Cluster:
                 content = dataclasses.asdict(case) | {"timed": False}
                 try:
                     files = _files(case)
-                except OSError as error:  # of this case alone, and not of the scheduler
-                    said = InputError("scene", case.scene, f"{error.filename} cannot be read: {error.strerror}")
-                    arrived(case, partial(_raise, said))
+                except OSError as error:  # an error of this case, not of the scheduler
+                    unread = InputError("scene", case.scene, f"{error.filename} cannot be read: {error.strerror}")
+                    arrived(case, partial(_raise, unread))
                     continue
                 except InputError as error:
                     arrived(case, partial(_raise, error))
@@ -115,12 +116,12 @@ class Cluster:
             failed(self._gone(error))
 
     def map(self, function: Callable[[Item], Found], items: Sequence[Item]) -> Iterator[tuple[str, Found]]:
-        """The machine's name and what a function gives for each item, in order, each computed in a watched process.
+        """Yields the machine's name and a function's result for each item, in order, from watched processes.
 
-        The function and its results can be pickled.
+        The function and its results must be picklable.
 
         Raises:
-            ProofrollError: a process or the scheduler ended, or the function said so.
+            ProofrollError: a process or the scheduler ended, or the function raised it.
         """
         waiting: list[Any] = []
         rest = iter(items)
@@ -143,14 +144,14 @@ class Cluster:
             self.stop(waiting)
 
     def stop(self, futures: Sequence[Any] = ()) -> None:
-        """Ends what runs and waits there for this command."""
+        """Ends the running and waiting cases of this command on the cluster."""
         with self._room:
             self._stopped = True
             futures = [*futures, *self._sent]
             self._sent.clear()
             self._room.notify_all()
         if futures and self._client.status == "running":
-            with contextlib.suppress(Exception):  # it may be gone, and then nothing of it is left to be ended
+            with contextlib.suppress(Exception):  # a scheduler that is gone needs no end
                 self._client.cancel(futures)
                 self._client.run(cluster_task.end, self._asked.command, on_error="ignore")
 
@@ -161,7 +162,7 @@ class Cluster:
         return self._client.submit(task, self._asked, *arguments, key=key, pure=False)
 
     def _has_room(self) -> bool:
-        """Waits until another case may be sent; False: nothing more is to be."""
+        """Waits until another case may be sent; False if the cluster was stopped."""
         most = self._most()
         with self._room:
             while not self._stopped and len(self._sent) >= most:
@@ -169,18 +170,18 @@ class Cluster:
             return not self._stopped
 
     def _most(self) -> int:
-        """Largest number of cases the cluster may hold."""
+        """Largest number of cases that the cluster may hold."""
         if time.monotonic() - self._counted > _COUNTED:
             self._threads, self._counted = sum(self._client.nthreads().values()), time.monotonic()
         return _AHEAD * self._threads + _AT_LEAST
 
     def _come(self, failed: Callable[[Exception], None], future: Any) -> None:
-        """Takes back what a worker sent, with whatever else has come by now: to fetch one costs as much as many.
+        """Fetches the result of a finished case with all others finished by now, which costs no more than one.
 
-        Each goes to the run that sent it: a run may be over when Dask tells of the last that was fetched with others.
+        Each result goes to the run that sent its case; that run may be over when Dask reports a result fetched before.
         """
         with self._room:
-            if future not in self._sent:  # it has been fetched with others
+            if future not in self._sent:  # fetched already, with others
                 return
             done = [item for item in self._sent if item.status == "finished"][:_TOGETHER]
             done = done if future in done else [future]
@@ -189,7 +190,7 @@ class Cluster:
         self._fetch(sent, failed)
 
     def _fetch(self, sent: Sequence[tuple[Any, Case, Arrived]], failed: Callable[[Exception], None]) -> None:
-        """Hands each case, with what a worker sent for it, to the run that it is of."""
+        """Fetches results and hands each, with its case, to the run that sent it."""
         try:
             answers = self._client.gather([future for future, _, _ in sent])
         except Exception as error:
@@ -197,24 +198,24 @@ class Cluster:
 
             if not isinstance(error, KilledWorker):
                 failed(self._gone(error))
-            elif len(sent) > 1:  # of which one was lost meanwhile, and its workers again and again
+            elif len(sent) > 1:  # one of them killed its workers: find it by fetching each alone
                 for one in sent:
                     self._fetch([one], failed)
             else:
-                said = f"each of {error.allowed_failures + 1} workers of the cluster that ran it was lost"
+                lost = f"each of {error.allowed_failures + 1} workers of the cluster that ran it was lost"
                 ((_, case, arrived),) = sent
-                arrived(case, partial(_raise, WorkerDied(Status.CRASHED, said)))
+                arrived(case, partial(_raise, WorkerDied(Status.CRASHED, lost)))
             return
         for (_, case, arrived), (content, data) in zip(sent, answers, strict=True):
             arrived(case, partial(_made, content, data))
 
     def _gone(self, error: Exception | None) -> ProofrollError:
-        """Error that ends a run, in one line."""
+        """Error that ends a run because of the cluster, in one line."""
         if isinstance(error, ProofrollError):
             return error
         if error is None or isinstance(error, (CancelledError, OSError)):
-            said = f"the Dask scheduler at {self.address} is gone"
-            return ProofrollError(f"{said}; what was finished is kept, and the same command goes on from there")
+            gone = f"the Dask scheduler at {self.address} is gone"
+            return ProofrollError(f"{gone}; what was finished is kept, and the same command goes on from there")
         text = " ".join(str(error).split())[:200]
         return ProofrollError(f"the workers of {self.address} cannot run a case ({type(error).__name__}: {text})")
 
@@ -224,7 +225,7 @@ def _raise(error: Exception, _: Path) -> Result:
 
 
 def _made(content: dict[str, Any], data: bytes | None, path: Path) -> Result:
-    """Writes the trajectory that a worker sent; the result that came with it."""
+    """Result sent by a worker, after its trajectory was written to ``path``."""
     if data is not None:
         path.write_bytes(data)
     result = Result.from_dict(content)
@@ -232,7 +233,7 @@ def _made(content: dict[str, Any], data: bytes | None, path: Path) -> Result:
 
 
 def _files(case: Case) -> dict[str, bytes]:
-    """Content that decides a scene of the user's own, from its folder or robot file: no other machine need have it."""
+    """Files of a scene that is not part of proofroll, by name, to be sent to the workers; its folder or robot file."""
     if (source := source_of(case.scene)) is not None:
         return {source[1].name: source[1].read_bytes()}
     if not case.scene or (folder := scene_folder(case.scene)).parent == data_folder("models"):
@@ -242,7 +243,7 @@ def _files(case: Case) -> dict[str, bytes]:
 
 
 def _connected(address: str) -> tuple[Any, Any]:
-    """A client of the scheduler, and the cluster that was started for it, if any."""
+    """Client of the scheduler, and the cluster that was started for it, or None."""
     local = re.fullmatch(r"local(?::(\d+))?", address)
     if not local and not re.match(r"\w+://.", address):
         raise InputError("--scheduler", address, "give the address of a Dask scheduler, tcp://…, or local, local:4")
@@ -251,9 +252,9 @@ def _connected(address: str) -> tuple[Any, Any]:
     except ModuleNotFoundError as error:
         raise Missing(f"--scheduler needs Dask ({error.name} is missing): pip install 'proofroll[cluster]'") from None
     for name in [name for name in logging.root.manager.loggerDict if name.partition(".")[0] == "distributed"]:
-        logging.getLogger(name).disabled = True  # what matters of it is said in our own line
-    # The tracker of multiprocessing unblocks the signal where it begins, so it must be there already.
-    sys.warnoptions.append("ignore")  # inherited by it: what was not given back is no news where all ends at once
+        logging.getLogger(name).disabled = True  # our own message has what matters
+    # The resource tracker of multiprocessing unblocks Ctrl-C when it starts, so it must run before Ctrl-C is held.
+    sys.warnoptions.append("ignore")  # inherited by the tracker: leaks do not matter when all processes end at once
     resource_tracker.ensure_running()
     sys.warnoptions.pop()
     try:
@@ -277,7 +278,7 @@ def _connected(address: str) -> tuple[Any, Any]:
 
 
 def _end(client: Any, own: Any, command: str) -> None:
-    """Leaves a cluster, and ends it where it was started here."""
+    """Disconnects from a cluster, after ending the command's processes there or the cluster that was started here."""
     with contextlib.suppress(Exception):
         if client.status == "running" and own is None:
             client.run(cluster_task.end, command, on_error="ignore")

@@ -1,4 +1,4 @@
-"""Worker of a Dask cluster: one case in the same watched process that would run it at home."""
+"""Side of a Dask worker: runs one case in the same kind of watched process as a local run."""
 
 import base64
 import collections
@@ -27,9 +27,9 @@ from proofroll.running.process import WorkerDied
 from proofroll.running.runner import ended, run_one
 from proofroll.running.worker_pool import Workers
 
-# Processes are kept between the cases of a command, in each Dask worker for so many engines and commands.
+# Engines and commands for which a Dask worker keeps processes between cases.
 _ENGINES, _COMMANDS = 2, 3
-# A function that takes longer in its process [s] hangs.
+# Time limit of a function in its process [s].
 _HANGS = 3600.0
 
 _lock = threading.Lock()
@@ -38,7 +38,7 @@ _same: set[tuple[str, str, str]] = set()
 
 
 class Unfit(ProofrollError):  # noqa: N818 -- a fact about a worker, which ends the command that met it
-    """Error: a Dask worker differs from this machine's installation, so that cases would have other results."""
+    """A Dask worker's installation differs from that of the command's machine, so its results would differ."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -46,9 +46,9 @@ class Asked:
     """Request of a command to every Dask worker.
 
     Attributes:
-        command: a name of its own, under which its processes are kept and ended.
-        installed: versions on which results hang, where the command runs; see :func:`installed`.
-        memory: limit for each process [GB]; None: what the worker's own machine has by default.
+        command: unique name of the command, under which its processes are kept and ended.
+        installed: versions that decide results on the command's machine, see :func:`installed`.
+        memory: limit for each process [GB]; None: the default of the worker's machine.
     """
 
     command: str
@@ -57,9 +57,9 @@ class Asked:
 
 
 def installed() -> dict[str, str]:
-    """Versions of Python, of proofroll with a hash of its code, of every engine and of what engines and truths need.
+    """Versions of Python, proofroll (with a hash of its code), engines and all packages that they need.
 
-    It comes from the metadata of packages: no engine is imported.
+    They are read from the metadata of packages; no engine is imported.
     """
     engines = announced(GROUP)
     extras = {point.name for point in engines} | {"fast"}
@@ -79,12 +79,15 @@ def installed() -> dict[str, str]:
 
 
 def run_case(asked: Asked, content: dict[str, Any], files: Mapping[str, bytes]) -> tuple[dict[str, Any], bytes | None]:
-    """Runs a case; its result as a dictionary, with the machine's name, and the file of its trajectory, if any.
+    """Runs a case; returns its result as a dictionary, and the bytes of its trajectory or None.
 
-    Where the scene does not come with proofroll, ``files`` has those of its folder by name, or the one that is it.
+    Args:
+        asked: request of the command.
+        content: the case as a dictionary.
+        files: files of a scene that is not part of proofroll, by name: of its folder, or the robot file itself.
 
     Raises:
-        Unfit: results here are not those of the command's own machine.
+        Unfit: results here would differ from those of the command's machine.
     """
     case = Case.from_dict(content)
     with tempfile.TemporaryDirectory() as name:
@@ -103,12 +106,12 @@ def run_case(asked: Asked, content: dict[str, Any], files: Mapping[str, bytes]) 
             result = run_one(case, out, workers)
         except InputError as error:
             result = ended(case, Status.REFUSED, error)
-        said = dataclasses.asdict(dataclasses.replace(result, host=socket.gethostname()))
-        return said, out.read_bytes() if result.trajectory is not None else None
+        content = dataclasses.asdict(dataclasses.replace(result, host=socket.gethostname()))
+        return content, out.read_bytes() if result.trajectory is not None else None
 
 
 def call(asked: Asked, function: Callable[[Any], Any], item: Any) -> tuple[str, Any]:
-    """Result of a function for an item, computed in a watched process, after the machine's name.
+    """The machine's name and the result of a function for an item, computed in a watched process.
 
     Raises:
         Unfit: as :func:`run_case`.
@@ -120,19 +123,19 @@ def call(asked: Asked, function: Callable[[Any], Any], item: Any) -> tuple[str, 
     try:
         with workers.lend("") as worker:
             answer = worker.request(request, _HANGS)
-    except ProofrollError as error:  # those with further arguments do not survive pickling
+    except ProofrollError as error:  # subclasses with further arguments cannot be unpickled
         raise ProofrollError(str(error)) from None
     return socket.gethostname(), pickle.loads(base64.b64decode(answer["text"]))
 
 
 def computed(text: str) -> dict[str, str]:
-    """The watched process's side of :func:`call`."""
+    """Part of :func:`call` that runs in the watched process."""
     function, item = pickle.loads(base64.b64decode(text))
     return {"text": base64.b64encode(pickle.dumps(function(item))).decode()}
 
 
 def end(command: str) -> None:
-    """Ends all processes of a command here, also those that run a case."""
+    """Ends all processes of a command on this machine, also those that run a case."""
     with _lock:
         workers = _workers.pop(command, None)
     if workers is not None:
@@ -140,14 +143,14 @@ def end(command: str) -> None:
 
 
 def _workers_of(asked: Asked) -> Workers:
-    """The processes of a command; of commands that have not been heard of for longest, idle ones are ended."""
+    """Processes of a command, after its versions were compared; closes those of the longest unused commands."""
     with _lock:
         known = asked.command in _workers
     if not known:
-        here = installed()
-        other = [name for name in {**asked.installed, **here} if asked.installed.get(name) != here.get(name)]
+        own = installed()
+        other = [name for name in {**asked.installed, **own} if asked.installed.get(name) != own.get(name)]
         if other:
-            raise unfit(*({name: workers.get(name, "absent") for name in other} for workers in (asked.installed, here)))
+            raise unfit(*({name: known.get(name, "absent") for name in other} for known in (asked.installed, own)))
     with _lock:
         workers = _workers.setdefault(asked.command, Workers(asked.memory, _ENGINES))
         _workers.move_to_end(asked.command)
@@ -158,7 +161,7 @@ def _workers_of(asked: Asked) -> Workers:
 
 
 def _check(asked: Asked, case: Case, workers: Workers) -> None:
-    """Checks that the case is the same here: its engine with all that decides its results, and its scene."""
+    """Raises Unfit unless the engine, with all that decides its results, and the scene are the same on this machine."""
     engine = case.engine
     known = asked.command, engine.name, engine.code
     if known not in _same:
@@ -166,7 +169,7 @@ def _check(asked: Asked, case: Case, workers: Workers) -> None:
         if isinstance(facts, EngineFacts):
             there = {engine.name: f"{facts.version} (code {facts.code})"}
         elif isinstance(facts, WorkerDied):
-            return  # as at home: what the engine does is a row
+            return  # a crash of the engine becomes its result, as in a local run
         else:
             there = {engine.name: f"none ({facts})"}
         here = {engine.name: f"{engine.version} (code {engine.code})"}
@@ -179,7 +182,7 @@ def _check(asked: Asked, case: Case, workers: Workers) -> None:
 
 
 def unfit(here: Mapping[str, str], there: Mapping[str, str]) -> Unfit:
-    """The error that names what differs, as the command's own machine and this one have it."""
+    """Error that names the differing versions: ``here`` on the command's machine, ``there`` on this one."""
     one, other = (", ".join(f"{name} {value}" for name, value in versions.items()) for versions in (here, there))
-    said = f"a worker of the cluster, on {socket.gethostname()}, has other versions: here {one}; there {other}"
-    return Unfit(f"{said}; install the same on both")
+    fault = f"a worker of the cluster, on {socket.gethostname()}, has other versions: here {one}; there {other}"
+    return Unfit(f"{fault}; install the same on both")

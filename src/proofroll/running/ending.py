@@ -1,4 +1,4 @@
-"""A process that ends with the one that started it, however that one ends, and only then by Ctrl-C."""
+"""Ends a process when the process that started it ends, and lets only the latter handle Ctrl-C."""
 
 import contextlib
 import fcntl
@@ -12,16 +12,19 @@ from proofroll.running.memory import descendants
 
 # Signals by which a command is ended from outside: Ctrl-C, a time limit, the end of the terminal.
 INTERRUPTS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
-# How often a process looks for its parent [s]; a look costs some microseconds.
+# Interval at which a process looks for its parent [s]; a look costs some microseconds.
 _TICK = 0.25
 
 
 @contextlib.contextmanager
 def interrupt_held() -> Iterator[None]:
-    """Ctrl-C waits until this is left, and processes that begin here never see it: who began them ends them.
+    """Context manager that defers Ctrl-C to its end; processes started inside never receive it.
 
-    The mask is for what begins here. It does not keep another thread from taking the signal, for which Python then
-    interrupts the main thread; so that waits, too, as do other signals that are handled. A second one ends at once.
+    The signal mask is inherited by these processes, whose parent ends them. It does not stop another thread of this
+    process
+    from taking the signal, for which Python would interrupt the main thread; so handlers that only take note are
+    installed
+    for all handled signals. A second signal ends the process at once.
     """
     waiting: list[int] = []
 
@@ -45,21 +48,23 @@ def interrupt_held() -> Iterator[None]:
 
 
 def end_at_once(*_: object) -> None:
-    """Handler of a second interrupt: ends this process with a line; what it started ends with it."""
+    """Handler of a second interrupt: ends this process, and with it those that it started, after a line of text."""
     os.write(2, b"proofroll: interrupted again, ended at once; cases that were finished and stored will be reused\n")
     os._exit(130)
 
 
 def end_with(parent: int) -> None:
-    """Makes this process end, with all that it started, soon after ``parent`` has, even while it computes."""
+    """Makes this process, with all that it started, end soon after ``parent`` has, even while it computes."""
     threading.Thread(target=_watch, args=(parent,), daemon=True).start()
 
 
 def end_with_pipe(pipe: int) -> None:
-    """Makes the system end this process and its group when no process can write into a pipe any more.
+    """Makes the kernel kill this process and its group once no process can write into a pipe any more (Linux only).
 
-    This also holds while an engine that computes in C lets no thread of Python run; only Linux can do it. ``pipe`` is
-    its end for reading; nothing is ever written into the other.
+    It works even while an engine that computes in C blocks all Python threads.
+
+    Args:
+        pipe: reading end of a pipe into which nothing is ever written.
     """
     if hasattr(fcntl, "F_SETSIG"):
         with contextlib.suppress(OSError):

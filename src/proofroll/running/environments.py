@@ -1,8 +1,8 @@
-"""Environments of engines in other versions, made by ``proofroll engines add`` and kept where a person's data are.
+"""Environments of engines in other versions, made by ``proofroll engines add`` in the user's data folder.
 
-One folder for each: ``NAME/LABEL/`` with the virtual environment ``venv`` and the stamp ``engine.json``, which is
-written last: what has none is a half, and is made anew. An environment is never changed in place, so that its label
-goes on meaning what was installed.
+Each is a folder ``NAME/LABEL/`` with the virtual environment ``venv`` and the stamp ``engine.json``. The stamp is
+written last: a folder without it is incomplete and is made anew. An environment is never changed in place, so that a
+label keeps its meaning.
 """
 
 import contextlib
@@ -24,15 +24,15 @@ _LABEL = r"\w[\w.+-]*"
 
 @dataclass(frozen=True)
 class Environment:
-    """A remembered environment.
+    """A complete environment.
 
     Attributes:
         name, label: of the engine ``NAME@LABEL``.
-        folder: where it lies.
-        version: of the engine, as the engine said when it was made.
-        requirements: with which it was made.
+        folder: its folder.
+        version: of the engine, read from the engine when the environment was made.
+        requirements: those that it was made with.
         interpreter: version of its Python.
-        packages: all that are installed in it, ``name==version``.
+        packages: all installed packages, ``name==version``.
     """
 
     name: str
@@ -45,16 +45,16 @@ class Environment:
 
     @property
     def python(self) -> Path:
-        """Its Python."""
+        """Path of its Python."""
         return self.folder / "venv" / "bin" / "python"
 
     def stamp(self) -> None:
-        """Remembers it."""
+        """Writes its stamp, which makes it complete."""
         from proofroll.files.atomic import replacing
 
-        said = asdict(self) | {"folder": str(self.folder)}
+        content = asdict(self) | {"folder": str(self.folder)}
         with replacing(self.folder / STAMP) as temporary:
-            temporary.write_text(json.dumps(said, indent=1), encoding="utf-8")
+            temporary.write_text(json.dumps(content, indent=1), encoding="utf-8")
 
 
 def root() -> Path:
@@ -63,23 +63,23 @@ def root() -> Path:
     if chosen:
         return Path(chosen).expanduser().absolute()
     data = Path(os.environ.get("XDG_DATA_HOME", ""))
-    # The specification says that a relative path is none.
+    # The XDG specification says to ignore a relative path.
     return (data if data.is_absolute() else Path.home() / ".local" / "share") / "proofroll" / "engines"
 
 
 def remembered() -> list[Environment]:
-    """Remembered environments, by name and label."""
+    """All complete environments, sorted by name and label."""
     environments = (_read(stamp.parent) for stamp in sorted(root().glob(f"*/*/{STAMP}")))
     return [item for item in environments if item is not None]
 
 
 def find(name: str, label: str) -> Environment | None:
-    """The environment ``name@label``, or None."""
+    """The environment ``name@label``, or None if there is none."""
     return _read(folder_of(name, label)) if re.fullmatch(_LABEL, label) else None
 
 
 def shown_name(engine: str) -> str:
-    """``NAME@PLACE`` in few words: the label of an environment for the path of its Python, or the folder's name."""
+    """Short ``NAME@PLACE``: a path of a Python becomes the label of its environment, or the name of its folder."""
     name, where = plain_name(engine), place_of(engine)
     if os.sep not in where:
         return engine
@@ -90,14 +90,14 @@ def shown_name(engine: str) -> str:
 
 
 def folder_of(name: str, label: str) -> Path:
-    """The folder of an environment. Raises InputError if the label is no name of a folder."""
+    """Folder of an environment. Raises InputError if the label cannot be the name of a folder."""
     if not re.fullmatch(_LABEL, label):
         raise InputError("label", label, "use letters, digits, dots, hyphens and plus signs, e.g. 3.8.1")
     return root() / name / label
 
 
 def remove(engine: str) -> None:
-    """Forgets an environment ``NAME@LABEL`` and deletes its folder; also what is left of one that was not finished.
+    """Deletes the environment ``NAME@LABEL``, also an incomplete one.
 
     Raises:
         InputError: there is none.
@@ -113,7 +113,7 @@ def remove(engine: str) -> None:
 
 
 def delete(folder: Path) -> None:
-    """Deletes the folder of an environment, its stamp first, so that a half that is left is not taken for a whole.
+    """Deletes the folder of an environment, its stamp first, so that an incomplete rest is recognised.
 
     Raises:
         ProofrollError: it cannot be deleted.
@@ -132,10 +132,10 @@ def delete(folder: Path) -> None:
 
 @contextlib.contextmanager
 def making(folder: Path) -> Iterator[None]:
-    """Keeps other processes from making or deleting the same environment meanwhile.
+    """Context manager with a lock on an environment, so that no other process makes or deletes it.
 
     Raises:
-        ProofrollError: another process does, or the place cannot be written.
+        ProofrollError: another process has the lock, or the place cannot be written.
     """
     import fcntl
 
@@ -143,8 +143,8 @@ def making(folder: Path) -> Iterator[None]:
         root().mkdir(parents=True, exist_ok=True)
         lock = os.open(root() / f".{folder.parent.name}@{folder.name}.lock", os.O_CREAT | os.O_RDWR, 0o644)
     except OSError as error:
-        said = f"{root()} cannot be written ({error.strerror or error}); choose another place by {VARIABLE}"
-        raise ProofrollError(said) from None
+        fault = f"{root()} cannot be written ({error.strerror or error}); choose another place by {VARIABLE}"
+        raise ProofrollError(fault) from None
     try:
         fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:
@@ -158,8 +158,8 @@ def making(folder: Path) -> Iterator[None]:
 
 def _read(folder: Path) -> Environment | None:
     try:
-        said = json.loads((folder / STAMP).read_text(encoding="utf-8"))
-        kept = {key: said[key] for key in ("version", "requirements", "interpreter", "packages")}
+        content = json.loads((folder / STAMP).read_text(encoding="utf-8"))
+        kept = {key: content[key] for key in ("version", "requirements", "interpreter", "packages")}
         return Environment(folder.parent.name, folder.name, folder, **kept)  # it may have been moved
     except (OSError, ValueError, KeyError, TypeError):
         return None

@@ -1,4 +1,4 @@
-"""First message of a worker, which keeps numbers of another proofroll, or of another place, apart."""
+"""First message of a worker, which reveals a different proofroll or the wrong place."""
 
 import platform
 import sys
@@ -9,12 +9,12 @@ from typing import Any
 import proofroll
 from proofroll.running.identity import digest
 
-# Of requests and answers; see docs/worker_protocol.md.
+# Version of the protocol of requests and answers; see docs/worker_protocol.md.
 PROTOCOL = 2
 
 
 def identify_and_settle(place: str) -> dict[str, Any]:
-    """Identity of this worker; from then on it serves engines ``NAME@place`` alone."""
+    """Identity of this worker, which from now on serves only engines ``NAME@place``."""
     from proofroll.running import loading
 
     loading.settle(place)
@@ -23,14 +23,14 @@ def identify_and_settle(place: str) -> dict[str, Any]:
 
 @cache
 def own() -> dict[str, Any]:
-    """Protocol, version and code of this proofroll."""
+    """Version of the protocol, and version and code hash of this proofroll."""
     return {"protocol": PROTOCOL, "proofroll": proofroll.__version__, "code": digest([])}
 
 
 def mismatch(answer: Mapping[str, Any]) -> str:
-    """Reason that a worker with this answer cannot serve here; empty: it can.
+    """Reason why a worker with this identity cannot serve this process; empty: it can.
 
-    Its code must be the same, not only its version: it reads the scene, certifies and records.
+    Its code must be the same, not only its version, as the worker reads scenes, certifies and records.
     """
     mine = own()
     if answer.get("protocol") != PROTOCOL:

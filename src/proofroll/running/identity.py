@@ -1,4 +1,4 @@
-"""Identity of an engine: its settings, its versions and the code that its results rest on."""
+"""Identity of an engine: its settings, its versions and the code that decides its results."""
 
 import contextlib
 import dataclasses
@@ -22,14 +22,14 @@ from proofroll.running.case import EngineDescription, EngineFacts
 from proofroll.running.manifest import version_of
 from proofroll.running.program import path_of
 
-# Folders on which every result rests; reports and the command line are not among them.
+# Folders whose code decides every result; reports and the command line do not.
 FOUNDATION = ("core", "elements", "files", "running")
-# Modules and folders that only show results, wherever they lie.
+# Names of modules and folders, at any depth, that only show or explain results.
 ASIDE = frozenset({"reproducer", "reproducer_source", "robot_reader", "report", "failure_program", "diagnosis"})
 
 
 def describe(engine: str) -> dict[str, Any]:
-    """Description of an engine, with the rungs of its formulations on the ladder of models."""
+    """Description of an engine (:class:`EngineDescription`), as a dictionary."""
     from proofroll.core.engine_abilities import CannotLeaveOut, MadeFor, SupportsFrom, TellsDefaults, TellsLevels
     from proofroll.running.loading import load
 
@@ -57,7 +57,7 @@ def describe(engine: str) -> dict[str, Any]:
 
 
 def resolve(engine: str, options: dict[str, Any], requires: Sequence[str] = ()) -> dict[str, Any]:
-    """Complete settings of an engine, what else decides its results, and what in them is not its own."""
+    """Complete settings of an engine and further facts that decide its results (fields of :class:`EngineFacts`)."""
     if engine == "truth":
         if options:
             raise InputError("truth", ", ".join(options), "the truth has no settings; leave them out")
@@ -88,13 +88,13 @@ def resolve(engine: str, options: dict[str, Any], requires: Sequence[str] = ()) 
 
 
 def used(settings: Any) -> dict[str, Any]:
-    """Settings but those that their formulation does not use, which have the values of its presets."""
+    """Settings without those that their formulation does not use."""
     unused = getattr(settings, "unused", ())
     return {name: value for name, value in dataclasses.asdict(settings).items() if name not in unused}
 
 
 def truth_version() -> str:
-    """Version of proofroll, and of the libraries that integrate the truth."""
+    """Versions of proofroll and of the libraries that integrate the truth."""
     versions_of = [f"proofroll {proofroll.__version__}"]
     for name in ("numpy", "scipy", "heyoka"):
         with contextlib.suppress(metadata.PackageNotFoundError):
@@ -103,9 +103,10 @@ def truth_version() -> str:
 
 
 def libraries(engine: str) -> dict[str, str]:
-    """Libraries besides an engine and its adapter that decide the last digits of its results.
+    """Versions of libraries that decide the last digits of an engine's results.
 
-    In another interpreter all its packages count, for engines bring libraries of their own; of a program it itself.
+    In another interpreter all packages count, in one hash, for engines bring libraries of their own. For an engine that
+    is a program, the hash of the program counts instead.
     """
     program = path_of(engine)
     if program is not None:
@@ -120,15 +121,15 @@ def libraries(engine: str) -> dict[str, str]:
 
 
 def digest(sources: Iterable[Path]) -> str:
-    """Hash of the folders that every result rests on, and of what an engine or a truth is itself.
+    """Hash of the code that decides every result, and of further sources: those of an engine or a truth.
 
-    What only shows results (:data:`ASIDE`), as the bug reports of an adapter do, is left out.
+    Code that only shows results (:data:`ASIDE`) is left out.
     """
     return hash_of([*(OWN / name for name in FOUNDATION), *sources], ASIDE)
 
 
 def _code_of(*kinds: Any) -> str:
-    """Digest of engines or truths."""
+    """Hash of the code that decides the results of engines or truths."""
     return _code_of_ours(*kinds) if {package_of(kind) for kind in kinds} == {OWN} else _digest_of(*kinds)
 
 
@@ -136,12 +137,15 @@ def _digest_of(*kinds: Any) -> str:
     return digest(sorted({place for kind in kinds for place in _of(kind)}))
 
 
-# To read it all takes as long as a short run; a process has this package's own code as it was when it loaded it.
+# Cached for engines of this package: to read all files takes as long as a short run.
 _code_of_ours = cache(_digest_of)
 
 
 def _of(kind: Any) -> list[Path]:
-    """The code of an engine or a truth: of this package its own folder or module, else all of it and its imports."""
+    """Sources of an engine or a truth.
+
+    Its folder or module if it is in this package; otherwise its whole package and all that this imports.
+    """
     if (whole := package_of(kind)) != OWN:
         return with_imports(whole or Path(inspect.getfile(kind)))
     _, *inside = kind.__module__.split(".")

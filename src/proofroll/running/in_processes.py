@@ -1,4 +1,4 @@
-"""A function of many arguments, computed in several processes."""
+"""A function of many items, computed in several processes."""
 
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
@@ -12,17 +12,17 @@ Found = TypeVar("Found")
 
 
 def in_processes(function: Callable[[Item], Found], items: Sequence[Item], workers: int) -> Iterator[Found]:
-    """Results of a function for each item, in order, from some processes; 1 computes in this one.
+    """Yields a function's result for each item, in order, computed in ``workers`` processes; 1: in this one.
 
-    The function and its results can be pickled. Ctrl-C ends the processes that compute.
+    The function and its results must be picklable. Ctrl-C ends the processes.
     """
     if workers == 1:
         yield from map(function, items)
         return
-    # Not forked: a parent that shows progress has threads, and a fork copies their locks as they are.
+    # Spawned, not forked: a parent that shows progress has threads, and a fork would copy their held locks.
     with ProcessPoolExecutor(workers, get_context("spawn"), initializer=end_with_pool) as pool:
         try:
-            # Not map, which cancels the rest when interrupted: a pool whose processes are then ended complains.
+            # Not pool.map: when interrupted it cancels the rest, and the pool complains when its processes are killed.
             with interrupt_held():
                 futures = [pool.submit(function, item) for item in items]
             for one in futures:
@@ -34,9 +34,9 @@ def in_processes(function: Callable[[Item], Found], items: Sequence[Item], worke
 
 
 def end_with_pool() -> None:
-    """Variant of :func:`proofroll.running.ending.end_with` for a process of a ``ProcessPoolExecutor``.
+    """Makes a process of a ``ProcessPoolExecutor`` end with its parent (:func:`proofroll.running.ending.end_with`).
 
-    Such a process waits on a pipe that all of them hold open, and so for ever when their parent is killed.
+    Otherwise it would wait for ever, on a pipe that all of the pool's processes hold open, if the parent is killed.
     """
     owner = parent_process()
     if owner is not None and owner.pid is not None:

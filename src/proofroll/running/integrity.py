@@ -1,4 +1,4 @@
-"""Check of a worker's process: an engine must not replace the functions that judge it."""
+"""Checks that an engine did not replace the functions that judge it, in a worker's process."""
 
 import importlib
 import operator
@@ -9,25 +9,25 @@ from typing import Any
 
 from proofroll.core.source_code import OWN
 
-# What reads scenes, certifies and records; none of it has a reason to change while a process lives.
+# Modules that read scenes, certify and record; none of them may change while a process lives.
 _JUDGING = tuple(f"proofroll.{folder}." for folder in ("core", "elements", "files", "running"))
-# Loaded by the first case otherwise, when an engine's package may have been at work already.
+# Imported early: the first case would import them only after the engine's package.
 _EARLY = ("core.first_steps", "core.dataset", "running.recording", "files.scene_file")
 
 _watched: dict[str, tuple[Any, ...]] = {}
 
 
 def watch() -> None:
-    """Remembers what judges engines in this process, before any is loaded."""
+    """Records the functions that judge engines in this process, before any engine is loaded."""
     for name in _EARLY:
         importlib.import_module(f"proofroll.{name}")
     _watched.update(_held())
 
 
 def changed(kind: Any) -> str | None:
-    """The first name in what judges that is another one than before, or of the package of an engine; None: none is.
+    """Name of the first judging function, class or constant that was replaced, or that belongs to the engine's package.
 
-    Modules that were loaded since :func:`watch` are held against it from now on. Nothing where it was never called.
+    None if there is none, or :func:`watch` was never called. Modules loaded since then are recorded for later checks.
     """
     if not _watched:
         return None
@@ -58,7 +58,7 @@ def _of_module(module: ModuleType) -> Iterator[tuple[str, tuple[Any, ...]]]:
 
 
 def _identity(value: Any) -> tuple[Any, ...]:
-    """The object itself and, of a function, what it runs."""
+    """The object itself and, for a function, its code and defaults."""
     if isinstance(value, FunctionType):
         return value, value.__code__, value.__defaults__, value.__kwdefaults__
     return (value,)

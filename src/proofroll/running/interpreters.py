@@ -1,4 +1,4 @@
-"""Engines ``NAME@PLACE``: a worker in another Python, which has proofroll and the engine."""
+"""Engines ``NAME@PLACE``, which run in a worker of another Python that has proofroll and the engine."""
 
 import contextlib
 import json
@@ -15,9 +15,9 @@ from proofroll.running.handshake import mismatch
 from proofroll.running.process import Worker, WorkerDied, environment_of_another
 from proofroll.running.program import PREFIX
 
-# A first start reads the packages of another interpreter from a cold disk; one that does not answer hangs [s].
+# Time limit for the first answer, which may have to read packages from a cold disk [s].
 HELLO_SECONDS = 60.0
-# What a Python is asked that did not answer as a worker; one of any age understands it [s].
+# Program, valid in any Python 3, that asks a Python that did not answer as a worker for its version and proofroll's.
 _PROBE = """
 import sys, json
 try:
@@ -32,11 +32,11 @@ OLDEST = (3, 11)
 
 
 def start(engine: str, memory: float | None = None) -> Worker:
-    """A worker for an engine, ``NAME``, which runs in this interpreter, or ``NAME@PLACE``.
+    """Worker for an engine ``NAME``, in this interpreter, or ``NAME@PLACE``.
 
     Raises:
         InputError: there is no such place.
-        Missing: there is no Python, or none that has this proofroll.
+        Missing: there is no Python, or it does not have this proofroll.
         WorkerDied: it crashed or hung before it answered.
     """
     place = place_of(engine)
@@ -59,15 +59,15 @@ def start(engine: str, memory: float | None = None) -> Worker:
 
 
 def python_at(engine: str) -> Path:
-    """The Python of an engine ``NAME@PLACE``: a path, a remembered label, or a command.
+    """Path of the Python for an engine ``NAME@PLACE``; the place is a path, the label of an environment, or a command.
 
     Raises:
-        InputError: there is no such thing.
-        Missing: a remembered environment is gone.
+        InputError: there is no such place.
+        Missing: the environment's Python is gone.
     """
     name, place = plain_name(engine), place_of(engine)
     if os.sep in place or place.startswith(("~", ".")):
-        # Not resolved: the Python of a virtual environment is a link, and followed it is another interpreter.
+        # Links are not followed: the Python of a virtual environment is a link to another interpreter.
         path = Path(os.path.abspath(Path(place).expanduser()))
         if path.is_dir():
             path = path / "bin" / "python"
@@ -96,7 +96,7 @@ def _install(engine: str) -> str:
 
 
 def _explained(engine: str, python: Path, error: ProofrollError) -> ProofrollError:
-    """Error that says why a worker did not identify itself, as far as the Python itself can tell."""
+    """Error that says why a worker did not identify itself, after probing its Python."""
     if isinstance(error, WorkerDied) and error.status == Status.TIMEOUT:
         return WorkerDied(error.status, f"{engine}: {python} did not answer within {HELLO_SECONDS:g} s")
     with contextlib.suppress(OSError, subprocess.SubprocessError, ValueError, TypeError, LookupError):

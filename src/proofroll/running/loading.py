@@ -1,4 +1,4 @@
-"""Engines and scenes as a case names them, in the process that runs it: it is the right ones, or an error."""
+"""Loads the engine and the scene of a case in the process that runs it, and checks their versions."""
 
 import gc
 from typing import Any
@@ -10,26 +10,27 @@ from proofroll.files.scene_file import load_scene
 from proofroll.running.case import Case
 from proofroll.running.program import engine, path_of
 
-# What this process was told that it is: the part after ``@`` of the engines that it runs; empty: none.
+# Place that this process serves: the part after ``@`` of its engines; empty: engines of this interpreter.
 _settled = ""
 
 
 def settle(place: str) -> None:
-    """Makes this process the one for engines ``NAME@place``."""
-    global _settled  # noqa: PLW0603 -- a fact about the process, said once when it starts
+    """Makes this process serve engines ``NAME@place``."""
+    global _settled  # noqa: PLW0603 -- a fact about the process, set once when it starts
     _settled = place
 
 
 def here(name: str) -> str:
-    """``NAME`` of ``NAME@PLACE`` if this process is the one at that place; else the name as it is."""
+    """``NAME`` for ``NAME@PLACE`` if this process serves that place; otherwise the name unchanged."""
     return plain_name(name) if place_of(name) == _settled else name
 
 
 def load(name: str) -> Any:
-    """The class of an engine ``NAME``, ``NAME@PLACE`` or ``NAME@program:PATH``.
+    """Class of an engine ``NAME``, ``NAME@PLACE`` or ``NAME@program:PATH``.
 
     Raises:
-        InputError, Missing: see :func:`proofroll.core.plugins.load_engine`; or this process is at another place.
+        InputError, Missing: see :func:`proofroll.core.plugins.load_engine`; Missing, too, if this process serves
+        another place.
     """
     if path_of(name) is not None:
         return engine(name)
@@ -42,26 +43,26 @@ def load(name: str) -> Any:
 
 
 def loaded(case: Case) -> tuple[Any, Any]:
-    """Class of the engine, and complete settings, of a case.
+    """Class of the engine and complete settings of a case.
 
     Raises:
-        ProofrollError: the engine here is of another version than the one that was asked when the case was made.
+        ProofrollError: the engine has another version here than when the case was made.
     """
     kind = load(case.engine.name)
-    gc.enable()  # the process of a worker imports without
+    gc.enable()  # a worker's process imports with it disabled
     version = kind.version()
     if version != case.engine.version:
-        said = f"{case.engine.name} is version {version} here, and was {case.engine.version} when it was asked"
-        raise ProofrollError(f"{said}; begin again")
+        change = f"{case.engine.name} is version {version} here, and was {case.engine.version} when it was asked"
+        raise ProofrollError(f"{change}; begin again")
     return kind, resolve_settings(kind, case.engine.settings)
 
 
 def scene_of(case: Case) -> Scene:
-    """The scene of a case.
+    """Scene of a case.
 
     Raises:
         InputError: there is no such scene or parameter.
-        ProofrollError: the scene read here is not the one for which the case was made.
+        ProofrollError: the scene has another digest here than when the case was made.
     """
     scene = load_scene(case.scene, asks=case.asks, **case.parameters)
     if scene.digest != case.scene_digest:

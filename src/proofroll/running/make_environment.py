@@ -33,12 +33,12 @@ found = sorted({f"{item.name}=={item.version}" for item in distributions()})
 print(json.dumps([platform.python_version(), found]))
 """
 _PINNED = re.compile(r"\s*([\w.-]+)(?:\[[^\]]*\])?\s*==\s*(\w[\w.+-]*)\s*")
-_VERSIONS = re.compile(r"\(from versions: (?:[^)]*, )?((?:[^,)]+, ){2}[^,)]+)\)")  # in what pip says
-_WORDS = 400  # of what pip says the end is shown [characters]
+_VERSIONS = re.compile(r"\(from versions: (?:[^)]*, )?((?:[^,)]+, ){2}[^,)]+)\)")  # in an error message of pip
+_WORDS = 400  # length of the end of pip's message that is shown [characters]
 
 
 def label_of(requirements: Sequence[str]) -> str:
-    """The label where none is given: the version that the first requirement pins; else empty."""
+    """Default label: the version that the first requirement pins; empty if it pins none."""
     pinned = _PINNED.fullmatch(requirements[0])
     return pinned[2] if pinned else ""
 
@@ -50,14 +50,18 @@ def add(
     python: str = "",
     tell: Callable[[str], None] | None = None,
 ) -> Environment:
-    """Makes an environment and remembers it as ``NAME@LABEL`` once its engine has been imported there.
+    """Makes an environment, imports its engine there, and keeps it as ``NAME@LABEL``.
 
-    Requirements are as pip reads them, e.g. ``mujoco==3.8.1``; the label is by default the version that the first one
-    pins. ``python`` is a command or path, by default this one; ``tell`` is called with what is being done.
+    Args:
+        name: of the engine.
+        requirements: as pip reads them, e.g. ``mujoco==3.8.1``.
+        label: by default the version that the first requirement pins.
+        python: command or path of the Python; by default this one.
+        tell: called with lines about the progress.
 
     Raises:
-        InputError: something given makes no sense, or the label is taken.
-        ProofrollError: it cannot be made; nothing is left of it.
+        InputError: an argument is invalid, or the label is taken.
+        ProofrollError: the environment cannot be made; its folder was deleted.
     """
     tell = tell or (lambda _: None)
     if not re.fullmatch(r"[\w-]+", name):
@@ -96,7 +100,7 @@ def add(
 
 
 def package_of(engine: str) -> str:
-    """The package that brings an engine: what the adapter's package requires for the extra of its name, else empty."""
+    """Package that brings an engine: the requirement of the adapter's extra of the engine's name; empty if unknown."""
     for point in announced(GROUP):
         if point.name != engine or point.dist is None:
             continue
@@ -107,11 +111,14 @@ def package_of(engine: str) -> str:
 
 
 def _require_supported(name: str, requirements: Sequence[str]) -> None:
-    """Asks the engine that is installed here, if any, from which version on its adapter supports it."""
+    """Raises InputError if a requirement pins a version older than the adapter of the engine supports.
+
+    The oldest version is asked from the engine that is installed here; without it nothing is checked.
+    """
     package = package_of(name) or name
     pinned = [match for text in requirements if (match := _PINNED.fullmatch(text)) and match[1] == package]
     oldest = ""
-    with contextlib.suppress(ProofrollError):  # nobody is here to be asked
+    with contextlib.suppress(ProofrollError):  # the engine is not installed here
         oldest = describe(name).oldest if pinned else ""
     for match in pinned:
         if oldest and release(match[2]) < release(oldest):
@@ -150,12 +157,15 @@ def _made(
 
 
 def _install_by_pip(venv: Path, base: Path, wanted: Sequence[str], tell: Callable[[str], None]) -> None:
-    """Installs by the pip of this Python, where it may serve: another in the environment takes seconds to install."""
+    """Installs packages into the environment by pip.
+
+    The pip of this Python serves if the environment has the same Python; otherwise one is installed there first.
+    """
     target = venv / "bin" / "python"
     if base == Path(sys.executable) and find_spec("pip"):
         _call([base, "-m", "venv", "--without-pip", venv])
         command: list[str | Path] = [base, "-m", "pip", "--python", target]
-    else:  # a pip is made for its own version of Python and older ones
+    else:  # pip does not serve Pythons newer than its own
         _call([base, "-m", "venv", venv])
         command = [target, "-m", "pip"]
     tell("installing by pip")
@@ -170,7 +180,7 @@ def _install_by_uv(uv: str, venv: Path, base: Path, wanted: Sequence[str], tell:
 
 
 def _interpreter(python: str) -> Path:
-    """The Python from which an environment is made."""
+    """Path of the Python from which an environment is made. Raises InputError if it is no Python or too old."""
     if not python:
         return Path(sys.executable)
     program = shutil.which(str(Path(python).expanduser()))
@@ -194,7 +204,7 @@ def _interpreter(python: str) -> Path:
 
 
 def _carried(name: str, wheels: Path) -> list[str]:
-    """This proofroll and the package of the engine's adapter, as arguments of pip: the same code as here."""
+    """Wheels of this proofroll and of the package of the engine's adapter: the environment gets the same code."""
     names = ["proofroll"]
     for point in announced(GROUP):
         if point.name == name and point.dist is not None and point.dist.name not in names:
@@ -203,9 +213,9 @@ def _carried(name: str, wheels: Path) -> list[str]:
 
 
 def _wheel(item: metadata.Distribution, folder: Path) -> Path:
-    """An installed package as a wheel again, from the list of its files (PEP 376, PEP 427).
+    """Wheel rebuilt from the files of an installed package (PEP 376, PEP 427).
 
-    Of one that was installed to be edited these are the path of its source, which is then shared.
+    For a package in editable mode it contains the path of the source, which is then shared.
     """
     files = [file for file in item.files or () if ".." not in file.parts and "__pycache__" not in file.parts]
     info = next((file.parts[0] for file in files if file.parts[0].endswith(".dist-info")), None)
@@ -227,7 +237,7 @@ def _wheel(item: metadata.Distribution, folder: Path) -> Path:
 
 
 def _call(command: Sequence[str | Path]) -> str:
-    """Output of a program; it ends, with all that it started, when this process is interrupted."""
+    """Output of a program; when this process is interrupted, the program and all that it started are killed."""
     try:
         process = subprocess.Popen(
             command,
@@ -242,15 +252,15 @@ def _call(command: Sequence[str | Path]) -> str:
     except OSError as error:
         raise ProofrollError(f"{command[0]} cannot be started ({error.strerror or error})") from None
     try:
-        printed, said = process.communicate()
+        printed, errors_printed = process.communicate()
     except BaseException:
         with contextlib.suppress(ProcessLookupError):
             os.killpg(process.pid, signal.SIGKILL)
         process.wait()
         raise
     if process.returncode:
-        errors = [line for line in said.splitlines() if line.startswith("ERROR:")]
-        words = " ".join(" ".join(errors or said.splitlines() or printed.splitlines()).split())
+        errors = [line for line in errors_printed.splitlines() if line.startswith("ERROR:")]
+        words = " ".join(" ".join(errors or errors_printed.splitlines() or printed.splitlines()).split())
         words = _VERSIONS.sub(r"(the last versions are \1)", words)[-_WORDS:]
         program = Path(str(command[0])).name
         what = " ".join(str(item) for item in command[1:4] if str(item).isascii() and len(str(item)) < 20)

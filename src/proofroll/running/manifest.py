@@ -1,4 +1,4 @@
-"""Manifest of a trajectory: how it was made."""
+"""Manifest of a trajectory: the engine, settings, versions and machine that made it."""
 
 import json
 import platform
@@ -19,7 +19,7 @@ def versions(engine: str, version: str) -> dict[str, str]:
     return {engine: version} | own | {name: version_of(name) for name in ("numpy", "scipy")}
 
 
-# Of a package that is installed; to read it takes a millisecond, and every run tells it.
+# Version of an installed package; cached, as reading it takes a millisecond and every run needs it.
 version_of = cache(metadata.version)
 
 
@@ -32,8 +32,9 @@ def manifest(
 ) -> dict[str, str]:
     """Attributes of a trajectory: engine, settings, parameters [SI], versions, interpreter and machine.
 
-    Settings, parameters and versions are JSON; ``not_reported`` has what the engine does not say of its model, if that
-    is anything.
+    Settings, parameters and versions are JSON. ``not_reported`` lists quantities of the certificate that the engine
+    does
+    not report, if there are any.
     """
     silent = ", ".join(line.quantity for line in certificate if line.standing is Standing.NOT_REPORTED)
     return ({"not_reported": silent} if silent else {}) | {

@@ -1,9 +1,9 @@
-"""Limit on the memory of a worker and its descendants, beyond which they are ended.
+"""Limit on the memory of a worker and its descendants, which are killed beyond it.
 
-Resident memory is watched from outside. A limit on the address space would end engines that merely reserve it
-(just-in-time compilers, arenas, threads' stacks), and an allocation that fails ends a library anywhere, so that the
-row could not say why. The watch is as fine as the parent's tick; what is faster than that, the kernel ends: workers
-volunteer for it before anybody else (``oom_score_adj``).
+Resident memory is watched from outside, at each tick of the parent. A limit on the address space instead would kill
+engines that merely reserve it (just-in-time compilers, arenas, threads' stacks), and allocations would fail inside
+libraries without a clear message. If memory fills faster than a tick, the kernel kills: workers offer themselves first
+(``oom_score_adj``).
 """
 
 import contextlib
@@ -14,7 +14,7 @@ from pathlib import Path
 from proofroll.core.errors import InputError
 
 VARIABLE = "PROOFROLL_MEMORY"
-# More than ten times what the hungriest of our own engines needs: the truth with slip has 0.23 GB at most.
+# More than ten times what our own engines and truths need; the most was 0.23 GB, for a truth with slip.
 _USUAL_GB = 4.0
 # One engine must leave a small machine to the others.
 _SHARE = 0.5
@@ -22,7 +22,9 @@ GB = 1e9
 
 
 def memory_limit() -> float:
-    """Memory that one worker with its children may have [GB]: ``PROOFROLL_MEMORY``, or 4 and at most half the machine.
+    """Memory that one worker with its descendants may use [GB].
+
+    The value of ``PROOFROLL_MEMORY``, or 4 GB and at most half the memory of the machine.
 
     Raises:
         InputError: the variable holds no positive number.
@@ -49,7 +51,7 @@ def resident_gb(process: int) -> float:
 
 
 def descendants(process: int) -> list[int]:
-    """Children of a process, and theirs; none where the system has no ``/proc``."""
+    """Process numbers of the children of a process, and of theirs; none where the system has no ``/proc``."""
     processes: list[int] = []
     queue = [process]
     while queue:
@@ -62,7 +64,7 @@ def descendants(process: int) -> list[int]:
 
 
 def volunteer() -> None:
-    """Makes this process the first that the kernel ends when memory runs out, and lets it leave no core file."""
+    """Makes the kernel choose this process first when memory runs out, and prevents core files."""
     import resource
 
     with contextlib.suppress(OSError):

@@ -1,4 +1,4 @@
-"""The parent's side of a worker process: asks it, watches it, and ends it with whatever it started."""
+"""Parent's side of a worker process: sends requests, watches it, and ends it with all that it started."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ THREADS = dict.fromkeys(
     ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMEXPR_NUM_THREADS", "VECLIB_MAXIMUM_THREADS"),
     "1",
 )
-# What makes a Python find other modules than its own, or start another one: of this one's, none is meant for that one.
+# Variables that redirect a Python's imports or start-up; they are meant for this Python, not for another interpreter.
 _OF_THIS_PYTHON = (
     "PYTHONPATH",
     "PYTHONHOME",
@@ -34,15 +34,15 @@ _OF_THIS_PYTHON = (
     "PYTHONUSERBASE",
     "__PYVENV_LAUNCHER__",
 )
-# How often memory and life are looked at [s]: a look costs less than 0.1 ms, and memory fills at some GB/s.
+# Interval at which a worker's memory and life are checked [s]: a check costs less than 0.1 ms; memory fills at GB/s.
 _TICK = 0.1
-# How long a process that has closed its answers may take to end, with threads and exit handlers of its own [s].
+# Time that a process may take to end after it closed its answers, for threads and exit handlers [s].
 _GRACE = 5.0
-# Of what an engine prints only the end is kept [bytes]; it goes through a pipe, so that no flood fills a disk.
+# Length of the end of an engine's output that is kept [bytes]; it comes through a pipe, so that it cannot fill a disk.
 _KEPT = 4096
-# Reads that empty the pipe, which holds 64 kB, even where each finds only a line.
+# Most reads to empty the pipe of 64 kB, as a read may return only a line.
 _DRAUGHTS = 64
-# An answer is a record of a few kB; what is longer without an end is none [bytes].
+# Longest answer [bytes]; a record has a few kB.
 _LONGEST_ANSWER = 1 << 22
 
 _living: set[Worker] = set()
@@ -59,42 +59,42 @@ class WorkerDied(ProofrollError):  # noqa: N818 -- a fact about the worker, turn
 
 
 def end_all() -> None:
-    """Sends every worker of this process, and what it started, its end; for a signal handler, so it waits for none."""
+    """Kills every worker of this process with all that it started, without waiting; safe in a signal handler."""
     for worker in list(_living):
         worker.shoot()
 
 
 def processor_seconds() -> float:
-    """Processor time of this process and of all its workers, as far as these have answered [s]."""
+    """Processor time of this process and of its workers up to their last answers [s]."""
     return time.process_time() + _used_by_workers
 
 
 def _count(worker: Worker, used: float) -> None:
-    global _used_by_workers  # noqa: PLW0603 -- like the time of this process, which is its own as well
+    global _used_by_workers  # noqa: PLW0603 -- a total of this process
     with _counting:
         _used_by_workers += max(0.0, used - worker.used)
         worker.used = max(used, worker.used)
 
 
 def safe_environment() -> dict[str, str]:
-    """Environment variables of a child Python that must not import from the working folder (``-m``, ``-c``)."""
+    """Environment variables for a child Python that must not import from the working folder (``-m``, ``-c``)."""
     return {**os.environ, "PYTHONSAFEPATH": "1"}
 
 
 def environment_of_another() -> dict[str, str]:
-    """The environment of a process in another interpreter, which shall find its own modules and no others."""
+    """Environment variables for a process in another interpreter, without those that redirect its imports."""
     return {name: value for name, value in safe_environment().items() if name not in _OF_THIS_PYTHON}
 
 
 class Worker:
-    """A worker process; restarted by making a new one.
+    """A worker process. After its end a new one must be made.
 
     Args:
-        memory: limit for it and its children [GB]; by default :func:`memory.memory_limit`.
+        memory: limit for it and its descendants [GB]; by default :func:`memory.memory_limit`.
         python: another interpreter in which it runs; by default this one.
 
     Attributes:
-        waited: wall seconds for the last answer; for the first one from the start of the process [s].
+        waited: wall time for the last answer; for the first one from the start of the process [s].
         used: processor time of the process until its last answer [s].
     """
 
@@ -104,7 +104,7 @@ class Worker:
         self._ending = threading.Lock()
         self._answers, writer = os.pipe()
         self._words, log = os.pipe()
-        life, self._life = os.pipe()  # nothing is written: it closes with this process, however that ends
+        life, self._life = os.pipe()  # never written to: it closes when this process ends, even if killed
         os.set_blocking(self._words, False)
         self._open = [self._answers, self._words]
         self._descriptors = [*self._open, self._life]
@@ -134,11 +134,14 @@ class Worker:
         self._asked = 0
 
     def ask(self, request: Mapping[str, Any], time_limit: float) -> dict[str, Any]:
-        """One request, one answer.
+        """Answer to one request.
+
+        Args:
+            request: for the worker.
+            time_limit: wall time, without time in which others had the processor [s].
 
         Raises:
-            WorkerDied: the process crashed, took longer than ``time_limit`` [s], in which time that others had the
-                processor does not count, or needed too much memory.
+            WorkerDied: the process crashed, took too long, or needed too much memory.
         """
         self._forget_words()
         self._asked += 1
@@ -146,7 +149,7 @@ class Worker:
             assert self._process.stdin is not None  # it was opened with a pipe
             self._process.stdin.write(json.dumps({**request, "number": self._asked}) + "\n")
             self._process.stdin.flush()
-        except (OSError, ValueError):  # a broken pipe, or one that is closed already
+        except (OSError, ValueError):  # the pipe is broken or closed
             raise WorkerDied(Status.CRASHED, self._last_words()) from None
         asked = time.perf_counter()
         line = self._line(time_limit)
@@ -161,10 +164,10 @@ class Worker:
         raise WorkerDied(Status.CRASHED, "the engine wrote into the answers of its process, which was ended")
 
     def request(self, request: Mapping[str, Any], time_limit: float) -> dict[str, Any]:
-        """Answer as by :meth:`ask`; errors that the worker met are raised here.
+        """Answer to one request as by :meth:`ask`, with the worker's errors raised.
 
         Raises:
-            InputError, Missing, WorkerDied: the worker says so, or it ended.
+            InputError, Missing, WorkerDied: the worker answers so, or it ended.
         """
         answer = self.ask(request, time_limit)
         match answer.get("error"):
@@ -177,14 +180,14 @@ class Worker:
         return answer
 
     def _line(self, time_limit: float) -> bytes:
-        """The next line of the answers."""
+        """Next line of the answers; raises WorkerDied if there is none in time."""
         starved_before = _starved(self._process.pid)
         deadline = time.monotonic() + time_limit
         look = time.monotonic() + _TICK
         while b"\n" not in self._pending:
             now = time.monotonic()
             if now >= deadline:
-                # What it waited for others is granted once more, until it had the time for itself.
+                # Extend the deadline by the time in which other processes had the processor.
                 starved_now = _starved(self._process.pid)
                 if starved_now - starved_before > _TICK:
                     deadline, starved_before = now + starved_now - starved_before, starved_now
@@ -209,11 +212,11 @@ class Worker:
     def _watch_memory(self) -> None:
         if resident_gb(self._process.pid) > self._memory:
             self.kill()
-            said = f"needed more than {self._memory:g} GB of memory and was ended; {VARIABLE} allows more"
-            raise WorkerDied(Status.CRASHED, said)
+            fault = f"needed more than {self._memory:g} GB of memory and was ended; {VARIABLE} allows more"
+            raise WorkerDied(Status.CRASHED, fault)
 
     def _listen(self, seconds: float) -> list[int]:
-        """Waits for answers or words, keeps the end of the words, and gives what there was."""
+        """Waits for answers or printed text, keeps the end of the text, and returns the pipes that were ready."""
         ready = select.select(self._open, [], [], seconds)[0]
         if self._words in ready:
             with contextlib.suppress(BlockingIOError):
@@ -224,7 +227,7 @@ class Worker:
         return ready
 
     def _forget_words(self) -> None:
-        """Drops what was printed for an earlier request: it explains no end in this one."""
+        """Drops text printed during an earlier request, which would not explain a crash in this one."""
         if self._asked and not self._ended():
             for _ in range(_DRAUGHTS):
                 if self._words not in self._listen(0):
@@ -232,7 +235,7 @@ class Worker:
             self._said = b""
 
     def _ended(self) -> bool:
-        """True if the process has ended. It is not reaped yet, so that no other process can get its group."""
+        """True if the process has ended. It is not reaped, so that no other process can get its number."""
         if self._process.returncode is not None:
             return True
         if not hasattr(os, "waitid"):  # macOS before Python 3.13: there what the process started outlives it
@@ -243,7 +246,7 @@ class Worker:
             return True
 
     def _last_words(self) -> str:
-        """Way in which the process ended, and the last line it wrote."""
+        """Sentence with the way in which the process ended and the last line that it printed."""
         self._open = [item for item in self._open if item == self._words]
         deadline = time.monotonic() + _GRACE
         while not (ended := self._ended()) and time.monotonic() < deadline:
@@ -258,24 +261,24 @@ class Worker:
         return f"the engine's process {how}" + (f": {last[:200]}" if last else "")
 
     def shoot(self) -> None:
-        """Sends the process, and what it started, its end."""
+        """Kills the process and all that it started, without waiting."""
         if self._process.returncode is not None:
-            return  # its number may be somebody else's by now
-        for process in descendants(self._process.pid):  # one that left the group is found only here
+            return  # its number may belong to another process by now
+        for process in descendants(self._process.pid):  # those that left the process group
             with contextlib.suppress(ProcessLookupError, PermissionError):
                 os.kill(process, signal.SIGKILL)
         with contextlib.suppress(ProcessLookupError, PermissionError):
             os.killpg(self._process.pid, signal.SIGKILL)
 
     def kill(self) -> int:
-        """Ends the process at once, with what it started; its exit code."""
+        """Kills the process with all that it started, and returns its exit code."""
         with self._ending:
             self.shoot()
             _living.discard(self)
             return self._process.wait()
 
     def close(self) -> None:
-        """Ends the process."""
+        """Kills the process and closes its pipes."""
         self.kill()
         if self._process.stdin is not None:
             with contextlib.suppress(BrokenPipeError):
@@ -291,11 +294,12 @@ class Worker:
 
 
 def _starved(process: int) -> float:
-    """Time [s] that the process or the longest waiting descendant was ready while others had the processor.
+    """Longest time [s] that a thread of the process or of its descendants was ready while others had the processor.
 
-    On a machine with other work a wall clock says more about that work than about an engine. The kernel counts how long
-    every thread waited in the queue of a processor (``schedstat``, second number); a process that hangs asleep waits in
-    none, so that a limit of wall seconds less these still ends it. 0 where the system does not count it.
+    On a busy machine wall time says little about an engine. The kernel counts how long every thread waited for a
+    processor
+    (``schedstat``, second number). A process that hangs asleep does not wait for one, so that a limit of wall time less
+    this one still ends it. 0 where the system does not count.
     """
     longest = 0
     for one in (process, *descendants(process)):
@@ -306,7 +310,7 @@ def _starved(process: int) -> float:
 
 
 def _how(code: int) -> str:
-    """An exit code in words."""
+    """Exit code in words."""
     if code >= 0:
         return f"ended with exit code {code}"
     name = signal.Signals(-code).name if -code in set(signal.Signals) else f"signal {-code}"

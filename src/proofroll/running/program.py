@@ -1,4 +1,4 @@
-"""An engine that is a program of its own, in any language: ``NAME@program:PATH``. See docs/worker_protocol.md."""
+"""Engines that are programs in any language: ``NAME@program:PATH``. See docs/worker_protocol.md."""
 
 import dataclasses
 import json
@@ -21,12 +21,12 @@ from proofroll.files.json_data import plain
 
 PREFIX = "program:"
 PROTOCOL = 1
-# Of a line that is no answer so much is shown [characters].
+# Length of an invalid answer that is shown [characters].
 _SHOWN = 80
 
 
 def path_of(name: str) -> Path | None:
-    """The program of an engine ``NAME@program:PATH``; None: it is none.
+    """Path of the program of an engine ``NAME@program:PATH``; None: it is no such engine.
 
     Raises:
         InputError: there is no such program.
@@ -40,12 +40,12 @@ def path_of(name: str) -> Path | None:
     return path
 
 
-# Settings that trade speed for accuracy, the first that there is.
+# Names of the setting that trades speed for accuracy, in order of preference.
 _RESOLUTIONS = ("dt", "rtol")
 
 
 class Pipe:
-    """A running program: one request a line on its standard input, one answer a line on its standard output."""
+    """A running program: it reads one request a line and writes one answer a line."""
 
     def __init__(self, path: Path) -> None:
         self._path = path
@@ -57,11 +57,11 @@ class Pipe:
             raise ProofrollError(f"{path} cannot be started ({error.strerror or error})") from None
 
     def ask(self, request: Mapping[str, Any]) -> dict[str, Any]:
-        """One request, one answer.
+        """Answer to one request.
 
         Raises:
-            Refused, Diverged: the program says so.
-            ProofrollError: it ended, or its line is no answer.
+            Refused, Diverged: the program answers so.
+            ProofrollError: it ended, or its line is no JSON object.
         """
         process = self._process
         assert process.stdin is not None  # both were opened with pipes
@@ -94,17 +94,17 @@ class Pipe:
         self._process.communicate()
 
 
-def _in_arrays(said: Mapping[str, Any]) -> dict[str, Any]:
-    return {key: np.asarray(value, dtype=float) if isinstance(value, list) else value for key, value in said.items()}
+def _in_arrays(record: Mapping[str, Any]) -> dict[str, Any]:
+    return {key: np.asarray(value, dtype=float) if isinstance(value, list) else value for key, value in record.items()}
 
 
 class _Built:
-    """Model as the program reports it; None: no report."""
+    """Model as the program reports it; fields that it does not report are None."""
 
     regularised: ClassVar[Mapping[str, Any]] = {}
 
-    def __init__(self, said: Mapping[str, Any]) -> None:
-        values = _in_arrays(said)
+    def __init__(self, report: Mapping[str, Any]) -> None:
+        values = _in_arrays(report)
         self.terms = frozenset(values.pop("terms")) if "terms" in values else None
         self.__dict__.update(values)
 
@@ -114,7 +114,7 @@ class _Built:
 
 
 class Program:
-    """The protocol of engines, spoken through a pipe; :func:`engine` makes a class of it for each program."""
+    """Engine protocol, spoken through a pipe; :func:`engine` makes a subclass for each program."""
 
     name: ClassVar[str]
     path: ClassVar[Path]
@@ -135,7 +135,7 @@ class Program:
 
     def __init__(self, scene: Scene, settings: Any) -> None:
         self._pipe, self._step = Pipe(self.path), fixed_step(settings)
-        (element,) = scene.elements  # of several, each is built alone
+        (element,) = scene.elements  # elements of a scene with several are built one by one
         self._sample_type = element.sample_type
         content = {"kind": type(element).__name__, "name": element.name} | plain(dataclasses.asdict(element))  # type: ignore[call-overload]  # elements are dataclasses
         try:
@@ -154,7 +154,7 @@ class Program:
         self._last = self._pipe.ask({"do": "advance", "to": t})
 
     def sample(self) -> Sample:
-        """The sample that came with the last answer."""
+        """Sample that came with the last answer. Raises ProofrollError if it is incomplete."""
         said = self._last.get("sample")
         names = [item.name for item in dataclasses.fields(self._sample_type)]
         if not isinstance(said, dict) or not set(REQUIRED) <= said.keys() <= set(names):
@@ -174,14 +174,14 @@ class Program:
 
 @cache
 def engine(name: str) -> type[Program]:
-    """The class of an engine ``NAME@program:PATH``, from what the program says of itself.
+    """Class of an engine ``NAME@program:PATH``, from the program's description of itself.
 
     Raises:
-        InputError: there is no such program.
-        ProofrollError: it does not say what it is, or is another engine.
+        InputError: there is no such program, or it has another name.
+        ProofrollError: its description is invalid.
     """
     path = path_of(name)
-    assert path is not None  # the caller looked
+    assert path is not None  # the caller checked
     pipe = Pipe(path)
     try:
         told = pipe.ask({"do": "describe", "protocol": PROTOCOL})
@@ -222,7 +222,7 @@ def engine(name: str) -> type[Program]:
 
 
 def _require_values(where: str, values: Mapping[str, Any]) -> None:
-    """Raises ProofrollError for the first setting of a preset that no run could take."""
+    """Raises ProofrollError for the first invalid setting of a preset."""
     for key, value in values.items():
         if not isinstance(value, (bool, int, float, str)):
             raise ProofrollError(f"{where}: {key} = {json.dumps(value)}: give a number, a text, true or false")
@@ -231,7 +231,7 @@ def _require_values(where: str, values: Mapping[str, Any]) -> None:
 
 
 def _settings(formulations: Mapping[str, Any]) -> type[Any]:
-    """The class of a program's settings: formulation, preset, and all that its presets name."""
+    """Class of a program's settings: formulation, preset, and every setting named in its presets."""
     values: dict[str, Any] = {}
     for item in formulations.values():
         for preset in item["presets"].values():

@@ -1,4 +1,4 @@
-"""Runs one built engine over a time grid: the only loop over samples, and the place where NaN is noticed."""
+"""Runs one built engine over a time grid: the only loop over samples, and the only check for NaN."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
-# Part by which the length of a quaternion may differ from 1: more than single precision and drift leave of it.
+# Largest error of the length of a quaternion: more than single precision and drift cause.
 _UNIT = 1e-3
 
 
@@ -37,12 +37,13 @@ class Recording:
     Attributes:
         columns: the trajectory up to the last finite sample.
         failure: one sentence if it failed early, else None.
-        ended: one sentence if it ended where the ball leaves the wall, for the model holds the ball there, else None.
-        wall_seconds: spent inside ``advance`` [s].
-        advancing, sampling: spent inside ``advance``, and inside ``sample`` and around it: wall and processor seconds
-            [s].
-        passed: samples at the times at which the engine was stopped, by time [s].
-        remarks: of the engine about a run that went well (:class:`proofroll.core.engine_abilities.TellsRemarks`).
+        ended: one sentence if it ended without a failure because its model left the scene (a ball left the wall), else
+            None.
+        wall_seconds: wall time inside ``advance`` [s].
+        advancing: wall and processor time inside ``advance`` [s].
+        sampling: wall and processor time of all the rest, mainly ``sample`` [s].
+        passed: time [s] -> sample, for all times at which the engine was stopped.
+        remarks: of the engine on a successful run (:class:`proofroll.core.engine_abilities.TellsRemarks`).
     """
 
     columns: Columns
@@ -56,21 +57,26 @@ class Recording:
 
     @property
     def dataset(self) -> xr.Dataset:
-        """The trajectory as a dataset."""
+        """The trajectory as an xarray dataset."""
         return self.columns.dataset()
 
     def message(self, until: float) -> str:
-        """One sentence: why it ended early, or that it reached ``until`` [s] and what is to be said about that."""
+        """One sentence: why the run ended early, or that it reached ``until`` [s], with the engine's remarks."""
         return self.failure or self.ended or "; ".join([f"reached {until:g} s", *self.remarks])
 
 
 def record(
     engine: Any, scene: Scene, asked: FloatArray, probes: Iterable[float] = (), counting: Iterable[float] = ()
 ) -> Recording:
-    """Advances an engine freshly built of a scene and samples it at the times that are ``asked`` [s].
+    """Advances a freshly built engine and samples it.
 
-    Probes are a few times off that grid [s], from :func:`proofroll.core.time_grid.off_grid`; what is sampled at times
-    for ``counting`` turns [s], from :func:`proofroll.core.turns.samples_between`, is left out of the result.
+    Args:
+        engine: at time 0.
+        scene: that it was built from.
+        asked: times of the samples [s].
+        probes: a few times off that grid [s], from :func:`proofroll.core.time_grid.off_grid`.
+        counting: further times at which turns are counted [s], from :func:`proofroll.core.turns.samples_between`; their
+            samples are left out of the result.
     """
     began, processor = time.perf_counter(), -time.process_time()
     inside = 0.0
@@ -101,7 +107,7 @@ def record(
             continue
         samples.append(sample)
         if any(watch.over(sample_of(scene, element, sample)) for element, watch in watches):
-            break  # from here on the model is another one than the scene
+            break  # the run has left the scene's model
     processor += time.process_time()
     sampling = time.perf_counter() - began - wall, processor - inside
     ended: str | None = None
@@ -134,13 +140,13 @@ _NOT_FINITE = "is not finite (NaN or overflow)"
 
 
 def noticed(message: str) -> bool:
-    """True if a failure's sentence reports a sample that was not finite: noticed here, not by the engine."""
+    """True if a failure's sentence is that of a non-finite sample, which the harness noticed and not the engine."""
     return message.partition(" ")[2].startswith(_NOT_FINITE)
 
 
 def _finite(sample: AnySample, t: float, scene: Scene) -> AnySample:
     for name, values in arrays(scene, sample, t):
-        # The sum of finite numbers is finite but for overflow; numpy's own question takes ten times as long.
+        # The sum is finite if all are, unless it overflows; numpy's test takes ten times as long.
         if not math.isfinite(sum(values.ravel().tolist())) and not np.all(np.isfinite(values)):
             raise Diverged(f"{name} {_NOT_FINITE} at {t:g} s")
         if name == "q_WB":
@@ -149,7 +155,7 @@ def _finite(sample: AnySample, t: float, scene: Scene) -> AnySample:
 
 
 def _require_state(scene: Scene, first: AnySample, sample: AnySample, t: float) -> None:
-    """Checks that each sample has the state variables of the first one."""
+    """Raises Diverged if a sample lacks a state variable that the first sample has."""
     for element in scene.elements:
         before, now = sample_of(scene, element, first), sample_of(scene, element, sample)
         for name in Sample.widths:
@@ -158,7 +164,7 @@ def _require_state(scene: Scene, first: AnySample, sample: AnySample, t: float) 
 
 
 def require_unit(q_WB: FloatArray, where: str) -> None:
-    """Raises Diverged, with the length and ``where``, if a quaternion, shape (…, 4), is not of unit length."""
+    """Raises Diverged, naming the length and ``where``, unless quaternions, shape (…, 4), have unit length."""
     lengths = np.sqrt(np.sum(q_WB**2, axis=-1)).ravel()
     worst = float(lengths[np.argmax(np.abs(lengths - 1))])
     if abs(worst - 1) > _UNIT:

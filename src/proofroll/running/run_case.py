@@ -1,4 +1,4 @@
-"""Runs a case in this process, from its certificate to its file."""
+"""Runs a case in this process, from its certificate to the file of its trajectory."""
 
 from __future__ import annotations
 
@@ -22,21 +22,21 @@ from proofroll.running.time_case import clean_runs
 
 
 def run(case: dict[str, Any], out: str) -> dict[str, Any]:
-    """Runs a case and writes its trajectory to ``out``; everything the case says comes back as a result."""
+    """Runs a case, writes its trajectory to ``out``, and returns its result as a dictionary."""
     spent, wanted = _TimeAccounts(), Case.from_dict(case)
-    gc.freeze()  # what there is by now are modules: to look at each of them after the case costs as much as a short one
+    gc.freeze()  # exclude loaded modules from collection, which would take as long as a short case
     try:
         answer = dataclasses.asdict(_run(wanted, Path(out), spent)) | {"interpreter": sys.executable}
         _require_untouched(wanted.engine.name)
     finally:
-        gc.collect()  # the next case of this process starts clean,
-        gc.freeze()  # and need not look again at what stays: the modules
+        gc.collect()  # the next case of this process starts clean
+        gc.freeze()  # exclude modules loaded by this case, too
     spent.on("clean-up")
     return answer | {"spent": spent.seconds, "processor": spent.processor}
 
 
 def _require_untouched(engine: str) -> None:
-    """Raises ProofrollError if the engine replaced code that judges it; the process then ends before the next row."""
+    """Raises ProofrollError if the engine replaced code that judges it; the caller then ends the process."""
     from proofroll.running.loading import load
 
     if engine != "truth" and (name := changed(load(engine))):
@@ -99,15 +99,15 @@ def _run(case: Case, out: Path, spent: _TimeAccounts) -> Result:
         versions=versions,
         trajectory=out.name,
     )
-    said = {"status": result.status.value, "message": result.message, "wall_seconds": result.wall_seconds}
-    said |= manifest(case.engine.name, case.engine.settings, scene, versions, lines_of_certificate)
-    write(recording.columns.assign(**said), out)
+    attrs = {"status": result.status.value, "message": result.message, "wall_seconds": result.wall_seconds}
+    attrs |= manifest(case.engine.name, case.engine.settings, scene, versions, lines_of_certificate)
+    write(recording.columns.assign(**attrs), out)
     spent.on("writing")
     return result
 
 
 def _answer(error: Refused | Diverged, versions: dict[str, str]) -> Result:
-    """Result for an engine's refusal or divergence, unless the machine caused it: then there is none."""
+    """Result for a refusal or divergence of an engine; raises ProofrollError if the machine caused it."""
     if lack := lack_behind(error):
         raise ProofrollError(f"{error} ({type(lack).__name__})")
     status = Status.REFUSED if isinstance(error, Refused) else Status.DIVERGED
@@ -131,21 +131,21 @@ def _run_truth(
         spent.on("truth")
     wall = time.perf_counter() - start
     message = dataset.attrs.get("ill_posed") or f"{dataset.attrs['route']}, checked by {dataset.attrs['second_route']}"
-    said = {"status": "done", "message": message, "wall_seconds": wall}
-    write(dataset.assign_attrs(said | manifest("truth", {}, scene, versions)), out)
+    attrs = {"status": "done", "message": message, "wall_seconds": wall}
+    write(dataset.assign_attrs(attrs | manifest("truth", {}, scene, versions)), out)
     spent.on("writing")
     return Result(Status.DONE, message, wall_seconds=wall, versions=versions, trajectory=out.name)
 
 
 class _TimeAccounts:
-    """Accounts of the time of a case, by cause.
+    """Time of a case by activity.
 
     Attributes:
-        seconds: wall seconds by cause [s].
-        processor: seconds of this process by cause [s], whoever else computes on the machine.
+        seconds: activity -> wall time [s].
+        processor: activity -> processor time of this process [s], which other processes do not lengthen.
     """
 
-    _counted = 0.0  # of the processor, in the cases before: what has passed since was the start, and other requests
+    _counted = 0.0  # processor time up to the end of the last case [s]; later time is start-up and other requests
 
     def __init__(self) -> None:
         self.seconds: dict[str, float] = {}
@@ -154,9 +154,11 @@ class _TimeAccounts:
         self._since = time.perf_counter(), now
 
     def on(self, cause: str, **parts: tuple[float, float]) -> None:
-        """Adds the time since the last call to ``cause``, less ``parts`` of it, which are added to causes of their own.
+        """Adds the time since the last call to an activity.
 
-        Each part is a pair of wall and processor seconds [s].
+        Args:
+            cause: the activity.
+            **parts: activity -> wall and processor time of its own [s], which are taken off.
         """
         now = time.perf_counter(), time.process_time()
         for index, account in enumerate((self.seconds, self.processor)):

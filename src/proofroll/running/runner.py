@@ -1,4 +1,4 @@
-"""Runs cases in worker processes and survives whatever happens there."""
+"""Runs cases in worker processes and survives their crashes."""
 
 from __future__ import annotations
 
@@ -37,8 +37,8 @@ class Runner:
     Args:
         store: where results are kept.
         jobs: number of workers at once.
-        fresh: run every case again, once, whatever is stored.
-        cluster: where the cases run; None: here. Engines are asked here, and speeds measured here, all the same.
+        fresh: run every case again, once, though its result is stored.
+        cluster: runs the cases; None: this machine does. Engines are asked and speeds measured on this machine always.
         workers: processes that may have loaded an engine already; None: new ones.
     """
 
@@ -53,14 +53,14 @@ class Runner:
         self.store = store
         self.cluster = cluster
         self.workers = workers or Workers()
-        """Idle workers, for whoever asks engines something on behalf of the same study."""
+        """Idle workers, also for questions of the same study to engines."""
         self.jobs = jobs or os.cpu_count() or 1
         self.fresh = fresh
         self.reused = 0
         self.damaged: set[str] = set()
-        """Keys of the cases that were run again because what was stored is not what had been put there."""
+        """Keys of the cases that were run again because their stored results were damaged."""
         self.hosts: Counter[str] = Counter()
-        """How many of the results come from which machine, those of before included; an empty name is this one."""
+        """Machine -> number of results that it made, stored ones included; an empty name is this machine."""
         self._run_here: set[str] = set()
         self._busy: set[Worker] = set()
         self._stopping = threading.Event()
@@ -72,17 +72,21 @@ class Runner:
         budget: TimeBudget | None = None,
         place: Mapping[str, int] = MappingProxyType({}),
     ) -> dict[str, Result]:
-        """Results by key of the case; what the ``budget`` does not suffice for is left out.
+        """Results of cases, by key.
 
-        ``progress`` is called in this thread as each arrives; ``place``: see ``follow``.
+        Args:
+            cases: those to be run.
+            progress: called in this thread with each case and result as it arrives.
+            budget: processor time of all cases; cases beyond it are left out.
+            place: see :meth:`follow`.
         """
 
-        def told(case: Case, result: Result) -> tuple[()]:
+        def no_more(case: Case, result: Result) -> tuple[()]:
             if progress:
                 progress(case, result)
             return ()
 
-        return self.follow(cases, told, budget, place)
+        return self.follow(cases, no_more, budget, place)
 
     def follow(
         self,
@@ -91,13 +95,13 @@ class Runner:
         budget: TimeBudget | None = None,
         place: Mapping[str, int] = MappingProxyType({}),
     ) -> dict[str, Result]:
-        """Like :meth:`run`, but each result may ask for further cases, which are begun at once.
+        """Results of cases as by :meth:`run`, where each result may lead to further cases, which begin at once.
 
         Args:
-            cases: with which it begins.
+            cases: the first ones.
             then: called in this thread as each result arrives; returns cases that have not been asked for yet.
-            budget: processor time of cases in workers here; a cluster has none.
-            place: of cases by key; those of an earlier place are all begun first.
+            budget: processor time of cases on this machine; a cluster has none.
+            place: key of a case -> number; cases with a smaller number are all begun before others.
         """
         results: dict[str, Result] = {}
         asked: set[str] = set()
@@ -107,7 +111,7 @@ class Runner:
         ready: deque[tuple[Case, Result]] = deque()
 
         def ask(case: Case) -> int:
-            """Number of answers that will still arrive: one, or none where the answer is there already."""
+            """Number of answers that are still to arrive for a case: 1, or 0 if its result is there already."""
             if case.key in asked:
                 return 0
             asked.add(case.key)
@@ -155,7 +159,7 @@ class Runner:
         return results
 
     def _begin(self, pool: ThreadPoolExecutor, waiting: WaitingCases, arrived: _Arrived) -> None:
-        """Begins to serve what waits: on the cluster, or in so many workers here."""
+        """Starts serving the waiting cases, on the cluster or in workers of this machine."""
         if self.cluster is not None:
             pool.submit(self.cluster.serve, waiting.take, partial(self._arrive, arrived), arrived.put)
             return
@@ -163,7 +167,7 @@ class Runner:
             pool.submit(self._serve, waiting, arrived)
 
     def _stop(self) -> None:
-        """Ends what runs, here and on the cluster."""
+        """Ends all running cases, on this machine and on the cluster."""
         self._stopping.set()
         for worker in list(self._busy):
             worker.kill()
@@ -171,7 +175,7 @@ class Runner:
             self.cluster.stop()
 
     def _next(self, waiting: WaitingCases, engine: str | None, arrived: _Arrived) -> tuple[Case, float] | None:
-        """The next case and how long it may take [s]; None: there is none, or it all stops."""
+        """Next case and its time limit [s]; None: there are no more, or the runner stops."""
         while not self._stopping.is_set() and (case := waiting.take(engine)) is not None:
             if not (budget := waiting.budget):
                 return case, case.time_limit
@@ -182,7 +186,7 @@ class Runner:
         return None
 
     def _serve(self, waiting: WaitingCases, arrived: _Arrived) -> None:
-        """Serves cases one after another, in a new worker for another engine and after each crash."""
+        """Serves cases one after another; a new worker is taken for another engine and after each crash."""
         worker: Worker | None = None
         engine: str | None = None
         try:
@@ -196,14 +200,14 @@ class Runner:
                 if worker is None:
                     try:
                         worker = self.workers.take(engine)
-                    except (InputError, Missing, WorkerDied) as error:  # another interpreter, gone since it was asked
+                    except (InputError, Missing, WorkerDied) as error:  # the engine's interpreter is gone meanwhile
                         status = error.status if isinstance(error, WorkerDied) else Status.MISSING
                         if waiting.budget:
                             waiting.budget.end(case.key)
                         arrived.put((case, ended(case, status, error)))
                         continue
                     self._busy.add(worker)
-                    if self._stopping.is_set():  # whoever stops us may not have seen this worker
+                    if self._stopping.is_set():  # _stop may have run before this worker was in _busy
                         break
                 if not self._arrive(arrived, case, partial(_counted, waiting.budget, worker, case, limit)):
                     self._drop(worker)
@@ -220,32 +224,32 @@ class Runner:
             self.workers.keep(engine, worker)
 
     def _lacks_speed(self, case: Case, stored: Result) -> bool:
-        """True if a stored result has no speed only because it comes from another machine: then it is run here."""
+        """True if a stored result has no speed only because a cluster made it; the case is then run on this machine."""
         return bool(case.timed and stored.host and stored.status == Status.DONE and self.cluster is None)
 
     def _arrive(self, arrived: _Arrived, case: Case, make: Callable[[Path], Result]) -> bool:
-        """Takes in what came of a case, whatever it is; whether the process that made it lives on."""
+        """Stores and delivers the result of a case, or its failure; False if the process that made it has died."""
         try:
             result, lives = self._result(case, make), True
         except WorkerDied as error:
             if self._stopping.is_set():
                 return False
             result, lives = ended(case, error.status, error), False
-        except ProofrollError as error:  # a full disk, say, which costs this case alone
+        except ProofrollError as error:  # affects this case only, for example a full disk
             result, lives = ended(case, Status.CRASHED, error), True
         arrived.put((case, result))
         return lives
 
     def _result(self, case: Case, make: Callable[[Path], Result]) -> Result:
-        """The result of a case, stored; ``make`` writes its trajectory to a file."""
+        """Stored result of a case; ``make`` writes its trajectory to a file and returns the result."""
         with self.store.incoming(case) as written:
             try:
                 result = make(written)
-            except InputError as error:  # a step that does not divide the grid, say: this case's own affair
+            except InputError as error:  # affects this case only, for example a step that does not divide the grid
                 result = ended(case, Status.REFUSED, error)
-            except WorkerDied as error:  # where the disk is full the name for a while means nothing to a person
-                said = str(error).replace(str(written.absolute()), str(self.store.trajectory(case)))
-                raise WorkerDied(error.status, said) from None
+            except WorkerDied as error:  # show the final name of the file, not the temporary one
+                shown = str(error).replace(str(written.absolute()), str(self.store.trajectory(case)))
+                raise WorkerDied(error.status, shown) from None
             return self.store.put(case, result, written)
 
     def _drop(self, worker: Worker) -> None:
@@ -261,14 +265,14 @@ def _ask(worker: Worker, case: Case, limit: float, out: Path) -> Result:
         ran = result.versions.get(name)
         if ran != case.engine.version:
             raise WorkerDied(Status.CRASHED, f"version {ran} of {name} ran, and {case.engine.version} had answered")
-        waited = worker.waited - sum(result.spent.values())  # a new process starts, and messages go to and fro
+        waited = worker.waited - sum(result.spent.values())  # start of the process and transfer of messages
         return dataclasses.replace(result, spent=result.spent | {"process start": waited})
     except Missing as error:
         return Result(Status.MISSING, str(error))
 
 
 def _counted(budget: TimeBudget | None, worker: Worker, case: Case, limit: float, out: Path) -> Result:
-    """Result of a case; a budget learns its cost, and a case that would cost more is left out."""
+    """Result of a case whose processor time is charged to the budget; beyond its share the case is left out."""
     if budget is None:
         return _ask(worker, case, limit, out)
     before = worker.used
@@ -283,12 +287,12 @@ def _counted(budget: TimeBudget | None, worker: Worker, case: Case, limit: float
 
 
 def ended(case: Case, status: Status, error: ProofrollError) -> Result:
-    """Result of a case without a result of the worker."""
+    """Result of a case whose worker gave none, from the error."""
     return Result(status, str(error), versions={plain_name(case.engine.name): case.engine.version})
 
 
 def run_one(case: Case, out: Path, workers: Workers | None = None) -> Result:
-    """Runs a single case, its trajectory going to ``out``, with nothing stored or reused."""
+    """Result of a single case, with its trajectory in ``out``; nothing is stored or reused."""
     try:
         with lent_workers(workers) as lent, lent.lend(case.engine.name) as worker:
             return _ask(worker, case, case.time_limit, out)

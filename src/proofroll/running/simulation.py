@@ -1,4 +1,4 @@
-"""One scene in one engine, from Python, in this process."""
+"""Runs one scene in one engine from Python, in this process."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 
 def build(scene: Scene, engine: Any, **settings: Any) -> Any:
-    """The scene in the engine at time 0, after checking that the engine can represent it.
+    """Engine with the scene at time 0, after checking that it can represent the scene.
 
     Args:
         scene: from :func:`proofroll.load_scene`.
@@ -32,7 +32,7 @@ def build(scene: Scene, engine: Any, **settings: Any) -> Any:
         **settings: the engine's settings, besides those in brackets.
 
     Raises:
-        InputError: unknown engine or setting, or one that is given twice.
+        InputError: unknown engine or setting, or a setting that is given twice.
         Missing: the engine is not installed.
         Refused: the engine cannot represent the scene.
     """
@@ -41,7 +41,7 @@ def build(scene: Scene, engine: Any, **settings: Any) -> Any:
 
 
 def _resolved(scene: Scene, engine: Any, settings: dict[str, Any]) -> tuple[Any, Any]:
-    """The engine's class, and its complete settings."""
+    """Class and complete settings of an engine. Raises InputError as :func:`build` does."""
     if not isinstance(engine, str):
         if lacking := lacking_of(engine, "advance", "sample", "built"):
             shown = engine.__name__ if isinstance(engine, type) else repr(engine)
@@ -63,24 +63,24 @@ def simulate(
     every: float | None = None,
     **settings: Any,
 ) -> xr.Dataset:
-    """The trajectory of a scene in an engine, with units on every variable.
+    """Trajectory of a scene in an engine, with units on every variable.
 
     Args:
         scene: from :func:`proofroll.load_scene`, or the name or path that it takes.
         engine: ``truth``, ``name``, ``name[key=value,…]``, or the class, which no package needs to announce.
         until: last time [s].
-        every: interval between samples [s]; by default 0.01 s, or the nearest whole number of steps.
+        every: sampling interval [s]; by default 0.01 s, or the nearest whole number of steps.
         **settings: e.g. ``formulation="chart", dt=1e-4``.
 
     Returns:
-        Dataset with the attributes ``status`` (``done`` or ``diverged``), ``message``, one sentence, and those of
+        Dataset with the attributes ``status`` (``done`` or ``diverged``), ``message`` (one sentence) and those of
         :func:`proofroll.running.manifest.manifest`: engine, settings, parameters, versions. The truth's variables have
         an attribute ``error_bar``, in their unit.
 
     Raises:
         InputError: a value that makes no sense.
         Missing: the engine is not installed.
-        Refused: the engine cannot represent the scene, or built something else than the scene says.
+        Refused: the engine cannot represent the scene, or its model contradicts it (certificate).
     """
     if isinstance(scene, str):
         scene = load_scene(scene)
@@ -115,7 +115,7 @@ def simulate(
 
 
 def recorded(engine: Any, scene: Scene, *, until: float = 2.0, every: float | None = None) -> xr.Dataset:
-    """The trajectory of an engine that is built already, at time 0; see :func:`simulate`."""
+    """Trajectory of an engine that was built by the caller and is at time 0; see :func:`simulate`."""
     recording = record(engine, scene, time_grid(until, EVERY if every is None else every))
     status = "done" if recording.failure is None else "diverged"
     return recording.dataset.assign_attrs(status=status, message=recording.message(until))

@@ -1,4 +1,4 @@
-"""Measures the speed of cases in worker processes, one at a time, so that nothing of ours runs beside them."""
+"""Measures the speed of cases in worker processes, one at a time, so that no other case of ours runs beside them."""
 
 import dataclasses
 from typing import Self
@@ -9,14 +9,14 @@ from proofroll.running.case import Case
 from proofroll.running.process import Worker, WorkerDied
 from proofroll.running.worker_pool import Workers
 
-# Long enough for the clock and for caches to settle, short enough for many rounds.
+# Default length of a measurement [s]: long enough for the clock and the caches, short enough for many rounds.
 SECONDS = 0.05
 
 
 class Stopwatch:
-    """Clock with one worker per engine, kept warm between the rounds of :func:`proofroll.running.timing.interleaved`.
+    """Measures speeds with one worker per engine, kept warm for :func:`proofroll.running.timing.interleaved`.
 
-    They come from ``workers`` and go back there.
+    The workers are borrowed from ``workers``.
     """
 
     def __init__(self, workers: Workers | None = None) -> None:
@@ -24,15 +24,15 @@ class Stopwatch:
         self._workers: dict[str, Worker] = {}
 
     def __call__(self, case: Case, seconds: float | None = None) -> float | None:
-        """Wall seconds per simulated second of a case, from clean runs that only advance; None: it did not run.
+        """Wall time per simulated second of a case, from clean runs that only advance; None: they failed.
 
-        They last ``seconds``, by default :data:`SECONDS`.
+        The runs take ``seconds`` of wall time, by default :data:`SECONDS`.
         """
         name = case.engine.name
         if name not in self._workers:
             try:
                 self._workers[name] = self._lent.take(name)
-            except ProofrollError:  # another interpreter that does not serve any more
+            except ProofrollError:  # the engine's interpreter is gone
                 return None
         request = {"do": "time", "case": dataclasses.asdict(case), "seconds": seconds or SECONDS}
         try:
@@ -40,13 +40,13 @@ class Stopwatch:
         except WorkerDied:
             self._workers.pop(name).close()
             return None
-        except BaseException:  # its answer is still to come, and would be taken for the next one's
+        except BaseException:  # the late answer would be taken for that of the next request
             self._workers.pop(name).close()
             raise
         return float(rate) if rate is not None else None
 
     def close(self) -> None:
-        """Gives the workers back to their lender, or ends them."""
+        """Returns the workers to their pool."""
         for name, worker in self._workers.items():
             self._lent.keep(name, worker)
         self._workers.clear()

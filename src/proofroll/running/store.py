@@ -1,4 +1,4 @@
-"""Results on disk: one trajectory and one record per case, each whole or not there, named by the case's key."""
+"""Results on disk: one trajectory and one record per case, named by the case's key and written atomically."""
 
 import atexit
 import contextlib
@@ -20,7 +20,7 @@ from proofroll.running.case import LASTING, Case, Result
 
 
 def write_text(path: Path, text: str) -> None:
-    """Writes a text file so that it is either whole or not there.
+    """Writes a text file atomically.
 
     Raises:
         ProofrollError: the place cannot be written.
@@ -29,7 +29,7 @@ def write_text(path: Path, text: str) -> None:
         temporary.write_text(text, encoding="utf-8")
 
 
-# A trajectory that is being made lies in a folder of this kind, which its process has locked.
+# Prefix of the folder of an unfinished trajectory, which its process has locked.
 _INCOMING = ".incoming-"
 
 
@@ -54,7 +54,7 @@ class Store:
             ) from None
 
     def _sweep(self) -> None:
-        """Removes what processes left that were ended in the middle of a case, and nothing that is in use."""
+        """Removes unfinished trajectories of processes that were killed; those in use are locked and stay."""
         with self._locked(fcntl.LOCK_EX):
             for place in self.folder.glob(f"{_INCOMING}*"):
                 with contextlib.suppress(OSError), _holding(place, fcntl.LOCK_EX | fcntl.LOCK_NB):  # else in use
@@ -65,38 +65,45 @@ class Store:
         return self.folder / f"{case.key}{STORED}"
 
     def stored(self, case: Case) -> StoredTrajectory:
-        """Trajectory of a case; the same object as long as anything holds it, so that all share what was read."""
+        """Trajectory of a case; one shared object while it is in use, so that the file is read once."""
         return self._held.setdefault(case.key, StoredTrajectory(self.trajectory(case)))
 
     @contextlib.contextmanager
     def incoming(self, case: Case) -> Iterator[Path]:
-        """A file for a trajectory that is being made, in a folder of its own; what is left there is removed.
+        """Context manager with a file for a trajectory in a temporary folder, which is removed at the end.
 
         Raises:
             ProofrollError: the place cannot be written.
         """
         with contextlib.ExitStack() as held:
             try:
-                with self._locked(fcntl.LOCK_SH):  # or another process would remove it before it is locked
+                with self._locked(fcntl.LOCK_SH):  # or _sweep of another process would remove it before it is locked
                     place = tempfile.mkdtemp(prefix=_INCOMING, dir=self.folder)
-                    held.callback(shutil.rmtree, place, ignore_errors=True)  # who ends while writing leaves a half
-                    with contextlib.suppress(OSError):  # of a file system that cannot lock
+                    held.callback(shutil.rmtree, place, ignore_errors=True)  # with an unfinished file, if any
+                    with contextlib.suppress(OSError):  # the file system cannot lock
                         held.enter_context(_holding(Path(place), fcntl.LOCK_SH))
             except OSError as error:
                 raise ProofrollError(f"{self.folder} cannot be written ({error.strerror or error})") from None
             yield Path(place) / self.trajectory(case).name
 
     def has(self, case: Case) -> bool:
-        """True if there is a record of the case, sound or not."""
+        """True if there is a record of the case, damaged or not."""
         return os.path.lexists(self.folder / f"{case.key}.json")
 
     def put(self, case: Case, result: Result, written: Path | None = None) -> Result:
-        """Keeps a result, with its trajectory, if any, from the file ``written``; None: it is in place already.
+        """Stores a result and its trajectory; returns the result with the checksum of the trajectory.
 
-        Record and trajectory change together, and only when both are wholly on the disk.
+        Record and trajectory are replaced together, after both are completely on disk. A result that may change next
+        time
+        (:data:`LASTING`) is not stored.
+
+        Args:
+            case: that was run.
+            result: of the case.
+            written: file of the trajectory, which is moved into place; None: it is in place already, or there is none.
 
         Raises:
-            ProofrollError: the place cannot be written; what was stored before is still there.
+            ProofrollError: the place cannot be written; an earlier result is still there.
         """
         if result.trajectory is not None:
             path = written or self.trajectory(case)
@@ -106,12 +113,12 @@ class Store:
                 raise ProofrollError(f"{path} cannot be read ({error.strerror or error})") from None
             result = dataclasses.replace(result, checksum=checksum)
         if result.status in LASTING:
-            said = {"case": dataclasses.asdict(case), "result": dataclasses.asdict(result)}
+            content = {"case": dataclasses.asdict(case), "result": dataclasses.asdict(result)}
             place = self.folder / f"{case.key}.json"
             with self._locked(fcntl.LOCK_EX), replacing(place) as record:
-                record.write_text(json.dumps(said | {"seal": _seal(said)}, indent=1), encoding="utf-8")
+                record.write_text(json.dumps(content | {"seal": _seal(content)}, indent=1), encoding="utf-8")
                 for old in (place, self.trajectory(case)):
-                    if old.is_dir() and not old.is_symlink():  # under the name of a result it is damage
+                    if old.is_dir() and not old.is_symlink():  # a folder in the place of a result is damage
                         shutil.rmtree(old)
                 self._held.pop(case.key, None)
                 if written and result.trajectory is not None:
@@ -120,14 +127,14 @@ class Store:
 
     @contextlib.contextmanager
     def _locked(self, how: int) -> Iterator[None]:
-        """Keeps other processes from changing records meanwhile, where the file system can lock."""
+        """Context manager with a lock on the folder, if the file system can lock."""
         with contextlib.ExitStack() as stack:
             with contextlib.suppress(OSError):
                 stack.enter_context(_holding(self.folder, how))
             yield
 
     def get(self, case: Case) -> Result | None:
-        """The stored result, or None if there is none or it is not what was stored."""
+        """Stored result of a case; None if there is none or it is damaged."""
         try:
             with self._locked(fcntl.LOCK_SH):
                 record = json.loads(ordinary_content(self.folder / f"{case.key}.json"))
@@ -139,15 +146,15 @@ class Store:
                 checksum = hashlib.sha256(ordinary_content(self.trajectory(case))).hexdigest()
                 return result if checksum == result.checksum else None
         except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError, MemoryError):
-            return None  # absent, truncated, tampered with or no file of ours: the case is run again
+            return None  # absent, truncated, changed or not our file: the case is run again
 
 
 @contextlib.contextmanager
 def _holding(folder: Path, how: int) -> Iterator[None]:
-    """Holds a lock of a folder; the system lets it go when the process ends, however that ends.
+    """Context manager with a lock on a folder, which the system releases even if the process is killed.
 
     Raises:
-        OSError: another process has it, where ``how`` does not wait, or the file system cannot lock.
+        OSError: another process has the lock and ``how`` does not wait, or the file system cannot lock.
     """
     opened = os.open(folder, os.O_RDONLY)
     try:
@@ -158,7 +165,7 @@ def _holding(folder: Path, how: int) -> Iterator[None]:
 
 
 def _remove_empty(folders: Sequence[Path]) -> None:
-    """Removes folders that were made for results, the innermost first, if a wrong name left them empty."""
+    """Removes folders made for results if they stayed empty, the innermost first."""
     with contextlib.suppress(OSError):
         for folder in folders:
             folder.rmdir()
@@ -166,7 +173,7 @@ def _remove_empty(folders: Sequence[Path]) -> None:
 
 @contextlib.contextmanager
 def alone_in(folder: Path, wait: Callable[[], None]) -> Iterator[None]:
-    """Only one process at a time is in here for a folder; ``wait`` is called where another one is waited for."""
+    """Context manager that only one process at a time enters for a folder; ``wait`` is called before waiting."""
     with contextlib.ExitStack() as stack:
         try:
             stack.enter_context(_holding(folder, fcntl.LOCK_EX | fcntl.LOCK_NB))
@@ -174,10 +181,10 @@ def alone_in(folder: Path, wait: Callable[[], None]) -> Iterator[None]:
             wait()
             stack.enter_context(_holding(folder, fcntl.LOCK_EX))
         except OSError:
-            pass  # of a file system that cannot lock
+            pass  # the file system cannot lock
         yield
 
 
 def _seal(record: object) -> str:
-    """Hash of a record, so that one whose numbers were changed is not believed."""
+    """Hash of a record, which reveals that it was changed."""
     return hashlib.sha256(json.dumps(record, sort_keys=True).encode()).hexdigest()

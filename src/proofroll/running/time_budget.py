@@ -1,4 +1,4 @@
-"""Processor time that the cases of one study may take together, for studies that would rather leave something out."""
+"""Limit on the total processor time of a study's cases; cases beyond it are left out."""
 
 import threading
 import time
@@ -8,30 +8,33 @@ from types import MappingProxyType
 
 from proofroll.running.process import processor_seconds
 
-# Part of the seconds that is kept for reading and judging what comes of the cases, until it is known what that takes.
+# Part of the budget that is reserved for reading and judging results, until its real cost is known.
 _AFTER = 0.1
-# A case with less time than it takes to start a process is not begun [s].
+# Least time for a case [s], about that for starting a process; with less it is not begun.
 _LEAST = 0.5
-# Least share of a group, as far as so much is left [s]: enough for a truth and the first runs. With less no group would
-# finish anything, and the same command would begin the same runs again.
+# Least share of a group, if so much is left [s]: enough for a truth and the first runs. With less no group would finish
+# anything, and a repeated command would begin the same runs again.
 _SHARE = 10.0
 
 
 class TimeBudget:
-    """Processor time of the cases of one study; what it does not suffice for is left out.
+    """Processor time for the cases of one study; cases beyond it are left out.
 
-    Cases belong to groups, as the comparisons of a report. A group that begins gets an equal part of the time left,
-    but at least what a truth needs; what it leaves over is for later groups. A case gets an equal part of its group's
-    time among the cases of the group that run now, and never more than an equal part of the time left among all that
-    run: so the sum is never exceeded. A case that was ended begins again, and only with more time.
+    Cases belong to groups, for example the comparisons of a report. A group that begins gets an equal part of the time
+    left,
+    but at least enough for a truth; what it does not use is for later groups. A case gets an equal part of its group's
+    time
+    among the group's running cases, and at most an equal part of the time left among all running cases, so that the
+    total
+    is never exceeded. A case that was ended for lack of time begins again only with more time.
 
     Args:
-        seconds: of processor time, that of this process included [s].
-        spent: those of them that asking the engines has taken already [s].
-        group: of cases by key; all others are one.
+        seconds: processor time, with that of this process [s].
+        spent: processor time that was spent on asking engines before [s].
+        group: key of a case -> group; all other cases are in group 0.
 
     Attributes:
-        after: processor time that is kept for what comes after the cases [s].
+        after: processor time that is reserved for the work after the cases [s].
     """
 
     def __init__(self, seconds: float, spent: float = 0.0, group: Mapping[str, int] = MappingProxyType({})) -> None:
@@ -47,32 +50,32 @@ class TimeBudget:
 
     @property
     def sentence(self) -> str:
-        """Reason that a case is left out."""
+        """Reason why a case is left out."""
         return f"the {self.seconds:g} s of processor time did not suffice"
 
     @property
     def left(self) -> float:
-        """Processor time that is left for cases [s]."""
+        """Processor time left for cases [s]."""
         with self._lock:
             return self._left()
 
     def _left(self) -> float:
-        """See :attr:`left`; under the lock."""
+        """Processor time left for cases [s]; to be called with the lock held."""
         used = processor_seconds() - self._start + self._lost + sum(map(self._passed, self._begun))
         return max(0.0, self.seconds - self.after - used)
 
     def _passed(self, case: str) -> float:
-        """Seconds of a case that has begun: by the wall, where others may have the processor, but what it may take."""
+        """Wall time of a running case [s], but at most its allowed time, as others may have the processor."""
         begun, allowed = self._begun[case]
         return min(time.monotonic() - begun, allowed)
 
     def wait(self, case: str) -> None:
-        """Counts one more case that waits for a worker."""
+        """Registers a case that waits for a worker."""
         with self._lock:
             self._unfinished[self._group.get(case, 0)] += 1
 
     def begin(self, case: str, abreast: int) -> float:
-        """Seconds that a case may take beside at most ``abreast`` - 1 others; 0: it is not to be begun."""
+        """Time that a case may take while at most ``abreast`` cases run [s]; 0: it must not begin."""
         group = self._group.get(case, 0)
         with self._lock:
             left = self._left()
@@ -87,12 +90,12 @@ class TimeBudget:
             return seconds
 
     def end(self, case: str, used: float = 0.0, *, lost: bool = False) -> None:
-        """Counts a case that has ended.
+        """Registers the end of a case.
 
         Args:
             case: its key.
             used: its processor time [s].
-            lost: it has none, and counts by its wall time, but by no more than it was allowed.
+            lost: True if its processor time is unknown; its wall time counts, but at most the allowed time.
         """
         group = self._group.get(case, 0)
         with self._lock:

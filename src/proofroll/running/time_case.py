@@ -1,4 +1,4 @@
-"""Speed of an engine from clean runs: they only advance, take one last sample, and end where the judged run ends."""
+"""Speed of an engine from clean runs, which only advance, take one last sample, and end where the judged run ends."""
 
 from __future__ import annotations
 
@@ -17,24 +17,25 @@ from proofroll.running.case import Case
 if TYPE_CHECKING:
     from proofroll.running.recording import Recording
 
-# A clean run shorter than this is repeated, up to three times, so that its median means something.
+# Clean runs are repeated up to _TIMED_RUNS times until they took _TIMED_SECONDS together; one run is cut off after
+# _ENOUGH_SECONDS [s].
 _TIMED_SECONDS = 0.2
 _TIMED_RUNS = 3
 _ENOUGH_SECONDS = 0.3
-# A measurement builds a short case again and again until it has run long enough to mean something, but all of it, the
-# builds included, may last no more than this many times as long.
+# A measurement repeats a short case, each time newly built; with all builds it takes at most this many times the time
+# that is to be measured.
 _MOST_BUILDING = 5.0
-# The same stops give the same run, to the last bit or nearly so; relative to the size of an element.
+# Largest difference of two runs with the same stops, relative to the size of an element.
 _SAME = 1e-6
-# A sample that costs so many usual ones, and as much as this part of the run before it, does work that was put off; in
-# less than so many seconds nothing can be told.
+# The last sample does work that ``advance`` put off if it costs as much as _PUT_OFF usual samples, _PART of the run
+# before it, and at least _LEAST_SECONDS [s].
 _PUT_OFF, _PART, _LEAST_SECONDS = 10.0, 0.5, 0.05
 
 
 def time_once(case: dict[str, Any], seconds: float) -> dict[str, Any]:
-    """One measurement of a case's speed: clean runs for about this many wall seconds, one after another.
+    """Measures a case's speed once: clean runs, one after another, for about this much wall time [s].
 
-    Of the truth they are whole runs of both routes together.
+    For the truth the runs are whole ones, of both routes together.
     """
     from proofroll.core.time_grid import time_grid
     from proofroll.core.truth import truth
@@ -63,11 +64,11 @@ def time_once(case: dict[str, Any], seconds: float) -> dict[str, Any]:
 
 @dataclass
 class CleanRuns:
-    """Runs that only advance.
+    """Measurement of runs that only advance.
 
     Attributes:
-        rates: of each, wall seconds per simulated second; none where they are not the run that is judged.
-        wall, processor: of all [s].
+        rates: wall time per simulated second of each; empty if they do not repeat the judged run.
+        wall, processor: time of all runs [s].
         remarks: warnings about the times, one clause each.
     """
 
@@ -78,9 +79,9 @@ class CleanRuns:
 
 
 def clean_runs(kind: Any, scene: Scene, settings: Any, recording: Recording) -> CleanRuns:
-    """Runs that stop where the one that was recorded did, each on an engine built for it.
+    """Clean runs with the stops of the recorded run, each on a newly built engine.
 
-    An engine that is not looked at must do the same as one that is: they end at one place.
+    They must end in the same place as the recorded run, which was sampled.
     """
     last = float(recording.columns["time"].values[-1])
     stops, timed, runs = [t for t in recording.passed if t <= last], CleanRuns(), list[_CleanRun]()
@@ -109,7 +110,13 @@ def clean_runs(kind: Any, scene: Scene, settings: Any, recording: Recording) -> 
 
 
 def is_put_off(advancing: float, sampling: float, usual: float) -> bool:
-    """True if the last sample does work that ``advance`` put off, by the seconds of both and of a usual sample."""
+    """True if the last sample does work that ``advance`` put off.
+
+    Args:
+        advancing: time of ``advance`` [s].
+        sampling: time of the last sample [s].
+        usual: time of a usual sample [s].
+    """
     return sampling > max(_LEAST_SECONDS, _PART * advancing, _PUT_OFF * usual)
 
 
@@ -123,7 +130,7 @@ def _apart(scene: Scene, one: AnySample, other: AnySample) -> float:
 
 @dataclass(frozen=True)
 class _CleanRun:
-    """One run to time ``t`` [s]: wall seconds of all and of its last sample [s], and that sample."""
+    """One clean run to time ``t`` [s]: wall time of the whole run and of its last sample [s], and that sample."""
 
     t: float
     wall: float
@@ -132,10 +139,11 @@ class _CleanRun:
 
 
 def _clean_run(engine: Any, stops: Iterable[float], enough: float) -> _CleanRun:
-    """A run that only advances, up to a last sample, before which some engines are not done.
+    """Clean run: it only advances, and takes one last sample, as some engines finish their work only then.
 
-    It stops where the sampled run stopped, for an adaptive step that may run past a sample is another, cheaper one;
-    and it ends when ``enough`` wall seconds are over, which measure a rate as well as ten times as many do.
+    It stops where the sampled run stopped, as an adaptive step that passes over a sample would be a cheaper run. It
+    ends
+    after ``enough`` wall time [s], which measures a rate as well as ten times as much would.
     """
     clock = time.perf_counter
     start, t = clock(), 0.0

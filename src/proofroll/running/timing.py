@@ -1,7 +1,6 @@
-"""Timings that can be compared on a noisy machine: taken in turns, with an interval, in pyperf's data model.
+"""Timings that are comparable on a noisy machine: in rounds, with a confidence interval, in pyperf's data model.
 
-Whatever slows the machine for a while slows everything that is measured in that round, so a ratio of two timings is
-taken round by round.
+A disturbance slows all tasks of its round, so a ratio of two timings is taken round by round.
 """
 
 import math
@@ -18,25 +17,26 @@ import numpy as np
 
 from proofroll.files.atomic import replacing
 
-# Wanted of every interval …
+# Least confidence of an interval.
 CONFIDENCE = 0.95
-# … which fewer values cannot give: the whole range of five holds the median with 94 %.
+# Fewest rounds that give this confidence: the whole range of five values holds the median with 94 %.
 ROUNDS = 6
-# A claim about cost is contradicted if its engine takes more than this many times as long as another one. Neighbouring
-# steps of a sweep are a factor of 2 to 2.5 apart, and so is the cost at which an engine is seen to hold a tolerance:
-# what is less than that apart may change places with one more step between two others, or on another processor.
+# A claim about cost is contradicted if its engine takes more than this many times as long as another one. Steps of a
+# sweep differ by factors of 2 to 2.5, and so do the costs at which an engine meets a tolerance: a smaller ratio might
+# reverse with one more step in the sweep, or on another processor.
 FACTOR = 2.0
 
 
 @dataclass(frozen=True)
 class Interval:
-    """A measured number with an interval.
+    """Median of measured values with a confidence interval.
 
     Attributes:
         value: the median.
-        low, high: two of the measured values, as far inside as the confidence allows.
-        confidence: with which they enclose the true median: at least 0.95 from six values on; 0.75 for the range of
-            three; 0 for a single one.
+        low, high: the two innermost measured values that have the confidence.
+        confidence: probability that they enclose the true median: at least 0.95 from six values on; 0.75 for the range
+            of
+            three; 0 for a single value.
     """
 
     value: float
@@ -46,7 +46,7 @@ class Interval:
 
     @property
     def known(self) -> bool:
-        """True if it is an interval of at least 95 %, rather than the range of too few values."""
+        """True if the confidence is at least 95 %; otherwise there were too few values."""
         return self.confidence >= CONFIDENCE
 
 
@@ -56,7 +56,7 @@ class Timing:
 
     Attributes:
         values: one per round, in the order of the rounds [s].
-        warmups: those before, which do not count [s].
+        warmups: earlier values, which do not count [s].
     """
 
     values: tuple[float, ...]
@@ -64,7 +64,7 @@ class Timing:
 
     @cached_property
     def interval(self) -> Interval:
-        """Median of the values [s]."""
+        """Median of the values with its interval [s]."""
         return _interval(np.array(self.values))
 
 
@@ -75,14 +75,14 @@ def interleaved(
     once_above: float = np.inf,
     enough: Callable[[], bool] = lambda: False,
 ) -> dict[str, Timing]:
-    """Every task once per round, each round in another order; the first of several only warms up.
+    """Timings of tasks, each run once per round in a random order; the first of several rounds is a warm-up.
 
     Args:
-        tasks: measure something once and give seconds, or None where it cannot be measured: it is then left out.
+        tasks: name -> function that measures once and returns seconds, or None if that failed: the task is left out.
         rounds: number of rounds that count.
         progress: called with a task's name after each of its measurements.
-        once_above: longest time of a first round [s] that is measured again; above it that value counts.
-        enough: asked after each round; true ends the measurement.
+        once_above: a task whose first value is larger [s] is not measured again; that value counts.
+        enough: called after each round; True ends the measurement.
     """
     order = random.Random(0)
     seconds_of: dict[str, list[float]] = {name: [] for name in tasks}
@@ -109,21 +109,21 @@ def interleaved(
 
 
 def ratio(numerator: Timing, denominator: Timing) -> Interval:
-    """Ratio of two times, round by round; both from one call of :func:`interleaved`."""
+    """Ratio of two timings, taken round by round; both must come from one call of :func:`interleaved`."""
     return _interval(np.array(numerator.values) / np.array(denominator.values))
 
 
 def named(confidence: float) -> str:
-    """Name of an interval with this confidence: the range of too few values is no interval of 95 %."""
+    """Text for an interval with this confidence; one below 95 % is called a range."""
     if not confidence:
         return "measured once"
     return f"{'interval' if confidence >= CONFIDENCE else 'range'} of {100 * confidence:.3g} %"
 
 
 def _interval(values: np.ndarray[Any, np.dtype[np.float64]]) -> Interval:
-    """The narrowest pair of values, equally many from either end, that has the confidence; else their whole range.
+    """Narrowest pair of values, at equal ranks from both ends, that has the confidence; else the whole range.
 
-    As many values lie below the true median as heads fall in as many throws of a coin, whatever their distribution.
+    The number of values below the true median has a binomial distribution with p = 1/2, whatever that of the values.
     Source: H. A. David, H. N. Nagaraja, Order Statistics, 3rd ed., section 7.1.
     """
     ordered, count = np.sort(values), len(values)
@@ -134,7 +134,7 @@ def _interval(values: np.ndarray[Any, np.dtype[np.float64]]) -> Interval:
 
 
 def machine() -> dict[str, str]:
-    """Facts of the machine that matter for speed."""
+    """Facts of the machine that affect speed."""
     return {
         "processor": _processor(),
         "cores": str(os.cpu_count()),
@@ -144,7 +144,7 @@ def machine() -> dict[str, str]:
 
 
 def _processor() -> str:
-    """Name of the processor; the architecture where the system does not tell."""
+    """Name of the processor, or the architecture if the system has no name."""
     try:
         lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
     except OSError:

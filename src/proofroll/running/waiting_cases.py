@@ -1,4 +1,4 @@
-"""Cases that wait for a worker, by engine."""
+"""Queue of cases that wait for a worker, by engine."""
 
 import threading
 from collections import deque
@@ -10,11 +10,13 @@ from proofroll.running.time_budget import TimeBudget
 
 
 class WaitingCases:
-    """Cases that wait for a worker, which keeps its engine while it can: a new worker costs more than many cases.
+    """Queue of cases that wait for a worker.
+
+    A worker gets cases of the same engine while there are any, as a new worker costs more than many cases.
 
     Args:
-        budget: of the processor time of the cases, or None.
-        place: of cases by key, 0 without; those of an earlier place are all begun before one of a later place is.
+        budget: processor time of the cases, or None.
+        place: key of a case -> number, by default 0; cases with a smaller number are all begun before others.
     """
 
     def __init__(self, budget: TimeBudget | None = None, place: Mapping[str, int] = MappingProxyType({})) -> None:
@@ -26,7 +28,7 @@ class WaitingCases:
         self._closed = False
 
     def add(self, case: Case) -> None:
-        """Puts a case at the end."""
+        """Appends a case."""
         if self.budget:
             self.budget.wait(case.key)
         with self._changed:
@@ -35,15 +37,16 @@ class WaitingCases:
             self._changed.notify()
 
     def close(self) -> None:
-        """Nothing more will come, and what waits is not to be begun."""
+        """Closes the queue: no more cases come, and waiting ones are not begun."""
         with self._changed:
             self._closed = True
             self._changed.notify_all()
 
     def take(self, engine: str | None) -> Case | None:
-        """Next case, of this engine if it has one, else of one that no worker has begun; None: it is closed.
+        """Next case, preferably of this engine, else of one that no worker has begun; None: the queue is closed.
 
-        Where all are begun, the one with the most cases left is shared. Where there is none, it waits for one.
+        If all engines are begun, the one with the most waiting cases is shared. While there is no case, it waits for
+        one.
         """
         with self._changed:
             while not self._closed:

@@ -1,7 +1,7 @@
-"""The process in which engines run: one request a line on standard input, one answer a line on a private pipe.
+"""Process in which engines run: it reads one request a line from standard input, and answers through a private pipe.
 
-``python -m proofroll.running.worker FD PARENT LIFE`` serves requests until its input ends. What an engine prints cannot
-reach the answers, and what an engine breaks costs only this process.
+``python -m proofroll.running.worker FD PARENT LIFE`` serves requests until its input ends. Text that an engine prints
+cannot get into the answers, and a crash of an engine ends only this process.
 """
 
 import gc
@@ -25,12 +25,18 @@ from proofroll.running.time_case import time_once
 
 
 def main(answers: int, parent: int, life: int) -> None:
-    """Serves requests; ``answers`` is the pipe for the answers, ``life`` one that ``parent``, who asks, holds open."""
+    """Serves requests until standard input ends.
+
+    Args:
+        answers: file descriptor of the pipe for answers.
+        parent: number of the process that sends requests.
+        life: file descriptor of a pipe that the parent holds open while it lives.
+    """
     end_with(parent)
     end_with_pipe(life)
-    signal.signal(signal.SIGINT, signal.SIG_DFL)  # an engine that catches it would take it for its own failure
+    signal.signal(signal.SIGINT, signal.SIG_DFL)  # an engine might catch KeyboardInterrupt as its own failure
     volunteer()
-    gc.disable()  # until the engine is loaded: modules leave nothing to collect, and to look costs a tenth of the start
+    gc.disable()  # until the engine is loaded: imports leave no garbage, and collection takes a tenth of the start
     watch()
     requests = os.fdopen(os.dup(0), encoding="utf-8")
     with open(os.devnull, "rb") as nothing:
@@ -40,7 +46,7 @@ def main(answers: int, parent: int, life: int) -> None:
             request = json.loads(line)
             number = request.pop("number")
             answer = _answer(request)
-            used = sum(os.times()[:4])  # of the processor, with that of processes that it waited for
+            used = sum(os.times()[:4])  # processor time of this process and of its ended children
             pipe.write(json.dumps({**answer, "number": number, "used": used}) + "\n")
             pipe.flush()
 
@@ -64,7 +70,7 @@ def _answer(request: dict[str, Any]) -> dict[str, Any]:
         return {"error": "input", "field": error.field, "value": value, "advice": error.advice}
     except Missing as error:
         return {"error": "missing", "message": str(error)}
-    except ProofrollError as error:  # a full disk, say
+    except ProofrollError as error:  # for example a full disk
         return {"error": "crashed", "message": str(error)}
     except Exception as error:
         return {"error": "crashed", "message": one_line(error)}
@@ -73,7 +79,7 @@ def _answer(request: dict[str, Any]) -> dict[str, Any]:
 
 
 def write(case: dict[str, Any], what: str) -> dict[str, Any]:
-    """The text that an engine writes of a case, its ``reproducer`` or ``model_file``; or why it writes none."""
+    """Text of the ``reproducer`` or ``model_file`` that an engine writes for a case, or why it writes none."""
     from proofroll.core.engine_abilities import Reproduces, WritesModels
     from proofroll.running.loading import loaded, scene_of
 
@@ -92,8 +98,8 @@ def write(case: dict[str, Any], what: str) -> dict[str, Any]:
 
 
 def call(function: str, arguments: dict[str, Any]) -> dict[str, Any]:
-    """A function of another package in this process, ``module:name``, e.g. one that measures an engine."""
-    gc.freeze()  # modules need not be looked at again in every collection
+    """Calls a function ``module:name`` of any package in this process, e.g. one that measures an engine."""
+    gc.freeze()  # exclude loaded modules from collection
     try:
         answer: dict[str, Any] | None = pkgutil.resolve_name(function)(**arguments)
     except (Refused, Diverged) as error:
@@ -102,10 +108,10 @@ def call(function: str, arguments: dict[str, Any]) -> dict[str, Any]:
 
 
 def one_line(error: BaseException) -> str:
-    """Kind and text of an exception in one line, and where in the engine's adapter it arose."""
+    """Type and text of an exception in one line, with the line of the engine's adapter that raised it."""
     text, where = " ".join(str(error).split()), raised_at(error)
-    said = f"{type(error).__name__}: {text}"[:400] if text else type(error).__name__
-    return f"{said} ({where})" if where else said
+    summary = f"{type(error).__name__}: {text}"[:400] if text else type(error).__name__
+    return f"{summary} ({where})" if where else summary
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""Worker processes that are kept for the engine they have loaded: starting another costs more than many a case."""
+"""Pool of idle worker processes, by the engine that they have loaded, as starting one costs more than many a case."""
 
 import threading
 import weakref
@@ -9,14 +9,16 @@ from proofroll.core.errors import InputError, Missing
 from proofroll.running.interpreters import start
 from proofroll.running.process import Worker
 
-# Idle workers that are kept, some hundred MB each; of more, the one that has waited longest is ended.
+# Most idle workers that are kept, some hundred MB each; beyond it the longest idle one is ended.
 MOST = 8
 
 
 class Workers:
-    """Idle workers by engine, at most ``most`` in all. They end with this object, and at the latest with this process.
+    """Pool of idle workers by engine. They end with this object, or with this process.
 
-    Each may have so much ``memory`` [GB], by default :func:`proofroll.running.memory.memory_limit`.
+    Args:
+        memory: limit for each [GB]; by default :func:`proofroll.running.memory.memory_limit`.
+        most: largest number of idle workers.
     """
 
     def __init__(self, memory: float | None = None, most: int = MOST) -> None:
@@ -27,7 +29,7 @@ class Workers:
         self._end = weakref.finalize(self, _close, self._idle)
 
     def take(self, engine: str) -> Worker:
-        """A worker that has this engine loaded, or a new one.
+        """Idle worker that has this engine loaded, or a new one.
 
         Raises:
             InputError, Missing, WorkerDied: the engine's interpreter does not serve, see :func:`interpreters.start`.
@@ -42,7 +44,7 @@ class Workers:
         return worker
 
     def keep(self, engine: str, worker: Worker) -> None:
-        """Takes back a worker that has answered all that it was asked."""
+        """Takes back a worker that has answered all its requests."""
         with self._lock:
             self._idle.append((engine, worker))
             surplus = [self._idle.pop(0)[1]] if len(self._idle) > self._most else []
@@ -50,13 +52,13 @@ class Workers:
             old.close()
 
     def rename(self, asked: str, engine: str) -> None:
-        """Enters an idle worker under its ``engine``; it was started as ``asked``, before that was known."""
+        """Files idle workers of ``asked`` under ``engine``: they were started before the engine was known."""
         with self._lock:
             self._idle[:] = [(engine if name == asked else name, worker) for name, worker in self._idle]
 
     @contextmanager
     def lend(self, engine: str) -> Iterator[Worker]:
-        """A worker for this engine; it is kept if it has answered, be it with what is wrong or missing."""
+        """Context manager that lends a worker for this engine; it is kept unless it failed to answer."""
         worker = self.take(engine)
         try:
             yield worker
@@ -74,7 +76,7 @@ class Workers:
             _close(self._idle)
 
     def kill(self) -> None:
-        """Ends all workers that were made here, lent ones among them: a process that waits for one sees it died."""
+        """Kills all workers that were made here, lent ones, too; threads that wait for one get WorkerDied."""
         with self._lock:
             made = list(self._made)
         for worker in made:

@@ -1,4 +1,4 @@
-"""The one place that makes cases: of any study, and of one run as the command line asks for it."""
+"""Makes all cases: those of studies, and that of a single run on the command line."""
 
 import threading
 from collections.abc import Iterable, Mapping, Sequence
@@ -17,16 +17,23 @@ _USUAL = 2.0  # s
 
 
 def usual_length(scene: str) -> float:
-    """Length of a run where none is given: 2 s, or the ``duration`` of the scene's file where that is shorter [s]."""
+    """Default length of a run [s]: 2 s, or the ``duration`` of the scene's file if it is shorter."""
     return min(_USUAL, read_scene_file(scene).duration or _USUAL)
 
 
 def case_of(
     name: str, scene: Scene, given: Iterable[str], engine: EngineFacts, until: float, every: float, **others: Any
 ) -> Case:
-    """A case of any study, on a scene that was loaded with what it is asked and with the parameters ``given``.
+    """Case of any study.
 
-    Times are those of :class:`proofroll.running.case.Case` [s], ``others`` its fields that have defaults.
+    Args:
+        name: of the scene.
+        scene: loaded with its questions and parameters.
+        given: names of the parameters that were given.
+        engine: with complete settings.
+        until: last time [s].
+        every: sampling interval [s].
+        **others: further fields of :class:`proofroll.running.case.Case`.
     """
     parameters = {parameter: scene.parameters[parameter] for parameter in given}
     return Case(name, parameters, scene.digest, engine, until, every, asks=scene.asks, **others)
@@ -43,14 +50,20 @@ def single_case(
     asks: Sequence[str] = (),
     workers: Workers | None = None,
 ) -> Case:
-    """The case of one run.
+    """Case of one run on the command line.
 
-    Without ``until`` its length is the :func:`usual_length`.
-    Without an interval ``every`` between samples it is that of :func:`proofroll.core.time_grid.sampling_interval`.
-    The engine is asked in one of ``workers``, if they are given: the run can then go on in the same process.
+    Args:
+        scene: name or path.
+        parameters: values of parameters, as text or numbers.
+        engine: ``name`` or ``name[key=value,…]``.
+        until: last time [s]; None: :func:`usual_length`.
+        every: sampling interval [s]; None: :func:`proofroll.core.time_grid.sampling_interval`.
+        time_limit: wall time of the run [s].
+        asks: results wanted besides the motion.
+        workers: pool of the worker that is asked for the settings, so that it can also run the case; None: a new one.
 
     Raises:
-        InputError, Missing: something that was given does not exist or makes no sense.
+        InputError, Missing: an argument names something unknown or makes no sense.
     """
     if not 0 < time_limit <= threading.TIMEOUT_MAX:
         raise InputError("time_limit", time_limit, "give a positive, finite time in s")

@@ -1,6 +1,6 @@
-"""The references behind a result: of its engines, its scenes, the truth and proofroll itself.
+"""References behind a result: of its engines, its scenes, the truth and proofroll itself.
 
-Each belongs to what it is about: a file ``references.bib`` beside an engine's module, a truth's, or a ``scene.toml``.
+Each is in a file ``references.bib`` beside its subject: the module of an engine or a truth, or a ``scene.toml``.
 """
 
 import dataclasses
@@ -30,14 +30,14 @@ _FIELD = re.compile(r"^\s*(\w+)\s*=\s*\{(.*)\},?\s*$", flags=re.MULTILINE)
 
 @dataclasses.dataclass(frozen=True)
 class Cited:
-    """One thing that a result rests on, with what to cite for it.
+    """A subject that a result depends on, with references to cite for it.
 
     Attributes:
         kind: ``suite``, ``truth``, ``engine`` or ``scene``.
-        name: its own.
-        versions: that made the results; of several results there may be several.
-        source: a scene's own words on where it comes from.
-        references: entries of BibTeX; empty where none is known.
+        name: of the subject.
+        versions: those that made the results; several results may have several.
+        source: origin of a scene, in the words of its file.
+        references: entries of BibTeX; empty if none is known.
     """
 
     kind: str
@@ -48,24 +48,24 @@ class Cited:
 
     @property
     def heading(self) -> str:
-        """Heading of a citation: its subject in a few words."""
+        """Heading of a citation: the subject with its versions."""
         known = f" {', '.join(self.versions)}" if self.versions else ""
         return f"{self.name}{known}" if self.kind == "suite" else f"{self.kind} {self.name}{known}"
 
 
-# What a result names: ``scene`` or ``engine``, its name, and the version as far as it says it.
+# Subject named in a result: ``scene`` or ``engine``, its name, and its version or "".
 _Named = tuple[str, str, str]
 
 
 def cited(subjects: Iterable[str]) -> list[Cited]:
-    """Sources behind results, comparisons, scenes or engines; without a scene all truths are cited.
+    """References behind results, comparisons, scenes or engines; without a scene all truths are cited.
 
     Args:
         subjects: files of results (``.json`` of a command, ``.nc`` or ``.npz`` of a run), comparisons, scenes, names of
             engines.
 
     Raises:
-        InputError: something is none of these.
+        InputError: a subject is none of these.
     """
     engines: dict[str, list[str]] = {}
     scenes: dict[str, None] = {}
@@ -76,11 +76,11 @@ def cited(subjects: Iterable[str]) -> list[Cited]:
         versions = engines.setdefault(plain_name(name), [])
         if version and version not in versions:
             versions.append(version)
-    told = [
+    citations = [
         Cited("suite", "proofroll", [proofroll.__version__], references=entries(Path(proofroll.__file__).parent)),
         Cited("truth", "by two routes", references=_beside(_truths_of(scenes))),
     ]
-    told += [
+    citations += [
         Cited(
             "engine",
             name,
@@ -90,11 +90,11 @@ def cited(subjects: Iterable[str]) -> list[Cited]:
         for name, versions in engines.items()
         if name != "truth"
     ]
-    return told + [_scene(name) for name in scenes]
+    return citations + [_scene(name) for name in scenes]
 
 
 def _named(subject: str) -> list[_Named]:
-    """The scenes and engines that a subject is about."""
+    """Scenes and engines in a subject."""
     path = Path(subject)
     if path.suffix in {".json", NETCDF, STORED} and path.is_file():
         named = list(_walk(_document(path)))
@@ -117,8 +117,8 @@ def _document(path: Path) -> object:
     try:
         if path.suffix == ".json":
             return json.loads(ordinary_content(path))
-        said = dict(read(path).attrs)
-        return said | {"versions": json.loads(said.get("versions", "{}"))}
+        attrs = dict(read(path).attrs)
+        return attrs | {"versions": json.loads(attrs.get("versions", "{}"))}
     except (OSError, RecursionError, TypeError, ValueError) as error:
         raise InputError("result", path.name, f"this cannot be read ({error})") from None
 
@@ -155,7 +155,7 @@ def _scene(name: str) -> Cited:
 
 
 def _truths_of(scenes: Iterable[str]) -> list[str]:
-    """The modules of the truths that cover these scenes; of all truths where there is no scene."""
+    """Modules of the truths that cover these scenes; of all truths if there is no scene."""
     announcements = announced(TRUTHS)
     elements = [element for name in scenes for element in load_scene(name).elements]
     if not elements:
@@ -166,7 +166,7 @@ def _truths_of(scenes: Iterable[str]) -> list[str]:
 
 
 def _beside(modules: Iterable[str]) -> list[str]:
-    """Entries beside modules; these are not imported, for an engine may be absent."""
+    """References beside modules, without importing these, as an engine may not be installed."""
     folders = map(_folder, modules)
     return list(dict.fromkeys(entry for folder in folders if folder for entry in entries(folder)))
 
@@ -184,10 +184,10 @@ def _folder(module: str) -> Path | None:
 
 
 def entries(folder: Path) -> list[str]:
-    """The entries of a folder's ``references.bib``; none where there is no such file.
+    """Entries of a folder's ``references.bib``; none if there is no such file.
 
     Raises:
-        InputError: the file has something else than entries with a field in braces on each line.
+        InputError: the file has lines that are no entries with one field in braces a line, or an entry without a title.
     """
     path = folder / FILE
     if not path.is_file():
@@ -196,13 +196,13 @@ def entries(folder: Path) -> list[str]:
     references = [match[0] for match in _ENTRY.finditer(text)]
     rest = [line for line in _ENTRY.sub("", text).splitlines() if line.strip() and not line.startswith("%")]
     if rest or not all("title" in fields(entry) for entry in references):
-        said = rest[0] if rest else "an entry without a title"
-        raise InputError(str(path), said, "write entries of BibTeX, a line for each field: name = {value},")
+        fault = rest[0] if rest else "an entry without a title"
+        raise InputError(str(path), fault, "write entries of BibTeX, a line for each field: name = {value},")
     return references
 
 
 def fields(entry: str) -> dict[str, str]:
-    """The fields of an entry, as plain text."""
+    """Fields of an entry, as plain text."""
     return {name.lower(): _plain(value) for name, value in _FIELD.findall(entry)}
 
 
@@ -211,30 +211,30 @@ def _plain(text: str) -> str:
 
 
 def sentence(entry: str) -> str:
-    """A reference as a line of a bibliography: authors, title, where, year, how to find it."""
-    said = fields(entry)
-    where = said.get("journal") or said.get("booktitle") or said.get("publisher") or said.get("howpublished")
-    volume = f"{said.get('volume', '')}{'(' + said['number'] + ')' if 'number' in said else ''}"
+    """Line of a bibliography: authors, title, publication, year, pages, DOI or address."""
+    given = fields(entry)
+    where = given.get("journal") or given.get("booktitle") or given.get("publisher") or given.get("howpublished")
+    volume = f"{given.get('volume', '')}{'(' + given['number'] + ')' if 'number' in given else ''}"
     parts = [
-        _names(said.get("author", "")),
-        said["title"],
+        _names(given.get("author", "")),
+        given["title"],
         " ".join(filter(None, [where, volume])),
-        said.get("year", ""),
-        said.get("pages", ""),
-        f"doi:{said['doi']}" if "doi" in said else said.get("url", ""),
+        given.get("year", ""),
+        given.get("pages", ""),
+        f"doi:{given['doi']}" if "doi" in given else given.get("url", ""),
     ]
     return ", ".join(filter(None, parts))
 
 
 def _names(authors: str) -> str:
-    """``Blajer, Wojciech and Izzo, Dario`` as a person would say it."""
+    """Authors of BibTeX, ``Blajer, Wojciech and Izzo, Dario``, as ``Wojciech Blajer and Dario Izzo``."""
     turned = [author.partition(", ") for author in re.split(r"\s+and\s+", authors)]
     *some, last = [f"{first} {family}".strip() for family, _, first in turned]
     return f"{', '.join(some)} and {last}" if some else last
 
 
 def content(told: Iterable[Cited]) -> list[dict[str, Any]]:
-    """Plain data for ``--json``."""
+    """Citations as plain data for ``--json``."""
     return [
         dataclasses.asdict(item) | {"references": [{"bibtex": entry, **fields(entry)} for entry in item.references]}
         for item in told

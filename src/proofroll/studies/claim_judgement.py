@@ -9,8 +9,8 @@ class ClaimJudgement:
 
     Attributes:
         claim: in one sentence.
-        because: its reason.
-        holds: None: undecided, for what is measured does not tell.
+        because: reason that the file gives for it.
+        holds: True or False; None: the measurements do not decide.
         found: result of the study, in one sentence.
     """
 
@@ -22,7 +22,13 @@ class ClaimJudgement:
 
 @dataclass(frozen=True)
 class JudgedFile:
-    """Judgement of the claims of one file by a study, as sentences; ``file`` is None where none was held against it."""
+    """Judgement of all claims of a file, as sentences.
+
+    Attributes:
+        file: its path; None: no file was judged.
+        contradictions: about claims that do not hold.
+        undecided: about claims that the measurements do not decide.
+    """
 
     file: str | None = None
     contradictions: list[str] = field(default_factory=list)

@@ -1,6 +1,6 @@
 """Failures of runs, found in trajectories, and whether the engine reported them.
 
-Signs that only a kind of element has, as a ball off its wall, come from the elements.
+Signs of failure of one kind of element (a ball that left its wall) come from the elements.
 """
 
 from __future__ import annotations
@@ -25,9 +25,9 @@ from proofroll.studies.judging.reference import Reference
 if TYPE_CHECKING:
     import xarray as xr
 
-# Accurate: the deciding observable is off by at most this part of its range.
+# A run is accurate if the deciding observable is wrong by at most this part of its range.
 ACCURATE = 0.01
-# Stable: by at most the whole range. Beyond, even a curve that stays at its start would be better.
+# A run is stable if it is wrong by at most this part: beyond it a constant curve would be better.
 WRONG = 1.0
 
 DIVERGED, GAVE_UP, CRASHED = "diverged", "solver gave up", "crashed"
@@ -41,12 +41,12 @@ MEANINGS = {
     REFUSED: "the engine said before the run that it cannot represent the scene",
     WRONG_MODEL: "what the engine built is not the scene, so it was not run",
 }
-# Who was not run has passed no boundary.
+# Failures of runs that were not made, so that they tell nothing about the boundaries.
 NOT_RUN = frozenset({REFUSED, WRONG_MODEL})
 
 
 def meanings(scene: Scene) -> Mapping[str, str]:
-    """Every kind of failure that a run of the scene may show, with its meaning."""
+    """Every kind of failure that a run of the scene may show -> its meaning."""
     kinds = dict(MEANINGS)
     for element in scene.elements:
         kinds |= element.failures
@@ -58,13 +58,15 @@ class RunOutcome:
     """Outcome of a run.
 
     Attributes:
-        stable: it reached the end without a sign of failure, and was not wrong by the whole range.
-        accurate: and the deciding observable held 1 % of its range; where there is no truth the same as stable.
-        failure: first fault, if it was not accurate.
-        silent: it failed, and the engine did not report it.
-        error: largest error of the deciding observable in parts of its range; None if it is not known.
-        time: when the failure showed [s].
-        message: last words of the run.
+        stable: True if it reached the end without a sign of failure, and was not wrong by the whole range.
+        accurate: True if it is stable and the deciding observable was wrong by at most 1 % of its range; without a
+            truth
+            the same as stable.
+        failure: first sign of failure, if it was not accurate.
+        silent: True if it failed and the engine did not report it.
+        error: largest error of the deciding observable, as a part of its range; None if unknown.
+        time: of the failure [s].
+        message: of the run.
     """
 
     stable: bool
@@ -82,10 +84,10 @@ class Yardstick:
 
     Attributes:
         scene: the scene that was run.
-        truth: the true run; None where there is none.
+        truth: the true run; None: there is none.
         name: of the deciding observable.
-        true: its values; None where there is no truth.
-        scale: its range, of several components the widest.
+        true: its true values; None without a truth.
+        scale: its range; with several components the widest.
     """
 
     scene: Scene
@@ -96,7 +98,7 @@ class Yardstick:
 
     @classmethod
     def of(cls, scene: Scene, truth: xr.Dataset | None) -> Yardstick:
-        """Yardstick from the truth, or, where there is none, from the scene alone."""
+        """Yardstick from the truth, or without one from the scene."""
         name = scene.deciding
         if truth is None:
             return cls(scene, None, name, None, 1.0)
@@ -109,14 +111,14 @@ class Yardstick:
         return Reference.of(self.scene, self.truth)
 
     def off_grid(self, dataset: xr.Dataset) -> float:
-        """Largest error between the samples, where run and truth say anything there, in parts of the range."""
+        """Largest error at samples off the grid, as a part of the range; 0 if the run or the truth has none."""
         known = self.truth is not None and BETWEEN in dataset and BETWEEN in self.truth
         both = held_against.between(self._reference, self.name, dataset) if known else None
         return 0.0 if both is None else largest_difference(*both) / self.scale
 
 
 def run_outcome(result: Result, dataset: xr.Dataset | None, yardstick: Yardstick) -> RunOutcome:
-    """Outcome of a run from its end and its trajectory, held against the yardstick of its place."""
+    """Outcome of a run from its result and its trajectory, measured by the yardstick."""
     early = {
         Status.CRASHED: CRASHED,
         Status.TIMEOUT: TOO_SLOW,
@@ -138,7 +140,7 @@ def run_outcome(result: Result, dataset: xr.Dataset | None, yardstick: Yardstick
     if first is not None:
         return _failed(first[0], result, error, first[1], silent=True)
     if errors is not None and yardstick.true is not None and len(errors) < len(yardstick.true):
-        # Its model ended the run where it is no longer that of the scene.
+        # The run ended early without an error, where its model left the scene.
         return _failed(_by_event(dataset, yardstick.scene) or GAVE_UP, result, error, float(dataset["time"][-1]))
     if errors is None or error is None or error <= ACCURATE:
         return RunOutcome(True, True, None, False, error, None, result.message)
@@ -147,7 +149,7 @@ def run_outcome(result: Result, dataset: xr.Dataset | None, yardstick: Yardstick
 
 
 def _by_event(dataset: xr.Dataset, scene: Scene) -> str | None:
-    """The failure that an event of the run stands for, if one does."""
+    """Failure that an event of the run stands for, or None."""
     for element in scene.elements:
         for event in events_of(part(scene, element, dataset)):
             if event.kind in element.failing_events:
@@ -162,9 +164,9 @@ def _failed(
 
 
 def _errors(dataset: xr.Dataset, yardstick: Yardstick) -> FloatArray | None:
-    """Error of the deciding observable at each sample, the largest component in parts of its range.
+    """Error of the deciding observable at each sample, of its worst component, as a part of the range.
 
-    An error off the grid counts at the last of them.
+    The error off the grid is added to the last sample.
     """
     if yardstick.true is None:
         return None
@@ -178,7 +180,7 @@ def _errors(dataset: xr.Dataset, yardstick: Yardstick) -> FloatArray | None:
 
 
 def _first(dataset: xr.Dataset, yardstick: Yardstick, errors: FloatArray | None) -> tuple[str, float] | None:
-    """First sign of instability, and its time [s]; None: the run is stable as far as it went."""
+    """First sign of instability and its time [s]; None: the run is stable as far as it went."""
     times = dataset["time"].to_numpy()
     shown: dict[str, int] = {}
     scene, truth = yardstick.scene, yardstick.truth
@@ -199,7 +201,7 @@ def _first(dataset: xr.Dataset, yardstick: Yardstick, errors: FloatArray | None)
 
 
 def _wrong(dataset: xr.Dataset, yardstick: Yardstick, errors: FloatArray, index: int) -> str:
-    """Cause of a wrong bounded path at a sample: from the element of the deciding observable, or lost phase."""
+    """Cause of a bounded but wrong path at a sample, from the element of the deciding observable; else lost phase."""
     scene = yardstick.scene
     reached = dataset.isel(time=slice(0, index + 1))
     for element in scene.elements:

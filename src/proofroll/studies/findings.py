@@ -1,4 +1,4 @@
-"""Findings about engines: a file each under ``findings/``, with a program with the engine alone."""
+"""Findings about engines: files under ``findings/``, each with a program that uses only the engine."""
 
 import json
 import re
@@ -15,11 +15,11 @@ from proofroll.core.errors import InputError, Missing, require_known
 from proofroll.files.data_folders import data_folder
 from proofroll.running.process import safe_environment
 
-# Exit code of a program whose finding still shows; 0 says that it is gone, everything else that it could not tell.
+# Exit code of a program whose finding still shows; 0: it is gone; any other: the program could not tell.
 SHOWS = 10
 _FRONT = re.compile(r"\+\+\+\n(.*?)\n\+\+\+\n(.*)", re.DOTALL)
 _PROGRAM = re.compile(r"```python\n(.*?)```", re.DOTALL)
-# Tells which of the packages that are named in the command line are installed, with their versions.
+# Program that prints the installed versions of the packages in its arguments.
 _LOOK = """
 import importlib.metadata, json, sys
 known = {str(item.metadata["Name"]).lower(): item.version for item in importlib.metadata.distributions()}
@@ -34,10 +34,10 @@ class EngineFinding:
     Attributes:
         name: of the file.
         title: behaviour of the engine, in one line.
-        engine: whose.
+        engine: name of the engine.
         package: distribution that has to be installed.
         seen: versions in which it was seen, for a person.
-        gone: versions in which it was seen to be gone; may be empty.
+        gone: versions in which it no longer showed; may be empty.
         issue: address of the public thread about it; may be empty.
         text: words of the documentation, observed behaviour, consequence, remedy.
         program: source; exit code 10 if it shows.
@@ -65,13 +65,13 @@ class FindingState(StrEnum):
 
 @dataclass(frozen=True)
 class Shown:
-    """A finding against what is installed.
+    """Result of a finding's program with the installed package.
 
     Attributes:
-        finding: which.
-        state: whether it shows.
-        version: of the package that is installed; empty if none is.
-        said: the last line of the program.
+        finding: the finding.
+        state: see :class:`FindingState`.
+        version: of the installed package; empty if it is not installed.
+        said: the last line that the program printed.
     """
 
     finding: EngineFinding
@@ -81,10 +81,10 @@ class Shown:
 
 
 def load_findings(engines: Iterable[str] = ()) -> list[EngineFinding]:
-    """All findings, by name; of some engines alone, if any are named.
+    """All findings by name, or those about the named engines.
 
     Raises:
-        InputError: a file that is no finding, or an engine without one.
+        InputError: a file is no finding, or there is none about a named engine.
     """
     every_finding = [read_finding(path) for path in sorted(data_folder("findings").glob("*.md"))]
     wanted = list(engines)
@@ -95,7 +95,11 @@ def load_findings(engines: Iterable[str] = ()) -> list[EngineFinding]:
 
 
 def read_finding(path: Path) -> EngineFinding:
-    """One file: TOML between lines of +++, then text with one Python program. Raises InputError if one is missing."""
+    """Finding from its file: TOML between lines of +++, then text with one Python program.
+
+    Raises:
+        InputError: a part is missing or invalid.
+    """
     parts = _FRONT.match(path.read_text(encoding="utf-8"))
     if parts is None:
         raise InputError(str(path), path.name, "it has to begin with TOML between two lines of +++")
@@ -115,7 +119,12 @@ def read_finding(path: Path) -> EngineFinding:
 
 
 def shown(findings: Sequence[EngineFinding], python: str = "", time_limit: float = 300.0) -> Iterator[Shown]:
-    """Runs each program in a process of its own, of another Python if one is given, for so long at most [s].
+    """Runs the program of each finding in a process of its own.
+
+    Args:
+        findings: those to run.
+        python: path of another interpreter; by default this one.
+        time_limit: of each program [s].
 
     Raises:
         Missing: there is no such interpreter.
@@ -138,7 +147,7 @@ def shown(findings: Sequence[EngineFinding], python: str = "", time_limit: float
 
 
 def _run(command: list[str], time_limit: float, folder: str | None = None) -> tuple[int, str]:
-    """Exit code and output, that of standard error where there is nothing else; engines may write into ``folder``."""
+    """Exit code and output of a command, or standard error if it printed nothing else; it runs in ``folder``."""
     try:
         done = subprocess.run(
             command,

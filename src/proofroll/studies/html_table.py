@@ -1,14 +1,14 @@
-"""A table of results as a notebook shows it, with a small drawing in each row."""
+"""Table of results for a notebook, with a small drawing in each row."""
 
 import math
 from collections.abc import Iterable, Sequence
 from html import escape
 
-_DECADES, _WIDTH, _HEIGHT = 6, 120, 14  # to each side of the tolerance; of a gauge, in pixels
+_DECADES, _WIDTH, _HEIGHT = 6, 120, 14  # decades on each side of the tolerance; size of a gauge [pixels]
 
 
 def gauge(error: float, tolerance: float) -> str:
-    """SVG of an error on a logarithmic axis whose middle is the tolerance; what is off the axis stands at its end."""
+    """SVG of an error on a logarithmic axis with the tolerance in its middle, clipped to the axis."""
     ratio = error / tolerance
     decades = _DECADES if not ratio < math.inf else math.log10(max(ratio, 1e-300))
     x = _WIDTH * (0.5 + 0.45 * min(max(decades / _DECADES, -1), 1))
@@ -29,9 +29,14 @@ def html_table(
     *,
     gauges: Iterable[str] = (),
 ) -> str:
-    """HTML of a heading, a table whose first column names the rows, and a paragraph for each note; all are texts.
+    """HTML of a heading, a table whose first column names the rows, and a paragraph for each note.
 
-    In a last column stands the gauge of each row, empty where it has none.
+    Args:
+        head: the heading.
+        columns: names of the columns.
+        rows: texts of the cells.
+        notes: texts of the paragraphs.
+        gauges: SVG for a last column, one for each row; may be empty.
     """
     drawn = list(gauges)
     header = "".join(f"<th>{escape(name)}</th>" for name in [*columns, *(["error by tolerance"] if drawn else [])])

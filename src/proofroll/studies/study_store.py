@@ -1,6 +1,6 @@
 """Cache of slow studies; valid while its inputs are unchanged.
 
-The inputs besides the question are found without importing a single engine.
+Inputs other than the question are found without importing any engine.
 """
 
 import datetime
@@ -27,15 +27,16 @@ from proofroll.running.store import write_text
 from proofroll.running.timing import machine
 
 _Study = TypeVar("_Study")
-# Folders of the package on which no result hangs.
+# Folders of the package whose code decides no result.
 _ASIDE = frozenset({"cli", "conformance", "report"})
 
 
 def versions() -> dict[str, str]:
-    """Versions of proofroll, of what it can use, of packages that announce engines, and of remembered environments.
+    """Versions of proofroll, of its requirements, of packages that announce engines, and of environments.
 
-    An environment ``NAME@LABEL`` has the hash of all that is installed in it for its version, and what announces
-    engines, truths or kinds of elements besides its version a hash of its code.
+    For an environment ``NAME@LABEL`` it is a hash of all its packages. Packages that announce engines, truths or kinds
+    of
+    elements have a further entry with a hash of their code.
     """
     plug_ins = [point for group in (GROUP, ELEMENTS, TRUTHS) for point in announced(group) if point.dist is not None]
     names = _required() | {point.dist.name for point in plug_ins if point.dist is not None}
@@ -54,7 +55,7 @@ def versions() -> dict[str, str]:
 
 
 def _code_of(top: str) -> str:
-    """Hash of a top package or module, which is found but not imported; empty where it lies at several places."""
+    """Hash of a top-level package or module, which is not imported; empty if it has no single place."""
     spec = find_spec(top)
     if spec is None or spec.origin is None:
         return ""
@@ -63,12 +64,12 @@ def _code_of(top: str) -> str:
 
 
 def _required() -> set[str]:
-    """Names of proofroll and of all that it can use: requirements of all extras count."""
+    """Names of proofroll and of its requirements, those of all extras included."""
     return {"proofroll"} | {re.split(r"[\s;<>=!~\[(]", text, maxsplit=1)[0] for text in requires("proofroll") or []}
 
 
 def code() -> str:
-    """Hash of everything in proofroll on which a result may hang."""
+    """Hash of all code in proofroll that may decide a result."""
     root = Path(proofroll.__file__).parent
     content = hashlib.sha256()
     for file in sorted(root.rglob("*.py")):
@@ -88,7 +89,7 @@ class Measured:
 
 
 def measured() -> Measured:
-    """Time, machine, versions and code of a study that is being made."""
+    """Time, machine, versions and code at this moment."""
     return Measured(datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"), machine(), versions(), code())
 
 
@@ -101,9 +102,9 @@ def changes(measured: Measured) -> list[str]:
     own = _required()
     for name in sorted(then.keys() | now.keys(), key=str.lower):
         if name not in then and name not in own:
-            continue  # a further engine, which was not measured and changes nothing of what was
+            continue  # a new engine does not affect the measured ones
         if "@" in name and name not in now:
-            continue  # an environment that is gone was not made anew with something else
+            continue  # a removed environment does not affect the measured results
         if then.get(name) != now.get(name):
             differences.append(f"{name} {then.get(name, 'absent')} then, {now.get(name, 'absent')} now")
     if measured.code != code():
@@ -112,10 +113,10 @@ def changes(measured: Measured) -> list[str]:
 
 
 def kept(path: Path, kind: type[_Study]) -> tuple[_Study | None, list[str]]:
-    """A kept study if it still holds here.
+    """Stored study if it is still valid here.
 
     Returns:
-        the study, or None and why there is none: what has changed since, or nothing if there is no such file.
+        The study or None, and if it is invalid the changes that made it so; no changes if there is no such file.
     """
     try:
         content = json.loads(ordinary_content(path))
@@ -123,17 +124,17 @@ def kept(path: Path, kind: type[_Study]) -> tuple[_Study | None, list[str]]:
             return None, ["what is stored is not what had been put there"]
         reasons = changes(record(Measured, content["measured"]))
         return (None, reasons) if reasons else (record(kind, content), [])
-    except (OSError, ValueError, KeyError, TypeError, RecursionError):  # absent, half written, or something else
+    except (OSError, ValueError, KeyError, TypeError, RecursionError):  # absent, truncated or not our file
         return None, []
 
 
 def _seal(study: Mapping[str, Any]) -> str:
-    """Hash of a kept study's content without the hash itself; shows a file that was cut or changed."""
+    """Hash of a stored study, which reveals a truncated or changed file."""
     content = {key: value for key, value in study.items() if key != "seal"}
     return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
 
 
 def keep(study: Any, path: Path) -> None:
-    """Writes a study as :func:`kept` reads it. Raises ProofrollError if the folder cannot be written."""
+    """Stores a study for :func:`kept`. Raises ProofrollError if the folder cannot be written."""
     content = plain(study)
     write_text(path, json.dumps({**content, "seal": _seal(content)}))

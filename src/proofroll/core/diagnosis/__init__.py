@@ -1,8 +1,8 @@
-"""Causes of a motion unlike the scene's: hypotheses, each proven by what it leaves of the difference.
+"""Causes of a motion unlike the scene's: hypotheses, each proven by how much of the difference it leaves.
 
 A kind of element brings its hypotheses (:class:`ExplainsRuns`). Each looks at a run, its truth and its certificate, and
-says what the difference would be if the engine did one thing otherwise. It is named only where that closes the
-difference; an unproven cause is not named.
+computes what the engine would report if it made one particular mistake. The cause is named only if that mistake closes
+the difference.
 """
 
 from __future__ import annotations
@@ -21,17 +21,17 @@ from proofroll.core.number_format import number
 if TYPE_CHECKING:
     import xarray as xr
 
-# A hypothesis has to leave no more than this part of a difference. One number that is fitted to a curve of many samples
-# takes away the part of it that is alike by chance: to leave a twentieth, 99.75 % of the squares have to be alike.
+# A proven cause leaves at most this part of a difference. One number fitted to a curve of many samples always removes
+# a part of it by chance; to leave a twentieth it has to explain 99.75 % of the sum of squares.
 CLOSES = 1 / 20
-# A difference below this part of the quantity's size says nothing about causes: the truth's samples, between which a
-# spline is laid, know themselves no better.
+# A difference below this part of the quantity's size says nothing about causes: a spline through the truth's samples is
+# no more accurate.
 _LEAST = 1e-7
-# A step that is coarse for a motion changes its equations as a number near the scene's does (Hairer, Lubich and Wanner
-# 2006, chapter IX: modified equations): a fitted number that is no farther from the scene's, as a part of it or of what
-# is natural for it, accuses nobody.
+# The error of a coarse step acts like slightly changed numbers in the equations (Hairer, Lubich and Wanner 2006,
+# chapter IX: modified equations). So a fitted number that differs from the scene's by at most this, relative to it or
+# to a natural size, accuses no engine.
 METHOD = 1e-2
-# At time 0 both sides are exact numbers: what is left of a difference is round-off.
+# As CLOSES, at time 0, where both sides are exact numbers and only round-off may be left.
 CLOSES_EXACTLY = 1e-6
 _AS_GOOD = 3.0
 _ALTERNATIVES = 2
@@ -46,10 +46,10 @@ class Evidence:
         lines: of the certificate (:meth:`proofroll.core.certificate.Line.as_dict`).
         run, truth: the element's variables, at the same times; None: the engine was not run.
         step: of the engine [s], or None.
-        settled: observables that were judged and found right: nothing about them is to be explained.
-        by_step: whether the limit of small steps leaves no more of the difference than a cause may: the run moves by
-            the scene's equations.
-        found: results that hypotheses share, see :func:`proofroll.core.diagnosis.fitting.once`.
+        settled: observables whose verdict is right, which need no explanation.
+        by_step: True if the limit of small steps leaves no more of the difference than a cause may: the run follows the
+            scene's equations.
+        found: cache of results that hypotheses share, see :func:`proofroll.core.diagnosis.fitting.once`.
     """
 
     element: Any
@@ -72,13 +72,14 @@ class Cause:
         quantity, unit: of the difference that it closes.
         before, after: difference without and with the hypothesis, in ``unit``.
         remedy: place for an author to look at.
-        fitted: number of free numbers that were fitted.
-        covers: further quantities that it explains; no other cause is looked for.
+        fitted: number of fitted parameters.
+        covers: further quantities that it explains, for which no other cause is sought.
         closes: largest part of the difference that it may leave.
-        alternative: whether it explains what another cause explains as well: from outside the two look the same.
+        alternative: True if another cause explains the same as well, so that the data cannot tell the two apart.
         explains: independent numbers of the difference that it closes; None: as many as there are samples.
-        change: distance of its fitted numbers from the scene's, as a part of them or of a natural size; infinite: those
-            of a known mistake.
+        change: distance of the fitted parameters from the scene's, relative to them or to a natural size; infinite if
+            they
+            are those of a known mistake.
     """
 
     id: str
@@ -97,18 +98,18 @@ class Cause:
 
     @property
     def accuses(self) -> bool:
-        """True if a method's own error does not do it as well; what a method does proves nothing else, either."""
+        """True if the change is too large to be the error of a coarse step (:data:`METHOD`)."""
         return self.change > METHOD
 
     @property
     def proven(self) -> bool:
-        """True if it closes the difference, of more independent numbers than it has free ones."""
+        """True if it closes the difference, and explains more independent numbers than were fitted."""
         enough = self.explains is None or self.explains > self.fitted
         return bool(enough and self.before > 0 and np.isfinite(self.after) and self.after <= self.closes * self.before)
 
     @property
     def left(self) -> float:
-        """Part of the difference that it leaves, as far as that says anything."""
+        """Part of the difference that it leaves, at least the part that is resolvable."""
         return max(self.after / self.before, _LEAST)
 
     @property
@@ -125,8 +126,8 @@ class Hypothesis:
 
     Attributes:
         id: unique within the kind of element.
-        grounds: its test, and the reason for which that proves it.
-        test: gives causes worth looking at; those that do not close the difference are dropped by :func:`diagnose`.
+        grounds: the test, and why it is a proof.
+        test: yields candidate causes; :func:`diagnose` drops those that do not close the difference.
     """
 
     id: str
@@ -139,7 +140,7 @@ class Hypothesis:
 
 
 def hypothesis(name: str, grounds: str) -> Callable[[Callable[[Evidence], Iterable[Cause]]], Hypothesis]:
-    """Makes a :class:`Hypothesis` of the function that tests it, with this name as its id."""
+    """Decorator that makes a :class:`Hypothesis`, with this name as its id, of the function that tests it."""
     return lambda test: Hypothesis(name, grounds, test)
 
 
@@ -149,14 +150,15 @@ class ExplainsRuns(Protocol):
 
     @staticmethod
     def hypotheses() -> Sequence[Hypothesis]:
-        """Its hypotheses; those that concern what an engine says come first."""
+        """Its hypotheses; those about what an engine reports come first."""
 
 
 def diagnose(evidence: Evidence, hypotheses: Sequence[Hypothesis]) -> list[Cause]:
-    """The proven causes, the best first: with the fewest fitted numbers, then with the smallest part left.
+    """The proven causes: fewest fitted parameters first, then the smallest remaining difference.
 
-    Of those that explain the same quantity few more are kept, if they do so as well: as alternatives. A number that was
-    fitted proves nothing where another fitted number does as well.
+    A cause of a quantity that an earlier one explains already is kept only if it is as good, as an alternative, and
+    only a
+    few are. A cause with a fitted parameter is dropped if another fitted one is as good: neither proves anything.
     """
     proven = [cause for item in hypotheses for cause in item.test(evidence) if cause.proven]
     proven.sort(key=lambda cause: (cause.fitted, cause.left))
@@ -168,9 +170,8 @@ def diagnose(evidence: Evidence, hypotheses: Sequence[Hypothesis]) -> list[Cause
         elif all(_rivals(cause, rival) for rival in rivals) and len(rivals) <= _ALTERNATIVES:
             causes.append(dataclasses.replace(cause, alternative=True))
     known = [cause for cause in causes if cause.accuses and not any(_unsure(cause, other) for other in proven)]
-    told = [cause for cause in known if not cause.alternative]
-    # an alternative is one to a cause that is told
-    return told + [cause for cause in known if cause.alternative and any(_share(cause, first) for first in told)]
+    main = [cause for cause in known if not cause.alternative]
+    return main + [cause for cause in known if cause.alternative and any(_share(cause, first) for first in main)]
 
 
 def _share(one: Cause, other: Cause) -> bool:
@@ -179,7 +180,7 @@ def _share(one: Cause, other: Cause) -> bool:
 
 
 def _rivals(cause: Cause, first: Cause) -> bool:
-    """True if a cause explains as much as the first one and as well, and is not only a part of it."""
+    """True if a cause explains all that the first one does, and as well."""
     as_good = cause.fitted == first.fitted and cause.left <= _AS_GOOD * first.left
     whole = cause.quantity == first.quantity or first.quantity in cause.covers
     return as_good and whole and cause.id != first.id
@@ -191,7 +192,7 @@ def _unsure(cause: Cause, other: Cause) -> bool:
 
 
 def hypotheses_of(element: Element) -> Sequence[Hypothesis]:
-    """Hypotheses of the element's kind: the kind in whose package the element is defined."""
+    """Hypotheses of the kind of element in whose package the element's class is defined; empty if it has none."""
     from proofroll.core.plugins import load_element_kinds
 
     package = type(element).__module__.rpartition(".")[0]
@@ -207,7 +208,10 @@ def above_round_off(difference: float, size: float) -> bool:
 
 
 def apart(one: FloatArray, other: FloatArray) -> float:
-    """Largest difference; infinite where something is not finite in one of them alone."""
+    """Largest difference of two arrays; infinite if one value is not finite and its counterpart is.
+
+    Pairs of NaN are ignored.
+    """
     difference = np.abs(np.asarray(one) - np.asarray(other))
     known = difference[~(np.isnan(one) & np.isnan(other))] if difference.size else difference
     largest = float(np.max(known, initial=0.0))

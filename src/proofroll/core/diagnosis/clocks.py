@@ -1,6 +1,7 @@
-"""Errors of reported times: a shift of all times, or a factor on them.
+"""Errors of reported times: a constant shift, or a factor on all times.
 
-The true curve is laid through its samples; the first and last few, beyond which it would be needed, are left out.
+The reports are compared with a spline through the samples of the truth. The first and last samples, for which the
+spline would have to be extrapolated, are left out.
 """
 
 import numpy as np
@@ -10,15 +11,15 @@ from proofroll.core.diagnosis import apart
 from proofroll.core.diagnosis.fitting import fitted
 
 _SPLINE = 5
-# Fewer samples tell no time; where there are few, fewer at the ends are left out.
+# Fewest samples that determine a shift; from _MANY on the degree of the spline is left out at each end, else _END.
 _FEWEST, _MANY, _END = 9, 18, 2
 _SHIFTS = 6
-# A clock that is further off than this is another fault [relative].
+# Largest relative error of a clock that is looked for.
 _PACE = 0.25
 
 
 def _comparable(time: FloatArray, said: FloatArray, true: FloatArray) -> tuple[FloatArray, FloatArray] | None:
-    """Numbers that are finite in both throughout, shape (time, numbers); None: too few samples."""
+    """Components that are finite in all samples of both, each of shape (time, components); None: too few samples."""
     if len(time) < _FEWEST:
         return None
     flat, held = said.reshape(len(time), -1), true.reshape(len(time), -1)
@@ -27,7 +28,10 @@ def _comparable(time: FloatArray, said: FloatArray, true: FloatArray) -> tuple[F
 
 
 def late(time: FloatArray, said: FloatArray, true: FloatArray) -> tuple[float, float, float] | None:
-    """Delay of the reported values [s], and the differences without and with it; None: too few samples."""
+    """Delay of the reported values [s], and the largest difference before and after correction.
+
+    None if there are too few samples.
+    """
     from scipy.interpolate import make_interp_spline
 
     comparable = _comparable(time, said, true)
@@ -49,7 +53,10 @@ def late(time: FloatArray, said: FloatArray, true: FloatArray) -> tuple[float, f
 
 
 def stretched(time: FloatArray, said: FloatArray, true: FloatArray) -> tuple[float, float, float] | None:
-    """Factor of the clock, largest difference before and after correction by it; None: too few samples."""
+    """Factor of the engine's clock, and the largest difference before and after correction.
+
+    None if there are too few samples.
+    """
     from scipy.interpolate import make_interp_spline
 
     comparable = _comparable(time, said, true)
@@ -67,12 +74,12 @@ def stretched(time: FloatArray, said: FloatArray, true: FloatArray) -> tuple[flo
 
 
 def in_steps(delay: float, step: float | None) -> float:
-    """Size of a shift in time, in steps; infinite where there are none."""
+    """Size of a time shift in steps; infinite if there is no step."""
     return abs(delay) / step if step else np.inf
 
 
 def said_delay(delay: float, step: float | None) -> str:
-    """Text of a shift in time, in steps if it is a half, one or two of them."""
+    """Text of a time shift; in steps if it is half a step, one or two."""
     word = "late" if delay > 0 else "early"
     if step:
         steps = abs(delay) / step

@@ -1,4 +1,4 @@
-"""Other models of an element held against its certificate or its run, and the number of one that explains it best."""
+"""Fits wrong models of an element to its certificate or its run."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -12,14 +12,14 @@ from proofroll.core.diagnosis import Cause, Evidence, Hypothesis, hypothesis
 
 M = TypeVar("M")
 FactT = TypeVar("FactT")
-# The true run's own residuals are the measurement's: a difference below so many of them says nothing.
+# A residual below this many times the true run's own, which is measurement error, says nothing.
 ABOVE = 20.0
 
 _ROUNDS = 8
 _STEP = 1e-4
-# Part of the largest change, or of the difference, from which on a number is changed at all.
+# Part of the largest change, or of the difference, below which a number counts as unchanged.
 _CHANGED = 1e-6
-# Numbers that mistakes make: a fitted factor this near to one of them is taken to be it.
+# Relative distance within which a fitted factor is taken for that of a known mistake (FACTORS); absolute for 0.
 _NEAR = 2e-3
 _NOTHING = 1e-5
 FACTORS: Mapping[float, str] = {
@@ -37,7 +37,7 @@ FACTORS: Mapping[float, str] = {
 
 
 def fitted(residual: Callable[[float], FloatArray], start: float, size: float) -> float:
-    """The number for which the residuals have the smallest sum of squares, by Gauss-Newton with halved steps."""
+    """Parameter that minimises the sum of squared residuals, by Gauss-Newton with halved steps."""
     x, at = start, residual(start)
     for _ in range(_ROUNDS):
         slope = (residual(x + _STEP * size) - at) / (_STEP * size)
@@ -59,7 +59,7 @@ def fitted(residual: Callable[[float], FloatArray], start: float, size: float) -
 
 
 def known_factor(factor: float) -> tuple[float, str] | None:
-    """The number that a mistake makes, and its words, if a factor is one."""
+    """Factor of a known mistake that is near to the given one, and its description; None: there is none."""
     for value, words in FACTORS.items():
         if abs(factor - value) <= (_NEAR * abs(value) or _NOTHING):
             return value, words
@@ -73,28 +73,29 @@ def said_factor(factor: float) -> str:
 
 
 def change_by(factor: float) -> float:
-    """Change of a number by a factor, see :class:`.Cause`."""
+    """Relative change of a number by a factor (``change`` of :class:`.Cause`); infinite if it is a known mistake."""
     return abs(factor - 1) if known_factor(factor) is None else np.inf
 
 
 def possible(factor: float, signed: bool) -> bool:
-    """True if a number of a scene can have this factor; a wrong sign is possible for ``signed`` numbers alone."""
+    """True if a number can have this factor; a negative one only a ``signed`` number, by a known mistake."""
     return factor >= 0 or (signed and known_factor(factor) is not None)
 
 
 @dataclass(frozen=True)
 class Residuals(Generic[M]):
-    """Residuals of a difference under models of an element.
+    """Residuals of the equations, or of a certificate, under models of an element.
 
     Attributes:
-        left: residual of a model, as one row of numbers; infinite for None, which is no model.
-        quantity, unit: of what it leaves.
-        before: largest that the scene's own model leaves.
-        closes: part of it that a proof may leave.
+        left: model -> its residual, shape (numbers,); infinite for None, which stands for an impossible model.
+        quantity, unit: of the residual.
+        before: largest residual of the scene's own model.
+        closes: part of it that a proven cause may leave.
         covers: quantities that follow from the model.
         plain: the scene's own model.
-        others: models that differ from it in one number each; their changes span all that is distinguishable.
-        contradicted: whether something that the engine says, and that holds, speaks against a model.
+        others: models that differ from it in one number each; their changes of the residual span all that is
+            distinguishable.
+        contradicted: True for a model that contradicts a correct report of the engine.
     """
 
     left: Callable[[M | None], FloatArray]
@@ -109,9 +110,9 @@ class Residuals(Generic[M]):
 
     @cached_property
     def _changes(self) -> FloatArray:
-        """Changes that the other models make of the remainder, each by its size, shape (numbers, models).
+        """Normalised changes of the residual by the other models, shape (numbers, models).
 
-        Those of round-off, as of numbers that act on accelerations where there are none, are left out.
+        Changes that are round-off are left out, as by numbers that act on accelerations where there are none.
         """
         at = self.left(self.plain)
         changed = np.stack([self.left(model) - at for model in self.others()], axis=-1)
@@ -121,11 +122,11 @@ class Residuals(Generic[M]):
 
     @property
     def alone(self) -> bool:
-        """True if there is only one equation, which a single unknown always closes."""
+        """True if there is only one equation, which any single fitted parameter closes."""
         return len(self.left(self.plain)) < 2
 
     def explained(self, model: M | None) -> int:
-        """Count of independent numbers that a model changes and that the other models can tell apart."""
+        """Count of independent residuals that a model changes and by which it differs from the other models."""
         change = self.left(model) - self.left(self.plain)
         size = np.abs(change)
         if not np.all(np.isfinite(size)) or not np.any(size):
@@ -139,11 +140,20 @@ class Residuals(Generic[M]):
         return float(np.max(np.abs(self.left(model)), initial=0.0))
 
     def fit(self, model: Callable[[float], M | None], start: float) -> float:
-        """Fitted number of a model: the one with the smallest remainder."""
+        """Parameter of a family of models with the smallest residual."""
         return fitted(lambda x: self.left(model(x)), start, 1.0)
 
     def cause(self, name: str, says: str, model: M | None, remedy: str, number: int, change: float = np.inf) -> Cause:
-        """Cause: the engine moves by this model, in which so many numbers were fitted, with this change of them."""
+        """Cause: the engine moves by this model.
+
+        Args:
+            name: id of the hypothesis.
+            says: behaviour of the engine, as a clause.
+            model: the model; None: it is impossible.
+            remedy: advice to an author.
+            number: count of fitted parameters in it.
+            change: their change, see :class:`.Cause`.
+        """
         after = self.largest(model)
         closes = after <= self.closes * self.before
         if closes and (model is None or self.contradicted(model)):
@@ -154,7 +164,7 @@ class Residuals(Generic[M]):
 
 
 def once(residuals: Callable[[Evidence], Iterator[FactT]]) -> Callable[[Evidence], Sequence[FactT]]:
-    """The same, found only once for each evidence: nearly every hypothesis asks for it."""
+    """The residuals, computed once for each evidence and cached, since nearly every hypothesis needs them."""
 
     @wraps(residuals)
     def remembered(evidence: Evidence) -> Sequence[FactT]:
@@ -170,12 +180,12 @@ def any_gravity(
     gravity_of: Callable[[Any], FloatArray],
     falling: Callable[[Any, FloatArray], Any],
 ) -> Hypothesis:
-    """Hypothesis: gravity points another way.
+    """Hypothesis: gravity has another direction or magnitude.
 
     Args:
-        residuals: data that models of an element are fitted to.
-        gravity_of: an element in the scene [m/s²].
-        falling: the model of an element in which gravity is another.
+        residuals: residuals of an evidence.
+        gravity_of: gravity of an element in the scene [m/s²].
+        falling: model of an element with another vector of gravity.
     """
 
     @hypothesis("direction of gravity", "the equations are linear in gravity: one vector closes them at every state")

@@ -1,4 +1,4 @@
-"""Certificates under a hypothesis: what an engine says of time 0, held against what another model would say."""
+"""Certificates under a hypothesis: an engine's report at time 0 compared with the numbers of another model."""
 
 import dataclasses
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
@@ -11,16 +11,16 @@ from proofroll.core.certificate import Line, told_apart, worst_numbers
 from proofroll.core.diagnosis import Cause, Evidence, Hypothesis, hypothesis
 from proofroll.core.diagnosis.fitting import said_factor
 
-# Differences that are left in units of what a line allows; an engine that is soft there says so in its tolerance.
+# Lines with a larger tolerance are softened by the engine and prove nothing.
 _EXACT = 1e-6
-# So many numbers of a line are shown in a cause; of more the one that is furthest off.
+# Most numbers of a line that are shown in a cause; of more only the one that differs most.
 _SHOWN = 3
-# Numbers of one line are one factor times the scene's to this part.
+# Relative deviation within which all numbers of a line are the scene's times one factor.
 _ALIKE = 1e-9
 
 
 def differing(lines: Iterable[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
-    """Lines of quantities that the engine says, and that are not the scene's."""
+    """Lines of quantities that the engine reports and that differ from the scene's."""
     return [line for line in lines if not line["holds"] and line["found"] and np.all(np.isfinite(line["found"]))]
 
 
@@ -33,9 +33,13 @@ def scale_of(line: Mapping[str, Any]) -> float:
 def left(
     lines: Sequence[Mapping[str, Any]], expected: Mapping[str, Sequence[float]], given: Collection[str]
 ) -> FloatArray:
-    """Relative differences of all that the engine says from what another model expects, one after the other.
+    """Relative differences of all reported quantities from those of another model, shape (numbers,).
 
-    What it was ``given``, as a mass, and says to hold is left out: an adapter may say what it meant to build.
+    Args:
+        lines: of the certificate.
+        expected: quantity -> numbers of the other model; the scene's where it is missing.
+        given: quantities that the adapter hands to the engine (a mass). Where they agree with the scene they are left
+            out, as an adapter may report what it meant to build.
     """
     parts = [np.zeros(0)]
     for line in lines:
@@ -51,10 +55,10 @@ def left(
 
 
 def built_otherwise(given: Collection[str], covers: tuple[str, ...]) -> Hypothesis:
-    """Hypothesis: a model was built of other numbers than the scene's, as its certificate says.
+    """Hypothesis: the model was built with other numbers than the scene's, as its certificate shows.
 
     Args:
-        given: quantities that an engine is given.
+        given: quantities that the adapter hands to the engine.
         covers: quantities that follow from them.
     """
 
@@ -77,7 +81,7 @@ def built_otherwise(given: Collection[str], covers: tuple[str, ...]) -> Hypothes
 
 
 def _otherwise(line: Mapping[str, Any]) -> str:
-    """Text of a quantity built wrongly: its factor, if one factor explains it, and both numbers."""
+    """Text about a wrongly built quantity: both numbers, and their ratio if all its numbers have the same."""
     built, expected = (np.asarray(line[key], dtype=np.float64) for key in ("found", "expected"))
     own = {field.name: line[field.name] for field in dataclasses.fields(Line)}
     one, other = told_apart(*worst_numbers(Line(**own), _SHOWN))
@@ -89,12 +93,12 @@ def _otherwise(line: Mapping[str, Any]) -> str:
 
 
 def _is_single(line: Mapping[str, Any]) -> bool:
-    """True if the found numbers are the expected ones rounded to float32, and some of them changed by that."""
+    """True if the found numbers are the expected ones rounded to float32."""
     return np.array_equal(np.float32(line["expected"]), np.asarray(line["found"])) and any(line["expected"])
 
 
 def single_precision(lines: Sequence[Mapping[str, Any]]) -> Iterator[Cause]:
-    """The cause that the engine computes with 24 bits: what differs is the float32 of what is expected."""
+    """Cause: the engine computes with 24 bits, as the differing numbers are the expected ones rounded to float32."""
     exact = [line for line in differing(lines) if _is_single(line)]
     if exact:
         before = max(line["difference"] for line in exact)

@@ -16,7 +16,7 @@ from proofroll.core.verdict import Judgement, Verdict
 if TYPE_CHECKING:
     import xarray as xr
 
-# So many causes are told; where more close something, the first ones do it best.
+# Most causes that are reported for an element; the best come first.
 _MOST = 3
 _WRONG = frozenset({Verdict.DIFFERS, Verdict.CONVERGES})
 _RIGHT = frozenset({Verdict.AGREES, Verdict.UNCONFIRMED})
@@ -27,7 +27,7 @@ class Diagnosis:
     """A cause of one element.
 
     Attributes:
-        element: its name.
+        element: name of the element.
         cause: with its proof.
         seen: right and wrong parts of the run, as the beginning of the sentence; may be empty.
     """
@@ -58,9 +58,16 @@ def diagnosed(
 ) -> list[Diagnosis]:
     """The proven causes of all elements of a scene.
 
-    ``lines`` are those of the stored certificate, ``run`` and ``truth`` trajectories at the same times, ``step`` is the
-    engine's [s]. Where there are judgements of observables, an element whose observables are all right is left out:
-    the rest is round-off and truncation, which any fault may seem to close.
+    With judgements, an element whose observables are all right is left out: its remaining differences are round-off and
+    truncation, which any fault may seem to explain.
+
+    Args:
+        scene: of the run.
+        lines: of the stored certificate.
+        run: trajectory of the engine; None: it was not run.
+        truth: the truth at the same times.
+        step: of the engine [s], or None.
+        judgements: of observables.
     """
     if run is None and all(line["holds"] for line in lines):
         return []
@@ -93,7 +100,7 @@ def diagnosed(
 
 
 def _closed_by_step(item: Judgement) -> bool:
-    """True if the limit of small steps closes an error as a cause has to."""
+    """True if the limit of small steps leaves no more of the error than a proven cause may."""
     return item.limit_error is not None and item.limit_error <= CLOSES * item.error
 
 
@@ -102,7 +109,8 @@ def what_is_right(scene: Scene, judgements: Iterable[Judgement]) -> str:
 
     Empty unless some are right and some are not.
     """
-    right, wrong = [], []  # what holds at every instant, a balance or an audit, follows from the rest
+    right, wrong = [], []  # residuals (balances, audits) are left out: they follow from the other observables
+
     for item in judgements:
         known = scene.observables.get(item.observable)
         if known is None or (known.role == Role.RESIDUAL and not known.hangs_on_events):

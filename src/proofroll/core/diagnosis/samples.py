@@ -1,6 +1,6 @@
-"""Hypotheses of wrong reports of a right motion, in samples or at the start, of any element with poses and twists.
+"""Hypotheses of a right motion that is reported wrongly, for any element with poses and twists.
 
-Its variables are ``p_WB``, ``v_WB``, ``w_WB`` and perhaps ``q_WB``; its kind tests further variables.
+They test the variables ``p_WB``, ``v_WB``, ``w_WB`` and, if present, ``q_WB``; a kind of element tests its others.
 """
 
 from __future__ import annotations
@@ -22,22 +22,22 @@ from proofroll.core.multi_element import REQUIRED
 if TYPE_CHECKING:
     import xarray as xr
 
-# In this order: a state that is wrong makes all that follows wrong, and not the other way round.
+# Velocities come before accelerations: a wrong state makes accelerations wrong, but not the other way round.
 _STATE = (("velocity", "the velocity", "m/s"), ("spin", "the angular velocity", "rad/s"))
 _RATES = (
     ("acceleration", "the acceleration", "m/s^2"),
     ("angular acceleration", "the angular acceleration", "rad/s^2"),
 )
-# Fewer samples tell no frame and no time.
+# Fewest samples that determine a frame or a time.
 _FEWEST = 3
-# Parts of a state that differ by less than this part of the largest difference are as they are.
+# Parts of a state that differ by less than this part of the largest difference are not given more weight.
 _PART = 1e-2
-# Quaternions at time 0 that are this near to each other are the same.
+# Quaternions at time 0 that differ by less than this are equal.
 _START = 1e-6
 
 
 def both(evidence: Evidence) -> tuple[xr.Dataset, xr.Dataset] | None:
-    """Run and truth, if both have samples, at the same times."""
+    """Run and truth; None unless both have enough samples, at the same times."""
     run, truth = evidence.run, evidence.truth
     if run is None or truth is None or run.sizes["time"] != truth.sizes["time"] or run.sizes["time"] < _FEWEST:
         return None
@@ -46,7 +46,7 @@ def both(evidence: Evidence) -> tuple[xr.Dataset, xr.Dataset] | None:
 
 @hypothesis("float32", "every number of the run, or each built one that differs, is exactly a float32")
 def single_precision_run(evidence: Evidence) -> Iterator[Cause]:
-    """Hypothesis: samples hold numbers of single precision (24 bits); one random double in 5e8 looks so by chance."""
+    """Hypothesis: samples hold numbers of single precision (24 bits); of random doubles one in 5e8 looks so."""
     yield from single_precision(evidence.lines)
     run, truth = evidence.run, evidence.truth
     said_so = any(str(line["because"]).endswith(ROUNDED) for line in evidence.lines)  # what is declared is no finding
@@ -97,19 +97,19 @@ def another_clock(state: Callable[[Any, xr.Dataset], FloatArray], covers: tuple[
     return test
 
 
-# Part of a difference that another clock may leave, which is a fitted number and needs no equation: a pendulum that was
-# pushed for 20 ms is, without the push, the true one at another time but for a fiftieth.
+# Part of a difference that a wrong clock may leave. It is strict, as the clock is a fitted number: a pendulum whose
+# push of 20 ms was left out equals the true one at other times up to a fiftieth.
 _CLOCK = 2e-3
-# Variables of a state, and those that go another way with it if the motion is another: a report moves no body.
+# Variable -> variables that differ, too, if the motion itself is wrong rather than the report of this variable.
 _WITH = {"p_WB": ("v_WB",), "v_WB": ("p_WB", "q_WB"), "w_WB": ("p_WB", "q_WB"), "q_WB": ("w_WB",)}
 # Part of its natural size below which a variable stands still.
 _STILL = 1e-3
-# Causes that may concern places and velocities at once, as of centres of mass; then bodies turn as they should.
+# Causes that may affect positions and velocities at once (of centres of mass) while the rotation is right.
 _OF_BOTH = ("frame.", "axes.", "centre of mass.")
 
 
 def _alike(said: FloatArray, true: FloatArray) -> FloatArray:
-    """Weights that give each part of a state an equal largest error: speeds must not hide wrong positions."""
+    """Weights that scale all parts of a state to the same largest error: speeds must not hide wrong positions."""
     off = np.abs(said - true).reshape(-1, said.shape[-1]).max(axis=0)
     largest = float(np.max(off))
     return np.where(off > _PART * largest, largest / np.maximum(off, _PART * largest), 1.0)
@@ -125,11 +125,11 @@ def reported_vectors(
     """Hypothesis: positions, velocities or angular velocities are each reported wrongly.
 
     Args:
-        units: variable -> what it is in words, and its unit.
-        frames: in which they may be given by mistake, at each time of the true run.
-        clock: error of the clock, if it explains all of them.
+        units: variable -> its description and unit.
+        frames: frames in which they may be reported by mistake, at each time of the true run.
+        clock: hypothesis of a wrong clock; if proven, it explains all of them.
         least: size below which a variable of an element stands still.
-        besides: other explanations of one of them.
+        besides: further causes of a wrong report of one variable.
     """
 
     @hypothesis(
@@ -155,19 +155,19 @@ def reported_vectors(
 
 
 def moves_otherwise(evidence: Evidence, name: str, *others: str) -> bool:
-    """True if what goes with a variable departs from the truth as it does: the motion is another, not what is said."""
+    """True if other variables of the state are wrong, too: the motion itself differs, not only one report."""
     least = CLOSES * _departure(evidence, name)
     return any(_departure(evidence, other) > least for other in others or _WITH[name])
 
 
 def forced_otherwise(evidence: Evidence, told: Reported) -> bool:
-    """True if velocities depart from the truth as a force does: it belongs to another motion."""
+    """True if velocities are as wrong as a force: the force belongs to a different motion."""
     least = CLOSES * told.before / (told.size or 1.0)
     return any(_departure(evidence, name) > least for name in ("v_WB", "w_WB"))
 
 
 def _departure(evidence: Evidence, name: str) -> float:
-    """Largest difference of a variable over what it does in the truth since the start; 0 where one does not have it."""
+    """Largest error of a variable, relative to its change in the truth since the start; 0 if a run lacks it."""
     run, truth, element = evidence.run, evidence.truth, evidence.element
     if run is None or truth is None or name not in run or name not in truth or run[name].shape != truth[name].shape:
         return 0.0
@@ -179,9 +179,9 @@ def _departure(evidence: Evidence, name: str) -> float:
 
 
 def reported_quaternions(true_ones: Callable[[Evidence], FloatArray]) -> Hypothesis:
-    """Hypothesis: quaternions are reported in another order, or inverted.
+    """Hypothesis: quaternions are reported with their scalar last, or inverted.
 
-    ``true_ones`` gives the true ones, scalar first, shape (time, …, 4).
+    ``true_ones`` gives the true quaternions, scalar first, shape (time, …, 4).
     """
 
     @hypothesis("quaternion", "the true quaternions in another order or inverted are what is said, up to their sign")
@@ -214,10 +214,10 @@ def _turned(said: FloatArray, other: FloatArray) -> float:
 
 
 def at_start(frames_of: Callable[[Any], Mapping[str, FloatArray]], follows: frozenset[str]) -> Hypothesis:
-    """Hypothesis: velocities and accelerations at time 0 are reported with other signs, units or axes.
+    """Hypothesis: velocities and accelerations at time 0 are reported with wrong signs, units or axes.
 
     Args:
-        frames_of: of an element at time 0, in which a vector may be given by mistake; each of shape (vectors, 3, 3).
+        frames_of: element -> frames at time 0 in which a vector may be given by mistake, each of shape (vectors, 3, 3).
         follows: quantities that follow from the velocities.
     """
     state, accelerations = ({name for name, _, _ in vectors} for vectors in (_STATE, _RATES))

@@ -1,7 +1,7 @@
-"""Errors of a vector on its way from an engine into a sample: sign, unit, axes, frame, time, precision.
+"""Errors in reporting a vector: sign, unit, axes, frame, time, limit.
 
-Every test takes the true vectors, does to them what the engine may have done, and holds the result against the
-engine's report. So it needs no equations, and is proof by itself.
+Each test applies one such mistake to the true vectors and compares the result with the engine's report. So it needs no
+equations of motion, and agreement is proof by itself.
 """
 
 from __future__ import annotations
@@ -18,36 +18,35 @@ from proofroll.core.diagnosis.clocks import in_steps, late, said_delay
 from proofroll.core.diagnosis.fitting import change_by, known_factor, said_factor
 
 WORLD = "world"
-# A rotation is fitted with three numbers, a scale or a shift with one, a limit with one.
 _PERMUTATIONS = [
     (order, signs)
     for order in itertools.permutations(range(3))
     for signs in itertools.product((1.0, -1.0), repeat=3)
     if order != (0, 1, 2) or len(set(signs)) > 1
 ]
-# A unit is exact: a factor that nobody makes by mistake has to leave less, or few samples of anything would be alike.
+# Part of the difference that an arbitrary factor or limit may leave: as it is fitted, few samples agree by chance.
 _EXACT = 1e-3
-# A step in an otherwise constant curve fits any shift: that a time is another shows where the curve changes, at this
-# many samples at least, each by this part of the largest difference.
+# A jump in an otherwise constant curve fits any time shift. So a shift is looked for only if at least _SEEN samples
+# differ, each by the part _FEW of the largest difference.
 _SEEN, _FEW = 6, 1e-2
-# A delay is half a step to this part of the step.
+# Tolerance with which a delay counts as half a step, in steps.
 _HALF = 0.1
-# A difference within so many bars of the truth is none.
+# Differences up to this many error bars of the truth are ignored.
 _BARS = 10.0
-# Part of the largest number of a matrix from which on a component has a share.
+# Entries of a matrix below this part of its largest one count as zero.
 _SHARE = 1e-9
 _SIGN = "an engine may give what acts on the other body: look at whose vector it is"
 
 
 @dataclass(frozen=True)
 class Reported:
-    """A vector that an engine gives at each time.
+    """A vector that an engine reports at each time.
 
     Attributes:
         name: of the variable, e.g. ``w_WB``.
-        what: in words, e.g. ``the angular velocity``.
+        what: description, e.g. ``the angular velocity``.
         unit: its unit.
-        said, true: values, shape (time, …, 3); NaN where the equations do not determine them.
+        said, true: reported and true values, shape (time, …, 3); NaN where the equations do not determine them.
         time: [s], shape (time,).
         frames: name -> rotations whose columns are the frame's axes in the world, shape (time, …, 3, 3).
         least: size below which the quantity stands still, in its unit.
@@ -66,17 +65,17 @@ class Reported:
 
     @property
     def size(self) -> float:
-        """Size of the quantity."""
+        """Largest true component, at least :attr:`least`."""
         return max(float(np.nanmax(np.abs(self.true), initial=0.0)), self.least)
 
     @property
     def differs(self) -> bool:
-        """True if there is a difference beyond round-off and the error bar of the truth."""
+        """True if the report differs by more than round-off and the error bar of the truth."""
         known = self.said.shape == self.true.shape and above_round_off(self.before, self.size)
         return known and self.before > _BARS * self.bar
 
     def after_start(self) -> Reported:
-        """Without time 0 where that is right: an engine may give there what it was given."""
+        """The vector without time 0 if it is right there: an engine may report its initial values unchanged."""
         said, true = self.said, self.true
         if len(said) < 2 or said.shape != true.shape or above_round_off(apart(said[0], true[0]), self.size):
             return self
@@ -85,7 +84,7 @@ class Reported:
 
     @property
     def before(self) -> float:
-        """Largest difference."""
+        """Largest difference between report and truth."""
         return apart(self.said, self.true)
 
     def cause(
@@ -99,9 +98,9 @@ class Reported:
         explains: int | None = None,
         change: float = np.inf,
     ) -> Cause:
-        """Cause: the engine reports ``explained`` instead of the truth, as far as the truth is determined.
+        """Cause: the engine reports ``explained`` instead of the truth.
 
-        Where the truth is not determined, the report is left out of the comparison.
+        Values without a determined truth are left out.
         """
         partly = np.any(np.isnan(self.true), axis=-1, keepdims=True)
         aside = partly & (np.isnan(explained) | np.isnan(self.said))
@@ -115,7 +114,11 @@ class Reported:
         )
 
     def causes(self, step: float | None) -> Iterator[Cause]:
-        """All of this module, as far as there is a difference."""
+        """All causes of this module, the simple ones first; none if nothing differs.
+
+        Args:
+            step: of the engine [s], or None.
+        """
         if not self.differs:
             return
         sign = self.cause("sign", f"{self.name} has the wrong sign: it is minus {self.what}", -self.true, _SIGN)
@@ -130,7 +133,7 @@ class Reported:
             tried = list(causes)
             yield from tried
             if any(cause.proven and cause.left <= _EXACT for cause in tried):
-                return  # what is simple goes first, and is enough where it leaves nothing
+                return  # a simple mistake that leaves nothing is enough
 
     def _frames(self) -> Iterator[Cause]:
         remedy = f"give {self.name} along the axes of the world"
@@ -173,7 +176,7 @@ class Reported:
             yield self.cause("scaled", says, factor * self.true, remedy, 1, _EXACT, explains, change)
 
     def _clamped(self) -> Iterator[Cause]:
-        """A limit is held exactly, as a unit is."""
+        """Causes: each component, or the length of the vector, is limited to a constant."""
         limit = float(np.nanmax(np.abs(self.said), initial=0.0))
         sizes = np.linalg.norm(np.nan_to_num(self.true), axis=-1, keepdims=True)
         longest = float(np.max(np.linalg.norm(np.nan_to_num(self.said), axis=-1)))
@@ -197,7 +200,7 @@ class Reported:
         if shift is None:
             return
         delay, before, after = shift
-        # Half a step is what a method of first order makes of places, x + h v, by itself
+        # a method of first order, x + h v, is late by half a step without any mistake
         own = self.unit == "m" and bool(step) and abs(abs(delay) / (step or 1.0) - 0.5) < _HALF
         says = f"{self.name} is {said_delay(delay, step)}"
         remedy = f"sample {self.name} at the time that was asked for"
@@ -206,12 +209,12 @@ class Reported:
 
 
 def into(frame: FloatArray, vectors: FloatArray) -> FloatArray:
-    """Components along the axes of frames; NaN if they depend on a NaN."""
+    """Components of vectors along the axes of frames; NaN if they depend on a NaN."""
     return product(np.swapaxes(frame, -1, -2), vectors)
 
 
 def product(matrices: FloatArray, vectors: FloatArray) -> FloatArray:
-    """Matrices times vectors, NaN where a component that is NaN has a share in it."""
+    """Products of matrices and vectors; NaN where a NaN component contributes."""
     unknown = np.isnan(vectors)
     size = float(np.max(np.abs(matrices), initial=0.0))
     products = np.einsum("...ij,...j->...i", matrices, np.where(unknown, 0.0, vectors))
@@ -220,7 +223,7 @@ def product(matrices: FloatArray, vectors: FloatArray) -> FloatArray:
 
 
 def _distinct(values: FloatArray, size: float) -> int:
-    """Count of distinct numbers."""
+    """Count of distinct values, at a resolution of :data:`_EXACT` times ``size``."""
     if not values.size or not size:
         return 0
     return 1 + int(np.sum(np.diff(np.sort(values, axis=None)) > _EXACT * size))

@@ -1,4 +1,4 @@
-"""A comparison from Python: of a file, or of a scene about which no file says anything."""
+"""Comparison from Python, of a comparison file or of a scene alone."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -23,18 +23,18 @@ def compare(
     budget: float | None = None,
     **parameters: float,
 ) -> Outcome:
-    """Holds engines against the truth, as ``proofroll compare`` does; a notebook shows the outcome as a table.
+    """Compares engines with the truth, as ``proofroll compare`` does; a notebook shows the outcome as a table.
 
     Args:
         name: of a comparison, or the path of its file; or of a scene, the path of its folder or of a robot file.
         engines: those to be run; by default all of the comparison, or all that can represent the scene.
-        out: folder for results; what is there is reused.
+        out: folder for results; stored results are reused.
         jobs: workers at once; by default one for each core.
         budget: processor time of all runs of a scene [s]; by default 60.
         **parameters: of a scene, in SI units.
 
     Raises:
-        InputError: something that was given does not exist or makes no sense.
+        InputError: an argument names something unknown or makes no sense.
     """
     workers = Workers()
     if means_scene(name, alone=bool(parameters or budget)):

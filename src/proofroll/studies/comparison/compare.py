@@ -89,14 +89,14 @@ def evaluate(planned: Plan, results: dict[str, Result], runner: Runner) -> Outco
 
 
 def left_out(results: Mapping[str, Result]) -> set[str]:
-    """Keys of the cases that the processor time did not suffice for."""
+    """Keys of the cases that were left out for lack of processor time."""
     return {key for key, result in results.items() if result.status is Status.LEFT_OUT}
 
 
 def run_plan(
     planned: Plan, runner: Runner, progress: Callable[[Case, Result], None] | None = None
 ) -> dict[str, Result]:
-    """Results of a plan's cases by key; within a budget what is worth most comes first."""
+    """Results of a plan's cases by key; with a budget the most useful cases come first."""
     seconds = planned.comparison.budget
     if seconds is None:
         return runner.run(planned.cases, progress)
@@ -108,7 +108,7 @@ def run_plan(
 
 
 def _beyond_budget(planned: Plan, results: Mapping[str, Result]) -> list[str]:
-    """Cases that were left out, as text."""
+    """Texts of the cases that were left out for lack of processor time."""
     cases = [(f"the truth{at_point(case.parameters)}", case) for case in planned.truths.values()]
     cases += [
         (f"{run.row.engine}{at_point(run.parameters)}", case) for run in planned.runs for case in run.ladder.values()
@@ -135,13 +135,13 @@ def _run(planned: Planned, result: Result, **judged: Any) -> Run:
 
 
 def _with_trajectory(run: Run, held: Mapping[str, StoredTrajectory]) -> Run:
-    """The run with its trajectory, unless its file is not kept, as where a run was ended."""
+    """The run with its trajectory, if its file exists."""
     trajectory = held[run.case.key] if run.case else None
     return replace(run, trajectory=trajectory if trajectory and trajectory.file.is_file() else None)
 
 
 def _absent(run: Planned) -> Run:
-    """A row whose engine could not even be asked."""
+    """Row whose engine could not be asked: missing, crashed or hung."""
     status = Status.CRASHED
     if isinstance(run.facts, Missing):
         status = Status.MISSING
@@ -151,19 +151,19 @@ def _absent(run: Planned) -> Run:
 
 
 def _without_result(run: Planned, point: ComparedPoint, result: Result) -> Run:
-    """A row that was refused, failed, or was left out for lack of time, which contradicts nothing."""
+    """Row that was refused, failed, or was left out for lack of time, which contradicts no claim."""
     causes = diagnosed(point.scene, result.certificate, step=run.ladder[1.0].engine.step)
     failed = _run(run, result, diagnosis=causes)
     expected = run.row.expected(run.parameters)
     if failed.verdict in expected or result.status is Status.LEFT_OUT:
         return failed
     where = f"{run.row.engine}{at_point(run.parameters)}"
-    said = f"{where} {result.status}, expected: {' or '.join(expected)} ({result.message})"
-    return replace(failed, contradictions=[said])
+    contradiction = f"{where} {result.status}, expected: {' or '.join(expected)} ({result.message})"
+    return replace(failed, contradictions=[contradiction])
 
 
 def _without_truth(run: Planned, point: ComparedPoint, result: Result) -> Run:
-    """Row at a point without a truth: it was refused, which says nothing about the engine, or its run was lost."""
+    """Row at a point without a truth: not judged if the truth was refused, failed if its run was lost."""
     truth = point.result
     lasts = truth.status in LASTING
     status = Status.NO_TRUTH if lasts else truth.status
@@ -172,17 +172,17 @@ def _without_truth(run: Planned, point: ComparedPoint, result: Result) -> Run:
 
 
 def _of_another_scene(run: Planned, result: Result, sentence: str) -> Run:
-    """A row whose engine ran another scene: shown with its trajectory, and not judged."""
+    """Row whose engine ran a model of a different kind: shown with its trajectory, but not judged."""
     result = replace(result, status=Status.ANOTHER_SCENE, message=sentence)
     expected = {Verdict.ANOTHER_SCENE, Verdict.DIFFERS, Verdict.FAILED} & set(run.row.expected(run.parameters))
-    said = [] if expected else [f"{run.row.engine}{at_point(run.parameters)}: {sentence}"]
-    return _run(run, result, contradictions=said)
+    contradictions = [] if expected else [f"{run.row.engine}{at_point(run.parameters)}: {sentence}"]
+    return _run(run, result, contradictions=contradictions)
 
 
 def _judgements(
     run: Planned, band: Band, reference: Reference, trajectories: dict[float, xr.Dataset], lost: str
 ) -> tuple[list[Judgement], dict[float, dict[str, float]]]:
-    """The judgements of a run; and factor of each rung of its ladder -> error of each observable."""
+    """Judgements of a run, and factor of each rung of its ladder -> observable -> error."""
     reference, trajectories = reference.common_span(trajectories)
     curves = {factor: held_against.observed(reference, dataset) for factor, dataset in trajectories.items()}
     main = curves[1.0]
@@ -225,7 +225,7 @@ def _judgements(
 
 
 def _rungs(run: Planned, results: dict[str, Result], errors: dict[float, dict[str, float]]) -> list[LadderRun]:
-    """The ladder without the run itself."""
+    """Runs of the ladder without the run itself."""
     rungs = []
     for factor, case in run.ladder.items():
         facts = case.engine
@@ -235,10 +235,10 @@ def _rungs(run: Planned, results: dict[str, Result], errors: dict[float, dict[st
 
 
 def _limit(run: Planned, name: str, curves: dict[float, dict[str, FloatArray]], magnitude: float) -> Limit | None:
-    """Limit of small steps of an observable whose numbers have some size, if every rung of the ladder gave it."""
+    """Limit of small steps of an observable, if every rung has it; ``magnitude``: size of its numbers."""
     assert isinstance(run.facts, EngineFacts)  # there are curves
     stepped = run.facts.resolution == "dt"
-    # of tolerances those that the engine takes
+    # tolerances that the engine refuses are left out
     factors = run.row.ladder if stepped else [factor for factor in run.row.ladder if factor in run.ladder]
     if len(factors) == 1 or not all(name in curves.get(factor, {}) for factor in factors):
         return None
@@ -262,7 +262,7 @@ def _with_floor(
     scale: float | None,
     unit: str,
 ) -> Limit | None:
-    """The limit, or in single precision without one what ended the refinement."""
+    """The limit; where single precision hides it, with a clause on the error floor."""
     facts = run.facts
     if limit is None or not limit.rounded or not isinstance(facts, EngineFacts) or facts.step is None:
         return limit
@@ -273,7 +273,7 @@ def _with_floor(
 def _with_events(
     run: Planned, name: str, limit: Limit | None, reference: Reference, trajectories: dict[float, xr.Dataset]
 ) -> Limit | None:
-    """The limit with what one step beside an event does to its finest run."""
+    """The limit with the effect of events that are one step late in its finest run."""
     if limit is None or not isinstance(run.facts, EngineFacts):
         return limit
     factor = run.row.ladder[-1]
@@ -282,7 +282,7 @@ def _with_events(
 
 
 def _lost(run: Planned, results: dict[str, Result]) -> str:
-    """The first step of the ladder that has no trajectory, and why; empty if each has one."""
+    """First step of the ladder without a trajectory, and why; empty if each has one."""
     for case in run.ladder.values():
         result, name = results[case.key], case.engine.resolution
         if result.status != Status.DONE and name is not None:
@@ -291,6 +291,6 @@ def _lost(run: Planned, results: dict[str, Result]) -> str:
 
 
 def _has_ladder(run: Planned, curve: FloatArray) -> bool:
-    """True if small steps could confirm the curve: several were asked for, and there is something to converge."""
+    """True if the ladder has several steps, and the curve has values that can converge."""
     resolved = isinstance(run.facts, EngineFacts) and run.facts.resolution is not None
     return resolved and len(run.row.ladder) > 1 and curve.size > 0

@@ -1,4 +1,4 @@
-"""A scene about which no file says anything: what can be asked of it all the same."""
+"""Default comparison of a scene that has no comparison file, and default axes of its stability map."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -19,23 +19,27 @@ from proofroll.running.process import processor_seconds
 from proofroll.running.worker_pool import Workers
 from proofroll.studies.stability.axes import Axis, AxisTerm
 
-_UNTIL, _FIRST, _SAMPLES = 1.0, 2.0, 50  # s where the scene says nothing, s of a first look at most
-_STEP = 4e-3  # s: samples lie whole numbers of it apart, which a ladder of steps down to 1e-3 s divides
-BUDGET = 60.0  # processor-seconds that a person waits for who asks nothing in particular
+_UNTIL, _FIRST, _SAMPLES = 1.0, 2.0, 50  # default length [s], longest length [s], number of samples
+_STEP = 4e-3  # s: sampling intervals are multiples of it, so that a ladder of steps down to 1e-3 s divides them
+BUDGET = 60.0  # default processor time of all runs [s]
 _CLOSE = "close"
 _BECAUSE = "no file says what to expect of this scene"
-# Along an axis a parameter is taken to these parts of its default, where its bounds allow.
+# Values of a parameter along an axis, relative to its default, as far as its bounds allow.
 _PARTS = (0.1, 1.0, 10.0)
 
 
 def compared(
     name: str, parameters: Mapping[str, Any], workers: Workers | None = None, budget: float | None = BUDGET
 ) -> Comparison:
-    """Every formulation of every installed engine that can, held against the truth of a scene, with nothing claimed.
+    """Comparison of every able formulation of every installed engine with the truth of a scene; it makes no claims.
 
-    It is a first look: of a scene that lasts longer it has the first 2 s.
-    ``parameters`` are those that differ from the defaults; engines are asked in one of ``workers``, if they are given;
-    ``budget`` is the processor time of all runs [s], None: any.
+    It is a first look: if the scene lasts longer, it has the first 2 s only.
+
+    Args:
+        name: of the scene.
+        parameters: those that differ from the defaults.
+        workers: pool for the questions to engines; None: new workers.
+        budget: processor time of all runs [s]; None: no limit.
 
     Raises:
         InputError: there is no such scene, a parameter makes no sense, or no installed engine can represent it.
@@ -64,14 +68,14 @@ def compared(
 
 
 def times_of(file: SceneFile) -> tuple[float, float]:
-    """Last time and interval between samples of a first comparison of a scene [s]."""
+    """Last time and sampling interval of a first comparison of a scene [s]."""
     duration = file.duration or _UNTIL
     every = _STEP * max(1, round(duration / _SAMPLES / _STEP))
     return every * max(1, int(duration / every + 1e-9)), every
 
 
 def _stepped(engines: Sequence[str], dt: float | None, workers: Workers | None) -> list[str]:
-    """The engines, with the step that the scene asks for where their own is longer."""
+    """The engines, each with the step that the scene's file recommends if its own is longer."""
     if dt is None:
         return [*engines]
     specs = [parse_engine(engine) for engine in engines]
@@ -85,9 +89,9 @@ def _stepped(engines: Sequence[str], dt: float | None, workers: Workers | None) 
 
 
 def bounds(scene: Scene, every: float) -> dict[str, Tolerance]:
-    """One per cent of what moves; where that has no size of its own, a thousandth of its unit.
+    """Tolerances: one per cent of each motion, or a thousandth of its unit if it has no size of its own.
 
-    Times of watched events may be off by the sampling interval ``every`` [s].
+    The tolerance of watched times of events is the sampling interval ``every`` [s].
     """
     all_of = {key: item for key, item in scene.observables.items() if item.role is Role.MOTION}
     moves = {key: item for key, item in all_of.items() if item.headline}
@@ -102,42 +106,49 @@ def bounds(scene: Scene, every: float) -> dict[str, Tolerance]:
 
 
 def able(scene: Scene, workers: Workers | None = None, *, first: bool = False) -> list[str]:
-    """Formulations of installed engines that can represent the scene, as files write them; ``first``: one of each."""
+    """Formulations of installed engines that can represent the scene, as files write them.
+
+    Args:
+        scene: the scene.
+        workers: pool for the questions to engines; None: new workers.
+        first: True for one formulation per engine.
+    """
     formulations = []
-    for told in _installed(workers):
+    for engine in _installed(workers):
         fitting = [
             name
-            for name in told.provides
-            if represents(scene, name, told.provides) and offered(name, scene.requires, told.made_for)
+            for name in engine.provides
+            if represents(scene, name, engine.provides) and offered(name, scene.requires, engine.made_for)
         ]
-        formulations += [f"{told.name}[formulation={name}]" for name in fitting[: 1 if first else None]]
+        formulations += [f"{engine.name}[formulation={name}]" for name in fitting[: 1 if first else None]]
     return formulations
 
 
 def _installed(workers: Workers | None) -> list[EngineDescription]:
     """Descriptions of the installed engines."""
-    return [told for told in described(engine_names(), workers).values() if isinstance(told, EngineDescription)]
+    return [item for item in described(engine_names(), workers).values() if isinstance(item, EngineDescription)]
 
 
 def _why_none(scene: Scene, workers: Workers | None) -> str:
-    """Capabilities that no formulation provides; if there are none, the elements that each engine cannot build."""
+    """Reason why no engine can represent a scene: missing capabilities, or else the elements that each cannot build."""
     engines = _installed(workers)
-    given = {item for told in engines for items in told.provides.values() for item in items}
+    given = {item for engine in engines for items in engine.provides.values() for item in items}
     if lacking := scene.requires - given:
         return f"no installed engine has {', '.join(sorted(lacking))}"
-    said = []
-    for told in engines:
+    reasons = []
+    for engine in engines:
         none = [
             f"{alone.elements[0].name} ({', '.join(sorted(alone.requires))})"
             for alone in each_alone(scene)
-            if not any(alone.requires <= set(items) for items in told.provides.values())
+            if not any(alone.requires <= set(items) for items in engine.provides.values())
         ]
-        said.append(f"{told.name} has no formulation for {' and '.join(none) or 'all elements of one kind at once'}")
-    return f"no installed engine can represent all of the scene: {'; '.join(said)}"
+        lacking_for = " and ".join(none) or "all elements of one kind at once"
+        reasons.append(f"{engine.name} has no formulation for {lacking_for}")
+    return f"no installed engine can represent all of the scene: {'; '.join(reasons)}"
 
 
 def axes_of(name: str) -> list[Axis]:
-    """Axes of a stability map: each parameter of the scene that is no count and not zero, and the length of the run."""
+    """Axes of a stability map: each continuous parameter of the scene that is not zero, and the length of the run."""
     file = read_scene_file(name)
     values = load_scene(name).parameters
     axes = []

@@ -1,4 +1,4 @@
-"""Expectations of a comparison, held against its results."""
+"""Compares the results of a comparison with its claims."""
 
 from collections.abc import Collection
 
@@ -8,9 +8,9 @@ from proofroll.core.verdict import Judgement, Verdict
 from proofroll.studies.comparison.outcome import SEVERITY, worst
 from proofroll.studies.comparison.planning import Planned, at_point
 
-# Where nobody can be judged; that contradicts no claim, and is expected of every engine.
+# Verdicts without a judgement; they contradict no claim and may be expected of every engine.
 NOBODY = frozenset({Verdict.ILL_POSED, Verdict.NOT_JUDGED, Verdict.ANOTHER_SCENE})
-# Verdicts that the rest of a ladder may still make of one without it.
+# Verdict without the rest of the ladder -> verdicts that it may become with it.
 _OPEN = {
     Verdict.UNCONFIRMED: {Verdict.AGREES, Verdict.UNCONFIRMED, Verdict.DIFFERS},
     Verdict.DIFFERS: {Verdict.CONVERGES, Verdict.DIFFERS},
@@ -24,14 +24,15 @@ def contradictions_of(
     missing: Collection[str],
     unfinished: bool = False,
 ) -> list[str]:
-    """Contradictions of the claim, as sentences.
+    """Contradictions of a claim by a run, as sentences.
 
     Args:
-        comparison: the claim.
-        run: its row.
+        comparison: the comparison.
+        run: row at a point.
         judgements: of the row's observables.
-        missing: observables that are to be judged and that the run does not give.
-        unfinished: a part of the ladder was left out for lack of time; then only what no ladder can change counts.
+        missing: observables that should be judged and that the run does not report.
+        unfinished: True if a part of the ladder was left out for lack of time; then only contradictions count that the
+            rest of the ladder cannot change.
     """
     where = f"{run.row.engine}{at_point(run.parameters)}"
     sentences = []
@@ -42,12 +43,12 @@ def contradictions_of(
 
     known = [judgement for judgement in judgements if judgement.verdict not in NOBODY]
     overall = worst(known, missing)
-    # Where something cannot be judged, the rest contradicts only by being worse than expected.
+    # If some observables cannot be judged, the others contradict only by a worse verdict than expected.
     whole = len(known) == len(judgements)
     worse = bool(known) and SEVERITY.index(overall) > max(map(SEVERITY.index, expected))
-    # What is missing is said below, name by name.
+    # Missing observables are reported below, name by name.
     if contradicts(overall, {*expected, Verdict.INCOMPLETE}) and (whole or worse):
-        # Which observables make it so; where it is better than expected, all of them do.
+        # The observables with the worst verdict.
         guilty = [judgement for judgement in known if judgement.verdict == overall]
         guilty.sort(key=lambda item: item.error / item.tolerance, reverse=True)
         said = "; ".join(f"{item.observable} {item.verdict}" for item in guilty)

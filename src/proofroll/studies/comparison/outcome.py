@@ -19,8 +19,7 @@ from proofroll.studies.judging.reference import Reference
 SEVERITY = list(Verdict)
 
 
-# What a run is called that was honestly not made, or came to its end and cannot be judged; any other that is not done
-# failed.
+# Verdict on runs that were not made for a good reason, or cannot be judged; all others that are not done failed.
 _UNJUDGED = {
     Status.REFUSED: Verdict.REFUSED,
     Status.ANOTHER_SCENE: Verdict.ANOTHER_SCENE,
@@ -30,7 +29,7 @@ _UNJUDGED = {
 
 
 def worst(judgements: Sequence[Judgement], missing: Collection[str] = ()) -> Verdict:
-    """The worst verdict of any observable, those that are missing included; failed if there is no judgement."""
+    """Worst verdict of the observables, missing ones included; failed if there is no judgement."""
     verdicts = [judgement.verdict for judgement in judgements]
     return max(
         [*verdicts, *([Verdict.INCOMPLETE] if verdicts and missing else [])], key=SEVERITY.index, default=Verdict.FAILED
@@ -39,12 +38,12 @@ def worst(judgements: Sequence[Judgement], missing: Collection[str] = ()) -> Ver
 
 @dataclass(frozen=True)
 class ComparedPoint:
-    """One point of the parameters: the scene there and its truth; whoever reports of it loads nothing again.
+    """One point of the parameters: the scene there and its truth, loaded once for all reports.
 
     Attributes:
-        scene: with its numbers.
+        scene: with the parameters of the point.
         case: of the truth.
-        result: end of the truth's run.
+        result: of the truth.
         trajectory: of the truth.
     """
 
@@ -55,7 +54,7 @@ class ComparedPoint:
 
     @cached_property
     def reference(self) -> Reference | None:
-        """The truth, read when it is first asked for; None: there is none."""
+        """The truth, read at the first access; None: there is none."""
         return Reference.of(self.scene, self.trajectory.dataset) if self.trajectory.file.is_file() else None
 
 
@@ -65,8 +64,9 @@ class LadderRun:
 
     Attributes:
         value: of the step [s] or tolerance.
-        result: its end, with message and times.
-        errors: largest distance from the truth, between the samples too, by observable; empty without a trajectory.
+        result: of the run.
+        errors: observable -> largest distance from the truth, samples off the grid included; empty without a
+            trajectory.
     """
 
     value: float
@@ -82,15 +82,15 @@ class Run:
         row: the claim.
         parameters: the point.
         facts: the engine with complete settings, or None if it could not be asked.
-        result: end of the run itself.
+        result: of the run itself.
         judgements: one per observable; empty if there is no trajectory.
-        contradictions: sentences about what the claim did not expect.
+        contradictions: sentences about unexpected results.
         case: the run's case, or None.
-        missing: observables that the claim's tolerances judge and the run does not give.
+        missing: observables that the claim's tolerances judge and the run does not report.
         shared: clause that names the route of the truth with the same equations; empty: there is none.
-        diagnosis: causes of a difference that are proven.
+        diagnosis: proven causes of a difference.
         rungs: the other runs of its ladder.
-        trajectory: its samples, read when they are first asked for; None: there are none.
+        trajectory: of the run, read at the first access; None: there is none.
     """
 
     row: Row
@@ -108,7 +108,7 @@ class Run:
 
     @property
     def verdict(self) -> Verdict:
-        """The worst verdict of any observable; incomplete if all that is reported agrees but something is missing."""
+        """Worst verdict of the observables; incomplete if all reported ones agree but some are missing."""
         if self.result.status != Status.DONE:
             return _UNJUDGED.get(self.result.status, Verdict.FAILED)
         return worst(self.judgements, self.missing)
@@ -120,11 +120,11 @@ class Outcome:
 
     Attributes:
         comparison: the comparison that was run.
-        scene: with its own parameters.
-        file: the scene's, for its words.
+        scene: with its default parameters.
+        file: of the scene, for its texts.
         runs: with their judgements.
         points: by :func:`proofroll.studies.comparison.planning.point_name`.
-        beyond_budget: cases that the processor time did not suffice for, as text.
+        beyond_budget: texts of the cases that were left out for lack of processor time.
     """
 
     comparison: Comparison
@@ -141,7 +141,7 @@ class Outcome:
 
     @cached_property
     def laws_alone(self) -> list[str]:
-        """Points without a unique truth at which residuals alone are judged: runs are held to laws of mechanics."""
+        """Names of points without a unique motion, where only residuals (laws of mechanics) are judged."""
         from proofroll.studies.comparison.planning import point_name
 
         names = []
@@ -155,25 +155,25 @@ class Outcome:
 
     @property
     def lost(self) -> list[Run]:
-        """Runs whose engine is missing, crashed or hung, though the comparison does not expect a failure."""
+        """Runs whose engine is missing, crashed or hung, unless the comparison expects a failure."""
         broken = {Status.MISSING, Status.CRASHED, Status.TIMEOUT}
         lost = [run for run in self.runs if run.result.status in broken]
         return [run for run in lost if Verdict.FAILED not in run.row.expected(run.parameters)]
 
     def _repr_html_(self) -> str:
-        """A row for each run, with what is furthest beyond its tolerance, for a notebook."""
+        """HTML table for a notebook: a row for each run, with the observable that is furthest beyond its tolerance."""
         rows, gauges = [], []
         for run in self.runs:
             worst_of = max(run.judgements, key=lambda item: item.error / item.tolerance, default=None)
-            said = ["", "", "", run.result.message]
+            cells = ["", "", "", run.result.message]
             if worst_of is not None:
                 unit = "" if worst_of.unit == "1" else f" {worst_of.unit}"
                 off = [number(value) + unit for value in (worst_of.error, worst_of.tolerance)]
-                said = [worst_of.observable, *off, worst_of.reason]
+                cells = [worst_of.observable, *off, worst_of.reason]
             gauges.append("" if worst_of is None else gauge(worst_of.error, worst_of.tolerance))
             name = " ".join([run.row.engine, *(f"{key}={value:g}" for key, value in run.parameters.items())])
             cost = run.result.seconds_per_second
-            rows.append((name, str(run.verdict), *said[:3], "" if cost is None else number(cost), said[3]))
+            rows.append((name, str(run.verdict), *cells[:3], "" if cost is None else number(cost), cells[3]))
         columns = ("", "verdict", "furthest", "off by", "allowed", "s/s", "why")
         left = f"Left out for lack of time: {', '.join(self.beyond_budget)}"
         notes = [*self.contradictions, *([left] if self.beyond_budget else [])]

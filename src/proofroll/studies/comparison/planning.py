@@ -1,4 +1,4 @@
-"""The cases of a comparison: every row at every point of its parameters, with its ladder of steps."""
+"""Plans the cases of a comparison: every row at every point of its parameters, with its ladder of steps."""
 
 from __future__ import annotations
 
@@ -24,28 +24,31 @@ from proofroll.running.process import processor_seconds
 from proofroll.running.worker_pool import Workers
 from proofroll.studies.cases import case_of
 
-# What is expected of a row whose formulation cannot represent the scene.
+# Expected verdicts that allow a formulation that cannot represent the scene.
 _UNFIT = frozenset({"failed", "refused", "another-scene"})
-# Factors of a ladder of steps where a row says none.
+# Default factors of a ladder of steps.
 _USUAL = [4.0, 2.0, 1.0]
-# In this order: finer steps cost more.
+# Ladders that replace it if its steps do not fit between samples, the cheapest first.
 _LADDERS = (_USUAL, [2.0, 1.0, 0.5], [1.0, 0.5, 0.25])
 
 
 def point_name(parameters: Mapping[str, float | Edge]) -> str:
-    """A point of the parameters as text, e.g. ``speed=4, rolling_resistance=0.0005``; an edge by its two ends."""
+    """Text of a point of the parameters, e.g.
+
+    ``speed=4, rolling_resistance=0.0005``; an edge is shown by its two ends.
+    """
     ends = {key: value.edge_between if isinstance(value, Edge) else (value,) for key, value in parameters.items()}
     return ", ".join(f"{key}={'…'.join(f'{end:.12g}' for end in each)}" for key, each in ends.items())
 
 
 def at_point(parameters: dict[str, float]) -> str:
-    """Phrase with a point's parameters, e.g. `` at speed=4``; empty where a comparison has one point alone."""
+    """Phrase with a point's parameters, e.g. `` at speed=4``; empty without parameters."""
     return f" at {point_name(parameters)}" if parameters else ""
 
 
 @dataclass(frozen=True)
 class Planned:
-    """A run with the cases of its ladder by their factor on the step; the run's own case has the factor 1."""
+    """A row at a point, with factor on the step -> case of its ladder; the run's own case has the factor 1."""
 
     row: Row
     parameters: dict[str, float]
@@ -53,21 +56,21 @@ class Planned:
     ladder: dict[float, Case] = field(default_factory=dict)
 
     def keys(self, truths: Mapping[str, Case]) -> set[str]:
-        """Keys of the cases that its judgement rests on."""
+        """Keys of the cases that its judgement needs."""
         return {case.key for case in (truths[point_name(self.parameters)], *self.ladder.values())}
 
 
 @dataclass(frozen=True)
 class Plan:
-    """The cases of a comparison: to be run together with those of others, then judged.
+    """Cases of a comparison, to be run together with those of others and then judged.
 
     Attributes:
         comparison: with its edges found.
-        scene: with its own parameters.
-        file: the scene's.
-        scenes: at each point, by :func:`point_name`.
-        truths: their cases.
-        runs: of all rows at all points.
+        scene: with its default parameters.
+        file: of the scene.
+        scenes: :func:`point_name` -> scene at that point.
+        truths: :func:`point_name` -> case of the truth.
+        runs: all rows at all points.
     """
 
     comparison: Comparison
@@ -79,30 +82,30 @@ class Plan:
 
     @property
     def cases(self) -> list[Case]:
-        """Every case once or more; the runner runs equal ones once."""
+        """All cases; equal ones may occur several times, and the runner runs them once."""
         return [case for stage in self.stages for case in stage]
 
     @property
     def stages(self) -> list[list[Case]]:
-        """The cases by what they are worth where not all can be run: truths, runs, then steps of their ladders."""
+        """Cases in order of value if not all can be run: truths, runs, then the other steps of ladders."""
         runs = [case for run in self.runs for factor, case in run.ladder.items() if factor == 1]
         steps = [case for run in self.runs for factor, case in run.ladder.items() if factor != 1]
         return [[*self.truths.values()], runs, steps]
 
     @property
     def brief(self) -> Plan:
-        """The part at the combinations that a brief report has."""
+        """The plan reduced to the combinations of a brief report."""
         return self._part(self.comparison.briefly())
 
     def ended(self, unfinished: Set[str]) -> Plan:
-        """The part at the combinations of a brief report, and at the others without ``unfinished`` cases."""
+        """The plan without combinations that have ``unfinished`` cases; those of a brief report always stay."""
         left = {point_name(run.parameters) for run in self.runs if run.keys(self.truths) & unfinished}
         left -= self.brief.truths.keys()
         points = self.comparison.combinations()
         return self._part(self.comparison.at([point for point in points if point_name(point) not in left]))
 
     def _part(self, comparison: Comparison) -> Plan:
-        """The part at the combinations of ``comparison``, which has some of this plan's."""
+        """The plan reduced to the combinations of ``comparison``, which must be some of its own."""
         names = {point_name(point) for point in comparison.combinations()}
         truths = {name: case for name, case in self.truths.items() if name in names}
         return replace(
@@ -114,7 +117,9 @@ class Plan:
 
 
 def plan(comparison: Comparison, engines: Iterable[str] = (), workers: Workers | None = None) -> Plan:
-    """The cases of a comparison, or of its rows of some engines alone; ``mujoco@3.8.1`` runs those of mujoco there.
+    """Plan of a comparison, or of its rows of some engines only.
+
+    An engine in another interpreter, ``mujoco@3.8.1``, runs the rows of ``mujoco`` there.
 
     Raises:
         InputError: an engine or setting that does not exist.
@@ -169,17 +174,17 @@ def plan(comparison: Comparison, engines: Iterable[str] = (), workers: Workers |
 
 
 def scene_at(comparison: Comparison, point: Mapping[str, float]) -> Scene:
-    """The scene at a point of the parameters.
+    """Scene at a point of the parameters.
 
     Raises:
-        InputError: it has no such parameter, or not with this value; with the name of the file.
+        InputError: the scene has no such parameter, or not with this value; the text names the comparison's file.
     """
     with told_of(f"{comparison.name}.toml"):
         return load_scene(comparison.scene, **point)
 
 
 def _moved(row: Row, name: str) -> Row | None:
-    """A row of an engine in another interpreter, ``mujoco@3.8.1``; None: it is one of another engine."""
+    """A row moved to its engine in another interpreter, ``mujoco@3.8.1``; None: the row has another engine."""
     spec = parse_engine(row.engine)
     if spec.name != plain_name(name):
         return None
@@ -189,7 +194,13 @@ def _moved(row: Row, name: str) -> Row | None:
 def row_facts(
     comparison: Comparison, rows: Sequence[tuple[int, Row]], requires: Collection[str], workers: Workers | None = None
 ) -> tuple[list[EngineFacts | ProofrollError], EngineFacts]:
-    """The complete settings of rows, each with its place in the file, or why there are none, and those of the truth.
+    """Complete settings of rows, or an error for each, and those of the truth.
+
+    Args:
+        comparison: for messages.
+        rows: index of each row in the file, and the row.
+        requires: capabilities that the scene requires.
+        workers: pool for the questions; None: new workers.
 
     Raises:
         InputError: an engine or setting that does not exist.
@@ -203,10 +214,12 @@ def row_facts(
 
 
 def require_fit(comparison: Comparison, facts: Sequence[EngineFacts | ProofrollError], workers: Workers) -> None:
-    """Every point is one of the scene, and of a row that is expected to run one of its formulation and in its steps.
+    """Checks that the scene allows every point, and that formulations and steps suit the scene and the samples.
+
+    Rows that are expected to fail are not checked.
 
     Raises:
-        InputError: the first that is not.
+        InputError: the first that does not fit.
     """
     known = described([item.name for item in facts if isinstance(item, EngineFacts)], workers)
     times = time_grid(comparison.until, comparison.every)
@@ -239,7 +252,7 @@ def require_fit(comparison: Comparison, facts: Sequence[EngineFacts | ProofrollE
 def _rungs(
     rows: list[Row], resolved: list[EngineFacts | ProofrollError], workers: Workers | None
 ) -> list[dict[float, EngineFacts]]:
-    """Facts of the ladder of every row: its own settings with the resolution scaled, where that is allowed."""
+    """Factor -> facts of each rung of every row's ladder, as far as the engine allows the scaled resolution."""
     wanted: list[tuple[int, float, EngineFacts]] = []
     for index, (row, facts) in enumerate(zip(rows, resolved, strict=True)):
         if isinstance(facts, EngineFacts) and facts.resolution is not None:
@@ -257,12 +270,12 @@ def _rungs(
 
 
 def _asked(facts: EngineFacts, factor: float) -> bool:
-    """True if a ladder has this rung: a relative tolerance of 1 or more asks for nothing."""
+    """True if a rung makes sense: a relative tolerance of 1 or more would ask for nothing."""
     return facts.resolution != "rtol" or facts.settings["rtol"] * _scaled(facts, factor) < 1
 
 
 def _scaled(facts: EngineFacts, factor: float) -> float:
-    """Factor on the resolution: a tolerance is loosened by decades where a step is doubled."""
+    """Factor on the resolution: where a step is doubled, a tolerance is loosened by a decade."""
     return factor if facts.resolution == "dt" else float(10 ** np.log2(factor))
 
 
@@ -274,10 +287,10 @@ def _case(
 
 
 def settled(comparison: Comparison) -> Comparison:
-    """The comparison with every edge found.
+    """The comparison with the value of every edge found.
 
     Raises:
-        InputError: an edge of a parameter for which it is not defined, or none between the two values.
+        InputError: the truth finds no edges of this parameter, or none between the two values.
     """
     points = [dict(point) for point in comparison.points]
     for point in points:
@@ -302,7 +315,7 @@ def _edge_found(comparison: Comparison, point: dict[str, float | Edge], name: st
 
 
 def _misfit(factors: Sequence[float], step: float, times: FloatArray) -> InputError | None:
-    """Error for a ladder that does not fit between the samples, or None; the last interval may be shorter."""
+    """Error for a ladder whose steps do not divide the sampling intervals (the last may be shorter), or None."""
     for factor in factors:
         for start, end in (times[:2].tolist(), times[-2:].tolist()):
             try:
@@ -313,7 +326,7 @@ def _misfit(factors: Sequence[float], step: float, times: FloatArray) -> InputEr
 
 
 def _fitting(row: Row, step: float | None, times: FloatArray) -> Row:
-    """The row, with factors that fit where it has the usual ones and they do not; without a fixed step, itself."""
+    """The row, with a ladder that fits the samples if it has the default one and that does not fit."""
     if step is None or row.ladder != _USUAL:
         return row
     ladder = next((factors for factors in _LADDERS if _misfit(factors, step, times) is None), row.ladder)

@@ -1,1 +1,1 @@
-"""Judgement of one trajectory: read, held against the truth, put into words."""
+"""Judgement of one trajectory: it is read, compared with the truth, and described."""

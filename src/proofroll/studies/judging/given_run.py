@@ -1,4 +1,4 @@
-"""A trajectory from anywhere, read as a dataset with ``time`` and what can be held against the truth."""
+"""Reads a trajectory from any program as a dataset with ``time`` and variables that can be compared with the truth."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 RunInput = Any
 """An ``xarray.Dataset``, the path of a file (netCDF, CSV, ``.npz``), or arrays by name, ``time`` [s] among them."""
-# Other ways to write a unit of the truth, as in files of other programs.
+# Other spellings of units, as in files of other programs.
 _SPELT = {
     "sec": "s", "second": "s", "seconds": "s", "radian": "rad", "radians": "rad", "m s-1": "m/s", "rad s-1": "rad/s",
     "meter": "m", "meters": "m", "metre": "m", "metres": "m",
@@ -38,12 +38,13 @@ class GivenRun:
     """Run of the user.
 
     Attributes:
-        dataset: with ``time``, and with all that follows from the state where that is given.
-        units: of the variables that say theirs.
-        labels: of the dimensions that have names, as bodies, in their order.
-        besides: variables that are none of the state, and velocities, with why they are not judged where that is known
-            already; none of a run of proofroll's own.
-        reactions: those of them that do not follow from the state; forces and moments together have them all.
+        dataset: with ``time``, and with all variables that follow from the state if that is given.
+        units: variable -> its unit, if it has one.
+        labels: dimension -> its labels (names of bodies) in order.
+        besides: variable that is not part of the state, or a velocity -> reason why it is not judged, or None if that
+            is
+            not known yet; empty for a run of proofroll's own.
+        reactions: those of them that do not follow from the state: forces and moments.
     """
 
     dataset: xr.Dataset
@@ -53,10 +54,10 @@ class GivenRun:
     reactions: Collection[str] = ()
 
     def require_units(self, truth: xr.Dataset) -> None:
-        """Every variable that the truth has too is in the truth's unit, if it says its own, and bodies in its order.
+        """Checks that variables have the units of the truth, if they have one, and bodies its order.
 
         Raises:
-            InputError: one is not.
+            InputError: one has not.
         """
         for dim, given in self.labels.items():
             wanted = truth[dim].to_numpy().tolist() if dim in truth.coords else given
@@ -75,7 +76,7 @@ def _require_unit(name: str, unit: str, wanted: str) -> None:
 
 
 def read_run(run: RunInput, scene: Scene) -> GivenRun:
-    """Reads a trajectory. Raises InputError if it is none, or of another scene."""
+    """Reads a trajectory. Raises InputError if it is none, or belongs to another scene."""
     dataset = _dataset(run)
     made_of = dataset.attrs.get("scene_digest")
     if made_of is not None and made_of != scene.digest:
@@ -99,28 +100,28 @@ def read_run(run: RunInput, scene: Scene) -> GivenRun:
     if made_of is not None:
         if _whole(dataset, scene):
             return GivenRun(dataset, units, labels, {})
-        # Variables were left out: what there is on the grid is judged by itself.
+        # The user left variables out: the rest, on the grid only, is judged like a foreign run.
         dataset = dataset.drop_dims(BETWEEN, errors="ignore").drop_attrs(deep=False)
     names = [str(name) for name in dataset.data_vars]
-    # a scene of several elements is judged by variables
+    # a scene of several elements is judged by its given variables only
     if not all(name in dataset for name in REQUIRED) or len(scene.elements) > 1 or times[0] > 0:
         return GivenRun(dataset, units, labels, dict.fromkeys(names))
     state = [field.name for field in fields(scene.elements[0].sample_type) if field.name in dataset]
     completed = _completed(dataset, scene, times, state)
-    # Reactions do not follow from a state that has none: they are judged as they are given.
-    kept = [name for name in names if name not in state and not _told(completed, name)]
+    # Reactions do not follow from the state: they are judged as they are given.
+    kept = [name for name in names if name not in state and not _has_values(completed, name)]
     besides: dict[str, str | None] = dict.fromkeys([name for name in names if name not in (*state, *kept)], FROM_STATE)
-    besides |= dict.fromkeys((*REQUIRED[1:], *kept))  # velocities: what is asked may be of places alone
+    besides |= dict.fromkeys((*REQUIRED[1:], *kept))  # velocities: the judged observables may need positions only
     return GivenRun(completed.assign({name: dataset[name] for name in kept}), units, labels, besides, kept)
 
 
-def _told(run: xr.Dataset, name: str) -> bool:
-    """True if a variable has some number."""
+def _has_values(run: xr.Dataset, name: str) -> bool:
+    """True if a variable has a finite value."""
     return name in run and bool(np.any(np.isfinite(run[name].to_numpy())))
 
 
 def _whole(run: xr.Dataset, scene: Scene) -> bool:
-    """True if a file that was once a run has all variables of its motion."""
+    """True if a run of proofroll's own still has all headline variables of its motion."""
     try:
         observed = observe(scene, run)
     except (KeyError, AttributeError):  # of xarray, for a variable or an attribute of one that is not there
@@ -130,7 +131,7 @@ def _whole(run: xr.Dataset, scene: Scene) -> bool:
 
 
 def _require_finite_state(run: xr.Dataset, scene: Scene) -> None:
-    """Raises InputError unless places, velocities and orientations are finite, and quaternions of unit length."""
+    """Raises InputError unless positions, velocities and orientations are finite, and quaternions of unit length."""
     for element in scene.elements:
         for own in element.sample_type.widths:
             name = scene.label(element, own)
@@ -157,7 +158,7 @@ def _dataset(run: RunInput) -> xr.Dataset:
             run = _from_file(Path(run))
         except FileNotFoundError:
             raise InputError("run", Path(run), "there is no such file") from None
-        except (OSError, ValueError, LookupError) as error:  # a file that was cut off ends in any of them
+        except (OSError, ValueError, LookupError) as error:  # a truncated file may raise any of them
             how = "" if Path(run).suffix in {CSV, STORED} else _WRITE_NETCDF
             advice = f"it cannot be read ({error}){how}"
             raise InputError("run", Path(run), advice) from None
@@ -169,14 +170,14 @@ def _dataset(run: RunInput) -> xr.Dataset:
     if "time" not in given:
         raise InputError("run", ", ".join(given), "it has no time; add the times in s as time")
     _check_lengths(given)
-    said = {str(name): dict(getattr(run[name], "attrs", {})) for name in run}
+    attrs = {str(name): dict(getattr(run[name], "attrs", {})) for name in run}
     dims = {name: ("time", *(f"{name}_{axis}" for axis in range(1, np.ndim(v)))) for name, v in given.items()}
-    variables = {name: (dims[name], values, said[name]) for name, values in given.items()}
+    variables = {name: (dims[name], values, attrs[name]) for name, values in given.items()}
     return xr.Dataset({name: item for name, item in variables.items() if name != "time"}, {"time": variables["time"]})
 
 
 def _from_file(path: Path) -> RunInput:
-    """Content of a file: a dataset, or for numpy's own formats arrays by name."""
+    """Content of a file: a dataset, or arrays by name for numpy's own formats."""
     from proofroll.files.trajectory_file import read, read_arrays
 
     try:

@@ -1,4 +1,4 @@
-"""Values of a run as they are compared with the truth: on its turns and signs, at its times."""
+"""Values of a run prepared for comparison with the truth: same turns, signs of quaternions and times."""
 
 from __future__ import annotations
 
@@ -21,39 +21,40 @@ if TYPE_CHECKING:
 
 
 def always(reference: Reference, names: Iterable[str]) -> dict[str, Tolerance]:
-    """Tolerances of the observables that are judged without one; only what differs is shown."""
+    """Tolerances of the observables that are judged even without one in the file; only differences are shown."""
     items = {name: reference.scene.observables[name] for name in names if reference.scene.observables[name].always}
     end = Tolerance(float(reference.dataset["time"][-1]), False, "s")
     return {name: end if item.role is Role.EVENT else Tolerance(0.5, True) for name, item in items.items()}
 
 
 def observed(reference: Reference, dataset: xr.Dataset) -> dict[str, FloatArray]:
-    """The observables of an engine's trajectory of this scene."""
+    """Observables of an engine's trajectory, by name."""
     curves = observe(reference.scene, dataset)
     for element in reference.scene.elements:
         own, true = part(reference.scene, element, dataset), part(reference.scene, element, reference.dataset)
-        if "event_kind" in own:  # else it says nothing of events
+        if "event_kind" in own:  # the run reports events
             curves[reference.scene.label(element, EVENT_ORDER)] = event_order(own, true)
     curves = {name: values for name, values in curves.items() if name in reference.scene.observables}
     for name in [name for name in curves if name in dataset and dataset[name].dims[-1:] == ("wxyz",)]:
         values = curves.pop(name)
-        if name in reference.curves:  # the truth of a scene that asks for it
+        if name in reference.curves:  # the scene asks for orientations
             curves[name] = turned_alike(values, reference.curves[name])
     both = (dataset, reference.dataset)
-    sure = {name: on_turns_of(reference.curves.get(name), values, name, both) for name, values in curves.items()}
-    return {name: values for name, values in sure.items() if values is not None}
+    turned = {name: on_turns_of(reference.curves.get(name), values, name, both) for name, values in curves.items()}
+    return {name: values for name, values in turned.items() if values is not None}
 
 
 def between(reference: Reference, name: str, dataset: xr.Dataset) -> tuple[FloatArray, FloatArray] | None:
-    """Values of an observable or state of a run off the grid, and its true values there; None: nothing to compare.
+    """Values of an observable or state at samples off the grid, and its true values there; None: nothing to compare.
 
-    Intervals with an event of the run or of the truth are left out: for up to a step of the engine its forces may
-    still be those from before the event.
+    Intervals with an event of the run or of the truth are left out: for up to a step of the engine its forces may be
+    those
+    from before the event.
     """
     own, item = f"{BETWEEN}.{name}", reference.scene.observables.get(name)
     if own not in dataset or own not in reference.dataset:
         return None
-    run, truth = dataset.variables, reference.dataset.variables  # of items xarray makes new arrays
+    run, truth = dataset.variables, reference.dataset.variables  # indexing a dataset would copy arrays
     times, known, grid = run[BETWEEN].values, truth[BETWEEN].values, truth["time"].values
     happened = [event.time for one in (dataset, reference.dataset) for event in reference.events_of(one)]
     alone = ~np.isin(np.searchsorted(grid, times), np.searchsorted(grid, happened))
@@ -64,25 +65,25 @@ def between(reference: Reference, name: str, dataset: xr.Dataset) -> tuple[Float
     if run[own].dims[-1:] == ("wxyz",):
         values = turned_alike(values, true)
     turned = on_turns_of(true, values, name, (dataset, reference.dataset))
-    said = np.isfinite(true)
-    return None if turned is None else (turned[said], true[said])
+    known = np.isfinite(true)
+    return None if turned is None else (turned[known], true[known])
 
 
 def error(reference: Reference, name: str, values: FloatArray, dataset: xr.Dataset) -> float:
-    """Largest distance of an observable's ``values`` from the truth, and of those that its run has off the grid."""
+    """Largest distance of an observable from the truth, at the samples and off the grid."""
     off_grid = between(reference, name, dataset)
     on_grid = largest_difference(values, reference.true(name, values)[0])
     return on_grid if off_grid is None else max(on_grid, largest_difference(*off_grid))
 
 
 def turned_alike(values: FloatArray, true: FloatArray) -> FloatArray:
-    """Quaternions with the signs of the true ones, for q and -q are the same orientation; shape (…, 4)."""
+    """Quaternions, shape (…, 4), with the signs of the true ones, as q and -q are the same orientation."""
     if values.shape != true.shape:
         return values
     return np.asarray(values * np.where(np.sum(values * true, axis=-1, keepdims=True) < 0, -1.0, 1.0))
 
 
 def event_order(dataset: xr.Dataset, truth: xr.Dataset) -> FloatArray:
-    """Count of events that are missing, too many, or of another kind than the truth's."""
+    """Number of events that differ in kind from the truth's, are missing or are too many; shape (1,)."""
     kinds = itertools.zip_longest(*([event.kind for event in events_of(item)] for item in (dataset, truth)))
     return np.array([float(sum(a != b for a, b in kinds))])

@@ -1,4 +1,4 @@
-"""A trajectory of anybody's against the truth of a scene, and the words for how it stands."""
+"""Compares any trajectory with the truth of a scene, and describes the result."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class Compared:
 
     Attributes:
         judgement: see :class:`proofroll.core.verdict.Judgement`.
-        at: when it is farthest from the truth [s]; None of what has no time.
+        at: time of the largest difference [s]; None if the quantity is no function of time.
     """
 
     judgement: Judgement
@@ -50,34 +50,34 @@ class Compared:
 
     @property
     def agrees(self) -> bool:
-        """True if it is within its tolerance of the truth, and the truth known well enough to judge."""
+        """True if it is within its tolerance, and the truth is known well enough to judge."""
         return self.judgement.verdict is Verdict.AGREES
 
     def __str__(self) -> str:
-        """Difference of the quantity with its time, its tolerance, and the error bar of the truth."""
+        """Largest difference with its time, the tolerance, and the error bar of the truth."""
         judgement = self.judgement
         unit = "" if judgement.unit == "1" else f" {judgement.unit}"
         when = "" if self.at is None else f" at {self.at:.4g} s"
         error, allowed = number(judgement.error, 3), number(judgement.tolerance, 3)
-        said = f"{judgement.observable} is off by {error}{unit}{when}, allowed {allowed}{unit}"
+        difference = f"{judgement.observable} is off by {error}{unit}{when}, allowed {allowed}{unit}"
         if not np.isfinite(judgement.error):
-            said = f"{judgement.observable} is not finite, or has not as many values as the truth"
+            difference = f"{judgement.observable} is not finite, or has not as many values as the truth"
         bar = f"the truth is known to {number(judgement.truth_error_bar)}{unit}"
         if judgement.verdict is Verdict.NOT_JUDGED:
             bar = f"not judged, for {bar} only"
         remarks = ["the question is ill-posed here"] if judgement.verdict is Verdict.ILL_POSED else []
-        return "; ".join([said, bar, *remarks, *judgement.remarks])
+        return "; ".join([difference, bar, *remarks, *judgement.remarks])
 
 
 @dataclass(frozen=True)
 class Judged:
-    """A trajectory held against the truth of a scene.
+    """A trajectory compared with the truth of a scene.
 
     Attributes:
         scene: its name.
-        compared: each quantity that was judged, the farthest from its tolerance first.
+        compared: each judged quantity, the one farthest beyond its tolerance first.
         because: reason of the tolerances; empty if not given.
-        unjudged: variables that were given and are not judged -> why.
+        unjudged: given variable that is not judged -> reason.
     """
 
     scene: str
@@ -91,7 +91,7 @@ class Judged:
         return all(item.agrees for item in self.compared)
 
     def __str__(self) -> str:
-        """One line, one for each quantity, and one for each reason why something that was given is not judged."""
+        """A headline, then a line for each quantity, and a line for each reason why given variables are not judged."""
         why = f" (tolerance: {self.because})" if self.because else ""
         head = f"{'agrees with' if self.agrees else 'differs from'} the truth of {self.scene}{why}"
         lines = [f"  {'ok' if item.agrees else '!!'} {item}" for item in self.compared]
@@ -100,7 +100,7 @@ class Judged:
         return "\n".join([head, *lines])
 
     def _repr_html_(self) -> str:
-        """The same as a table with gauges, for a notebook."""
+        """HTML table with gauges for a notebook, with the content of the text."""
         head, *lines = str(self).splitlines()
         rows = []
         for item in self.compared:
@@ -123,29 +123,30 @@ class Judged:
             | {"at": item.at, "verdict": item.judgement.verdict.value, "remarks": list(item.judgement.remarks)}
             for item in self.compared
         ]
-        said = {"scene": self.scene, "agrees": self.agrees, "because": self.because}
-        return said | {"compared": rows, "unjudged": dict(self.unjudged)}
+        head = {"scene": self.scene, "agrees": self.agrees, "because": self.because}
+        return head | {"compared": rows, "unjudged": dict(self.unjudged)}
 
 
 def judge(
     run: RunInput, scene: str | Scene, tolerance: Mapping[str, object] | str | float | None = None, *, because: str = ""
 ) -> Judged:
-    """Holds a trajectory against the truth of a scene at the trajectory's own times.
+    """Compares a trajectory with the truth of a scene at the trajectory's own times.
 
     Args:
         run: from :func:`proofroll.simulate`, the path of a file (netCDF, CSV or ``.npz``), or arrays by name: ``time``
             [s], and the state (``p_WB``, ``v_WB``, ``w_WB``, as in :class:`proofroll.core.engine.Sample`, one row for
-            each time; for mechanisms ``q_WB``; finite, quaternions of length 1), or variables that the truth has, as
-            ``q.hinge``, ``tip.x``, ``positions``, ``z``; in the truth's units.
+            each time; for mechanisms ``q_WB``; finite, quaternions of length 1), or variables that the truth has, such
+            as ``q.hinge``, ``tip.x``, ``positions``, ``z``; in the truth's units.
         scene: name, path of a folder, or :func:`proofroll.load_scene`.
-        tolerance: by name of the observable or variable, ``"1 %"`` of its scale, ``"1e-3 m"``, or a number in its unit;
-            one alone is for what decides the scene, or for the only variable. None: 1 % of each main quantity,
-            of every force and moment, and of places, velocities, spins and orientations that are given; the time
-            of the first slip to the interval between samples. What says that it sticks while it slips never agrees.
-        because: reason for which that is close enough.
+        tolerance: observable or variable -> ``"1 %"`` of its scale, ``"1e-3 m"``, or a number in its unit. A single one
+            is for the deciding observable of the scene, or for the only variable. None: 1 % of each main quantity, of
+            every force and moment, and of given positions, velocities, angular velocities and orientations; for the
+                time
+            of the first slip the sampling interval. A run that reports sticking while it slips never agrees.
+        because: reason for these tolerances.
 
     Raises:
-        InputError: something that was given does not exist or makes no sense.
+        InputError: an argument names something unknown or makes no sense.
         Refused, Diverged: there is no truth of this scene.
     """
     scene = load_scene(scene) if isinstance(scene, str) else scene
@@ -171,13 +172,13 @@ def judge(
         unjudged |= _events_left(scene, observed, bounds)
         if any(scene.observables[name].role is Role.REACTION for name in bounds if name in scene.observables):
             unjudged = {name: why for name, why in unjudged.items() if name not in given.reactions}
-    for item in compared:  # also where only what follows from it was given
+    for item in compared:  # judged observables, though perhaps derived from other given variables
         unjudged.pop(item.judgement.observable, None)
     return Judged(scene.name, tuple(compared), because, unjudged)
 
 
 def _unjudged(given: GivenRun, reference: Reference, judged: Mapping[str, Tolerance]) -> dict[str, str]:
-    """Reasons that further variables of the user's run are not judged, by name."""
+    """Given variable that is not judged -> reason."""
     reasons = {}
     for name, why in given.besides.items():
         if not _comparable(reference, name):
@@ -188,13 +189,13 @@ def _unjudged(given: GivenRun, reference: Reference, judged: Mapping[str, Tolera
 
 
 def _events_left(scene: Scene, observed: Mapping[str, FloatArray], judged: Mapping[str, Tolerance]) -> dict[str, str]:
-    """Reasons that events of a run are not judged without a tolerance, by name."""
+    """Observable of events that is not judged -> reason; for runs without a given tolerance."""
     names = [name for name in observed if scene.observables[name].role is Role.EVENT and name not in judged]
     return dict.fromkeys(names, _NO_TOLERANCE) if any(observed[name].size for name in names) else {}
 
 
 def _unsure(dataset: xr.Dataset, reference: Reference, judged: Mapping[str, Tolerance]) -> dict[str, str]:
-    """Reasons that variables of a whole run are too coarsely sampled to judge, by name."""
+    """Variable that is sampled too coarsely to judge -> reason."""
     reasons = {}
     for name in judged.keys() | {name for name, item in reference.scene.observables.items() if item.headline}:
         if name in dataset and UNCERTAIN in dataset[name].attrs:
@@ -203,7 +204,7 @@ def _unsure(dataset: xr.Dataset, reference: Reference, judged: Mapping[str, Tole
 
 
 def _truth(scene: Scene, times: FloatArray, between: FloatArray) -> xr.Dataset:
-    """The truth at these times and those off their grid, which tests ask for again and again."""
+    """The truth at these times and at samples off the grid, cached, as tests ask for it again and again."""
     key = scene.digest, times.tobytes(), between.tobytes()
     if key not in _truths:
         late = times[0] > 0
@@ -221,7 +222,7 @@ def _bounds(
     observed: Mapping[str, FloatArray],
     variables: Sequence[str],
 ) -> dict[str, Tolerance]:
-    """Judged names with their tolerances: observables of a whole run, else variables that the truth has too."""
+    """Judged quantity -> its tolerance: observables of a complete run, otherwise variables that the truth has, too."""
     scene = reference.scene
     able = list(dict.fromkeys([*observed, *(name for name in variables if _comparable(reference, name))]))
     if not able:
@@ -245,19 +246,19 @@ def _bounds(
 
 
 def _is_main(item: Observable) -> bool:
-    """True if it is judged by default: headline observables, and every force and moment."""
+    """True if an observable is judged by default: headlines, and every force and moment."""
     return item.headline or (item.role is Role.REACTION and item.unit != "1")
 
 
 def _states(reference: Reference, variables: Sequence[str]) -> list[str]:
-    """Given parts of the state, judged as they are: places, velocities, spins and orientations."""
+    """Given variables of the state, judged directly: positions, velocities, angular velocities and orientations."""
     scene = reference.scene
     states = {scene.label(element, name) for element in scene.elements for name in element.sample_type.widths}
     return [name for name in variables if name in states and _comparable(reference, name)]
 
 
 def _size(reference: Reference, name: str, true: FloatArray, unit: str) -> float:
-    """Size that a percentage of a variable refers to: its range, but at least a hundredth of the natural one."""
+    """Size to which a percentage refers: the range of a variable, but at least a hundredth of its natural size."""
     if unit == "1":
         return 1.0  # of quaternions
     natural = 0.0
@@ -315,7 +316,7 @@ def _compared(
 
 
 def _farthest(values: FloatArray, true: FloatArray, times: FloatArray) -> float | None:
-    """Time at which two curves are farthest apart [s]."""
+    """Time of the largest difference of two curves [s]; None if it is undefined."""
     if values.shape != true.shape or not values.size or len(values) not in {len(times), len(times) - 1}:
         return None
     apart = np.abs(values - true).reshape(len(values), -1).max(axis=1)

@@ -1,1 +1,1 @@
-"""Ladder of models: one quantity while terms of the scene are added one by one."""
+"""Ladder of models: a quantity by ever fuller models, and with each optional term on and off."""

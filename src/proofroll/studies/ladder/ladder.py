@@ -1,4 +1,4 @@
-"""One quantity up the ladder of models, and every optional term switched on and off."""
+"""Runs the ladder of models for one quantity, and every optional term switched on and off."""
 
 from __future__ import annotations
 
@@ -33,19 +33,19 @@ from proofroll.studies.ladder.models import LadderModel, Rung, Switch, rungs, sw
 if TYPE_CHECKING:
     import xarray as xr
 
-_EVERY = 0.02  # interval between samples [s], as in the comparison files
+_EVERY = 0.02  # sampling interval [s], as in the comparison files
 
 
 @dataclass(frozen=True)
 class ModelAnswer:
-    """Answer of one model.
+    """Result of one model.
 
     Attributes:
-        case: the run asked for; None if its settings make no sense or its engine is missing.
-        result: its result.
-        values: of the quantity, None if there are none.
+        case: the requested run; None if its settings are invalid or its engine is missing.
+        result: of the run.
+        values: of the quantity, or None.
         run: its trajectory, if it reached the end.
-        timing: wall seconds per simulated second, None if it could not be timed.
+        timing: wall time per simulated second, or None if it could not be timed.
     """
 
     case: Case | None
@@ -56,21 +56,28 @@ class ModelAnswer:
 
 
 class Ladder:
-    """Plans, runs and times; :func:`proofroll.report.ladder.ladder.ladder_content` says what was found.
+    """Plans, runs and times the models; :func:`proofroll.report.ladder.ladder.ladder_content` reports the results.
 
     Attributes:
         ladder, switches: models to run and terms to switch.
-        answers: result of every model, by :func:`key_of`.
-        truths: by the parameters that a switch puts over the given ones, as text.
-        engines: facts of every engine, or the reason why it has none.
+        answers: :func:`key_of` a model -> its result.
+        truths: text of the parameters that a switch changes -> the truth with them.
+        engines: facts of every engine, or the error in asking it.
 
-    Without a ``quantity`` it is what decides the scene, until the time ``until`` [s], by default the usual length, of
-    all engines if none are named.
-    Without a ``tolerance`` of it, in its unit, a term counts if it moves the quantity by more than the smaller of the
-    errors with and without it. So many ``rounds`` of the timing count.
+    Args:
+        scene: name or path.
+        parameters: of the scene, those that differ from the defaults.
+        runner: runs the cases.
+        quantity: observable; None: the one that decides the scene.
+        until: last time [s]; None: the usual length.
+        tolerance: of the quantity, in its unit; None: a term counts if it changes the quantity by more than the smaller
+            of
+            the errors with and without it.
+        engines: names; all that are installed if empty.
+        rounds: of the timing; None: the usual number.
 
     Raises:
-        InputError: something that was given does not exist or makes no sense.
+        InputError: an argument names something unknown or makes no sense.
         Refused: the scene has no truth.
     """
 
@@ -87,7 +94,7 @@ class Ladder:
         rounds: int | None = None,
     ) -> None:
         until = usual_length(scene) if until is None else until
-        time_grid(until, _EVERY)  # what makes no sense is refused there
+        time_grid(until, _EVERY)  # checks the time
         if until <= 0:
             raise InputError("until", until, "give a time in s that is positive")
         if tolerance is not None and not (math.isfinite(tolerance) and tolerance > 0):
@@ -111,7 +118,7 @@ class Ladder:
         self.switches: list[Switch] = []
 
     def run(self, progress: Callable[[str], None] = lambda _: None) -> None:
-        """Runs every model once, stored results where there are some, then times all of them in turns."""
+        """Runs every model once, reusing stored results, then times all of them in rounds."""
         self._run_truths([{}], progress)
         self.switches = switches(self.ladder, self.engines, self.scene, self.truths[str({})].dataset)
         wanted = [rung.model for rung in self.ladder] + [m for s in self.switches for m in (s.on, s.off)]
@@ -136,7 +143,7 @@ class Ladder:
 
     def _run_truths(self, wanted: Sequence[dict[str, float]], progress: Callable[[str], None]) -> None:
         wanted = [point for point in wanted if str(point) not in self.truths]
-        # Which steps the models take is not known yet: none, and round ones of few parts of an interval.
+        # The steps of the models are not known yet: assume adaptive ones, and simple fractions of the interval.
         off_grid = off_grids(time_grid(self.until, _EVERY), [None, _EVERY / 2, _EVERY / 4, _EVERY / 5])
         cases = {
             str(point): dataclasses.replace(
@@ -166,12 +173,12 @@ class Ladder:
         return ModelAnswer(case, result, curves.get(self.quantity), run)
 
     def bar(self, point: dict[str, float]) -> float:
-        """Error bar of the true quantity in the scene with these parameters."""
+        """Error bar of the true quantity, with these parameters of the scene changed."""
         reference = self.truths[str(point)]
         return reference.true(self.quantity, reference.curves[self.quantity])[1]
 
     def error(self, model: LadderModel, point: dict[str, float]) -> float | None:
-        """Largest distance from the truth of the scene with these parameters; None: no answer."""
+        """Largest distance of a model from the truth with these parameters changed; None: no answer."""
         answer = self.answers[key_of(model)]
         if answer.values is None or answer.run is None:
             return None
@@ -190,12 +197,12 @@ class Ladder:
 
 
 def key_of(model: LadderModel) -> str:
-    """Distinguishes models."""
+    """Text that identifies a model."""
     return repr((model.engine, sorted(model.options.items()), sorted(model.parameters.items()), model.asks))
 
 
 def absence(error: ProofrollError) -> Result:
-    """Result for an engine, or settings, that could not be asked."""
+    """Result for an engine or settings that could not be asked."""
     if isinstance(error, WorkerDied):
         return Result(error.status, str(error))
     return Result(Status.REFUSED if isinstance(error, InputError) else Status.MISSING, str(error))

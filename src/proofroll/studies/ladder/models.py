@@ -1,4 +1,4 @@
-"""The models that a scene can be given: rungs of the ladder, what can be switched in each, and whether it is needed."""
+"""Models for a scene: rungs of the ladder, terms to switch in each, and whether a term is needed."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ from proofroll.running.timing import Interval, named
 if TYPE_CHECKING:
     import xarray as xr
 
-# A ratio of costs below this is nothing to be saved.
+# A ratio of costs below this saves nothing.
 _FELT = 1.02
-# A change by this part of the quantity's size is round-off that has grown: nobody's answer hangs on it.
+# A change by less than this part of the quantity's size is accumulated round-off.
 _ROUND_OFF = 1e-9
 
 
@@ -31,8 +31,8 @@ class LadderModel:
 
     Attributes:
         engine: its name.
-        options: put over the preset, formulation and preset among them.
-        parameters: of the scene, put over those that were given.
+        options: settings that override the preset; formulation and preset are among them.
+        parameters: of the scene, which override the given ones.
         asks: results wanted besides the motion.
     """
 
@@ -55,7 +55,7 @@ class Rung:
         level: its level.
         model: the model to run; None if there is none.
         variant: its difference from the formulation's own model, e.g. ``condim=4``; empty for that one.
-        message: reason for which there is none.
+        message: reason why there is no model.
     """
 
     level: Level
@@ -66,13 +66,13 @@ class Rung:
 
 @dataclass(frozen=True)
 class Switch:
-    """A term of a model, with it and without.
+    """A term of a model, to be compared with and without it.
 
     Attributes:
-        term: for a person.
+        term: name for a person.
         kind: ``scene`` or ``engine``.
         model: the model in which it is switched.
-        on, off: the model with and without it; None where it cannot be left out.
+        on, off: the model with and without it; None if it cannot be left out.
         because: purpose of the term.
     """
 
@@ -85,7 +85,7 @@ class Switch:
 
 
 def rungs(engines: Mapping[str, EngineDescription | ProofrollError], requires: frozenset[str]) -> list[Rung]:
-    """Rungs from the simplest model to the fullest: each formulation, ``matched`` or with its first preset."""
+    """Rungs from the simplest to the fullest model: each formulation, with its preset ``matched`` or its first one."""
     ladder: list[Rung] = []
     for level in Level:
         before = len(ladder)
@@ -118,7 +118,8 @@ def switches(
     """Models with and without each optional term.
 
     Terms of the scene are switched in one model of each engine and level, terms of an engine in each model that has
-    them. Models that refuse the scene are left out.
+    them.
+    Models that cannot represent the scene are left out.
     """
     switches_of_terms: list[Switch] = []
     models = [
@@ -149,7 +150,7 @@ def _represents(told: EngineDescription | ProofrollError, model: LadderModel, sc
 
 
 def _of_the_scene(model: LadderModel, scene: Scene, truth: xr.Dataset, inherent: Mapping[str, str]) -> list[Switch]:
-    """Switches of the optional terms of the scene's elements."""
+    """Switches for the optional terms of the scene's elements."""
     switches_of_terms: list[Switch] = []
     for element in scene.elements:
         for term in element.optional_terms(scene.parameters, part(scene, element, truth)):
@@ -175,9 +176,13 @@ class Need(StrEnum):
 
 @dataclass(frozen=True)
 class Ran:
-    """A model that was run: the error of the quantity and wall seconds per simulated second, None where there is none.
+    """A model that was run.
 
-    Its settings are None where the engine could not be asked.
+    Attributes:
+        settings: None if the engine could not be asked.
+        status, message: end of the run.
+        error: of the quantity; None if there is no answer.
+        seconds_per_second: wall time per simulated second; None if unknown.
     """
 
     settings: dict[str, Any] | None
@@ -188,7 +193,7 @@ class Ran:
 
     @property
     def ending(self) -> str:
-        """Status and message of the end."""
+        """Status and message of the run."""
         return f"{self.status}, {self.message}"
 
 
@@ -202,24 +207,23 @@ def need_of_term(
     bar: float,
     scale: float,
 ) -> tuple[Need, str]:
-    """The verdict, and why.
+    """Need of a term, and its reason.
 
-    A term moves the answer if leaving it out changes the quantity by more than is allowed: by the tolerance, or where
-    none is given by the smaller of the two errors, and by more than round-off; never by less than the truth's error
-    bar.
+    A term is needed if leaving it out changes the quantity by more than the tolerance. Without a tolerance the limit is
+    the smaller of the two errors, and at least round-off. The limit is never below the truth's error bar.
 
     Args:
-        on: the model with the term, held against the truth that has it.
-        off: without it.
+        on: the model with the term, compared with the truth that has it.
+        off: the model without it.
         change: of the quantity between the two; None if one of them has no answer.
-        cost: ratio of the run's times with the term and without; None: not known.
-        tolerance: error that is allowed; None: whatever is left anyway.
+        cost: ratio of the run times with and without the term; None: unknown.
+        tolerance: allowed error; None: see above.
         bar: error bar of the truth.
         scale: size of the quantity.
     """
     if on.error is None or on.error > scale:
-        said = on.ending if on.error is None else f"the answer is off by {number(on.error)}, more than its whole size"
-        return Need.NO_ANSWER, f"with it: {said}"
+        fault = on.ending if on.error is None else f"the answer is off by {number(on.error)}, more than its whole size"
+        return Need.NO_ANSWER, f"with it: {fault}"
     if off.error is None or change is None:
         return Need.NEEDED, f"without it: {off.ending}"
     limit = max(bar, max(min(on.error, off.error), _ROUND_OFF * scale) if tolerance is None else tolerance)

@@ -1,1 +1,1 @@
-"""Stability maps: where along an axis of parameters a run fails, and what explains it."""
+"""Stability maps: places along an axis of parameters at which runs fail, and numbers that explain them."""

@@ -1,4 +1,4 @@
-"""Axes of a stability map: how one number changes a scene, as data; and how much of them is mapped."""
+"""Axes of a stability map, each a number that changes parameters of a scene; and limits on the cost of the map."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ class AxisTerm:
     """A parameter as a function of the axis's value x: ``times`` · x^``power``.
 
     Attributes:
-        times: a number, or the name of a parameter, which stands for its default.
-        power: of the value.
+        times: a number, or the name of a parameter, whose default is taken.
+        power: exponent of x.
     """
 
     times: float | str = 1.0
@@ -31,10 +31,10 @@ class Axis:
         name: as the user writes it.
         unit: of its values.
         meaning: effect of the axis, for a person.
-        values: log-spaced as a rule.
+        values: usually spaced logarithmically.
         parameters: parameter -> its dependence on the value; the others keep their defaults.
-        horizon: the value is the length of the run in natural times.
-        scale_free: the dimensionless problem is the same at every value, so that nothing may depend on it.
+        horizon: whether the value is the length of the run in natural times.
+        scale_free: whether the dimensionless problem is the same at every value, so that no boundary may depend on it.
     """
 
     name: str
@@ -46,7 +46,7 @@ class Axis:
     scale_free: bool = False
 
     def at(self, scene: Scene, value: float) -> dict[str, float]:
-        """The parameters of a scene, whose own are its defaults, at a value of the axis.
+        """Parameters of a scene at a value of the axis, from the scene's own as defaults.
 
         Raises:
             InputError: the axis names a parameter that the scene does not have.
@@ -62,7 +62,7 @@ class Axis:
 
 
 def chosen(axes: Sequence[Axis], names: Sequence[str]) -> list[Axis]:
-    """The axes of these names; all if there are none. Raises InputError if there is no such axis."""
+    """Axes of these names; all if no names are given. Raises InputError if there is no such axis."""
     known = {axis.name: axis for axis in axes}
     for name in names:
         require_known("axis", name, known, "there is no such axis; choose from")
@@ -70,7 +70,7 @@ def chosen(axes: Sequence[Axis], names: Sequence[str]) -> list[Axis]:
 
 
 def thinned(values: Sequence[float], count: int) -> list[float]:
-    """``count`` of the values, with both ends, evenly spread."""
+    """Selection of at most ``count`` of the values, evenly spread, with both ends."""
     if len(values) <= count:
         return list(values)
     last = len(values) - 1
@@ -82,13 +82,13 @@ class Effort:
     """Limits on the cost of a map.
 
     Attributes:
-        periods: length of every run in natural times; an axis may say otherwise.
+        periods: length of every run in natural times, unless the axis decides it.
         values: largest number of values per axis, or None.
-        steps: a run of more fixed steps is too long. Steps are counted rather than seconds, so that every machine
-            looks for a boundary on the same rungs.
-        limit: a run that takes longer is ended [s]; a worker's start counts. What it would have shown is left open.
-        longest: lengths of runs in natural times that an axis may have, or None: any.
-        matched: only the matched settings of each formulation are mapped, or its first where there are none.
+        steps: largest number of fixed steps of a run. Steps are counted rather than seconds, so that every machine
+            searches the same rungs.
+        limit: wall time after which a run is ended [s], with the start of its worker; its outcome stays open.
+        longest: longest run that an axis may have, in natural times; None: any.
+        matched: True if only the matched settings of each formulation are mapped, or its first ones without matched.
     """
 
     periods: float = 3.0
@@ -99,11 +99,11 @@ class Effort:
     matched: bool = False
 
     def values_of(self, axis: Axis) -> list[float]:
-        """The values of an axis that are mapped."""
+        """Values of an axis that are mapped."""
         cut = axis.horizon and self.longest is not None
         values = [value for value in axis.values if value <= self.longest] if cut else axis.values  # type: ignore[operator]
         return thinned(values, self.values) if self.values else values
 
 
-# Most of a map's time is spent on the longest runs and on engines that no affordable step makes accurate.
+# A quick map leaves out the longest runs and the finest steps, which take most of the time.
 QUICK = Effort(values=3, steps=2_500, limit=3.0, longest=10.0, matched=True)

@@ -1,4 +1,4 @@
-"""Finds the coarsest rung of a ladder from which on everything passes, with few and cheap runs."""
+"""Finds the coarsest rung of a ladder from which on all rungs pass, with few and cheap runs."""
 
 from collections.abc import Callable, Generator
 from dataclasses import dataclass, field
@@ -12,17 +12,17 @@ class SearchResult:
     """Result of a search; rungs are numbered from the coarsest.
 
     Attributes:
-        seen: rung -> what a run on it gave.
-        limit: the first rung whose run is too long, or the number of rungs.
+        seen: rung -> outcome of its run.
+        limit: first rung whose run is too long, or the number of rungs.
     """
 
     seen: dict[int, RunOutcome] = field(default_factory=dict)
     limit: int = 0
 
     def boundary(self, passes: Callable[[RunOutcome], bool]) -> tuple[int | None, int | None]:
-        """The coarsest rung from which on all that ran passed, and the failing rung next to it; None: no such rung.
+        """Coarsest rung from which on all runs passed, and the failing rung next to it; None: there is no such rung.
 
-        A rung that passes above one that fails does not count: a user who refines the step would get worse.
+        A rung that passes but is coarser than a failing one does not count: refining its step would make it fail.
         """
         failing = max((rung for rung, verdict in self.seen.items() if not passes(verdict)), default=None)
         holding = [rung for rung in self.seen if failing is None or rung > failing]
@@ -30,12 +30,13 @@ class SearchResult:
 
 
 def search(size: int, stride: int) -> Generator[int, RunOutcome | None, SearchResult]:
-    """Asks for rungs and is sent what a run on each gave; returns what it found.
+    """Generator that yields rungs to run, receives their outcomes, and returns the result.
 
-    It goes down by ``stride`` until a run is accurate and one half a stride below it too: the finest run costs most.
-    Then it bisects for either boundary, and last makes sure that the rung below each passes too, for right beside a
-    boundary a pass may be luck. What is known is never asked again. A rung for which None is sent, and all finer ones,
-    are left out as too long.
+    It refines by ``stride`` rungs until a run is accurate, and a second one half a stride finer, too; the finest runs
+    cost
+    most. Then it bisects for both boundaries, and last runs the rung below each, since a pass right at a boundary may
+    be
+    luck. No rung is asked for twice. Sending None means that a rung is too long: it and all finer ones are left out.
     """
     result: SearchResult = SearchResult(limit=size)
     seen = result.seen

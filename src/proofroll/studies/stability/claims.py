@@ -1,4 +1,4 @@
-"""Reads the files that ask for a stability map and claim something of it: ``study = "stability"``."""
+"""Reads the files with a question and claims for a stability map: ``study = "stability"``."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ from proofroll.studies.stability.records import Boundary, BoundaryPoint, Stabili
 from proofroll.studies.stability.step_numbers import step_numbers
 
 STUDY = "stability"
-# A dependence along an axis shows between as many values.
+# Fewest values of an axis between which a dependence can show.
 _FEWEST_ALIKE = 2
-# That no step holds is seen on as many of them, each a fraction of the one before; no search goes down to nothing.
+# Fewest steps that must fail to confirm that no step holds; each is a fraction of the one before.
 _TRIED = 4
 
 
@@ -32,17 +32,17 @@ class Claim:
     """Claim about an engine's boundaries.
 
     Attributes:
-        engine: name, or ``name[key=value,…]``; every curve with these settings.
+        engine: name, or ``name[key=value,…]``; it stands for every curve with these settings.
         boundary: ``stable`` or ``accurate``.
         because: why.
-        axes: along which; all if empty.
+        axes: names of the axes; all if empty.
         values: lowest and highest value of the axis; all if empty.
-        never: no step holds; then nothing else is claimed but ``failure`` and ``silent``.
-        same: in natural times the boundary is the same all along each axis.
+        never: whether no step holds; then nothing else is claimed but ``failure`` and ``silent``.
+        same: whether the boundary, in natural times, is the same all along each axis.
         number: dimensionless number of the boundary that is claimed to lie in ``between``.
         between: lowest and highest.
         failure: kinds of failure allowed beyond it.
-        silent: whether the engine is silent about it.
+        silent: whether the engine does not report the failure.
     """
 
     engine: str
@@ -58,7 +58,7 @@ class Claim:
     silent: bool | None = None
 
     def untested(self, points: Sequence[BoundaryPoint]) -> str:
-        """Reason that the points of a map cannot test it; empty if they can."""
+        """Reason why the points of a map cannot test the claim; empty if they can."""
         about = [point for point in points if self._about(point) and not point.problem]
         if not about:
             return "no point of this map is about it"
@@ -75,16 +75,16 @@ class Claim:
         return ""
 
     def contradictions(self, points: Sequence[BoundaryPoint]) -> list[str]:
-        """Contradictions by the points of a map, as sentences; none where a run met the limit of time."""
+        """Contradictions by the points of a map, as sentences; points whose runs met the time limit do not count."""
         sentences = []
         about = [p for p in points if self._about(p) and not p.problem and not p.timed_out]
         if self.same:
             for curve, axis in dict.fromkeys((point.curve, point.axis) for point in about):
                 along = [p for p in about if (p.curve, p.axis) == (curve, axis)]
-                said = dependence(along, self.boundary)
-                if said:
+                change = dependence(along, self.boundary)
+                if change:
                     sentences.append(
-                        f"{curve} along {axis}: {self.boundary} up to {said}, expected the same everywhere"
+                        f"{curve} along {axis}: {self.boundary} up to {change}, expected the same everywhere"
                     )
         expected = self.failure and not any(point.sides[self.boundary].failure for point in about)
         if about and expected and not any(point.cut for point in about):
@@ -107,7 +107,7 @@ class Claim:
         return not self.values or self.values[0] <= point.value <= self.values[1]
 
     def _wrong(self, side: Boundary, cut: bool) -> list[str]:
-        """Contradictions by one boundary; a missing boundary is none if the search was ``cut`` for its many steps."""
+        """Contradictions by one boundary; a missing one is no contradiction if finer runs were ``cut`` as too long."""
         sentences = []
         largest = side.largest
         if self.never and largest is not None:
@@ -118,8 +118,8 @@ class Claim:
             if value is None and cut:
                 return sentences
             if value is None or not low <= value <= high:
-                said = "no step is" if value is None else f"{value:.3g} is the largest"
-                sentences.append(f"{self.boundary}: {self.number}: {said}, expected between {low:g} and {high:g}")
+                seen = "no step is" if value is None else f"{value:.3g} is the largest"
+                sentences.append(f"{self.boundary}: {self.number}: {seen}, expected between {low:g} and {high:g}")
         if self.failure and side.failure and side.failure not in self.failure:
             sentences.append(f"beyond {self.boundary}: {side.failure}, expected: {' or '.join(self.failure)}")
         if self.silent is not None and side.failure and side.silent != self.silent:
@@ -138,7 +138,7 @@ class StabilityFile:
         scene: name of the scene.
         axes: along which it is taken to its extremes.
         claims: expectations.
-        on_request: a report without names has this map only where it is kept.
+        on_request: whether a report without names has this map only if it is stored already.
     """
 
     name: str
@@ -155,7 +155,7 @@ class StabilityFile:
 
 
 def file_for(scene: str) -> StabilityFile:
-    """The file about a scene, or the file at a path that ends in ``.toml``; without one its parameters are the axes.
+    """File about a scene, or at a path that ends in ``.toml``; without one, a default map along the scene's parameters.
 
     Raises:
         InputError: there is no such scene, or the file is broken.
@@ -184,7 +184,7 @@ def _check(where: str, file: StabilityFile) -> None:
         if not axis.values:
             raise InputError(f"{where}: axes.{index}.values", "nothing", "an axis needs its values; add them")
         for value in axis.values:
-            # a parameter may be infinite, the length of a run not
+            # a parameter may be infinite, but not the length of a run
             if not value > -math.inf or (axis.horizon and not (math.isfinite(value) and value > 0)):
                 what = "a length in natural times that is positive and finite" if axis.horizon else "a number"
                 raise InputError(f"{where}: axes.{index}.values", value, f"give {what}")

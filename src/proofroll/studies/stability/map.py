@@ -1,7 +1,7 @@
 """Stability map of every engine, formulation and setting, along axes that take a scene to its extremes.
 
-Each point of the map is a search for two boundaries on a ladder of steps or tolerances. All searches go on side by
-side, each as fast as its answers come. Every run is a stored case, so an interrupted map resumes where it was.
+Each point of the map is a search for two boundaries on a ladder of steps or tolerances. All searches run side by side.
+Every run is a stored case, so an interrupted map resumes where it was.
 """
 
 import dataclasses
@@ -26,7 +26,7 @@ from proofroll.studies.tradeoff.sweep import curves_of
 _TOLERANCES = [10.0**-power for power in range(1, 14)]
 # Rungs skipped on the way down: a factor of four in the step, three decades of tolerance.
 _STRIDE = {"dt": 4, "rtol": 3}
-# After so many runs that met the limit of time a search goes no further: each finer one would too.
+# A search stops after this many runs that met the time limit, as each finer one would meet it, too.
 _TIMEOUTS = 2
 
 
@@ -54,9 +54,9 @@ class MapPoint:
         return dataclasses.replace(facts, settings={**facts.settings, str(facts.resolution): self.ladder[rung]})
 
     def too_long(self, rung: int, effort: Effort) -> bool:
-        """True if a run is not made: it has too many steps, or coarser ones met the limit of time.
+        """True if a run is not made: it has too many steps, or several coarser runs met the time limit.
 
-        The coarsest is always made: in a long run it may have more steps than are allowed to a finer one.
+        The coarsest run is always made, even if it has more steps than allowed.
         """
         if self.timeouts >= _TIMEOUTS:
             return True
@@ -64,13 +64,13 @@ class MapPoint:
 
     @property
     def timeouts(self) -> int:
-        """Count of runs that met the limit of time."""
+        """Count of runs that met the time limit."""
         return sum(result.status == Status.TIMEOUT for result in self.results.values())
 
 
 @dataclass
 class StabilityMap:
-    """Stability map as found.
+    """Stability map before it is summarised.
 
     Attributes:
         scene: name of the scene.
@@ -89,7 +89,7 @@ class StabilityMap:
 
     @property
     def runs(self) -> int:
-        """Count of runs."""
+        """Count of all runs."""
         return sum(len(point.results) for point in self.points)
 
 
@@ -106,13 +106,18 @@ def stability(
     effort: Effort | None = None,
     progress: Progress | None = None,
 ) -> StabilityMap:
-    """Maps the boundaries.
+    """Maps the boundaries of engines.
 
-    What an axis does not change keeps the scene's default. Engines are names or ``name[key=value,…]``; all that are
-    installed if there are none. ``progress`` is called with a text and how many points have been finished since.
+    Args:
+        scene: name or path; parameters that an axis does not change keep their defaults.
+        axes: of the map.
+        runner: runs the cases.
+        engines: names or ``name[key=value,…]``; all that are installed if empty.
+        effort: limits on the cost.
+        progress: called with a text and the number of points finished since the last call.
 
     Raises:
-        InputError: something that does not exist.
+        InputError: an unknown scene, parameter or engine.
     """
     effort = effort or Effort()
     tell: Progress = progress or (lambda _text, _count: None)
@@ -135,17 +140,17 @@ def stability(
 
 
 def _refused(points: Sequence[MapPoint]) -> dict[str, str]:
-    """Engines that refuse the scene everywhere and for the same reason, which is then no boundary; and the reason."""
-    said: dict[str, set[tuple[str, str]]] = {}
+    """Engine that refuses the scene at every place for the same reason -> that reason; it has no boundary."""
+    endings: dict[str, set[tuple[str, str]]] = {}
     for point in points:
         answers = {(str(result.status), result.message) for result in point.results.values()}
-        said.setdefault(point.curve.engine, set()).update(answers)
-    only = {engine: next(iter(answers)) for engine, answers in said.items() if len(answers) == 1}
+        endings.setdefault(point.curve.engine, set()).update(answers)
+    only = {engine: next(iter(answers)) for engine, answers in endings.items() if len(answers) == 1}
     return {engine: message for engine, (status, message) in only.items() if status == Status.REFUSED}
 
 
 def _matched(curves: Sequence[Curve]) -> list[Curve]:
-    """One curve for each formulation: with the matched settings, or the first."""
+    """One curve for each formulation: the one with the matched settings, or else the first."""
     kept: dict[tuple[str, object], Curve] = {}
     for curve in curves:
         key = curve.facts.name, curve.facts.settings.get("formulation")
@@ -155,7 +160,7 @@ def _matched(curves: Sequence[Curve]) -> list[Curve]:
 
 
 def _search(name: str, points: Sequence[MapPoint], effort: Effort, runner: Runner, tell: Progress) -> None:
-    """Runs all searches side by side: each asks for its next case as soon as it has the answer to the last."""
+    """Runs all searches side by side; each asks for its next case when the result of the last one arrives."""
     asking: dict[str, list[tuple[MapPoint, Searching, int]]] = {}
     known: dict[str, Result] = {}
     finished = 0
@@ -183,7 +188,7 @@ def _search(name: str, points: Sequence[MapPoint], effort: Effort, runner: Runne
     def answer(point: MapPoint, searching: Searching, rung: int) -> int | None:
         case = point.cases[rung]
         point.results[rung] = result = known[case.key]
-        if result.status == Status.TIMEOUT:  # a faster machine would have seen what came of it
+        if result.status == Status.TIMEOUT:  # the outcome is open: a faster machine might have finished
             return _send(point, searching, None)
         dataset = None if result.trajectory is None else read(runner.store.trajectory(case))
         return _send(point, searching, run_outcome(result, dataset, point.place.yardstick))
@@ -204,7 +209,7 @@ def _search(name: str, points: Sequence[MapPoint], effort: Effort, runner: Runne
 
 
 def _send(point: MapPoint, searching: Searching, outcome: RunOutcome | None) -> int | None:
-    """Gives an answer to a search; returns what it asks next, or None when it has ended."""
+    """Sends an outcome to a search; returns the next rung, or None when the search has ended."""
     try:
         return searching.send(outcome)
     except StopIteration as stop:
@@ -213,7 +218,7 @@ def _send(point: MapPoint, searching: Searching, outcome: RunOutcome | None) -> 
 
 
 def failure_beyond(point: MapPoint, rung: int | None) -> RunOutcome | None:
-    """The outcome on a failing rung; where no run was affordable at all, that it is too slow."""
+    """Outcome on a failing rung; "too slow" if even the coarsest run takes too long; None: nothing failed."""
     if rung is not None:
         return point.found.seen[rung]
     if not point.found.seen and point.found.limit == 0:
@@ -223,7 +228,7 @@ def failure_beyond(point: MapPoint, rung: int | None) -> RunOutcome | None:
 
 
 def stability_path(folder: Path, scene: str, axes: Sequence[Axis], engines: Sequence[str], effort: Effort) -> Path:
-    """File of a map: one for each scene, axes with their values, engines and effort."""
+    """File of a map, named by a hash of the scene, the axes with their values, the engines and the effort."""
     identity = [load_scene(scene).digest, [dataclasses.asdict(axis) for axis in axes], sorted(engines), repr(effort)]
     digest = hashlib.sha256(json.dumps(identity).encode()).hexdigest()[:10]
     return folder / "stability" / f"{Path(scene).name}-{digest}.json"

@@ -1,4 +1,4 @@
-"""The places of a stability map: the scene at each value of an axis, with its truth and its runs."""
+"""Places of a stability map: the scene at each value of an axis, with its truth and its runs."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
@@ -19,25 +19,26 @@ from proofroll.studies.tradeoff.curve import Question
 
 # Sampling intervals per natural time; the coarsest step is one of them, the finer ones divide it.
 PER_PERIOD = 8
-# Parts into which that interval is divided, about two per octave.
+# Divisors of that interval for the finer steps, two per octave.
 _FINEST = 17
 _PARTS = [1, *(part for power in range(_FINEST) for part in (2 << power, 3 << power))]
-# More samples than these are not kept of a long run: the interval becomes an odd number of the above, so that the
-# samples still visit all phases of an oscillation.
+# Most samples of a long run. The interval becomes an odd multiple of that above, so that the samples still visit all
+# phases of an oscillation.
 _MOST_SAMPLES = 400
 
 
 @dataclass
 class Place:
-    """A value of an axis where there is a scene, and the truth of it.
+    """A value of an axis for which there is a scene, with its truth.
 
     Attributes:
-        axis, value: where; the axis by its name.
+        axis: name of the axis.
+        value: of the axis.
         parameters: of the scene, those that differ from the defaults.
-        scene: with them.
+        scene: with these parameters.
         until, every: length and sampling interval of every run [s].
         yardstick: truth and sizes by which runs are measured.
-        problem: reason for which there is no truth here.
+        problem: reason why there is no truth here.
     """
 
     axis: str
@@ -51,17 +52,17 @@ class Place:
 
     @property
     def steps(self) -> list[float]:
-        """Fixed steps that are tried, coarse first [s]."""
+        """Fixed steps of the search, coarse first [s]."""
         return [self.scene.natural_time / PER_PERIOD / part for part in _PARTS]
 
 
 def places_of(name: str, axes: Sequence[Axis], effort: Effort) -> list[Place | MappedPlace]:
-    """Every value of every axis, without the truth yet; mapped is one that has no scene, with the reason."""
+    """Places of all axes, without truths yet; a value that gives no scene is a MappedPlace with the reason."""
     default = load_scene(name)
     places: list[Place | MappedPlace] = []
     for axis in axes:
         for value in effort.values_of(axis):
-            # A default that is given is left out, so that axes share the runs of the place where they meet.
+            # Parameters equal to their defaults are left out, so that axes share runs where they meet.
             given = {
                 key: number for key, number in axis.at(default, value).items() if number != default.parameters[key]
             }
@@ -78,7 +79,7 @@ def places_of(name: str, axes: Sequence[Axis], effort: Effort) -> list[Place | M
 
 
 def measure(name: str, places: Sequence[Place], runner: Runner, tell: Callable[[], None]) -> None:
-    """The truth of every place, or why there is none."""
+    """Computes the truth of every place and sets its yardstick, and its problem if there is no truth."""
     _, facts = resolve_with_truth([], runner.workers)
     cases = [
         replace(
@@ -97,6 +98,6 @@ def measure(name: str, places: Sequence[Place], runner: Runner, tell: Callable[[
 
 
 def case_at(name: str, place: Place, facts: EngineFacts, limit: float) -> Case:
-    """A run at a place with a limit of time [s]."""
+    """Case at a place with a time limit [s]."""
     question = Question(name, place.parameters, place.until, place.scene.deciding)
     return question.case(place.scene, facts, place.every, limit)

@@ -1,4 +1,4 @@
-"""Records of a stability map, for its file, its text, its verdict and its drawings."""
+"""Records of a stability map: for its file, its texts, the judgement of claims and drawings."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -12,7 +12,7 @@ from proofroll.studies.stability.step_numbers import Explanation
 from proofroll.studies.study_store import Measured
 
 BOUNDARIES = ("stable", "accurate")
-# Boundaries this factor apart count as the same: two rungs of the ladder of steps, one of that of tolerances.
+# Boundaries within this factor count as equal: two rungs of a ladder of steps (True), one of tolerances (False).
 _SAME = {True: 2.3, False: 15.0}
 
 
@@ -21,15 +21,15 @@ class Boundary:
     """Boundary at which a curve stops being stable, or accurate, at one place.
 
     Attributes:
-        largest: step [s] or tolerance that holds; None: none that is affordable does.
-        reached: something holds, and something beyond it fails.
-        numbers: dimensionless numbers of that step, by name.
-        beyond: the next step or tolerance, which fails.
+        largest: largest step [s] or tolerance that holds; None: no affordable one does.
+        reached: True if a step or tolerance holds, and a larger one fails.
+        numbers: dimensionless number of a step -> its value at the boundary.
+        beyond: the next larger step or tolerance, which fails.
         failure: kind of failure there.
-        silent: the engine does not report it.
-        error: of the deciding observable there, in parts of its range.
-        time: when the failure shows [s].
-        message: last words of the run there.
+        silent: True if the engine does not report it.
+        error: of the deciding observable there, as a part of its range.
+        time: of the failure [s].
+        message: of the run there.
     """
 
     largest: float | None
@@ -53,17 +53,17 @@ class BoundaryPoint:
         until: length of every run [s].
         period: natural time of the scene there [s].
         largest_stable, largest_accurate: of the two boundaries.
-        boundary: name of the one to show; ``failure``, ``silent`` and ``message`` are its own.
-        sides: both, ``stable`` and ``accurate``.
+        boundary: name of the one to show; ``failure``, ``silent`` and ``message`` belong to it.
+        sides: ``stable`` and ``accurate`` -> boundary.
         least_error: of all stable runs.
         finest: the finest step or tolerance that was run.
-        too_slow: the first that was not, for its many steps or for runs that met the limit of time.
-        timed_out: a run met that limit.
-        runs: how many there were.
-        problem: reason for which there is no truth here.
+        too_slow: first rung that was not run, for its many steps or for coarser runs that met the time limit.
+        timed_out: True if a run met that limit.
+        runs: number of runs.
+        problem: reason why there is no truth here.
         reproducer: path of a program that shows the failure.
         reproducer_needs: packages that it imports.
-        reproducer_note: reason for which it needs proofroll, or for which there is none.
+        reproducer_note: reason why it needs proofroll, or why there is none.
     """
 
     engine: str
@@ -98,18 +98,18 @@ class BoundaryPoint:
 
     @property
     def shown(self) -> Boundary:
-        """The boundary that is to be shown."""
+        """The boundary to show."""
         return self.sides[self.boundary]
 
     @property
     def cut(self) -> bool:
-        """True if the search ended for runs that were too slow: a missing boundary then proves nothing."""
+        """True if the search ended because finer runs were too slow: a missing boundary then proves nothing."""
         return self.too_slow is not None
 
 
 @dataclass(frozen=True, kw_only=True)
 class ExplainedBoundary(Explanation):
-    """The number that changes least among the boundaries of a curve along an axis."""
+    """Dimensionless number that varies least among the boundaries of a curve along an axis."""
 
     curve: str
     axis: str
@@ -118,7 +118,7 @@ class ExplainedBoundary(Explanation):
 
 @dataclass(frozen=True)
 class MappedPlace:
-    """Place on an axis: its value, the scene's parameters there, and the reason if it has no truth."""
+    """Place on an axis: its value, the scene's parameters there, and the reason if there is no truth."""
 
     axis: str
     value: FloatOrInf
@@ -128,27 +128,27 @@ class MappedPlace:
 
 @dataclass(frozen=True, kw_only=True)
 class StabilityStudy:
-    """A map with counts on top.
+    """A stability map with its counts and conclusions.
 
     Attributes:
         scene, axes, periods, effort: question of the study.
-        accurate: part of the range that an accurate run holds.
-        runs: how many there were.
+        accurate: largest error of an accurate run, as a part of the range.
+        runs: number of runs.
         boundaries: number of points with a failure beyond them.
         silent: number of these that the engine did not report.
-        refused: points that the engine refused before the run.
-        wrong_model: points that were not run, for what the engine built is not the scene.
-        failures: kind of failure -> how many points.
-        never_accurate: points at which nothing affordable holds.
-        meanings: kind of failure -> what it is.
+        refused: number of points that the engine refused before the run.
+        wrong_model: number of points that were not run because the engine's model contradicts the scene.
+        failures: kind of failure -> number of points.
+        never_accurate: number of points at which no affordable step is accurate.
+        meanings: kind of failure -> its meaning.
         step_symbols: dimensionless number of a step -> its symbol.
         points: every engine at every place.
         explanations: numbers that explain boundaries.
         findings: conclusions, as sentences.
         places: the values of the axes.
         absent: engine -> why it is not on the map.
-        hosts: machine of a cluster -> how many of the results it made.
-        measured: when, where and with what.
+        hosts: machine of a cluster -> number of results that it made.
+        measured: time, machine and versions.
         claims: judgements of the claims in its file.
     """
 
@@ -178,9 +178,11 @@ class StabilityStudy:
 
 
 def dependence(points: Sequence[BoundaryPoint], name: str) -> str:
-    """Change of a boundary, in parts of the natural time, along an axis; empty if there is none.
+    """Text on the change of a boundary along an axis, in natural times; empty if it does not change.
 
-    The points are those of one curve. Where the search was cut for its many steps, a missing boundary proves nothing.
+    Args:
+        points: those of one curve; one without a boundary does not count if its search was cut.
+        name: of the boundary.
     """
     fixed_step = any(point.resolution == "dt" for point in points)
     sizes = [
@@ -192,17 +194,17 @@ def dependence(points: Sequence[BoundaryPoint], name: str) -> str:
     if not sizes or (not without and max(sizes)[0] <= _SAME[fixed_step] * min(sizes)[0]):
         return ""
     what = " of the natural time" if fixed_step else ""
-    said = f"{number(max(sizes)[0])}{what} at {max(sizes)[1]:g}"
+    largest_of_all = f"{number(max(sizes)[0])}{what} at {max(sizes)[1]:g}"
     if without:
         places = ", ".join(f"{point.value:g} ({point.sides[name].failure})" for point in without)
-        return f"{said}, but nowhere at {places}"
-    return f"{said}, but {number(min(sizes)[0])}{what} at {min(sizes)[1]:g}"
+        return f"{largest_of_all}, but nowhere at {places}"
+    return f"{largest_of_all}, but {number(min(sizes)[0])}{what} at {min(sizes)[1]:g}"
 
 
 def silent_ranking(study: StabilityStudy) -> list[BoundaryPoint]:
-    """The silent failures, the worst first: wrong at any step, then by how wrong the run beyond the boundary was.
+    """Silent failures, the worst first: wrong at any step, then by the error of the run beyond the boundary.
 
-    Searches that were cut because finer runs have too many steps come last: a finer step might have been right.
+    Points whose search was cut come last: a finer step might have been right.
     """
 
     def badness(point: BoundaryPoint) -> tuple[bool, bool, bool, float]:

@@ -1,4 +1,4 @@
-"""Writes a self-contained program for every boundary of a map that shows the failure with the engine alone."""
+"""Writes a program for every boundary of a map that shows the failure, if possible with the engine alone."""
 
 import re
 from dataclasses import replace
@@ -14,7 +14,7 @@ from proofroll.studies.failure import ACCURATE, REFUSED, TOO_SLOW, WRONG, WRONG_
 from proofroll.studies.stability.map import MapPoint, StabilityMap
 from proofroll.studies.stability.records import BOUNDARIES, BoundaryPoint, StabilityStudy
 
-# A run that did not begin, and one that nobody waited for, show nothing.
+# Failures that no program can show -> the reason.
 _NOTHING_TO_SHOW = {
     REFUSED: "the run was refused before it began",
     WRONG_MODEL: "what was built is not the scene, so it was not run",
@@ -25,10 +25,10 @@ _NOTHING_TO_SHOW = {
 def with_programs(
     stability_map: StabilityMap, study: StabilityStudy, folder: Path, workers: Workers | None = None
 ) -> StabilityStudy:
-    """Writes a program into the folder for each point that shows a failure.
+    """Writes a program into the folder for each point that has a failure to show.
 
     Returns:
-        the study, whose points name their programs or say why they have none.
+        The study, whose points name their programs or say why they have none.
     """
     points = list(study.points)
     wanted: list[tuple[int, str, Case]] = []
@@ -80,7 +80,7 @@ def _failed(made: MapPoint, point: BoundaryPoint, case: Case, boundary: str, not
 
 
 def _shown(point: BoundaryPoint) -> str:
-    """The boundary that a program can show: that of stability, or else that of accuracy."""
+    """Boundary whose failure a program can show: that of stability, or else that of accuracy."""
     for name in BOUNDARIES:
         failure = point.sides[name].failure
         if failure and failure not in _NOTHING_TO_SHOW:

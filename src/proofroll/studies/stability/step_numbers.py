@@ -1,4 +1,4 @@
-"""The dimensionless numbers of a step, and which of them explains a boundary."""
+"""Dimensionless numbers of a step, and the one that explains a boundary."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ from proofroll.core.scene import Scene
 if TYPE_CHECKING:
     import xarray as xr
 
-# The step in parts of the natural time: every scene has it, and it explains nothing.
+# Name of the step divided by the natural time, a number that every scene has; it explains nothing.
 OSCILLATION = "oscillation"
-# A number explains a boundary that it keeps within this factor along an axis.
+# A number explains boundaries if it varies by at most this factor among them along an axis.
 _EXPLAINS = 2.0
-# Fewer boundaries than these say nothing about an axis.
+# Fewest boundaries that allow an explanation.
 _ENOUGH = 3
 
 
 def step_numbers(scene: Scene, h: float = 1.0, truth: xr.Dataset | None = None) -> list[StepNumber]:
-    """The numbers of a step ``h`` [s], of all elements."""
+    """Dimensionless numbers of a step ``h`` [s], of all elements."""
     numbers = []
     for element in scene.elements:
         own = None if truth is None else part(scene, element, truth)
@@ -33,20 +33,20 @@ def step_numbers(scene: Scene, h: float = 1.0, truth: xr.Dataset | None = None) 
 
 
 def values(scene: Scene, h: float, truth: xr.Dataset | None = None) -> dict[str, float]:
-    """The numbers by name; those that are zero at every step, or not known, are left out."""
+    """Dimensionless number of a step -> its value; numbers that are zero or unknown are left out."""
     known = {number.name: number.value for number in step_numbers(scene, h, truth) if number.value}
     return known | {OSCILLATION: h / scene.natural_time}
 
 
 @dataclass(frozen=True)
 class Explanation:
-    """The number that changes least among the boundaries along an axis.
+    """Dimensionless number that varies least among the boundaries along an axis.
 
     Attributes:
         number: its name.
         low, high: its least and largest value.
         spread: largest over least value.
-        explains: it stays within a factor of two, while the axis moves at least one of the others by more.
+        explains: True if it stays within a factor of two while another number varies by more.
     """
 
     number: str

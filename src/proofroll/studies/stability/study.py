@@ -1,4 +1,4 @@
-"""A stability map as it is kept: counts, boundaries, what explains them, and what depends on what it should not."""
+"""Summary of a stability map for storage: counts, boundaries, explanations, and violations of scale invariance."""
 
 from collections import Counter
 from collections.abc import Sequence
@@ -37,15 +37,13 @@ def make_stability(
     effort: Effort,
     progress: Progress | None = None,
 ) -> tuple[StabilityStudy, Path]:
-    """Maps the boundaries of a scene, see :func:`stability`, and keeps the map with a program for each boundary.
-
-    Both go below the folder of all results; what the file claims is held against the map.
+    """Maps the boundaries of a scene (:func:`stability`), and stores the map with a program for each boundary.
 
     Returns:
-        the study with ``claims``, and its file.
+        The study with judged claims, and its file.
 
     Raises:
-        InputError: something that does not exist.
+        InputError: an unknown scene, parameter or engine.
         ProofrollError: the folder cannot be written.
     """
     stability_map = stability(asked.scene, axes, runner, engines=engines, effort=effort, progress=progress)
@@ -57,7 +55,7 @@ def make_stability(
 
 
 def stability_study(stability_map: StabilityMap) -> StabilityStudy:
-    """Record of a stability map, with the numbers of its boundaries and of silent ones."""
+    """Record of a stability map with its counts and conclusions."""
     points = [_point(point) for point in stability_map.points]
     scene = load_scene(stability_map.scene)
     failing = [point for point in points if point.failure and point.failure not in NOT_RUN]
@@ -90,8 +88,8 @@ def _point(point: MapPoint) -> BoundaryPoint:
     place, facts = point.place, point.curve.facts
     sides = {name: _side(point, name) for name in BOUNDARIES}
     if place.yardstick.true is None:
-        sides["accurate"] = replace(sides["accurate"], largest=None, numbers={})  # without truth nobody is right
-    # Where nothing breaks on the ladder, what is to be shown is where it stops being right.
+        sides["accurate"] = replace(sides["accurate"], largest=None, numbers={})  # unknown without a truth
+    # Without a boundary of stability that of accuracy is shown.
     boundary = "stable" if sides["stable"].failure else "accurate"
     first = sides[boundary]
     errors = [item.error for item in point.found.seen.values() if item.stable and item.error is not None]
@@ -126,7 +124,7 @@ def _point(point: MapPoint) -> BoundaryPoint:
 
 
 def _side(point: MapPoint, name: str) -> Boundary:
-    """One boundary: the largest step or tolerance that holds, and what is beyond."""
+    """One boundary of a point: the largest step or tolerance that holds, and the failure beyond it."""
     holding, failing = point.found.boundary(attrgetter(name))
     beyond = failure_beyond(point, failing)
     scene, yardstick = point.place.scene, point.place.yardstick
@@ -145,7 +143,7 @@ def _side(point: MapPoint, name: str) -> Boundary:
 
 
 def _explanations(points: Sequence[BoundaryPoint]) -> list[ExplainedBoundary]:
-    """Most constant dimensionless number of every curve, axis and boundary, along the axis."""
+    """Dimensionless number that varies least, for every curve, axis and boundary."""
     explained = []
     for curve in dict.fromkeys(point.curve for point in points):
         for axis in dict.fromkeys(point.axis for point in points):
@@ -158,13 +156,13 @@ def _explanations(points: Sequence[BoundaryPoint]) -> list[ExplainedBoundary]:
 
 
 def _scale_conclusions(stability_map: StabilityMap, points: Sequence[BoundaryPoint]) -> list[str]:
-    """Sentences on results that depend on an axis along which the dimensionless problem is the same."""
+    """Sentences on boundaries that change along an axis though the dimensionless problem does not."""
     sentences = []
     for axis in (axis for axis in stability_map.axes if axis.scale_free):
         for curve in dict.fromkeys(point.curve for point in points):
             along = [point for point in points if point.curve == curve and point.axis == axis.name]
             for name in BOUNDARIES:
-                said = dependence([p for p in along if not (p.problem and name == "accurate")], name)
-                if said:
-                    sentences.append(f"{curve} depends on {axis.name}, as it should not: {name} up to {said}")
+                change = dependence([p for p in along if not (p.problem and name == "accurate")], name)
+                if change:
+                    sentences.append(f"{curve} depends on {axis.name}, as it should not: {name} up to {change}")
     return sentences

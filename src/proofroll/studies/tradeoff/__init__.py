@@ -1,1 +1,1 @@
-"""Speed against accuracy: curves of error against cost, error budgets, fronts and recommendations."""
+"""Speed against accuracy: curves of error against cost, error budgets, Pareto fronts and recommendations."""

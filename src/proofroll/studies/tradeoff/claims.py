@@ -1,7 +1,7 @@
-"""Comparison files that claim something of a trade-off, ``study = "tradeoff"``, and the judgement of their claims.
+"""Files with a question and claims for a trade-off, ``study = "tradeoff"``, and the judgement of these claims.
 
-Steps and orders are judged exactly, cost by ratios. A claim that the measured costs do not decide is neither held nor
-contradicted: the speed of a machine, or its other work, must not contradict one.
+Steps and orders are judged exactly, cost by ratios. A claim about cost stays undecided if the measurements do not
+decide it, since a slow or busy machine must not contradict a claim.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from proofroll.studies.tradeoff.requirements import Requirements
 
 @dataclass(frozen=True)
 class Holds:
-    """Claim on the coarsest step that holds a tolerance with margin at the scene's own parameters; nothing is timed.
+    """Claim on the coarsest step that holds a tolerance with margin, at the scene's own parameters; nothing is timed.
 
     Attributes:
         engine: whose curves, ``name[key=value,…]``.
@@ -47,20 +47,20 @@ class Holds:
 
     def judged(self, study: TradeoffStudy, quantity: str) -> ClaimJudgement:
         """Judgement of the claim; exact in a brief study, too."""
-        said = f"{self.engine} holds {_to(quantity, self.tolerance)} up to a step of {self.step:g}"
+        claim = f"{self.engine} holds {_to(quantity, self.tolerance)} up to a step of {self.step:g}"
         if unknown := _unknown(study, [self.engine]):
-            return ClaimJudgement(said, self.because, None, unknown)
+            return ClaimJudgement(claim, self.because, None, unknown)
         held = holding(study, Requirements(quantity, self.tolerance, engines=(self.engine,)), here=True)
         steps = [point.step for point in held if point.step is not None]
         if not steps:
-            return ClaimJudgement(said, self.because, False, "no step of the sweep does")
+            return ClaimJudgement(claim, self.because, False, "no step of the sweep does")
         shown = f"the coarsest that does is {max(steps):g}"
-        return ClaimJudgement(said, self.because, math.isclose(max(steps), self.step), shown)
+        return ClaimJudgement(claim, self.because, math.isclose(max(steps), self.step), shown)
 
 
 @dataclass(frozen=True)
 class Converges:
-    """Claim: the order of convergence; no clock.
+    """Claim on the order of convergence; nothing is timed.
 
     Attributes:
         engine: whose curves, ``name[key=value,…]``.
@@ -75,28 +75,28 @@ class Converges:
     def judged(self, study: TradeoffStudy, quantity: str) -> ClaimJudgement:
         """Judgement of the claim; exact in a brief study, too."""
         lowest, highest = self.order
-        said = f"{self.engine} converges in {quantity} with order {lowest:g} to {highest:g}"
+        claim = f"{self.engine} converges in {quantity} with order {lowest:g} to {highest:g}"
         if unknown := _unknown(study, [self.engine]):
-            return ClaimJudgement(said, self.because, None, unknown)
+            return ClaimJudgement(claim, self.because, None, unknown)
         curves = {point.curve for point in study.points if fits(point, self.engine)}
         budgets = [b for b in study.budgets if b.curve in curves and b.quantity == quantity]
         orders = [(b.order_low or b.order, b.order_high or b.order) for b in budgets if b.order]
         if not orders:
-            return ClaimJudgement(said, self.because, False, "no order shows")
+            return ClaimJudgement(claim, self.because, False, "no order shows")
         shown = "what shows is " + ", ".join(f"{low:.3g} to {high:.3g}" for low, high in orders)
         holds = all(low <= highest and high >= lowest for low, high in orders)
-        return ClaimJudgement(said, self.because, holds, shown)
+        return ClaimJudgement(claim, self.because, holds, shown)
 
 
 @dataclass(frozen=True)
 class Cheapest:
-    """Claim: the cheapest engine at a tolerance.
+    """Claim on the cheapest engine at a tolerance.
 
     Attributes:
         tolerance: of the quantity.
         engine: any of these, ``name[key=value,…]``.
         because: reason.
-        levels: among which rungs of the ladder; all engines proper if empty.
+        levels: rungs of the ladder that are compared; if empty, all of engines' own models.
     """
 
     tolerance: Tolerance
@@ -105,19 +105,18 @@ class Cheapest:
     levels: list[Level] = field(default_factory=list)
 
     def judged(self, study: TradeoffStudy, quantity: str) -> ClaimJudgement:
-        """Judges by the ratio of its cost to that of the cheapest other that holds the tolerance.
+        """Judgement by the ratio of its cost to that of the cheapest rival that holds the tolerance.
 
-        It holds where the whole interval of the ratio is at most 1, and is contradicted where all of it exceeds
-        :data:`proofroll.running.timing.FACTOR`, which no brief study can show; where no step of the engine holds the
-        tolerance it is contradicted without a clock.
+        It holds if the whole interval of the ratio is at most 1. It is contradicted if the interval lies above
+        :data:`proofroll.running.timing.FACTOR` and the study is not brief, or if no step of the engine holds the
+        tolerance.
         """
         among = f" among {', '.join(self.levels)}" if self.levels else ""
-        said = f"the cheapest that holds {_to(quantity, self.tolerance)}{among} is {' or '.join(self.engine)}"
-        return ClaimJudgement(
-            said, self.because, *self._found(study, Requirements(quantity, self.tolerance, levels=tuple(self.levels)))
-        )
+        claim = f"the cheapest that holds {_to(quantity, self.tolerance)}{among} is {' or '.join(self.engine)}"
+        required = Requirements(quantity, self.tolerance, levels=tuple(self.levels))
+        return ClaimJudgement(claim, self.because, *self._compared(study, required))
 
-    def _found(self, study: TradeoffStudy, required: Requirements) -> tuple[bool | None, str]:
+    def _compared(self, study: TradeoffStudy, required: Requirements) -> tuple[bool | None, str]:
         if unknown := _unknown(study, self.engine):
             return None, unknown
         held = holding(study, required)
@@ -131,14 +130,14 @@ class Cheapest:
         if not best.rounds or len(best.rounds) != len(rival.rounds):
             return None, f"{_name(best)} and {_name(rival)} were not timed in the same rounds"
         cost = ratio(Timing(tuple(best.rounds)), Timing(tuple(rival.rounds)))
-        said = (
+        measured = (
             f"{_name(best)} takes {cost.value:.3g} times as long as {_name(rival)} "
             f"({cost.low:.3g} to {cost.high:.3g}, {named(cost.confidence)})"
         )
         if cost.high <= 1:
-            return True, said
+            return True, measured
         contradicted = cost.low > FACTOR and cost.known and not study.brief
-        return (False if contradicted else None), said
+        return (False if contradicted else None), measured
 
 
 def _to(quantity: str, tolerance: Tolerance) -> str:
@@ -151,7 +150,7 @@ def _name(point: MeasuredPoint) -> str:
 
 
 def _unknown(study: TradeoffStudy, engines: Sequence[str]) -> str:
-    """Reason that the study knows nothing of some engines; empty if it does."""
+    """Reason why the study cannot judge some engines; empty if it can."""
     about = [point for point in study.points if any(fits(point, text) for text in engines)]
     if not about:
         return "it was not measured"
@@ -210,13 +209,13 @@ class TradeoffClaims:
 
 
 def claims_for(scene: str) -> TradeoffClaims | None:
-    """The claims about a scene as its file has them, or None if there is no file."""
+    """Claims of the file about a scene, or None if there is no such file."""
     files = (_claims(path, content) for path, content in study_files(STUDY) if content.get("scene") == scene)
     return next(files, None)
 
 
 def load_claims(path: str | Path) -> TradeoffClaims:
-    """Reads a file. Raises InputError if it is broken, or is about something else."""
+    """Reads a file of claims. Raises InputError if it is broken, or is for another study."""
     return _claims(Path(path), study_content(Path(path), STUDY))
 
 

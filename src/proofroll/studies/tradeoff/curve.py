@@ -1,4 +1,4 @@
-"""Points and curves of a sweep with their errors, and the question that they answer."""
+"""Points and curves of a sweep with their errors, and the question of the sweep."""
 
 from __future__ import annotations
 
@@ -30,12 +30,12 @@ from proofroll.studies.tradeoff.records import Corner
 if TYPE_CHECKING:
     import xarray as xr
 
-# Samples per run. An oscillation of the founding scene's z has a dozen of them.
+# Sampling intervals per run; a dozen per oscillation of z in the first scene, stick_slip.
 SAMPLES = 40
-# An adaptive step ends at each sample, so that with many of them no tolerance may be too loose. A run with so few is
-# made besides, and the larger of both errors counts.
+# Sampling intervals of a second run with an adaptive step, whose larger error counts. Steps end at each sample, so that
+# with many samples even a loose tolerance gives short steps.
 SPARSE = 2
-# Errors of runs that are the same but for round-off differ by less than this part.
+# Relative difference of errors below which two runs differ by round-off only.
 _SAME = 1e-6
 
 
@@ -47,7 +47,7 @@ class Question:
         scene: name of the scene.
         parameters: its parameters that differ from the defaults.
         until: length of every run [s].
-        quantity: the observable that decides how far the sweep goes.
+        quantity: observable that decides how far the sweep goes.
     """
 
     scene: str
@@ -66,30 +66,30 @@ class Question:
         return float(f"{self.until / SPARSE:.12g}")
 
     def step(self, factor: float) -> float:
-        """Step of several sampling intervals [s], without digits that multiplying leaves (0.005000000000000001)."""
+        """Step of ``factor`` sampling intervals [s], rounded to 12 digits (0.005 instead of 0.005000000000000001)."""
         return float(f"{self.every * factor:.12g}")
 
     @cached_property
     def loaded(self) -> Scene:
-        """The scene with these parameters, read when it is first asked for."""
+        """The scene with these parameters, read at the first access."""
         return load_scene(self.scene, **self.parameters)
 
     def case(self, scene: Scene, facts: EngineFacts, every: float, time_limit: float = STUDY_TIME_LIMIT) -> Case:
-        """One run, on the loaded scene."""
+        """Case of one run on the loaded scene."""
         return case_of(self.scene, scene, self.parameters, facts, self.until, every, time_limit=time_limit)
 
     def cases(self, scene: Scene, facts: EngineFacts, every: float) -> tuple[Case, ...]:
-        """Cases of a point: its run; of an adaptive step also one with sparse samples."""
+        """Cases of a point: its run and, with an adaptive step, a second run with few samples."""
         adaptive = facts.resolution not in {None, "dt"}
         return tuple(self.case(scene, facts, each) for each in ((every, self.sparse) if adaptive else (every,)))
 
     def truth(self, scene: Scene, facts: EngineFacts, runs: Collection[Case]) -> Case:
-        """Case of the truth, known wherever the runs are sampled."""
+        """Case of the truth, with samples off the grid wherever the runs have them."""
         steps = [run.engine.step for run in runs if run.every == self.every]
         return replace(self.case(scene, facts, self.every), between=off_grids(time_grid(self.until, self.every), steps))
 
     def reference(self, scene: Scene, truth: xr.Dataset, every: float) -> Reference:
-        """The truth at a sampling interval [s], from that at the shortest one, which has all its times."""
+        """Reference with this sampling interval [s], taken from the samples of the truth with the shortest one."""
         if every != self.every:
             known, times = truth["time"].to_numpy(), time_grid(self.until, every)
             places = np.abs(known[:, None] - times).argmin(axis=0)
@@ -103,14 +103,14 @@ class CurvePoint:
 
     Attributes:
         case, result: the run.
-        curves: observables of its trajectory; empty if there is none.
-        errors: largest distance of each from the truth; with an adaptive step also over few samples.
-        bars: error bars of the truth, by observable.
-        scales: see :meth:`proofroll.studies.judging.reference.Reference.scale`, by observable.
-        dense: ``errors`` over the many samples alone.
+        curves: observable -> values of its trajectory; empty if there is none.
+        errors: observable -> largest distance from the truth, that of ``sparse`` included.
+        bars: observable -> error bar of the truth.
+        scales: observable -> :meth:`proofroll.studies.judging.reference.Reference.scale`.
+        dense: ``errors`` without those of ``sparse``.
         sparse: the run over few samples, with its errors; None with a fixed step, which samples do not change.
-        timing: of the run, wall seconds per simulated second; None where it is not measured.
-        corners: the runs at the corners of a range of the scene's parameters; None where it was not checked there.
+        timing: wall time per simulated second; None if it was not measured.
+        corners: runs at the corners of a range of the scene's parameters; None if it was not checked there.
     """
 
     case: Case
@@ -132,10 +132,10 @@ class CurvePoint:
 
 
 class Floor(NamedTuple):
-    """Floor of a curve, below which its runs come no closer because each step rounds the state.
+    """Error floor of a curve: with smaller steps the error grows, because each step rounds the state.
 
     Attributes:
-        best: the most accurate run; those with smaller steps are worse.
+        best: the most accurate run.
         error: of that run.
         scatter: change by the next smaller step.
     """
@@ -147,12 +147,12 @@ class Floor(NamedTuple):
 
 @dataclass
 class Curve:
-    """One engine, formulation and preset over its range.
+    """One engine, formulation and preset over its range of steps or tolerances.
 
     Attributes:
         engine: ``name[formulation=…,preset=…]``.
         facts: with the preset's own step or tolerance.
-        level: its rung on the ladder of models, or None if the engine does not tell.
+        level: its rung on the ladder of models, or None if the engine does not declare it.
         points: coarse first.
         dropped: step -> why there is no run with it.
     """
@@ -165,25 +165,26 @@ class Curve:
 
     @property
     def fixed_step(self) -> bool:
-        """True if it is swept over steps rather than over tolerances."""
+        """True if it is swept over steps, False for tolerances."""
         return self.facts.resolution == "dt"
 
     @property
     def tried(self) -> set[float | None]:
-        """Steps or tolerances with which there is a run, or why there is none."""
+        """Steps or tolerances that were run or dropped."""
         return {point.step for point in self.points} | self.dropped.keys()
 
     def envelope(self, quantity: str) -> list[float]:
         """Envelope of the points' errors, see :func:`proofroll.studies.tradeoff.pareto.envelope`.
 
-        Below the best step the round-off of single precision grows; that counts against no larger step.
+        Errors at steps below the best one, which grow by round-off in single precision, do not count against larger
+        steps.
         """
         errors, floor = [point.errors.get(quantity, np.inf) for point in self.points], self.floor(quantity)
         last = self.points.index(floor.best) + 1 if floor else len(errors)
         return envelope(errors[:last]) + errors[last:]
 
     def floor(self, quantity: str) -> Floor | None:
-        """Floor at which smaller steps become worse in single precision; None: double, or none is clearly worse."""
+        """Error floor of single precision; None in double precision, or if no smaller step is clearly worse."""
         if self.facts.precision == "double" or not self.fixed_step:
             return None
         done = [point for point in self.points if np.isfinite(point.errors.get(quantity, np.inf))]
@@ -194,7 +195,7 @@ class Curve:
         least = int(np.argmin(changes))
         errors = [point.errors[quantity] for point in done]
         best = done.index(used[least + 1])
-        while best and errors[best - 1] <= errors[best]:  # an error that cancels at one step alone is not reached
+        while best and errors[best - 1] <= errors[best]:  # take the coarsest step with as small an error
             best -= 1
         if not is_floor(errors[best:], done[best].scales.get(quantity)):
             return None
@@ -203,7 +204,7 @@ class Curve:
     def saturated(self, quantity: str) -> bool:
         """True if the two loosest tolerances give the same run, so that something else limits its steps.
 
-        Where an array happens to lie in memory may change the round-off of a run, so equal is equal up to that.
+        Runs count as the same up to round-off, which may depend on the place of arrays in memory.
         """
         if self.fixed_step or len(self.points) < 2:
             return False
@@ -213,9 +214,12 @@ class Curve:
 
 
 def judged(points: Sequence[CurvePoint], references: Mapping[float, Reference], runner: Runner) -> CurvePoint:
-    """The point with its observables and their errors, if it has a trajectory that reached the end.
+    """Point with its observables and their errors, if its run reached the end.
 
-    ``points`` are the run, and the one over few samples if there is one; the truth is known by sampling interval.
+    Args:
+        points: the run, and with an adaptive step the one over few samples.
+        references: sampling interval [s] -> truth.
+        runner: whose store has the trajectories.
     """
     done = (
         measured(point, references[point.case.every], read(runner.store.trajectory(point.case)))
@@ -228,7 +232,7 @@ def judged(points: Sequence[CurvePoint], references: Mapping[float, Reference], 
         return point
     (sparse,) = others
     reference = references[sparse.case.every]
-    # What is derived from neighbouring samples, as an audit, is not compared where there are few.
+    # Observables derived from neighbouring samples (audits) are not compared where samples are few.
     errors = {
         name: max(error, sparse.errors.get(name, np.inf)) if name in reference.dataset else error
         for name, error in point.errors.items()
@@ -237,7 +241,7 @@ def judged(points: Sequence[CurvePoint], references: Mapping[float, Reference], 
 
 
 def measured(point: CurvePoint, reference: Reference, run: xr.Dataset) -> CurvePoint:
-    """The point with its observables and their errors; an event in a wide bracket is as wrong as that is half wide."""
+    """Point with its observables and their errors; the error of an event is at least half the width of its bracket."""
     given = held_against.observed(reference, run)
     curves = {name: values for name, values in given.items() if np.isfinite(reference.true(name, values)[1])}
     return replace(

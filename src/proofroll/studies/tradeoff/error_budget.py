@@ -1,8 +1,8 @@
-"""The error budget of a curve: model form, time step with its order, round-off or solver tolerance, truth.
+"""Error budget of a curve: model form, time step with its order, round-off or solver tolerance, truth.
 
-The run with step h is x(h). With the limit x(0) of small steps, estimated from the finest runs alone, its distance
-from the truth is at most |x(h) - x(0)| (the time step) + |x(0) - truth| (the model form) + the truth's own error bar;
-what keeps the fine runs from coming closer to one another is the floor of round-off and solver tolerances.
+A run with step h is x(h), and x(0) is the limit of small steps, estimated from the finest runs alone. The error of a
+run is at most |x(h) - x(0)| (the time step) + |x(0) - truth| (the model form) + the truth's own error bar. The floor is
+the difference of the finest runs if it no longer shrinks: round-off or solver tolerances.
 """
 
 import itertools
@@ -22,13 +22,13 @@ from proofroll.running.timing import CONFIDENCE
 from proofroll.studies.tradeoff.curve import Curve, CurvePoint
 from proofroll.studies.tradeoff.records import CurveBudget
 
-# Neighbouring local orders this near to each other belong to one power law.
+# Largest range of neighbouring local orders that belong to one power law.
 _SAME_ORDER = 0.3
-# Differences that shrink with less than this order do not shrink.
+# Least order with which differences count as shrinking.
 _STALLED = 0.25
-# Differences this many times larger than the scatter are more than scatter.
+# Differences below this many times the scatter are scatter.
 _ABOVE = 3.0
-# How far a declared order may lie outside the interval of the observed one before it counts as contradicted.
+# Distance of a declared order from the interval of the observed one beyond which it is contradicted.
 _SLACK = 0.25
 
 NOTHING = "there is no step and no tolerance"
@@ -41,7 +41,7 @@ TIME_STEP, MODEL_FORM, FLOOR, TRUTH = (
 
 
 class Order(NamedTuple):
-    """An order of convergence, and where it was observed; all None where no power law shows.
+    """Observed order of convergence; all None if no power law shows.
 
     Attributes:
         value: of the order.
@@ -59,14 +59,23 @@ class Order(NamedTuple):
 def budget(
     curve: Curve, quantity: str, every: float, true: FloatArray, observable: Observable, magnitude: float
 ) -> CurveBudget:
-    """The budget of one quantity, with its true values, observable and the size of its numbers, along a curve.
+    """Error budget of one quantity along a curve.
 
-    Order and limit come from runs that are sampled at ``every`` [s]. One with a longer step has fewer samples, and only
-    the coarsest of them counts, as the coarse end.
+    Order and limit come from runs sampled at ``every``. Runs with a longer step have fewer samples; only the coarsest
+    of
+    them is used, for the coarse end.
+
+    Args:
+        curve: with its points.
+        quantity: name of the observable.
+        every: sampling interval [s].
+        true: true values.
+        observable: declaration of the quantity.
+        magnitude: size of the numbers whose round-off it has.
     """
     used = [p for p in curve.points if p.case.every == every and np.isfinite(p.errors.get(quantity, np.inf))]
     bar, single = _bar(used, quantity), curve.floor(quantity)
-    if single:  # runs with smaller steps show their roundings alone
+    if single:  # with smaller steps only round-off shows
         used = used[: max(sum((p.step or 0.0) >= (single.best.step or 0.0) for p in used), 3)]
     budget_of_curve = CurveBudget(
         engine=curve.facts.name,
@@ -92,14 +101,14 @@ def budget(
         seen = differences
         if single:
             seen = list(itertools.takewhile(lambda difference: difference > _ABOVE * single.scatter, differences))
-        elif stalled:  # what lies in the scatter of the finest runs shows no order
+        elif stalled:  # differences within the scatter of the finest runs show no order
             scatter = _ABOVE * max(differences[-2:])
             seen = list(itertools.takewhile(lambda difference: difference > scatter, differences))
         moved = max(differences) > round_off_of(curve.facts.precision, magnitude)  # round-off alone has no order
         order = order_of(steps[: len(seen) + 1], seen) if moved else Order()
     else:
         limit, order = tightest(values), Order()
-        # A tolerance that limits nothing any more gives the same run again; one at the floor gives scatter.
+        # Differences that no longer shrink: the tolerance has no effect, or only round-off changes.
         stalled = differences[-1] >= differences[-2]
     floor = max(differences[-2:]) if stalled else None
     if single:
@@ -131,10 +140,11 @@ def budget(
 
 
 def _contradicted(order: Order, facts: EngineFacts, role: Role) -> bool:
-    """True if the observed order lies outside those declared, from the one for this scene to the highest.
+    """True if the observed order lies outside the declared ones, from the one for this scene to the highest.
 
-    What lowers an order, as a joint that begins to slip within a step, need not happen in a run. A declared order is
-    that of the motion: reactions and residuals may have a higher one, as over a transient.
+    An event that lowers the order (a joint that begins to slip within a step) need not happen in a run. A declared
+    order
+    is that of the motion: reactions and residuals may have a higher one.
     """
     if facts.order is None or order.low is None or order.high is None:
         return False
@@ -144,9 +154,13 @@ def _contradicted(order: Order, facts: EngineFacts, role: Role) -> bool:
 
 
 def order_of(steps: Sequence[float], differences: Sequence[float]) -> Order:
-    """Order and its confidence interval from the longest stretch of runs that follow one power law.
+    """Order and its confidence interval, from the longest sequence of runs that follow one power law.
 
-    Steps fall; the difference of neighbouring runs is C |h1^p - h2^p|, and C and p are fitted in logarithms.
+    The difference of neighbouring runs is C |h1^p - h2^p|; C and p are fitted in logarithms.
+
+    Args:
+        steps: falling [s].
+        differences: size of the difference of neighbouring runs.
     """
     from scipy.optimize import curve_fit
     from scipy.stats import t
@@ -172,7 +186,7 @@ def order_of(steps: Sequence[float], differences: Sequence[float]) -> Order:
 
 
 def _stretch(local: Sequence[float]) -> tuple[int, int]:
-    """First and past-the-last index of the longest run of local orders that agree; the finer of equally long ones."""
+    """First and past-the-end index of the longest sequence of equal local orders; the finest of equally long ones."""
     best = (0, 0)
     for start in range(len(local)):
         end = start
@@ -188,7 +202,7 @@ def _bar(points: Sequence[CurvePoint], quantity: str) -> float:
 
 
 def _coarse_end(curve: Curve, quantity: str, every: float, limit: Limit) -> tuple[CurvePoint, FloatArray] | None:
-    """The coarsest run that reached the end, and how far it is from the limit; None if it cannot be compared.
+    """The coarsest run that reached the end, and its difference from the limit; None if they cannot be compared.
 
     With a step longer than the sampling interval it has only some of the limit's samples.
     """
@@ -202,11 +216,11 @@ def _coarse_end(curve: Curve, quantity: str, every: float, limit: Limit) -> tupl
 
 
 def _dominant(departure: FloatArray, limit: Limit, model_form: float, floor: float | None, truth: float) -> str:
-    """Dominating part of the error of a run at some distance from the limit of small steps."""
-    # Where the runs still approach one another, what is not known of their limit is the time step's too.
+    """Name of the dominating part of the error of a run with this departure from the limit of small steps."""
+    # While runs still approach one another, the uncertainty of the limit counts as error of the time step.
     time_step = max(size(departure), limit.error_bar if floor is None else 0.0)
     parts = {TIME_STEP: time_step, TRUTH: truth, FLOOR: floor or 0.0}
-    # A limit that is no further from the truth than it is uncertain says nothing about the model.
+    # A limit that differs from the truth by no more than its uncertainty shows no error of the model.
     parts[MODEL_FORM] = model_form if model_form > limit.error_bar + truth else 0.0
     return max(parts, key=lambda name: parts[name])
 
@@ -219,22 +233,22 @@ def _sentence(budget: CurveBudget, unit: str, resolution: str) -> str:
     coarse, fine = budget.coarse, budget.fine
     if resolution != "dt":
         coarse, fine = (name.replace(TIME_STEP, "step control") for name in (coarse, fine))
-    said = f"At {resolution} {number(budget.coarse_step, 3)}{step} the {coarse} dominates{_order(budget)}; "
-    said += f"at {number(budget.fine_step, 3)}{step}, with an error of {number(budget.fine_error)} {unit}, "
-    said += "still it does" if fine == coarse else f"the {fine}"
+    text = f"At {resolution} {number(budget.coarse_step, 3)}{step} the {coarse} dominates{_order(budget)}; "
+    text += f"at {number(budget.fine_step, 3)}{step}, with an error of {number(budget.fine_error)} {unit}, "
+    text += "still it does" if fine == coarse else f"the {fine}"
     if budget.truth is None:
-        said += ". Nothing is known of the model itself: the truth's error bar is not finite"
+        text += ". Nothing is known of the model itself: the truth's error bar is not finite"
     elif budget.model_form > budget.model_form_bar + budget.truth:
         known = number(budget.model_form_bar, 1)
-        said += f". In the limit of small steps {number(budget.model_form)} {unit} remain (known to {known})"
+        text += f". In the limit of small steps {number(budget.model_form)} {unit} remain (known to {known})"
     else:
         seen = max(budget.model_form_bar, budget.truth)
-        said += f". No error of the model itself is seen above {number(seen, 1)} {unit}"
+        text += f". No error of the model itself is seen above {number(seen, 1)} {unit}"
     if budget.floor is not None and budget.best_step is not None:
-        said += f"; {floor_text(budget.best_step, budget.floor, unit)}, smaller steps are worse"
+        text += f"; {floor_text(budget.best_step, budget.floor, unit)}, smaller steps are worse"
     elif budget.floor is not None:
-        said += f"; refining ends at a scatter of {number(budget.floor, 1)} {unit}"
-    return said + "."
+        text += f"; refining ends at a scatter of {number(budget.floor, 1)} {unit}"
+    return text + "."
 
 
 def _order(budget: CurveBudget) -> str:

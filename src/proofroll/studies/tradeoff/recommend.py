@@ -1,4 +1,4 @@
-"""The cheapest engine, formulation and step that holds a tolerance, from measured points alone."""
+"""The cheapest engine, formulation and step that holds a tolerance, from measured points only."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -13,23 +13,23 @@ from proofroll.studies.tradeoff.pareto import tied
 from proofroll.studies.tradeoff.records import MeasuredPoint, TradeoffStudy
 from proofroll.studies.tradeoff.requirements import MARGIN, Requirements, absolute_tolerance, why_it_fails
 
-# What of a measured point is told.
+# Fields of a measured point that are written to JSON.
 _OF_A_POINT = (
     "engine", "settings", "resolution", "step", "level", "seconds_per_second", "interval", "confidence", "measurements",
 )  # fmt: skip
 _CLOSEST = "the most accurate that was measured, nothing beyond is guessed"
-# Rungs of the ladder that are worked out for a scene by hand rather than modelled in an engine.
+# Rungs of the ladder with equations derived for the scene by hand, which are not engines' models.
 _BY_HAND = frozenset({Level.CLOSED_FORM, Level.REDUCED, Level.PROJECTION})
 
 
 def by_hand(level: str | None) -> bool:
-    """True if a rung of the ladder solves equations derived for the scene, and is not an engine's model of it."""
+    """True if a rung of the ladder solves equations derived by hand for the scene."""
     return level in set(_BY_HAND)
 
 
 @dataclass(frozen=True)
 class Choice:
-    """A measured point, its error of the quantity, and why it is named."""
+    """A measured point, its error of the quantity, and the reason why it is named."""
 
     point: MeasuredPoint
     error: float | None
@@ -37,8 +37,8 @@ class Choice:
 
     def as_dict(self) -> dict[str, Any]:
         """Point, error and reason for JSON."""
-        told = {name: getattr(self.point, name) for name in _OF_A_POINT}
-        return told | {
+        fields_of_point = {name: getattr(self.point, name) for name in _OF_A_POINT}
+        return fields_of_point | {
             "caveat": self.point.caveat,
             "family": self.point.family,
             "error": self.error,
@@ -55,11 +55,11 @@ class Answer:
         tolerance: in that unit.
         margin: factor by which an error must be smaller.
         choice: the cheapest point that holds the tolerance with margin, and at every corner of the range.
-        ties: others that hold it and whose cost is not distinguishable from the choice's, for their intervals overlap.
+        ties: other points that hold it, with costs whose intervals overlap the choice's.
         runner_up: the cheapest of another engine or formulation.
-        first_failure: of all cheaper points, which fail, the most accurate.
-        least_model: the cheapest solution of the scene's own equations.
-        closest: where there is no choice, the most accurate point.
+        first_failure: the most accurate of the cheaper points, which all fail.
+        least_model: the cheapest solution of equations derived by hand for the scene.
+        closest: if there is no choice, the most accurate point.
     """
 
     quantity: str
@@ -76,7 +76,13 @@ class Answer:
 
 @dataclass(frozen=True)
 class CheckedOver:
-    """Check of a choice over ranges of parameters: the ranges, number of their corners, length of the runs [s]."""
+    """Range over which a choice was checked.
+
+    Attributes:
+        parameters: parameter -> lowest and highest value.
+        corners: number of corners.
+        until: length of the runs [s].
+    """
 
     parameters: dict[str, list[float]]
     corners: int
@@ -88,13 +94,13 @@ class Recommendation:
     """An answer with its circumstances.
 
     Attributes:
-        answer: the recommended engine and setting, as a sentence.
-        scene, parameters: where.
-        budget: wall seconds per simulated second that may be spent, or None.
-        affordable: whether the choice is within it.
-        best_within_budget: where it is not, the most accurate point that is.
-        checked: the range.
-        measured: when, on which machine and with which versions.
+        answer: the recommended engine and setting.
+        scene, parameters: of the study.
+        budget: allowed wall time per simulated second, or None.
+        affordable: True if the choice is within the budget.
+        best_within_budget: if it is not, the most accurate point that is.
+        checked: range of parameters.
+        measured: time, machine and versions.
         not_measured: engines that were not asked about.
     """
 
@@ -110,10 +116,10 @@ class Recommendation:
 
 
 def recommend(study: TradeoffStudy, required: Requirements) -> Recommendation:
-    """The cheapest point that holds a tolerance, and what else a person should know.
+    """The cheapest point that holds a tolerance, with alternatives and reasons.
 
     Raises:
-        InputError: a quantity or an engine that was not measured, or a percentage of what has no size.
+        InputError: a quantity or an engine that was not measured, or a percentage of a quantity without a size.
     """
     absolute = absolute_tolerance(study, required)
     timed = [p for p in study.points if p.seconds_per_second is not None and required.quantity in p.envelope]
@@ -123,7 +129,7 @@ def recommend(study: TradeoffStudy, required: Requirements) -> Recommendation:
     def why_not(point: MeasuredPoint) -> str | None:
         return why_it_fails(study, point, required, absolute)
 
-    def told(point: MeasuredPoint | None, reason: str = "") -> Choice | None:
+    def chosen(point: MeasuredPoint | None, reason: str = "") -> Choice | None:
         if point is None:
             return None
         return Choice(point, point.error.get(required.quantity), reason or _holds(study, point, required, absolute))
@@ -142,12 +148,12 @@ def recommend(study: TradeoffStudy, required: Requirements) -> Recommendation:
         unit=study.quantities[required.quantity].unit,
         tolerance=absolute,
         margin=MARGIN,
-        choice=told(choice),
-        ties=[tie for p in others if choice and tied(p.interval, choice.interval) and (tie := told(p))],
-        runner_up=told(next((p for p in others if choice and _model(p) != _model(choice)), None)),
-        first_failure=told(failing, why_not(failing) or "") if failing is not None else None,
-        least_model=None if hand is not None and choice is not None and hand.id == choice.id else told(hand),
-        closest=told(closest, f"{why_not(closest)}; {_CLOSEST}") if closest is not None else None,
+        choice=chosen(choice),
+        ties=[tie for p in others if choice and tied(p.interval, choice.interval) and (tie := chosen(p))],
+        runner_up=chosen(next((p for p in others if choice and _model(p) != _model(choice)), None)),
+        first_failure=chosen(failing, why_not(failing) or "") if failing is not None else None,
+        least_model=None if hand is not None and choice is not None and hand.id == choice.id else chosen(hand),
+        closest=chosen(closest, f"{why_not(closest)}; {_CLOSEST}") if closest is not None else None,
     )
     within = [p for p in asked if required.budget is not None and p.cost <= required.budget]
     return Recommendation(
@@ -156,7 +162,7 @@ def recommend(study: TradeoffStudy, required: Requirements) -> Recommendation:
         study.parameters,
         required.budget,
         affordable,
-        None if affordable else told(best(within), "the most accurate within the budget"),
+        None if affordable else chosen(best(within), "the most accurate within the budget"),
         CheckedOver(
             {name: [min(values), max(values)] for name, values in study.over.items()},
             max((len(p.corners) for p in study.points if p.corners is not None), default=0),
@@ -167,9 +173,9 @@ def recommend(study: TradeoffStudy, required: Requirements) -> Recommendation:
 
 
 def holding(study: TradeoffStudy, required: Requirements, *, here: bool = False) -> list[MeasuredPoint]:
-    """Every point among those asked for that holds the tolerance with margin, the cheapest first, untimed ones last.
+    """All allowed points that hold the tolerance with margin, the cheapest first, untimed ones last.
 
-    With ``here`` the scene's own parameters are enough, whatever happens at the corners of the range.
+    With ``here`` only the scene's own parameters matter, not the corners of the range.
     """
     absolute = absolute_tolerance(study, required)
     within = replace(study, over={}) if here else study
@@ -194,18 +200,18 @@ def _asked(point: MeasuredPoint, required: Requirements) -> bool:
 
 
 def fits(point: MeasuredPoint, text: str) -> bool:
-    """True if a point is of the engine, and has the settings, of ``name[key=value,…]``."""
+    """True if a point has the engine and the settings of ``name[key=value,…]``."""
     return chosen_by(text, point.engine, point.settings)
 
 
 def chosen_by(text: str, engine: str, settings: Mapping[str, Any]) -> bool:
-    """True if ``name[key=value,…]`` is of this engine, with values that are among the settings."""
+    """True if ``name[key=value,…]`` means this engine, and the settings contain its values."""
     spec = parse_engine(text)
     return engine == spec.name and all(_same(settings.get(key), value) for key, value in spec.options.items())
 
 
 def covers(measured: Sequence[str], asked: Sequence[str]) -> bool:
-    """True if a study restricted to some engines (to none: of all) can answer about the engines asked for."""
+    """True if a study of the engines ``measured`` has all of ``asked``; an empty list means all engines."""
     if not measured or not asked:
         return not measured
     whole = {spec.name for spec in map(parse_engine, measured) if not spec.options}
@@ -220,17 +226,17 @@ def _same(value: object, text: str) -> bool:
 
 
 def _holds(study: TradeoffStudy, point: MeasuredPoint, required: Requirements, absolute: float) -> str:
-    """Margin by which a point holds the tolerance, as text."""
+    """Text on the margin with which a point holds the tolerance."""
     held, bar = point.held(required.quantity), study.quantities[required.quantity].truth_error_bar or 0.0
     if not max(held, bar):
         return "no error is seen"
-    # Of an error below the truth's error bar no more is known than that.
-    said = f"{_times(absolute / max(held, bar), at_least=held < bar)} better than asked"
+    # An error below the truth's error bar is known only to be below it.
+    text = f"{_times(absolute / max(held, bar), at_least=held < bar)} better than asked"
     if point.corners:
         worst = max(corner.off(required.tolerance.relative)[required.quantity] for corner in point.corners)
         there = required.tolerance.value if required.tolerance.relative else absolute
-        said += f", and {_times(there / worst)} at the worst of {len(point.corners)} corners" if worst else ""
-    return said
+        text += f", and {_times(there / worst)} at the worst of {len(point.corners)} corners" if worst else ""
+    return text
 
 
 def _times(ratio: float, *, at_least: bool = False) -> str:
@@ -240,5 +246,5 @@ def _times(ratio: float, *, at_least: bool = False) -> str:
 
 
 def _model(point: MeasuredPoint) -> tuple[str, str | None]:
-    """The engine and the formulation."""
+    """Engine and formulation of a point."""
     return point.engine, point.settings.get("formulation")

@@ -1,4 +1,4 @@
-"""Records of a trade-off, for its file, its text, its advice and its drawings."""
+"""Records of a trade-off: for its file, its texts, its advice and its drawings."""
 
 import math
 from dataclasses import dataclass, field
@@ -15,10 +15,11 @@ class MeasuredCost:
     """Cost of computing.
 
     Attributes:
-        seconds_per_second: median of wall seconds per simulated second; None: not measured.
-        interval: lowest and highest, with ``confidence``; None where it was measured once.
-        rounds: the measurements, in the order of the rounds, which are those of all points: a ratio of two costs can
-            be taken round by round.
+        seconds_per_second: median of wall time per simulated second; None: not measured.
+        interval: lowest and highest, with ``confidence``; None if it was measured once.
+        rounds: the measurements, one per round; the rounds are the same for all points, so that a ratio of two costs
+            can be
+            taken round by round.
         measurements: number of measurements.
     """
 
@@ -30,19 +31,19 @@ class MeasuredCost:
 
     @property
     def cost(self) -> float:
-        """``seconds_per_second``; infinite where it was not measured."""
+        """``seconds_per_second``; infinite if it was not measured."""
         return math.inf if self.seconds_per_second is None else self.seconds_per_second
 
 
 @dataclass(frozen=True)
 class SparseRun:
-    """The run of an adaptive step over few samples.
+    """Run of an engine with an adaptive step over few samples.
 
     Attributes:
         every: sampling interval [s].
-        error: largest distance from the truth, by observable.
-        dense_error: that of the run over many samples.
-        message: last words of the run.
+        error: observable -> largest distance from the truth.
+        dense_error: observable -> largest distance of the run over many samples.
+        message: of the run.
     """
 
     every: float
@@ -53,13 +54,13 @@ class SparseRun:
 
 @dataclass(frozen=True)
 class Corner:
-    """One run of a point at other parameters.
+    """Run of a point at a corner of the range of parameters.
 
     Attributes:
-        parameters: where.
-        errors: largest distance from the truth, by observable; empty if the run did not reach the end.
-        relative: the same in parts of the observable's scale there.
-        message: last words of the run.
+        parameters: the corner.
+        errors: observable -> largest distance from the truth; empty if the run did not reach the end.
+        relative: observable -> error divided by the observable's scale there.
+        message: of the run.
     """
 
     parameters: dict[str, FloatOrInf]
@@ -68,7 +69,7 @@ class Corner:
     message: str
 
     def off(self, relative: bool) -> dict[str, float]:
-        """Relative errors, or else ``errors``."""
+        """Errors, divided by the scales if ``relative``."""
         return self.relative if relative else self.errors
 
 
@@ -78,13 +79,12 @@ class MeasuredPoint(MeasuredCost):
 
     Attributes:
         id: number of the point in its study.
-        engine, curve, level, settings, resolution, step, order, caveat, family, precision: which, and what it says of
-            itself.
+        engine, curve, level, settings, resolution, step, order, caveat, family, precision: the engine's facts.
         status, message, host: end of the run, and the machine of a cluster that made it.
-        error: largest distance from the truth, by observable; None: not finite.
-        envelope: the largest of that and of the next finer runs.
+        error: observable -> largest distance from the truth; None: not finite.
+        envelope: observable -> largest error of this run and of the next finer ones.
         sparse: the run over few samples; None with a fixed step.
-        corners: the runs over the range of parameters; None: there are none.
+        corners: runs at the corners of the range of parameters; None: there are none.
     """
 
     id: int
@@ -107,17 +107,21 @@ class MeasuredPoint(MeasuredCost):
     corners: list[Corner] | None
 
     def held(self, quantity: str) -> float:
-        """Its envelope of an observable; infinite where that is not finite."""
+        """Envelope of an observable; infinite if it is not finite."""
         error = self.envelope.get(quantity)
         return math.inf if error is None else error
 
 
 @dataclass(frozen=True)
 class MeasuredQuantity:
-    """Record of an observable: unit, size that a percentage refers to, and the truth's error bar; None: there is none.
+    """Record of an observable.
 
-    ``symbol`` is what heads its columns, and ``column`` is true if tables show it by
-    default.
+    Attributes:
+        unit: of its values.
+        scale: size to which a percentage refers; None: there is none.
+        truth_error_bar: None: it is not finite.
+        symbol: heading of its columns.
+        column: True if tables show it by default.
     """
 
     unit: str
@@ -129,7 +133,7 @@ class MeasuredQuantity:
 
 @dataclass(frozen=True)
 class DroppedStep:
-    """A step or tolerance of an engine with which there is no run, and why."""
+    """A step or tolerance of an engine that was not run, and the reason."""
 
     engine: str
     step: float
@@ -138,26 +142,27 @@ class DroppedStep:
 
 @dataclass(frozen=True, kw_only=True)
 class CurveBudget:
-    """Makeup of the error of one quantity along a curve; lengths of error in the quantity's unit.
+    """Parts of the error of one quantity along a curve, in the quantity's unit.
 
     Attributes:
         engine, curve, quantity: which.
-        model_form: distance of the limit of small steps from the truth; None where too few runs reached the end.
+        model_form: distance of the limit of small steps from the truth; None if too few runs reached the end.
         model_form_bar: uncertainty of that limit.
-        order: observed order of the time step; None with an adaptive step or where no power law shows.
+        order: observed order of the time step; None with an adaptive step or if no power law shows.
         order_low, order_high: its confidence interval of 95 %; None from too few runs.
-        order_from, order_to: coarsest and finest step of the runs that follow that power law [s]; outside them the
-            order is not claimed.
+        order_from, order_to: coarsest and finest step of the runs that follow that power law [s].
         declared: order that the engine declares.
-        contradicts_declaration: whether the observed one lies below it or, of the motion, above what it has at best.
-        floor: scatter of the finest runs, where refining them no longer helps; None: not reached.
-        best_step: step of the most accurate run where finer ones are worse, for they round more often in single
-            precision [s]; None: there is none.
+        contradicts_declaration: True if the observed order is below the declared one or, for a motion, above its
+            highest.
+        floor: scatter of the finest runs, where refinement no longer helps; None: not reached.
+        best_step: step of the most accurate run if finer ones are worse by round-off in single precision [s]; None:
+            there
+            is none.
         truth: error bar of the truth; None: it is not finite.
-        coarse, fine: dominant part of the error at either end.
-        coarse_step, fine_step: those ends.
+        coarse, fine: dominant part of the error at the coarse and the fine end.
+        coarse_step, fine_step: steps at these ends.
         fine_error: error at the fine end.
-        sentence: all this in one.
+        sentence: the budget in words.
     """
 
     engine: str
@@ -195,20 +200,20 @@ class TradeoffStudy:
     """Error against cost.
 
     Attributes:
-        scene, parameters, until, every, quantity: question of the sweep; every: interval between samples [s].
+        scene, parameters, until, every, quantity: question of the sweep; every: sampling interval [s].
         quantities: the observables of the truth.
         points: of all curves, coarse first.
         dropped: runs that were left out.
         absent: engine -> why it has no curve.
         budgets: parts of the errors.
-        pareto: observable -> numbers of the points that nothing beats, cheapest first.
-        pareto_engines: the same without solutions of the scene's own equations.
+        pareto: observable -> ids of the points on the Pareto front, cheapest first.
+        pareto_engines: the fronts without equations derived by hand for the scene.
         truth: its cost.
         over: parameter -> values; the range over which the best points were checked.
         findings: conclusions, as sentences.
-        brief: whether speeds were measured less often.
-        measured: when, where and with what.
-        engines: those to which it is restricted; none: all.
+        brief: True if speeds were measured less often.
+        measured: time, machine and versions.
+        engines: those to which it is restricted; empty: all.
         claims: judgements of the claims in its file.
     """
 

@@ -1,4 +1,4 @@
-"""Requirements of a recommendation, and reasons that a measured point does not meet them."""
+"""Requirements of a recommendation, and reasons why a measured point does not meet them."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from proofroll.core.number_format import number
 if TYPE_CHECKING:
     from proofroll.studies.tradeoff.records import MeasuredPoint, SparseRun, TradeoffStudy
 
-# How many times smaller than the tolerance an error must be, at the scene's own parameters, to pass with margin.
+# Ratio of the tolerance to the error that is required at the scene's own parameters.
 MARGIN = 2.0
 _COARSE = "the step is too coarse"
 
@@ -25,8 +25,8 @@ class Requirements:
     Attributes:
         quantity: an observable.
         tolerance: largest error of it.
-        budget: wall seconds per simulated second that may be spent, or None.
-        engines: the engines among which to choose; every engine proper if empty.
+        budget: allowed wall time per simulated second, or None.
+        engines: the engines among which to choose; if empty, all engines with models of their own.
         levels: the rungs among which to choose; all if empty.
     """
 
@@ -38,7 +38,7 @@ class Requirements:
 
 
 def absolute_tolerance(study: TradeoffStudy, required: Requirements) -> float:
-    """The tolerance in the quantity's unit."""
+    """Tolerance in the quantity's unit. Raises InputError if a percentage has no size to refer to."""
     known = study.quantities
     require_known("quantity", required.quantity, known, "measured are")
     scale = known[required.quantity].scale
@@ -49,7 +49,7 @@ def absolute_tolerance(study: TradeoffStudy, required: Requirements) -> float:
 
 
 def why_it_fails(study: TradeoffStudy, point: MeasuredPoint, required: Requirements, absolute: float) -> str | None:
-    """Reason that a point does not hold the tolerance, in one sentence; None if it does."""
+    """Reason why a point does not hold the tolerance, in one sentence; None if it does."""
     sparse = point.sparse
     lives = _lives_on_the_grid(study, sparse, required.quantity, absolute) if sparse else None
     return (
@@ -60,7 +60,7 @@ def why_it_fails(study: TradeoffStudy, point: MeasuredPoint, required: Requireme
 
 
 def _why_not_here(study: TradeoffStudy, point: MeasuredPoint, name: str, absolute: float) -> str | None:
-    """Reason that it does not hold it with margin at the scene's own parameters."""
+    """Reason why it does not hold the tolerance with margin at the scene's own parameters, or None."""
     unit = study.quantities[name].unit
     error, held = point.error.get(name), point.envelope.get(name)
     if error is None or held is None:
@@ -80,7 +80,7 @@ def _why_not_here(study: TradeoffStudy, point: MeasuredPoint, name: str, absolut
 
 
 def _lives_on_the_grid(study: TradeoffStudy, sparse: SparseRun, name: str, absolute: float) -> str | None:
-    """Sentence on a setting that holds its tolerance by the density of samples alone; None if it holds it without."""
+    """Sentence on a point that holds the tolerance only because many samples shorten its steps; else None."""
     dense, rare, unit = sparse.dense_error.get(name), sparse.error.get(name), study.quantities[name].unit
     if dense is None or dense * MARGIN > absolute or (rare is not None and rare * MARGIN <= absolute):
         return None
@@ -92,7 +92,7 @@ def _lives_on_the_grid(study: TradeoffStudy, sparse: SparseRun, name: str, absol
 
 
 def _why_not_there(study: TradeoffStudy, point: MeasuredPoint, required: Requirements, absolute: float) -> str | None:
-    """Reason that a point misses the tolerance at some corner of the range."""
+    """Reason why a point misses the tolerance at a corner of the range, or None."""
     name, unit = required.quantity, study.quantities[required.quantity].unit
     if point.corners is None:
         return "it was not checked over the range of the parameters"
@@ -115,7 +115,7 @@ def _finer_holds(study: TradeoffStudy, point: MeasuredPoint, quantity: str, abso
 
 
 def _blame(study: TradeoffStudy, point: MeasuredPoint, quantity: str, absolute: float) -> str:
-    """Clause on the help to expect of a finer step."""
+    """Clause on whether a finer step would help."""
     budget = next((b for b in study.budgets if b.curve == point.curve and b.quantity == quantity), None)
     if budget is None or budget.model_form is None:
         return "too few finer runs reached the end to say whether a finer step would do"

@@ -1,4 +1,4 @@
-"""A trade-off as it is kept: its points, error budgets, fronts and conclusions."""
+"""Summary of a trade-off for storage: points, error budgets, Pareto fronts and conclusions."""
 
 import dataclasses
 from collections.abc import Callable, Mapping, Sequence
@@ -47,15 +47,26 @@ def make_tradeoff(
     budget: float | None = None,
     progress: Callable[[str], None] | None = None,
 ) -> tuple[TradeoffStudy, Path]:
-    """Measures a trade-off, see :func:`tradeoff`, and keeps it with all its timings in pyperf's form.
+    """Measures a trade-off (:func:`tradeoff`), and stores it with all its timings in pyperf's format.
 
-    It goes below the folder of all results. ``claims`` are held against it unless it is restricted to some engines.
+    Claims are judged unless the study is restricted to some engines.
+
+    Args:
+        question: of the sweep.
+        runner: runs the cases.
+        folder: of all results.
+        engines: those to which it is restricted; empty: all.
+        over: parameter -> values; range over which the best points are checked.
+        claims: of a file, or None.
+        brief: True to measure less.
+        budget: processor time [s]; None: no limit.
+        progress: called with short texts.
 
     Returns:
-        the study with what was judged, and its file.
+        The study with its judged claims, and its file.
 
     Raises:
-        InputError: something that does not exist.
+        InputError: an unknown scene, parameter, quantity or engine.
         ProofrollError: there is no truth, or the folder cannot be written.
     """
     claimed = [item.engine for kind in (claims.holds, claims.converges) for item in kind] if claims else []
@@ -83,7 +94,7 @@ def make_tradeoff(
 
 
 def tradeoff_study(outcome: Tradeoff) -> TradeoffStudy:
-    """Record of a trade-off; numbers that are not finite are None."""
+    """Record of a trade-off; numbers that are not finite become None."""
     question, reference, known = outcome.question, outcome.reference, outcome.reference.scene.observables
     numbers = {point.case.key: number for number, point in enumerate(outcome.points)}
     budgets = _budgets(outcome)
@@ -123,7 +134,7 @@ def tradeoff_study(outcome: Tradeoff) -> TradeoffStudy:
 
 
 def _budgets(outcome: Tradeoff) -> list[CurveBudget]:
-    """The error budget of every curve for every quantity that it has."""
+    """Error budget of every curve for each of its quantities."""
     every, made = outcome.question.every, []
     for curve in outcome.curves:
         for quantity in outcome.reference.curves:
@@ -179,7 +190,7 @@ def _point(curve: Curve, point: CurvePoint, number: int, envelope: dict[str, flo
 
 
 def _cost(timing: Timing | None) -> dict[str, Any]:
-    """The fields of :class:`~proofroll.studies.tradeoff.records.MeasuredCost`."""
+    """Fields of :class:`~proofroll.studies.tradeoff.records.MeasuredCost`."""
     if timing is None:
         return {}
     interval = timing.interval

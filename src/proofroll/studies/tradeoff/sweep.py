@@ -1,4 +1,4 @@
-"""Every engine, formulation and preset over its usable range of steps or tolerances, on one scene."""
+"""Runs every engine, formulation and preset over its usable range of steps or tolerances, on one scene."""
 
 import itertools
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -19,19 +19,19 @@ from proofroll.running.worker_pool import Workers
 from proofroll.studies.judging.reference import Reference
 from proofroll.studies.tradeoff.curve import Curve, CurvePoint, Question, judged
 
-# Steps in sampling intervals: those that every curve starts with, and those by which it may be extended.
+# Steps in sampling intervals: those of every curve, and those by which it may be extended.
 _STEPS = (1.0, 1 / 2, 1 / 5, 1 / 10, 1 / 25, 1 / 50, 1 / 100, 1 / 250)
 _COARSER = (2.0, 4.0, 8.0)
 FINER = (1 / 500, 1 / 1000, 1 / 2500)
 _TOLERANCES = (1e-1, 1e-2, 1e-3, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12)
 _LOOSER = (1.0, 10.0, 100.0)
-# A run is broken where its error is this part of the quantity's scale; a curve starts in the broken range.
+# A run is broken if its error is at least this part of the quantity's scale; a curve is extended until a run breaks.
 BROKEN = 0.1
-# A curve is refined while that still takes off this part of the error; the finest step is short enough to end that,
-# and how fast the machine is must not.
+# A curve is refined while each finer step removes at least this part of the error. The speed of the machine does not
+# matter, only the list of steps ends it.
 GAIN = 0.4
-# Within a budget a run may take an equal share of this part of what is left, for it is timed afterwards; a tighter
-# tolerance takes no more than so many times as long as the one before.
+# With a budget, the part of the time left that runs may share (the rest is for timing), and the factor by which a
+# tighter tolerance is assumed to take longer.
 _OF_RUNS, _TIGHTER = 0.5, 2.0
 
 
@@ -41,17 +41,24 @@ Progress = Callable[[Case, Result], None]
 def curves_of(
     engines: Iterable[str], workers: Workers | None = None, requires: frozenset[str] = frozenset()
 ) -> tuple[list[Curve], dict[str, str]]:
-    """Empty curves, one for each formulation and preset of the engines; and reasons by engine without one.
+    """Empty curves, one for each formulation and preset of the engines; and engine without a curve -> reason.
 
-    An engine is a name, or ``name[key=value,…]`` for one formulation or setting; none means all that are installed.
-    Formulations that provide nothing of what the scene requires are for other kinds of scenes, and left out.
+    Formulations that provide nothing that the scene requires are for other kinds of scenes, and left out.
+
+    Args:
+        engines: ``name``, or ``name[key=value,…]`` for one formulation or setting; empty: all that are installed.
+        workers: pool for the questions to engines; None: new workers.
+        requires: capabilities that the scene requires.
+
+    Raises:
+        InputError: an unknown engine, formulation or setting.
     """
     wanted: list[tuple[str, str | None]] = []
     absent: dict[str, str] = {}
     asked = [(text, parse_engine(text)) for text in list(engines) or engine_names()]
-    told = described((spec.name for _, spec in asked), workers)
+    descriptions = described((spec.name for _, spec in asked), workers)
     for text, spec in asked:
-        answer = told[spec.name]
+        answer = descriptions[spec.name]
         if isinstance(answer, InputError):
             raise answer
         if isinstance(answer, ProofrollError):
@@ -81,7 +88,10 @@ def curves_of(
 def _chosen(
     spec: EngineSpec, described: EngineDescription, requires: frozenset[str]
 ) -> tuple[list[tuple[str, str | None]], bool]:
-    """Formulations and presets that a specification means, each with its level; whether some are for other scenes."""
+    """Formulations and presets that a specification selects, each with its level.
+
+    The second value is True if some were left out because they are for other kinds of scenes.
+    """
     chosen: list[tuple[str, str | None]] = []
     foreign = False
     for formulation, presets in described.presets.items():
@@ -109,11 +119,20 @@ def sweep(
     gain: float = GAIN,
     budget: TimeBudget | None = None,
 ) -> dict[float, Reference]:
-    """Fills the curves with points, and returns the truth by sampling interval.
+    """Fills the curves with points, and returns sampling interval [s] -> truth.
 
-    Every curve begins with the same steps. It is then extended to coarser ones until it breaks, and to its ``finer``
-    ones, in sampling intervals, while each takes off this part of the error, ``gain``. Within a ``budget`` the coarsest
-    runs of all curves come first, and what would take more than its share is dropped.
+    Every curve begins with the same steps. It is then extended to coarser ones until it breaks, and to finer ones while
+    each removes the part ``gain`` of the error. With a budget the coarsest runs of all curves come first, and runs that
+    would exceed their share are dropped.
+
+    Args:
+        question: of the sweep.
+        curves: without points.
+        runner: runs the cases.
+        progress: called with each case and result.
+        finer: curve -> its finer steps, in sampling intervals.
+        gain: see above.
+        budget: processor time of all runs, or None.
     """
     references: dict[float, Reference] = {}
     for first in (True, False, False, False):
@@ -148,9 +167,9 @@ def _further(
     finer_steps: Sequence[float] = FINER,
     gain: float = GAIN,
 ) -> list[float]:
-    """One coarser step or looser tolerance if the coarsest is not broken yet, one of ``finer_steps`` if that pays.
+    """Next steps of a curve: a coarser one unless the coarsest is broken, and one of ``finer_steps`` if that pays.
 
-    Nothing is seen of an error below the truth's own error bar, or below the round-off of doubles.
+    Refinement ends at the truth's error bar, or at the round-off of double precision.
     """
     if curve.facts.resolution is None or not curve.points:
         return []
@@ -184,7 +203,7 @@ def _run(
     progress: Progress | None,
     budget: TimeBudget | None,
 ) -> None:
-    """Runs curves with steps or tolerances, and the truths that they need besides those that are there."""
+    """Runs curves with these steps or tolerances, and the truths that are still missing."""
     scene = question.loaded
     options: list[tuple[str, dict[str, Any]]] = []
     for curve, value in wanted:
@@ -225,7 +244,7 @@ def _run(
 
 
 def _stages(cases: Sequence[tuple[Curve, tuple[Case, ...]]]) -> list[list[tuple[Curve, tuple[Case, ...]]]]:
-    """Runs in turns: the first of every curve, then the second, and so on."""
+    """Runs in turns: the first of every curve, then the second of every curve, and so on."""
     turns: dict[str, list[tuple[Curve, tuple[Case, ...]]]] = {}
     for curve, both in cases:
         turns.setdefault(curve.engine, []).append((curve, both))
@@ -233,9 +252,9 @@ def _stages(cases: Sequence[tuple[Curve, tuple[Case, ...]]]) -> list[list[tuple[
 
 
 def _affordable(curve: Curve, case: Case, budget: TimeBudget, abreast: int) -> bool:
-    """True if a run takes no more than its share of what is left, by the one before; else it is dropped, with why.
+    """True if a run is expected to fit its share of the budget, judged by the one before; otherwise it is dropped.
 
-    An engine that refuses the scene refuses it with every step.
+    A refused run is dropped, too: the engine would refuse the scene with every step.
     """
     if not curve.points:
         return not curve.dropped

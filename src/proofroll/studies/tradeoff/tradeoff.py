@@ -1,7 +1,7 @@
-"""Speed against accuracy: the curves of all engines, what their errors consist of, and the Pareto front.
+"""Speed against accuracy: the curves of all engines, the parts of their errors, and the Pareto front.
 
-Three phases: the sweep, whose runs may go side by side; the check of the best points over a range of the scene's
-parameters; and the timing, in which one process at a time advances an engine while everything else is idle.
+Three phases: the sweep, whose runs may be parallel; the check of the best points over a range of the scene's
+parameters; and the timing, in which one process at a time advances an engine while all others are idle.
 """
 
 import dataclasses
@@ -30,27 +30,26 @@ from proofroll.studies.tradeoff.recommend import chosen_by
 from proofroll.studies.tradeoff.records import Corner
 from proofroll.studies.tradeoff.sweep import FINER, GAIN, curves_of, sweep
 
-# What makes up most of a study's time is the repetition of measurements. A brief one repeats less: two rounds
-# show how far a cost can be trusted; a run longer than this [s] warms itself up, and is measured once.
-# A shorter measurement scatters more, which the interval of the rounds shows. Any study measures once a run that takes
-# ten times as long as its own motion: seven rounds of it would last longer than all the others.
+# Timing takes most of a study. A brief study has BRIEF_ROUNDS rounds, measures each speed for BRIEF_SECONDS, and
+# measures a run of more than BRIEF_ONCE [s per simulated s] only once, as it warms itself up. Any study measures a run
+# of more than ONCE [s per simulated s] only once: seven rounds of it would take longer than all others.
 BRIEF_ROUNDS, BRIEF_ONCE, BRIEF_SECONDS, ONCE = 2, 0.1, 0.02, 10.0
-# The finest steps take as long as all others together, and tell little of a choice: at least this part of an interval,
-# or that one where a claim is about the curve, and only where a step takes off as much of the error as with order 2:
-# with order 1 the curve goes on as it came.
+# The finest steps take as long as all others together and hardly affect a choice. A brief study refines to BRIEF_FINER
+# of a sampling interval (BRIEF_CLAIMED for curves with a claim), and only while each step removes BRIEF_GAIN of the
+# error, as methods of order 2 do; a curve of order 1 can be extrapolated.
 BRIEF_FINER, BRIEF_CLAIMED, BRIEF_GAIN = 2e-3, 1e-3, 0.65
 
 
 @dataclass
 class Tradeoff:
-    """Trade-off as found.
+    """Trade-off before it is summarised.
 
     Attributes:
-        question: scene, duration and quantity of the curves that were swept.
+        question: of the sweep.
         curves: with their points.
         absent: engine -> why it has no curve.
-        references: the truth by sampling interval.
-        truth_timing: time of the truth itself, measured in turns with the points; None if it could not be.
+        references: sampling interval [s] -> truth.
+        truth_timing: time of the truth itself, measured in the rounds of the points; None if it failed.
         over: parameter -> values; the range over which the best points were checked.
         brief, budget: see :func:`tradeoff`.
     """
@@ -76,7 +75,7 @@ class Tradeoff:
 
     @property
     def quantities(self) -> list[str]:
-        """The observables of the truth that a recommendation may be asked for."""
+        """Observables of the truth that a recommendation may be asked for."""
         return [name for name in self.reference.curves if self.reference.scene.observables[name].asked_for]
 
 
@@ -98,19 +97,19 @@ def tradeoff(
     """Runs the study.
 
     Args:
-        question: the scene, how long, and the quantity that decides how far each curve goes.
-        runner: where the cases run.
+        question: the scene, the length of runs, and the quantity that decides how far each curve goes.
+        runner: runs the cases.
         engines: names or ``name[key=value,…]``; all that are installed if empty.
         over: parameter -> values; every combination is a corner of the range.
         rounds: number of measurements of every speed.
-        brief: measure every speed :data:`BRIEF_ROUNDS` times at most, and that of a long run once; leave out the
-            finest steps, but for those of curves that fall with order 2 or more, and most of these, too.
-        claimed: engines, ``name[key=value,…]``, whose curves are followed further in a brief study.
-        budget: processor time of the sweep and the timing [s], which are brief then; what would exceed it is dropped.
+        brief: True to measure every speed :data:`BRIEF_ROUNDS` times at most, and to leave out most of the finest
+            steps.
+        claimed: engines, ``name[key=value,…]``, whose curves are refined further in a brief study.
+        budget: processor time of the sweep and the timing [s]; the study is brief then, and runs beyond it are dropped.
         progress: called with a short text after every run and every measurement.
 
     Raises:
-        InputError: something that does not exist, or a quantity that the scene does not have.
+        InputError: an unknown scene, parameter, quantity or engine.
         Missing: no engine can be asked.
     """
     limit, brief = TimeBudget(budget) if budget else None, brief or bool(budget)
@@ -121,17 +120,17 @@ def tradeoff(
         raise Missing("there is no engine to measure: " + "; ".join(f"{name}: {why}" for name, why in absent.items()))
     tell = progress or (lambda _: None)
 
-    def told(case: Case, _: Result) -> None:
+    def arrived(case: Case, _: Result) -> None:
         tell(case.engine.name)
 
     finer, gain = (partial(_briefly, claimed), BRIEF_GAIN) if brief else (lambda _: FINER, GAIN)
-    references = sweep(question, curves, runner, told, finer, gain, limit)
+    references = sweep(question, curves, runner, arrived, finer, gain, limit)
     ranges = {name: [float(value) for value in values] for name, values in (over or {}).items()}
     study = Tradeoff(question, curves, absent, references, over=ranges, brief=brief, budget=budget)
     _, truth = resolve_with_truth([], runner.workers)
     _time(study, question.case(study.reference.scene, truth, question.every), runner.workers, rounds, tell, limit)
     if ranges:
-        _check(study, truth, runner, told)
+        _check(study, truth, runner, arrived)
     return study
 
 
@@ -161,10 +160,12 @@ def _time(
         point.timing = timings.get(point.case.key)
 
 
-def _check(tradeoff: Tradeoff, truth: EngineFacts, runner: Runner, told: Callable[[Case, Result], None]) -> None:
-    """Runs the points on any formulation's own Pareto front, for any quantity, at every corner of the range.
+def _check(tradeoff: Tradeoff, truth: EngineFacts, runner: Runner, arrived: Callable[[Case, Result], None]) -> None:
+    """Runs the best points at every corner of the range.
 
-    A question about one kind of model must not lose a formulation that another one of the same engine dominates.
+    These are the points on the Pareto front of each formulation, for each quantity: a question about one kind of model
+    must
+    not lose a formulation that another one of the same engine dominates.
     """
     formulations: dict[tuple[str, object], list[Curve]] = {}
     for curve in tradeoff.curves:
@@ -184,7 +185,7 @@ def _check(tradeoff: Tradeoff, truth: EngineFacts, runner: Runner, told: Callabl
         true = question.truth(scene, truth, [case for both in runs.values() for case in both])
         asked.append((place, question, true, runs))
     cases = [case for _, _, true, runs in asked for case in (true, *itertools.chain(*runs.values()))]
-    results = runner.run(cases, told)
+    results = runner.run(cases, arrived)
     corners: dict[str, list[Corner]] = {key: [] for key in chosen}
     for place, question, true, runs in asked:
         if results[true.key].status != Status.DONE:
@@ -210,7 +211,7 @@ def _corner(place: dict[str, float], point: CurvePoint, reference: Reference) ->
 
 
 def pareto_entries(curves: Iterable[Curve], quantity: str) -> list[tuple[CurvePoint, float, float]]:
-    """Timed points with their costs and the envelopes of their errors, no smaller than the truth's error bar."""
+    """Timed points with their costs and the envelopes of their errors, at least the truth's error bar."""
     entries = []
     for curve in curves:
         for point, error in zip(curve.points, curve.envelope(quantity), strict=True):
@@ -220,7 +221,7 @@ def pareto_entries(curves: Iterable[Curve], quantity: str) -> list[tuple[CurvePo
 
 
 def stored(folder: Path, question: Question, engines: Sequence[str] = (), *, brief: bool = False) -> Path:
-    """File of a question's study below the folder of results; a brief or restricted one has its own."""
+    """File of a question's study below the folder of results; brief and restricted studies have their own."""
     scene = question.loaded
     parts = [[scene.digest, question.until], *([sorted(engines)] if engines else [])]
     digests = (hashlib.sha256(json.dumps(part).encode()).hexdigest()[:10] for part in parts)

@@ -1,1 +1,1 @@
-"""Two versions of one engine on the same cases, and their differences."""
+"""Comparison of two versions of one engine on the same cases."""

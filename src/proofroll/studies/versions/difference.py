@@ -1,4 +1,4 @@
-"""One case in two versions of an engine: verdicts, observed orders and numbers that changed."""
+"""Differences of one case between two versions of an engine: verdicts, observed orders and numbers."""
 
 from __future__ import annotations
 
@@ -22,15 +22,15 @@ from proofroll.studies.comparison.planning import point_name
 if TYPE_CHECKING:
     import xarray as xr
 
-# Of two runs relative to the size of the quantity: another compiler or another order of sums moves numbers by some
-# 1e-13, and the solvers of constraints stop at tolerances of theirs; what physics or a method changes is far above.
+# Largest difference, relative to the size of the quantity, that counts as round-off. Another compiler or order of sums
+# changes numbers by some 1e-13, solvers of constraints by their tolerances, other physics or methods by far more.
 ROUND_OFF = 1e-9
-# Two observed orders that are further apart are different methods: a ladder shows a whole order to a tenth or two.
+# Observed orders that differ by more belong to different methods; a ladder shows an order to a tenth or two.
 _ANOTHER_ORDER = 0.5
 
 
 def setting_of(run: Run) -> str:
-    """Settings as the file writes them, without the engine."""
+    """Settings of a row as the file writes them, without the engine."""
     return ", ".join(f"{key}={value}" for key, value in parse_engine(run.row.engine).options.items()) or "as it is"
 
 
@@ -44,13 +44,13 @@ class NumberKind(StrEnum):
 
 @dataclass(frozen=True)
 class NumbersApart:
-    """Difference of two trajectories, by the observable that differs most for its size.
+    """Difference of two trajectories, for the observable with the largest relative difference.
 
     Attributes:
-        quantity, unit: of that observable; empty where nothing differs.
+        quantity, unit: of that observable; empty if nothing differs.
         difference: the largest, in its unit.
-        relative: the same in parts of its size [1].
-        kind: meaning of the change.
+        relative: difference divided by the observable's size [1].
+        kind: of difference.
     """
 
     quantity: str = ""
@@ -65,11 +65,11 @@ class RunInVersion:
     """A case in one of the versions.
 
     Attributes:
-        status, message: its end.
+        status, message: end of the run.
         verdict: of its worst observable.
         declared_order: of the engine with these settings, or None.
-        errors: largest error of each observable that is judged.
-        versions: of all that it ran on.
+        errors: judged observable -> largest error.
+        versions: of the engine and of the software that it ran on.
     """
 
     status: Status
@@ -81,7 +81,7 @@ class RunInVersion:
 
     @classmethod
     def of(cls, run: Run) -> Self:
-        """Facts of a judged run."""
+        """Record of a judged run."""
         order = run.facts.order if run.facts else None
         errors = {judgement.observable: judgement.error for judgement in run.judgements}
         return cls(run.result.status, run.result.message, run.verdict, order, errors, run.result.versions)
@@ -89,7 +89,7 @@ class RunInVersion:
 
 @dataclass(frozen=True)
 class OrderChange:
-    """Change of a quantity's observed order of convergence that means another method."""
+    """Change of a quantity's observed order of convergence that is large enough for a different method."""
 
     quantity: str
     old: float
@@ -102,8 +102,8 @@ class CaseDifference:
 
     Attributes:
         comparison, scene, setting, point: identity of the case.
-        old, new: outcomes.
-        numbers: differences between both; None where one has no trajectory.
+        old, new: its runs.
+        numbers: difference of the trajectories; None if one has none.
         orders: observed orders that changed.
         changed: verdicts that changed, ``refused (why) → agrees``.
     """
@@ -120,7 +120,7 @@ class CaseDifference:
 
 
 def case_difference(outcome: Outcome, before: Run, after: Run) -> CaseDifference:
-    """One case in both versions."""
+    """Differences of one case between two versions."""
     verdicts = [
         (one.observable, one.verdict, other.verdict)
         for one in before.judgements
@@ -158,7 +158,7 @@ def _ending(run: Run) -> str:
 
 
 def _numbers(outcome: Outcome, before: Run, after: Run) -> NumbersApart | None:
-    """Difference of the trajectories; None: there are none."""
+    """Difference of the trajectories; None if one is missing."""
     if before.trajectory is None or after.trajectory is None:
         return None
     point = outcome.points[point_name(before.parameters)]
@@ -181,7 +181,7 @@ def _apart(scene: Scene, one: xr.Dataset, other: xr.Dataset, sizes: Mapping[str,
             continue
         difference = float(np.nanmax(np.abs(mine[:count] - theirs[:count]), initial=0.0))
         relative = difference / (sizes.get(name) or float(np.nanmax(np.abs(mine), initial=0.0)) or 1.0)
-        if not relative < largest.relative:  # also where it is not a number: then they differ
+        if not relative < largest.relative:  # NaN counts as a difference
             kind = NumberKind.CHANGED if relative > ROUND_OFF else NumberKind.ROUND_OFF
             largest = NumbersApart(name, item.unit, difference, relative, kind)
     return largest

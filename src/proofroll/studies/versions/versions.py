@@ -1,4 +1,4 @@
-"""One engine in two versions: the same cases in both, and what changed."""
+"""Runs the same cases in two versions of one engine, and summarises the differences."""
 
 import dataclasses
 from collections import Counter
@@ -34,14 +34,14 @@ from proofroll.studies.versions.difference import (
 
 
 def comparisons_about(subject: str, engine: str) -> list[Comparison]:
-    """Comparisons to run: one, or those about a scene, or all that have rows of the engine.
+    """Comparisons to run: the named one, those about a scene, or all that have rows of the engine.
 
     Args:
-        subject: name or path of a comparison, or of a scene; empty: all comparisons, briefly.
-        engine: plain name; of a scene without comparisons, each of its formulations and presets is run.
+        subject: name or path of a comparison, or of a scene; empty: all comparisons, each reduced to its brief part.
+        engine: plain name; for a scene without comparisons, all its formulations are run.
 
     Raises:
-        InputError: there is no such thing, or it has nothing of this engine.
+        InputError: there is no such comparison or scene, or it has no rows of this engine.
     """
     if not subject:
         comparisons = [load_comparison(name).briefly() for name in comparison_names()]
@@ -85,11 +85,11 @@ class SettingDifference:
     Attributes:
         comparison, setting: which.
         cases: number of points.
-        verdicts: ``old`` and ``new`` -> verdict -> how many cases.
-        numbers: of the case whose numbers are farthest apart.
-        declared_order: ``old`` and ``new`` -> those of its points, without repetition; none declared is left out.
+        verdicts: ``old`` and ``new`` -> verdict -> number of cases.
+        numbers: of the case with the largest difference.
+        declared_order: ``old`` and ``new`` -> declared orders of its points, without repetition.
         orders: observed orders that changed, of all cases.
-        changed: number of cases with another verdict.
+        changed: number of cases with a changed verdict.
         speed: time of the new version over that of the old one, or None.
     """
 
@@ -115,7 +115,7 @@ class EngineVersion:
 
 @dataclass(frozen=True)
 class ChangedDefault:
-    """Default value or capability that changed; None: absent in that version."""
+    """Default value or capability that changed; None: it does not exist in that version."""
 
     name: str
     old: Any
@@ -129,12 +129,12 @@ class VersionsStudy:
     Attributes:
         engine: its name.
         old, new: the versions.
-        comparisons: names of what was run; of a robot its file.
-        rows: changes by comparison and setting.
-        cases: changes by case.
-        defaults: changes of the engine's own choices.
-        hosts: machine of a cluster -> how many of the results it made.
-        robot: of a robot file: its ``file``, ``layers``, and rows ``old`` and ``new``; else None.
+        comparisons: names of the comparisons that were run; for a robot its file.
+        rows: differences by comparison and setting.
+        cases: differences by case.
+        defaults: changed default values and capabilities.
+        hosts: machine of a cluster -> number of results that it made.
+        robot: for a robot file its ``file``, ``layers``, and rows ``old`` and ``new``; else None.
         changed: sentences about verdicts that changed.
         lost: sentences about runs whose engine is missing.
     """
@@ -159,15 +159,20 @@ def compared(
     rounds: int,
     progress: Progress | None = None,
 ) -> VersionsStudy:
-    """Differences between two versions of an engine (``NAME`` or ``NAME@PLACE``) on the same cases.
+    """Differences between two versions of an engine on the same cases.
 
-    Speeds are measured in so many rounds; with 0 they are not. ``progress`` is called with what has just been done.
+    Args:
+        sides: the versions, ``NAME`` or ``NAME@PLACE``.
+        comparisons: to be run with both.
+        runner: runs the cases.
+        rounds: of the timing; 0: speeds are not measured.
+        progress: called with a text after each step.
 
     Raises:
-        InputError, Missing, WorkerDied: one of them cannot be asked at all.
+        InputError, Missing, WorkerDied: a version cannot be asked.
     """
     progress = progress or (lambda _: None)
-    told = [describe(side, runner.workers) for side in sides]
+    descriptions = [describe(side, runner.workers) for side in sides]
     plans = [plan(dataclasses.replace(item, timed=False), sides, runner.workers) for item in comparisons]
     cases = {case.key: case for item in plans for case in item.cases}
     results = runner.run(cases.values(), lambda case, _: progress(case.engine.name))
@@ -178,7 +183,9 @@ def compared(
         pairs += [(outcome, before, after) for before, after in zip(one, other, strict=True)]
     differences = [case_difference(outcome, before, after) for outcome, before, after in pairs]
     speeds = _speeds(pairs, runner, rounds, progress) if rounds else {}
-    old, new = (EngineVersion(name, its.version, its.interpreter) for name, its in zip(sides, told, strict=True))
+    old, new = (
+        EngineVersion(name, item.version, item.interpreter) for name, item in zip(sides, descriptions, strict=True)
+    )
     return VersionsStudy(
         engine=plain_name(parse_engine(sides[0]).name),
         old=old,
@@ -186,7 +193,7 @@ def compared(
         comparisons=[item.name for item in comparisons],
         rows=_rows(differences, speeds),
         cases=differences,
-        defaults=_defaults(*told),
+        defaults=_defaults(*descriptions),
         hosts=hosts(run.result for _, *pair in pairs for run in pair),
         changed=[f"{_where(case)}: {what}" for case in differences for what in case.changed],
         lost=[
@@ -203,7 +210,7 @@ def _where(case: CaseDifference) -> str:
 
 
 def _rows(cases: Sequence[CaseDifference], speeds: Mapping[tuple[str, str], Interval]) -> list[SettingDifference]:
-    """Summaries of all points of a setting."""
+    """Summary of all points of each setting."""
     grouped: dict[tuple[str, str], list[CaseDifference]] = {}
     for case in cases:
         grouped.setdefault((case.comparison, case.setting), []).append(case)
@@ -236,7 +243,7 @@ def _rows(cases: Sequence[CaseDifference], speeds: Mapping[tuple[str, str], Inte
 def _speeds(
     pairs: Sequence[tuple[Outcome, Run, Run]], runner: Runner, rounds: int, progress: Progress
 ) -> dict[tuple[str, str], Interval]:
-    """Time of the new version over that of the old one, for the first point of each setting that both run."""
+    """Time of the new version over that of the old one, at the first point of each setting that both ran."""
     chosen: dict[tuple[str, str], tuple[Run, Run]] = {}
     for outcome, before, after in pairs:
         if before.result.status == after.result.status == Status.DONE:
@@ -254,7 +261,7 @@ def _speeds(
 
 
 def _defaults(old: EngineDescription, new: EngineDescription) -> list[ChangedDefault]:
-    """Default values of the engine and capabilities of its formulations that changed."""
+    """Default values and capabilities that differ between two versions."""
     both: tuple[tuple[dict[str, Any], dict[str, Any]], ...] = (
         (old.defaults, new.defaults),
         (old.provides, new.provides),
