@@ -32,8 +32,7 @@ def assert_agrees(
     Args:
         scene: name, path of a folder, or :func:`proofroll.load_scene`.
         engine: ``name[key=value,…]``; a class, which no package needs to announce; an engine built by the caller, at
-            time
-            0; or a trajectory, as for :func:`proofroll.judge`.
+            time 0; or a trajectory, as for :func:`proofroll.judge`.
         tolerance: allowed error, as for :func:`proofroll.judge`.
         because: reason for this tolerance.
         until: last time of an engine's run [s].
@@ -45,8 +44,7 @@ def assert_agrees(
 
     Raises:
         AssertionError: it differs, or did not reach the end; the text has each error with its time, its tolerance and
-            the
-            error bar of the truth.
+            the error bar of the truth.
         InputError: an argument names something unknown or makes no sense.
         Missing, Refused: the engine is not installed, or cannot represent the scene.
     """

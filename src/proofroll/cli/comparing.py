@@ -141,11 +141,9 @@ def outcomes_of(
         runner: runs their cases.
         stage: prefix of the bar's text.
         finished: called when a comparison has ended, brief or whole, with all ended ones by number, and True if it is
-            the
-            last.
+            the last.
         budget: processor time of all of them [s]. All runs then come before the first ladder, and each comparison has
-            an
-            equal share of the time left; what it does not use is for later ones.
+            an equal share of the time left; what it does not use is for later ones.
         spent: part of the budget that was used before [s].
     """
     from proofroll.running.process import processor_seconds

@@ -126,8 +126,7 @@ class Subject:
         """Largest :meth:`distance` of two runs of one motion, made with different calls of ``advance``.
 
         With a fixed step both make the same steps: solvers of implicit steps leave about 1e-8, a lost or doubled step
-        1e-2.
-        With a tolerance, some hundred steps each contribute about the tolerance.
+        1e-2. With a tolerance, some hundred steps each contribute about the tolerance.
         """
         if self.settings.resolution is None:
             distance = 1e-9

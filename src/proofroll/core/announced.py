@@ -20,8 +20,7 @@ def loaded(group: str, of: type = type, like: Any = None) -> list[tuple[EntryPoi
     """Entry points of a group, each with the object that it names.
 
     An entry point is left out, with a warning, if it cannot be loaded, if its object is no instance of ``of`` (by
-    default
-    a class), or if the object lacks a member of the protocol ``like``.
+    default a class), or if the object lacks a member of the protocol ``like``.
     """
     loaded_points = []
     for point in announced(group):

@@ -19,8 +19,7 @@ def beside_events(times: FloatArray, curve: FloatArray, events: Sequence[float],
 
     At an event a curve jumps in value, slope or curvature (position, velocity, force where friction switches). A sample
     between the true event and the late one is wrong by the jump of the value. Later samples are wrong by what the jumps
-    of
-    slope and curvature make of the delay.
+    of slope and curvature make of the delay.
 
     Args:
         times: times of the curve [s], shape (time,).

@@ -69,21 +69,16 @@ def richardson(
     """Extrapolates three curves computed with three steps, coarse first.
 
     The observed order p follows from the sizes of the two differences (Roache 1998, section 5.9). The ladder is
-    asymptotic
-    if p is the order of the scheme, or another whole order while both differences have the same shape over time (those
-    of
-    round-off do not). Then the extrapolation removes the term h^p and after it h^(p+1). Its error bar is twice the last
-    change, or the change from removing a term h^(p-1) instead, which h^p may hide, if that is larger; where the order
-    was
-    rounded to a whole one, the bar includes the effect of rounding it. In any other ladder extrapolation would spread
-    the
-    error of the coarse curves: the limit is the finest curve, with twice the change of the last refinement (more if the
-    order is below one) as its bar.
+    asymptotic if p is the order of the scheme, or another whole order while both differences have the same shape over
+    time (those of round-off do not). Then the extrapolation removes the term h^p and after it h^(p+1). Its error bar is
+    twice the last change, or the change from removing a term h^(p-1) instead, which h^p may hide, if that is larger;
+    where the order was rounded to a whole one, the bar includes the effect of rounding it. In any other ladder
+    extrapolation would spread the error of the coarse curves: the limit is the finest curve, with twice the change of
+    the last refinement (more if the order is below one) as its bar.
 
     In single precision each step rounds the state, so that shorter steps may be worse. Unless the differences are far
     above that scatter, an order counts only if the ladder is asymptotic with differences of one shape; otherwise, and
-    for
-    orders below one, which no scheme has, the result shows neither order nor limit.
+    for orders below one, which no scheme has, the result shows neither order nor limit.
 
     Args:
         curves: three arrays of one shape.
@@ -173,8 +168,7 @@ def tightest(curves: Sequence[FloatArray]) -> Limit:
     """Limit of a method with adaptive steps: the curve of its tightest tolerance.
 
     The error bar is the change by the last tightening, or the sum of all further changes if each shrinks as the last
-    one
-    did, whichever is larger. Where one tightening changed nothing, or all changed round-off only, it is the largest
+    one did, whichever is larger. Where one tightening changed nothing, or all changed round-off only, it is the largest
     change: two nearly equal changes of that kind would be extrapolated as slow convergence.
     """
     changes = [size(after - before) for before, after in itertools.pairwise(curves)]
@@ -202,8 +196,7 @@ def is_floor(errors: Sequence[float], scale: float | None) -> bool:
     """True if the errors of ever shorter steps reach a floor of single precision.
 
     The least error must be small against the scale of the observable, if it has one, and some step must be clearly
-    worse
-    than a longer one: while steps are too long to show an order, errors are as large as the motion and may rise a
+    worse than a longer one: while steps are too long to show an order, errors are as large as the motion and may rise a
     little.
     """
     rises = any(later > _WORSE * earlier for earlier, later in itertools.combinations(errors, 2))

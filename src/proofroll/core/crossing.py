@@ -19,8 +19,7 @@ def stays_negative(function: Callable[[FloatArray], FloatArray], start: float, e
     """True for each function that is certainly negative throughout a step; shape (functions,).
 
     Each function is bounded by a polynomial through 6 Chebyshev points; ten times its last two terms stand for those
-    that
-    are left out. The functions must be as smooth as in a step of an integrator of high order. It spares
+    that are left out. The functions must be as smooth as in a step of an integrator of high order. It spares
     :func:`first_rise` most steps.
 
     Args:

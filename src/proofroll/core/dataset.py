@@ -146,8 +146,7 @@ def common_span(
     """Truth and runs cut to the time in which they are comparable for every element (:class:`WatchesRuns`).
 
     The element whose comparable time ends first ends it for all. Only that element keeps its events after the last
-    sample;
-    later events of the other elements are dropped.
+    sample; later events of the other elements are dropped.
     """
     spans = {}
     for element in scene.elements:

@@ -168,8 +168,7 @@ class Element(Protocol):
         """Values of each observable that a run determines; a reaction without time 0.
 
         Observables of samples off the grid are ``between.<name>`` along ``between`` [s]. The harness computes those
-        that are
-        variables themselves; the element computes those that need several samples.
+        that are variables themselves; the element computes those that need several samples.
         """
 
     def scales(self, truth: xr.Dataset) -> dict[str, float]:
@@ -199,8 +198,7 @@ class ElementKind(Protocol):
     Attributes:
         name: of the entry point.
         tables: names of the tables of a scene file that it reads. Of a table that another kind reads, too, it gets the
-            rows
-            that refer to things in its own tables.
+            rows that refer to things in its own tables.
         units: unit of each number in them, by its key.
     """
 

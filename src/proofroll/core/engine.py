@@ -55,8 +55,7 @@ class Settings(Protocol):
 
     Further fields are optional. ``precision = "single"`` marks an engine that computes in single precision, see
     :func:`precision_of`; ``scheme`` names the integration rule, see :class:`Scheme`; ``unused`` lists fields that have
-    no
-    meaning for the formulation, which a run does not show.
+    no meaning for the formulation, which a run does not show.
     """
 
     @property

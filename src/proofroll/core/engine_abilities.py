@@ -106,7 +106,7 @@ class LowersOrder(Protocol):
 
     @staticmethod
     def lowered(settings: Any) -> Mapping[str, int]:
-        """Lower order of convergence by the capability that causes it, as ``provides`` names it."""
+        """Capability, as in ``provides`` -> lower order of convergence that it causes."""
 
 
 def lowest(order: int | None, lowered: Mapping[str, int], requires: Collection[str]) -> int | None:
@@ -166,8 +166,7 @@ class Reproduces(Protocol):
         For a ball it assigns RADIUS [m], MASS [kg], INERTIA [kg m²], GRAVITY [m/s²] and the initial state, and defines
         ``frame(p)``, ``gap(p)`` (:func:`proofroll.elements.ball_on_surface.reproducer_source.cut_program`) and
         ``run(times)``. That is a generator of the ball's centre, velocity and angular velocity in the world at each
-        time [s];
-        if the engine reports a failure, it raises RuntimeError with the engine's text.
+        time [s]; if the engine reports a failure, it raises RuntimeError with the engine's text.
 
         Raises:
             Refused: there is no program for this; the text says why.

@@ -38,15 +38,13 @@ def first_steps(kind: Any, scene: Scene, settings: Any) -> list[Line]:
     """Certificate lines of the acceleration and angular acceleration at time 0, derived from the first steps.
 
     A parabola and a cubic through the velocities after zero to three steps give the derivative at time 0; runs with
-    half
-    the step give it again. For a method of order p the change by halving over 2^p - 1 is the remaining error, which is
-    subtracted. The uncertainty is the difference of the two polynomials, plus that of the two steps, plus the effect of
-    rounding the velocities; the tolerance is three times the uncertainty.
+    half the step give it again. For a method of order p the change by halving over 2^p - 1 is the remaining error,
+    which is subtracted. The uncertainty is the difference of the two polynomials, plus that of the two steps, plus the
+    effect of rounding the velocities; the tolerance is three times the uncertainty.
 
     An engine without a step is sampled after short times. There are no lines for an element whose motion has no
-    direction
-    yet (a ball at rest under rolling resistance), one that may come to rest within these steps, and a contact so soft
-    that its springs move first.
+    direction yet (a ball at rest under rolling resistance), one that may come to rest within these steps, and a contact
+    so soft that its springs move first.
 
     Raises:
         Diverged, Refused: by the engine.

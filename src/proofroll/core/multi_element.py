@@ -70,8 +70,7 @@ def formulation_for(requires: Collection[str], formulation: str, provides: Mappi
     """Formulation that builds an element in a run of the given formulation.
 
     It is the run's own if that provides all. If the run's formulation knows no capability of this kind of element at
-    all,
-    it is the first formulation of the engine that provides all.
+    all, it is the first formulation of the engine that provides all.
 
     Args:
         requires: capabilities that the element alone requires.

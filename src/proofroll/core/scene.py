@@ -66,7 +66,7 @@ class Scene:
 
     @property
     def fully_asked(self) -> Self:
-        """The scene with every possible question besides the motion, as a truth needs it."""
+        """The scene with all results asked for that its elements offer, as a truth needs it."""
         asks = dict.fromkeys(ask for element in self.elements for ask in element.askable)
         return replace(self, asks=tuple(asks))
 

@@ -86,8 +86,7 @@ def hash_of(places: Iterable[Path], aside: frozenset[str] = frozenset()) -> str:
     """Hash of Python files and of all Python files in folders.
 
     Modules and folders whose name is in ``aside`` are left out at any depth. So are modules ``robot_…``, which read
-    robot
-    files and affect no result.
+    robot files and affect no result.
     """
     content = hashlib.sha256()
     for place in places:

@@ -34,8 +34,7 @@ class ElementTruth(Protocol):
         """True run of an element: its variables, each with the attribute ``error_bar`` in its own unit.
 
         The attributes ``route`` and ``second_route`` name the two methods; ``ill_posed``, if present, says in a
-        sentence why
-        the motion depends on less than the accuracy of the parameters.
+        sentence why the motion depends on less than the accuracy of the parameters.
 
         Args:
             element: one that it covers.

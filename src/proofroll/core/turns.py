@@ -96,8 +96,7 @@ def on_turns_of(
     """Values of an observable shifted by whole turns to those of another run, if a run cannot count turns itself.
 
     A run that cannot has the attribute ``UNCERTAIN``. None if no comparison is left: the observable depends on turns,
-    but
-    not by a period (the energy of a spring that turns wind up).
+    but not by a period (the energy of a spring that turns wind up).
     """
     said = [run[name].attrs for run in datasets if name in run and UNCERTAIN in run[name].attrs]
     if not said or other is None or values.shape != other.shape:

@@ -128,7 +128,7 @@ def judge_curve(
         doubt: verdicts that an ill-posed question does not allow.
         own_bar: uncertainty of the run's own value (an event between two of its samples); an error that this alone may
             explain is no difference.
-        sampled_bar: part of ``own_bar`` that the sampling explains, the most that excuses an error.
+        sampled_bar: largest part of ``own_bar`` that may excuse an error: the part that the sampling interval explains.
         between: values of the run at a few times off the grid, and the true ones; None: there are none.
         magnitude: of the numbers whose round-off the curve has, if larger than ``scale``: of positions, for a gap.
         precision: in which the run was computed, see :func:`proofroll.core.engine.precision_of`.

@@ -40,8 +40,7 @@ class SceneFile:
         reason: purpose of the scene, for a person.
         duration: length of a run that shows the purpose of the scene [s].
         dt: step that is short enough for engines with a fixed one [s]; recommended if a run with a longer one fails,
-            and
-            used by a first look.
+            and used by a first look.
         files: models beside it in the formats of engines, e.g. ``mujoco_free.xml``, with the meshes that these read.
         tables: all others, which kinds of elements read.
     """

@@ -55,8 +55,7 @@ class EngineDescription:
         defaults: its default values.
         oldest: oldest version that its adapter supports; empty: not declared.
         made_for: formulation -> capabilities, sorted; it is offered only to scenes that require one of them. A
-            formulation
-            that is missing here is offered to all.
+            formulation that is missing here is offered to all.
     """
 
     name: str
@@ -94,8 +93,7 @@ class EngineFacts:
         precision: of its arithmetic, see :func:`proofroll.core.engine.precision_of`.
         scheme: integration rule, see :class:`proofroll.core.engine.Scheme`; empty: it declares none.
         libraries: versions of Python, numpy and scipy, which decide the last digits; in another interpreter also a hash
-            of
-            all its packages.
+            of all its packages.
     """
 
     name: str

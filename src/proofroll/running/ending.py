@@ -21,10 +21,8 @@ def interrupt_held() -> Iterator[None]:
     """Context manager that defers Ctrl-C to its end; processes started inside never receive it.
 
     The signal mask is inherited by these processes, whose parent ends them. It does not stop another thread of this
-    process
-    from taking the signal, for which Python would interrupt the main thread; so handlers that only take note are
-    installed
-    for all handled signals. A second signal ends the process at once.
+    process from taking the signal, for which Python would interrupt the main thread; so handlers that only take note
+    are installed for all handled signals. A second signal ends the process at once.
     """
     waiting: list[int] = []
 

@@ -33,8 +33,7 @@ def manifest(
     """Attributes of a trajectory: engine, settings, parameters [SI], versions, interpreter and machine.
 
     Settings, parameters and versions are JSON. ``not_reported`` lists quantities of the certificate that the engine
-    does
-    not report, if there are any.
+    does not report, if there are any.
     """
     silent = ", ".join(line.quantity for line in certificate if line.standing is Standing.NOT_REPORTED)
     return ({"not_reported": silent} if silent else {}) | {

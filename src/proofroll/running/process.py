@@ -297,9 +297,8 @@ def _starved(process: int) -> float:
     """Longest time [s] that a thread of the process or of its descendants was ready while others had the processor.
 
     On a busy machine wall time says little about an engine. The kernel counts how long every thread waited for a
-    processor
-    (``schedstat``, second number). A process that hangs asleep does not wait for one, so that a limit of wall time less
-    this one still ends it. 0 where the system does not count.
+    processor (``schedstat``, second number). A process that hangs asleep does not wait for one, so that a limit of wall
+    time less this one still ends it. 0 where the system does not count.
     """
     longest = 0
     for one in (process, *descendants(process)):

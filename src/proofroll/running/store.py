@@ -94,8 +94,7 @@ class Store:
         """Stores a result and its trajectory; returns the result with the checksum of the trajectory.
 
         Record and trajectory are replaced together, after both are completely on disk. A result that may change next
-        time
-        (:data:`LASTING`) is not stored.
+        time (:data:`LASTING`) is not stored.
 
         Args:
             case: that was run.

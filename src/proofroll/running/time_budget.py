@@ -21,12 +21,9 @@ class TimeBudget:
     """Processor time for the cases of one study; cases beyond it are left out.
 
     Cases belong to groups, for example the comparisons of a report. A group that begins gets an equal part of the time
-    left,
-    but at least enough for a truth; what it does not use is for later groups. A case gets an equal part of its group's
-    time
-    among the group's running cases, and at most an equal part of the time left among all running cases, so that the
-    total
-    is never exceeded. A case that was ended for lack of time begins again only with more time.
+    left, but at least enough for a truth; what it does not use is for later groups. A case gets an equal part of its
+    group's time among the group's running cases, and at most an equal part of the time left among all running cases, so
+    that the total is never exceeded. A case that was ended for lack of time begins again only with more time.
 
     Args:
         seconds: processor time, with that of this process [s].

@@ -142,8 +142,7 @@ def _clean_run(engine: Any, stops: Iterable[float], enough: float) -> _CleanRun:
     """Clean run: it only advances, and takes one last sample, as some engines finish their work only then.
 
     It stops where the sampled run stopped, as an adaptive step that passes over a sample would be a cheaper run. It
-    ends
-    after ``enough`` wall time [s], which measures a rate as well as ten times as much would.
+    ends after ``enough`` wall time [s], which measures a rate as well as ten times as much would.
     """
     clock = time.perf_counter
     start, t = clock(), 0.0

@@ -35,8 +35,7 @@ class Interval:
         value: the median.
         low, high: the two innermost measured values that have the confidence.
         confidence: probability that they enclose the true median: at least 0.95 from six values on; 0.75 for the range
-            of
-            three; 0 for a single value.
+            of three; 0 for a single value.
     """
 
     value: float

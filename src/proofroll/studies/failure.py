@@ -60,8 +60,7 @@ class RunOutcome:
     Attributes:
         stable: True if it reached the end without a sign of failure, and was not wrong by the whole range.
         accurate: True if it is stable and the deciding observable was wrong by at most 1 % of its range; without a
-            truth
-            the same as stable.
+            truth the same as stable.
         failure: first sign of failure, if it was not accurate.
         silent: True if it failed and the engine did not report it.
         error: largest error of the deciding observable, as a part of its range; None if unknown.

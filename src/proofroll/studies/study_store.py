@@ -35,8 +35,7 @@ def versions() -> dict[str, str]:
     """Versions of proofroll, of its requirements, of packages that announce engines, and of environments.
 
     For an environment ``NAME@LABEL`` it is a hash of all its packages. Packages that announce engines, truths or kinds
-    of
-    elements have a further entry with a hash of their code.
+    of elements have a further entry with a hash of their code.
     """
     plug_ins = [point for group in (GROUP, ELEMENTS, TRUTHS) for point in announced(group) if point.dist is not None]
     names = _required() | {point.dist.name for point in plug_ins if point.dist is not None}

@@ -78,8 +78,7 @@ class Cause:
         alternative: True if another cause explains the same as well, so that the data cannot tell the two apart.
         explains: independent numbers of the difference that it closes; None: as many as there are samples.
         change: distance of the fitted parameters from the scene's, relative to them or to a natural size; infinite if
-            they
-            are those of a known mistake.
+            they are those of a known mistake.
     """
 
     id: str
@@ -157,8 +156,8 @@ def diagnose(evidence: Evidence, hypotheses: Sequence[Hypothesis]) -> list[Cause
     """The proven causes: fewest fitted parameters first, then the smallest remaining difference.
 
     A cause of a quantity that an earlier one explains already is kept only if it is as good, as an alternative, and
-    only a
-    few are. A cause with a fitted parameter is dropped if another fitted one is as good: neither proves anything.
+    only a few are. A cause with a fitted parameter is dropped if another fitted one is as good: neither proves
+    anything.
     """
     proven = [cause for item in hypotheses for cause in item.test(evidence) if cause.proven]
     proven.sort(key=lambda cause: (cause.fitted, cause.left))

@@ -225,7 +225,7 @@ def _judgements(
 
 
 def _rungs(run: Planned, results: dict[str, Result], errors: dict[float, dict[str, float]]) -> list[LadderRun]:
-    """Runs of the ladder without the run itself."""
+    """Further runs of a row's ladder, without the run at the row's own step."""
     rungs = []
     for factor, case in run.ladder.items():
         facts = case.engine

@@ -42,8 +42,7 @@ class GivenRun:
         units: variable -> its unit, if it has one.
         labels: dimension -> its labels (names of bodies) in order.
         besides: variable that is not part of the state, or a velocity -> reason why it is not judged, or None if that
-            is
-            not known yet; empty for a run of proofroll's own.
+            is not known yet; empty for a run of proofroll's own.
         reactions: those of them that do not follow from the state: forces and moments.
     """
 

@@ -48,8 +48,7 @@ def between(reference: Reference, name: str, dataset: xr.Dataset) -> tuple[Float
     """Values of an observable or state at samples off the grid, and its true values there; None: nothing to compare.
 
     Intervals with an event of the run or of the truth are left out: for up to a step of the engine its forces may be
-    those
-    from before the event.
+    those from before the event.
     """
     own, item = f"{BETWEEN}.{name}", reference.scene.observables.get(name)
     if own not in dataset or own not in reference.dataset:

@@ -141,8 +141,7 @@ def judge(
         tolerance: observable or variable -> ``"1 %"`` of its scale, ``"1e-3 m"``, or a number in its unit. A single one
             is for the deciding observable of the scene, or for the only variable. None: 1 % of each main quantity, of
             every force and moment, and of given positions, velocities, angular velocities and orientations; for the
-                time
-            of the first slip the sampling interval. A run that reports sticking while it slips never agrees.
+            time of the first slip the sampling interval. A run that reports sticking while it slips never agrees.
         because: reason for these tolerances.
 
     Raises:

@@ -71,8 +71,7 @@ class Ladder:
         quantity: observable; None: the one that decides the scene.
         until: last time [s]; None: the usual length.
         tolerance: of the quantity, in its unit; None: a term counts if it changes the quantity by more than the smaller
-            of
-            the errors with and without it.
+            of the errors with and without it.
         engines: names; all that are installed if empty.
         rounds: of the timing; None: the usual number.
 

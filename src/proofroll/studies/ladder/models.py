@@ -118,8 +118,7 @@ def switches(
     """Models with and without each optional term.
 
     Terms of the scene are switched in one model of each engine and level, terms of an engine in each model that has
-    them.
-    Models that cannot represent the scene are left out.
+    them. Models that cannot represent the scene are left out.
     """
     switches_of_terms: list[Switch] = []
     models = [

@@ -33,10 +33,9 @@ def search(size: int, stride: int) -> Generator[int, RunOutcome | None, SearchRe
     """Generator that yields rungs to run, receives their outcomes, and returns the result.
 
     It refines by ``stride`` rungs until a run is accurate, and a second one half a stride finer, too; the finest runs
-    cost
-    most. Then it bisects for both boundaries, and last runs the rung below each, since a pass right at a boundary may
-    be
-    luck. No rung is asked for twice. Sending None means that a rung is too long: it and all finer ones are left out.
+    cost most. Then it bisects for both boundaries, and last runs the rung below each, since a pass right at a boundary
+    may be luck. No rung is asked for twice. Sending None means that a rung is too long: it and all finer ones are left
+    out.
     """
     result: SearchResult = SearchResult(limit=size)
     seen = result.seen

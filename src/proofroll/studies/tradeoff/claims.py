@@ -96,7 +96,7 @@ class Cheapest:
         tolerance: of the quantity.
         engine: any of these, ``name[key=value,…]``.
         because: reason.
-        levels: rungs of the ladder that are compared; if empty, all of engines' own models.
+        levels: rungs of the ladder that are compared; if empty, all but equations derived by hand for the scene.
     """
 
     tolerance: Tolerance

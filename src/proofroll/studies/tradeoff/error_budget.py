@@ -62,8 +62,7 @@ def budget(
     """Error budget of one quantity along a curve.
 
     Order and limit come from runs sampled at ``every``. Runs with a longer step have fewer samples; only the coarsest
-    of
-    them is used, for the coarse end.
+    of them is used, for the coarse end.
 
     Args:
         curve: with its points.
@@ -143,8 +142,7 @@ def _contradicted(order: Order, facts: EngineFacts, role: Role) -> bool:
     """True if the observed order lies outside the declared ones, from the one for this scene to the highest.
 
     An event that lowers the order (a joint that begins to slip within a step) need not happen in a run. A declared
-    order
-    is that of the motion: reactions and residuals may have a higher one.
+    order is that of the motion: reactions and residuals may have a higher one.
     """
     if facts.order is None or order.low is None or order.high is None:
         return False

@@ -18,8 +18,7 @@ class MeasuredCost:
         seconds_per_second: median of wall time per simulated second; None: not measured.
         interval: lowest and highest, with ``confidence``; None if it was measured once.
         rounds: the measurements, one per round; the rounds are the same for all points, so that a ratio of two costs
-            can be
-            taken round by round.
+            can be taken round by round.
         measurements: number of measurements.
     """
 
@@ -156,8 +155,7 @@ class CurveBudget:
             highest.
         floor: scatter of the finest runs, where refinement no longer helps; None: not reached.
         best_step: step of the most accurate run if finer ones are worse by round-off in single precision [s]; None:
-            there
-            is none.
+            there is none.
         truth: error bar of the truth; None: it is not finite.
         coarse, fine: dominant part of the error at the coarse and the fine end.
         coarse_step, fine_step: steps at these ends.

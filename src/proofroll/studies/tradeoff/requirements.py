@@ -26,7 +26,8 @@ class Requirements:
         quantity: an observable.
         tolerance: largest error of it.
         budget: allowed wall time per simulated second, or None.
-        engines: the engines among which to choose; if empty, all engines with models of their own.
+        engines: the engines among which to choose; if empty, all but equations derived by hand for the scene.
+
         levels: the rungs among which to choose; all if empty.
     """
 

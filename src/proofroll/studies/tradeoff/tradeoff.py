@@ -164,8 +164,7 @@ def _check(tradeoff: Tradeoff, truth: EngineFacts, runner: Runner, arrived: Call
     """Runs the best points at every corner of the range.
 
     These are the points on the Pareto front of each formulation, for each quantity: a question about one kind of model
-    must
-    not lose a formulation that another one of the same engine dominates.
+    must not lose a formulation that another one of the same engine dominates.
     """
     formulations: dict[tuple[str, object], list[Curve]] = {}
     for curve in tradeoff.curves:
