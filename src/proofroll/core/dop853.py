@@ -81,7 +81,10 @@ def controlled_step(solver: Any, accept: Accept | None, until: float, longest: f
 
 
 def corrected_by(corrected: Callable[[FloatArray], FloatArray]) -> Accept:
-    """Acceptance that projects a state onto its constraints; if that fails the error names the time."""
+    """Function to call after each step (:data:`Accept`) that projects the state onto its constraints.
+
+    If the projection fails, the error names the time.
+    """
 
     def accept(t: float, y: FloatArray) -> FloatArray:
         try:

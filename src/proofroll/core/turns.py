@@ -93,10 +93,19 @@ def doubt(
 def on_turns_of(
     other: FloatArray | None, values: FloatArray, name: str, datasets: Iterable[xr.Dataset]
 ) -> FloatArray | None:
-    """Values of an observable shifted by whole turns to those of another run, if a run cannot count turns itself.
+    """Values of an observable, shifted by whole periods towards another run's if the turns of a run are uncertain.
 
-    A run that cannot has the attribute ``UNCERTAIN``. None if no comparison is left: the observable depends on turns,
-    but not by a period (the energy of a spring that turns wind up).
+    Runs that cannot count turns mark the variable with the attribute ``UNCERTAIN``.
+
+    Args:
+        other: values of the other run, or None.
+        values: those to shift.
+        name: of the observable.
+        datasets: both runs.
+
+    Returns:
+        None if the observable depends on turns without being periodic, so that no comparison is possible (the energy of
+            a spring that turns wind up).
     """
     said = [run[name].attrs for run in datasets if name in run and UNCERTAIN in run[name].attrs]
     if not said or other is None or values.shape != other.shape:

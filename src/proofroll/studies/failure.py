@@ -97,7 +97,7 @@ class Yardstick:
 
     @classmethod
     def of(cls, scene: Scene, truth: xr.Dataset | None) -> Yardstick:
-        """Yardstick from the truth, or without one from the scene."""
+        """Yardstick made from the truth; if there is none, from the scene alone."""
         name = scene.deciding
         if truth is None:
             return cls(scene, None, name, None, 1.0)

@@ -126,7 +126,7 @@ class Residuals(Generic[M]):
         return len(self.left(self.plain)) < 2
 
     def explained(self, model: M | None) -> int:
-        """Count of independent residuals that a model changes and by which it differs from the other models."""
+        """Number of independent residuals that distinguish a model from the scene's and from the other models."""
         change = self.left(model) - self.left(self.plain)
         size = np.abs(change)
         if not np.all(np.isfinite(size)) or not np.any(size):

@@ -252,9 +252,10 @@ def _stages(cases: Sequence[tuple[Curve, tuple[Case, ...]]]) -> list[list[tuple[
 
 
 def _affordable(curve: Curve, case: Case, budget: TimeBudget, abreast: int) -> bool:
-    """True if a run is expected to fit its share of the budget, judged by the one before; otherwise it is dropped.
+    """True if a run is expected to fit its share of the budget, from the time of the curve's last run.
 
-    A refused run is dropped, too: the engine would refuse the scene with every step.
+    Otherwise its step is dropped with a reason. False, too, if the engine refused the scene, as it would with every
+    step.
     """
     if not curve.points:
         return not curve.dropped
