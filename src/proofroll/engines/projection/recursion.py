@@ -122,7 +122,7 @@ def _moments(forces: Array) -> Array:
 
 
 def _spatial(inertia: Array) -> Array:
-    """Spatial inertia, shape (6, 6), from the matrix Σ, shape (4, 4)."""
+    """Spatial inertia, shape (6, 6), from a body's matrix Σ of moments of mass (:mod:`.elimination`), shape (4, 4)."""
     matrix = np.zeros((6, 6), dtype=inertia.dtype)
     matrix[:3, :3] = np.eye(3) * np.trace(inertia[:3, :3]) - inertia[:3, :3]
     matrix[:3, 3:] = (inertia[:3, 3] @ SKEW).reshape(3, 3)

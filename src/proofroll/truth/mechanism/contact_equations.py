@@ -1,4 +1,4 @@
-"""Equations of route 2 of bodies that touch: separate bodies, one linear system of motion, joints and contacts."""
+"""Equations of route 2 for bodies that touch: one linear system for accelerations and forces of joints and contacts."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -80,7 +80,7 @@ class ContactEquations:
         self._driven = [mechanism.joint_index[motor.joint] for motor in self._limited.values()]
 
     def at(self, state: Array) -> BodiesState:
-        """Bodies at a state of :meth:`NumericEquations.rate` with the time [s] as one more component."""
+        """Rows and loads of the bodies at a state: coordinates, velocities, angles, and last the time [s]."""
         e = self.equations.equations
         constrained, C, bias, half, force = self.equations.loaded(state[:-1], float(state[-1]), self.clamped(state))
         bodies = []

@@ -1,4 +1,7 @@
-"""Stretches of a mechanism whose bodies touch: what both routes share, without equations and decisions."""
+"""Integration and events of a mechanism whose bodies touch, as both routes share them.
+
+Each route adds its own equations and its own decisions on the next mode.
+"""
 
 from abc import abstractmethod
 from collections.abc import Sequence

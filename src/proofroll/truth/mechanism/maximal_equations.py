@@ -138,7 +138,7 @@ class MaximalEquations:
         switched: Switched | None = None,
         time: Scalar = 0.0,
     ) -> ConstrainedEquations:
-        """Equations for a state as of :meth:`start`, of any scalars, with unit quaternions.
+        """Equations for a state laid out as by :meth:`start`, in any scalars; quaternions must have unit length.
 
         Rows of couplings come after those of connections; rows of held ``switched`` joints come last.
         """
