@@ -1,4 +1,4 @@
-"""Engines that each break one promise of the protocol; ``FAILS`` says which check must notice."""
+"""Engines that each break one promise of the protocol; ``FAILS``: engine -> conformance check that must fail."""
 
 from __future__ import annotations
 
@@ -23,17 +23,17 @@ FAILS: dict[type[Tiny], str] = {}
 
 
 class Breaking(Tiny):
-    """An engine that the check ``breaks`` must notice. Settings of its own are its only preset."""
+    """Base of engines that must fail the conformance check ``breaks``; own settings become the only preset."""
 
     def __init_subclass__(cls, breaks: str = "") -> None:
-        """Lists it."""
+        """Adds the engine to ``FAILS``."""
         if breaks:
             FAILS[cls] = breaks
         if "settings" in vars(cls):
             cls.presets = {"midpoint": {"matched": cls.settings()}}
 
     def sample(self) -> BallSample:
-        """Sample as reported, right or not."""
+        """Reported sample; subclasses change it in ``_told``."""
         return self._told(super().sample())
 
     def _told(self, right: BallSample) -> BallSample:
@@ -41,29 +41,29 @@ class Breaking(Tiny):
 
 
 class Unannounced(Breaking, breaks="name_is_the_entry_point"):
-    """No package has an entry point of this name."""
+    """Has a name that is no entry point."""
 
     name = "unannounced"
 
 
 class Versionless(Breaking, breaks="version_is_told"):
-    """The version is a number."""
+    """Returns a number as its version."""
 
     @staticmethod
     def version() -> Any:
-        """Not text."""
+        """Version of a wrong type."""
         return 2
 
 
 class ProvidesText(Breaking, breaks="provides_capabilities"):
-    """Says what it provides in its own words."""
+    """Declares a capability that does not exist."""
 
     provides: ClassVar[Any] = frozenset({"rolling", BallCapability.ROLLING})
 
 
 @dataclass
 class MutableSettings:
-    """Not frozen."""
+    """Settings in a dataclass that is not frozen."""
 
     formulation: str = "midpoint"
     preset: str = "matched"
@@ -73,49 +73,49 @@ class MutableSettings:
 
 
 class Mutable(Breaking, breaks="settings_are_a_frozen_dataclass"):
-    """Its settings can be changed after the fact."""
+    """Has settings that can be changed after they are made."""
 
     settings = MutableSettings
 
 
 class MixedUp(Breaking, breaks="presets_are_complete"):
-    """Its preset calls itself something else."""
+    """Has a preset whose settings name another preset."""
 
     presets: ClassVar[Mapping[str, Mapping[str, Any]]] = {"midpoint": {"default": TinySettings()}}
 
 
 @dataclass(frozen=True)
 class OrderlessSettings(TinySettings):
-    """A step, and no whole order."""
+    """Settings whose order is not an integer."""
 
     @property
     def order(self) -> Any:
-        """Half an order."""
+        """Order of a wrong type."""
         return 1.5
 
 
 class Orderless(Breaking, breaks="resolution_and_order_are_told"):
-    """Says no order that is one."""
+    """Declares an order that is not an integer."""
 
     settings = OrderlessSettings
 
 
 @dataclass(frozen=True)
 class HalfSettings(TinySettings):
-    """An unknown precision."""
+    """Settings with an unknown precision."""
 
     precision: ClassVar[str] = "half"
 
 
 class Half(Breaking, breaks="precision_is_told"):
-    """Computes in neither single nor double precision."""
+    """Declares an unknown precision."""
 
     settings = HalfSettings
 
 
 @dataclass(frozen=True)
 class LaxSettings(TinySettings):
-    """Takes any step."""
+    """Settings that accept any step."""
 
     dt: float = 1e-3
 
@@ -127,28 +127,28 @@ class Lax(Breaking, breaks="bad_settings_give_one_line"):
 
 
 class Boastful(Breaking, breaks="provides_what_it_says"):
-    """Says that it provides rolling resistance, and refuses every scene with it."""
+    """Declares rolling resistance, but refuses every scene with it."""
 
     @classmethod
     def build(cls, scene: Scene, settings: Any) -> Self:
-        """Refuses what it said it provides."""
+        """Refuses scenes with rolling resistance."""
         if BallCapability.ROLLING_RESISTANCE in scene.requires:
             raise Refused("no resistance, after all")
         return super().build(scene, settings)
 
 
 class Floating(Breaking, breaks="provides_for_some_scene"):
-    """Provides what no scene requires, and nothing else."""
+    """Provides only a capability that no scene requires."""
 
     provides: ClassVar[Mapping[str, frozenset[str]]] = {"midpoint": frozenset({"levitation"})}
 
 
 class Silent(Breaking, breaks="builds_or_refuses"):
-    """Refuses without a word."""
+    """Refuses scenes without a reason."""
 
     @classmethod
     def build(cls, scene: Scene, settings: Any) -> Self:
-        """No reason given."""
+        """Refuses scenes on planes with an empty text."""
         if BallCapability.CURVED_SURFACE not in scene.requires:
             raise Refused("")
         return super().build(scene, settings)
@@ -164,7 +164,7 @@ class Heavy(Breaking, breaks="certificate_holds"):
 
 
 class Doubled(Heavy, breaks="certificate_holds"):
-    """Builds a ball of twice the mass, and calls that a softened mass."""
+    """Builds a ball of twice the mass, and declares the mass as regularised."""
 
     def __init__(self, scene: Scene, settings: Any) -> None:
         ball = scene.elements[0].ball
@@ -176,7 +176,7 @@ class Doubled(Heavy, breaks="certificate_holds"):
 
 
 class Pulled(Breaking, breaks="certificate_holds"):
-    """Lives in one and a half times the gravity, and calls that softened."""
+    """Builds 1.5 times the gravity, and declares gravity as regularised."""
 
     def __init__(self, scene: Scene, settings: Any) -> None:
         gravity = dataclasses.replace(scene.elements[0].gravity, magnitude=1.5 * scene.elements[0].gravity.magnitude)
@@ -188,17 +188,17 @@ class Pulled(Breaking, breaks="certificate_holds"):
 
 
 def _excused(built: BallBuilt) -> BallBuilt:
-    """The same with every quantity softened without limit."""
+    """Certificate data with an infinite tolerance for every quantity."""
     names = ("mass", "inertia", "gravity", "position", "acceleration", "angular acceleration", "N", "F2", "F3")
     excuse = Regularised(float("inf"), "our engine is soft")
     return dataclasses.replace(built, regularised=dict.fromkeys(names, excuse))
 
 
 class Mute(Breaking):
-    """Says nothing of what it built but what it must, and gives no force."""
+    """Reports only the rolling resistance of its model, and no force."""
 
     def built(self) -> BallBuilt:
-        """The scene's own resistance, whatever it does with it."""
+        """Certificate data with the scene's rolling resistance alone."""
         return BallBuilt(rolling_resistance=self.body.contact.rolling_resistance)
 
     def _told(self, right: BallSample) -> BallSample:
@@ -206,7 +206,7 @@ class Mute(Breaking):
 
 
 class Damped(Mute, breaks="first_steps_fit_the_scene"):
-    """Its velocity is damped by 4 % per second, and it does not say so."""
+    """Damps its velocity by 4 % per second without declaring it."""
 
     def rates(self, x: Any) -> Any:
         """Rates with damping."""
@@ -214,7 +214,7 @@ class Damped(Mute, breaks="first_steps_fit_the_scene"):
 
 
 class Clamped(Mute, breaks="first_steps_fit_the_scene"):
-    """Its spin is clamped at 30 rad/s as soon as it moves, and it does not say so."""
+    """Clamps its angular velocity at 30 rad/s after the start without declaring it."""
 
     def _told(self, right: BallSample) -> BallSample:
         silent = super()._told(right)
@@ -222,16 +222,16 @@ class Clamped(Mute, breaks="first_steps_fit_the_scene"):
 
 
 class Unresisting(Mute, breaks="first_steps_fit_the_scene"):
-    """Says that there is rolling resistance, and ignores it."""
+    """Reports rolling resistance, but ignores it."""
 
     def rates(self, x: Any) -> Any:
-        """Rates without it."""
+        """Rates without rolling resistance."""
         contact = dataclasses.replace(self.body.contact, rolling_resistance=0.0)
         return reduced_rates(dataclasses.replace(self.body, contact=contact), x)[0]
 
 
 class Drifting(Breaking, breaks="moves_as_the_truth"):
-    """Its position moves by a thousandth faster than its velocity says."""
+    """Reports positions that move 0.1 % faster than its velocity."""
 
     def _told(self, right: BallSample) -> BallSample:
         ahead = self.body.surface.position(self.x[:2] + 1e-3 * self.t * self.x[2:4])
@@ -239,7 +239,7 @@ class Drifting(Breaking, breaks="moves_as_the_truth"):
 
 
 class Beating(Breaking, breaks="moves_as_the_truth"):
-    """Off by a beat that is over at every hundredth of a second, where everybody samples."""
+    """Adds an oscillation to the position that is zero at every hundredth of a second, the usual samples."""
 
     def _told(self, right: BallSample) -> BallSample:
         along = self.body.surface.frame(self.x[:2])[:, 2]
@@ -247,7 +247,7 @@ class Beating(Breaking, breaks="moves_as_the_truth"):
 
 
 class Wasteful(Breaking, breaks="builds_only_what_is_required"):
-    """Carries rolling resistance along that was not asked for."""
+    """Builds rolling resistance that the scene does not require."""
 
     def __init__(self, scene: Scene, settings: Any) -> None:
         super().__init__(scene, settings)
@@ -255,18 +255,18 @@ class Wasteful(Breaking, breaks="builds_only_what_is_required"):
 
 
 class Thrifty(Breaking, breaks="builds_only_what_is_required"):
-    """Leaves out what the scene requires."""
+    """Reports a model without terms that the scene requires."""
 
     def built(self) -> BallBuilt:
-        """Nothing but rolling."""
+        """Certificate data without optional terms."""
         return dataclasses.replace(super().built(), terms=frozenset())
 
 
 class Turning(Breaking, breaks="builds_only_what_is_required"):
-    """Follows the orientation without being asked, and without saying why."""
+    """Integrates an orientation that the scene does not ask for, without a declared reason."""
 
     def built(self) -> BallBuilt:
-        """Among its terms."""
+        """Certificate data with the orientation among the terms."""
         right = super().built()
         return dataclasses.replace(right, terms=(right.terms or frozenset()) | {BallCapability.ORIENTATION})
 
@@ -275,32 +275,32 @@ class Turning(Breaking, breaks="builds_only_what_is_required"):
 
 
 class Row(Breaking, breaks="samples_are_well_formed"):
-    """Gives its position as a row of a matrix."""
+    """Reports positions of shape (1, 3)."""
 
     def _told(self, right: BallSample) -> BallSample:
         return BallSample(right.p_WB[None], right.v_WB, right.w_WB)
 
 
 class Stretched(Breaking, breaks="samples_are_well_formed"):
-    """Gives quaternions that grow longer on the way."""
+    """Reports quaternions of length 1.01 after the start."""
 
     def _told(self, right: BallSample) -> BallSample:
         return dataclasses.replace(right, q_WB=np.array([1.01 if self.t else 1.0, 0, 0, 0]))
 
 
 class Hushed(Breaking, breaks="samples_are_well_formed"):
-    """Gives a force at time 0, and none later."""
+    """Reports a force at time 0 only."""
 
     def _told(self, right: BallSample) -> BallSample:
         return right if self.t == 0 else dataclasses.replace(right, force=None)
 
 
 class Secretly(Breaking, breaks="samples_are_well_formed"):
-    """Computes in single precision, and does not say so; its velocity is put together in doubles."""
+    """Keeps its state in single precision without declaring it; velocities are computed in double precision."""
 
     @property
     def x(self) -> Any:
-        """The state."""
+        """State as doubles."""
         return np.array(self.own, dtype=np.float64)
 
     @x.setter
@@ -312,7 +312,7 @@ class Secretly(Breaking, breaks="samples_are_well_formed"):
 
 
 class Views(Breaking, breaks="reading_back_changes_nothing"):
-    """Gives the array that it goes on working with."""
+    """Returns the array that it changes in later steps."""
 
     def __init__(self, scene: Scene, settings: Any) -> None:
         super().__init__(scene, settings)
@@ -323,13 +323,13 @@ class Views(Breaking, breaks="reading_back_changes_nothing"):
         return BallSample(self.p, right.v_WB, right.w_WB, force=right.force)
 
     def advance(self, t: float) -> None:
-        """Moves what it gave before."""
+        """Advances, and overwrites the last sample's position."""
         super().advance(t)
         self.sample()
 
 
 class OneBuffer(Breaking, breaks="reading_back_changes_nothing"):
-    """Gives the same arrays each time, which the next sample fills anew."""
+    """Returns the same arrays each time, overwritten by the next sample."""
 
     buffer: BallSample | None = None
 
@@ -342,7 +342,7 @@ class OneBuffer(Breaking, breaks="reading_back_changes_nothing"):
 
 
 class OneForAll(OneBuffer, breaks="reading_back_changes_nothing"):
-    """The same for all that are built."""
+    """Returns the same arrays from all its runs."""
 
     def _told(self, right: BallSample) -> BallSample:
         if OneForAll.buffer is None:
@@ -362,17 +362,17 @@ class Moody(Breaking, breaks="advance_is_repeatable"):
 
 
 class Forgetful(Breaking, breaks="advance_in_two_parts"):
-    """Leaves out a step whenever it is stopped."""
+    """Omits a step in each call of advance."""
 
     def advance(self, t: float) -> None:
-        """Starts late."""
+        """Advances by one step less than required."""
         if t > self.t:
             self.t += self.dt
         super().advance(t)
 
 
 class Restless(Breaking, breaks="sampling_changes_nothing"):
-    """Moves when it is looked at."""
+    """Changes its state when it is sampled."""
 
     def _told(self, right: BallSample) -> BallSample:
         if self.t > 0:
@@ -381,16 +381,16 @@ class Restless(Breaking, breaks="sampling_changes_nothing"):
 
 
 class Lazy(Breaking, breaks="samples_cost_the_same"):
-    """Notes the time, and moves when it is looked at; each step takes a while."""
+    """Defers its slow steps from ``advance`` to ``sample``."""
 
     due = 0.0
 
     def advance(self, t: float) -> None:
-        """Later."""
+        """Records the time."""
         self.due = t
 
     def sample(self) -> BallSample:
-        """State after the steps that were put off."""
+        """State after the deferred steps."""
         while self.t < self.due - self.dt / 2:
             time.sleep(2e-3)
             super().advance(min(self.t + self.dt, self.due))
@@ -398,28 +398,28 @@ class Lazy(Breaking, breaks="samples_cost_the_same"):
 
 
 class HandedOver(Lazy, breaks="samples_cost_the_same"):
-    """Hands its cheap steps over, which costs more than a hundred of them."""
+    """Defers cheap steps to ``sample``; a call of ``advance`` costs more than a hundred of them."""
 
     def advance(self, t: float) -> None:
-        """Later."""
+        """Records the time, with a fixed cost."""
         time.sleep(5e-3)
         super().advance(t)
 
     def sample(self) -> BallSample:
-        """State after the steps that were put off, and a moment for the look at it."""
+        """State after the deferred steps, with a fixed cost for the sample."""
         time.sleep(2e-3 + 2e-5 * (self.due - self.t) / self.dt)
         self.t = self.due
         return Tiny.sample(self)
 
 
 class Shared(Breaking, breaks="engines_do_not_disturb_each_other"):
-    """Keeps its state where every other one keeps it too."""
+    """Keeps the state of all its runs in one place."""
 
     state: ClassVar[dict[str, Any]] = {}
 
     @property
     def x(self) -> Any:
-        """The state of whoever moved last."""
+        """State of the run that moved last."""
         return Shared.state["x"]
 
     @x.setter
@@ -428,24 +428,24 @@ class Shared(Breaking, breaks="engines_do_not_disturb_each_other"):
 
 
 class Millimetres(Breaking, breaks="velocities_are_the_rates"):
-    """Gives its velocity in mm/s, but only after the start."""
+    """Reports velocities in mm/s after the start."""
 
     def _told(self, right: BallSample) -> BallSample:
         return dataclasses.replace(right, v_WB=right.v_WB * (1000 if self.t else 1))
 
 
 class BodyFrame(Breaking, breaks="velocities_are_the_rates"):
-    """Gives an orientation that does not turn as its angular velocity says."""
+    """Reports a constant orientation, though its angular velocity is not zero."""
 
     def _told(self, right: BallSample) -> BallSample:
         return dataclasses.replace(right, q_WB=np.array([1.0, 0, 0, 0]))
 
 
 class FirstOrder(Breaking, breaks="order_is_as_declared"):
-    """Declares the second order and has the first."""
+    """Declares order 2, but has order 1."""
 
     def advance(self, t: float) -> None:
-        """Euler."""
+        """Advances by Euler's method."""
         for _ in range(round((t - self.t) / self.dt)):
             self.x = self.x + self.dt * self.rates(self.x)
         self.t = t
@@ -453,7 +453,7 @@ class FirstOrder(Breaking, breaks="order_is_as_declared"):
 
 @dataclass(frozen=True)
 class AdaptiveSettings:
-    """A tolerance without effect."""
+    """Settings with a tolerance that has no effect."""
 
     formulation: str = "midpoint"
     preset: str = "matched"
@@ -464,6 +464,6 @@ class AdaptiveSettings:
 
 
 class Deaf(Breaking, breaks="tolerance_has_an_effect"):
-    """Its tolerance does nothing."""
+    """Has a tolerance without effect."""
 
     settings = AdaptiveSettings

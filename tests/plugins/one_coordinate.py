@@ -1,4 +1,4 @@
-"""Motion of one joint with a body of unit inertia and no gravity: what drives it is its acceleration."""
+"""Motion of one joint whose body has unit inertia and no weight: its acceleration equals its drives and efforts."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from proofroll.elements.mechanism.signal import value_at
 
 @cache
 def moved(mechanism: Mechanism, until: float) -> tuple[float, float, list[float]]:
-    """Coordinate, velocity and efforts of its actuators at a time [s], from the scene's laws alone."""
+    """Coordinate, velocity and efforts of actuators at a time [s], integrated from the scene's laws alone."""
     (joint,) = mechanism.joints
 
     def efforts(t: float, q: float, v: float) -> list[float]:

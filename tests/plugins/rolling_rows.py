@@ -1,11 +1,11 @@
-"""Balls that roll on surfaces in maximal coordinates: a further witness of scenes with balls, and of those that mix.
+"""Balls that roll on surfaces, in maximal coordinates: an independent check of truths, also in scenes with mechanisms.
 
-Tests hold it against a ball's two routes, with which it shares neither coordinates nor equations; it makes no truth.
-Whole scenes are put together in ``rolling_scenes.py``.
+Tests compare it with a ball's two routes, with which it shares neither coordinates nor equations; it is no truth.
+``rolling_scenes.py`` assembles whole scenes.
 
-A ball is a free body. Its contact point stands still, v + ω × a e1 = 0, in three rows; of these only the distance along
-the normal e1 can be violated by a place, the other two hold velocities alone (Blajer 2006, section 2). Of the surface
-only its distance is used, and its derivatives; neither coordinates nor frames of it.
+A ball is a free body. Its contact point has no velocity, v + ω × a e1 = 0, in three rows. Only the row along the normal
+e1 also constrains positions (the distance); the other two constrain velocities alone (Blajer 2006, section 2). Of the
+surface, only its distance function and derivatives of it are used, neither coordinates nor frames.
 """
 
 from __future__ import annotations
@@ -28,13 +28,13 @@ from proofroll.truth.scalars import Scalar, cross, dot, scaled
 
 @dataclass(frozen=True)
 class RollingContact:
-    """A ball that rolls without slip on a wall that stands.
+    """A ball that rolls without slip on a wall at rest.
 
     Attributes:
-        body: its name.
-        radius: a [m].
-        path: the surface on which its centre moves.
-        start: a place of its centre [m], which tells on which side of a plane or cylinder it is.
+        body: name of the ball's body.
+        radius: radius a [m].
+        path: surface on which the ball's centre moves.
+        start: initial place of the centre [m], which defines the side of a plane or cylinder.
     """
 
     body: str
@@ -43,7 +43,7 @@ class RollingContact:
     start: Vector
 
     def normal(self, r: Sequence[Scalar], v: Sequence[Scalar]) -> tuple[Scalar, list[Scalar], list[Scalar]]:
-        """Gap [m], normal e1 towards the wall and its rate [1/s] of a centre at r with velocity v, of any scalars."""
+        """Gap [m], normal e1 towards the wall and its rate [1/s], of a centre at r with velocity v; any scalar type."""
         gap: Jet = self._distance(*variables(*r))
         xx, xy, xz, yy, yz, zz = gap.second
         bent = ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz))
@@ -62,7 +62,7 @@ class RollingContact:
 
 
 class RollingRows(ConstraintRows):
-    """Rows of joints and loops, and of the balls ``rolling`` at these numbers."""
+    """Rows of joints, loops and rolling balls; ``rolling``: number of the connection -> ball."""
 
     rolling: dict[int, RollingContact]
 
@@ -71,7 +71,7 @@ class RollingRows(ConstraintRows):
         return self._of_rolling(number) if number in self.rolling else super().of(number)
 
     def _of_rolling(self, number: int) -> list[ConstraintRow]:
-        """The contact point of a ball does not move; only its distance from the wall can be violated by a place."""
+        """Three rows of a ball: zero velocity of its contact point; the gap is the only residual of positions."""
         ball, view = self.rolling[number], self._views[self._connections[number].b]
         gap, e1, e1_rate = ball.normal(view.r, view.v)
         arm = scaled(ball.radius, e1)
@@ -85,10 +85,10 @@ class RollingRows(ConstraintRows):
 
 
 def rolling_equations(balls: Sequence[RollingContact]) -> type[MaximalEquations]:
-    """Equations of mechanisms with these balls; their forces come after those of joints and loops."""
+    """Class of equations for mechanisms with these balls, whose forces follow those of joints and loops."""
 
     class RollingEquations(MaximalEquations):
-        """A mechanism some of whose bodies, free ones without joints of their own, are balls that roll on a wall."""
+        """Equations of a mechanism with rolling balls, which are free bodies of it."""
 
         def __init__(self, mechanism: Mechanism, allow_planar: bool) -> None:
             super().__init__(mechanism, allow_planar)

@@ -1,4 +1,4 @@
-"""Scenes with balls that roll, as one mechanism and the contacts that its balls roll on."""
+"""Scenes with rolling balls, as one mechanism and rolling contacts."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ from proofroll.elements.mechanism.parts import Body
 
 
 def rolling_scene(scene: Scene) -> tuple[Mechanism, tuple[RollingContact, ...]]:
-    """All elements of a scene as one mechanism, its balls as free bodies, and what these roll on.
+    """All elements of a scene as one mechanism, whose balls are free bodies, and the rolling contacts of these.
 
     Raises:
-        Refused: an element, or a law of contact, that such rows do not have; the text names it.
+        Refused: an element or a law of contact has no such rows; the text names it.
     """
     bodies: list[Body] = []
     joints: list[Joint] = []
@@ -66,7 +66,7 @@ def _contact(ball: RollingBall) -> RollingContact:
 
 
 def _free(ball: RollingBall) -> tuple[Body, Joint]:
-    """The ball as a body whose axes are the world's at the start."""
+    """A ball as a free body, whose axes are the world's at the start."""
     name, inertia = ball.ball.name, float(ball.ball.inertia)
     start = (*_vector(ball.p0), 1.0, 0.0, 0.0, 0.0)
     body = Body(name, ball.ball.mass, inertia=(inertia, inertia, inertia))  # type: ignore[arg-type]  # three moments

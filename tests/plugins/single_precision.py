@@ -1,4 +1,4 @@
-"""An engine in numpy's float32, or the same in doubles: chains of hinges and one free body, stepped by two schemes."""
+"""An engine in single or double precision, for trees of hinges or one free body, with two integration schemes."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ from proofroll.elements.mechanism.sampling import MechanismBuilt, MechanismSampl
 
 @dataclass(frozen=True)
 class SingleSettings:
-    """A scheme, its step and the precision."""
+    """Settings: integration scheme, step and precision."""
 
     formulation: Literal["euler", "rk4"] = "rk4"
     preset: Literal["matched"] = "matched"
     dt: Annotated[float, Gt(0)] = 1e-3
     precision: Literal["single", "double"] = "single"
-    heavier: float = 1.0  # masses and inertias are taken so many times; 1.001 is a wrong model
+    heavier: float = 1.0  # factor on masses and inertias; 1.001 is a wrong model
     resolution: ClassVar[str] = "dt"
 
     @property
@@ -34,7 +34,10 @@ class SingleSettings:
 
 
 class Single:
-    """Hinges turn about lines in the world at the start; a free body has its position and a turn from the start."""
+    """Run of a tree of hinges or of a free body.
+
+    A hinge's coordinate is its angle from the start; a free body has its centre and its rotation from the start.
+    """
 
     name: ClassVar[str] = "single"
     provides: ClassVar[Mapping[str, frozenset[str]]] = dict.fromkeys(
@@ -103,7 +106,7 @@ class Single:
 
     def _rate(self, q: Any, v: Any) -> tuple[Any, Any]:
         """Rates of coordinates and of velocities."""
-        if self.free:  # the spin is told in axes that turn with the body
+        if self.free:  # the angular velocity is in axes fixed to the body
             w, (s, x) = v[3:], (q[3], q[4:])
             inertia = self.moments[0]
             turning = np.linalg.solve(inertia, -np.cross(w, inertia @ w))
@@ -125,7 +128,7 @@ class Single:
         return turn @ self.moments[body] @ turn.T
 
     def _turned(self, q: Any) -> dict[int, tuple[Any, Any]]:
-        """Turn from the start, and what it shifts, of each body."""
+        """Displacement of each body from the start: body -> rotation R and shift s, x -> R x + s."""
         found = {-1: (np.eye(3, dtype=self.single), self._own(np.zeros(3)))}
         for (body, parent), anchor, axis, angle in zip(self.tree, self.anchors, self.axes, q, strict=True):
             turn, shift = found[parent]
@@ -137,7 +140,11 @@ class Single:
         return found
 
     def _kinematics(self, q: Any, v: Any) -> dict[int, tuple[Any, ...]]:
-        """Centre, spin, its velocity, both by the rates, and both accelerations without rates' changes; by body."""
+        """Kinematics by body.
+
+        Centre, angular velocity, velocity of the centre, Jacobians of centre and rotation, and accelerations of both at
+        zero joint accelerations.
+        """
         n, turned, found = len(q), self._turned(q), {}
         zero, none = self._own(np.zeros(3)), np.zeros((3, n), self.single)
         found[-1] = (zero, zero, zero, none, none, zero, zero)
@@ -162,7 +169,7 @@ class Single:
         return found
 
     def sample(self) -> MechanismSample:
-        """See :class:`proofroll.core.engine.Engine`; the numbers are its own, as doubles."""
+        """See :class:`proofroll.core.engine.Engine`; numbers of its own precision as doubles."""
         if self.free:
             s, x = self.q[3], self.q[4:]
             cross = self._own([[0, -x[2], x[1]], [x[2], 0, -x[0]], [-x[1], x[0], 0]])
@@ -201,7 +208,7 @@ class Single:
 
 
 class OnePrecision(Single):
-    """The same, with one precision for its whole process, as a library may have a switch: the first one stays."""
+    """An engine with one precision for its whole process, that of its first run, as if a library had a switch."""
 
     name: ClassVar[str] = "one_precision"
     presets: ClassVar[Mapping[str, Mapping[str, Any]]] = {

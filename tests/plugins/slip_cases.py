@@ -1,4 +1,4 @@
-"""Cases of stick and slip in the cylinder, with their events, and runs of them that tests share."""
+"""Cases of stick and slip in the cylinder, with times of events, and runs shared by tests."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ CASES: Mapping[str, tuple[Mapping[str, float], float, tuple[float, ...], float]]
 
 @functools.cache
 def run(case: str, engine: str, until: float, every: float) -> xr.Dataset:
-    """A run of a case, made once for all tests; it goes to its end."""
+    """Trajectory of an engine for a case, cached for all tests; fails if the run ends early."""
     scene = load_scene("sphere_in_cylinder", **CASES[case][0])
     recording = record(build(scene, engine), scene, time_grid(until, every))
     assert recording.failure is recording.ended is None

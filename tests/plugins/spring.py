@@ -28,7 +28,7 @@ SPRUNG = "a mass on a spring"
 
 @dataclass(frozen=True)
 class Spring:
-    """m ẍ = -k x from x0 at rest."""
+    """Point mass on a spring: m ẍ = -k x, from x0 at rest."""
 
     name: str
     mass: float
@@ -49,7 +49,7 @@ class Spring:
 
     @property
     def rate(self) -> float:
-        """ω [rad/s]."""
+        """Angular frequency ω [rad/s]."""
         return float(np.sqrt(self.stiffness / self.mass))
 
     @property
@@ -59,19 +59,19 @@ class Spring:
 
     @property
     def natural_time(self) -> float:
-        """One oscillation [s]."""
+        """Period of the oscillation [s]."""
         return 2 * np.pi / self.rate
 
     softened = frozenset[str]()
 
     @property
     def first_motion(self) -> FirstMotion:
-        """Back to the middle."""
+        """Initial acceleration, towards x = 0, with its scale and a short time."""
         start = np.array([[-(self.rate**2) * self.x0, 0.0, 0.0]])
         return FirstMotion(start, np.zeros((1, 3)), self.rate**2 * abs(self.x0), 1e-3 / self.rate)
 
     def step_numbers(self, h: float, truth: xr.Dataset | None) -> Sequence[StepNumber]:
-        """The phase of a step."""
+        """Angle of the oscillation in a step, ωh."""
         return (StepNumber("phase", "ωh", "angle of the oscillation in a step", self.rate * h),)
 
     def variables(self, times: FloatArray, samples: Sequence[Sample]) -> Columns:
@@ -84,35 +84,35 @@ class Spring:
         return Columns(variables | {"time": Variable(("time",), times, {"units": "s"})})
 
     def lacks(self, samples: Sequence[Sample], asks: Sequence[str]) -> str | None:
-        """Nothing."""
+        """None: samples have all that is needed."""
         return None
 
     def observe(self, dataset: xr.Dataset) -> dict[str, FloatArray]:
-        """Observables as they are; the pull without time 0."""
+        """Observables as in the dataset; the pull without time 0."""
         found = {item.name: dataset[item.name].to_numpy() for item in self.observables}
         return found | {"pull": found["pull"][1:]}
 
     def scales(self, truth: xr.Dataset) -> dict[str, float]:
-        """Scales of the start."""
+        """Scale of each observable, from the start."""
         pull = self.stiffness * abs(self.x0)
         return {"x": abs(self.x0), "pull": pull, "energy_error": 0.5 * pull * abs(self.x0)}
 
     def certify(self, built: Any, sample: Sample) -> list[Line]:
-        """Mass and start."""
+        """Lines of the certificate for the mass and the initial elongation."""
         pairs = {"mass": (self.mass, built["mass"], "kg"), "x": (self.x0, float(np.ravel(sample.p_WB)[0]), "m")}
         return [Line(k, u, (a,), (b,), abs(a - b) / abs(a), 1e-12) for k, (a, b, u) in pairs.items()]
 
     def signs(self, dataset: xr.Dataset, truth: xr.Dataset | None) -> list[Sign]:
-        """Far out."""
+        """Sign of failure: elongation above ten times the initial one."""
         return [Sign("far out", np.abs(dataset["x"].to_numpy()) > 10 * abs(self.x0))]
 
     def optional_terms(self, parameters: Mapping[str, float], truth: xr.Dataset) -> list[OptionalTerm]:
-        """None."""
+        """No optional terms."""
         return []
 
 
 class SpringKind:
-    """Reads ``[[masses]]``."""
+    """Kind of element that is read from ``[[masses]]``."""
 
     name: ClassVar[str] = "spring"
     tables: ClassVar[tuple[str, ...]] = ("masses",)
@@ -120,31 +120,31 @@ class SpringKind:
 
     @staticmethod
     def read(tables: Mapping[str, Any], gravity: Gravity, numbers: Parameters, where: str) -> Sequence[Spring]:
-        """One element for each."""
+        """One element for each table."""
         return [Spring(**table) for table in numbers.filled(tables["masses"], where, SpringKind.units)]
 
     @staticmethod
     def conformance_scenes() -> Mapping[str, Scene]:
-        """One scene."""
+        """One scene with a spring."""
         return {"spring": Scene("spring", "", (Spring("m", 2.0, 50.0, 0.3),), {"mass": 2.0})}
 
     @staticmethod
     def truth_scenes() -> Mapping[str, Scene]:
-        """The same."""
+        """The conformance scenes."""
         return SpringKind.conformance_scenes()
 
 
 class SpringTruth:
-    """Cosine, and the exponential of the matrix."""
+    """Truth of a spring by two routes: a cosine, and the exponential of the system matrix."""
 
     @staticmethod
     def covers(element: Element) -> bool:
-        """Springs."""
+        """True for springs."""
         return isinstance(element, Spring)
 
     @staticmethod
     def truth(element: Spring, times: FloatArray, asks: Sequence[str]) -> xr.Dataset:
-        """Both routes."""
+        """Dataset of the first route, with error bars from its difference to the second."""
         from scipy.linalg import expm
 
         w, A = element.rate, np.array([[0, 1], [-element.stiffness / element.mass, 0]])
@@ -162,7 +162,7 @@ def at(x: float, v: float) -> Sample:
 
 
 class Sprung:
-    """Explicit midpoint for springs, each of several by itself."""
+    """Engine for one spring: explicit midpoint rule."""
 
     name: ClassVar[str] = "sprung"
     provides: ClassVar[Mapping[str, frozenset[str]]] = {"midpoint": frozenset({SPRUNG})}

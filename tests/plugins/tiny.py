@@ -63,7 +63,7 @@ class Tiny:
         self.x = np.array([*self.body.u0, *self.body.udot0, scene.elements[0].start.spin])
 
     def rates(self, x: FloatArray) -> FloatArray:
-        """ẋ."""
+        """Rates ẋ of the state x = (u, u̇, ω1)."""
         return reduced_rates(self.body, x)[0]
 
     def advance(self, t: float) -> None:
@@ -94,7 +94,7 @@ class Tiny:
 
 
 class Sleepy(Tiny):
-    """Takes as long for a simulated second as a second lasts."""
+    """Needs one second of wall time for each simulated second."""
 
     name: ClassVar[str] = "sleepy"
 

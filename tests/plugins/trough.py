@@ -1,4 +1,4 @@
-"""A surface that somebody else declares: a lying half-pipe, given by a position and a distance."""
+"""Surface of another package: a horizontal half-pipe, declared by its points and its distance."""
 
 # ruff: noqa: D102 -- what the methods mean is said in Declared
 
@@ -17,9 +17,9 @@ class Trough(Declared):
     """Inside of a half-pipe along x.
 
     Attributes:
-        name: by which contacts name it.
+        name: name to which contacts refer.
         radius: inner radius [m].
-        kind: which surface it is.
+        kind: kind of the surface.
     """
 
     name: str

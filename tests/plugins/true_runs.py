@@ -1,4 +1,4 @@
-"""Truths that tests of engines share: each costs more than most runs of an engine."""
+"""Cached truths for tests of engines: each costs more than most runs of an engine."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ _runs: dict[tuple[str, float, float], xr.Dataset] = {}
 
 
 def true_run(scene: Scene, until: float, every: float) -> xr.Dataset:
-    """The truth of a scene, found once in a process."""
+    """Truth of a scene up to ``until`` [s], sampled each ``every`` [s]; computed once in a process."""
     key = scene.digest, until, every
     if key not in _runs:
         _runs[key] = simulate(scene, "truth", until=until, every=every)

@@ -1,4 +1,4 @@
-"""An engine that says when it begins and goes on when it may, for tests that end something meanwhile."""
+"""An engine that signals its start and waits for permission, for tests that end a process meanwhile."""
 
 from __future__ import annotations
 

@@ -1,9 +1,8 @@
-"""Worker processes that all tests of a pytest process share: to start one costs more than most of what it is asked.
+"""Worker processes shared by all tests of a pytest process: starting one costs more than most requests to it.
 
-A worker is lent again where everything is as it was when it started: the engine that it has loaded, the memory that it
-may have, and the environment; to the folder of a test it goes by itself. Engines of ``ENTRY_POINTS`` load no library
-that another of them does not, so one worker serves them all until one of them ends it. Tests of the processes
-themselves are marked ``own_workers`` and share none.
+A worker is lent again if its engine, its memory limit and the environment are those with which it started; it changes
+to the test's folder. All engines of ``ENTRY_POINTS`` load the same libraries, so one worker serves them all until one
+of them ends it. Tests of worker processes themselves are marked ``own_workers`` and share none.
 """
 
 from __future__ import annotations
@@ -22,9 +21,9 @@ from proofroll.running import process
 from proofroll.running.process import Worker
 from proofroll.running.worker_pool import Workers
 
-# Idle ones that are kept, some hundred MB each; of more, the one that has waited longest is ended.
+# Largest number of idle workers, some hundred MB each; beyond it, the one idle for longest is ended.
 _MOST = 12
-# What every test has otherwise, and no worker reads.
+# Variables that differ from test to test, and that no worker reads.
 _PASSING = {"PYTEST_CURRENT_TEST", "COLUMNS"}
 
 # A worker in another interpreter, or one that is no Python at all, stays in the folder in which it began.
@@ -47,7 +46,7 @@ def _follow(worker: Worker) -> None:
 
 
 class WarmWorkers:
-    """Idle workers."""
+    """Pool of idle workers."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
@@ -57,7 +56,7 @@ class WarmWorkers:
 
     @contextmanager
     def lent(self) -> Iterator[None]:
-        """Meanwhile whoever wants a worker gets one of these, and gives it back instead of ending it."""
+        """Context in which workers are taken from this pool, and returned to it instead of ended."""
         take, safe = Workers.take, process.safe_environment
 
         def noted() -> dict[str, str]:
@@ -109,6 +108,6 @@ class WarmWorkers:
             old.close()
 
     def close(self) -> None:
-        """Ends them."""
+        """Ends all idle workers."""
         while self._idle:
             self._idle.pop()[1].close()

@@ -1,4 +1,4 @@
-"""DART for proofroll: mechanisms by its skeletons, stepped by DART, or by scipy around DART's forward dynamics."""
+"""DART for proofroll: mechanisms as skeletons, stepped by DART, or integrated by scipy with DART's accelerations."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class DartSettings:
 
     Attributes:
         formulation: ``world``, DART's own steps; ``forward_dynamics``, DART's accelerations, integrated by scipy.
-        preset: ``default`` of the first, ``matched`` of the second.
+        preset: ``default`` for ``world``, ``matched`` for ``forward_dynamics``.
         dt: step of a world [s].
         rtol: tolerance of scipy's DOP853.
     """
@@ -51,11 +51,7 @@ class DartSettings:
     rtol: Annotated[float, Gt(0), Le(1)] | None = None
 
     def __post_init__(self) -> None:
-        """Refuses a step without a world, and a tolerance with one.
-
-        Raises:
-            InputError: one of them.
-        """
+        """Raises InputError unless ``world`` has a step alone, and ``forward_dynamics`` a tolerance alone."""
         wanted, other = ("dt", "rtol") if self.formulation == "world" else ("rtol", "dt")
         if getattr(self, wanted) is None or getattr(self, other) is not None:
             value = getattr(self, wanted)
@@ -68,12 +64,12 @@ class DartSettings:
 
     @property
     def order(self) -> int | None:
-        """Order of semi-implicit Euler."""
+        """Order of a world's semi-implicit Euler; None: scipy's steps are adaptive."""
         return 1 if self.formulation == "world" else None
 
     @property
     def scheme(self) -> str:
-        """Rule of a world's steps; scipy adapts its own."""
+        """Integration scheme of a world; empty for scipy."""
         return Scheme.SEMI_IMPLICIT_EULER if self.formulation == "world" else ""
 
 
@@ -96,12 +92,12 @@ class Dart:
 
     @staticmethod
     def caveat(settings: DartSettings) -> str:
-        """Part that is not DART's own."""
+        """See :class:`proofroll.core.engine_abilities.TellsCaveats`."""
         return "integrated by scipy around DART's accelerations" if settings.formulation == "forward_dynamics" else ""
 
     @classmethod
     def build(cls, scene: Scene, settings: DartSettings) -> Dart:
-        """The mechanism as a skeleton in a world of its own."""
+        """See :class:`proofroll.core.engine.Engine`; the mechanism is a skeleton in a world of its own."""
         return cls(mechanism_of(scene), settings)
 
     def __init__(self, mechanism: Mechanism, settings: DartSettings) -> None:
@@ -133,7 +129,7 @@ class Dart:
             built.setAxis2([1.0, 0.0, 0.0])
         elif joint.nv:
             built.setAxis([0.0, 0.0, 1.0])
-        # DART's springs are implicit: even an acceleration at an instant has what they will do in a step
+        # DART's springs are implicit: even its accelerations at an instant depend on the step
         for index in range(joint.nv if self._settings.dt else 0):
             built.setSpringStiffness(index, joint.stiffness)
             built.setRestPosition(index, joint.rest)
@@ -142,7 +138,7 @@ class Dart:
         if joint.limits:
             built.setPositionLowerLimit(0, joint.limits[0])
             built.setPositionUpperLimit(0, joint.limits[1])
-            built.setLimitEnforcement(True)  # without it limits hold nothing
+            built.setLimitEnforcement(True)  # without it limits have no effect
         self._bodies[joint.child] = body
 
     def _put(self, q: Any, v: Any) -> None:
@@ -150,19 +146,19 @@ class Dart:
         self._skeleton.setVelocities(v)
 
     def _efforts(self, t: float) -> Any:
-        """Efforts of the actuators at the present state."""
+        """Efforts of the actuators in the present state [N or N m]."""
         q, v = self._skeleton.getPositions(), self._skeleton.getVelocities()
         return np.array([item.effort(t, q[at], v[at]) for item, at in self._actuators])
 
     def _driven(self, t: float) -> Any:
-        """Drives of the joints and efforts of the actuators, along the velocities."""
+        """Generalised forces of the joints' drives and of actuators, shape (velocities,)."""
         forces = np.array([float(value_at(joint.torque, t)) for joint in self._of])
         if self._actuators:
             np.add.at(forces, [at for _, at in self._actuators], self._efforts(t))
         return forces
 
     def _rates(self, t: float, x: Any) -> Any:
-        """Velocities, and DART's accelerations."""
+        """Rates of the state: velocities, and DART's accelerations."""
         q, v = np.split(x, 2)
         self._put(q, v)
         self._skeleton.setForces(self._driven(t) - self._stiffness * (q - self._rest) - self._damping * v)

@@ -1,7 +1,7 @@
-"""A ball by Drake's terms: mass matrix, bias and Jacobian of the contact are Drake's, the rest is not.
+"""A ball with Drake's mass matrix, bias and Jacobian of the contact point; constraints and integration are ours.
 
-Rolling is written here as three rows on the acceleration of the body's point at the contact, and the motion is
-integrated by scipy: what agrees is Drake's dynamics, never its contact.
+Rolling is three rows on the acceleration of the body's point at the contact, and scipy integrates. So agreement shows
+Drake's dynamics, not its contact.
 """
 
 from __future__ import annotations
@@ -27,7 +27,10 @@ INHERENT = {BallCapability.ORIENTATION: "a free body of Drake has one"}
 
 
 class DrakeBall:
-    """See :class:`proofroll.core.engine.Engine` for the methods. The state is Drake's: quaternion, place, rates."""
+    """Run of a ball; see :class:`proofroll.core.engine.Engine` for the methods.
+
+    The state is Drake's: quaternion, position of the centre, angular velocity, velocity.
+    """
 
     def __init__(self, body: RollingBall, settings: DrakeSettings) -> None:
         self._ball, self._rtol, self._t = body, settings.rtol, 0.0
@@ -48,7 +51,7 @@ class DrakeBall:
         return cls(rolling_ball(scene), settings)
 
     def _solved(self, x: Any) -> tuple[Any, Any]:
-        """Rates of Drake's velocities (turning first), and the force of the wall on the ball [N]."""
+        """Accelerations (angular first) in the world, and force of the wall on the ball [N]."""
         plant, context, ball = self._plant, self._context, self._ball
         plant.SetPositionsAndVelocities(context, x)
         p, w, v = x[4:7], x[7:10], x[10:13]

@@ -1,4 +1,4 @@
-"""Bodies that touch in a discrete plant of Drake: spheres, ellipsoids and planes, soft as Drake's points of contact."""
+"""Contacts of bodies in a discrete plant of Drake: spheres, ellipsoids and planes, with Drake's soft point contact."""
 
 from __future__ import annotations
 
@@ -31,7 +31,8 @@ APPROXIMATIONS: Mapping[str, DiscreteContactApproximation] = {
     "sap": DiscreteContactApproximation.kSap,
     "lagged": DiscreteContactApproximation.kLagged,
 }
-STIFFNESS, DISSIPATION, STICTION = 1e6, 50.0, 1e-4  # N/m of a pair, s/m, m/s
+# Stiffness of a pair [N/m], Hunt-Crossley dissipation [s/m], slip speed up to which friction counts as sticking [m/s].
+STIFFNESS, DISSIPATION, STICTION = 1e6, 50.0, 1e-4
 
 
 def family(settings: DrakeSettings) -> Mapping[str, str]:
@@ -41,17 +42,17 @@ def family(settings: DrakeSettings) -> Mapping[str, str]:
 
 
 class DrakeContacts:
-    """The geometries of a mechanism in a plant, and what they press.
+    """Geometries of a mechanism in a plant, and their contact forces.
 
     Args:
-        mechanism: with one law for all its pairs.
-        plant: discrete, with a scene graph, not finalised.
-        scene_graph: of the plant.
-        bodies: of the plant, by name.
-        settings: which approximation of contact.
+        mechanism: mechanism with one law for all its pairs.
+        plant: discrete plant with a scene graph, not finalised.
+        scene_graph: scene graph of the plant.
+        bodies: bodies of the plant, by name.
+        settings: settings with the approximation of contact.
 
     Raises:
-        Refused: pairs have different laws, rebound, or have a shape that Drake's points of contact lack.
+        Refused: pairs have different coefficients of friction, or a shape that Drake's point contact lacks.
     """
 
     def __init__(
@@ -102,7 +103,7 @@ class DrakeContacts:
         return found
 
     def built(self, found: MechanismBuilt) -> MechanismBuilt:
-        """Model that was built, with the coefficients of its contacts."""
+        """Certificate data with the coefficients of the contacts added."""
         count = len(self._mechanism.pairs)
         friction = self._mechanism.pairs[0].friction
         return replace(
@@ -113,14 +114,14 @@ class DrakeContacts:
 
 
 def _properties(friction: float) -> ProximityProperties:
-    """Material of a surface: two of twice the stiffness in a row have the stiffness of the pair."""
+    """Material of a surface, with twice the stiffness of a pair, whose surfaces are springs in series."""
     made = ProximityProperties()
     AddContactMaterial(DISSIPATION, 2 * STIFFNESS, CoulombFriction(friction, friction), made)
     return made
 
 
 def _shape(shape: Any, sunk: float) -> Any:
-    """A shape of Drake, larger by as much as it is pressed in at the start."""
+    """Drake's shape, enlarged by its depth ``sunk`` at the start [m]. Raises Refused for other kinds of shapes."""
     if shape.kind == "sphere" and shape.radius:
         return Sphere(shape.radius + sunk)
     if shape.kind == "ellipsoid":

@@ -1,4 +1,4 @@
-"""Drake: a ball by its terms, mechanisms as continuous and as discrete plants."""
+"""Engine Drake: a ball with Drake's terms of motion, and mechanisms as continuous or discrete plants."""
 
 from __future__ import annotations
 
@@ -42,11 +42,11 @@ class Drake:
 
     @staticmethod
     def build(scene: Scene, settings: DrakeSettings) -> Any:
-        """The model of the formulation."""
+        """See :class:`proofroll.core.engine.Engine`; builds a run of the formulation."""
         kind = DrakeBall if settings.formulation == "terms" else DrakeMechanism
         return kind.build(scene, settings)
 
     @staticmethod
     def caveat(settings: DrakeSettings) -> str:
-        """Part that is not Drake's own."""
+        """See :class:`proofroll.core.engine_abilities.TellsCaveats`."""
         return "rolling and integration are ours, around Drake's terms" if settings.formulation == "terms" else ""

@@ -1,4 +1,4 @@
-"""Joints of a mechanism as Drake's, and where they start."""
+"""Joints of a mechanism in Drake, and their initial state."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _TURNED = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
 
 
 def connect(plant: Any, bodies: Mapping[str, Any], joint: Joint) -> Any:
-    """Adds a joint with its frames on both bodies."""
+    """Adds a joint, and its frames on both bodies, to a plant; returns Drake's joint."""
     turn = _TURNED if joint.kind == "universal" else np.eye(3)
     ends = []
     for what, body, R, p in (
@@ -55,7 +55,7 @@ def _made(joint: Joint, on_parent: Any, on_child: Any) -> Any:
 
 
 def start(plant: Any, context: Any, joint: Joint, built: Any) -> None:
-    """Puts a joint where it starts; Drake's velocities of free and ball joints are along the parent's axes."""
+    """Sets the initial state of a joint; Drake's velocities of free and ball joints are along the parent's axes."""
     q, v = np.array(joint.q0), np.array(joint.v0)
     if joint.kind in {"spherical", "free"}:
         R = RotationMatrix(Quaternion(q[-4:]))

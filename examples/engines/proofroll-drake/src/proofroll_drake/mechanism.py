@@ -54,7 +54,7 @@ _AT_ITS_END = "a discrete plant takes the forces of springs and dampers as they 
 
 
 class DrakeMechanism:
-    """See :class:`proofroll.core.engine.Engine` for the methods."""
+    """Run of a mechanism; see :class:`proofroll.core.engine.Engine` for the methods."""
 
     def __init__(self, mechanism: Mechanism, settings: DrakeSettings, time: float) -> None:
         self._turn = (
@@ -104,7 +104,7 @@ class DrakeMechanism:
         return self._plant.AddRigidBody(body.name, inertia)
 
     def _add_forces(self) -> None:
-        """Springs of joints and between points, and inertias of drives."""
+        """Adds springs of joints and between points, and armature as rotor inertia of actuators."""
         plant = self._plant
         for joint, built in zip(self._mechanism.joints, self._joints, strict=True):
             if joint.stiffness:
@@ -123,7 +123,7 @@ class DrakeMechanism:
             plant.AddForceElement(LinearSpringDamper(*ends, spring.length, spring.stiffness, spring.damping))
 
     def _add_laws(self) -> None:
-        """Couplings and stops, which discrete plants have."""
+        """Adds couplings and stops, which only discrete plants have."""
         number = self._mechanism.joint_index
         for item in self._mechanism.couplings:
             a, b = (self._joints[number[name]] for name in (item.joint_a, item.joint_b))
@@ -133,7 +133,7 @@ class DrakeMechanism:
                 built.set_position_limits([joint.limits[0]], [joint.limits[1]])
 
     def _efforts(self, t: float) -> Any:
-        """Efforts of the actuators at the present state: explicit, as a controller outside of the plant."""
+        """Efforts of the actuators in the present state [N or N m], as from a controller outside of the plant."""
         q, v = self._plant.GetPositions(self._context), self._plant.GetVelocities(self._context)
         found = []
         for item in self._mechanism.actuators:
@@ -170,7 +170,7 @@ class DrakeMechanism:
                 self._plant.AddBallConstraint(a, on_a, b, on_b)
 
     def _ground(self) -> Any:
-        """A body that is welded to the world: a ball constraint with the world itself ends the process (1.51.1)."""
+        """Adds a body welded to the world: a ball constraint on the world itself crashes Drake 1.51.1."""
         inertia = SpatialInertia.MakeFromCentralInertia(1.0, np.zeros(3), RotationalInertia(1.0, 1.0, 1.0))
         ground = self._plant.AddRigidBody("ground of loops", inertia)
         self._plant.WeldFrames(self._plant.world_frame(), ground.body_frame())
@@ -199,7 +199,7 @@ class DrakeMechanism:
         poses = [plant.EvalBodyPoseInWorld(context, body) for body in bodies]
         rates = [plant.EvalBodySpatialVelocityInWorld(context, body) for body in bodies]
         force, torque, pressed = None, None, None
-        if self._steps or not self._contacts:  # forces of contact are those of a step
+        if self._steps or not self._contacts:  # contact forces exist only after a step
             force, torque = self._reactions()
             pressed = self._contacts.forces(context) if self._contacts else None
         return MechanismSample(
@@ -214,9 +214,9 @@ class DrakeMechanism:
         )
 
     def _reactions(self) -> tuple[Any, Any]:
-        """Force and moment on the child of each joint; Drake gives them along the joint's axes on the child [N, N m].
+        """Force [N] and moment [N m] on the child of each joint, world axes; NaN for loops.
 
-        Those of loops are not reported.
+        Drake gives them in the joint's frame on the child.
         """
         count = len(self._joints) + len(self._mechanism.loops)
         force, torque = np.full((count, 3), np.nan), np.full((count, 3), np.nan)
@@ -262,7 +262,7 @@ class DrakeMechanism:
 
 
 def _axis(context: Any, joint: Joint, built: Any) -> Any:
-    """The joint's axis in the world; NaN where it has none."""
+    """World direction of a joint's axis, shape (3,); NaN if the kind has none."""
     if joint.kind not in WITH_AXIS:
         return np.full(3, np.nan)
     column = 0 if joint.kind == "universal" else 2  # see joints.connect
@@ -270,7 +270,7 @@ def _axis(context: Any, joint: Joint, built: Any) -> Any:
 
 
 def _central(inertia: Any) -> Any:
-    """About the centre of mass [kg m²]."""
+    """Inertia about the centre of mass [kg m²], shape (3, 3)."""
     c = np.array(inertia.get_com())
     about_origin = np.array(inertia.CalcRotationalInertia().CopyToFullMatrix3())
     return about_origin - inertia.get_mass() * (c @ c * np.eye(3) - np.outer(c, c))

@@ -1,4 +1,4 @@
-"""Drake's own importers of URDF and MJCF, the plant read back."""
+"""Drake's own importers of URDF and MJCF, with the plant read back."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class DrakeRobots:
         return importlib.metadata.version("drake")
 
     def read(self, request: Request) -> Reading:
-        """The plant, evaluated."""
+        """See :class:`proofroll.robots.protocol.RobotReader`."""
         plant = _plant(request, _STEP if request.robot.mimics else 0.0)
         context = plant.CreateDefaultContext()
         carriers = {body: joint for joint, body in request.children.items()}
@@ -101,14 +101,17 @@ def _plant(request: Request, step: float) -> Any:
 
 
 def _name(joint: Any, carriers: Mapping[str, str]) -> str:
-    """The file's name; a free body's joint is made by the engine and named after the body."""
+    """Name of a joint in the file; Drake makes the joint of a free body itself and names it after the body."""
     if joint.num_velocities() == 6:
         return carriers.get(joint.child_body().name(), joint.name())
     return str(joint.name())
 
 
 def _put(request: Request, plant: Any, context: Any, joints: Mapping[str, Any], k: int) -> Array:
-    """Puts the plant into a state; a free joint's velocity has the rotation first, a ball's the parent's axes."""
+    """Puts the plant into state ``k``; returns T of ``AtState``.
+
+    In Drake a free joint has the angular velocity first, and a ball joint has it in the parent's axes.
+    """
     from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
 
     states = request.states
@@ -135,13 +138,13 @@ def _put(request: Request, plant: Any, context: Any, joints: Mapping[str, Any], 
 
 
 def _central(inertia: Any) -> Array:
-    """About the centre of mass."""
+    """Inertia about the centre of mass [kg m²], shape (3, 3)."""
     c = np.array(inertia.get_com())
     about_origin = np.array(inertia.CalcRotationalInertia().CopyToFullMatrix3())
     return np.asarray(about_origin - inertia.get_mass() * (c @ c * np.eye(3) - np.outer(c, c)))
 
 
 def _coupled(request: Request, plant: Any) -> tuple[str, ...]:
-    """Joints that the plant holds to others."""
+    """Joints that the plant couples to others: all followers of the file, if it has a constraint for each."""
     mimics = request.robot.mimics
     return tuple(mimic.joint for mimic in mimics) if plant.num_constraints() >= len(mimics) > 0 else ()

@@ -21,7 +21,7 @@ class DrakeSettings:
             mechanisms as a plant of that kind; ``contact``, bodies that touch in a discrete plant.
         preset: ``default`` or ``matched``.
         integrator: of the continuous plant, by Drake's name.
-        rtol: tolerance of integration, except of the discrete plant.
+        rtol: relative tolerance of integration; None for discrete plants.
         dt: step of the discrete plant [s].
         contact: approximation of contact, by Drake's name.
     """
@@ -34,11 +34,7 @@ class DrakeSettings:
     contact: Literal["tamsi", "sap", "lagged"] = "tamsi"
 
     def __post_init__(self) -> None:
-        """Refuses what does not belong together.
-
-        Raises:
-            InputError: a step where there is a tolerance, or the other way round.
-        """
+        """Raises InputError unless discrete formulations have a step alone, and the others a tolerance alone."""
         wanted, other = (self.resolution, "rtol" if self.resolution == "dt" else "dt")
         if getattr(self, wanted) is None:
             raise InputError(f"drake: {wanted}", None, f"{self.formulation} needs it; give a positive number")
@@ -52,25 +48,25 @@ class DrakeSettings:
 
     @property
     def order(self) -> int | None:
-        """Order of the discrete plant's semi-implicit Euler."""
+        """Order of the discrete plant's semi-implicit Euler; None: steps are adaptive."""
         return 1 if self.resolution == "dt" else None
 
     @property
     def scheme(self) -> str:
-        """Rule of the discrete plant's steps; a continuous one adapts them."""
+        """Integration scheme of the discrete plant; empty for the others."""
         return Scheme.SEMI_IMPLICIT_EULER if self.resolution == "dt" else ""
 
 
 PRESETS: Mapping[str, Mapping[str, DrakeSettings]] = {
     "terms": {"matched": DrakeSettings("terms", "matched", rtol=1e-12)},
     "continuous": {
-        # what a Simulator has if nobody chooses
+        # defaults of Drake's Simulator
         "default": DrakeSettings("continuous", "default", "runge_kutta3", 1e-3),
         "matched": DrakeSettings("continuous", "matched", "runge_kutta5", 1e-10),
     },
     "discrete": {"default": DrakeSettings("discrete", "default", dt=1e-3)},
     "contact": {
-        "default": DrakeSettings("contact", "default", dt=1e-3, contact="lagged"),  # what a plant has if nobody chooses
+        "default": DrakeSettings("contact", "default", dt=1e-3, contact="lagged"),  # default of Drake's plant
         "matched": DrakeSettings("contact", "matched", dt=1e-3, contact="tamsi"),
     },
 }

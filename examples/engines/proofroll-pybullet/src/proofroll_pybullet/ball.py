@@ -1,7 +1,7 @@
-"""A free ball against a static plane that is posed anew before each step, tangent to the wall at the contact.
+"""A free ball against a static plane that is posed before each step, tangent to the wall at the contact.
 
-PyBullet has no concave wall that is smooth. Its own contact solver finds the normal impulse, and that of friction in a
-cone; the wall's normal is that at the start of the step (semi-implicit Euler, first order).
+PyBullet has no smooth concave wall. Its own contact solver finds the impulses of the normal force and of friction in a
+cone, with the wall's normal at the start of the step (semi-implicit Euler, first order).
 """
 
 from __future__ import annotations
@@ -25,16 +25,16 @@ from proofroll_pybullet.world import World
 
 PROVIDES: frozenset[str] = ALL_OF_A_BALL
 INHERENT = {BallCapability.ORIENTATION: "every rigid body of PyBullet has one"}
-# Friction without bound needs a number; in double precision this one leaves the cone's other numbers their digits.
+# Coefficient that stands for unbounded friction; larger ones would cost the solver digits in double precision.
 UNBOUNDED = 1e6
-# Nearer to the cone than this is on it: what repetitions of the solver leave.
+# Part of the cone from which on a force counts as on it, given the errors of the iterative solver.
 _ON_CONE = 1 - 1e-6
 _FLAT = "for the length of a step the wall is a plane, and the first step does not yet know that it bends"
 _NUMBER = f"PyBullet's cone needs a number, here {UNBOUNDED:g}"
 
 
 class PybulletBall:
-    """See :class:`proofroll.core.engine.Engine` for the methods."""
+    """Run of a ball; see :class:`proofroll.core.engine.Engine` for the methods."""
 
     def __init__(self, body: RollingBall, settings: PybulletSettings) -> None:
         if body.contact.mu_static != body.contact.mu_kinetic:
@@ -78,11 +78,11 @@ class PybulletBall:
         for _ in range(whole_steps(self._steps * dt, t, dt)):
             self._step()
             self._steps += 1
-            if self._bounded and self._steps > 1:  # in the first step a wall that bends does not press yet
+            if self._bounded and self._steps > 1:  # in the first step a curved wall does not press yet
                 self._follow((self._steps - 1) * dt, self._steps * dt)
 
     def _step(self) -> None:
-        """One step, with the plane where the wall is now, and the moment of rolling resistance."""
+        """Makes one step: poses the plane at the wall, and applies the moment of rolling resistance."""
         p, _ = self._pose()
         surface = self._body.surface
         gap, *e1 = surface.nearby(*p)
@@ -99,7 +99,7 @@ class PybulletBall:
             self._normal_force = self._contact()[0]
 
     def _resistance(self, e1: Any) -> Any:
-        """Moment against rolling, with the normal force of the step before; no more than stops the ball [N m]."""
+        """Moment of rolling resistance [N m] with the normal force of the last step; limited so as to stop the ball."""
         ball, f = self._body.ball, self._body.contact.rolling_resistance
         v = np.array(self._velocities()[0])
         speed = float(np.linalg.norm(v))
@@ -109,7 +109,7 @@ class PybulletBall:
         return min(f * self._normal_force, most) * np.cross(e1, v) / speed
 
     def _first_normal_force(self) -> float:
-        """Normal force of a first step, which is then taken back [N]."""
+        """Normal force of a first step, which is then undone [N]."""
         state = self._world.saveState()
         self._step()
         self._world.restoreState(state)
@@ -117,7 +117,7 @@ class PybulletBall:
         return self._normal_force
 
     def _follow(self, start: float, end: float) -> None:
-        """Notes where friction begins and ceases to reach its cone [s]."""
+        """Records an event if the contact changed between stick and slip in the step from ``start`` to ``end`` [s]."""
         status = self._sticks()
         if status != self._status:
             self._events.append(Event(status, 0.5 * (start + end), start, end))
@@ -181,7 +181,7 @@ class PybulletBall:
         )
 
     def _bend(self) -> float:
-        """Most of the acceleration that the wall's bend can make at time 0, over what moves the ball there."""
+        """Bound of the acceleration from the wall's curvature at time 0, over the natural acceleration [1]."""
         body = self._body
         turning = float(np.linalg.norm(body.surface.normal_gradient(body.p0) @ body.v0))
         fastest = float(np.linalg.norm(body.v0)) + body.ball.radius * float(np.linalg.norm(body.w0))
@@ -193,8 +193,8 @@ class PybulletBall:
 
 
 def _upright(x: float, y: float, z: float) -> list[float]:
-    """A quaternion, scalar last, that turns the z axis to the opposite of this unit vector."""
-    if z > 0:  # each of the two has its pole on the other half of the sphere
+    """Quaternion, scalar last, that turns the z axis to the opposite of a unit vector."""
+    if z > 0:  # each formula is singular on the other half of the sphere only
         half = math.sqrt(0.5 * (1 + z))
         return [half, 0.0, -x / (2 * half), y / (2 * half)]
     half = math.sqrt(0.5 * (1 - z))

@@ -1,4 +1,4 @@
-"""PyBullet: contact of a ball by its own solver, and mechanisms as multibodies that its importer of URDF makes."""
+"""Engine PyBullet: a ball with its own contact solver, and mechanisms as multibodies from its importer of URDF."""
 
 from __future__ import annotations
 
@@ -47,6 +47,6 @@ class Pybullet:
 
     @staticmethod
     def build(scene: Scene, settings: PybulletSettings) -> Any:
-        """The model of the formulation."""
+        """See :class:`proofroll.core.engine.Engine`; builds a run of the formulation."""
         models = {"plane": PybulletBall, "urdf": PybulletMechanism, "spheres": PybulletSpheres}
         return models[settings.formulation].build(scene, settings)

@@ -1,6 +1,7 @@
-"""A mechanism as a multibody that PyBullet's importer of URDF makes; loops as its point-to-point constraints.
+"""A mechanism as a multibody from PyBullet's importer of URDF, with loops as point-to-point constraints.
 
-Poses of links come out of PyBullet in single precision, so bodies are placed by the joints' coordinates, which do not.
+PyBullet returns poses of links in single precision, so poses of bodies are computed from the joints' coordinates, which
+it returns in double precision.
 """
 
 from __future__ import annotations
@@ -43,11 +44,11 @@ LACKING: Mapping[str, str] = {
 }
 _TYPES = {"fixed": "fixed", "revolute": "continuous", "prismatic": "prismatic", "spherical": "spherical"}
 _ROWS = "a loop's rows are those of the step's start, and the first step does not yet know that they turn"
-_LARGE = 1e9  # of a limit that is none: force [N], speed, travel [m]
+_LARGE = 1e9  # stands for no limit: of force [N], speed, travel [m]
 
 
 class PybulletMechanism:
-    """See :class:`proofroll.core.engine.Engine` for the methods."""
+    """Run of a mechanism; see :class:`proofroll.core.engine.Engine` for the methods."""
 
     def __init__(self, mechanism: Mechanism, settings: PybulletSettings) -> None:
         for body in mechanism.bodies:
@@ -59,7 +60,7 @@ class PybulletMechanism:
         with tempfile.TemporaryDirectory() as folder:
             file = Path(folder) / "mechanism.urdf"
             file.write_text(urdf(mechanism), encoding="utf-8")
-            flags = self._world.URDF_USE_INERTIA_FROM_FILE  # else it weighs collision shapes, of which there are none
+            flags = self._world.URDF_USE_INERTIA_FROM_FILE  # else it computes inertias from collision shapes
             self._robot = self._world.loadURDF(str(file), useFixedBase=True, flags=flags)
         count = self._world.getNumJoints(self._robot)
         told = [self._world.getJointInfo(self._robot, index) for index in range(count)]
@@ -91,7 +92,7 @@ class PybulletMechanism:
         return cls(mechanism_of(scene), settings)
 
     def _start(self, joint: Joint, index: int) -> None:
-        """Puts a joint where it starts, without the motor that PyBullet gives it to hold it."""
+        """Sets the initial state of a joint, and removes PyBullet's default motor that holds it."""
         robot = self._robot
         if self._settings.preset == "matched":
             self._world.changeDynamics(
@@ -99,7 +100,7 @@ class PybulletMechanism:
             )  # fmt: skip
         if joint.nv == 1:
             self._world.resetJointState(robot, index, joint.q0[0], joint.v0[0])
-            # a motor that wants rest with no more than a force is dry friction; that of a URDF is read and not used
+            # a velocity motor with target 0 and bounded force is dry friction; PyBullet ignores that of a URDF
             self._world.setJointMotorControl2(robot, index, self._world.VELOCITY_CONTROL, force=joint.friction)
         elif joint.nv == 3:
             q = [*joint.q0[1:], joint.q0[0]]
@@ -110,7 +111,7 @@ class PybulletMechanism:
             )  # fmt: skip
 
     def _from_com(self, body: str, position: Any) -> list[float]:
-        """A point of a body against its centre of mass, as PyBullet wants pivots."""
+        """Position of a point relative to the body's centre of mass [m], as PyBullet needs pivots."""
         if body == WORLD:
             return list(position)
         return list(np.array(position) - self._mechanism.bodies[self._mechanism.body_index[body]].com)
@@ -145,13 +146,13 @@ class PybulletMechanism:
         return np.array(q), np.array(v)
 
     def sample(self) -> MechanismSample:
-        """See :class:`proofroll.core.engine.Engine`; PyBullet's reactions of chains are not those, so none is given."""
+        """See :class:`proofroll.core.engine.Engine`; no reactions, for PyBullet's are wrong in chains of links."""
         motion = self._tree.at(*self._state())
         turned = np.array([to_quaternion(R) for R in motion.R_WB[:-1]])
         return MechanismSample(motion.p_WB[:-1], motion.v_WB[:-1], motion.w_WB[:-1], turned, effort=self._efforts())
 
     def _efforts(self) -> Any:
-        """Efforts of the actuators at the present state, which the next step has; None: there are none."""
+        """Efforts of the actuators in the present state, applied in the next step; None: there are no actuators."""
         (q, v), mechanism = self._state(), self._mechanism
         places = [(item, *mechanism.place_of(item.joint)) for item in mechanism.actuators]
         now = self._steps * self._settings.dt
@@ -177,7 +178,7 @@ class PybulletMechanism:
 
 
 def urdf(mechanism: Mechanism) -> str:
-    """The bodies and joints as a URDF, whose links have their frames where their joints are, along the bodies' axes."""
+    """URDF of the bodies and joints; a link has its frame at its joint, with the body's axes."""
     base = {WORLD: np.zeros(3)} | {
         body.name: np.array(_joint_of(mechanism, body).child_position) for body in mechanism.bodies
     }

@@ -1,4 +1,4 @@
-"""PyBullet's own importer of URDF, the multibody read back."""
+"""PyBullet's own importer of URDF, with the multibody read back."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 from proofroll.robots.model import Array, RobotBody, composed
 from proofroll.robots.protocol import AtState, Reading, Request, evaluate
 
-# One step of semi-implicit Euler shows the acceleration at its start exactly, whatever its length [s].
+# Step [s] from which accelerations are read: semi-implicit Euler gives that at its start exactly, for any step.
 _STEP = 1e-2
 
 
@@ -24,8 +24,8 @@ class PybulletRobots:
         "inertia_from_file": "take inertias from the file, not from collision shapes (default here: true)",
         "merge_fixed": "merge links at fixed joints into their parents",
     }
-    # Poses of links come out in single precision, and so do those of fixed joints; its own inertias are diagonalised by
-    # a method that stops at 1e-10; accelerations are differences over one step.
+    # PyBullet returns poses of links and of fixed joints in single precision, diagonalises inertias by a method that
+    # stops at 1e-10, and accelerations are differences over one step.
     tolerances: ClassVar[Mapping[str, float]] = {
         "kinematics": 5e-6,
         "bodies": 1e-6,
@@ -42,7 +42,10 @@ class PybulletRobots:
         return importlib.metadata.version("pybullet")
 
     def read(self, request: Request) -> Reading:
-        """The multibody, evaluated; with a free base, where its inverse dynamics damage memory, from single steps."""
+        """See :class:`proofroll.robots.protocol.RobotReader`.
+
+        With a free base, PyBullet's inverse dynamics corrupts memory, so all terms come from single steps.
+        """
         robot = _Loaded(request)
         frames: dict[str, list[tuple[Array, Array]]] = {name: [] for name in robot.link}
         arrays = evaluate(request, robot.joints, robot.dofs, lambda k: robot.at(k, frames))
@@ -101,16 +104,16 @@ class _Loaded:
         self.names = names
 
     def mass_matrix(self, q: Array) -> Array:
-        """The mass matrix; a free base has the axes of its principal frame at its centre of mass, rotation first."""
+        """Mass matrix; velocities of a free base are at its centre of mass in principal axes, rotation first."""
         return np.array(self.p.calculateMassMatrix(self.body, list(q)))
 
     def inertial(self, index: int) -> tuple[float, Array, Array, Array]:
-        """Mass, principal moments, position and rotation of the principal frame in the link's."""
+        """Mass [kg], principal moments [kg m²], position [m] and rotation of a link's principal frame in its own."""
         info = self.p.getDynamicsInfo(self.body, index)
         return float(info[0]), np.array(info[2]), np.array(info[3]), _matrix(info[4])
 
     def at(self, k: int, frames: dict[str, list[tuple[Array, Array]]]) -> AtState:
-        """One state."""
+        """Terms of the multibody in state ``k``; adds the poses of links to ``frames``."""
         states = self.request.states
         q = np.array([states.angle[name][k] if name in states.angle else 0.0 for name in self.names])
         v = np.array([states.velocity[name][k][0] if name in states.velocity else 0.0 for name in self.names])
@@ -149,7 +152,10 @@ class _Loaded:
         )
 
     def put(self, q: Array, v: Array, pose: Any, rate: Array | None) -> None:
-        """Puts the multibody into a state; the base is placed by its principal frame."""
+        """Sets the state: joint coordinates ``q`` and rates ``v``, and for a free base its pose and velocity.
+
+        ``pose``: position and rotation of its principal frame, and vector from its origin to the centre of mass [m].
+        """
         if pose is not None and rate is not None:
             place, turned, r = pose
             quaternion = Rotation.from_matrix(turned).as_quat()
@@ -161,7 +167,7 @@ class _Loaded:
     def stepped(
         self, q: Array, v: Array, pose: Any, rate: Array | None, torque: Array, T: Array, drift: Array, *, damped: bool
     ) -> Array:
-        """Acceleration in the engine's velocities, from the velocities after one step."""
+        """Accelerations in the engine's velocities, from the change of velocities over one step."""
         self.put(q, v, pose, rate)
         for index, damping in self.damping.items():
             self.p.changeDynamics(self.body, index, jointDamping=damping if damped else 0.0)
@@ -184,7 +190,7 @@ class _Loaded:
         return np.asarray(T @ np.concatenate([origin, spin, found]) + drift)
 
     def frame(self, index: int) -> tuple[Array, Array]:
-        """Frame of a link in the world."""
+        """Position and rotation of a link's frame in the world."""
         if index >= 0:
             state = self.p.getLinkState(self.body, index, computeForwardKinematics=1)
             return np.array(state[4]), _matrix(state[5])
@@ -194,7 +200,7 @@ class _Loaded:
         return np.array(place) - R @ c, R
 
     def groups(self) -> dict[str, RobotBody]:
-        """Bodies that each moving joint carries rigidly."""
+        """Moving joint -> composite of the bodies that it carries rigidly."""
         homes = {index: (index, np.zeros(3), np.eye(3)) for index in (-1, *self.indices)}
         parts: dict[int, list[tuple[RobotBody, Array, Array]]] = {index: [] for index in homes}
         for index in range(-1, len(self.parents)):

@@ -20,7 +20,7 @@ class PybulletSettings:
             ``spheres``, free bodies with spheres that touch.
         preset: ``default``: PyBullet's own options and its own step; ``matched``: no damping, slack or bound on spin.
         dt: step [s].
-        iterations: of the solver of contacts and loops.
+        iterations: iterations of the solver of contacts and loops.
     """
 
     formulation: Literal["plane", "urdf", "spheres"] = "plane"
@@ -33,7 +33,7 @@ class PybulletSettings:
 
     @property
     def order(self) -> int | None:
-        """Order of semi-implicit Euler; none is declared where springs and slack of fixed size are in the way."""
+        """Order of semi-implicit Euler; None for PyBullet's defaults, whose damping and slack do not shrink with dt."""
         return 1 if self.preset == "matched" else None
 
 

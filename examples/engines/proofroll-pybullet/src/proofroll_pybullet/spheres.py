@@ -1,4 +1,4 @@
-"""Free bodies whose spheres touch a plane or each other, by PyBullet's own contact and its cone of friction."""
+"""Free bodies with spheres that touch a plane or each other, by PyBullet's own contacts with a cone of friction."""
 
 from __future__ import annotations
 
@@ -26,15 +26,15 @@ _ALONE = "its bodies are free ones, each with its spheres"
 LACKING: Mapping[str, str] = {
     str(name): _ALONE for name in (_CAPABILITY.REVOLUTE, _CAPABILITY.PRISMATIC, _CAPABILITY.PLANAR)
 }
-# Of accelerations where three feet slide: their friction is some ten degrees off the slip.
+# Relative tolerance of accelerations where three feet slide: their friction is some ten degrees off the slip.
 _ASIDE, _TURNED = 0.1, "each row of friction is found by its own response, so that it is not against the slip"
-_LARGE = 1e6  # rad/s: a bound of spin that is none
-_NEAR = 1e-6  # m: what is further apart does not touch yet
-_SLOW = 1e-6  # m/s: approaches above it rebound
+_LARGE = 1e6  # rad/s: stands for no bound of the angular velocity
+_NEAR = 1e-6  # m: largest gap at which bodies count as touching
+_SLOW = 1e-6  # m/s: speed of approach above which bodies rebound
 
 
 class PybulletSpheres:
-    """See :class:`proofroll.core.engine.Engine` for the methods."""
+    """Run of free bodies with spheres; see :class:`proofroll.core.engine.Engine` for the methods."""
 
     def __init__(self, mechanism: Mechanism, settings: PybulletSettings) -> None:
         self._mechanism, self._settings, self._steps = mechanism, settings, 0
@@ -48,11 +48,11 @@ class PybulletSpheres:
             raise Refused("only bodies that touch are built")
         if len(laws) > 1:
             raise Refused("PyBullet multiplies coefficients of two bodies; pairs with laws of their own are not built")
-        self._law = [math.sqrt(value) for value in laws.pop()]  # of each of two bodies
+        self._law = [math.sqrt(value) for value in laws.pop()]  # PyBullet multiplies the coefficients of two bodies
         self._world = World(mechanism.gravity, settings)
         if settings.preset == "matched":
             self._world.setPhysicsEngineParameter(restitutionVelocityThreshold=_SLOW, enableConeFriction=1)
-            if self._law[1]:  # what is left of a gap would be taken off a rebound, and what closes it added
+            if self._law[1]:  # corrections of gap and depth would change the speed of a rebound
                 self._world.setPhysicsEngineParameter(contactERP=0, contactBreakingThreshold=_NEAR)
         self._item = {WORLD: self._floor([each for pair in pairs for each in pair if each.kind == "plane"])}
         for body, joint in zip(mechanism.bodies, mechanism.joints, strict=True):
@@ -75,7 +75,7 @@ class PybulletSpheres:
         return int(item)
 
     def _body(self, body: Any, joint: Any) -> int:
-        """A body at its centre of mass along its principal axes, with its spheres."""
+        """Adds a body with its spheres; in PyBullet its frame is at the centre of mass along the principal axes."""
         moments, axes = np.linalg.eigh(body.inertia)
         axes[:, 2] *= np.linalg.det(axes)
         self._axes = {**getattr(self, "_axes", {}), body.name: axes}
@@ -119,12 +119,12 @@ class PybulletSpheres:
         return p, v, w, q
 
     def sample(self) -> MechanismSample:
-        """See :class:`proofroll.core.engine.Engine`; forces are those of the last step, none before it."""
+        """See :class:`proofroll.core.engine.Engine`; contact forces are those of the last step, none at time 0."""
         p, v, w, q = self._poses()
         return MechanismSample(p, v, w, q, contact_force=self._forces(p, q) if self._steps else None)
 
     def _forces(self, p: Any, q: Any) -> Any:
-        """Forces on the first body of each pair [N]; a point of contact belongs to the sphere that is nearest."""
+        """Forces on the first body of each pair [N], shape (pairs, 3); a contact point is of the nearest sphere."""
         index = {body.name: k for k, body in enumerate(self._mechanism.bodies)}
         force = np.zeros((len(self._mechanism.pairs), 3))
         pairs = [[self._geometries[name] for name in pair.geometries] for pair in self._mechanism.pairs]

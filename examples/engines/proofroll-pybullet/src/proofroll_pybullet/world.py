@@ -1,4 +1,4 @@
-"""PyBullet's functions and constants for one model."""
+"""PyBullet's functions and constants, bound to one physics server."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from proofroll_pybullet.settings import PybulletSettings
 
 
 class World:
-    """World of its own with the functions of the module ``pybullet``; it ends with this object."""
+    """A physics server of its own, with the functions of the module ``pybullet``; disconnects with this object."""
 
     def __init__(self, gravity: Sequence[float], settings: PybulletSettings) -> None:
         self._number = pybullet.connect(pybullet.DIRECT)
@@ -23,7 +23,7 @@ class World:
         self.setGravity(*gravity)
         self.setTimeStep(settings.dt)
         self.setPhysicsEngineParameter(numSolverIterations=settings.iterations, enableFileCaching=0)
-        if settings.preset == "matched":  # nothing is soft, and nothing is corrected in two ways
+        if settings.preset == "matched":  # hard contacts and constraints, errors corrected fully in each step
             self.setPhysicsEngineParameter(
                 erp=1, contactERP=1, frictionERP=0, contactSlop=0, globalCFM=0, useSplitImpulse=0,
                 solverResidualThreshold=0,
@@ -34,7 +34,7 @@ class World:
         return functools.partial(found, physicsClientId=self._number) if callable(found) else found
 
     def gravity(self) -> Any:
-        """Gravity as PyBullet has it [m/s²], shape (3,)."""
+        """Gravity read back from PyBullet [m/s²], shape (3,)."""
         told = self.getPhysicsEngineParameters()
         return np.array([told[f"gravityAcceleration{axis}"] for axis in "XYZ"])
 
