@@ -253,6 +253,6 @@ def _centre(body: RollingBall, distance: float) -> FloatArray:
 def _back(gap: float, distance: float) -> float:
     """Coordinate along e1 of the hollow sphere's centre from the ball's [m].
 
-    At most -``distance``/2: the sphere does not follow a ball that is further from the wall than that.
+    At most -``distance``/2: beyond a gap of ``distance``/2 the sphere follows the ball, not the wall.
     """
     return min(gap, 0.5 * distance) - distance

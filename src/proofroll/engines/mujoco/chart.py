@@ -1,4 +1,4 @@
-"""The ball on joints that follow the surface's coordinates, in real contact with a plane that follows it."""
+"""Formulation ``chart``: a ball on joints along the surface's coordinates, in MuJoCo's contact with a tangent plane."""
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager

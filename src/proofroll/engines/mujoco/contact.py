@@ -64,8 +64,8 @@ class Resistance:
 
     Attributes:
         f: distance by which the normal force is shifted forward [m].
-        stopping: torque that takes 1 m/s from a ball that rolls within a step: (1 + κ) m a / dt [N s].
-        pull: velocity that gravity adds to a rolling ball within a step: dt g / (1 + κ) [m/s].
+        stopping: torque that slows a rolling ball by 1 m/s in one step: (1 + κ) m a / dt [N s].
+        pull: velocity that gravity adds to a rolling ball in one step: dt g / (1 + κ) [m/s].
     """
 
     f: float
@@ -103,9 +103,10 @@ class Resistance:
         torque[2] = scale * (v0 * e1_ - v1 * e0)
 
     def stop(self, torque: Any, N: float, e1: Sequence[float], v: Sequence[float]) -> None:
-        """Writes the torque (see :meth:`apply`) on a ball of velocity ``v`` [m/s] that it stops within this step.
+        """Writes the torque into ``torque`` for a ball so slow that the whole torque would stop it within this step.
 
-        The torque is at most the one that brings the ball to rest at the end of the step: more would reverse it.
+        Limited to the torque that brings the ball to rest at the end of the step: more would reverse it. Arguments as
+        in :meth:`apply`.
         """
         inward = sum(pull * normal for pull, normal in zip(self.pull, e1, strict=True))
         free = [rate + pull - inward * normal for rate, pull, normal in zip(v, self.pull, e1, strict=True)]

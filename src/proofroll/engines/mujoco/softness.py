@@ -81,9 +81,9 @@ def softness(body: RollingBall, settings: MujocoSettings) -> Mapping[str, Regula
 def _dynamics(body: RollingBall, settings: MujocoSettings, soft: float, why: str) -> dict[str, Regularised]:
     """Tolerances of accelerations and forces; ``soft`` is that of the centre, relative to the natural acceleration.
 
-    An error of friction changes the angular acceleration, times a, by m a²/J times as much as the acceleration. Rolling
-    resistance lengthens the lever a by f. A contact's own friction against turning and rolling adds moments of at most
-    N times the coefficient.
+    An error F of friction changes the acceleration by F/m, and a times the angular acceleration by a² F/J: m a²/J times
+    as much. Rolling resistance adds f to the lever a. A contact's own friction against turning and rolling adds moments
+    of at most N times the coefficient.
     """
     a = body.ball.radius
     turning = soft * (1 + body.contact.rolling_resistance / a) / body.ball.inertia_ratio

@@ -154,7 +154,7 @@ class _Loaded:
     def put(self, q: Array, v: Array, pose: Any, rate: Array | None) -> None:
         """Sets the state: joint coordinates ``q`` and rates ``v``, and for a free base its pose and velocity.
 
-        ``pose``: position and rotation of its principal frame, and vector from its origin to the centre of mass [m].
+        ``pose`` of the base: position and rotation of its principal frame, and vector from the link's origin there [m].
         """
         if pose is not None and rate is not None:
             place, turned, r = pose
