@@ -106,9 +106,10 @@ def new_cluster(scheduler: str | None) -> Cluster | None:
 
 @contextmanager
 def progress_bar(what: str, total: int | None = None) -> Iterator[Callable[..., None]]:
-    """Context manager with a progress bar on standard error, which yields a function of a description and a count (1).
+    """Context manager with a progress bar on standard error.
 
-    If standard error is no terminal, or nothing may move there, it prints a line every few seconds instead.
+    It yields a function to be called with a description and, if not 1, a count. If standard error is no terminal, or
+    nothing may move there, it prints a line every few seconds instead.
     """
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, Task, TextColumn, TimeElapsedColumn
     from rich.text import Text

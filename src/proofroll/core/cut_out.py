@@ -145,7 +145,7 @@ class CutOut:
         return [part for part in node.body if (name := _optional(part)) and name not in self.attributes]
 
     def _order(self, place: _Place, ordered: dict[_Place, None], begun: set[_Place]) -> None:
-        """Adds a definition after what it needs."""
+        """Appends a definition to the order, after all that it needs."""
         if place in begun:
             return
         begun.add(place)

@@ -287,7 +287,7 @@ def _counted(budget: TimeBudget | None, worker: Worker, case: Case, limit: float
 
 
 def ended(case: Case, status: Status, error: ProofrollError) -> Result:
-    """Result of a case whose worker gave none, from the error."""
+    """Result of a case without an answer of its worker; the error is its message."""
     return Result(status, str(error), versions={plain_name(case.engine.name): case.engine.version})
 
 

@@ -19,7 +19,10 @@ _PACE = 0.25
 
 
 def _comparable(time: FloatArray, said: FloatArray, true: FloatArray) -> tuple[FloatArray, FloatArray] | None:
-    """Components that are finite in all samples of both, each of shape (time, components); None: too few samples."""
+    """Components of both arrays that are finite in all samples, each of shape (time, components).
+
+    None if there are too few samples or no such component.
+    """
     if len(time) < _FEWEST:
         return None
     flat, held = said.reshape(len(time), -1), true.reshape(len(time), -1)

@@ -140,7 +140,7 @@ class Residuals(Generic[M]):
         return float(np.max(np.abs(self.left(model)), initial=0.0))
 
     def fit(self, model: Callable[[float], M | None], start: float) -> float:
-        """Parameter of a family of models with the smallest residual."""
+        """Value of the free parameter for which the residual is smallest, in a family of models."""
         return fitted(lambda x: self.left(model(x)), start, 1.0)
 
     def cause(self, name: str, says: str, model: M | None, remedy: str, number: int, change: float = np.inf) -> Cause:
