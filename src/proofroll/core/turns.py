@@ -107,10 +107,10 @@ def on_turns_of(
         None if the observable depends on turns without being periodic, so that no comparison is possible (the energy of
             a spring that turns wind up).
     """
-    said = [run[name].attrs for run in datasets if name in run and UNCERTAIN in run[name].attrs]
-    if not said or other is None or values.shape != other.shape:
+    marked = [run[name].attrs for run in datasets if name in run and UNCERTAIN in run[name].attrs]
+    if not marked or other is None or values.shape != other.shape:
         return values
-    if PERIOD not in said[0]:
+    if PERIOD not in marked[0]:
         return None
-    period = float(said[0][PERIOD])
+    period = float(marked[0][PERIOD])
     return np.asarray(values + period * np.round((other - values) / period))

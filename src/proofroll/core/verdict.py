@@ -225,8 +225,10 @@ def _read(limit: Limit, error: float, tolerance: float, truth_bar: float, round_
         finding = LimitResult.ANOTHER
     shown = limit.shown or limit.error_bar <= _SHOWN_WRONG * round_off
     wrong = shown and finding == LimitResult.WITHIN and error > _SHOWN_WRONG * (bar + round_off) + limit.beside
-    told = f"no order{' shows in single precision' if limit.rounded else ''}" if order is None else f"order {order:.3g}"
-    text = f"off by {number(error)} ± {number(bar, 1)}{unit}, {told}"
+    shown_order = (
+        f"no order{' shows in single precision' if limit.rounded else ''}" if order is None else f"order {order:.3g}"
+    )
+    text = f"off by {number(error)} ± {number(bar, 1)}{unit}, {shown_order}"
     if not np.isfinite(error):
         text = "it has not as many values as the truth"
     elif limit.beside > bar:

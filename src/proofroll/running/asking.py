@@ -66,11 +66,13 @@ def described(engines: Iterable[str], workers: Workers | None = None) -> dict[st
     """Description of each engine, or the error that prevented it."""
     names = list(dict.fromkeys(engines))
     descriptions: dict[str, EngineDescription | ProofrollError] = {}
-    for name, told in zip(names, _answers([(n, {"do": "describe", "engine": n}) for n in names], workers), strict=True):
-        if isinstance(told, ProofrollError):
-            descriptions[name] = told
+    for name, answer in zip(
+        names, _answers([(n, {"do": "describe", "engine": n}) for n in names], workers), strict=True
+    ):
+        if isinstance(answer, ProofrollError):
+            descriptions[name] = answer
         else:
-            descriptions[name] = EngineDescription(**{**told, "terms": [Term(**term) for term in told["terms"]]})
+            descriptions[name] = EngineDescription(**{**answer, "terms": [Term(**term) for term in answer["terms"]]})
     return descriptions
 
 
@@ -86,7 +88,7 @@ def resolve(
     common = {"do": "resolve", "requires": sorted(requires)}
     requests = [(name, {**common, "engine": name, "options": dict(options)}) for name, options in engines]
     answers = _answers(requests, workers)
-    return [told if isinstance(told, ProofrollError) else EngineFacts(**told) for told in answers]
+    return [answer if isinstance(answer, ProofrollError) else EngineFacts(**answer) for answer in answers]
 
 
 def resolve_with_truth(
@@ -121,8 +123,8 @@ def programs(cases: Sequence[Case], workers: Workers | None = None) -> list[tupl
     Returns:
         For each case the text, or None and the reason.
     """
-    told = _answers([_to_write(case, "reproducer") for case in cases], workers)
-    return [(None, str(a)) if isinstance(a, ProofrollError) else (a.get("text"), a.get("message", "")) for a in told]
+    answers = _answers([_to_write(case, "reproducer") for case in cases], workers)
+    return [(None, str(a)) if isinstance(a, ProofrollError) else (a.get("text"), a.get("message", "")) for a in answers]
 
 
 def model_file(case: Case) -> str:

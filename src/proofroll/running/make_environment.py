@@ -150,8 +150,8 @@ def _made(
     try:
         version = describe(f"{name}@{python}").version
     except ProofrollError as error:
-        said = str(error).replace(f"{name}@{python}: ", "")
-        raise ProofrollError(f"{name} does not work with {', '.join(requirements)}: {said}") from None
+        reason = str(error).replace(f"{name}@{python}: ", "")
+        raise ProofrollError(f"{name} does not work with {', '.join(requirements)}: {reason}") from None
     interpreter, packages = json.loads(_call([python, "-c", _PACKAGES]))
     return Environment(name, label, folder, version, list(requirements), interpreter, packages)
 
@@ -188,10 +188,10 @@ def _interpreter(python: str) -> Path:
         raise InputError("--python", python, "there is no such program; give the command or the path of a Python")
     try:
         # A command may be a script around the real one, as pyenv's are.
-        told = _call(
+        output = _call(
             [program, "-c", "import sys; print(sys.executable); print(sys.version_info[0], sys.version_info[1])"]
         )
-        executable, version = told.splitlines()[-2:]
+        executable, version = output.splitlines()[-2:]
         numbers = tuple(map(int, version.split()))
     except (ProofrollError, ValueError) as error:
         raise InputError("--python", python, f"it does not run as a Python: {error}") from None

@@ -114,8 +114,8 @@ def read_finding(path: Path) -> EngineFinding:
     for name in names:
         if not isinstance(front.get(name), str):
             raise InputError(f"{path}: {name}", front.get(name), "give a text; it may be empty")
-    told = {name: front[name] for name in names}
-    return EngineFinding(name=path.stem, **told, text=_PROGRAM.sub("", parts[2]).strip(), program=programs[0])
+    texts = {name: front[name] for name in names}
+    return EngineFinding(name=path.stem, **texts, text=_PROGRAM.sub("", parts[2]).strip(), program=programs[0])
 
 
 def shown(findings: Sequence[EngineFinding], python: str = "", time_limit: float = 300.0) -> Iterator[Shown]:
@@ -141,9 +141,9 @@ def shown(findings: Sequence[EngineFinding], python: str = "", time_limit: float
         with tempfile.TemporaryDirectory() as folder:
             file = Path(folder) / f"{item.name}.py"
             file.write_text(item.program, encoding="utf-8")
-            code, said = _run([interpreter, str(file)], time_limit, folder)
+            code, output = _run([interpreter, str(file)], time_limit, folder)
         state = {SHOWS: FindingState.SHOWS, 0: FindingState.GONE}.get(code, FindingState.BROKEN)
-        yield Shown(item, state, versions[item.package], (said.strip().splitlines() or [""])[-1])
+        yield Shown(item, state, versions[item.package], (output.strip().splitlines() or [""])[-1])
 
 
 def _run(command: list[str], time_limit: float, folder: str | None = None) -> tuple[int, str]:

@@ -43,7 +43,7 @@ def test_a_statement_stands_once_with_what_it_is() -> None:
     text = CutOut([cross], []).text
     assert text.count("_NEXT, _LAST = ") == 1
     assert "Cross products of two vectors" in text
-    assert "# No smooth motion needs such steps." in CutOut([StepWatch], ["took"]).text
+    assert "# A step is tiny below this part of the largest;" in CutOut([StepWatch], ["took"]).text
 
 
 def test_of_docstrings_the_first_line_is_kept() -> None:

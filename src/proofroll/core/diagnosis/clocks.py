@@ -18,26 +18,26 @@ _SHIFTS = 6
 _PACE = 0.25
 
 
-def _comparable(time: FloatArray, said: FloatArray, true: FloatArray) -> tuple[FloatArray, FloatArray] | None:
+def _comparable(time: FloatArray, reported: FloatArray, true: FloatArray) -> tuple[FloatArray, FloatArray] | None:
     """Components of both arrays that are finite in all samples, each of shape (time, components).
 
     None if there are too few samples or no such component.
     """
     if len(time) < _FEWEST:
         return None
-    flat, held = said.reshape(len(time), -1), true.reshape(len(time), -1)
+    flat, held = reported.reshape(len(time), -1), true.reshape(len(time), -1)
     known = np.isfinite(flat).all(0) & np.isfinite(held).all(0)
     return (flat[:, known], held[:, known]) if known.any() else None
 
 
-def late(time: FloatArray, said: FloatArray, true: FloatArray) -> tuple[float, float, float] | None:
+def late(time: FloatArray, reported: FloatArray, true: FloatArray) -> tuple[float, float, float] | None:
     """Delay of the reported values [s], and the largest difference before and after correction.
 
     None if there are too few samples.
     """
     from scipy.interpolate import make_interp_spline
 
-    comparable = _comparable(time, said, true)
+    comparable = _comparable(time, reported, true)
     if comparable is None:
         return None
     flat, held = comparable
@@ -55,14 +55,14 @@ def late(time: FloatArray, said: FloatArray, true: FloatArray) -> tuple[float, f
     return delay, apart(flat, held[inner]), apart(flat, curve(time[inner] - delay))
 
 
-def stretched(time: FloatArray, said: FloatArray, true: FloatArray) -> tuple[float, float, float] | None:
+def stretched(time: FloatArray, reported: FloatArray, true: FloatArray) -> tuple[float, float, float] | None:
     """Factor of the engine's clock, and the largest difference before and after correction.
 
     None if there are too few samples.
     """
     from scipy.interpolate import make_interp_spline
 
-    comparable = _comparable(time, said, true)
+    comparable = _comparable(time, reported, true)
     if comparable is None:
         return None
     since = time - time[0]

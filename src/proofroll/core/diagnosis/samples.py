@@ -52,10 +52,10 @@ def single_precision_run(evidence: Evidence) -> Iterator[Cause]:
     said_so = any(str(line["because"]).endswith(ROUNDED) for line in evidence.lines)  # what is declared is no finding
     if run is None or truth is None or said_so:
         return
-    told = [run[name].to_numpy() for name in REQUIRED]
-    if all(in_single_precision(said) for said in told):
+    required = [run[name].to_numpy() for name in REQUIRED]
+    if all(in_single_precision(reported) for reported in required):
         true, says = truth[REQUIRED[0]].to_numpy(), "every number of the run is a single-precision one (float32)"
-        before = apart(told[0], true) if told[0].shape == true.shape else np.inf
+        before = apart(required[0], true) if required[0].shape == true.shape else np.inf
         yield Cause("float32", says, REQUIRED[0], "m", before, 0.0, "compute and report in double precision")
 
 
@@ -74,19 +74,19 @@ def another_clock(state: Callable[[Any, xr.Dataset], FloatArray], covers: tuple[
         pair = both(evidence)
         if pair is None:
             return
-        said, true = (state(evidence.element, data) for data in pair)
-        if said.shape != true.shape or not above_round_off(apart(said, true), float(np.max(np.abs(true)))):
+        reported, true = (state(evidence.element, data) for data in pair)
+        if reported.shape != true.shape or not above_round_off(apart(reported, true), float(np.max(np.abs(true)))):
             return
-        time, weights = pair[1]["time"].to_numpy(), _alike(said, true)
-        said, true = said * weights, true * weights
-        moved = late(time, said, true)
+        time, weights = pair[1]["time"].to_numpy(), _alike(reported, true)
+        reported, true = reported * weights, true * weights
+        moved = late(time, reported, true)
         if moved is not None:
             delay, before, after = moved
             says = f"every sample is {said_delay(delay, evidence.step)}: the motion is right at another time"
             remedy = "advance(t) has to end at t, neither a step before nor after it"
             change = in_steps(delay, evidence.step)
             yield Cause("late", says, "state", "m", before, after, remedy, 1, covers, _CLOCK, change=change)
-        paced = stretched(time, said, true)
+        paced = stretched(time, reported, true)
         if paced is not None:
             rate, before, after = paced
             says = f"the engine's time runs {rate:.6g} times as fast as it says: the motion is right at other times"
@@ -108,9 +108,9 @@ _STILL = 1e-3
 _OF_BOTH = ("frame.", "axes.", "centre of mass.")
 
 
-def _alike(said: FloatArray, true: FloatArray) -> FloatArray:
+def _alike(reported: FloatArray, true: FloatArray) -> FloatArray:
     """Weights that scale all parts of a state to the same largest error: speeds must not hide wrong positions."""
-    off = np.abs(said - true).reshape(-1, said.shape[-1]).max(axis=0)
+    off = np.abs(reported - true).reshape(-1, reported.shape[-1]).max(axis=0)
     largest = float(np.max(off))
     return np.where(off > _PART * largest, largest / np.maximum(off, _PART * largest), 1.0)
 
@@ -144,10 +144,10 @@ def reported_vectors(
         run, truth = pair
         time, own = truth["time"].to_numpy(), frames(evidence)
         for name, (what, unit) in units.items():
-            said, true, size = run[name].to_numpy(), truth[name].to_numpy(), least(evidence.element, name)
-            told = Reported(name, what, unit, said, true, time, own, size).after_start()
+            reported, true, size = run[name].to_numpy(), truth[name].to_numpy(), least(evidence.element, name)
+            vector = Reported(name, what, unit, reported, true, time, own, size).after_start()
             moves, turns = moves_otherwise(evidence, name), moves_otherwise(evidence, name, "q_WB", "w_WB")
-            for cause in (*told.causes(evidence.step), *besides(told, evidence)):
+            for cause in (*vector.causes(evidence.step), *besides(vector, evidence)):
                 if not (turns if name != "w_WB" and cause.id.startswith(_OF_BOTH) else moves):
                     yield cause
 
@@ -171,8 +171,8 @@ def _departure(evidence: Evidence, name: str) -> float:
     run, truth, element = evidence.run, evidence.truth, evidence.element
     if run is None or truth is None or name not in run or name not in truth or run[name].shape != truth[name].shape:
         return 0.0
-    said, true = run[name].to_numpy(), truth[name].to_numpy()
-    off = _turned(said, true) if name == "q_WB" else apart(said, true)
+    reported, true = run[name].to_numpy(), truth[name].to_numpy()
+    off = _turned(reported, true) if name == "q_WB" else apart(reported, true)
     length, time = element.length, element.natural_time
     natural = {"p_WB": length, "v_WB": length / time, "w_WB": 1 / time, "q_WB": 1.0}[name]
     return off / max(apart(true, np.broadcast_to(true[:1], true.shape)), float(_STILL * natural))
@@ -189,17 +189,20 @@ def reported_quaternions(true_ones: Callable[[Evidence], FloatArray]) -> Hypothe
         pair = both(evidence)
         if pair is None or "q_WB" not in pair[0]:
             return
-        said, true = pair[0]["q_WB"].to_numpy(), true_ones(evidence)
-        if said.shape != true.shape or moves_otherwise(evidence, "q_WB"):
+        reported, true = pair[0]["q_WB"].to_numpy(), true_ones(evidence)
+        if reported.shape != true.shape or moves_otherwise(evidence, "q_WB"):
             return
-        if len(said) > 1 and apart(np.abs(said[0]), np.abs(true[0])) < _START:
-            said, true = said[1:], true[1:]  # an engine may give at time 0 what it was given
-        before = _turned(said, true)
+        if len(reported) > 1 and apart(np.abs(reported[0]), np.abs(true[0])) < _START:
+            reported, true = reported[1:], true[1:]  # an engine may give at time 0 what it was given
+        before = _turned(reported, true)
         if not above_round_off(before, 1.0):
             return
         for says, after in (
-            ("q_WB has its scalar last", _turned(said, true[..., [1, 2, 3, 0]])),
-            ("q_WB is that of the inverse rotation, of the world in the body", _turned(said, true * [1, -1, -1, -1])),
+            ("q_WB has its scalar last", _turned(reported, true[..., [1, 2, 3, 0]])),
+            (
+                "q_WB is that of the inverse rotation, of the world in the body",
+                _turned(reported, true * [1, -1, -1, -1]),
+            ),
         ):
             remedy = "give a unit quaternion of the body, scalar first"
             yield Cause("quaternion", says, "q_WB", "1", before, after, remedy)
@@ -207,10 +210,10 @@ def reported_quaternions(true_ones: Callable[[Evidence], FloatArray]) -> Hypothe
     return test
 
 
-def _turned(said: FloatArray, other: FloatArray) -> float:
+def _turned(reported: FloatArray, other: FloatArray) -> float:
     """Largest difference of quaternions, up to their signs."""
-    signs = np.where(np.sum(said * other, axis=-1, keepdims=True) < 0, -1.0, 1.0)
-    return apart(said * signs, other)
+    signs = np.where(np.sum(reported * other, axis=-1, keepdims=True) < 0, -1.0, 1.0)
+    return apart(reported * signs, other)
 
 
 def at_start(frames_of: Callable[[Any], Mapping[str, FloatArray]], follows: frozenset[str]) -> Hypothesis:
@@ -231,10 +234,12 @@ def at_start(frames_of: Callable[[Any], Mapping[str, FloatArray]], follows: froz
             for name, what, unit in vectors:
                 if name not in wrong or not set(wrong) <= others | {name}:
                     continue
-                said, true = (np.reshape(wrong[name][key], (-1, 3)) for key in ("found", "expected"))
-                if said.shape != true.shape:
+                reported, true = (np.reshape(wrong[name][key], (-1, 3)) for key in ("found", "expected"))
+                if reported.shape != true.shape:
                     continue
                 frames = {key: frame[None] for key, frame in frames_of(evidence.element).items()}
-                yield from Reported(name, what, unit, said[None], true[None], np.zeros(1), frames).causes(evidence.step)
+                yield from Reported(name, what, unit, reported[None], true[None], np.zeros(1), frames).causes(
+                    evidence.step
+                )
 
     return test

@@ -51,9 +51,9 @@ def contradictions_of(
         # The observables with the worst verdict.
         guilty = [judgement for judgement in known if judgement.verdict == overall]
         guilty.sort(key=lambda item: item.error / item.tolerance, reverse=True)
-        said = "; ".join(f"{item.observable} {item.verdict}" for item in guilty)
-        said = f"{said}; {guilty[0].observable}: {guilty[0].reason}" if guilty else "nothing is judged"
-        sentences.append(f"{where} {overall}, expected: {' or '.join(expected)} ({said})")
+        causes = "; ".join(f"{item.observable} {item.verdict}" for item in guilty)
+        causes = f"{causes}; {guilty[0].observable}: {guilty[0].reason}" if guilty else "nothing is judged"
+        sentences.append(f"{where} {overall}, expected: {' or '.join(expected)} ({causes})")
     for judgement in judgements:
         name, verdict = judgement.observable, judgement.verdict
         alone = row.expect_for.get(name)

@@ -230,12 +230,12 @@ def require_fit(comparison: Comparison, facts: Sequence[EngineFacts | ProofrollE
         for index, (row, item) in enumerate(zip(comparison.rows, facts, strict=True)):
             if not isinstance(item, EngineFacts) or point not in comparison.combinations(row.only):
                 continue
-            told = known[item.name]
-            if isinstance(told, ProofrollError) or _UNFIT & set(row.expected(numbers)):
+            description = known[item.name]
+            if isinstance(description, ProofrollError) or _UNFIT & set(row.expected(numbers)):
                 continue
             formulation, place = item.settings["formulation"], f"{comparison.name}.toml: rows.{index}.engine"
-            if not represents(scene, formulation, told.provides):
-                lacking = ", ".join(sorted(scene.requires - set(told.provides[formulation])))
+            if not represents(scene, formulation, description.provides):
+                lacking = ", ".join(sorted(scene.requires - set(description.provides[formulation])))
                 advice = f"it does not have {lacking}{at_point(numbers)}; expect refused there, or leave it out"
                 raise InputError(place, row.engine, advice)
             if (step := item.step) is None:

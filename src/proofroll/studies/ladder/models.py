@@ -89,17 +89,19 @@ def rungs(engines: Mapping[str, EngineDescription | ProofrollError], requires: f
     ladder: list[Rung] = []
     for level in Level:
         before = len(ladder)
-        for told in engines.values():
-            if isinstance(told, ProofrollError):
+        for description in engines.values():
+            if isinstance(description, ProofrollError):
                 continue
-            for formulation, presets in told.presets.items():
-                fits = requires & set(told.provides[formulation]) and offered(formulation, requires, told.made_for)
-                if told.levels.get(formulation) != level or not fits:
+            for formulation, presets in description.presets.items():
+                fits = requires & set(description.provides[formulation]) and offered(
+                    formulation, requires, description.made_for
+                )
+                if description.levels.get(formulation) != level or not fits:
                     continue
                 preset = "matched" if "matched" in presets else next(iter(presets))
-                model = LadderModel(told.name, {"formulation": formulation, "preset": preset})
+                model = LadderModel(description.name, {"formulation": formulation, "preset": preset})
                 ladder.append(Rung(level, model))
-                for term in told.terms:
+                for term in description.terms:
                     if term.rung and formulation in term.formulations:
                         variant = ",".join(f"{key}={value}" for key, value in term.on.items())
                         ladder.append(Rung(level, _with(model, term.on), variant))
@@ -128,24 +130,24 @@ def switches(
     ]
     seen: set[tuple[str, Level]] = set()
     for level, model in models:
-        told = engines[model.engine]
-        assert isinstance(told, EngineDescription)  # it has a rung
+        description = engines[model.engine]
+        assert isinstance(description, EngineDescription)  # it has a rung
         if (model.engine, level) not in seen:
-            switches_of_terms += _of_the_scene(model, scene, truth, told.inherent.get(model.formulation, {}))
+            switches_of_terms += _of_the_scene(model, scene, truth, description.inherent.get(model.formulation, {}))
         seen.add((model.engine, level))
     for _, model in models:
-        told = engines[model.engine]
-        assert isinstance(told, EngineDescription)
+        description = engines[model.engine]
+        assert isinstance(description, EngineDescription)
         switches_of_terms += [
             Switch(term.name, "engine", model, _with(model, term.on), _with(model, term.off), term.because)
-            for term in told.terms
+            for term in description.terms
             if model.formulation in term.formulations
         ]
     return switches_of_terms
 
 
-def _represents(told: EngineDescription | ProofrollError, model: LadderModel, scene: Scene) -> bool:
-    return isinstance(told, EngineDescription) and represents(scene, model.formulation, told.provides)
+def _represents(description: EngineDescription | ProofrollError, model: LadderModel, scene: Scene) -> bool:
+    return isinstance(description, EngineDescription) and represents(scene, model.formulation, description.provides)
 
 
 def _of_the_scene(model: LadderModel, scene: Scene, truth: xr.Dataset, inherent: Mapping[str, str]) -> list[Switch]:

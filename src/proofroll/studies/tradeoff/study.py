@@ -75,12 +75,12 @@ def make_tradeoff(
     )
     study = tradeoff_study(outcome)
     judged = claims if not engines else None
-    said = JudgedFile(
+    judgement = JudgedFile(
         claims.name if claims else None,
         judged.contradictions(study) if judged else [],
         judged.undecided(study) if judged else [],
     )
-    study = dataclasses.replace(study, engines=sorted(engines), claims=said)
+    study = dataclasses.replace(study, engines=sorted(engines), claims=judgement)
     path = stored(folder, question, engines, brief=outcome.brief)
     keep(study, path)
     timings = {
@@ -205,24 +205,24 @@ def _cost(timing: Timing | None) -> dict[str, Any]:
 
 def _conclusions(outcome: Tradeoff, budgets: Sequence[CurveBudget]) -> list[str]:
     """Conclusions of the study, as sentences."""
-    said = told_hosts(hosts(point.result for point in outcome.points))
+    sentences = told_hosts(hosts(point.result for point in outcome.points))
     quantity = outcome.question.quantity
     scale, unit = outcome.reference.scale(quantity) or 1.0, outcome.reference.scene.observables[quantity].unit
     judged = [item for item in budgets if item.quantity in outcome.quantities and item.contradicts_declaration]
     for curve in outcome.curves:
         if other := [item for item in judged if item.curve == curve.engine]:
             shown = ", ".join(f"{i.quantity} {i.order:.2f} ({i.order_low:.2f} to {i.order_high:.2f})" for i in other)
-            said.append(f"{curve.engine} declares order {other[0].declared}, but there show: {shown}.")
+            sentences.append(f"{curve.engine} declares order {other[0].declared}, but there show: {shown}.")
     for item in budgets:
         if item.quantity == quantity and item.best_step is not None and item.floor is not None:
             told = floor_text(item.best_step, item.floor, unit)
-            said.append(f"{item.curve}, {quantity}: {told}; smaller steps are worse.")
+            sentences.append(f"{item.curve}, {quantity}: {told}; smaller steps are worse.")
     whole = [
         c for c in outcome.curves if c.saturated(quantity) and c.points[0].errors.get(quantity, np.inf) < BROKEN * scale
     ]
     if whole:
         names = ", ".join(curve.engine for curve in whole)
-        said.append(f"No tolerance breaks {names}, sampled every {outcome.question.sparse:g} s either.")
+        sentences.append(f"No tolerance breaks {names}, sampled every {outcome.question.sparse:g} s either.")
     done = [point for point in outcome.points if point.result.status == Status.DONE]
     broken = [point for point in done if not point.errors.get(quantity, np.inf) < BROKEN * scale]
     reason = TimeBudget(outcome.budget or 0.0).sentence
@@ -232,14 +232,14 @@ def _conclusions(outcome: Tradeoff, budgets: Sequence[CurveBudget]) -> list[str]
         if (dropped := [step for step, why in curve.dropped.items() if why == reason])
     ]
     if beyond:
-        said.append(f"Left out, for {reason}: {', '.join(beyond)}.")
+        sentences.append(f"Left out, for {reason}: {', '.join(beyond)}.")
     refused = sum(point.result.status == Status.REFUSED for point in outcome.points)
     wrong = sum(point.result.status == Status.WRONG_MODEL for point in outcome.points)
     ended = len(outcome.points) - len(done) - refused - wrong
     built = f"{wrong} of a wrong model, " if wrong else ""
-    said.append(
+    sentences.append(
         f"{counted(len(outcome.points), 'runs')}: {refused} refused, {built}{ended} that did not reach the end, "
         f"all with a reason; {len(broken)} that reached it silently "
         f"with {quantity} off by more than {number(BROKEN * scale)} {unit}."
     )
-    return said
+    return sentences
