@@ -137,11 +137,11 @@ def test_a_recommendation_says_which_law_a_choice_has() -> None:
 
 
 def test_families_stand_under_the_rows() -> None:
-    """Rows of one law share a sentence, which names them; caveats follow."""
+    """Rows of one law share a sentence, which names them by their engines; caveats follow."""
     row = SimpleNamespace(name="machine", formulation="free", setting="default", caveat="", family="soft contact")
     other = replace_all(row, setting="matched", family="hard contact", caveat="somebody else's steps")
-    assert caveat_lines([row, other]) == [
-        "Soft contact: machine free default.",
+    assert caveat_lines([row, replace_all(row, name="tool"), other]) == [
+        "Soft contact: machine free default; tool free default.",
         "Hard contact: machine free matched.",
         "Somebody else's steps: machine free matched.",
     ]

@@ -143,14 +143,17 @@ def family_and_caveat(point: Any) -> str:
 
 
 def caveat_lines(rows: Sequence[Setting]) -> list[str]:
-    """Sentences on families and caveats of settings, each with the settings that have it."""
-    settings: dict[str, list[str]] = {}
-    for notes in ([row.family for row in rows], [row.caveat for row in rows]):
-        for row, note in zip(rows, notes, strict=True):
-            if note:
-                where = " ".join(str(part) for part in (row.formulation, row.setting) if part)
-                settings.setdefault(f"{note}: {row.name}", []).append(where)
-    return [f"{note[0].upper()}{note[1:]} {', '.join(dict.fromkeys(where))}." for note, where in settings.items()]
+    """Sentences on families and caveats of settings, each with the engines and their settings that have it."""
+    settings: dict[str, dict[str, list[str]]] = {}
+    for note, row in [*((row.family, row) for row in rows), *((row.caveat, row) for row in rows)]:
+        if note:
+            where = " ".join(str(part) for part in (row.formulation, row.setting) if part)
+            settings.setdefault(note, {}).setdefault(row.name, []).append(where)
+    lines = []
+    for note, engines in settings.items():
+        owners = (f"{name} {', '.join(dict.fromkeys(where))}" for name, where in engines.items())
+        lines.append(f"{note[0].upper()}{note[1:]}: {'; '.join(owners)}.")
+    return lines
 
 
 def settings_text(settings: dict[str, Any]) -> str:

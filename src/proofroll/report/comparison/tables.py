@@ -169,7 +169,7 @@ def one_scheme(content: ReportedComparison) -> list[str]:
     schemes: dict[str, dict[str, ReportedRow]] = {}
     groups: list[dict[str, ReportedRow]] = []
     for name, row, _ in content.lines():
-        if row.scheme and row.resolution == "dt":
+        if row.scheme and row.resolution == "dt" and row.observables:
             schemes.setdefault(row.scheme, {})[name] = row
         group = next((each for each in groups if _same_digits(next(iter(each.values())), row)), None)
         if group is None:

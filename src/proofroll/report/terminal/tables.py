@@ -154,7 +154,7 @@ def closing_lines(content: ReportedComparison) -> list[str]:
             if left
             else "Every verdict is as the comparison file expects."
         )
-    shared = [*one_scheme(content), *caveat_lines(content.rows)]
+    shared = [*one_scheme(content), *caveat_lines([row for row in content.rows if row.verdict != Verdict.REFUSED])]
     return [*lines, *budget_lines(content), *shared, *told_hosts(content.hosts)]
 
 
