@@ -55,9 +55,9 @@ def test_random_mechanisms_have_every_kind_of_joint_and_planar_bodies() -> None:
         assert not turning or {type(body) for body in made_bodies(mechanism, allow_planar=True)} == {Planar}
 
 
-@pytest.mark.parametrize("seed", [5, 10])
+@pytest.mark.parametrize("seed", [5, 10, 3060])
 def test_no_error_of_a_truth_lies_beyond_its_bar(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A loop in space and a planar tree, every quantity, over a short time; `drill referee` has any number."""
+    """A loop in space, a planar tree and a free body, every quantity; `drill referee` has any number."""
     monkeypatch.setattr(maximal_taylor, "heyoka", None)
     held = hold(seed, until=0.02)
     assert held.sound, held.text

@@ -190,10 +190,11 @@ class Referee:
         inverse = np.einsum("nij,njk,nlk->nil", R[:n], self._inverse, R[:n])
         a0, alpha0 = force[:n] / self._mass[:, None], np.einsum("nij,nj->ni", inverse, moment[:n])
         of_push, of_twist = push / self._mass[:, None], np.einsum("nij,mnj->mni", inverse, twist)
-        A = push.reshape(m, -1) @ of_push.reshape(m, -1).T + twist.reshape(m, -1) @ of_twist.reshape(m, -1).T
+        pushes, twists = push.reshape(m, 3 * n), twist.reshape(m, 3 * n)
+        A = pushes @ of_push.reshape(m, 3 * n).T + twists @ of_twist.reshape(m, 3 * n).T
         for k, (_, joint) in enumerate(self._armed, self._hard):
             A[k, k] += 1 / long(joint.armature)
-        right = -bias - push.reshape(m, -1) @ a0.ravel() - twist.reshape(m, -1) @ alpha0.ravel()
+        right = -bias - pushes @ a0.ravel() - twists @ alpha0.ravel()
         multipliers = _semidefinite_solve(A, right)
         acceleration = a0 + np.einsum("m,mni->ni", multipliers, of_push)
         alpha = alpha0 + np.einsum("m,mni->ni", multipliers, of_twist)
