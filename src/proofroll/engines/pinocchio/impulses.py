@@ -254,7 +254,8 @@ class ImpulseSteps:
             shifts[k, 2] = np.inf
             if self._midpoint:
                 if gap <= max(self._touching, self._gravity * dt**2):
-                    shifts[k, 2] = e * approach if hits else _CLOSED * gap / dt
+                    back = max(_CLOSED * gap / dt, -_SOFT * self._gravity * dt) if k >= first else _CLOSED * gap / dt
+                    shifts[k, 2] = e * approach if hits else back
             else:
                 reached = gap + dt * (approach - dt * self._gravity) <= 0
                 shifts[k, 2] = e * approach if hits and reached else gap / dt

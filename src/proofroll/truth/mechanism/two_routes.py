@@ -129,8 +129,9 @@ def _runs(
     refuse_switching(mechanism)
     if stiff(first, float(times[-1])):
         runs = run_stiff(mechanism, first.rank, times)
-        names = "joint coordinates, implicit collocation", "maximal coordinates, implicit collocation"
-        return matched(mechanism, runs.precise, runs.other), runs.coarse, runs.precise, runs.growth, names
+        names = "maximal coordinates, implicit collocation", "joint coordinates, implicit collocation"
+        best = matched(mechanism, runs.one, runs.precise)
+        return runs.one, best, best, runs.growth, names
     one = first.run(times, tolerance)
     two, precise, name = _second(second, times, tolerance)
     # route 1 alone counts turns; angles of the others are put on the same turns
