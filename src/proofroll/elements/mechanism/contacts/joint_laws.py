@@ -71,7 +71,8 @@ def joint_contacts(joints: Sequence[SwitchedJoint]) -> tuple[JointContact, ...]:
         sides = [side for side, stop in ((1, joint.low), (-1, joint.high)) if np.isfinite(stop)]
         if sides and joint.friction:
             raise Refused(
-                f"joint {joint.name} has stops and dry friction beside contacts of bodies; choose one of both"
+                f"joint {joint.name} has stops and dry friction beside contacts of bodies: at rest on a stop their "
+                "shares of the force are not determinate; leave out its limits or its friction"
             )
         found += [JointContact(joint, side) for side in sides or [0]]
     return tuple(found)
