@@ -168,7 +168,7 @@ def _compare_press(
     softest = max((soft.tolerance for soft in built.regularised.values()), default=0.0)
     if given is not None:
         given = None if softest > CAPS["forces of contact"].tolerance else np.reshape(given, wanted.shape)
-    natural = sum(body.mass for body in element.mechanism.bodies) * element.first_motion.scale
+    natural = element.mechanism.mass * element.first_motion.scale
     compare("forces of contact", "N", wanted, given, float(np.nanmax(np.abs(wanted), initial=0.0)) or natural)
 
 
@@ -182,7 +182,7 @@ def _compare_reactions(
         return
     found = element.first_motion
     wrench = np.where(element.analysis.determinate, element.first_wrench, np.nan)
-    natural = sum(body.mass for body in element.mechanism.bodies) * found.scale
+    natural = element.mechanism.mass * found.scale
     force = max(float(np.nanmax(np.abs(wrench[:, :3]), initial=0.0)), natural)
     torque = max(float(np.nanmax(np.abs(wrench[:, 3:]), initial=0.0)), force * element.length)
     compare("forces", "N", wrench[:, :3], reactions(element, sample, "joint_force"), force)
@@ -192,7 +192,7 @@ def _compare_reactions(
 def _compare_named(element: MechanismElement, sample: MechanismSample, compare: _Compare) -> None:
     """Compares efforts of actuators and forces of couplings."""
     names, natural = named_forces(element.mechanism), element.first_motion.scale * element.length
-    natural *= sum(body.mass for body in element.mechanism.bodies)
+    natural *= element.mechanism.mass
     for key, quantity in (("effort", "efforts"), ("coupling", "couplings")):
         mine = np.array([item.field == key for item in names], dtype=bool)
         if mine.any():

@@ -168,10 +168,9 @@ class MechanismElement:
         slowest = slowest if slowest > _HELD * float(held.max(initial=0.0)) and np.isfinite(slowest) else 0.0
         if gravity:
             return 2 * np.pi / max(slowest, float(np.sqrt(gravity / self.length)))
-        mass = sum(body.mass for body in self.mechanism.bodies)
         stiffest = max((spring.stiffness for spring in self.mechanism.springs), default=0.0)
         spin = float(np.max(np.linalg.norm(self.start.w_WB, axis=-1)))
-        return 2 * np.pi / rate if (rate := slowest or float(np.sqrt(stiffest / mass)) or spin) else 1.0
+        return 2 * np.pi / rate if (rate := slowest or float(np.sqrt(stiffest / self.mechanism.mass)) or spin) else 1.0
 
     @cached_property
     def turn_interval(self) -> float | None:
@@ -194,14 +193,13 @@ class MechanismElement:
     @property
     def force(self) -> float:
         """Weight, or if larger the centripetal force of its mass at its speed and length [N]."""
-        mass = sum(body.mass for body in self.mechanism.bodies)
-        return mass * max(float(np.linalg.norm(self.mechanism.gravity)), self.speed**2 / self.length)
+        return self.mechanism.mass * max(float(np.linalg.norm(self.mechanism.gravity)), self.speed**2 / self.length)
 
     @cached_property
     def _sizes(self) -> dict[str, float]:
         """Natural size of a quantity, by its unit."""
         length, speed, force = self.length, self.speed, self.force
-        momentum = sum(body.mass for body in self.mechanism.bodies) * speed
+        momentum = self.mechanism.mass * speed
         sizes = {"m": length, "m/s": speed, "N": force, "J": force * length}
         return sizes | {"N s": momentum, "N m s": momentum * length, "1": 1.0}
 

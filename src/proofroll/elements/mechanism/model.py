@@ -129,6 +129,11 @@ class Mechanism:
         return found
 
     @cached_property
+    def mass(self) -> float:
+        """Mass of all bodies [kg]."""
+        return sum(body.mass for body in self.bodies)
+
+    @cached_property
     def nq(self) -> int:
         """Number of coordinates of the tree."""
         return sum(joint.nq for joint in self.joints)

@@ -166,7 +166,7 @@ class Units(NamedTuple):
 def natural_units(mechanism: Mechanism) -> Units:
     """Units near the mechanism's own size, mass and time, see :func:`.natural_scale`."""
     length, rate = natural_scale(mechanism)
-    mass = sum(body.mass for body in mechanism.bodies)
+    mass = mechanism.mass
     return Units(length, 2.0 ** round(np.log2(mass)), 1 / rate)
 
 

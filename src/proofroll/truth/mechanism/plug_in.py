@@ -112,7 +112,7 @@ def _laws_alone(element: MechanismElement, times: FloatArray, reason: str) -> xr
 
 def _bar_of_a_law(name: str, element: MechanismElement, bars: Mapping[str, FloatArray]) -> float | None:
     """Error bar of a residual that combines several fields; None for any other variable."""
-    mass = sum(body.mass for body in element.mechanism.bodies)
+    mass = element.mechanism.mass
     place, velocity, force = (float(bars[field][-1]) if field in bars else 0.0 for field in ("p_WB", "v_WB", "pressed"))
     match name:
         case "friction_direction":  # large for contacts that hardly press or slide

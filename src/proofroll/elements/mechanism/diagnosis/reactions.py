@@ -102,7 +102,7 @@ def _reactions(
     element = evidence.element
     ends = element.mechanism.connections
     bodies = element.mechanism.body_index
-    force = sum(body.mass for body in element.mechanism.bodies) * element.first_motion.scale
+    force = element.mechanism.mass * element.first_motion.scale
     for kind, unit, what in _KINDS:
         known = np.isfinite(true[kind])
         heard = np.all(np.isfinite(said[kind]) | ~known, axis=(0, 2)) & np.any(known, axis=(0, 2))
