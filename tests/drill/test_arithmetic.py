@@ -268,6 +268,21 @@ def test_tests_that_fail_are_named(monkeypatch: pytest.MonkeyPatch, tmp_path: Pa
     assert Tried("x", "y").same
 
 
+def test_a_kind_that_ends_costs_its_own_row_alone(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """A kind whose comparisons end by an error is a failed row; the kinds before and after it have theirs."""
+
+    def recorded(kind: Any, *_: Any) -> dict[str, Any]:
+        if kind.name == "haswell":
+            raise subprocess.CalledProcessError(-9, "python")
+        return {}
+
+    monkeypatch.setattr(the_matrix, "took_effect", lambda *_: "")
+    monkeypatch.setattr(the_matrix, "_recorded", recorded)
+    found = matrix([BY_NAME[name] for name in ("reference", "haswell", "prescott")], ["sled"], "", tmp_path)
+    assert [item.same for item in found] == [True, False, True]
+    assert found[1].failed == ["its comparisons ended with exit code -9"]
+
+
 def test_bounds_near_what_is_seen_are_listed(monkeypatch: pytest.MonkeyPatch) -> None:
     """Bounds near round-off that a difference comes near to are listed; wide ones, and what differs on purpose, not."""
     monkeypatch.setattr(near_bounds, "seen", {})

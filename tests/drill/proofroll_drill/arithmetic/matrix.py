@@ -31,7 +31,7 @@ class Tried:
         untried: why it was not tried; empty: it was.
         runs: how many runs were held against the reference.
         differences: what of them is not as in the reference.
-        failed: tests that failed, by name; or the end of pytest's output where no test ran.
+        failed: tests that failed, by name; or how the runs, or pytest without a test, ended.
         passed: the last line of pytest; empty: no tests were asked for.
         late: runs that ran out of time, here or in the reference: they are compared with nothing.
     """
@@ -92,7 +92,14 @@ def _matrix(
         if why:
             found.append(Tried(kind.name, kind.says, why))
             continue
-        record = _recorded(kind, comparisons, folder, jobs)
+        try:
+            record = _recorded(kind, comparisons, folder, jobs)
+        except subprocess.CalledProcessError as error:
+            if reference is None:
+                raise
+            ended = f"its comparisons ended with exit code {error.returncode}"
+            found.append(Tried(kind.name, kind.says, failed=[ended]))
+            continue
         if reference is None:
             reference = place / kind.name, record
         records = reference[1], record
