@@ -119,7 +119,7 @@ def stability_study() -> StabilityStudy:
         scene="sphere_in_cylinder", axes=[Axis("V0", "m/s", "how fast it begins", [4.0, 8.0])], periods=3.0,
         accurate=0.01, runs=14, boundaries=2, silent=1, refused=0, wrong_model=0, failures={"sank in": 2},
         never_accurate=1, meanings={}, points=[silent, other], explanations=[explained],
-        findings=["good depends on mass, as it should not"], step_symbols={}, places=[], absent={}, effort=QUICK,
+        findings=["good depends on mass, which should not matter"], step_symbols={}, places=[], absent={}, effort=QUICK,
         measured=study_store.measured(),
     )  # fmt: skip
 

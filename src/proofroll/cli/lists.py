@@ -22,7 +22,7 @@ def scenes(
     ] = None,
     as_json: options.Json = False,
 ) -> None:
-    """List the scenes; of one that is named, the parameters that can be set."""
+    """List the scenes, or the parameters of one scene."""
     from proofroll.files.scene_file import read_scene_file, scene_names
 
     files = {scene: read_scene_file(scene) for scene in (scene_names() if name is None else [name])}

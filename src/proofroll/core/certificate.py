@@ -142,7 +142,7 @@ def require_shapes(built: Any, shapes: Mapping[str, tuple[tuple[int, ...], ...]]
         try:
             shape = np.asarray(given, dtype=np.float64).shape
         except (TypeError, ValueError):
-            raise Diverged(f"the engine's built() gave {name} that is no array of numbers") from None
+            raise Diverged(f"the engine's built() gave {name}, which is no array of numbers") from None
         if not any(
             len(shape) == len(one) and all(n in {m, -1} for n, m in zip(one, shape, strict=True)) for one in allowed
         ):

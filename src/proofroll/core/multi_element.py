@@ -153,7 +153,7 @@ def arrays(scene: Scene, sample: AnySample, t: float) -> Iterator[tuple[str, Flo
             try:
                 values = np.asarray(given, dtype=np.float64)
             except (TypeError, ValueError):
-                raise Diverged(f"the engine gave {name} that is no array of numbers at {t:g} s") from None
+                raise Diverged(f"the engine gave {name}, which is no array of numbers at {t:g} s") from None
             shape = (width,) if bodies == 1 else (bodies, width)
             if values.shape not in {shape, (bodies, width)}:
                 raise Diverged(f"the engine gave {name} with shape {values.shape} instead of {shape} at {t:g} s")

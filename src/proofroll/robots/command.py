@@ -41,7 +41,7 @@ def check(
 
     Of a scene it says where things start, with the normal force or the degrees of freedom, and --plot draws it.
     Of a robot file: exit 1 if an engine (or the file of --against) does not hold the model that the file describes, or
-    if the file describes what cannot be. The other options are for these.
+    if the file is physically impossible. The other options are for these.
     """
     if is_text_check(file):
         _require_none_for_robots(context)

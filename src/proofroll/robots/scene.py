@@ -64,7 +64,7 @@ class RobotScenes:
             left_out.append("stops of joints (unless limits=1)")
         parameters["couplings"] = (1, "1", "whether what couples joints besides the tree is asked for", _SWITCH)
         if any(body.impossible for body in robot.bodies.values()):
-            words = "whether each link must be a body that can be (1), or what a joint moves as a whole (0)"
+            words = "whether each link must be physically possible (1), or only all that a joint moves together (0)"
             parameters["possible"] = (1, "1", words, _SWITCH)
         return {
             "title": f"{robot.name}, released from a random pose",

@@ -192,7 +192,7 @@ def test_a_scene_may_be_named() -> None:
     [
         ({"p_WB": np.zeros(2)}, r"p_WB with shape \(2,\) instead of \(3,\) at 0 s"),
         ({"force": np.zeros((2, 3))}, r"force with shape \(2, 3\) instead of \(3,\) at 0 s"),
-        ({"v_WB": [[1.0, 2.0], [3.0]]}, "v_WB that is no array of numbers at 0 s"),
+        ({"v_WB": [[1.0, 2.0], [3.0]]}, "v_WB, which is no array of numbers at 0 s"),
     ],
 )
 def test_a_sample_of_a_wrong_shape(wrong: dict[str, Any], words: str) -> None:

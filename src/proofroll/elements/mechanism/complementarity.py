@@ -119,7 +119,7 @@ def struck(joints: Sequence[SwitchedJoint], q: Array, v: Array, hit: int, respon
     low, high = np.where(below, 0.0, -np.inf), np.where(below, np.inf, 0.0)
     _, impulse, left = complementary(returned, response[at], low, high)
     if np.count_nonzero(impulse) > 1 and any(joints[number].restitution for number in at_stop):
-        raise NotUnique("an impact presses several stops at once: with restitution its outcome hangs on their order")
+        raise NotUnique("an impact presses several stops at once: with restitution its outcome depends on their order")
     v = v + response @ impulse
     for number, rest in zip(at_stop, left, strict=True):
         joint = joints[number]

@@ -75,7 +75,7 @@ def along(sample: MechanismSample, name: str, count: int) -> FloatArray:
     try:
         return np.asarray(given, dtype=np.float64).reshape(count)
     except (TypeError, ValueError):
-        raise Diverged(f"the engine gave {name} that is no array of {count} numbers") from None
+        raise Diverged(f"the engine gave {name}, which is no array of {count} numbers") from None
 
 
 def reactions(element: MechanismElement, sample: MechanismSample, name: str) -> FloatArray:
@@ -90,7 +90,7 @@ def reactions(element: MechanismElement, sample: MechanismSample, name: str) -> 
     try:
         values = np.asarray(given, dtype=np.float64)
     except (TypeError, ValueError):
-        raise Diverged(f"the engine gave {name} that is no array of numbers") from None
+        raise Diverged(f"the engine gave {name}, which is no array of numbers") from None
     if values.shape not in {shape, (3 * shape[0],)}:
         raise Diverged(f"the engine gave {name} with shape {values.shape} instead of {shape}")
     return values.reshape(shape)

@@ -332,7 +332,7 @@ TERMS = (
         ("chart", "free"),
         {"condim": TURNS},
         {"condim": SLIDES},
-        "resists the spin about the normal, on which the ball's motion on a curved wall hangs",
+        "resists the spin about the normal, which decides the ball's motion on a curved wall",
         rung=True,
     ),
     Term(

@@ -80,7 +80,7 @@ class Pinocchio:
             ("contact",),
             {"integrator": "leapfrog"},
             {"integrator": "semi_implicit_euler"},
-            "tells the solver how fast the contact's plane turns during a step",
+            "gives the solver the rate at which the contact's plane turns during a step",
         ),
     )
     inherent: ClassVar[Mapping[str, Mapping[str, str]]] = {

@@ -98,7 +98,7 @@ def mechanism_source(run: MechanismRun, settings: PinocchioSettings) -> str:
         Refused: drives change in time.
     """
     if run.tree.varies:
-        raise Refused("programs hold no drives in time yet")
+        raise Refused("a program cannot have drives that change in time yet")
     mechanism: Any = run.tree.mechanism
     followed = [(point.body, point.position) for point in mechanism.points]
     followed = followed or [(body.name, (0.0, 0.0, 0.0)) for body in mechanism.bodies]

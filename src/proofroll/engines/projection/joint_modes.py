@@ -140,7 +140,7 @@ class SwitchedMotion(AlternatingMotion[Mode]):
         impulse, side = _bounded((1 + elastic) * v[at_stop], response[at], low, high)
         if np.count_nonzero(impulse) > 1 and elastic.any():
             raise NotUnique(
-                "an impact presses several stops at once: with restitution its outcome hangs on their order"
+                "an impact presses several stops at once: with restitution its outcome depends on their order"
             )
         change = np.asarray(response @ impulse)
         v += change[[joint.velocity for joint in self._joints]]

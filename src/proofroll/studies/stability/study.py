@@ -164,5 +164,5 @@ def _scale_conclusions(stability_map: StabilityMap, points: Sequence[BoundaryPoi
             for name in BOUNDARIES:
                 change = dependence([p for p in along if not (p.problem and name == "accurate")], name)
                 if change:
-                    sentences.append(f"{curve} depends on {axis.name}, as it should not: {name} up to {change}")
+                    sentences.append(f"{curve} depends on {axis.name}, which should not matter: {name} up to {change}")
     return sentences

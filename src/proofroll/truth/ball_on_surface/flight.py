@@ -94,7 +94,7 @@ def landed(body: RollingBall, route: Route, flight: Leg) -> Bounce | Landed | No
     if bounced and _slip(body, v, w, e1) is not None:
         raise Refused(
             f"at about {time:.6g} s the ball comes to stay on the wall after infinitely many bounces, each of "
-            "which turns back its contact point whole, so its spin has no limit; "
+            "which reverses the velocity of its contact point, so its spin alternates for ever; "
             "end the run earlier, take tangential_restitution below 1, or give friction a bound (mu_static)"
         )
     # Infinitely many impacts (e > 0) leave no slip, as with e_t = 0. A single impact (e = 0) reverses the slip by e_t,

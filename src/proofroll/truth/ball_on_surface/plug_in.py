@@ -28,7 +28,7 @@ from proofroll.truth.ball_on_surface.stick_slip import stays_on, stick_slip
 if TYPE_CHECKING:
     import xarray as xr
 
-_ILL_POSED = "the time of the first slip hangs on less than the parameters are known to"
+_ILL_POSED = "a change of the parameters within their accuracy changes the time of the first slip"
 
 
 class BallOnSurfaceTruth:

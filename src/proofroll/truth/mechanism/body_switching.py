@@ -198,7 +198,7 @@ class SwitchedBodies(JointStretches):
             raise Refused("no outcome of an impact on several stops keeps all its inequalities")
         if best[2] and (restitution or any(joints[k].restitution for k in resting)):
             raise NotUnique(
-                "an impact presses several stops at once: with restitution its outcome hangs on their order"
+                "an impact presses several stops at once: with restitution its outcome depends on their order"
             )
         return best[1], max(best[0], 0.0)
 

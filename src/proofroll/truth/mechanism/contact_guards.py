@@ -119,6 +119,6 @@ def refuse_turning_onset(contact: Touchable, own: Acting) -> None:
     """
     if own.along is None:
         raise Refused(
-            f"{contact.name} begins to slip where it could go in any direction of its surface; which it takes at first "
-            "hangs on less than the forces tell"
+            f"{contact.name} begins to slip at a point of its surface: the forces do not determine "
+            "the direction of its first motion"
         )

@@ -61,7 +61,7 @@ def _in_units(mechanism: Mechanism, units: Units, times: Array) -> TwoRouteMotio
         "joint coordinates, DOP853, contacts by Coulomb's law at all of them at once",
         "bodies alone, DOP853, contacts by trial of what they can do",
     )
-    reason = "it hangs on less than the parameters are known to which contacts hold, slide or open"
+    reason = "a change of the parameters within their accuracy changes which contacts stick, slide or open"
     forces = pressed * units.force, np.array([force for force, _ in applied]) * units.force
     one, two = units.record(mechanism, one), units.record(mechanism, two)
     return two_route_motion(mechanism, paths, one, two, routes, reason, units, kinds=kinds, pressed=forces)

@@ -100,6 +100,6 @@ def _switched(mechanism: Mechanism, units: Units, own: Mechanism, times: Array) 
     modes = [bodies.switched(paths[1].legs[number].mode) for number in legs]
     two = matched(own, one, second.recorded(times, states_of(bodies, paths[1], times, legs)[:, :-1], modes))
     routes = ("joint coordinates, DOP853, modes by complementarity", "maximal coordinates, DOP853, modes by trial")
-    reason = "it hangs on less than the parameters are known to which joints hold"
+    reason = "a change of the parameters within their accuracy changes which joints hold"
     one, two = units.record(mechanism, one), units.record(mechanism, two)
     return two_route_motion(mechanism, paths, one, two, routes, reason, units)

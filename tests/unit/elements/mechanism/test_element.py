@@ -164,7 +164,7 @@ def test_a_wrong_delassus_matrix_is_noticed() -> None:
     [
         (np.zeros((3, 2)), r"with shape \(3, 2\) instead of \(2, 3\)"),
         (np.zeros((3, 3)), r"with shape \(3, 3\) instead of \(2, 3\)"),
-        ("heavy", "that is no array of numbers"),
+        ("heavy", "which is no array of numbers"),
     ],
 )
 @pytest.mark.parametrize("name", ["joint_force", "joint_torque"])

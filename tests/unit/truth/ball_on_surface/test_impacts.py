@@ -146,7 +146,7 @@ def test_a_spin_that_alternates_for_ever_has_no_limit() -> None:
     rests = math.sqrt(2 / G) * 3
     spinning = load_scene("bouncing_ball", back_spin=60.0, **bouncing)
     with pytest.raises(
-        Refused, match="so its spin has no limit; end the run earlier, take tangential_restitution below"
+        Refused, match="so its spin alternates for ever; end the run earlier, take tangential_restitution below"
     ):
         truth(spinning, np.array([0.0, rests * 1.1]))
     # Before, or without a spin, with a bound, or where the spin fades, there is a limit.

@@ -275,7 +275,7 @@ class ContactDynamics:
             for b in pressed:
                 if a < b and np.abs(G[3 * a : 3 * a + 3, 3 * b : 3 * b + 3]).max() > RANK * np.abs(G).max():
                     raise NotUnique(
-                        f"an impact presses {names[a]} and {names[b]} at once: its outcome hangs on their order"
+                        f"an impact presses {names[a]} and {names[b]} at once: its outcome depends on their order"
                     )
         return v + state.W @ J.T @ impulse.ravel(), impulse, np.inf if same else 0.0
 

@@ -116,7 +116,7 @@ def touch_of(evidence: Evidence) -> Iterator[SeenContact]:
     )
 
 
-@hypothesis("contact forces", "the true forces with another sign, frame or time are what is said")
+@hypothesis("contact forces", "the engine reports the true forces with another sign, frame or time")
 def contact_forces(evidence: Evidence) -> Iterator[Cause]:
     """Hypothesis: contact forces are reported on the other body, in other axes, or at another time."""
     for touch in touch_of(evidence):
@@ -223,7 +223,8 @@ def _of_a_square(
 
 
 @hypothesis(
-    "contact forces at time 0", "as along the run, for the forces of the certificate: sign and axes, or a pyramid"
+    "contact forces at time 0",
+    "the certificate's forces have another sign or other axes, or friction is bounded by a pyramid",
 )
 def forces_at_start(evidence: Evidence) -> Iterator[Cause]:
     """Hypotheses of contact forces at time 0: sign, axes, or a pyramid."""

@@ -119,7 +119,7 @@ FACTORS_OF_ALL: tuple[Any, ...] = (
 )
 
 
-@hypothesis("body", "as for all bodies, for one")
+@hypothesis("body", "one body has another mass or inertia, or its inertia about other axes or another point")
 def of_each_body(evidence: Evidence) -> Iterator[Cause]:
     """Hypotheses on one body: a factor on its mass or inertia, inertia in other axes or about another point."""
     mechanism = evidence.element.mechanism

@@ -121,7 +121,7 @@ def _reactions(
 
 @hypothesis(
     "reactions",
-    "the true wrench on the child at the joint with another sign, frame, point, joint or time is what is said",
+    "the engine reports the true wrench with another sign, frame, point, joint or time",
 )
 def reactions(evidence: Evidence) -> Iterator[Cause]:
     """Hypotheses on forces and moments of joints and loops along the run, where they are determinate."""
@@ -138,7 +138,8 @@ def reactions(evidence: Evidence) -> Iterator[Cause]:
 
 
 @hypothesis(
-    "reactions at time 0", "as along the run, for the forces and moments of the certificate, if nothing else differs"
+    "reactions at time 0",
+    "the certificate's wrenches have another sign, frame, point or joint, and nothing else differs",
 )
 def reactions_at_start(evidence: Evidence) -> Iterator[Cause]:
     """Hypotheses on forces and moments at time 0."""
