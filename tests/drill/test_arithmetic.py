@@ -235,9 +235,9 @@ def baseline() -> str:
 
 
 def test_slow_arithmetic_has_the_time_it_needs() -> None:
-    """The governor's truth takes 197 s without heyoka, of the 60 s that its file allows: the matrix allows more."""
+    """Other arithmetic may take several times as long (the governor's truth 14 s, not 3, without heyoka)."""
     asked = load_comparison(str(REPOSITORY / "comparisons" / "mechanisms" / "flyball_governor.toml"))
-    assert unhurried(asked).time_limit > 2 * 197 > asked.time_limit
+    assert unhurried(asked).time_limit > 5 * asked.time_limit
     assert not unhurried(asked).timed
 
 

@@ -259,7 +259,7 @@ def test_describe() -> None:
     assert found.version == "1"
     assert found.provides == {"only": ["a curved surface", "rolling without slip"]}
     assert found.presets == {"only": {"matched": {"formulation": "only", "preset": "matched", "dt": 1e-2}}}
-    assert found.summary.startswith("Well behaved")
+    assert found.summary.startswith("Well-behaved")
 
 
 def test_describe_what_cannot_be_described() -> None:
