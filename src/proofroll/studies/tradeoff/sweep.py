@@ -226,7 +226,8 @@ def _run(
     pending = [] if references else [question.truth(scene, truth_facts, runs)]
     for stage in _stages(cases) if budget else [cases]:
         kept = [(curve, both) for curve, both in stage if not budget or _affordable(curve, both[0], budget, len(stage))]
-        results = runner.run([*pending, *(case for _, both in kept for case in both)], progress, budget)
+        cases_now = [*pending, *(case for _, both in kept for case in both)]
+        results = runner.run(cases_now, progress, budget, {case.key: -1 for case in pending})  # the truth begins first
         for case in pending:
             if results[case.key].status != Status.DONE:
                 raise ProofrollError(f"there is no truth here: {results[case.key].message}")

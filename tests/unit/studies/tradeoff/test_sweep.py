@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -15,6 +16,7 @@ from proofroll.core.truth import truth
 from proofroll.running.case import Case, Result, Status
 from proofroll.running.runner import Runner
 from proofroll.running.store import Store
+from proofroll.running.time_budget import TimeBudget
 from proofroll.studies.tradeoff import tradeoff
 from proofroll.studies.tradeoff.curve import Curve, CurvePoint, Question
 from proofroll.studies.tradeoff.sweep import BROKEN, FINER, _affordable, _first, _further, curves_of, sweep
@@ -195,6 +197,18 @@ def test_within_a_budget_a_step_takes_no_more_than_its_share(step: float, left: 
     curve.points, curve.dropped = [CurvePoint(case(2e-3), refused)], {}
     assert not _affordable(curve, case(step), budget, 2)  # type: ignore[arg-type]
     assert curve.dropped == {}
+
+
+def test_the_truth_begins_before_any_run(tmp_path: Path) -> None:
+    """With a budget the truth is the first case, however many runs wait: without it all of them are worth nothing."""
+    engines = [f"projection[formulation=rotating_frame,preset={preset}]" for preset in ("default", "matched")]
+    curves, _ = curves_of(engines)
+
+    def first(case: Case, _: Result) -> None:
+        raise KeyboardInterrupt(case.engine.name)
+
+    with pytest.raises(KeyboardInterrupt, match=r"^truth$"):
+        sweep(QUESTION, curves, Runner(Store(tmp_path), jobs=1), first, budget=TimeBudget(60.0))
 
 
 def test_a_coarser_truth_is_that_of_fewer_samples() -> None:
