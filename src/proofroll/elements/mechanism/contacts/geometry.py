@@ -32,6 +32,9 @@ _KEYS: Mapping[str, tuple[str, ...]] = {
     "plane": ("normal",),
     "box": ("size", "orientation"),
 }
+# Largest semi-axis of an ellipsoid over its smallest. The support function squares the ratio, which costs 1e-10 of the
+# height at 1e3; and a contact on a flat side is as stiff as that ratio.
+_FLATTEST = 1e3
 _RULES = "only a plane with a sphere, ellipsoid, circle or box, and two spheres, have a rule; choose one of these pairs"
 
 
@@ -46,7 +49,7 @@ class Geometry:
         position: of its centre, or of any point of a plane, in the body's frame [m].
         orientation: roll, pitch, yaw of an ellipsoid's or a box's axes in the body's frame [rad].
         radius: of a sphere or circle; a sphere of radius 0 is a vertex [m].
-        axes: semi-axes of an ellipsoid [m].
+        axes: semi-axes of an ellipsoid, the largest at most 1000 times the smallest [m].
         normal: of a plane, out of the material, or of a circle's disc, in the body's frame; default: z.
         size: edges of a box [m].
     """
@@ -85,6 +88,9 @@ class Geometry:
                 if min(found) <= 0:
                     raise InputError(f"{place}.{key}", found, "each must be above 0")
                 checks.assign(self, **{key: found})
+        if self.axes is not None and max(self.axes) > _FLATTEST * min(self.axes):
+            advice = f"the largest may be at most {_FLATTEST:g} times the smallest; a flat disc is a circle"
+            raise InputError(f"{place}.axes", self.axes, advice)
 
     @cached_property
     def frame(self) -> Array:

@@ -41,6 +41,7 @@ def made(
         ({**BALL, "kind": "cone"}, "geometries.1.kind"),
         ({**BALL, "axes": [1, 1, 1]}, "geometries.ball.axes = (1.0, 1.0, 1.0): a sphere has none; it has radius"),
         ({**STONE, "axes": [1, 1, 0]}, "geometries.stone.axes = (1.0, 1.0, 0.0): each must be above 0"),
+        ({**STONE, "axes": [0.2, 0.1, 1e-6]}, "geometries.stone.axes = (0.2, 0.1, 1e-06): the largest may be at most"),
         ({**BALL, "kind": "circle", "radius": 0}, "geometries.ball.radius = 0.0: a circle has a radius above 0"),
         ({"name": "box", "body": "b", "kind": "box"}, "geometries.box.size = 'nothing': a box needs it; add it"),
         ({**PLANE, "normal": [0, 0, 0]}, "geometries.floor.normal"),
