@@ -252,7 +252,8 @@ class MechanismElement:
         found += contact_observables(self.mechanism, self._sizes, _LEAST)
         for item in named_forces(self.mechanism):
             floor = force if item.unit == "N" else force * self.length
-            found.append(Observable(item.name, str(item.unit), item.meaning, Role.REACTION, floor=floor))
+            column = item.field == "coupling"
+            found.append(Observable(item.name, str(item.unit), item.meaning, Role.REACTION, floor=floor, column=column))
         if self.conservative:
             meaning = "energy now minus energy at the start"
             floor = force * self.length

@@ -25,9 +25,13 @@ _MOST_COLUMNS = 4  # largest number of quantities that are shown by default
 
 
 def default_quantities(study: TradeoffStudy) -> list[str]:
-    """Quantities shown by default: the deciding one, and columns that the scene's elements declare; at most four."""
+    """Quantities shown by default: the deciding one, and columns that the scene's elements declare; at most four.
+
+    A column is left out if every run has it exactly, as forces of bearings that carry nothing: it chooses no engine.
+    """
     decides = [study.quantity] if study.quantity in study.quantities else []  # an order of events has no curve
-    beside = (name for name, item in study.quantities.items() if item.column)
+    told = {name: {point.error.get(name) for point in study.points} - {None} for name in study.quantities}
+    beside = (name for name, item in study.quantities.items() if item.column and told[name] != {0.0})
     return list(dict.fromkeys([*decides, *beside]))[:_MOST_COLUMNS]
 
 

@@ -259,3 +259,14 @@ def test_a_front_shows_the_errors_by_which_it_is_one() -> None:
 def test_what_has_no_curve_is_no_column() -> None:
     """A study by the order of events, of which the truth has no curve, shows what else it has."""
     assert default_quantities(study(FAST, quantity="event_order")) == ["z"]
+
+
+def test_what_every_run_has_exactly_is_no_column() -> None:
+    """Forces that are zero in the truth and in every run choose no engine; a run that ended early has none."""
+    known = {name: MeasuredQuantity("m", 0.1, 1e-13, name, column=True) for name in ("z", "forces", "gear")}
+    points = [
+        measured_point(error={"z": 1e-2, "forces": 0.0, "gear": 0.0}),
+        measured_point(error={"z": 1e-4, "forces": 0.0, "gear": 1e-3}),
+        measured_point(error={"z": None, "forces": None, "gear": None}),
+    ]
+    assert default_quantities(study(*points, quantities=known)) == ["z", "gear"]
