@@ -63,6 +63,7 @@ def test_forces_and_engines_of_several_scenes(proofroll: Proofroll, report: Path
         (["arm", "ball", "--measure"], "--measure"),
         (["arm", "ball", "--engine", "nobody"], "nobody"),
         (["arm", "ball", "--tolerance", "1 mm"], "1 mm"),
+        (["arm", "--report", "nowhere.json"], "proofroll report writes one"),
     ],
 )
 def test_what_a_report_cannot_answer_is_one_line(

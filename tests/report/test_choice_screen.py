@@ -13,7 +13,7 @@ import pytest
 from browsing import UNDRAWN, Visit
 
 from proofroll.report.page.advice import advice
-from proofroll.report.page.choice_matrix import DECADES, ChoiceMatrix
+from proofroll.report.page.choice_matrix import DECADES, FIRST, ChoiceMatrix
 
 Visiting = Callable[..., AbstractContextManager[Visit]]
 SHOWN = """[...document.querySelectorAll('#choice tbody tr')].map((row) =>
@@ -66,6 +66,27 @@ def test_the_slider_chooses_the_tolerance(seen: Visit, matrix: ChoiceMatrix) -> 
     seen.wait(f"document.getElementById('choice').dataset.at === '{2 * len(DECADES) - 1}'")
     assert seen.page.evaluate(SHOWN) == expected(matrix, DECADES.stop - 1, True)
     assert seen.page.locator("#also").inner_text() == "", "the answer itself says it"
+
+
+@pytest.mark.drill
+def test_a_framed_cell_names_its_setting_and_step(report_page: Path, visit: Visiting, matrix: ChoiceMatrix) -> None:
+    """As it is written, and again after the slider has moved to another tolerance and with forces."""
+    with visit(report_page, before=UNDRAWN) as opened:
+        for decade, forces in ((FIRST, False), (FIRST + 1, True)):
+            if forces:
+                opened.page.get_by_label("forces count, too").check()
+                opened.page.locator("#tolerance").press("ArrowRight")
+                opened.wait(
+                    f"document.getElementById('choice').dataset.at === '{len(DECADES) + decade - DECADES.start}'"
+                )
+            best = matrix.best(10.0**-decade, forces)
+            steps = {
+                matrix.step(matrix.rows[at], matrix.cell(matrix.rows[at], column, 10.0**-decade, forces))
+                for at, column in zip(best, matrix.columns, strict=True)
+                if at is not None
+            }
+            assert steps - {""}
+            assert set(opened.page.locator("#choice td.best small").all_text_contents()) == steps - {""}
 
 
 def test_a_row_unfolds_to_its_settings(seen: Visit) -> None:

@@ -289,7 +289,7 @@ class _Comparing:
             # On a machine that does other things, too, processor time passes slower.
             left = min(left, self.limit.left * (time.monotonic() - self._start) / used)
         of = f"{min(len(self.ended) + 1, many)} of {many} comparisons, " if many > 1 else ""
-        self.tell(f"{of}{f'about {written(left, 1)} s left, ' if ran else ''}{case.engine.name}")
+        self.tell(f"{of}{f'about {float(written(left, 1)):g} s left, ' if ran else ''}{case.engine.name}")
 
 
 def exit_code(outcomes: list[Outcome]) -> int:

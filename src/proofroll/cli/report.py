@@ -223,7 +223,9 @@ def _command(
 
 
 def _begin(number: int, total: int, words: str) -> str:
-    """Prints on standard error which stage begins; returns the prefix of its progress bar."""
+    """Prints on standard error which of several stages begins; returns the prefix of its progress bar."""
+    if total == 1:
+        return ""
     options.complain(f"{number} of {total}, {words}")
     return f"{number} of {total}: "
 

@@ -120,7 +120,8 @@ class EarlierReport:
             lines = [TableLine(**{name: value for name, value in row if name in COLUMNS}) for row in rows]
             return cls(path, content["date"], made["machine"], made["versions"], lines)
         except OSError as problem:
-            raise InputError(option, path, f"cannot be read: {problem.strerror or problem}") from None
+            why = f"cannot be read: {problem.strerror or problem}; proofroll report writes one"
+            raise InputError(option, path, why) from None
         except (KeyError, RecursionError, TypeError, ValueError):
             raise InputError(option, path, "is no report.json with a long table; proofroll report writes one") from None
 

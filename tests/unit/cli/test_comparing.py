@@ -115,6 +115,9 @@ def test_the_time_that_is_left_is_never_less_than_none() -> None:
     assert said[0] == "mujoco"
     assert said[1].startswith("about ")
     assert "-" not in said[1].partition(" s left")[0].replace("e-", "")
+    running._start -= 50.0
+    running._tell(SimpleNamespace(engine=SimpleNamespace(name="mujoco")))  # type: ignore[arg-type]
+    assert said[2].startswith("about 50 s left"), "for a person, without a power of ten"
 
 
 def test_what_judging_took_is_kept_of_a_budget_for_the_end() -> None:

@@ -178,6 +178,10 @@ class ChoiceMatrix:
         clauses = [", ".join(other), *rest] if other else rest
         return f"{WITH_FORCES.format(number(tolerance))}: {'; '.join(clauses)}." if groups else ""
 
+    def step(self, row: ChoiceRow, cell: ChoiceCell) -> str:
+        """Setting and step of a cell, without the formulation of its row; empty if scenes need different ones."""
+        return cell.name.removeprefix(row.name).strip()
+
     def _phrase(self, column: ChoiceColumn, place: int, cell: ChoiceCell) -> str:
         return f"{cell.name or self.rows[place].name} for {column.group} ({cell.text})"
 
@@ -201,7 +205,10 @@ class ChoiceMatrix:
         ]
         ranks = [
             [
-                [(place, self._phrase(column, place, cell)) for place, cell in self.ranked(column, at, need)]
+                [
+                    (place, self._phrase(column, place, cell), self.step(self.rows[place], cell))
+                    for place, cell in self.ranked(column, at, need)
+                ]
                 for column in self.columns
             ]
             for need, at in ASKED

@@ -13,7 +13,7 @@
   form.hidden = false;
 
   // Texts are inserted as text nodes, for an engine's message must not become markup.
-  function fill(cell, [state, text, title, href], best) {
+  function fill(cell, [state, text, title, href], best, step) {
     cell.className = `cell ${state}${best ? " best" : ""}`;
     cell.replaceChildren();
     const hidden = (word) => Object.assign(document.createElement("span"), { className: "vh", textContent: word });
@@ -23,6 +23,7 @@
     const sign = Object.assign(document.createElement("span"), { textContent: symbols[state] });
     sign.setAttribute("aria-hidden", "true");
     link.append(sign, hidden(best ? "cheapest that agrees" : state), ` ${text}`);
+    if (best && step) link.append(" ", Object.assign(document.createElement("small"), { textContent: step }));
     cell.append(link);
   }
   const chosen = (on) => [...form.querySelectorAll("[name=engine]")].filter((box) => box.checked === on).map((box) => box.value);
@@ -64,7 +65,7 @@
     const data = JSON.parse(await unpack("choices"));
     const cheapest = (asked) => data.ranks[asked].map((ranked) => ranked.find(([at]) => !rows[at].classList.contains("off")));
     const best = cheapest(place);
-    rows.forEach((row, i) => data.grid[i].forEach((numbers, j) => fill(row.cells[j + 1], data.cells[numbers[place]], best[j]?.[0] === i)));
+    rows.forEach((row, i) => data.grid[i].forEach((numbers, j) => fill(row.cells[j + 1], data.cells[numbers[place]], best[j]?.[0] === i, best[j]?.[2])));
     answer.textContent = sentence(best, data);
     document.getElementById("also").textContent = forces.checked ? "" : also(best, cheapest(place + count), data);
     const words = advised(JSON.parse(await unpack("all-words"))[place]);

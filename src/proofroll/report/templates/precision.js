@@ -60,7 +60,7 @@
       const axis = { type: "log", gridcolor: paint("--rule"), linecolor: paint("--rule"), zeroline: false, ticks: "", exponentformat: "power" };
       layout[`xaxis${tail}`] = { ...axis, domain: x, anchor: `y${tail}`, range: span, ...(at && { matches: "x" }), title: { text: "cost [s/s]", standoff: 4 }, ...(span[1] - span[0] > 1.5 && { dtick: Math.ceil((span[1] - span[0]) / 6) }) };
       layout[`yaxis${tail}`] = { ...axis, domain: y, anchor: `x${tail}`, range: [Math.log10(least) - 0.4, 0.35], ...(at && { matches: "y" }), nticks: 8, ...(!column && { title: { text: "error", standoff: 4 } }) };
-      layout[`legend${tail}`] = { x: x[0], y: y[0] - TICKS / total, xanchor: "left", yanchor: "top", bgcolor: "rgba(0,0,0,0)", font: { size: 9.5 }, tracegroupgap: 0 };
+      layout[`legend${tail}`] = { x: x[0], y: y[0] - TICKS / total, xanchor: "left", yanchor: "top", bgcolor: "rgba(0,0,0,0)", font: { size: 11 }, tracegroupgap: 0 };
       layout.annotations.push({ text: `<b>${literal(engine)}</b>`, showarrow: false, xref: "paper", yref: "paper", x: x[0], y: y[1], xanchor: "left", yanchor: "bottom" });
       layout.shapes.push({ type: "line", xref: `x${tail} domain`, yref: `y${tail}`, x0: 0, x1: 1, y0: 10 ** -decade(), y1: 10 ** -decade(), line: { color: paint("--muted"), width: 1, dash: "dash" } });
       const here = { type: "scatter", xaxis: `x${tail}`, yaxis: `y${tail}`, legend: `legend${tail}` };
