@@ -7,6 +7,7 @@ import json
 import math
 import re
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pandas as pd
@@ -15,11 +16,12 @@ from invented import further
 
 from proofroll.core.comparison import Band, Comparison, Row, Tolerance
 from proofroll.core.verdict import LimitResult, Verdict
-from proofroll.report.comparison.lines import lines_of
+from proofroll.report.comparison.lines import _ended, lines_of
 from proofroll.report.long_table import LongTable
 from proofroll.report.page.growing import begun
 from proofroll.report.page.records import ReportContent
 from proofroll.report.tradeoff.part import _limit
+from proofroll.running.case import Result, Status
 from proofroll.running.runner import Runner
 from proofroll.running.store import Store
 from proofroll.studies.comparison.compare import compare
@@ -66,6 +68,14 @@ def test_a_rung_of_a_ladder_is_a_line_without_verdict(tmp_path: Path) -> None:
         assert not line.clean
         if step != main:
             assert line.verdict == ""
+
+
+def test_a_rough_cost_is_without_time_of_other_processes() -> None:
+    """Without clean runs the processor time counts; several threads, or a worker that does not tell, count by wall."""
+    outcome: Any = SimpleNamespace(comparison=SimpleNamespace(until=0.5))
+    for processor, cost in (({"advance": 0.25}, 0.5), ({"advance": 3.0}, 2.0), ({}, 2.0)):
+        result = Result(Status.DONE, "", wall_seconds=1.0, processor=processor)
+        assert _ended(outcome, result)["cost"] == cost
 
 
 def test_the_documented_line_reads_the_table(

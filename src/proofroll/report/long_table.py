@@ -37,7 +37,7 @@ class TableLine:
         cost: wall seconds per simulated second.
         cost_low, cost_high: its interval; None: it was measured once.
         clean: True if clean runs of their own measured the cost; else it is that of the sampled run, during which other
-            processes ran.
+            processes ran, by processor time where that is less.
     """
 
     study: str

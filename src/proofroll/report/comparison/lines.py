@@ -1,5 +1,6 @@
 """Lines of the long table for the runs of a comparison and of its ladders of steps."""
 
+import math
 from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
@@ -51,9 +52,13 @@ def _plain(outcome: Outcome, run: Run, row: int) -> TableLine:
 
 
 def _ended(outcome: Outcome, result: Result) -> dict[str, Any]:
-    """Status and cost of a run; without clean runs the cost of the sampled run, which other processes disturbed."""
+    """Status and cost of a run; without clean runs the cost of the sampled run, which other processes disturbed.
+
+    While others have the processor wall time passes and processor time does not; of several threads it is the longer.
+    """
     cost, done = Cost.of(result.timings), result.status == Status.DONE
-    rough = result.wall_seconds / outcome.comparison.until if done and not result.host and result.wall_seconds else None
+    spent = min(result.wall_seconds, result.processor.get("advance") or math.inf)
+    rough = spent / outcome.comparison.until if done and not result.host and spent else None
     return {
         "status": result.status,
         "message": "" if done else result.message,
