@@ -69,7 +69,7 @@ class FirstMotion:
         moment: short time after which an engine without a step is sampled first [s].
         pull: acceleration by the loads alone [m/s²], the unit of errors of short runs; None: ``scale``. Relative to the
             many times larger acceleration of a fast start an error of the loads would look small.
-        lasts: no body can come to rest before this time [s]; then the acceleration may change.
+        lasts: no body comes to rest, nor a joint to its stop, before this time [s]; then the acceleration may change.
     """
 
     acceleration: FloatArray

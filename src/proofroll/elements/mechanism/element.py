@@ -35,6 +35,7 @@ from proofroll.elements.mechanism.optional_terms import optional_terms
 from proofroll.elements.mechanism.placed import Placed
 from proofroll.elements.mechanism.sampling import MechanismSample
 from proofroll.elements.mechanism.start_words import start_facts
+from proofroll.elements.mechanism.switches import first_change
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -255,8 +256,7 @@ class MechanismElement:
             column = item.field == "coupling"
             found.append(Observable(item.name, str(item.unit), item.meaning, Role.REACTION, floor=floor, column=column))
         if self.conservative:
-            meaning = "energy now minus energy at the start"
-            floor = force * self.length
+            meaning, floor = "energy now minus energy at the start", force * self.length
             never: dict[str, Any] = {"hangs_on_events": False, "difference_of": "energy"}
             found.append(Observable("energy_error", "J", meaning, Role.RESIDUAL, "ΔE", floor, column=True, **never))
         meaning = "how far joints and loops are open"
@@ -290,16 +290,16 @@ class MechanismElement:
         rates = self._solution.acceleration if self._pressed is None else self._pressed.acceleration
         acceleration = (motion.J @ rates + motion.bias)[:-1]
         scale = max(float(np.max(np.abs(acceleration[:, :3]))), self.speed**2 / self.length)
+        lasts = first_change(self._equations.switched, *self.mechanism.start(), rates)
         if self.mechanism.contacts and self._pressed is None:
-            unknown = np.full((len(acceleration), 3), np.nan)
-            return FirstMotion(unknown, unknown, scale, _PART * self.natural_time, lasts=0.0)
-        return FirstMotion(acceleration[:, :3], acceleration[:, 3:], scale, _PART * self.natural_time)
+            acceleration, lasts = np.full_like(acceleration, np.nan), 0.0
+        moment = _PART * min(self.natural_time, lasts or np.inf)
+        return FirstMotion(acceleration[:, :3], acceleration[:, 3:], scale, moment, lasts=lasts)
 
     @cached_property
     def first_wrench(self) -> FloatArray:
         """Wrench of each joint and loop on its child at the start: force [N] and moment [N m], (joints + loops, 6)."""
-        wrench: FloatArray = self._first["wrench"]
-        return read_only(wrench)
+        return read_only(self._first["wrench"])
 
     @property
     def first_press(self) -> FloatArray:
@@ -311,11 +311,10 @@ class MechanismElement:
     @cached_property
     def first_named(self) -> FloatArray:
         """The named forces at the start [N, N m], see :mod:`proofroll.elements.mechanism.named_forces`."""
-        named: FloatArray = self._first["named"]
-        return read_only(named)
+        return read_only(self._first["named"])
 
     @cached_property
-    def _first(self) -> dict[str, Any]:
+    def _first(self) -> dict[str, FloatArray]:
         start = self.mechanism.start()
         if self._touching is not None:
             return self._touching[0].sample(*start, self._touching[1])[0]

@@ -9,8 +9,11 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from proofroll.core.errors import Refused
 from proofroll.elements.mechanism.model import Mechanism
+from proofroll.elements.mechanism.rotations import Array
 
 # Modes of the switched joints, then of the actuators whose effort has a limit.
 Mode = tuple[str, ...]
@@ -63,6 +66,14 @@ class SwitchedJoint:
         """Mode that can hold the joint at a coordinate; ``free`` if none can."""
         return "low" if q <= self.low else "high" if q >= self.high else "stick" if self.friction else "free"
 
+    def lasts(self, q: float, v: float, a: float) -> float:
+        """Time until it reaches a stop, or turns against friction, at a constant acceleration [s]; infinite: never."""
+        times = [-v / a] if self.friction and v * a < 0 else []
+        for stop in (self.low, self.high):
+            if math.isfinite(stop):
+                times += [root.real for root in np.roots([a / 2, v, q - stop]) if root.imag == 0]
+        return min((time for time in times if time > 0), default=math.inf)
+
     def push(self, mode: str) -> float:
         """Force of kinetic friction on the coordinate, N or N m."""
         return {"forward": -self.friction, "backward": self.friction}.get(mode, 0.0)
@@ -100,6 +111,11 @@ def switched_joints(mechanism: Mechanism) -> tuple[SwitchedJoint, ...]:
         low, high = joint.limits or (-math.inf, math.inf)
         found.append(SwitchedJoint(joint.name, number, q, v, joint.friction, low, high, joint.restitution))
     return tuple(found)
+
+
+def first_change(joints: Sequence[SwitchedJoint], q: Array, v: Array, rates: Array) -> float:
+    """Earliest time [s] at which a joint reaches a stop or turns against friction."""
+    return min((j.lasts(q[j.coordinate], v[j.velocity], rates[j.velocity]) for j in joints), default=math.inf)
 
 
 def left_by(mode: str) -> str:

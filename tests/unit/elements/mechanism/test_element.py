@@ -325,3 +325,12 @@ def test_the_natural_time_knows_servos_and_what_they_move() -> None:
     pair = element_of("double_pendulum").mechanism
     servo = Actuator("servo", pair.joints[0].name, "position", kp=1e6)
     assert MechanismElement(dataclasses.replace(pair, actuators=(servo,))).natural_time > 1.0
+
+
+def test_a_first_motion_ends_at_a_stop_or_where_friction_turns() -> None:
+    """A fall by h lasts sqrt(2 h/g), a swing against friction v over its deceleration; a free hinge has no such end."""
+    fall = element_of("stop", height=0.01).first_motion
+    assert fall.lasts == pytest.approx(np.sqrt(2 * 0.01 / 9.81), rel=1e-12)  # round-off of a root
+    swing = element_of("pendulum_friction", speed=1.0).first_motion
+    assert swing.lasts == pytest.approx(1.0 / np.max(np.abs(swing.angular_acceleration)), rel=1e-12)
+    assert element_of("double_pendulum").first_motion.lasts == np.inf
