@@ -128,7 +128,8 @@ def file_inside(folder: Path, name: str, inside: Path) -> Path | None:
         target = (folder / name).resolve()
     except (OSError, RuntimeError, ValueError):  # a loop of links; a name with a null character
         return None
-    return target if target.is_relative_to(inside) and target != inside else None
+    looped = target.is_symlink()  # from Python 3.13 on, resolve() returns a loop of links as it is
+    return target if target.is_relative_to(inside) and target != inside and not looped else None
 
 
 # Attributes that name a file; attributes that name folders of an MJCF's files; part of a name that is no path.
