@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import json
+import re
 import subprocess
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from html import unescape
 from pathlib import Path
 from typing import Any
 
@@ -108,6 +110,23 @@ def test_a_report_of_several_studies(proofroll: Proofroll, tmp_path: Path, out: 
         assert (out / run["trajectory"]).is_file()
 
 
+def test_the_terminal_ends_with_the_choice(proofroll: Proofroll, tmp_path: Path, out: Path) -> None:
+    """The last sentences are those of the first screen: the cheapest for each kind of scenes, and with forces."""
+    (name,) = files(tmp_path, claim=COMPARISON.replace('"oracle"', '"reduced[formulation=closed_form]"'))
+    code, said, err = proofroll("report", name, "--out", str(out))
+    assert code == 0, err
+    words = " ".join(said.split())
+    assert re.search(r"report\.json\. (The cheapest to hold|To hold) motion to 1e-4 of the path.*: .*\.$", words), words
+    assert words.endswith(" ".join(page_sentences(out)))
+
+
+def page_sentences(out: Path) -> list[str]:
+    """Sentences above the matrix of a page, without markup."""
+    html = (out / "report.html").read_text(encoding="utf-8")
+    found = re.findall(r'<p class="answer[^>]*>(.*?)</p>', html)
+    return [text for part in found if (text := unescape(re.sub(r"<[^>]*>", "", part)))]
+
+
 def test_a_statement_that_does_not_hold_is_a_contradiction(proofroll: Proofroll, tmp_path: Path, out: Path) -> None:
     """Exit code 1, named in what to look at first, and on the page; a report needs no comparison."""
     names = files(tmp_path, figures=FIGURES.replace("STATED", "-150"))
@@ -173,7 +192,7 @@ def test_a_stopped_report_keeps_what_has_ended_and_goes_on(
 
 
 def test_progress_counts_comparisons(proofroll: Proofroll, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """While cases run it is said which comparison is under way, and about how long the rest will take."""
+    """While cases run it is said how many comparisons have ended, and about how long the rest will take."""
     said: list[str] = []
 
     @contextmanager
@@ -185,9 +204,11 @@ def test_progress_counts_comparisons(proofroll: Proofroll, tmp_path: Path, monke
     names = files(tmp_path, first=oracle, second=oracle.replace("[4]", "[3]"))
     code, _, err = proofroll("report", *names, "--out", str(tmp_path / "out"), "--jobs", "1")
     assert code == 0, err
-    assert "1 of 2 comparisons, about" in said[0]
+    assert "0 of 2 comparisons ended, about" in said[0]
     assert "s left, " in said[0]
-    assert "2 of 2 comparisons, " in said[-1]
+    ended = [int(text.partition(" of ")[0]) for text in said]
+    assert ended == sorted(ended)
+    assert (ended.count(2), ended[-1]) == (1, 2), "with the last case of the second"
 
 
 def test_what_no_report_has_is_one_line(proofroll: Proofroll, tmp_path: Path) -> None:

@@ -56,6 +56,26 @@ def test_forces_and_engines_of_several_scenes(proofroll: Proofroll, report: Path
     assert "nothing holds it for ball" in " ".join(out.split())
 
 
+def test_forces_that_are_not_judged_are_no_failure(proofroll: Proofroll, report: Path) -> None:
+    """Where some of the scenes have no judged forces the advice for them is by the motion, says so, and exits 0."""
+    given = ("--forces", "--tolerance", "1e-3", "--json", "--report", str(report))
+    code, out, _ = proofroll("recommend", "arm", "ball", *given)
+    assert code == 0
+    ball = json.loads(out)["advice"][1]
+    assert ball["choice"] == "beta joints default at dt 1e-3 s"
+    assert ball["sentence"].startswith("For ball rolling forces are not judged; for motion alone to 1e-3 take beta")
+
+
+def test_without_a_tolerance_a_report_answers_for_that_of_its_first_screen(proofroll: Proofroll, report: Path) -> None:
+    """Which is 1e-4 of the path; measured curves of one scene need one, and the line names the option."""
+    code, out, _ = proofroll("recommend", "ball", "--report", str(report), "--json")
+    assert (code, json.loads(out)["tolerance"]) == (0, 1e-4)
+    code, out, err = proofroll("recommend", "pendulum")
+    assert (code, out, err.count("\n")) == (2, "", 1)
+    assert "--tolerance = ''" not in err
+    assert "--tolerance is missing" in err
+
+
 @pytest.mark.parametrize(
     ("more", "words"),
     [

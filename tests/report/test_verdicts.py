@@ -16,6 +16,7 @@ from rich.console import Console
 
 from proofroll.core.convergence import Limit, richardson
 from proofroll.core.verdict import Verdict, judge_curve
+from proofroll.report.comparison import tables
 from proofroll.report.comparison.plots import point_curves
 from proofroll.report.comparison.records import ReportedComparison
 from proofroll.report.comparison.sentences import conclusions
@@ -301,3 +302,14 @@ def test_every_verdict_is_documented() -> None:
     for verdict in Verdict:
         assert f"| {SYMBOLS[verdict]} *{verdict}* |" in page
         assert f"`{verdict}`" in json
+
+
+def test_a_comparison_that_is_not_timed_shows_its_rough_cost(made: tuple[Outcome, Store]) -> None:
+    """The verdict table has the cost of the judged run, marked as rough, and a dash only where nothing ran."""
+    outcome, _ = made
+    results = [dataclasses.replace(run.result, seconds_per_second=None, timings=[]) for run in outcome.runs]
+    results[0] = dataclasses.replace(results[0], wall_seconds=0.25, processor={"advance": 0.2})
+    runs = [dataclasses.replace(run, result=item) for run, item in zip(outcome.runs, results, strict=True)]
+    rows = outcome_content(dataclasses.replace(outcome, runs=runs)).rows
+    assert tables.cost_cell(rows[0], None) == ("~0.2", "of one run beside which others ran: to a factor of about two")
+    assert tables.cost_cell(rows[-1], None) == ("–", "not timed")

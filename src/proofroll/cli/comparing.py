@@ -288,7 +288,8 @@ class _Comparing:
         if self.limit and (used := self._budget - self.limit.left) > 0:
             # On a machine that does other things, too, processor time passes slower.
             left = min(left, self.limit.left * (time.monotonic() - self._start) / used)
-        of = f"{min(len(self.ended) + 1, many)} of {many} comparisons, " if many > 1 else ""
+        ended = sum(self._known(at) == len(item.cases) for at, item in enumerate(self.plans))
+        of = f"{ended} of {many} comparisons ended, " if many > 1 else ""
         self.tell(f"{of}{f'about {float(written(left, 1)):g} s left, ' if ran else ''}{case.engine.name}")
 
 

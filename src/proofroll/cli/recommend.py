@@ -12,7 +12,7 @@ import typer
 
 from proofroll.cli import options
 from proofroll.cli.tradeoff import Over, measure, question_of, ranges_of, require_observables
-from proofroll.core.errors import InputError, require_known
+from proofroll.core.errors import InputError, ProofrollError, require_known
 
 if TYPE_CHECKING:
     from proofroll.studies.tradeoff.claims import TradeoffClaims
@@ -54,7 +54,8 @@ def recommend(
     listed apart, unless --engine asks for them. Of the cheaper ones, which all fail, the most accurate is shown.
 
     Of several scenes, studies or groups (as loops) the runs of a report answer, OUT/report.json unless --report names
-    another: a choice for each, and over all. The tolerance is then a part of the path, or '0.1 %' of it.
+    another: a choice for each, and over all. The tolerance is then a part of the path, or '0.1 %' of it; by default
+    1e-4, as on the first screen. Where --forces asks for forces that are not judged, the choice is for motion alone.
     """
     if len(scenes) > 1 or forces or report is not None:
         given = {
@@ -93,10 +94,10 @@ def recommend(
 def _from_report(
     names: list[str], tolerance: str, engines: list[str], path: Path, *, forces: bool, as_json: bool
 ) -> None:
-    """Prints advice for several scenes from the runs of a report; exit code 1 if some scene has no choice."""
+    """Prints advice for several scenes from the runs of a report; exit code 1 if in one nothing holds the tolerance."""
     from proofroll.report.against import EarlierReport
     from proofroll.report.page.advice import advice
-    from proofroll.report.page.choice_matrix import ChoiceStudy, choice_matrix
+    from proofroll.report.page.choice_matrix import FIRST_TOLERANCE, ChoiceStudy, choice_matrix
 
     lines = EarlierReport.read(path, "--report").lines
     for name in engines:
@@ -109,14 +110,15 @@ def _from_report(
             known = ", ".join(dict.fromkeys(line.group for line in lines))
             raise InputError("scenes", name, f"{path} has none; proofroll report {name} runs it; groups there: {known}")
         studies |= {line.study: ChoiceStudy(line.study, "") for line in own}
-    part = _tolerance(tolerance, "1").absolute(1.0)
+    part = _tolerance(tolerance, "1").absolute(1.0) if tolerance else FIRST_TOLERANCE
     matrix = choice_matrix(lines, studies)
     advised = advice(matrix, part, forces)
     content = {"report": str(path), "tolerance": part, "with_forces": forces, "advice": advised}
     key = "s/s: seconds of computing per second of motion; ~: to a factor of about two."
     options.show(content, as_json, lambda: [*(item.sentence for item in advised), key])
     single = [item for item, column in zip(advised, matrix.columns, strict=False) if len(column.studies) == 1]
-    raise typer.Exit(options.OK if all(item.choice for item in single) else options.CONTRADICTED)
+    chosen = [bool(item.choice) for item in single if item.judged]
+    raise typer.Exit(options.OK if chosen and all(chosen) else options.CONTRADICTED)
 
 
 def _tolerance(text: str, unit: str) -> Any:
@@ -124,7 +126,8 @@ def _tolerance(text: str, unit: str) -> Any:
     from proofroll.core.comparison import Tolerance
 
     if not text:
-        raise InputError("tolerance", "nothing", "give the largest error that you can bear, e.g. --tolerance 1e-3")
+        words = "give the largest error that you can bear, e.g. --tolerance 1e-3, or --tolerance '1 %' of the scale"
+        raise ProofrollError(f"--tolerance is missing: {words}")
     advice = f"write a positive number in {unit}, e.g. 1e-3, or 1 % of the quantity's scale"
     match = re.fullmatch(r"\s*([-+]?[\d.]+(?:[eE][-+]?\d+)?)\s*(\S*)\s*", text)
     if match is None:

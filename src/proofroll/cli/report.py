@@ -249,7 +249,8 @@ def _exit_code(content: ReportContent, compared: int) -> int:
 
 
 def _shown(content: ReportContent, out: Path) -> Iterator[Table | str]:
-    """Tables and lines for the terminal: verdicts, further studies, what to look at first, path of the report."""
+    """Tables and lines for the terminal: verdicts, further studies, what to look at first, path, and the choice."""
+    from proofroll.report.page.choice_matrix import FIRST_TOLERANCE
     from proofroll.report.terminal.tables import change_lines, first_lines, part_lines, verdict_parts
 
     for item in content.comparisons:
@@ -262,3 +263,5 @@ def _shown(content: ReportContent, out: Path) -> Iterator[Table | str]:
     if content.left_out_words:
         yield content.left_out_words
     yield f"The report is in {out / 'report.html'}, the same content in {out / 'report.json'}."
+    if content.choice.rows:
+        yield f"{content.choice.answer(FIRST_TOLERANCE, False)} {content.choice.with_forces(FIRST_TOLERANCE)}".rstrip()

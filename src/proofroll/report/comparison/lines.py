@@ -1,12 +1,11 @@
 """Lines of the long table for the runs of a comparison and of its ladders of steps."""
 
-import math
 from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
 
 from proofroll.core.verdict import Judgement, Verdict
-from proofroll.report.comparison.records import Cost
+from proofroll.report.comparison.records import Cost, rough_cost
 from proofroll.report.comparison.summary import by_row, settings_of
 from proofroll.report.kinds import group_of
 from proofroll.report.long_table import TableLine
@@ -52,17 +51,12 @@ def _plain(outcome: Outcome, run: Run, row: int) -> TableLine:
 
 
 def _ended(outcome: Outcome, result: Result) -> dict[str, Any]:
-    """Status and cost of a run; without clean runs the cost of the sampled run, which other processes disturbed.
-
-    While others have the processor wall time passes and processor time does not; of several threads it is the longer.
-    """
+    """Status and cost of a run; without clean runs the rough cost of the sampled run."""
     cost, done = Cost.of(result.timings), result.status == Status.DONE
-    spent = min(result.wall_seconds, result.processor.get("advance") or math.inf)
-    rough = spent / outcome.comparison.until if done and not result.host and spent else None
     return {
         "status": result.status,
         "message": "" if done else result.message,
-        "cost": cost.median if cost else rough,
+        "cost": cost.median if cost else rough_cost(result, outcome.comparison.until),
         "cost_low": cost.low if cost else None,
         "cost_high": cost.high if cost else None,
         "clean": cost is not None,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
@@ -13,7 +14,7 @@ from proofroll.core.verdict import Judgement, Verdict
 from proofroll.files.json_data import MERGED
 from proofroll.report.comparison.spread import Spread
 from proofroll.report.labels import names, unit
-from proofroll.running.case import Status
+from proofroll.running.case import Result, Status
 from proofroll.running.timing import Timing
 
 if TYPE_CHECKING:
@@ -39,6 +40,15 @@ class Cost:
         if not found.confidence:
             return cls(found.value, None, None, None, len(timings))
         return cls(found.value, found.low, found.high, found.confidence, len(timings))
+
+
+def rough_cost(result: Result, until: float) -> float | None:
+    """Seconds of computing per simulated second of a sampled run, which other processes disturbed; None: unknown.
+
+    While others have the processor wall time passes and processor time does not; of several threads it is the longer.
+    """
+    spent = min(result.wall_seconds, result.processor.get("advance") or math.inf)
+    return spent / until if result.status == Status.DONE and not result.host and spent else None
 
 
 @dataclass(frozen=True)
@@ -123,6 +133,7 @@ class ReportedRow(Setting):
     as_expected: bool
     observables: dict[str, WorstJudgement]
     seconds_per_second: float | None
+    rough_cost: float | None
     message: str
 
 
@@ -146,6 +157,7 @@ class ReportedRun(Setting):
     judgements: list[Judgement]
     certificate: list[dict[str, Any]]
     seconds_per_second: float | None
+    rough_cost: float | None
     build_seconds: float | None
     timings: list[float]
     cost: Cost | None

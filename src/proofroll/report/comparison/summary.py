@@ -17,6 +17,7 @@ from proofroll.report.comparison.records import (
     ShownObservable,
     WorstJudgement,
     in_words,
+    rough_cost,
 )
 from proofroll.report.comparison.spread import spread_of
 from proofroll.report.kinds import group_of, kind_name
@@ -29,7 +30,7 @@ from proofroll.studies.comparison.planning import at_point, point_name
 
 def reported_rows(outcome: Outcome) -> list[ReportedRow]:
     """Summary of each row of a comparison."""
-    return [_row(runs) for runs in by_row(outcome).values()]
+    return [_row(runs, outcome.comparison.until) for runs in by_row(outcome).values()]
 
 
 def outcome_content(outcome: Outcome) -> ReportedComparison:
@@ -61,7 +62,7 @@ def outcome_content(outcome: Outcome) -> ReportedComparison:
             for name, band in comparison.bands.items()
         },
         rows=reported_rows(outcome),
-        runs=[_run(run, numbers[id(run.row)]) for run in outcome.runs],
+        runs=[_run(run, numbers[id(run.row)], outcome.comparison.until) for run in outcome.runs],
         hosts=hosts(run.result for run in outcome.runs),
         spread=[
             spread_of(
@@ -92,13 +93,14 @@ def by_row(outcome: Outcome) -> dict[int, list[Run]]:
     return rows
 
 
-def _row(runs: list[Run]) -> ReportedRow:
+def _row(runs: list[Run], until: float) -> ReportedRow:
     """Summary of a row over the points of the parameters, by the worst verdict and the largest cost."""
     first = runs[0]
     # A point where the question is ill-posed or not judged does not count against an engine.
     judged = [run for run in runs if run.verdict not in {Verdict.ILL_POSED, Verdict.NOT_JUDGED}] or runs
     names = list(dict.fromkeys(judgement.observable for run in judged for judgement in run.judgements))
     timings = [run.result.seconds_per_second for run in runs if run.result.seconds_per_second is not None]
+    rough = [cost for run in runs if (cost := rough_cost(run.result, until)) is not None]
     reason, limit = _why(judged)
     return ReportedRow(
         **settings_of(first),
@@ -118,6 +120,7 @@ def _row(runs: list[Run]) -> ReportedRow:
         as_expected=not any(run.contradictions for run in runs),
         observables={name: _worst(judged, name) for name in names},
         seconds_per_second=max(timings, default=None),
+        rough_cost=max(rough, default=None),
         message=next((run.result.message for run in runs if run.result.status != Status.DONE), ""),
     )
 
@@ -214,7 +217,7 @@ def settings_of(run: Run) -> dict[str, Any]:
     }
 
 
-def _run(run: Run, row: int) -> ReportedRun:
+def _run(run: Run, row: int, until: float) -> ReportedRun:
     reason, limit = _why([run])
     return ReportedRun(
         row=row,
@@ -234,6 +237,7 @@ def _run(run: Run, row: int) -> ReportedRun:
         judgements=run.judgements,
         certificate=run.result.certificate,
         seconds_per_second=run.result.seconds_per_second,
+        rough_cost=rough_cost(run.result, until),
         build_seconds=run.result.build_seconds,
         timings=run.result.timings,
         cost=Cost.of(run.result.timings),

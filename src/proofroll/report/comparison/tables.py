@@ -96,6 +96,15 @@ def cost_title(cost: Cost | None) -> str:
     return f"median of {cost.runs} clean runs; {cost_interval(cost)} s/s holds it with {known}"
 
 
+def cost_cell(of: ReportedRow | ReportedRun, cost: Cost | None) -> tuple[str, str]:
+    """Text of a cost [s/s], rough ones after ``~``, and a sentence that describes it."""
+    if of.seconds_per_second is not None:
+        return number(of.seconds_per_second), cost_title(cost)
+    if of.rough_cost is None:
+        return "–", cost_title(None)
+    return f"~{number(of.rough_cost)}", "of one run beside which others ran: to a factor of about two"
+
+
 def reasons(certificate: Iterable[Mapping[str, Any]]) -> dict[str, list[str]]:
     """Reasons for quantities of a certificate to differ by more than round-off: reason -> quantities."""
     quantities: dict[str, list[str]] = {}

@@ -20,12 +20,14 @@ class Advised:
         choice: setting and step, or formulation; None: nothing holds the tolerance.
         cost: of the choice, wall seconds per simulated second at the slowest scene; None: without a choice, or for
         ``all``.
+        judged: False: motion is judged in none of the scenes, so that nothing can be chosen.
     """
 
     of: str
     sentence: str
     choice: str | None = None
     cost: float | None = None
+    judged: bool = True
 
 
 def advice(matrix: ChoiceMatrix, tolerance: float, forces: bool) -> list[Advised]:
@@ -46,8 +48,9 @@ def words(matrix: ChoiceMatrix) -> str:
     for forces, tolerance in ASKED:
         heads, engines = [], []
         for column in matrix.columns:
-            found = {} if _unjudged(matrix, column, forces) else _engines(matrix, column, tolerance, forces)
-            heads.append(_asked(column, tolerance, forces))
+            head, judged = _asked(matrix, column, tolerance, forces)
+            found = {} if judged is None else _engines(matrix, column, tolerance, judged)
+            heads.append(head)
             engines.append(
                 [
                     (engine, cell.cost, _named(name, cell), cell.text)
@@ -62,14 +65,17 @@ def words(matrix: ChoiceMatrix) -> str:
 
 
 def of_column(matrix: ChoiceMatrix, column: ChoiceColumn, tolerance: float, forces: bool) -> Advised:
-    """Advice for a column: the cheapest that holds the tolerance, the best of other engines, the effect of forces."""
-    asked = _asked(column, tolerance, forces)
-    engines = _engines(matrix, column, tolerance, forces)
+    """Advice for a column: the cheapest that holds the tolerance, the best of other engines, the effect of forces.
+
+    Where forces are asked for and are not judged, the advice is for motion alone and says so.
+    """
+    asked, judged = _asked(matrix, column, tolerance, forces)
+    engines = _engines(matrix, column, tolerance, bool(judged))
     if not engines:
         return Advised(column.title, f"{asked} no engine was run.")
     first, *others = engines.values()
-    if _unjudged(matrix, column, forces):
-        return Advised(column.title, f"{asked}: {'forces are' if forces else 'motion is'} not judged there.")
+    if judged is None:
+        return Advised(column.title, f"{asked}: motion is not judged there.", judged=False)
     clauses = [_other(name, cell, first[1]) for name, cell in others]
     held = math.isfinite(first[1].cost)
     if held:
@@ -117,9 +123,15 @@ def _use(costs: dict[str, float], missing: set[str]) -> tuple[int, float]:
     return len(gained), -sum(math.log(costs[name]) for name in gained if costs[name] > 0)
 
 
-def _asked(column: ChoiceColumn, tolerance: float, forces: bool) -> str:
+def _asked(matrix: ChoiceMatrix, column: ChoiceColumn, tolerance: float, forces: bool) -> tuple[str, bool | None]:
+    """Head of a sentence, and whether the answer is about forces, too; None: motion is not judged."""
     title = column.title if column.whole else f"“{column.title}”"
-    return f"For {title} to {number(tolerance)}{' with forces' if forces else ''}"
+    size = number(tolerance)
+    if _unjudged(matrix, column, False):
+        return f"For {title} to {size}", None
+    if forces and _unjudged(matrix, column, True):
+        return f"For {title} forces are not judged; for motion alone to {size}", False
+    return f"For {title} to {size}{' with forces' if forces else ''}", forces
 
 
 def _unjudged(matrix: ChoiceMatrix, column: ChoiceColumn, forces: bool) -> bool:

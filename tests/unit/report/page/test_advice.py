@@ -53,7 +53,10 @@ def test_forces_are_told_where_they_change_nothing_or_are_never_given() -> None:
     exact = replace(FORCE, error=1e-9)
     assert said([LINE, exact], 1e-3)[0].endswith("It holds the forces, too.")
     assert said([LINE], 1e-3)[0].endswith("Forces are not judged there.")
-    assert said([LINE], 1e-3, forces=True)[0] == "For trees to 1e-3 with forces: forces are not judged there."
+    alone = (
+        "For trees forces are not judged; for motion alone to 1e-3 take alpha joints default at dt 1e-3 s (0.01 s/s)."
+    )
+    assert said([LINE], 1e-3, forces=True)[0] == alone
     assert "with forces" in said([LINE, exact], 1e-3, forces=True)[0]
 
 
