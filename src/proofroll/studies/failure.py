@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from proofroll.core.arrays import FloatArray, largest_difference
+from proofroll.core.arrays import FloatArray
 from proofroll.core.dataset import BETWEEN, part
 from proofroll.core.element_abilities import ExplainsErrors
 from proofroll.core.events import events_of
@@ -109,11 +109,17 @@ class Yardstick:
         assert self.truth is not None  # else nothing asks
         return Reference.of(self.scene, self.truth)
 
-    def off_grid(self, dataset: xr.Dataset) -> float:
-        """Largest error at samples off the grid, as a part of the range; 0 if the run or the truth has none."""
+    def off_grid(self, dataset: xr.Dataset) -> FloatArray:
+        """Largest error off the grid in the interval before each sample, as a part of the range; else 0."""
+        errors = np.zeros(dataset.sizes["time"])
         known = self.truth is not None and BETWEEN in dataset and BETWEEN in self.truth
-        both = held_against.between(self._reference, self.name, dataset) if known else None
-        return 0.0 if both is None else largest_difference(*both) / self.scale
+        found = held_against.off_grid(self._reference, self.name, dataset) if known else None
+        if found is not None:
+            times, values, true = found
+            wrong = np.abs(np.where(np.isfinite(true), values - true, 0.0)) / self.scale
+            ends = np.minimum(np.searchsorted(dataset["time"].to_numpy(), times), len(errors) - 1)
+            np.maximum.at(errors, ends, _worst(wrong))
+        return errors
 
 
 def run_outcome(result: Result, dataset: xr.Dataset | None, yardstick: Yardstick) -> RunOutcome:
@@ -165,17 +171,20 @@ def _failed(
 def _errors(dataset: xr.Dataset, yardstick: Yardstick) -> FloatArray | None:
     """Error of the deciding observable at each sample, of its worst component, as a part of the range.
 
-    The error off the grid is added to the last sample.
+    Errors off the grid count at the sample after them.
     """
     if yardstick.true is None:
         return None
     values = dataset[yardstick.name].to_numpy()
     with np.errstate(over="ignore", invalid="ignore"):
         errors = np.abs(values - yardstick.true[: len(values)]) / yardstick.scale
-        off_grid = yardstick.off_grid(dataset)
-    finite = np.where(np.isfinite(errors), errors, np.inf).reshape(len(errors), -1).max(axis=1)
-    finite[-1:] = np.maximum(finite[-1:], off_grid)
-    return np.asarray(finite)
+        return np.maximum(_worst(errors), yardstick.off_grid(dataset))
+
+
+def _worst(errors: FloatArray) -> FloatArray:
+    """Largest component of each error, infinite where one is not finite; shape (time,)."""
+    finite = np.where(np.isfinite(errors), errors, np.inf)
+    return np.asarray(finite.reshape(len(errors), -1).max(axis=1, initial=0.0))
 
 
 def _first(dataset: xr.Dataset, yardstick: Yardstick, errors: FloatArray | None) -> tuple[str, float] | None:

@@ -94,6 +94,15 @@ def test_what_is_wrong_between_the_samples_is_seen() -> None:
     assert (outcome.stable, outcome.accurate, outcome.error) == (True, False, pytest.approx(0.05))
 
 
+def test_what_is_wrong_between_two_samples_is_dated_there() -> None:
+    """A run that is wrong by the whole range within one interval alone fails at the end of that interval."""
+    known = truth(SCENE, TIMES, between=TIMES[:-1] + 0.4 * np.diff(TIMES))
+    yardstick, liar = Yardstick.of(SCENE, known), known.copy(deep=True)
+    liar[f"between.{SCENE.deciding}"][6] += 3 * yardstick.scale
+    outcome = run_outcome(DONE, liar, yardstick)
+    assert (outcome.stable, outcome.time) == (False, pytest.approx(TIMES[7]))
+
+
 def test_what_came_first() -> None:
     """Of two failures the earlier one counts, for the later may be its consequence."""
     later = (np.arange(len(TIMES)) >= 18)[:, None]

@@ -24,7 +24,7 @@ from proofroll.elements.mechanism.analysis import Analysis, analysed
 from proofroll.elements.mechanism.capabilities import MechanismCapability, required
 from proofroll.elements.mechanism.certificate import CAPS, certify
 from proofroll.elements.mechanism.contacts.observables import LAWS, RESIDUALS, contact_observables
-from proofroll.elements.mechanism.contacts.start import extent
+from proofroll.elements.mechanism.contacts.start import extent, natural_length
 from proofroll.elements.mechanism.dataset import from_samples
 from proofroll.elements.mechanism.failure_program import program
 from proofroll.elements.mechanism.joint import TURNING
@@ -148,15 +148,14 @@ class MechanismElement:
         """Round-off of the first accelerations [m/s², rad/s²]."""
         return self._equations.sensitivity()[1]
 
-    @property
-    def length(self) -> float:
-        """The :attr:`extent`, or 1 m if that is zero."""
-        return self.extent or 1.0
-
     @cached_property
-    def extent(self) -> float:
-        """Largest distance between joints, centres of mass, tracked points and contacts at the start [m]."""
-        return extent(self.mechanism, self._solution.motion)
+    def length(self) -> float:
+        """Largest distance between joints, centres of mass, tracked points and contacts at the start [m].
+
+        Where all of these are at one place, a length of :func:`.natural_length`.
+        """
+        found = self._solution
+        return extent(self.mechanism, found.motion) or natural_length(self.mechanism, found)
 
     @cached_property
     def natural_time(self) -> float:

@@ -45,7 +45,13 @@ def observed(reference: Reference, dataset: xr.Dataset) -> dict[str, FloatArray]
 
 
 def between(reference: Reference, name: str, dataset: xr.Dataset) -> tuple[FloatArray, FloatArray] | None:
-    """Values of an observable or state at samples off the grid, and its true values there; None: nothing to compare.
+    """Values of :func:`off_grid` with their true values, where the truth knows them; None: nothing to compare."""
+    found = off_grid(reference, name, dataset)
+    return None if found is None else (found[1][known := np.isfinite(found[2])], found[2][known])
+
+
+def off_grid(reference: Reference, name: str, dataset: xr.Dataset) -> tuple[FloatArray, FloatArray, FloatArray] | None:
+    """Times [s] of samples off the grid, an observable or state there, and its true values; None: nothing to compare.
 
     Intervals with an event of the run or of the truth are left out: for up to a step of the engine its forces may be
     those from before the event.
@@ -58,21 +64,20 @@ def between(reference: Reference, name: str, dataset: xr.Dataset) -> tuple[Float
     happened = [event.time for one in (dataset, reference.dataset) for event in reference.events_of(one)]
     alone = ~np.isin(np.searchsorted(grid, times), np.searchsorted(grid, happened))
     both = np.isin(times, known) & alone & (times < grid[-1])
-    values, true = run[own].values[both], truth[own].values[np.isin(known, times[both])]
+    times, values, true = times[both], run[own].values[both], truth[own].values[np.isin(known, times[both])]
     if item is not None and item.role is Role.RESIDUAL:
-        return values, np.zeros_like(values)
+        return times, values, np.zeros_like(values)
     if run[own].dims[-1:] == ("wxyz",):
         values = turned_alike(values, true)
     turned = on_turns_of(true, values, name, (dataset, reference.dataset))
-    known = np.isfinite(true)
-    return None if turned is None else (turned[known], true[known])
+    return None if turned is None else (times, turned, true)
 
 
 def error(reference: Reference, name: str, values: FloatArray, dataset: xr.Dataset) -> float:
     """Largest distance of an observable from the truth, at the samples and off the grid."""
-    off_grid = between(reference, name, dataset)
+    apart = between(reference, name, dataset)
     on_grid = largest_difference(values, reference.true(name, values)[0])
-    return on_grid if off_grid is None else max(on_grid, largest_difference(*off_grid))
+    return on_grid if apart is None else max(on_grid, largest_difference(*apart))
 
 
 def turned_alike(values: FloatArray, true: FloatArray) -> FloatArray:

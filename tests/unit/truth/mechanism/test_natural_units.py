@@ -15,6 +15,7 @@ from proofroll.elements.mechanism.assembly import assembled, check_start
 from proofroll.elements.mechanism.contacts.dynamics import ContactDynamics
 from proofroll.elements.mechanism.contacts.geometry import Geometry
 from proofroll.elements.mechanism.drives import Actuator, Coupling
+from proofroll.elements.mechanism.element import MechanismElement
 from proofroll.elements.mechanism.joint import Joint
 from proofroll.elements.mechanism.joint_coordinates import JointCoordinates
 from proofroll.elements.mechanism.model import Mechanism
@@ -215,6 +216,16 @@ def test_natural_units_follow_the_scene() -> None:
     assert slow == natural_units(spring)._replace(time=1024.0 * natural_units(spring).time)
     for number in (*units, *slow):
         assert np.log2(number) == round(np.log2(number))
+
+
+@pytest.mark.parametrize(("scene", "point"), [("servo", False), ("stop", False), ("stiff_damper", True)])
+def test_a_mechanism_at_one_place_has_a_length_that_follows_it(scene: str, point: bool) -> None:
+    """A body at the origin, above its stop, or a point with a speed has 100 times the length where it is as large."""
+    mechanism = mechanism_of(scene)
+    if point:
+        mechanism = replace(mechanism, bodies=tuple(replace(body, inertia=(0, 0, 0)) for body in mechanism.bodies))
+    one, other = (MechanismElement(item) for item in (mechanism, larger(mechanism, (100.0, 1.0, 10.0))))
+    assert other.length == pytest.approx(100.0 * one.length)
 
 
 def test_messages_of_routes_have_seconds() -> None:

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import InputError
 from proofroll.elements.mechanism.contacts.touching import Moving, Touching, touch
-from proofroll.elements.mechanism.joint_coordinates import JointCoordinates
+from proofroll.elements.mechanism.joint_coordinates import JointCoordinates, Solution
 from proofroll.elements.mechanism.kinematics import BodyMotion, Tree
 from proofroll.elements.mechanism.model import Mechanism
 
@@ -60,19 +60,34 @@ class Scale(NamedTuple):
         return STILL * self.length * self.rate
 
 
+def natural_length(mechanism: Mechanism, found: Solution) -> float:
+    """Largest of extent, prismatic travel and radii of gyration at one instant [m].
+
+    That of a point at its place is how far its speed carries it against its acceleration; without these 1 m, by which
+    nothing that it does is large or small.
+    """
+    motion = found.motion
+    ways = [abs(way) for joint in mechanism.joints if joint.kind == "prismatic" for way in (*joint.q0, joint.rest)]
+    radii = [np.sqrt(np.trace(body.inertia) / body.mass) for body in mechanism.bodies if body.mass]
+    length, pull = max([extent(mechanism, motion), *ways, *radii]), _largest(_rates(found)[:, :3])
+    return float(length or (pull and _largest(motion.v_WB) ** 2 / pull) or 1.0)
+
+
 def natural_scale(mechanism: Mechanism) -> Scale:
-    """Natural length, prismatic travel included, and the faster of the rates of gravity and of the first motion.
+    """Natural length, and the faster of the rates of gravity and of the first motion.
 
     Both are powers of two, so that a change of units causes no round-off.
     """
     found = JointCoordinates(mechanism).solve(*mechanism.start())
-    motion, rates = found.motion, found.motion.J @ found.acceleration + found.motion.bias
-    ways = [abs(way) for joint in mechanism.joints if joint.kind == "prismatic" for way in (*joint.q0, joint.rest)]
-    radii = [np.sqrt(np.trace(body.inertia) / body.mass) for body in mechanism.bodies if body.mass]
-    length = max([extent(mechanism, motion), *ways, *radii]) or 1.0
+    motion, rates, length = found.motion, _rates(found), natural_length(mechanism, found)
     pulls = _largest(mechanism.gravity) / length, _largest(rates[:, :3]) / length, _largest(rates[:, 3:])
     rate = max(np.sqrt(max(pulls)), _largest(motion.v_WB) / length, _largest(motion.w_WB)) or 1.0
     return Scale(*(2.0 ** round(np.log2(size)) for size in (length, rate)))
+
+
+def _rates(found: Solution) -> FloatArray:
+    """Accelerations and angular accelerations of the bodies, shape (body, 6)."""
+    return found.motion.J @ found.acceleration + found.motion.bias
 
 
 def _largest(values: ArrayLike) -> float:
