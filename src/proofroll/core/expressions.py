@@ -9,7 +9,7 @@ from typing import Any
 from simpleeval import FeatureNotAvailable, InvalidExpression, SimpleEval
 
 from proofroll.core.errors import InputError
-from proofroll.core.quantity import Quantity, UnitsDiffer, powers_of
+from proofroll.core.quantity import OR, Quantity, UnitsDiffer, powers_of
 
 _OPERATORS = {
     ast.Add: operator.add,
@@ -48,8 +48,8 @@ def evaluated(
         field: its place, for the message.
         text: the expression.
         names: the parameters, with their units.
-        unit: required unit of the result, as scene files write it; "": not checked. A formula of plain numbers is
-            accepted for any unit, as a plain number is.
+        unit: required unit of the result, as scene files write it, or several joined by OR; "": not checked. A formula
+            of plain numbers is accepted for any unit, as a plain number is.
         functions: functions of a dimensionless number that the expression may call.
 
     Raises:
@@ -78,7 +78,7 @@ def evaluated(
         raise InputError(field, text, f"is no finite real number; use + - * / ^ and {_list(known)}") from None
     if not math.isfinite(number):
         raise InputError(field, text, "is not finite; change the expression or its parameters")
-    if unit and quantity.powers is not None and quantity.powers != powers_of(unit):
+    if unit and quantity.powers is not None and quantity.powers not in map(powers_of, unit.split(OR)):
         advice = f"this number is in {unit}, the formula gives {quantity.unit}; a bare number in a product has no unit"
         raise InputError(field, text, f"{advice}: make a parameter of what has one")
     return number

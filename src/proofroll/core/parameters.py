@@ -10,9 +10,9 @@ from typing import Any
 
 from proofroll.core.errors import InputError, require_known
 from proofroll.core.expressions import evaluated
-from proofroll.core.quantity import Quantity, powers_of
+from proofroll.core.quantity import OR, Quantity, powers_of
 
-# Unit of a number, or of each number of a list; "": not checked.
+# Unit of a number, or of each number of a list; "": not checked. Several that are allowed are joined by OR.
 Unit = str | tuple[str, ...]
 _NUMBERED = re.compile(r"\{([^{}]*)\}")
 
@@ -59,7 +59,7 @@ class Parameters:
         if content.startswith("$"):
             require_known(where, content[1:], self.values, "there is no such parameter; choose from", content)
             given = self.units.get(content[1:], "")
-            if own and given and given != own:
+            if own and given and given not in own.split(OR):
                 raise InputError(where, content, f"this number is in {own}, that parameter in {given}")
             return self.values[content[1:]]
         if content.startswith("="):

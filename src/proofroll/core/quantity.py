@@ -17,6 +17,7 @@ _IN_BASE_UNITS: Mapping[str, Powers] = {
     "W": {"kg": 1, "m": 2, "s": -3},
     "Hz": {"s": -1},
 }
+OR = " or "  # between units of which a number may have any
 _POWER = re.compile(r"([^^]+)\^(-?\d+)")
 
 

@@ -11,6 +11,7 @@ from pydantic import BeforeValidator, ConfigDict, TypeAdapter, ValidationError
 from proofroll.core.bounds import OutOfBounds
 from proofroll.core.errors import InputError, no_such_key
 from proofroll.core.parameters import Unit
+from proofroll.core.quantity import OR
 
 _T = TypeVar("_T")
 # Number that may be infinite (friction without a bound); JSON writes null for infinity.
@@ -159,6 +160,6 @@ def all_units_of(*types: type) -> dict[str, str]:
         for item in fields(each):
             unit = item.metadata.get("unit", "")
             for kind, own in unit.items() if isinstance(unit, Mapping) else [("", unit)]:
-                for place, one in enumerate([own] if isinstance(own, str) else own):
+                for place, one in enumerate(own.split(OR) if isinstance(own, str) else own):
                     units[".".join(filter(None, [item.name, kind, str(place or "")]))] = one
     return {name: unit for name, unit in units.items() if unit}

@@ -123,9 +123,13 @@ def check_start(mechanism: Mechanism) -> None:
         if rate > least_rate:
             advice = f"v0 opens the coupling at {rate:.3g} rad/s (or m/s); {ADVICE.replace('q0', 'v0', 1)}"
             raise InputError(field, between, advice)
-    _check_inertia(mechanism, JointCoordinates(mechanism, 0).inertial(motion)[1])
+    equations = JointCoordinates(mechanism)
+    _check_inertia(mechanism, equations.inertial(motion)[1])
     if analysed(mechanism).mobility == 0:
         raise InputError("mechanism", f"{len(mechanism.joints)} joints", IMMOBILE)
+    if not np.isfinite(equations.solve(q, v).acceleration).all():
+        advice = "forces, gains or velocities are too large to be computed with"
+        raise InputError("accelerations", "infinite", advice)
 
 
 def _opening(C: Array, v: Array, away: float) -> tuple[float, float]:

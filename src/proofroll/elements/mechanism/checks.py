@@ -31,6 +31,7 @@ METRES, RADIANS, RATIO = ({"unit": unit} for unit in ("m", "rad", "1"))
 WORLD = "world"
 ZERO: Vector = (0.0, 0.0, 0.0)
 Z: Vector = (0.0, 0.0, 1.0)
+_SQUARED = 1e-150  # sizes above it, and below its inverse, have squares within the range of numbers
 
 
 def assign(item: object, **values: Any) -> None:
@@ -84,10 +85,12 @@ def vector(field: str, value: Any) -> Vector:
 def axis(field: str, value: Any) -> Vector:
     """The value as a unit vector. Raises InputError if it is not three finite numbers, or zero."""
     found = np.array(vector(field, value))
-    length = float(np.linalg.norm(found))
-    if length == 0.0:
+    largest = np.abs(found).max()
+    if largest == 0.0:
         raise InputError(field, value, "an axis of length zero has no direction; give a nonzero vector")
-    x, y, z = (float(component) for component in found / length)
+    if not _SQUARED < largest < 1 / _SQUARED:
+        found = found / largest
+    x, y, z = (float(component) for component in found / np.linalg.norm(found))
     return x, y, z
 
 

@@ -15,12 +15,9 @@ from proofroll.elements.mechanism.signal import Formula, Table, checked, value_a
 ActuatorKind = Literal["torque", "velocity", "position"]
 # Gains of each kind.
 _GAINS: Mapping[str, tuple[str, ...]] = {"torque": (), "velocity": ("kd",), "position": ("kp", "kd")}
-# Units of a target of a turning and of a sliding motor; a gear may turn one motion into the other.
-TARGET_UNITS: Mapping[str, tuple[str, ...]] = {
-    "torque": ("N m", "N"),
-    "velocity": ("rad/s", "m/s"),
-    "position": ("rad", "m"),
-}
+# Units of a turning and of a sliding motor; a gear may turn one motion into the other.
+_EFFORT, _PLACE = {"unit": "N m or N"}, {"unit": "rad or m"}
+_TARGET = {"unit": {"torque": _EFFORT["unit"], "velocity": "rad/s or m/s", "position": _PLACE["unit"]}}
 MODES = ("least", "linear", "greatest")  # of an effort with a limit: at its lower limit, between, at its upper limit
 
 
@@ -36,20 +33,20 @@ class Actuator:
         kind: what its target r is. Effort at the joint: n r (torque), n kd (r - n dq/dt) (velocity), n (kp (r - n q) -
             kd n dq/dt) (position), with n the gear.
         target: of the motor; a number, a formula ``"= 0.3*sin(2*pi*t)"``, or a table ``{times = [..], values = [..]}``.
-        kp: gain of a position [N m/rad, N/m, at the motor].
-        kd: gain of a velocity [N m s/rad, N s/m, at the motor].
+        kp: gain of a position, at the motor.
+        kd: gain of a velocity, at the motor.
         gear: turns of the motor per turn of the joint, n.
-        limit: largest size of the whole effort at the joint [N m, N]; None: none.
+        limit: largest size of the whole effort at the joint; None: none.
     """
 
     name: str
     joint: str
     kind: ActuatorKind
-    target: float | Formula | Table = field(default=0.0, metadata={"signal": True})
-    kp: float = 0.0
-    kd: float = 0.0
+    target: float | Formula | Table = field(default=0.0, metadata={**_TARGET, "signal": True})
+    kp: float = field(default=0.0, metadata={"unit": "N m/rad or N/m"})
+    kd: float = field(default=0.0, metadata={"unit": "N m s/rad or N s/m"})
     gear: float = field(default=1.0, metadata=checks.RATIO)
-    limit: float | None = None
+    limit: float | None = field(default=None, metadata=_EFFORT)
 
     def __post_init__(self) -> None:
         place = f"actuators.{checks.name(self.name, 'actuators')}"
@@ -69,6 +66,8 @@ class Actuator:
         gear = checks.number(f"{place}.gear", self.gear)
         if not gear:
             raise InputError(f"{place}.gear", gear, "a motor that never turns does nothing; give a number other than 0")
+        if not math.isfinite(gear * gear * max(self.kp, self.kd)):
+            raise InputError(f"{place}.gear", gear, "its square times a gain is infinite; give smaller numbers")
         checks.assign(self, gear=gear)
         if self.limit is not None:
             limit = checks.number(f"{place}.limit", self.limit)
@@ -118,14 +117,14 @@ class Coupling:
         name: unique among couplings.
         joint_a, joint_b: revolute or prismatic joints.
         ratio: of the rate of joint_b to that of joint_a.
-        offset: coordinate of joint_b where that of joint_a is zero [rad, m].
+        offset: coordinate of joint_b where that of joint_a is zero.
     """
 
     name: str
     joint_a: str
     joint_b: str
-    ratio: float
-    offset: float = 0.0
+    ratio: float = field(metadata={"unit": "1 or rad/m or m/rad"})
+    offset: float = field(default=0.0, metadata=_PLACE)
 
     def __post_init__(self) -> None:
         place = f"couplings.{checks.name(self.name, 'couplings')}"

@@ -17,7 +17,7 @@ from proofroll.elements.mechanism import checks
 from proofroll.elements.mechanism.assembly import assembled, check_start
 from proofroll.elements.mechanism.contacts.geometry import Geometry, Pair
 from proofroll.elements.mechanism.contacts.start import check_contacts
-from proofroll.elements.mechanism.drives import TARGET_UNITS, Actuator, Coupling
+from proofroll.elements.mechanism.drives import Actuator, Coupling
 from proofroll.elements.mechanism.joint import Joint
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.parts import Body, Loop, Point, Spring
@@ -97,8 +97,7 @@ def _made(kind: str, field: str, table: Any, numbers: Parameters) -> Any:
     made = KINDS[kind]
     units = units_of_kind(made, table.get("kind"))
     for key in _SIGNALS[kind] & table.keys():
-        allowed = TARGET_UNITS.get(str(table.get("kind")), ()) if made is Actuator else (str(units[key]),)
-        table = {**table, key: read_signal(f"{field}.{key}", table[key], numbers, allowed)}
+        table = {**table, key: read_signal(f"{field}.{key}", table[key], numbers, str(units[key]))}
     filled = numbers.filled(table, field, units)
     try:
         return validated(made, filled, field)

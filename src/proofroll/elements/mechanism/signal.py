@@ -24,6 +24,11 @@ FUNCTIONS: Mapping[str, Callable[[Any], Any]] = {
 }
 
 
+# What evaluates to no number; KeyError: an operator that is not known, such as a comparison.
+_NO_NUMBER: tuple[type[Exception], ...] = (InvalidExpression, ArithmeticError, KeyError, SyntaxError, TypeError)
+_NO_NUMBER += (ValueError, RecursionError, MemoryError)
+
+
 def _power(base: Any, power: Any) -> Any:
     return (float(base) if isinstance(base, int) else base) ** power  # integers would grow for hours
 
@@ -43,7 +48,7 @@ class Formula:
     def __post_init__(self) -> None:
         try:
             value = float(self.at(0.0))
-        except (InvalidExpression, ArithmeticError, SyntaxError, TypeError, ValueError, RecursionError, MemoryError):
+        except _NO_NUMBER:
             value = math.nan
         if len(self.text) > LONGEST or not math.isfinite(value):
             advice = "is no finite number at t = 0; use t, parameters, + - * / ^ ( ), pi and " + ", ".join(FUNCTIONS)
@@ -114,8 +119,8 @@ def checked(field: str, given: Any) -> Signal:
     return given if isinstance(given, Formula | Table) else checks.number(field, given)
 
 
-def read_signal(field: str, given: Any, numbers: Parameters, units: Sequence[str] = ()) -> Any:
-    """Signal of a file, in one of these units; a number or a formula without time is returned unchanged.
+def read_signal(field: str, given: Any, numbers: Parameters, unit: str = "") -> Any:
+    """Signal of a file, in this unit; a number or a formula without time is returned unchanged.
 
     Raises:
         InputError: a formula or a table is wrong, or a formula has another unit.
@@ -130,13 +135,14 @@ def read_signal(field: str, given: Any, numbers: Parameters, units: Sequence[str
                     )
                 own = tuple((name, float(value)) for name, value in numbers.values.items() if name in used)
                 made = Formula(given[1:].strip(), own)
-                _check_unit(field, made.text, numbers, units)
+                _check_unit(field, made.text, numbers, unit)
                 return made
         if isinstance(given, dict):
             for key in given:
                 if key not in {"times", "values"}:
                     raise no_such_key(key, given[key], ("times", "values"))
-            filled = {key: numbers.filled(given.get(key, []), key, {}) for key in ("times", "values")}
+            axes = {"times": "s", "values": unit}
+            filled = {key: numbers.filled(given.get(key, []), key, {}, axes[key]) for key in axes}
             return Table(**filled)
         if isinstance(given, str) and not given.startswith(("=", "$")):
             raise InputError(
@@ -148,17 +154,16 @@ def read_signal(field: str, given: Any, numbers: Parameters, units: Sequence[str
     return given
 
 
-def _check_unit(field: str, text: str, numbers: Parameters, units: Sequence[str]) -> None:
-    """Raises InputError if a formula has none of the units, with t as seconds or as a plain number."""
+def _check_unit(field: str, text: str, numbers: Parameters, unit: str) -> None:
+    """Raises InputError if a formula has another unit, with t as seconds or as a plain number."""
     wrong: InputError | None = None
-    for unit in filter(None, units):
-        for time in (Quantity(0.0, {"s": 1.0}), Quantity(0.0)):
-            try:
-                evaluated(field, text, {**numbers.quantities, TIME: time}, unit, FUNCTIONS)
-            except InputError as error:
-                wrong = wrong or error
-            else:
-                return
+    for time in (Quantity(0.0, {"s": 1.0}), Quantity(0.0)):
+        try:
+            evaluated(field, text, {**numbers.quantities, TIME: time}, unit, FUNCTIONS)
+        except InputError as error:
+            wrong = wrong or error
+        else:
+            return
     if wrong is not None:
         raise wrong
 

@@ -74,21 +74,22 @@ kp = 100
 target = "= size*sin(2*pi*t)^2"
 [[actuators]]
 name = "b"
-joint = "j"
-kind = "torque"
+joint = "k"
+kind = "position"
+kp = 1
 target = {times = [0, 1], values = ["$size", 2]}
 [[actuators]]
 name = "c"
 joint = "k"
 kind = "torque"
-target = "= 2*size"
+target = "= 2*3"
 """,
     )
     formula, table, number = (item.target for item in made.actuators)
     assert isinstance(formula, Formula)
     assert formula.at(np.array([0.0, 0.25, 0.125])) == pytest.approx([0.0, 0.3, 0.15])
     assert value_at(table, np.array([-1.0, 0.5, 3.0])) == pytest.approx([0.3, 1.15, 2.0])
-    assert number == 0.6
+    assert number == 6
     assert {MechanismCapability.ACTUATORS, MechanismCapability.SIGNALS} <= required(made)
 
 
@@ -162,6 +163,46 @@ def test_efforts_go_through_the_gear_and_the_limit_is_at_the_joint(more: dict[st
         (
             '[[couplings]]\nname = "g"\njoint_a = "j"\njoint_b = "k"\nratio = 1\noffset = 0.1',
             "couplings.g = 'j to k': q0 of k is -0.1 rad (or m) off",
+        ),
+        (
+            '[[actuators]]\nname = "a"\njoint = "j"\nkind = "position"\nkp = "100"',
+            "actuators.0.kp = '100': this is not a number; give one in N m/rad or N/m",
+        ),
+        (
+            '[[actuators]]\nname = "a"\njoint = "j"\nkind = "position"\nkp = "$size"',
+            "actuators.0.kp = '$size': this number is in N m/rad or N/m, that parameter in m",
+        ),
+        (
+            '[[actuators]]\nname = "a"\njoint = "j"\nkind = "torque"\nlimit = "= 2*size"',
+            "actuators.0.limit = ' 2*size': this number is in N m or N, the formula gives m",
+        ),
+        (
+            '[[actuators]]\nname = "a"\njoint = "j"\nkind = "torque"\ntarget = "$size"',
+            "actuators.0.target = '$size': this number is in N m or N, that parameter in m",
+        ),
+        (
+            '[[actuators]]\nname = "a"\njoint = "j"\nkind = "torque"\ntarget = {times = [0, 1], values = [0, "$size"]}',
+            "actuators.0.target.values.1 = '$size': this number is in N m or N, that parameter in m",
+        ),
+        (
+            '[[couplings]]\nname = "g"\njoint_a = "j"\njoint_b = "k"\nratio = "$size"',
+            "couplings.0.ratio = '$size': this number is in 1 or rad/m or m/rad, that parameter in m",
+        ),
+        (
+            '[[actuators]]\nname = "a"\njoint = "j"\nkind = "torque"\ntarget = "= t > 0.5"',
+            "actuators.0.target = '= t > 0.5': is no finite number",
+        ),
+        (
+            '[[actuators]]\nname = "a"\njoint = "j"\nkind = "torque"\ntarget = "= 1 if t > 1 else 2"',
+            "actuators.0.target = '= 1 if t > 1 else 2': is no finite number",
+        ),
+        (
+            '[[actuators]]\nname = "a"\njoint = "j"\nkind = "position"\nkp = 1\ngear = 1e200',
+            "actuators.a.gear = 1e+200: its square times a gain is infinite",
+        ),
+        (
+            '[[actuators]]\nname = "a"\njoint = "j"\nkind = "position"\nkp = 100\ntarget = 1e308',
+            "accelerations = 'infinite': forces, gains or velocities are too large to be computed with",
         ),
     ],
 )

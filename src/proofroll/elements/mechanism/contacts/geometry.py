@@ -74,9 +74,9 @@ class Geometry:
         for key in ("radius", "axes", "size", "orientation", "normal"):
             value, asked = getattr(self, key), key in _KEYS[self.kind]
             if not asked and value != usual.get(key):
-                raise InputError(f"{place}.{key}", value, f"a {self.kind} has none; it has {_said(self.kind)}")
+                raise InputError(f"{place}.{key}", value, f"{_a(self.kind)} has none; it has {_said(self.kind)}")
             if asked and value is None:
-                raise InputError(f"{place}.{key}", "nothing", f"a {self.kind} needs it; add it")
+                raise InputError(f"{place}.{key}", "nothing", f"{_a(self.kind)} needs it; add it")
         if self.radius is not None:
             radius = checks.number(f"{place}.radius", self.radius, at_least=0)
             if self.kind == "circle" and not radius:
@@ -192,6 +192,10 @@ def contacts_of(geometries: Sequence[Geometry], pairs: Sequence[Pair]) -> tuple[
             name = pair.name if len(touching) == 1 else f"{pair.name}.{number}"
             found.append(BodyContact(name, a.body, b.body, one, other, pair.friction, pair.restitution))
     return tuple(found)
+
+
+def _a(kind: str) -> str:
+    return f"an {kind}" if kind == "ellipsoid" else f"a {kind}"
 
 
 def _said(kind: str) -> str:

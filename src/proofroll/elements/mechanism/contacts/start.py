@@ -119,6 +119,8 @@ def check_contacts(mechanism: Mechanism) -> None:
     if not mechanism.contacts:
         return
     motion = Tree(mechanism).at(*mechanism.start())
+    if not np.isfinite(extent(mechanism, motion)):
+        raise InputError("geometries", "infinite", "places or sizes are too large to be computed with")
     scale = natural_scale(mechanism)
     for contact, each in zip(mechanism.contacts, touches(mechanism, motion), strict=True):
         between = f"{contact.body_a} and {contact.body_b}"

@@ -45,6 +45,7 @@ def made(
         ({**BALL, "kind": "circle", "radius": 0}, "geometries.ball.radius = 0.0: a circle has a radius above 0"),
         ({"name": "box", "body": "b", "kind": "box"}, "geometries.box.size = 'nothing': a box needs it; add it"),
         ({**PLANE, "normal": [0, 0, 0]}, "geometries.floor.normal"),
+        ({**STONE, "radius": 1}, "geometries.stone.radius = 1.0: an ellipsoid has none; it has axes and orientation"),
         ({**PLANE}, "geometries.floor.name = 'floor': this name is used twice"),
     ],
 )  # fmt: skip
@@ -90,6 +91,21 @@ def test_a_pair_has_a_name_of_its_own() -> None:
     """A pair that is named as a joint would have the same force in the results."""
     with pytest.raises(InputError, match="this name is used twice"):
         made(PLANE, BALL, pairs=({**PAIR, "name": "j"},))
+
+
+def test_a_normal_of_any_size_has_its_direction() -> None:
+    """A normal whose squares overflow or vanish is the same unit vector as a short one."""
+    for size in (1e200, 1e-200):
+        floor = made({**PLANE, "normal": [3 * size, 0, 4 * size]}).geometries[0]
+        assert floor.normal == pytest.approx((0.6, 0.0, 0.8))
+
+
+@pytest.mark.filterwarnings("ignore:overflow:RuntimeWarning")
+@pytest.mark.parametrize("ball", [{**BALL, "position": [1e300, 0, 0]}, {**BALL, "radius": 1e200}])
+def test_a_shape_beyond_numbers_is_one_line(ball: dict[str, Any]) -> None:
+    """A place or a radius whose square overflows is told as too large."""
+    with pytest.raises(InputError, match="geometries = 'infinite': places or sizes are too large"):
+        made(PLANE, ball, pairs=(PAIR,))
 
 
 def test_nothing_overlaps_at_the_start() -> None:
