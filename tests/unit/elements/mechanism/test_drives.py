@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from proofroll.core.errors import InputError
+from proofroll.core.errors import InputError, Refused
 from proofroll.elements.mechanism import Body, Joint, Mechanism
 from proofroll.elements.mechanism.capabilities import MechanismCapability, required
 from proofroll.elements.mechanism.drives import Actuator
@@ -258,6 +258,15 @@ def test_a_coupled_joint_takes_its_start_from_the_other(tmp_path: Path) -> None:
     assert v == pytest.approx([2.0, 6.0])
     assert MechanismCapability.COUPLINGS in required(made)
     assert JointCoordinates(made).rank == 1
+
+
+def test_a_scene_whose_forces_are_not_determinate_can_be_read(tmp_path: Path) -> None:
+    """Friction in both joints of a coupling is no mistake of a file: what cannot be solved is refused by who solves."""
+    text = PLAIN.replace('child = "b"', 'child = "b"\nfriction = 1').replace('child = "c"', 'child = "c"\nfriction = 1')
+    (tmp_path / "scene.toml").write_text(text + '[[couplings]]\nname = "g"\njoint_a = "j"\njoint_b = "k"\nratio = 1')
+    made = load_scene(str(tmp_path)).elements[0].mechanism  # type: ignore[attr-defined]
+    with pytest.raises(Refused, match="keep the friction or the stop of one of them"):
+        JointCoordinates(made).solve(*made.start())
 
 
 _ARM = np.array([[8 / 3 + 0.1, 5 / 6], [5 / 6, 1 / 3 + 0.1]])  # mass matrix of the hanging arm, armature included
