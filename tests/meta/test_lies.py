@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from flat_judging import judged_curve
 from honest import FORMULATIONS, Jointed, Rolling, Switching
 from liars import ALL, BALLS, EVERY, MECHANISMS, UNTIL, Lie, liar, scene_of
 from lies import table
@@ -25,15 +26,15 @@ from proofroll.core.multi_element import build
 from proofroll.core.observable import Role
 from proofroll.core.plugins import resolve_settings
 from proofroll.core.scene import Scene
-from proofroll.core.verdict import Judgement, LimitResult, Verdict, judge_curve
+from proofroll.core.verdict import Allowance, Judgement, LimitResult, Refinement, RunCurve, Verdict, judge_curve
 from proofroll.files.scene_file import load_scene
 from proofroll.running.case import Result, Status
 from proofroll.running.recording import record
 from proofroll.running.simulation import simulate
 from proofroll.running.time_case import clean_runs
 from proofroll.studies.comparison.default_comparison import bounds
-from proofroll.studies.judging import held_against
 from proofroll.studies.judging import judge as judging
+from proofroll.studies.judging import run_values
 from proofroll.studies.judging.judge import judge as judge_run
 from proofroll.studies.judging.reference import Reference
 from proofroll.studies.tradeoff.curve import CurvePoint, measured
@@ -125,7 +126,7 @@ def band_of(about: str) -> dict[str, str]:
     run = simulate(scene, liar(about, Lie("nothing", (about,))), until=UNTIL[about], every=EVERY)
     true = _true(scene, run)
     reference = Reference.of(scene, true)
-    given = [*held_against.observed(reference, run), *(name for name in _STATE if name in run and name in true)]
+    given = [*run_values.observed(reference, run), *(name for name in _STATE if name in run and name in true)]
     items = {name: scene.observables.get(name) for name in given}
     return {name: "1 %" if item and item.role is Role.RESIDUAL else "0.1 %" for name, item in items.items()}
 
@@ -247,7 +248,7 @@ def test_an_honest_engine(name: str, formulation: str) -> None:
     }
     assert {run.attrs["status"] for run in runs.values()} == {"done"}
     reference = Reference.of(scene, _true(scene, runs[1.0]))
-    curves = {factor: held_against.observed(reference, run) for factor, run in runs.items()}
+    curves = {factor: run_values.observed(reference, run) for factor, run in runs.items()}
     judgements = []
     for item, curve in curves[1.0].items():
         ladder = [curves[factor][item] for factor in factors]
@@ -255,23 +256,11 @@ def test_an_honest_engine(name: str, formulation: str) -> None:
         limit = richardson(ladder, factors, order) if field == "dt" else tightest(ladder)
         smallest = coarse * factors[-1] if field == "dt" else None
         limit = replace(limit, beside=reference.beside(item, limit.values, runs[factors[-1]], smallest))
-        true, bar = reference.true(item, curve)
         size = reference.sizes.get(item, 1.0)
-        judgements.append(
-            judge_curve(
-                item,
-                scene.observables[item].unit,
-                curve,
-                true,
-                truth_error_bar=bar,
-                tolerance=0.01 * size,
-                scale=size,
-                limit=limit,
-                ladder=True,
-                between=held_against.between(reference, item, runs[1.0]),
-                magnitude=reference.magnitude(item),
-            )
-        )
+        allowance = Allowance(item, scene.observables[item].unit, 0.01 * size, size)
+        off_grid, magnitude = run_values.between(reference, item, runs[1.0]), reference.magnitude(item)
+        own = RunCurve(curve, between=off_grid, magnitude=magnitude)
+        judgements.append(judge_curve(allowance, own, reference.true(item, curve), Refinement(limit, ladder=True)))
     assert not [item for item in judgements if item.limit is LimitResult.ANOTHER or item.remarks]
     # where the coarse steps show no limit, as of the chain, a difference is none of the model
     assert {item.limit for item in judgements if item.verdict is Verdict.DIFFERS} <= {LimitResult.NOT_SHOWN}
@@ -298,7 +287,7 @@ def _laddered(error: Callable[[float], float], order: int) -> Judgement:
     curves = {h: true + 0.01 * error(h) * np.cos(3 * _GRID) for h in _STEPS}
     limit = richardson(list(curves.values()), _STEPS, order)
     bars = {"truth_error_bar": 1e-12, "tolerance": 0.01, "scale": 1.0}
-    return judge_curve("z", "m", curves[1.0], true, limit=limit, ladder=True, **bars)
+    return judged_curve("z", "m", curves[1.0], true, limit=limit, ladder=True, **bars)
 
 
 @pytest.mark.parametrize("name", LADDERS)

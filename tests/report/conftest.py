@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 import pytest
 from browsing import Drawn, Visit, launched, visiting
+from flat_judging import judged_curve
 from folded import whole
 from invented import figures_part, further, regimes_part
 
@@ -24,7 +25,7 @@ from proofroll.core.comparison import Band, Comparison, Row, Tolerance
 from proofroll.core.dataset import observe, scales
 from proofroll.core.events import Event
 from proofroll.core.truth import truth
-from proofroll.core.verdict import Verdict, judge_curve
+from proofroll.core.verdict import Verdict
 from proofroll.files.scene_file import load_scene, read_scene_file
 from proofroll.files.trajectory_file import write
 from proofroll.report.comparison.plots import PointCurves
@@ -90,7 +91,7 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> tuple[Outcome, Store]:
                 dataset = dataset.drop_vars(["N", "F2", "F3", "needed_friction"])
             write(dataset, store.trajectory(run_case))
             judgements = [
-                judge_curve(
+                judged_curve(
                     name,
                     scene.observables[name].unit,
                     curve,

@@ -11,12 +11,13 @@ from typing import Any
 
 import numpy as np
 import pytest
+from flat_judging import judged_curve
 
 from proofroll.core.columns import PERIOD, UNCERTAIN
 from proofroll.core.comparison import ExceptAt, Row, Tolerance
 from proofroll.core.dataset import observe
 from proofroll.core.number_format import error
-from proofroll.core.verdict import Verdict, judge_curve
+from proofroll.core.verdict import Verdict
 from proofroll.files.json_data import plain
 from proofroll.files.scene_file import load_scene
 from proofroll.files.trajectory_file import StoredTrajectory, write
@@ -70,7 +71,7 @@ def test_largest_error_that_is_drawn_is_the_judged_one(made: tuple[Outcome, Stor
     write(off, store.trajectory(run.case))
     expected = observe(scene, fine)
     judged = {
-        key: judge_curve(key, "", curve, expected[key], truth_error_bar=0.0, tolerance=1.0, scale=1.0, limit=None)
+        key: judged_curve(key, "", curve, expected[key], truth_error_bar=0.0, tolerance=1.0, scale=1.0, limit=None)
         for key, curve in observe(scene, off).items()
         if key in {"gamma", "z", "N", "F2", "F3"}
     }

@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from flat_judging import judged_curve
 from folded import whole
 from rich.console import Console
 
 from proofroll.core.observable import Role
-from proofroll.core.verdict import judge_curve
 from proofroll.files.json_data import plain
 from proofroll.report.comparison.plots import point_curves
 from proofroll.report.comparison.summary import outcome_content
@@ -36,7 +36,7 @@ def _unsure(point: ComparedPoint) -> ComparedPoint:
 def _lawful(outcome: Outcome, run: Run, error: float) -> Run:
     """The run, judged by a law alone."""
     law = next(key for key, item in outcome.scene.observables.items() if item.role is Role.RESIDUAL)
-    item = judge_curve(
+    item = judged_curve(
         law, "m", np.full(3, error), np.zeros(3), truth_error_bar=0.0, tolerance=1e-3, scale=1.0, limit=None
     )
     return dataclasses.replace(run, judgements=[item], missing=[], contradictions=[])

@@ -11,11 +11,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from flat_judging import judged_curve
 from folded import whole
 from rich.console import Console
 
 from proofroll.core.convergence import Limit, richardson
-from proofroll.core.verdict import Verdict, judge_curve
+from proofroll.core.verdict import Verdict
 from proofroll.report.comparison import tables
 from proofroll.report.comparison.plots import point_curves
 from proofroll.report.comparison.records import ReportedComparison
@@ -41,7 +42,7 @@ WRONG_WITHIN = Limit(TRUE + 4e-4, 1e-7, 2.0)
 
 def answered(run: Run, error: float = 0.0, limit: Limit | None = None, **changes: Any) -> Run:
     """The run with one judgement, of z to a millimetre."""
-    item = judge_curve("z", "m", TRUE + error, TRUE, truth_error_bar=1e-12, tolerance=1e-3, scale=1.0, limit=limit)
+    item = judged_curve("z", "m", TRUE + error, TRUE, truth_error_bar=1e-12, tolerance=1e-3, scale=1.0, limit=limit)
     done = Result(Status.DONE, "done", trajectory=run.result.trajectory)
     return dataclasses.replace(run, result=done, judgements=[item], contradictions=[], **{"missing": []} | changes)
 
@@ -50,7 +51,7 @@ def test_another_number_of_events_has_no_bar() -> None:
     """A run with an event too many has an error without end, and a limit that no bar is said of."""
     times, true = np.array([0.1, 0.2, 0.3]), np.array([0.1, 0.2])
     limit = Limit(times, 9e-13, 1.0)
-    item = judge_curve("event_times", "s", times, true, truth_error_bar=0.0, tolerance=1e-3, scale=1.0, limit=limit)
+    item = judged_curve("event_times", "s", times, true, truth_error_bar=0.0, tolerance=1e-3, scale=1.0, limit=limit)
     assert Cell(item, "").title.endswith("error ∞ ± 0 s, tolerance 1e-3; another limit")
 
 

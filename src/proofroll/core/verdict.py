@@ -93,82 +93,121 @@ class Judgement:
     floor: str = ""
 
 
-def judge_curve(
-    name: str,
-    unit: str,
-    values: FloatArray,
-    true: FloatArray,
-    *,
-    truth_error_bar: float,
-    tolerance: float,
-    scale: float,
-    limit: Limit | None,
-    ladder: bool = False,
-    lost: str = "",
-    doubt: Doubt = Doubt.NONE,
-    own_bar: float = 0.0,
-    sampled_bar: float = np.inf,
-    between: tuple[FloatArray, FloatArray] | None = None,
-    magnitude: float = 0.0,
-    precision: str = "double",
-) -> Judgement:
-    """Compares a curve and its limit of small steps with the true curve. Every verdict on a curve is given here.
+@dataclass(frozen=True)
+class Allowance:
+    """Largest error of an observable that counts as agreement.
 
-    Args:
-        name: of the observable.
-        unit: of all values below.
-        values: the curve.
-        true: the true curve.
-        truth_error_bar: of the true curve.
-        tolerance: largest error that counts as agreement.
+    Attributes:
+        observable, unit: the compared quantity and its unit, that of all values.
+        tolerance: largest error.
         scale: size of the observable in this case.
-        limit: of small steps, or None if there is none.
-        ladder: True if several steps were run; without a limit they then confirm nothing.
-        lost: the first of these steps that has no curve, and why, as a clause; empty if each has one.
-        doubt: verdicts that an ill-posed question does not allow.
+    """
+
+    observable: str
+    unit: str
+    tolerance: float
+    scale: float
+
+    @property
+    def shown_unit(self) -> str:
+        """Unit for a text, with a space in front; empty for a ratio."""
+        return "" if self.unit == "1" else f" {self.unit}"
+
+
+@dataclass(frozen=True)
+class TrueCurve:
+    """True values of an observable; ``doubt``: verdicts that an ill-posed question does not allow."""
+
+    values: FloatArray
+    error_bar: float
+    doubt: Doubt = Doubt.NONE
+
+
+@dataclass(frozen=True)
+class RunCurve:
+    """Values of an observable in one run.
+
+    Attributes:
+        values: at the samples.
         own_bar: uncertainty of the run's own value (an event between two of its samples); an error that this alone may
             explain is no difference.
         sampled_bar: largest part of ``own_bar`` that may excuse an error: the part that the sampling interval explains.
-        between: values of the run at a few times off the grid, and the true ones; None: there are none.
-        magnitude: of the numbers whose round-off the curve has, if larger than ``scale``: of positions, for a gap.
+        between: values at a few times off the grid, and the true ones; None: there are none.
+        magnitude: of the numbers whose round-off the curve has, if larger than its scale: of positions, for a gap.
         precision: in which the run was computed, see :func:`proofroll.core.engine.precision_of`.
     """
-    error = largest_difference(values, true)
-    off_grid = 0.0 if between is None else largest_difference(*between)
-    hidden = off_grid > max(tolerance, _BETWEEN * error)
-    round_off = round_off_of(precision, max(scale, magnitude))
-    shown_unit = "" if unit == "1" else f" {unit}"
-    rungs = _Ladder(LimitResult.NOT_SHOWN if ladder else LimitResult.NO_LADDER, lost=lost)
+
+    values: FloatArray
+    own_bar: float = 0.0
+    sampled_bar: float = np.inf
+    between: tuple[FloatArray, FloatArray] | None = None
+    magnitude: float = 0.0
+    precision: str = "double"
+
+
+@dataclass(frozen=True)
+class Refinement:
+    """Runs of a row with smaller and smaller steps.
+
+    Attributes:
+        limit: of small steps, or None if there is none.
+        ladder: True if several steps were run; without a limit they then confirm nothing.
+        lost: the first of these steps that has no curve, and why, as a clause; empty if each has one.
+    """
+
+    limit: Limit | None = None
+    ladder: bool = False
+    lost: str = ""
+
+    @property
+    def unknown(self) -> LimitResult:
+        """Result for a limit that is not known."""
+        return LimitResult.NOT_SHOWN if self.ladder else LimitResult.NO_LADDER
+
+
+def judge_curve(
+    allowance: Allowance, run: RunCurve, true: TrueCurve, refinement: Refinement | None = None
+) -> Judgement:
+    """Compares a curve and its limit of small steps with the true curve. Every verdict on a curve is given here.
+
+    Without a refinement one step alone was run.
+    """
+    refinement = refinement or Refinement()
+    tolerance, limit = allowance.tolerance, refinement.limit
+    on_grid = largest_difference(run.values, true.values)
+    off_grid = 0.0 if run.between is None else largest_difference(*run.between)
+    hidden = off_grid > max(tolerance, _BETWEEN * on_grid)
+    rungs = _Ladder(refinement.unknown, lost=refinement.lost)
     if limit is not None:
-        rungs = _read(limit, largest_difference(limit.values, true), tolerance, truth_error_bar, round_off, shown_unit)
+        round_off = round_off_of(run.precision, max(allowance.scale, run.magnitude))
+        rungs = _read(limit, allowance, true, round_off)
     if hidden:
-        rungs = replace(rungs, finding=LimitResult.NOT_SHOWN if ladder else LimitResult.NO_LADDER)
-    on_grid, error = error, max(error, off_grid)
-    verdict = _verdict(error, tolerance, rungs, doubt)
-    vague, own_bar = own_bar > tolerance, min(own_bar, sampled_bar)
-    unknown = truth_error_bar + (own_bar if error > tolerance else 0.0)
+        rungs = replace(rungs, finding=refinement.unknown)
+    error = max(on_grid, off_grid)
+    verdict = _verdict(error, tolerance, rungs, true.doubt)
+    own_bar = min(run.own_bar, run.sampled_bar)
+    unknown = true.error_bar + (own_bar if error > tolerance else 0.0)
     placed = verdict in {Verdict.AGREES, Verdict.UNCONFIRMED, Verdict.DIFFERS}
-    if truth_error_bar > tolerance or (placed and abs(error - tolerance) <= unknown):
+    if true.error_bar > tolerance or (placed and abs(error - tolerance) <= unknown):
         verdict = Verdict.NOT_JUDGED
     remarks = []
     if rungs.wrong_within:
         remarks.append(f"within tolerance, but the limit of small steps is shown not to be the truth: {rungs.text}")
-    if vague and verdict in {Verdict.AGREES, Verdict.UNCONFIRMED}:
+    if run.own_bar > tolerance and verdict in {Verdict.AGREES, Verdict.UNCONFIRMED}:
         remarks.append("within tolerance by luck: the run leaves its events open by more than the tolerance")
+    reason = _reason(verdict, error, allowance, (true.error_bar, own_bar), rungs)
+    if hidden:
+        reason += f"; at the samples alone {number(on_grid)}{allowance.shown_unit}, so the error is between them"
     return Judgement(
-        observable=name,
-        unit=unit,
+        **vars(allowance),
         error=error,
-        truth_error_bar=truth_error_bar,
-        tolerance=tolerance,
-        scale=scale,
+        truth_error_bar=true.error_bar,
         verdict=verdict,
         order=rungs.order,
         limit_error=rungs.error,
         limit_error_bar=rungs.bar,
         limit=rungs.finding,
-        reason=_reason(verdict, error, tolerance, (truth_error_bar, own_bar), shown_unit, rungs)
-        + (f"; at the samples alone {number(on_grid)}{shown_unit}, so the error is between them" if hidden else ""),
+        reason=reason,
         remarks=tuple(remarks),
         floor=limit.floor if limit else "",
     )
@@ -202,18 +241,10 @@ class _Ladder:
     lost: str = ""
 
 
-def _read(limit: Limit, error: float, tolerance: float, truth_bar: float, round_off: float, unit: str) -> _Ladder:
-    """Summary of a ladder whose limit has this error.
-
-    Args:
-        limit: of small steps.
-        error: of the limit.
-        tolerance: largest error that counts as agreement.
-        truth_bar: error bar of the truth.
-        round_off: of the curve.
-        unit: for the text, with a space in front.
-    """
-    bar, order = limit.error_bar + truth_bar, limit.order if np.isfinite(limit.order) else None
+def _read(limit: Limit, allowance: Allowance, true: TrueCurve, round_off: float) -> _Ladder:
+    """Summary of a ladder with this limit of small steps; ``round_off``: of the curve."""
+    tolerance, unit, error = allowance.tolerance, allowance.shown_unit, largest_difference(limit.values, true.values)
+    bar, order = limit.error_bar + true.error_bar, limit.order if np.isfinite(limit.order) else None
     settled = limit.shown or limit.error_bar <= _FLAT * tolerance
     far_inside = error + _SEVERAL * bar <= tolerance
     doubted = bar + limit.beside + round_off
@@ -252,12 +283,10 @@ def _verdict(error: float, tolerance: float, rungs: _Ladder, doubt: Doubt) -> Ve
     return Verdict.DIFFERS if doubt == Doubt.NONE else Verdict.ILL_POSED
 
 
-def _reason(
-    verdict: Verdict, error: float, tolerance: float, bars: tuple[float, float], unit: str, rungs: _Ladder
-) -> str:
+def _reason(verdict: Verdict, error: float, allowance: Allowance, bars: tuple[float, float], rungs: _Ladder) -> str:
     """Reason of the verdict, as a clause with numbers; error bars are the truth's and the run's own."""
-    truth_error_bar, own_bar = bars
-    shown_error, allowed, bar = *_told_apart(error, tolerance), f"{number(truth_error_bar)}{unit}"
+    (truth_error_bar, own_bar), tolerance, unit = bars, allowance.tolerance, allowance.shown_unit
+    shown_error, allowed, bar = *_distinct_texts(error, tolerance), f"{number(truth_error_bar)}{unit}"
     if np.isinf(truth_error_bar):
         return "not judged: the truth does not tell it here"
     if truth_error_bar > tolerance:
@@ -279,7 +308,7 @@ def _reason(
     return f"the question is ill-posed here; {text}" if verdict == Verdict.ILL_POSED else text
 
 
-def _told_apart(one: float, other: float) -> tuple[str, str]:
+def _distinct_texts(one: float, other: float) -> tuple[str, str]:
     """Texts of two numbers with two digits, or as many as they need to differ."""
     texts = ((number(one, digits), number(other, digits)) for digits in range(2, 18))
     return next((pair for pair in texts if one == other or pair[0] != pair[1]), (repr(one), repr(other)))

@@ -14,6 +14,7 @@ _ROUND = 72
 _HEAD = 8.0  # length of an arrow's head [px]
 _LETTER = 8.0  # width of a letter [px]
 _MARGIN = 4.0  # around a drawing [px]
+_GRAVITY = 44.0  # length of the arrow of gravity [px]
 
 
 @dataclass(frozen=True)
@@ -32,15 +33,19 @@ class View:
 
     def __call__(self, point: npt.ArrayLike) -> FloatArray:
         """Positions of points in the picture [px], shape (..., 2): y downwards, the origin at (0, 0)."""
-        back = _unit(self.viewer)
-        right = _unit(np.cross(np.asarray(self.up, dtype=np.float64), back))
-        upright = np.cross(back, right)
+        right = self.right
+        upright = np.cross(unit(self.viewer), right)
         p = np.asarray(point, dtype=np.float64)
         return np.stack([self.scale * p @ right, -self.scale * p @ upright], axis=-1)
 
+    @property
+    def right(self) -> FloatArray:
+        """Unit direction in space that points to the right in the picture, shape (3,)."""
+        return unit(np.cross(np.asarray(self.up, dtype=np.float64), unit(self.viewer)))
+
     def towards(self, direction: npt.ArrayLike) -> FloatArray:
         """Component of a direction towards the viewer, shape (...)."""
-        return np.asarray(np.asarray(direction, dtype=np.float64) @ _unit(self.viewer))
+        return np.asarray(np.asarray(direction, dtype=np.float64) @ unit(self.viewer))
 
 
 @dataclass(frozen=True)
@@ -128,9 +133,9 @@ class Drawing:
         places = np.asarray(points, dtype=np.float64)
         self.path(places, look)
         tip = places[-1]
-        along = _unit(tip - places[-2])
-        across = 0.36 * np.array([-along[1], along[0]])
-        self.path([tip, tip - _HEAD * (along + across), tip - _HEAD * (along - across)], f"{look}-head", closed=True)
+        along = unit(tip - places[-2])
+        side = 0.36 * across(along)
+        self.path([tip, tip - _HEAD * (along + side), tip - _HEAD * (along - side)], f"{look}-head", closed=True)
 
     def vector(
         self, ends: npt.ArrayLike, look: str, name: str, by: float = 11.0, beside: tuple[float, float] = (0.0, 0.0)
@@ -139,7 +144,12 @@ class Drawing:
         self.arrow(ends, look)
         a, b = np.asarray(ends, dtype=np.float64)
         letters = "letter" if look == "thin" else f"{look}-letter"
-        self.text(b + by * _unit(b - a) + [0.0, 4.5], name, letters, beside)
+        self.text(b + by * unit(b - a) + [0.0, 4.5], name, letters, beside)
+
+    def gravity(self, at: View, gravity: FloatArray, place: npt.ArrayLike) -> None:
+        """Draws the direction of gravity [m/s²], shape (3,), at a place of the picture; nothing without gravity."""
+        if np.any(gravity):
+            self.vector(np.asarray(place) + np.outer([0.0, _GRAVITY], unit(at(gravity))), "force", "g")
 
     def text(
         self, place: npt.ArrayLike, symbol: str, look: str = "letter", beside: tuple[float, float] = (0.0, 0.0)
@@ -174,6 +184,12 @@ def circle(centre: npt.ArrayLike, one: npt.ArrayLike, other: npt.ArrayLike, angl
     return np.asarray(np.asarray(centre) + np.cos(phi) * np.asarray(one) + np.sin(phi) * np.asarray(other))
 
 
-def _unit(vector: npt.ArrayLike) -> FloatArray:
+def across(along: FloatArray) -> FloatArray:
+    """Unit vector of the picture at right angles to a direction, shape (2,)."""
+    return unit([-along[1], along[0]])
+
+
+def unit(vector: npt.ArrayLike) -> FloatArray:
+    """Unit vector in the same direction; zero stays zero."""
     v = np.asarray(vector, dtype=np.float64)
     return np.asarray(v / (np.linalg.norm(v) or 1.0))

@@ -115,7 +115,7 @@ class Store:
             content = {"case": dataclasses.asdict(case), "result": dataclasses.asdict(result)}
             place = self.folder / f"{case.key}.json"
             with self._locked(fcntl.LOCK_EX), replacing(place) as record:
-                record.write_text(json.dumps(content | {"seal": _seal(content)}, indent=1), encoding="utf-8")
+                record.write_text(json.dumps(content | {"seal": seal(content)}, indent=1), encoding="utf-8")
                 for old in (place, self.trajectory(case)):
                     if old.is_dir() and not old.is_symlink():  # a folder in the place of a result is damage
                         shutil.rmtree(old)
@@ -137,7 +137,7 @@ class Store:
         try:
             with self._locked(fcntl.LOCK_SH):
                 record = json.loads(ordinary_content(self.folder / f"{case.key}.json"))
-                if record.pop("seal") != _seal(record) or Case.from_dict(record["case"]).key != case.key:
+                if record.pop("seal") != seal(record) or Case.from_dict(record["case"]).key != case.key:
                     return None
                 result = Result.from_dict(record["result"])
                 if result.trajectory is None:
@@ -184,6 +184,6 @@ def alone_in(folder: Path, wait: Callable[[], None]) -> Iterator[None]:
         yield
 
 
-def _seal(record: object) -> str:
+def seal(record: object) -> str:
     """Hash of a record, which reveals that it was changed."""
     return hashlib.sha256(json.dumps(record, sort_keys=True).encode()).hexdigest()

@@ -19,7 +19,7 @@ from proofroll.core.events import events_of
 from proofroll.core.scene import Scene
 from proofroll.running.case import Result, Status
 from proofroll.running.recording import noticed
-from proofroll.studies.judging import held_against
+from proofroll.studies.judging import run_values
 from proofroll.studies.judging.reference import Reference
 
 if TYPE_CHECKING:
@@ -113,7 +113,7 @@ class Yardstick:
         """Largest error off the grid in the interval before each sample, as a part of the range; else 0."""
         errors = np.zeros(dataset.sizes["time"])
         known = self.truth is not None and BETWEEN in dataset and BETWEEN in self.truth
-        found = held_against.off_grid(self._reference, self.name, dataset) if known else None
+        found = run_values.off_grid(self._reference, self.name, dataset) if known else None
         if found is not None:
             times, values, true = found
             wrong = np.abs(np.where(np.isfinite(true), values - true, 0.0)) / self.scale

@@ -7,7 +7,6 @@ import datetime
 import hashlib
 import json
 import re
-from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, requires, version
 from importlib.util import find_spec
@@ -23,7 +22,7 @@ from proofroll.files.atomic import ordinary_content
 from proofroll.files.json_data import plain, record
 from proofroll.running.environments import remembered
 from proofroll.running.identity import ASIDE
-from proofroll.running.store import write_text
+from proofroll.running.store import seal, write_text
 from proofroll.running.timing import machine
 
 _Study = TypeVar("_Study")
@@ -119,21 +118,15 @@ def kept(path: Path, kind: type[_Study]) -> tuple[_Study | None, list[str]]:
     """
     try:
         content = json.loads(ordinary_content(path))
-        if content["seal"] != _seal(content):
+        if content.pop("seal") != seal(content):
             return None, ["what is stored is not what had been put there"]
         reasons = changes(record(Measured, content["measured"]))
         return (None, reasons) if reasons else (record(kind, content), [])
-    except (OSError, ValueError, KeyError, TypeError, RecursionError):  # absent, truncated or not our file
+    except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError):  # absent, truncated or not ours
         return None, []
-
-
-def _seal(study: Mapping[str, Any]) -> str:
-    """Hash of a stored study, which reveals a truncated or changed file."""
-    content = {key: value for key, value in study.items() if key != "seal"}
-    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
 
 
 def keep(study: Any, path: Path) -> None:
     """Stores a study for :func:`kept`. Raises ProofrollError if the folder cannot be written."""
     content = plain(study)
-    write_text(path, json.dumps({**content, "seal": _seal(content)}))
+    write_text(path, json.dumps({**content, "seal": seal(content)}))

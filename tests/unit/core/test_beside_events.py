@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from flat_judging import judged_curve
 
 from proofroll.core.beside_events import beside_events
 from proofroll.core.convergence import richardson
-from proofroll.core.verdict import LimitResult, judge_curve
+from proofroll.core.verdict import LimitResult
 
 T = np.linspace(0, 1, 51)
 BRAKE, ROLLS = 3.0, 5 / 7
@@ -53,7 +54,7 @@ def test_honest_engines_whose_events_end_with_steps_have_no_other_limit() -> Non
         bare = richardson(curves, steps)
         for beside in (0.0, beside_events(T, curves[-1], [end(speed, steps[-1])], steps[-1])):
             limit = type(bare)(bare.values, bare.error_bar, bare.order, bare.shown, beside=beside)
-            found = judge_curve(
+            found = judged_curve(
                 "x", "m", curves[-1], true, truth_error_bar=1e-15, tolerance=1e-4, scale=1.0, limit=limit, ladder=True
             )
             if found.limit is LimitResult.ANOTHER or found.remarks:

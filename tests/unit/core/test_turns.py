@@ -12,8 +12,8 @@ from proofroll.core.time_grid import EVERY, time_grid
 from proofroll.core.turns import doubt, on_turns_of, samples_between
 from proofroll.files.scene_file import load_scene
 from proofroll.running.simulation import build, recorded
-from proofroll.studies.judging.held_against import observed
 from proofroll.studies.judging.reference import Reference
+from proofroll.studies.judging.run_values import observed
 from proofroll.studies.versions.difference import _apart
 
 UNTIL = 2.0

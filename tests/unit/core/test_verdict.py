@@ -5,9 +5,10 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+from flat_judging import judged_curve
 
 from proofroll.core.convergence import Limit, richardson, tightest
-from proofroll.core.verdict import Doubt, Judgement, LimitResult, Verdict, judge_curve
+from proofroll.core.verdict import Doubt, Judgement, LimitResult, Verdict
 
 T = np.linspace(0, 2, 21)
 TRUE = np.sin(3 * T)
@@ -18,7 +19,7 @@ def verdict_of(
     error: float, limit: Limit | None = None, *, bar: float = 1e-12, tolerance: float = MILLIMETRE, ladder: bool = False
 ) -> Judgement:
     """The judgement of a curve that is off by ``error``."""
-    return judge_curve(
+    return judged_curve(
         "z", "m", TRUE + error, TRUE, truth_error_bar=bar, tolerance=tolerance, scale=1.0, limit=limit, ladder=ladder
     )
 
@@ -59,7 +60,7 @@ def test_tolerances_that_begin_to_matter_show_no_limit() -> None:
 )
 def test_what_is_hidden_from_the_samples_differs(on_grid: float, off_grid: float, verdict: Verdict) -> None:
     """Between samples a run is held to its tolerance; the limit of the samples excuses an error of their size alone."""
-    found = judge_curve(
+    found = judged_curve(
         "z", "m", TRUE + on_grid, TRUE, truth_error_bar=1e-12, tolerance=MILLIMETRE, scale=1.0,
         limit=errors(4 * on_grid, 2 * on_grid, on_grid), ladder=True, between=(np.full(3, off_grid), np.zeros(3)),
     )  # fmt: skip
@@ -135,7 +136,7 @@ def test_a_wrong_limit_within_tolerance_is_remarked(model: Callable[[np.ndarray]
     """What stays within tolerance but whose limit is shown to be another agrees, and the judgement says so."""
     true = 0.1 * np.sin(3 * T)
     curves = [model(T) + 1e-6 * h**2 * np.cos(T) for h in (4, 2, 1)]
-    found = judge_curve(
+    found = judged_curve(
         "z", "m", curves[-1], true, truth_error_bar=1e-12, tolerance=MILLIMETRE, scale=0.2,
         limit=richardson(curves, (4, 2, 1), 2), ladder=True,
     )  # fmt: skip
@@ -150,7 +151,7 @@ def test_a_right_limit_is_not_remarked() -> None:
     for h in (1.0, 0.1, 1e-4):
         curves = [TRUE + 1e-4 * (k * h) ** 2 * np.cos(T) for k in (4, 2, 1)]
         limit = richardson(curves, (4, 2, 1), 2)
-        found = judge_curve(
+        found = judged_curve(
             "z", "m", curves[-1], TRUE, truth_error_bar=1e-14, tolerance=MILLIMETRE, scale=1.0, limit=limit, ladder=True
         )
         assert (found.verdict, found.remarks) == (Verdict.AGREES, ())
@@ -311,10 +312,10 @@ def test_a_difference_that_may_be_the_sampling_alone_is_not_judged() -> None:
     """An event that a run shows 7 ms off, but only between two times 50 ms apart, is no difference of 2 ms."""
     late = {"truth_error_bar": 1e-9, "tolerance": 2e-3, "scale": 1.0, "limit": None}
     times = np.array([0.2727])
-    found = judge_curve("first_slip", "s", times + 7e-3, times, own_bar=25e-3, **late)
+    found = judged_curve("first_slip", "s", times + 7e-3, times, own_bar=25e-3, **late)
     assert found.verdict is Verdict.NOT_JUDGED
     assert "error 7e-3 s ± 0.025 s, for the run shows it only between two times" in found.reason
-    assert judge_curve("first_slip", "s", times + 7e-3, times, own_bar=1e-3, **late).verdict is Verdict.DIFFERS
+    assert judged_curve("first_slip", "s", times + 7e-3, times, own_bar=1e-3, **late).verdict is Verdict.DIFFERS
 
 
 def test_a_wide_bracket_excuses_no_more_than_the_samples_do() -> None:
@@ -322,7 +323,7 @@ def test_a_wide_bracket_excuses_no_more_than_the_samples_do() -> None:
     late = {"truth_error_bar": 1e-9, "tolerance": 2e-3, "scale": 1.0, "limit": None, "own_bar": 2.0}
     times = np.array([0.2727])
     for off, verdict in ((0.3, Verdict.DIFFERS), (7e-3, Verdict.NOT_JUDGED), (1e-3, Verdict.AGREES)):
-        found = judge_curve("first_slip", "s", times + off, times, sampled_bar=10e-3, **late)
+        found = judged_curve("first_slip", "s", times + off, times, sampled_bar=10e-3, **late)
         assert found.verdict is verdict
         assert ("by luck" in "".join(found.remarks)) == (verdict is Verdict.AGREES)
 
@@ -338,7 +339,7 @@ def test_tolerances_that_give_the_same_run_show_no_limit(off: tuple[float, float
 
 def test_a_limit_of_other_events_is_told_without_numbers() -> None:
     """Where the limit has not as many events as the truth there is no distance to tell."""
-    found = judge_curve(
+    found = judged_curve(
         "event_times", "s", np.ones(3), np.ones(2), truth_error_bar=9e-13, tolerance=2e-3, scale=1.0, ladder=True,
         limit=Limit(np.ones(3), 0.0, math.nan),
     )  # fmt: skip
@@ -363,7 +364,7 @@ def test_a_reason_never_sets_a_number_against_itself() -> None:
 def test_an_ill_posed_question(doubt: Doubt, agrees: Verdict, differs: Verdict) -> None:
     """What an ill-posed question leaves open decides whether difference, or agreement too, is judged."""
     for error, expected in ((0.0, agrees), (1.0, differs)):
-        found = judge_curve(
+        found = judged_curve(
             "z", "m", TRUE + error, TRUE, truth_error_bar=0.0, tolerance=1e-3, scale=1.0, limit=None, doubt=doubt
         )
         assert found.verdict is expected
@@ -390,7 +391,7 @@ def test_verdicts_are_ordered_from_best_to_worst() -> None:
 def test_a_limit_of_events_that_are_not_the_truths_says_so() -> None:
     """Where a ladder gives more events than there are, no number stands for how far the limit is off."""
     three = np.array([0.1, 0.2, 0.3])
-    found = judge_curve(
+    found = judged_curve(
         "event_times", "s", three, TRUE[:2], truth_error_bar=0.0, tolerance=1e-3, scale=1.0,
         limit=Limit(three, 9e-13, 2.0), ladder=True,
     )  # fmt: skip
@@ -403,7 +404,7 @@ def test_a_limit_of_events_that_are_not_the_truths_says_so() -> None:
 def test_round_off_of_large_numbers_in_their_difference_is_not_remarked(magnitude: float, remarks: int) -> None:
     """A gap of 3e-16 m of a ball a metre from the origin is no other limit, though the gap itself is small."""
     gap = np.full(TRUE.shape, 3e-16)
-    found = judge_curve(
+    found = judged_curve(
         "gap", "m", gap, 0 * TRUE, truth_error_bar=1e-18, tolerance=1e-6, scale=1e-4,
         limit=Limit(gap, 0.0, float("nan")), ladder=True, magnitude=magnitude,
     )  # fmt: skip

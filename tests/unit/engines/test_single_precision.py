@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from flat_judging import judged_curve
 from single_precision import OnePrecision, Single, SingleSettings
 
 from proofroll.conformance import checks
@@ -23,7 +24,7 @@ from proofroll.core.errors import InputError
 from proofroll.core.first_steps import certificate
 from proofroll.core.multi_element import build
 from proofroll.core.truth import truth
-from proofroll.core.verdict import LimitResult, Verdict, judge_curve
+from proofroll.core.verdict import LimitResult, Verdict
 from proofroll.files.scene_file import load_scene
 from proofroll.running.simulation import simulate
 from proofroll.studies.judging.judge import judge as judge_run
@@ -133,7 +134,7 @@ def test_nobody_has_another_limit_by_a_floor(truncation: float, noise: float, to
     """Round-off that grows with the number of steps is no other limit, at any tolerance."""
     curves = rungs(truncation, noise)
     limit = richardson(curves, (1.0, 0.5, 0.25), 4, SCATTER * noise)
-    found = judge_curve(
+    found = judged_curve(
         "x", "m", curves[0], np.cos(TIMES), truth_error_bar=1e-15, tolerance=tolerance, scale=1.0, limit=limit,
         ladder=True, precision="single",
     )  # fmt: skip
@@ -145,7 +146,7 @@ def test_another_motion_is_another_limit_in_single_precision_too() -> None:
     for truncation, noise in ((1e-3, 1e-8), (0.0, 1e-6)):
         curves = [1.01 * curve for curve in rungs(truncation, noise)]
         limit = richardson(curves, (1.0, 0.5, 0.25), 4, SCATTER * noise)
-        found = judge_curve(
+        found = judged_curve(
             "x", "m", curves[0], np.cos(TIMES), truth_error_bar=1e-15, tolerance=1e-4, scale=1.0, limit=limit,
             ladder=True, precision="single",
         )  # fmt: skip

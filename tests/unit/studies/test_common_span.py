@@ -16,8 +16,8 @@ from proofroll.core.truth import truth
 from proofroll.elements.ball_on_surface.element import changed
 from proofroll.running.recording import record
 from proofroll.running.simulation import build
-from proofroll.studies.judging.held_against import observed
 from proofroll.studies.judging.reference import Reference
+from proofroll.studies.judging.run_values import observed
 
 TIMES = time_grid(0.4, 5e-3)
 
@@ -48,7 +48,7 @@ def test_who_leaves_the_wall_is_judged_up_to_there(engine: str) -> None:
     held, cut = whole.common_span({1.0: run})
     curves = observed(held, cut[1.0])
     for name in ("gamma", "z", "N", "F2", "F3", "gap", "slip", "event_times", "event_order"):
-        true, _ = held.true(name, curves[name])
+        true = held.true(name, curves[name]).values
         assert curves[name].shape == true.shape, name
         size = max(held.sizes.get(name, 1.0), 1e-9)  # nothing moves along the axis
         assert np.max(np.abs(curves[name] - true), initial=0.0) < 5e-3 * size, name
@@ -62,7 +62,7 @@ def test_who_ends_too_early_is_not_excused() -> None:
     short = record(build(scene, "reduced"), scene, TIMES).dataset.isel(time=slice(30))
     held, cut = reference(scene).common_span({1.0: short})
     curve = observed(held, cut[1.0])["gamma"]
-    assert curve.shape != held.true("gamma", curve)[0].shape
+    assert curve.shape != held.true("gamma", curve).values.shape
 
 
 def test_without_lift_off_nothing_changes() -> None:
@@ -93,7 +93,7 @@ def test_a_ball_that_leaves_cuts_what_is_beside_it(other: str) -> None:
     curves = observed(held, cut[1.0])
     judged = {"gamma", "z", "N", "F2", "F3", "event_times", "event_order", "down", "across", "q", "tip"}
     for name in [name for name in curves if name.split(".")[0] in judged]:
-        true, _ = held.true(name, curves[name])
+        true = held.true(name, curves[name]).values
         assert curves[name].shape == true.shape, name
         size = max(held.sizes.get(name, 1.0), 1e-9)
         assert np.max(np.abs(curves[name] - true), initial=0.0) < 5e-3 * size, name

@@ -9,7 +9,7 @@ from proofroll.core.arrays import FloatArray
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.surfaces import Cylinder, Declared, Plane, Surface
 from proofroll.report.labels import symbol
-from proofroll.report.pen import Drawing, View, circle, turn
+from proofroll.report.pen import Drawing, View, across, circle, turn, unit
 
 _BALL = 84.0  # radius of the ball [px]
 # Shift of the normal force by rolling resistance, in radii; the true one would be invisible.
@@ -54,11 +54,10 @@ def _frame(drawn: Drawing, at: View) -> None:
 def _aside(at: View, place: FloatArray, axis: FloatArray, by: float) -> FloatArray:
     """Place of a letter beside an axis: right of an upright axis, above any other."""
     a, b = at([0 * axis, axis])
-    along = (b - a) / (np.linalg.norm(b - a) or 1.0)
-    across = np.array([-along[1], along[0]])
+    along, side = b - a, across(b - a)
     upright = abs(along[1]) > abs(along[0])
-    across = across * (1 if (across[0] > 0 if upright else across[1] < 0) else -1)
-    return np.asarray(at(place) + by * across + [0.0, 4.5])
+    side = side * (1 if (side[0] > 0 if upright else side[1] < 0) else -1)
+    return np.asarray(at(place) + by * side + [0.0, 4.5])
 
 
 def _drawn_radius(drawn: Drawing, at: View) -> None:
@@ -70,7 +69,7 @@ def _drawn_radius(drawn: Drawing, at: View) -> None:
     angle = float(angles[np.argmax(gaps)])
     centre, along = at(np.zeros(3)), np.array([np.cos(angle), np.sin(angle)])
     drawn.arrow(np.stack([centre, centre + _BALL * along]), "thin")
-    drawn.text(centre + 0.55 * _BALL * along + 11.0 * np.array([-along[1], along[0]]), "a", beside=(0.0, 4.5))
+    drawn.text(centre + 0.55 * _BALL * along + 11.0 * across(along), "a", beside=(0.0, 4.5))
 
 
 def _forces(drawn: Drawing, at: View, body: RollingBall) -> None:
@@ -138,7 +137,7 @@ def _cylinder(wall: Cylinder, body: RollingBall) -> list[Drawing]:
     leader = at(centre) + np.outer([0.0, radius, radius + 20.0], [0.9, 0.44])
     drawn.path(leader, "thin")
     drawn.text(leader[-1], "a", beside=(8.0, 5.0))
-    _gravity(drawn, at, body, at(-1.35 * b * _right(at)))
+    drawn.gravity(at, body.gravity, at(-1.35 * b * at.right))
     return [drawn, contact(body, (-0.6, -0.72, 0.36), (0, 0, 1))]
 
 
@@ -165,7 +164,7 @@ def _plane(wall: Plane, body: RollingBall) -> list[Drawing]:
     rim = at(start) + np.outer([0.0, a * at.scale, a * at.scale + 14.0], [-0.7, -0.7])
     drawn.path(rim, "thin")
     drawn.text(rim[-1], "a", beside=(-6.0, -2.0))
-    _gravity(drawn, at, body, at(-1.15 * size * _right(at)))
+    drawn.gravity(at, body.gravity, at(-1.15 * size * at.right))
     return [drawn, contact(body, (-0.42, 0.4, 0.8), (-1, 0, 0))]
 
 
@@ -198,7 +197,7 @@ def _net(wall: Declared, body: RollingBall) -> list[Drawing]:
     if speed:
         drawn.vector(at([start, start + 0.4 * size * body.v0 / speed]), "motion", "v")
     drawn.disc(at(start).tolist(), body.ball.radius * at.scale, "ball")
-    _gravity(drawn, at, body, at(-1.25 * size * _right(at)))
+    drawn.gravity(at, body.gravity, at(-1.25 * size * at.right))
     return [drawn, contact(body, (-0.6, -0.72, 0.36), (0, 0, 1) if abs(frame[2, 0]) < 0.9 else (-1, 0, 0))]
 
 
@@ -210,18 +209,12 @@ def _slope(drawn: Drawing, at: View, low: FloatArray, high: FloatArray) -> None:
     angle = float(np.arctan2(high[2] - low[2], np.hypot(*(high - low)[:2])))
     if angle < _LEVEL:
         return
-    along = (flat - low) / (np.linalg.norm(flat - low) or 1.0)
+    along = unit(flat - low)
     reach = 0.4 * float(np.linalg.norm(high - low))
     arc = at([low + reach * (np.cos(s) * along + np.sin(s) * np.array([0, 0, 1])) for s in turn(0.0, angle)])
     drawn.path(at([low, flat]), "hidden")
     drawn.path(arc, "thin")
     drawn.text(arc[len(arc) // 2], "α", beside=(-10.0, 5.0))
-
-
-def _right(at: View) -> FloatArray:
-    """Unit horizontal direction, in the world, that points to the right in the picture."""
-    across = np.cross(np.array([0.0, 0.0, 1.0]), np.asarray(at.viewer, dtype=np.float64))
-    return np.asarray(across / np.linalg.norm(across))
 
 
 def _tube(drawn: Drawing, at: View, wall: Cylinder, top: float, bottom: float) -> None:
@@ -258,16 +251,6 @@ def _radius(
     ends = at([centre, rim])
     drawn.arrow(ends, "thin")
     drawn.text(ends.mean(axis=0) + beside, letter)
-
-
-def _gravity(drawn: Drawing, at: View, body: RollingBall, place: FloatArray) -> None:
-    """Draws the direction of gravity at a place of the picture; nothing without gravity."""
-    size = float(np.linalg.norm(body.gravity))
-    if not size:
-        return
-    a, b = at([np.zeros(3), body.gravity / size])
-    along = (b - a) / (np.linalg.norm(b - a) or 1.0)
-    drawn.vector(np.stack([place, place + 44.0 * along]), "force", "g")
 
 
 def _direction(azimuth: float, elevation: float) -> tuple[float, float, float]:

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
 
 import numpy as np
 
-from proofroll.core.arrays import FloatArray
+from proofroll.core.arrays import FloatArray, largest_difference
 from proofroll.core.element import Element
 from proofroll.core.number_format import number
 
@@ -211,7 +211,5 @@ def apart(one: FloatArray, other: FloatArray) -> float:
 
     Pairs of NaN are ignored.
     """
-    difference = np.abs(np.asarray(one) - np.asarray(other))
-    known = difference[~(np.isnan(one) & np.isnan(other))] if difference.size else difference
-    largest = float(np.max(known, initial=0.0))
-    return largest if np.isfinite(largest) else float("inf")
+    unknown = np.isnan(one) & np.isnan(other)
+    return largest_difference(np.where(unknown, 0.0, one), np.where(unknown, 0.0, other))

@@ -13,7 +13,7 @@ from proofroll.core.comparison import Band, Comparison
 from proofroll.core.convergence import Limit, floor_of, richardson, scatter_of, tightest
 from proofroll.core.diagnosis.of_scene import diagnosed
 from proofroll.core.errors import Missing, ProofrollError
-from proofroll.core.verdict import Judgement, Verdict, judge_curve
+from proofroll.core.verdict import Allowance, Judgement, Refinement, Verdict, judge_curve
 from proofroll.files.trajectory_file import StoredTrajectory
 from proofroll.running.case import LASTING, Case, EngineFacts, Result, Status
 from proofroll.running.process import WorkerDied
@@ -22,7 +22,7 @@ from proofroll.running.time_budget import TimeBudget
 from proofroll.studies.comparison.expectations import contradictions_of
 from proofroll.studies.comparison.outcome import ComparedPoint, LadderRun, Outcome, Run
 from proofroll.studies.comparison.planning import Plan, Planned, at_point, plan, point_name
-from proofroll.studies.judging import held_against
+from proofroll.studies.judging import run_values
 from proofroll.studies.judging.reference import Reference
 
 if TYPE_CHECKING:
@@ -183,44 +183,35 @@ def _judgements(
     run: Planned, band: Band, reference: Reference, trajectories: dict[float, xr.Dataset], lost: str
 ) -> tuple[list[Judgement], dict[float, dict[str, float]]]:
     """Judgements of a run, and factor of each rung of its ladder -> observable -> error."""
+    facts = run.facts
+    assert isinstance(facts, EngineFacts)  # there are trajectories
     reference, trajectories = reference.common_span(trajectories)
-    curves = {factor: held_against.observed(reference, dataset) for factor, dataset in trajectories.items()}
+    curves = {factor: run_values.observed(reference, dataset) for factor, dataset in trajectories.items()}
     main = curves[1.0]
     judgements: list[Judgement] = []
     errors: dict[float, dict[str, float]] = {factor: {} for factor in curves}
-    always, given = held_against.always(reference, main), band.bounds | run.row.bound
+    always, given = run_values.always(reference, main), band.bounds | run.row.bound
     for name, curve in main.items():
         tolerance = given.get(name) or always.get(name)
         if tolerance is None:
             continue
-        true, bar = reference.true(name, curve)
-        scale, unit = reference.sizes.get(name, 1.0), reference.scene.observables[name].unit
-        magnitude = reference.magnitude(name)
-        limit = _with_floor(run, name, _limit(run, name, curves, magnitude), curves, true, reference.scale(name), unit)
-        judgement = judge_curve(
-            name,
-            unit,
-            curve,
-            true,
-            truth_error_bar=bar,
-            tolerance=tolerance.absolute(scale),
-            scale=scale,
-            limit=_with_events(run, name, limit, reference, trajectories),
-            ladder=_has_ladder(run, curve),
-            lost=lost,
-            doubt=reference.doubt(name),
-            own_bar=reference.own_bar(name, trajectories[1.0]),
-            sampled_bar=reference.sampled_bar,
-            between=held_against.between(reference, name, trajectories[1.0]),
-            magnitude=magnitude,
-            precision=run.facts.precision if isinstance(run.facts, EngineFacts) else "double",
-        )
+        true, scale = reference.true(name, curve), reference.sizes.get(name, 1.0)
+        own = run_values.run_curve(reference, name, curve, trajectories[1.0], facts.precision)
+        limit = _limit(run, facts, name, curves, own.magnitude)
+        if limit is not None:
+            finest = run.row.ladder[-1]
+            step = None if facts.step is None else facts.step * finest
+            beside = reference.beside(name, limit.values, trajectories[finest], step)
+            limit = replace(limit, beside=beside, floor=_floor(facts, name, limit, curves, true.values, reference))
+        ladder = facts.resolution is not None and len(run.row.ladder) > 1 and curve.size > 0
+        allowance = Allowance(name, reference.scene.observables[name].unit, tolerance.absolute(scale), scale)
+        judgement = judge_curve(allowance, own, true, Refinement(limit, ladder, lost))
         if name not in given and judgement.verdict is not Verdict.DIFFERS:
             continue
         judgements.append(judgement)
         for factor, observed in curves.items():
             if name in observed:
-                errors[factor][name] = held_against.error(reference, name, observed[name], trajectories[factor])
+                errors[factor][name] = run_values.error(reference, name, observed[name], trajectories[factor])
     return judgements, errors
 
 
@@ -234,10 +225,11 @@ def _rungs(run: Planned, results: dict[str, Result], errors: dict[float, dict[st
     return rungs
 
 
-def _limit(run: Planned, name: str, curves: dict[float, dict[str, FloatArray]], magnitude: float) -> Limit | None:
+def _limit(
+    run: Planned, facts: EngineFacts, name: str, curves: dict[float, dict[str, FloatArray]], magnitude: float
+) -> Limit | None:
     """Limit of small steps of an observable, if every rung has it; ``magnitude``: size of its numbers."""
-    assert isinstance(run.facts, EngineFacts)  # there are curves
-    stepped = run.facts.resolution == "dt"
+    stepped = facts.resolution == "dt"
     # tolerances that the engine refuses are left out
     factors = run.row.ladder if stepped else [factor for factor in run.row.ladder if factor in run.ladder]
     if len(factors) == 1 or not all(name in curves.get(factor, {}) for factor in factors):
@@ -249,36 +241,22 @@ def _limit(run: Planned, name: str, curves: dict[float, dict[str, FloatArray]], 
         return tightest(values)
     finest = run.ladder[factors[-1]]
     steps = finest.until / (finest.engine.step or finest.until)
-    scatter = scatter_of(run.facts.precision, magnitude, steps)
-    return richardson(values, run.row.ladder, run.facts.order, scatter)
+    return richardson(values, run.row.ladder, facts.order, scatter_of(facts.precision, magnitude, steps))
 
 
-def _with_floor(
-    run: Planned,
+def _floor(
+    facts: EngineFacts,
     name: str,
-    limit: Limit | None,
+    limit: Limit,
     curves: dict[float, dict[str, FloatArray]],
     true: FloatArray,
-    scale: float | None,
-    unit: str,
-) -> Limit | None:
-    """The limit; where single precision hides it, with a clause on the error floor."""
-    facts = run.facts
-    if limit is None or not limit.rounded or not isinstance(facts, EngineFacts) or facts.step is None:
-        return limit
+    reference: Reference,
+) -> str:
+    """Clause on the error floor where single precision hides the limit; else empty."""
+    if not limit.rounded or facts.step is None:
+        return limit.floor
     errors = {facts.step * factor: largest_difference(observed[name], true) for factor, observed in curves.items()}
-    return replace(limit, floor=floor_of(errors, scale, unit))
-
-
-def _with_events(
-    run: Planned, name: str, limit: Limit | None, reference: Reference, trajectories: dict[float, xr.Dataset]
-) -> Limit | None:
-    """The limit with the effect of events that are one step late in its finest run."""
-    if limit is None or not isinstance(run.facts, EngineFacts):
-        return limit
-    factor = run.row.ladder[-1]
-    step = None if run.facts.step is None else run.facts.step * factor
-    return replace(limit, beside=reference.beside(name, limit.values, trajectories[factor], step))
+    return floor_of(errors, reference.scale(name), reference.scene.observables[name].unit)
 
 
 def _lost(run: Planned, results: dict[str, Result]) -> str:
@@ -288,9 +266,3 @@ def _lost(run: Planned, results: dict[str, Result]) -> str:
         if result.status != Status.DONE and name is not None:
             return f"{name} {case.engine.settings[name]:g} {result.status}: {result.message}"
     return ""
-
-
-def _has_ladder(run: Planned, curve: FloatArray) -> bool:
-    """True if the ladder has several steps, and the curve has values that can converge."""
-    resolved = isinstance(run.facts, EngineFacts) and run.facts.resolution is not None
-    return resolved and len(run.row.ladder) > 1 and curve.size > 0

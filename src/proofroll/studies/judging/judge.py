@@ -18,13 +18,13 @@ from proofroll.core.observable import Observable, Role
 from proofroll.core.scene import Scene
 from proofroll.core.truth import truth
 from proofroll.core.turns import samples_between
-from proofroll.core.verdict import Doubt, Judgement, Verdict, judge_curve
+from proofroll.core.verdict import Allowance, Judgement, RunCurve, TrueCurve, Verdict, judge_curve
 from proofroll.files.scene_file import load_scene
 from proofroll.studies.html_table import gauge, html_table
-from proofroll.studies.judging import held_against
+from proofroll.studies.judging import run_values
 from proofroll.studies.judging.given_run import GivenRun, RunInput, read_run
-from proofroll.studies.judging.held_against import turned_alike
 from proofroll.studies.judging.reference import Reference
+from proofroll.studies.judging.run_values import turned_alike
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -158,11 +158,11 @@ def judge(
     observed: dict[str, FloatArray] = {}
     if "scene_digest" in dataset.attrs:  # all variables of a run
         reference, cut = reference.common_span({0: dataset})
-        dataset, observed = cut[0], held_against.observed(reference, cut[0])
+        dataset, observed = cut[0], run_values.observed(reference, cut[0])
     sure = [str(name) for name, variable in dataset.data_vars.items() if UNCERTAIN not in variable.attrs]
     bounds = _bounds(tolerance, reference, observed, sure)
     compared = [_compared(name, bound, reference, observed, dataset) for name, bound in bounds.items()]
-    further = {name: bound for name, bound in held_against.always(reference, observed).items() if name not in bounds}
+    further = {name: bound for name, bound in run_values.always(reference, observed).items() if name not in bounds}
     unasked = [_compared(name, bound, reference, observed, dataset) for name, bound in further.items()]
     compared += [item for item in unasked if item.judgement.verdict is Verdict.DIFFERS]
     compared.sort(key=lambda item: item.judgement.error / item.judgement.tolerance, reverse=True)
@@ -290,28 +290,21 @@ def _unit(reference: Reference, name: str) -> str:
 def _compared(
     name: str, bound: Tolerance, reference: Reference, observed: Mapping[str, FloatArray], dataset: xr.Dataset
 ) -> Compared:
-    item = reference.scene.observables.get(name)
+    item, unit = reference.scene.observables.get(name), _unit(reference, name)
     if name in observed:
-        values = observed[name]
-        true, bar = reference.true(name, values)
-        scale, doubt = reference.sizes.get(name, 1.0), reference.doubt(name)
-        own, between = reference.own_bar(name, dataset), held_against.between(reference, name, dataset)
+        run = run_values.run_curve(reference, name, observed[name], dataset)
+        true, scale = reference.true(name, run.values), reference.sizes.get(name, 1.0)
     else:
         values, truth_of = dataset[name].to_numpy(), reference.dataset[name]
-        true, bar = truth_of.to_numpy(), float(truth_of.attrs["error_bar"])
+        known = truth_of.to_numpy()
         if item and item.role is Role.REACTION and dataset["time"].to_numpy()[0] == 0:
-            true, values = true[1:], values[1:]  # several engines define reactions only after a first step
-        between = held_against.between(reference, name, dataset)
+            known, values = known[1:], values[1:]  # several engines define reactions only after a first step
         if truth_of.dims[-1:] == ("wxyz",):
-            values = turned_alike(values, true)
-        scale, doubt = _size(reference, name, true, _unit(reference, name)), Doubt.NONE
-        own = 0.0
-    judgement = judge_curve(
-        name, _unit(reference, name), values, true,
-        truth_error_bar=bar, tolerance=bound.absolute(scale), scale=scale, limit=None, doubt=doubt,
-        own_bar=own, sampled_bar=reference.sampled_bar, between=between,
-    )  # fmt: skip
-    return Compared(judgement, _farthest(values, true, dataset["time"].to_numpy()))
+            values = turned_alike(values, known)
+        run = RunCurve(values, between=run_values.between(reference, name, dataset))
+        true, scale = TrueCurve(known, float(truth_of.attrs["error_bar"])), _size(reference, name, known, unit)
+    judgement = judge_curve(Allowance(name, unit, bound.absolute(scale), scale), run, true)
+    return Compared(judgement, _farthest(run.values, true.values, dataset["time"].to_numpy()))
 
 
 def _farthest(values: FloatArray, true: FloatArray, times: FloatArray) -> float | None:

@@ -16,7 +16,7 @@ from proofroll.core.element_abilities import KnowsAnotherScene
 from proofroll.core.events import EVENT_ORDER, Event, events_of
 from proofroll.core.observable import Role
 from proofroll.core.scene import Scene
-from proofroll.core.verdict import Doubt
+from proofroll.core.verdict import Doubt, TrueCurve
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -87,8 +87,12 @@ class Reference:
             return next((float(time) for time in self.curves[name]), None)
         return self.sizes.get(name)
 
-    def true(self, name: str, values: FloatArray) -> tuple[FloatArray, float]:
-        """True values of an observable and their error bar, infinite if there are none; ``values`` are an engine's."""
+    def true(self, name: str, values: FloatArray) -> TrueCurve:
+        """True curve of an observable, of infinite error bar if there are no values; ``values`` are an engine's."""
+        return TrueCurve(*self._known(name, values), self.doubt(name))
+
+    def _known(self, name: str, values: FloatArray) -> tuple[FloatArray, float]:
+        """True values of an observable and their error bar."""
         item = self.scene.observables[name]
         if item.name == EVENT_ORDER:
             return np.zeros(1), 0.0

@@ -26,7 +26,7 @@ from proofroll.running.runner import Runner
 from proofroll.running.stopwatch import Stopwatch
 from proofroll.running.timing import ROUNDS, Timing, interleaved
 from proofroll.studies.cases import case_of, usual_length
-from proofroll.studies.judging import held_against
+from proofroll.studies.judging import run_values
 from proofroll.studies.judging.reference import Reference
 from proofroll.studies.ladder.models import LadderModel, Rung, Switch, rungs, switches
 
@@ -174,14 +174,14 @@ class Ladder:
     def bar(self, point: dict[str, float]) -> float:
         """Error bar of the true quantity, with these parameters of the scene changed."""
         reference = self.truths[str(point)]
-        return reference.true(self.quantity, reference.curves[self.quantity])[1]
+        return reference.true(self.quantity, reference.curves[self.quantity]).error_bar
 
     def error(self, model: LadderModel, point: dict[str, float]) -> float | None:
         """Largest distance of a model from the truth with these parameters changed; None: no answer."""
         answer = self.answers[key_of(model)]
         if answer.values is None or answer.run is None:
             return None
-        return held_against.error(self.truths[str(point)], self.quantity, answer.values, answer.run)
+        return run_values.error(self.truths[str(point)], self.quantity, answer.values, answer.run)
 
     def _time(self, progress: Callable[[str], None]) -> None:
         timed = {key: answer.case for key, answer in self.answers.items() if answer.values is not None}

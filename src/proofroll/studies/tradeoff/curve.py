@@ -22,7 +22,7 @@ from proofroll.running.case import Case, EngineFacts, Result, Status
 from proofroll.running.runner import Runner
 from proofroll.running.timing import Timing
 from proofroll.studies.cases import case_of
-from proofroll.studies.judging import held_against
+from proofroll.studies.judging import run_values
 from proofroll.studies.judging.reference import Reference
 from proofroll.studies.tradeoff.pareto import envelope
 from proofroll.studies.tradeoff.records import Corner
@@ -242,15 +242,15 @@ def judged(points: Sequence[CurvePoint], references: Mapping[float, Reference], 
 
 def measured(point: CurvePoint, reference: Reference, run: xr.Dataset) -> CurvePoint:
     """Point with its observables and their errors; the error of an event is at least half the width of its bracket."""
-    given = held_against.observed(reference, run)
-    curves = {name: values for name, values in given.items() if np.isfinite(reference.true(name, values)[1])}
+    given = run_values.observed(reference, run)
+    curves = {name: values for name, values in given.items() if np.isfinite(reference.true(name, values).error_bar)}
     return replace(
         point,
         curves=curves,
         errors={
-            name: max(held_against.error(reference, name, curve, run), reference.own_bar(name, run))
+            name: max(run_values.error(reference, name, curve, run), reference.own_bar(name, run))
             for name, curve in curves.items()
         },
-        bars={name: reference.true(name, curve)[1] for name, curve in curves.items()},
+        bars={name: reference.true(name, curve).error_bar for name, curve in curves.items()},
         scales={name: reference.scale(name) for name in curves},
     )

@@ -108,7 +108,7 @@ def tradeoff_study(outcome: Tradeoff) -> TradeoffStudy:
             name: MeasuredQuantity(
                 known[name].unit,
                 reference.scale(name),
-                reference.true(name, curve)[1],
+                reference.true(name, curve).error_bar,
                 known[name].shown + name.removeprefix(known[name].name),  # with the element, where there are several
                 known[name].column,
             )
@@ -142,7 +142,7 @@ def _budgets(outcome: Tradeoff) -> list[CurveBudget]:
             declared = outcome.reference.scene.observables[quantity]
             if not shown or (declared.role == Role.EVENT and not declared.asked_for):
                 continue
-            true = outcome.reference.true(quantity, shown[-1][1])[0]
+            true = outcome.reference.true(quantity, shown[-1][1]).values
             if all(values.shape == true.shape for point, values in shown if point.case.every == every):
                 made.append(budget(curve, quantity, every, true, declared, outcome.reference.magnitude(quantity)))
     return made

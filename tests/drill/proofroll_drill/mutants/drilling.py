@@ -19,10 +19,10 @@ from proofroll.core.first_steps import certificate as certificate_of
 from proofroll.core.scene import Scene
 from proofroll.core.time_grid import time_grid
 from proofroll.core.truth import truth
-from proofroll.core.verdict import Judgement, Verdict, judge_curve
+from proofroll.core.verdict import Allowance, Judgement, RunCurve, Verdict, judge_curve
 from proofroll.files.scene_file import load_scene
 from proofroll.running.recording import record
-from proofroll.studies.judging import held_against
+from proofroll.studies.judging import run_values
 from proofroll.studies.judging.reference import Reference
 from proofroll_drill.mutants import (
     ball_models,
@@ -130,14 +130,12 @@ def tried(kind: type[Mutant]) -> Mutated:
 def judged(reference: Reference, dataset: Any) -> list[Judgement]:
     """Verdicts of all observables that a run has."""
     found = []
-    for name, values in held_against.observed(reference, dataset).items():
-        true, bar = reference.true(name, values)
+    for name, values in run_values.observed(reference, dataset).items():
+        true = reference.true(name, values)
         size = reference.sizes.get(name, 1.0)
         unit = reference.scene.observables[name].unit
-        allowed = max(_TOLERANCE * size, 4 * bar)
-        found.append(
-            judge_curve(name, unit, values, true, truth_error_bar=bar, tolerance=allowed, scale=size, limit=None)
-        )
+        allowance = Allowance(name, unit, max(_TOLERANCE * size, 4 * true.error_bar), size)
+        found.append(judge_curve(allowance, RunCurve(values), true))
     return found
 
 

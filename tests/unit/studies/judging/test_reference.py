@@ -10,13 +10,13 @@ import xarray as xr
 
 from proofroll.core.engine_abilities import SharesEquations
 from proofroll.core.truth import truth
-from proofroll.core.verdict import Verdict, judge_curve
+from proofroll.core.verdict import Allowance, RunCurve, Verdict, judge_curve
 from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.engines.reduced import Reduced
 from proofroll.files.scene_file import load_scene
 from proofroll.running.case import Result, Status
 from proofroll.running.identity import resolve
-from proofroll.studies.judging import held_against
+from proofroll.studies.judging import run_values
 from proofroll.studies.judging.reference import Reference
 from proofroll.studies.tradeoff.curve import CurvePoint, measured
 from proofroll.truth.ball_on_surface.polar import Polar
@@ -50,11 +50,9 @@ def test_round_off_is_that_of_the_largest_number() -> None:
 
 def test_nothing_is_held_against_what_the_truth_does_not_tell() -> None:
     """Forces that are not determinate all the time are no curve of the truth: engines that tell them are not judged."""
-    held, told = Reference(load_scene("falling_rod"), None, {}, {}), np.ones((3, 2, 3))  # type: ignore[arg-type]
-    true, bar = held.true("contact_forces", told)
-    judgement = judge_curve(
-        "contact_forces", "N", told, true, truth_error_bar=bar, tolerance=1.0, scale=1.0, limit=None
-    )
+    held, told = Reference(load_scene("falling_rod"), xr.Dataset(), {}, {}), np.ones((3, 2, 3))
+    allowance = Allowance("contact_forces", "N", tolerance=1.0, scale=1.0)
+    judgement = judge_curve(allowance, RunCurve(told), held.true("contact_forces", told))
     assert judgement.verdict is Verdict.NOT_JUDGED
     assert judgement.reason == "not judged: the truth does not tell it here"
 
@@ -64,7 +62,7 @@ def test_a_trade_off_leaves_out_what_the_truth_does_not_tell(monkeypatch: pytest
     places = xr.Dataset({"positions": ("time", np.zeros(2), {"error_bar": 0.0})}, {"time": [0.0, 1.0]})
     held = Reference(load_scene("falling_rod"), places, {"positions": np.zeros(2)}, {})
     given = {"positions": np.full(2, 0.5), "contact_forces": np.ones(2)}
-    monkeypatch.setattr(held_against, "observed", lambda *_: given)
+    monkeypatch.setattr(run_values, "observed", lambda *_: given)
     point = CurvePoint(None, Result(Status.DONE, ""))  # type: ignore[arg-type]
     assert measured(point, held, places).errors == {"positions": 0.5}
 

@@ -9,11 +9,11 @@ from proofroll.elements.mechanism.contacts.start import TOUCHING, touches
 from proofroll.elements.mechanism.element import MechanismElement
 from proofroll.elements.mechanism.kinematics import Tree
 from proofroll.elements.mechanism.rotations import frame_of_axis
-from proofroll.report.pen import Drawing, View
+from proofroll.report.pen import Drawing, View, across, circle, unit
 
 _SIZE = 240.0  # size of the mechanism in the picture [px]
 _JOINT, _MASS, _POINT = 4.0, 2.5, 3.0  # radii of the marks [px]
-_GRAVITY = 44.0  # length of the arrow [px]
+_NEAR = 44.0  # distance of two names that would cover each other [px]
 _MOST_NAMES = 12  # of joints and loops: more would cover the drawing
 _OBLIQUE = (0.45, -0.85, 0.35)  # direction towards the viewer for spatial mechanisms, world axes with z up
 _STROKE = 10.0  # half of the stroke that marks a stop [px]
@@ -57,7 +57,8 @@ def drawn(element: MechanismElement) -> Drawing:
         picture.disc(here.tolist(), _POINT, "motion")
         _name(picture, here, point.name, "motion-letter", (0.0, 16.0))
     _laws(picture, at, element)
-    _gravity(picture, at, element)
+    left, top, width, _ = picture.box
+    picture.gravity(at, np.array(mechanism.gravity), [left + width + 14.0, top + 10.0])
     return picture
 
 
@@ -78,10 +79,8 @@ def _shapes(picture: Drawing, at: View, element: MechanismElement) -> None:
     mechanism = element.mechanism
     motion = Tree(mechanism).at(*mechanism.start())
     touching, index = touches(mechanism, motion), mechanism.body_index
-    e3, up = direction(element)
-    e1 = np.cross(up, e3) / np.linalg.norm(np.cross(up, e3))
-    angles = np.linspace(0.0, 2 * np.pi, _OUTLINE)
-    rim = np.outer(np.cos(angles), e1) + np.outer(np.sin(angles), np.cross(e3, e1))
+    upright = np.cross(direction(element)[0], at.right)
+    rim = circle(np.zeros(3), at.right, upright, np.linspace(0.0, 2 * np.pi, _OUTLINE))
     drawn_already: set[bytes] = set()
     for contact, each in zip(mechanism.contacts, touching, strict=True):
         for body, shape in ((contact.body_a, contact.shape_a), (contact.body_b, contact.shape_b)):
@@ -117,7 +116,7 @@ def _laws(picture: Drawing, at: View, element: MechanismElement) -> None:
     for coupling in mechanism.couplings:
         ends = at(np.stack([place(coupling.joint_a), place(coupling.joint_b)]))
         picture.path(ends, "hidden")
-        apart = np.linalg.norm(ends[1] - ends[0]) > _GRAVITY  # else below the names of joint and actuator
+        apart = np.linalg.norm(ends[1] - ends[0]) > _NEAR  # else below the names of joint and actuator
         _name(picture, ends.mean(axis=0), coupling.name, "letter", (0.0, -6.0 if apart else 36.0))
     for number, joint in enumerate(mechanism.joints):
         axis, here = _axis(element, number), place(joint.name)
@@ -126,9 +125,8 @@ def _laws(picture: Drawing, at: View, element: MechanismElement) -> None:
                 continue  # beyond the drawing
             if joint.kind == "prismatic":
                 there = at(here + (limit - joint.q0[0]) * axis)
-                along = at(axis)
-                across = np.array([-along[1], along[0]]) / (np.linalg.norm(along) or 1.0)
-                picture.path(np.stack([there - _STROKE * across, there + _STROKE * across]), "line")
+                side = _STROKE * across(at(axis))
+                picture.path(np.stack([there - side, there + side]), "line")
                 continue
             com = mechanism.bodies[mechanism.body_index[joint.child]].com
             arm = np.asarray(start.point(joint.child, com)[0]) - here
@@ -158,9 +156,8 @@ def direction(element: MechanismElement) -> tuple[FloatArray, FloatArray]:
 def _turned(direction: FloatArray, up: FloatArray) -> FloatArray:
     """A direction given for z up, turned along with z to another upward direction."""
     first = np.eye(3)[int(np.argmin(np.abs(up)))]
-    across = np.cross(up, first)
-    across /= np.linalg.norm(across)
-    return np.asarray(np.stack([np.cross(across, up), across, up], axis=1) @ direction)
+    second = unit(np.cross(up, first))
+    return np.asarray(np.stack([np.cross(second, up), second, up], axis=1) @ direction)
 
 
 def _axis(element: MechanismElement, number: int) -> FloatArray:
@@ -173,22 +170,11 @@ def _axis(element: MechanismElement, number: int) -> FloatArray:
 def _zigzag(ends: FloatArray) -> FloatArray:
     """Zigzag line of a spring between two places of the picture; ``ends`` has shape (2, 2)."""
     along = ends[1] - ends[0]
-    across = 5.0 * np.array([-along[1], along[0]]) / (np.linalg.norm(along) or 1.0)
-    inner = [ends[0] + (0.15 + 0.7 * (k + 0.5) / _TEETH) * along + (1 if k % 2 else -1) * across for k in range(_TEETH)]
+    side = 5.0 * across(along)
+    inner = [ends[0] + (0.15 + 0.7 * (k + 0.5) / _TEETH) * along + (1 if k % 2 else -1) * side for k in range(_TEETH)]
     return np.stack([ends[0], ends[0] + 0.15 * along, *inner, ends[0] + 0.85 * along, ends[1]])
 
 
 def _name(picture: Drawing, place: FloatArray, name: str, look: str, beside: tuple[float, float]) -> None:
     """Writes a name with spaces for underscores, which the pen would turn into indices."""
     picture.text(place, name.replace("_", " "), look, beside)
-
-
-def _gravity(picture: Drawing, at: View, element: MechanismElement) -> None:
-    """Draws the direction of gravity beside the mechanism; nothing without gravity."""
-    gravity = np.array(element.mechanism.gravity)
-    if not np.any(gravity):
-        return
-    x, y, width, _ = picture.box
-    along = at(gravity / np.linalg.norm(gravity)) / at.scale
-    place = np.array([x + width + 14.0, y + 10.0])
-    picture.vector(np.stack([place, place + _GRAVITY * along]), "force", "g")

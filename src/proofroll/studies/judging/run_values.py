@@ -14,6 +14,7 @@ from proofroll.core.dataset import BETWEEN, observe, part
 from proofroll.core.events import EVENT_ORDER, events_of
 from proofroll.core.observable import Role
 from proofroll.core.turns import on_turns_of
+from proofroll.core.verdict import RunCurve
 from proofroll.studies.judging.reference import Reference
 
 if TYPE_CHECKING:
@@ -73,10 +74,24 @@ def off_grid(reference: Reference, name: str, dataset: xr.Dataset) -> tuple[Floa
     return None if turned is None else (times, turned, true)
 
 
+def run_curve(
+    reference: Reference, name: str, values: FloatArray, dataset: xr.Dataset, precision: str = "double"
+) -> RunCurve:
+    """Values of an observable in a run, with the uncertainty of its events, its values off the grid and its size."""
+    return RunCurve(
+        values,
+        own_bar=reference.own_bar(name, dataset),
+        sampled_bar=reference.sampled_bar,
+        between=between(reference, name, dataset),
+        magnitude=reference.magnitude(name),
+        precision=precision,
+    )
+
+
 def error(reference: Reference, name: str, values: FloatArray, dataset: xr.Dataset) -> float:
     """Largest distance of an observable from the truth, at the samples and off the grid."""
     apart = between(reference, name, dataset)
-    on_grid = largest_difference(values, reference.true(name, values)[0])
+    on_grid = largest_difference(values, reference.true(name, values).values)
     return on_grid if apart is None else max(on_grid, largest_difference(*apart))
 
 
