@@ -71,6 +71,8 @@ class Judgement:
         order: observed order, or None.
         limit_error: distance of the limit of small steps from the truth, or None without a ladder.
         limit_error_bar: uncertainty of that distance.
+        limit_doubt: the same with round-off and with what one step beside an event does; a limit that is beyond a
+            tolerance by more than this does not hold it.
         limit: result of the ladder of steps, see :class:`LimitResult`.
         reason: ground of the verdict, as a clause with numbers.
         remarks: further facts for a reader that do not change the verdict, one clause each.
@@ -87,6 +89,7 @@ class Judgement:
     order: float | None = None
     limit_error: float | None = None
     limit_error_bar: float | None = None
+    limit_doubt: float | None = None
     limit: LimitResult = LimitResult.NO_LADDER
     reason: str = ""
     remarks: tuple[str, ...] = ()
@@ -206,6 +209,7 @@ def judge_curve(
         order=rungs.order,
         limit_error=rungs.error,
         limit_error_bar=rungs.bar,
+        limit_doubt=rungs.doubt,
         limit=rungs.finding,
         reason=reason,
         remarks=tuple(remarks),
@@ -225,6 +229,7 @@ class _Ladder:
     Attributes:
         finding: result for the limit of small steps.
         error, bar, order: of the limit; None without one.
+        doubt: the bar with round-off and with what one step beside an event does; None without a limit.
         leaves: True if finer steps leave the tolerance, with or without an order.
         wrong_within: True if the limit is within tolerance, but proven not to be the truth.
         text: the numbers, for a person.
@@ -235,6 +240,7 @@ class _Ladder:
     error: float | None = None
     bar: float | None = None
     order: float | None = None
+    doubt: float | None = None
     leaves: bool = False
     wrong_within: bool = False
     text: str = ""
@@ -268,7 +274,7 @@ def _read(limit: Limit, allowance: Allowance, true: TrueCurve, round_off: float)
         text += f"; {limit.floor}"
     if limit.saturated:
         text += "; two tolerances give the same run, so its steps have another limit, as near samples"
-    return _Ladder(finding, error, bar, order, leaves, wrong, text)
+    return _Ladder(finding, error, bar, order, doubted, leaves, wrong, text)
 
 
 def _verdict(error: float, tolerance: float, rungs: _Ladder, doubt: Doubt) -> Verdict:

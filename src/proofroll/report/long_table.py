@@ -27,6 +27,9 @@ class TableLine:
         status, message: end of the run.
         verdict: of the quantity, or of a run without quantities; empty: none was given.
         limit: result of a ladder of steps for the quantity.
+        limit_error: distance of the limit of small steps from the truth; None: there is none.
+        limit_doubt: uncertainty of that distance, of round-off and of steps beside events included.
+        floor: clause about the error floor of single precision that ends the refinement; empty: there is none.
         quantity, unit, role: the measured quantity and its role (:class:`proofroll.core.observable.Role`).
         headline: summaries show it.
         error: largest distance from the truth; None: not finite, or there is none.
@@ -58,6 +61,9 @@ class TableLine:
     message: str
     verdict: str
     limit: str = ""
+    limit_error: float | None = None
+    limit_doubt: float | None = None
+    floor: str = ""
     quantity: str = ""
     unit: str = ""
     role: str = ""
@@ -78,6 +84,13 @@ class TableLine:
         if self.error is None or not self.scale:
             return math.inf
         return (self.error + (self.truth_error_bar or 0.0)) / self.scale
+
+    @property
+    def limit_least(self) -> float | None:
+        """Least error that the limit of small steps can have, relative to the quantity's size; None without a limit."""
+        if self.limit_error is None or not self.scale:
+            return None
+        return max(0.0, self.limit_error - (self.limit_doubt or 0.0)) / self.scale
 
 
 COLUMNS = tuple(item.name for item in fields(TableLine))

@@ -13,6 +13,9 @@ from proofroll.running.case import Result, Status
 from proofroll.studies.comparison.outcome import LadderRun, Outcome, Run
 from proofroll.studies.comparison.planning import point_name
 
+# Fields of a line about a ladder of steps, which only the step at which a comparison judges has.
+_NO_LIMIT: dict[str, Any] = {"order": None, "limit": "", "limit_error": None, "limit_doubt": None, "floor": ""}
+
 
 def lines_of(outcome: Outcome) -> list[TableLine]:
     """Lines for each judgement, and for each error of a rung of a ladder, which has no verdict."""
@@ -70,6 +73,9 @@ def _judged(outcome: Outcome, run: Run, plain: TableLine, item: Judgement) -> Ta
         plain,
         verdict=item.verdict,
         limit=item.limit,
+        limit_error=item.limit_error,
+        limit_doubt=item.limit_doubt,
+        floor=item.floor,
         quantity=item.observable,
         unit=item.unit,
         role=known.role,
@@ -89,6 +95,6 @@ def _of_rung(outcome: Outcome, run: Run, plain: TableLine, rung: LadderRun) -> I
     for item in judged:
         verdict = item.verdict if item.verdict in {Verdict.ILL_POSED, Verdict.NOT_JUDGED} else ""
         line = _judged(outcome, run, ended, item)
-        yield replace(line, verdict=verdict, error=rung.errors[item.observable], order=None, limit="")
+        yield replace(line, verdict=verdict, error=rung.errors[item.observable], **_NO_LIMIT)
     if not judged:
         yield ended

@@ -2,13 +2,37 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import groupby
 
 from proofroll.core.verdict import LimitResult, Verdict
 from proofroll.report.labels import step
 from proofroll.report.long_table import TableLine
+from proofroll.studies.tradeoff.pareto import envelope
 
 # Results of a ladder of steps, from the most to the least promising.
 _LIMITS = (LimitResult.WITHIN, LimitResult.NO_LADDER, LimitResult.NOT_SHOWN, LimitResult.ANOTHER)
+
+# Roles of observables that a tolerance of the first screen bounds (:class:`proofroll.core.observable.Role`).
+_ROLES = ("motion", "reaction")
+
+
+@dataclass(frozen=True)
+class LadderResult:
+    """Result of a ladder of steps for motion, or for motion and forces.
+
+    Attributes:
+        limit: as the comparison's tolerance has it.
+        least: least error that the limit of small steps can have, relative to the quantity's size; None: not known.
+    """
+
+    limit: LimitResult
+    least: float | None
+
+    def at(self, tolerance: float) -> LimitResult:
+        """Result at another tolerance than the comparison's: a known limit is beyond it or within."""
+        if self.least is None or self.limit not in {LimitResult.WITHIN, LimitResult.ANOTHER}:
+            return self.limit
+        return LimitResult.ANOTHER if self.least > tolerance else LimitResult.WITHIN
 
 
 @dataclass(frozen=True)
@@ -19,10 +43,12 @@ class Candidate:
         row: number of its row in the study.
         name: engine, formulation, setting and step, for a person.
         motion, forces: largest error of a coordinate, and of a reaction, relative to its size; None: not reported.
+        motion_held, forces_held: smallest tolerance that it holds without luck: the largest of that error, of those of
+            its next two finer steps, and of the least error that its limit of small steps can have.
         cost: wall seconds per simulated second at the slowest place; None: not measured.
         clean: True if clean runs measured the cost.
         blame: verdict of a place without a result; None: every place has one.
-        motion_limit, forces_limit: result of its ladder of steps for either.
+        motion_ladder, forces_ladder: result of its ladder of steps for either.
         href: HTML id of the evidence of the place with the largest error.
         message: reason why a place has no result.
     """
@@ -31,24 +57,28 @@ class Candidate:
     name: str
     motion: float | None
     forces: float | None
+    motion_held: float | None
+    forces_held: float | None
     cost: float | None
     clean: bool
     blame: Verdict | None
-    motion_limit: LimitResult
-    forces_limit: LimitResult
+    motion_ladder: LadderResult
+    forces_ladder: LadderResult
     href: str
     message: str
 
     def error(self, forces: bool) -> float | None:
-        """Error that a tolerance bounds, of motion or of both; None: something is not reported."""
-        if not forces:
-            return self.motion
-        return None if self.motion is None or self.forces is None else max(self.motion, self.forces)
+        """Error at its own step, of motion or of both; None: something is not reported."""
+        return _worst([self.motion, self.forces] if forces else [self.motion])
 
-    def limit(self, forces: bool) -> LimitResult:
-        """Result of its ladder of steps, for motion or the worse of both."""
-        both = (self.motion_limit, self.forces_limit) if forces else (self.motion_limit,)
-        return max(both, key=_LIMITS.index)
+    def held(self, forces: bool) -> float | None:
+        """Smallest tolerance that it holds without luck, of motion or of both; None: something is not reported."""
+        return _worst([self.motion_held, self.forces_held] if forces else [self.motion_held])
+
+    def limit(self, forces: bool, tolerance: float) -> LimitResult:
+        """Result of its ladder of steps at a tolerance, for motion or the worse of both."""
+        both = (self.motion_ladder, self.forces_ladder) if forces else (self.motion_ladder,)
+        return max((item.at(tolerance) for item in both), key=_LIMITS.index)
 
 
 def candidates(lines: Sequence[TableLine], href: str, places: Sequence[str]) -> list[Candidate]:
@@ -58,12 +88,12 @@ def candidates(lines: Sequence[TableLine], href: str, places: Sequence[str]) -> 
     """
     needed = list(dict.fromkeys(line.place for line in lines))
     own = lines[0].step
-    limits = _limit(lines, "motion"), _limit(lines, "reaction")
+    ladders, bounds = [_ladder(lines, role) for role in _ROLES], held_by(lines)
     anchors = {"": href} | {place: f"{href}-r{lines[0].row}-p{number}" for number, place in enumerate(places)}
     steps = []
     for value in dict.fromkeys(line.step for line in lines):
         at = {place: [line for line in lines if line.step == value and line.place == place] for place in needed}
-        steps.append(_candidate(lines[0], value, at, limits=limits, anchors=anchors))
+        steps.append(_candidate(lines[0], value, at, bounds=bounds, ladders=ladders, anchors=anchors))
     return sorted(steps, key=lambda item: item.name != _name(lines[0], own))
 
 
@@ -72,7 +102,8 @@ def _candidate(
     value: float | None,
     at: dict[str, list[TableLine]],
     *,
-    limits: tuple[LimitResult, LimitResult],
+    bounds: dict[TableLine, float],
+    ladders: Sequence[LadderResult],
     anchors: dict[str, str],
 ) -> Candidate:
     """Candidate for one step of a row; ``anchors``: HTML ids of the evidence by place (the study's: empty place)."""
@@ -85,13 +116,17 @@ def _candidate(
     costs = [lines[0].cost for lines in at.values() if lines]
     cost = None if None in costs else max((item for item in costs if item is not None), default=None)
     clean = all(lines[0].clean for lines in at.values() if lines)
-    errors = {place: (largest(lines, "motion"), largest(lines, "reaction")) for place, lines in judged.items()}
+    own = {line: line.relative for line in bounds}
+    errors = {place: [largest(lines, role, own) for role in _ROLES] for place, lines in judged.items()}
     blame, message = _blame(judged)
     if judged:
         furthest = max(errors, key=lambda place: max(errors[place][0] or 0.0, errors[place][1] or 0.0))
         href = anchors.get(furthest, href)
     motion, forces = (_worst([pair[which] for pair in errors.values()]) for which in (0, 1))
-    return Candidate(first.row, name, motion, forces, cost, clean, blame, *limits, href, message)
+    held = [_worst([largest(lines, role, bounds) for lines in judged.values()]) for role in _ROLES]
+    return Candidate(
+        first.row, name, motion, forces, held[0], held[1], cost, clean, blame, ladders[0], ladders[1], href, message
+    )
 
 
 def _blame(judged: dict[str, list[TableLine]]) -> tuple[Verdict | None, str]:
@@ -107,9 +142,28 @@ def _blame(judged: dict[str, list[TableLine]]) -> tuple[Verdict | None, str]:
     return None, ""
 
 
-def largest(lines: Sequence[TableLine], role: str) -> float | None:
-    """Largest relative error of the quantities of a role that summaries show."""
-    return max((line.relative for line in _shown(lines, role)), default=None)
+def held_by(lines: Sequence[TableLine]) -> dict[TableLine, float]:
+    """Smallest tolerance that each line's run holds without luck, relative to the quantity's size.
+
+    The rule is that of the trade-off (:func:`proofroll.studies.tradeoff.pareto.envelope`) and that of a verdict: a
+    limit of small steps that is beyond the tolerance by more than its doubts outweighs agreement at one step.
+    """
+
+    def ladder(line: TableLine) -> tuple[str, int, str, str, str]:
+        return line.study, line.row, line.engine, line.place, line.quantity
+
+    bounds = {}
+    for _, own in groupby(sorted(lines, key=lambda x: (*ladder(x), -(x.step or 0.0))), key=ladder):
+        steps = list(own)
+        errors, least = [item.relative for item in steps], max(item.limit_least or 0.0 for item in steps)
+        floor = errors.index(min(errors)) if any(item.floor for item in steps) else None
+        bounds.update({item: max(size, least) for item, size in zip(steps, envelope(errors, floor), strict=True)})
+    return bounds
+
+
+def largest(lines: Sequence[TableLine], role: str, errors: dict[TableLine, float]) -> float | None:
+    """Largest of some errors over the quantities of a role that summaries show."""
+    return max((errors[line] for line in _shown(lines, role)), default=None)
 
 
 def _shown(lines: Sequence[TableLine], role: str) -> list[TableLine]:
@@ -118,10 +172,12 @@ def _shown(lines: Sequence[TableLine], role: str) -> list[TableLine]:
     return [line for line in of_role if line.headline] or of_role
 
 
-def _limit(lines: Sequence[TableLine], role: str) -> LimitResult:
+def _ladder(lines: Sequence[TableLine], role: str) -> LadderResult:
     """Worst result of a row's ladder of steps for a role."""
-    results = [item for line in _shown(lines, role) for item in _LIMITS if line.limit == item]
-    return max(results, key=_LIMITS.index, default=LimitResult.NO_LADDER)
+    shown = _shown(lines, role)
+    results = [item for line in shown for item in _LIMITS if line.limit == item]
+    limit = max(results, key=_LIMITS.index, default=LimitResult.NO_LADDER)
+    return LadderResult(limit, max((x for line in shown if (x := line.limit_least) is not None), default=None))
 
 
 def _worst(errors: Sequence[float | None]) -> float | None:

@@ -255,7 +255,7 @@ def choice_matrix(lines: Iterable[TableLine], studies: Mapping[str, ChoiceStudy]
 def _cell(steps: Sequence[Candidate], tolerance: float, forces: bool) -> ChoiceCell:
     """Cell of one study: the cheapest candidate that holds the tolerance, else the closest, else why there is none."""
     whole = [item for item in steps if item.blame is None]
-    known = [(size, item) for item in whole if (size := item.error(forces)) is not None]
+    known = [(size, item) for item in whole if (size := item.held(forces)) is not None]
     held = [(item.cost if item.cost is not None else math.inf, size, item) for size, item in known if size <= tolerance]
     if held:
         cost, size, item = min(held, key=lambda entry: entry[:2])
@@ -265,10 +265,13 @@ def _cell(steps: Sequence[Candidate], tolerance: float, forces: bool) -> ChoiceC
         return ChoiceCell(Verdict.AGREES, text, title, item.href, cost, item.name)
     if known:
         size, item = min(known, key=lambda entry: entry[0])
-        limit = item.limit(forces)
+        limit, own = item.limit(forces, tolerance), item.error(forces)
         state = Verdict.CONVERGES if limit == LimitResult.WITHIN else Verdict.DIFFERS
+        luck = own is not None and own <= tolerance
+        size = own if own is not None and not luck else size
         off = _beyond(size, tolerance)
-        title, why = f"{item.name}: off by {_beyond(size, tolerance, 2)}; {_WHY[limit]}", f"off by {off}, {_WHY[limit]}"
+        by = f"its error of {number(own)} is luck, finer steps or their limit are off by" if luck else "off by"
+        title, why = f"{item.name}: {by} {_beyond(size, tolerance, 2)}; {_WHY[limit]}", f"{by} {off}, {_WHY[limit]}"
         return ChoiceCell(state, off, title, item.href, name=item.name, why=why)
     if whole:
         lacking = "no forces" if whole[0].motion is not None else "no motion"

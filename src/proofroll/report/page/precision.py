@@ -8,7 +8,7 @@ from typing import NamedTuple
 from proofroll.core.verdict import Verdict
 from proofroll.report.labels import step, symbol
 from proofroll.report.long_table import TableLine
-from proofroll.report.page.candidates import largest
+from proofroll.report.page.candidates import held_by, largest
 
 # Least number of points of a picture; fewer are no more than a table.
 _FEWEST = 2
@@ -25,7 +25,9 @@ class PrecisionPoint(NamedTuple):
         clean: True if clean runs measured the cost.
         verdict: the worst; empty: a step of a ladder, which has no verdict.
         errors: largest error of each quantity of the picture, relative to its size; None: not reported; 1e300: not
-        finite.
+            finite.
+        held: the smallest tolerance that the run holds without luck
+            (:func:`proofroll.report.page.candidates.held_by`), in place of each error.
     """
 
     step: str
@@ -33,6 +35,7 @@ class PrecisionPoint(NamedTuple):
     clean: bool
     verdict: str
     errors: list[float | None]
+    held: list[float | None]
 
 
 @dataclass(frozen=True)
@@ -59,10 +62,11 @@ def work_precision(lines: Iterable[TableLine]) -> WorkPrecision | None:
     judged = [line for line in lines if line.verdict not in _UNJUDGED]
     named = list(dict.fromkeys(line.quantity for line in judged if line.scale))
     groups = [role for role in ("motion", "reaction") if any(line.role == role and line.scale for line in judged)]
+    bounds = held_by(judged)
     curves: dict[tuple[str, str, str, str], list[TableLine]] = {}
     for line in judged:
         curves.setdefault((line.engine, line.formulation, line.setting, line.resolution), []).append(line)
-    drawn = [_curve(own, groups, named) for own in curves.values()]
+    drawn = [_curve(own, groups, named, bounds) for own in curves.values()]
     drawn = [curve for curve in drawn if curve.points]
     if sum(len(curve.points) for curve in drawn) < _FEWEST:
         return None
@@ -70,28 +74,38 @@ def work_precision(lines: Iterable[TableLine]) -> WorkPrecision | None:
     return WorkPrecision([*(titles[role] for role in groups), *map(symbol, named)], drawn)
 
 
-def _curve(lines: Sequence[TableLine], groups: Sequence[str], named: Sequence[str]) -> PrecisionCurve:
+def _curve(
+    lines: Sequence[TableLine], groups: Sequence[str], named: Sequence[str], bounds: dict[TableLine, float]
+) -> PrecisionCurve:
     first = lines[0]
     steps = sorted({line.step for line in lines}, key=lambda value: -(value or 0.0))
-    points = [_point([line for line in lines if line.step == value], groups, named) for value in steps]
+    points = [_point([line for line in lines if line.step == value], groups, named, bounds) for value in steps]
     name = " ".join(filter(None, (first.formulation, first.setting))) or first.engine
     kept = [point for point in points if point is not None and any(item is not None for item in point.errors)]
     return PrecisionCurve(first.engine, first.formulation, name, first.own_equations, kept)
 
 
-def _point(lines: Sequence[TableLine], groups: Sequence[str], named: Sequence[str]) -> PrecisionPoint | None:
+def _point(
+    lines: Sequence[TableLine], groups: Sequence[str], named: Sequence[str], bounds: dict[TableLine, float]
+) -> PrecisionPoint | None:
     costs = [line.cost for line in lines if line.cost is not None]
     if len(costs) < len(lines) or any(line.status != "done" for line in lines):
         return None
-    errors = [largest(lines, role) for role in groups]
-    errors += [max((line.relative for line in lines if line.quantity == name), default=None) for name in named]
+    own = {line: line.relative for line in lines}
+    errors, held = (
+        [
+            *(largest(lines, role, sizes) for role in groups),
+            *(max((sizes[line] for line in lines if line.quantity == name), default=None) for name in named),
+        ]
+        for sizes in (own, bounds)
+    )
     verdict = max((line.verdict for line in lines if line.verdict), key=lambda x: _SEVERITY.get(x, 0), default="")
     return PrecisionPoint(
         step(lines[0].resolution or None, lines[0].step),
         _short(max(costs)),
         all(line.clean for line in lines),
         verdict,
-        [None if item is None else _short(item) if math.isfinite(item) else 1e300 for item in errors],
+        *([None if x is None else _short(x) if math.isfinite(x) else 1e300 for x in sizes] for sizes in (errors, held)),
     )
 
 

@@ -17,19 +17,19 @@
     const found = study.curves.filter(({ engine }) => !off.has(engine)).map((curve, number) => ({
       ...curve, number,
       points: curve.points.filter(([, cost, , , errors]) => cost > 0 && errors[quantity] !== null)
-        .map(([step, cost, clean, verdict, errors]) => ({ step, cost, clean, verdict, error: errors[quantity], y: Math.min(Math.max(errors[quantity], LEAST), LARGEST) })),
+        .map(([step, cost, clean, verdict, errors, held]) => ({ step, cost, clean, verdict, error: errors[quantity], held: held[quantity], y: Math.min(Math.max(errors[quantity], LEAST), LARGEST) })),
     }));
     return found.filter(({ points }) => points.length);
   }
   function front(points) {
     const best = [];
-    for (const point of [...points].sort((a, b) => a.cost - b.cost || a.y - b.y))
-      if (point.error <= LARGEST && (!best.length || point.y < best[best.length - 1].y)) best.push(point);
+    for (const point of [...points].sort((a, b) => a.cost - b.cost || a.held - b.held))
+      if (point.held <= LARGEST && (!best.length || point.held < best[best.length - 1].held)) best.push(point);
     return best;
   }
-  function told({ name, engine }, { step, cost, clean, verdict, error }) {
-    const held = error <= 10 ** -decade() ? "holds" : "does not hold";
-    return `<b>${literal(`${engine} ${name}`)}</b><br>${literal(step || "its own steps")}<br>error ${short(error)} of the size: ${held} 1e-${decade()}` +
+  function told({ name, engine }, { step, cost, clean, verdict, error, held }) {
+    const answer = held <= 10 ** -decade() ? "holds" : error <= 10 ** -decade() ? "by luck, finer steps are worse:" : "does not hold";
+    return `<b>${literal(`${engine} ${name}`)}</b><br>${literal(step || "its own steps")}<br>error ${short(error)} of the size: ${answer} 1e-${decade()}` +
       `<br>cost ${clean ? "" : "~"}${short(cost)} s/s<br>${verdict ? `verdict: ${literal(verdict)}` : "a step of its ladder"}<extra></extra>`;
   }
 
@@ -45,7 +45,7 @@
     const span = [Math.log10(Math.min(...costs)) - 0.3, Math.log10(Math.max(...costs)) + 0.3];
     const least = Math.min(...points.map(({ y }) => y), 10 ** -decade());
     const best = front(all.filter(({ own }) => !own).flatMap(({ points }) => points));
-    const choice = best.find(({ error }) => error <= 10 ** -decade());
+    const choice = best.find(({ held }) => held <= 10 ** -decade());
     const layout = {
       height: total + HEAD + 8, width, margin: { l: 52, r: 8, t: HEAD, b: 8 }, hovermode: "closest", showlegend: true,
       paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)", dragmode: matchMedia("(pointer: coarse)").matches ? false : "zoom",
@@ -67,7 +67,7 @@
       const others = all.filter((curve) => curve.engine !== engine).flatMap(({ points }) => [...points, { cost: null, y: null }]);
       traces.push({ ...here, mode: "lines+markers", x: others.map(({ cost }) => cost), y: others.map((point) => point.y), line: { color: paint("--muted"), width: 0.8 }, marker: { color: paint("--muted"), size: 3 }, opacity: 0.55, hoverinfo: "skip", showlegend: false });
       if (best.length) traces.push({
-        ...here, mode: "lines", x: [...best.map(({ cost }) => cost), 10 ** span[1]], y: [...best.map((point) => point.y), best[best.length - 1].y],
+        ...here, mode: "lines", x: [...best.map(({ cost }) => cost), 10 ** span[1]], y: [...best, best[best.length - 1]].map(({ held }) => Math.max(held, LEAST)),
         line: { color: paint("--truth"), width: 5, shape: "hv" }, hoverinfo: "skip", showlegend: false,
       });
       const formulations = [...new Set(all.filter((curve) => curve.engine === engine).map(({ formulation }) => formulation))];

@@ -132,7 +132,7 @@ class TradeoffPart(Part):
                     unit=study.quantities[name].unit,
                     role=scene.observables[name].role,
                     headline=scene.observables[name].headline,
-                    limit=limits.get((point.curve, name), ""),
+                    **limits.get((point.curve, name), {}),
                     error=error,
                     truth_error_bar=study.quantities[name].truth_error_bar,
                     scale=study.quantities[name].scale,
@@ -143,12 +143,12 @@ class TradeoffPart(Part):
         return lines
 
 
-def _limit(budget: CurveBudget) -> str:
-    """Result of a curve's limit of small steps: not shown, beyond both error bars of the truth, or within."""
+def _limit(budget: CurveBudget) -> dict[str, Any]:
+    """Fields about a curve's limit of small steps: not shown, beyond both error bars of the truth, or within."""
     if budget.model_form is None:
-        return LimitResult.NOT_SHOWN
-    known = (budget.model_form_bar or 0.0) + (budget.truth or 0.0) + (budget.floor or 0.0)
-    return LimitResult.ANOTHER if budget.model_form > _SHOWN * known else LimitResult.WITHIN
+        return {"limit": LimitResult.NOT_SHOWN}
+    limit = LimitResult.ANOTHER if budget.model_form > _SHOWN * budget.doubt else LimitResult.WITHIN
+    return {"limit": limit, "limit_error": budget.model_form, "limit_doubt": budget.doubt}
 
 
 def advice(study: TradeoffStudy, claims: TradeoffClaims) -> list[Advice]:

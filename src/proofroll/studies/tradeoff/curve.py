@@ -180,8 +180,7 @@ class Curve:
         steps.
         """
         errors, floor = [point.errors.get(quantity, np.inf) for point in self.points], self.floor(quantity)
-        last = self.points.index(floor.best) + 1 if floor else len(errors)
-        return envelope(errors[:last]) + errors[last:]
+        return envelope(errors, self.points.index(floor.best) if floor else None)
 
     def floor(self, quantity: str) -> Floor | None:
         """Error floor of single precision; None in double precision, or if no smaller step is clearly worse."""

@@ -9,17 +9,22 @@ _Item = TypeVar("_Item")
 _NEIGHBOURS = 2
 
 
-def envelope(errors: Sequence[float]) -> list[float]:
+def envelope(errors: Sequence[float], floor: int | None = None) -> list[float]:
     """Largest error of each run and of the next two finer ones that have a result; coarse first.
 
     So a coarse run whose error cancels by chance does not count as accurate. Only the next runs matter: round-off that
     grows at much smaller steps does not make a coarse run worse.
+
+    Args:
+        errors: coarse first; inf: no result.
+        floor: number of the run at the error floor of single precision; finer runs do not count. None: no floor.
     """
+    last = len(errors) if floor is None else floor + 1
     held = []
-    for index, error in enumerate(errors):
-        finer = [other for other in errors[index + 1 :] if other != float("inf")][:_NEIGHBOURS]
+    for index, error in enumerate(errors[:last]):
+        finer = [other for other in errors[index + 1 : last] if other != float("inf")][:_NEIGHBOURS]
         held.append(max([error, *finer]))
-    return held
+    return [*held, *errors[last:]]
 
 
 def tied(one: Sequence[float] | None, other: Sequence[float] | None) -> bool:

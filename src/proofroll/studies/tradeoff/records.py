@@ -185,6 +185,11 @@ class CurveBudget:
     fine_error: float | None = None
     sentence: str = ""
 
+    @property
+    def doubt(self) -> float:
+        """Uncertainty of the limit's distance from the truth: bar of the limit, error bar of the truth, scatter."""
+        return (self.model_form_bar or 0.0) + (self.truth or 0.0) + (self.floor or 0.0)
+
 
 @dataclass(frozen=True, kw_only=True)
 class TruthCost(MeasuredCost):

@@ -11,7 +11,7 @@ from proofroll.core.errors import InputError, require_known
 from proofroll.core.number_format import number
 
 if TYPE_CHECKING:
-    from proofroll.studies.tradeoff.records import MeasuredPoint, SparseRun, TradeoffStudy
+    from proofroll.studies.tradeoff.records import CurveBudget, MeasuredPoint, SparseRun, TradeoffStudy
 
 # Ratio of the tolerance to the error that is required at the scene's own parameters.
 MARGIN = 2.0
@@ -69,15 +69,24 @@ def _why_not_here(study: TradeoffStudy, point: MeasuredPoint, name: str, absolut
     if error > absolute:
         blame = _COARSE if _finer_holds(study, point, name, absolute) else _blame(study, point, name, absolute)
         return f"{name} is off by {number(error)} {unit}; {blame}"
-    if held > absolute:
-        finer = f"finer steps of the same model are off by {number(held)} {unit}"
-        return f"its error of {number(error)} {unit} is luck: {finer}"
+    if luck := _luck(study, point, name, absolute):
+        return f"its error of {number(error)} {unit} is luck: {luck}"
     if held * MARGIN > absolute:
         return f"{name} is off by {number(held)} {unit}, which leaves less than a factor of {MARGIN:g} to the tolerance"
     bar = study.quantities[name].truth_error_bar or 0.0
     if bar * MARGIN > absolute:
         return f"the truth itself is known only to {number(bar)} {unit}, so nothing can be seen to hold it"
     return None
+
+
+def _luck(study: TradeoffStudy, point: MeasuredPoint, name: str, absolute: float) -> str:
+    """Reason why an error within the tolerance is luck: finer steps, or their limit, are beyond it; else empty."""
+    unit, budget = study.quantities[name].unit, _budget(study, point, name)
+    if point.held(name) > absolute:
+        return f"finer steps of the same model are off by {number(point.held(name))} {unit}"
+    if budget and budget.model_form is not None and budget.model_form - budget.doubt > absolute:
+        return f"{number(budget.model_form)} {unit} remain in the limit of small steps"
+    return ""
 
 
 def _lives_on_the_grid(study: TradeoffStudy, sparse: SparseRun, name: str, absolute: float) -> str | None:
@@ -115,9 +124,14 @@ def _finer_holds(study: TradeoffStudy, point: MeasuredPoint, quantity: str, abso
     return any(p.held(quantity) * MARGIN <= absolute for p in finer)
 
 
+def _budget(study: TradeoffStudy, point: MeasuredPoint, quantity: str) -> CurveBudget | None:
+    """Parts of the error of a quantity along the curve of a point."""
+    return next((b for b in study.budgets if b.curve == point.curve and b.quantity == quantity), None)
+
+
 def _blame(study: TradeoffStudy, point: MeasuredPoint, quantity: str, absolute: float) -> str:
     """Clause on whether a finer step would help."""
-    budget = next((b for b in study.budgets if b.curve == point.curve and b.quantity == quantity), None)
+    budget = _budget(study, point, quantity)
     if budget is None or budget.model_form is None:
         return "too few finer runs reached the end to say whether a finer step would do"
     if budget.floor is not None and budget.best_step is not None and budget.floor > absolute:

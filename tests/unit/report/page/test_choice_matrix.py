@@ -41,6 +41,50 @@ def test_a_cell_has_the_cheapest_run_that_holds_the_tolerance() -> None:
     assert at(ARM, 6, setting="default").state == Verdict.CONVERGES, "what unfolds is that setting alone"
 
 
+def lucky(*errors: float, **changes: Any) -> list[TableLine]:
+    """Lines of a ladder with these errors at 1e-3 s and ever half of it; only the first has a verdict and a limit."""
+    rungs = [line(error=error, step=1e-3 / 2**place, cost=0.1 * 2**place) for place, error in enumerate(errors)]
+    return [replace(rungs[0], **changes), *(replace(rung, verdict="", limit="", order=None) for rung in rungs[1:])]
+
+
+@pytest.mark.parametrize("precision", ["double", "single"])
+def test_a_small_error_at_one_step_is_luck_where_finer_steps_are_worse(precision: str) -> None:
+    """An error counts as the largest of its own and of its next two finer steps, so that no luck is recommended."""
+    another = {"verdict": "differs", "limit": "another limit", "limit_error": 5e-2, "limit_doubt": 1e-3}
+    lines = lucky(1e-6, 2.5e-2, 3.75e-2, **another, precision=precision)
+    cell = at(lines, 4)
+    assert (cell.state, cell.cost) == (Verdict.DIFFERS, float("inf"))
+    assert "its error of 1e-6 is luck" in cell.title, "what is seen at that step is said, too"
+    assert "nothing that was run and timed holds it" in choice_matrix(lines, STUDIES).answer(1e-4, False)
+    assert at(lucky(1e-6, 1e-3, 1e-7, limit="no limit shown"), 4)[:2] == (Verdict.AGREES, "0.4"), "the finest holds"
+    other = replace(lines[1], place="mass=2", error=1e-6)
+    assert at([*lucky(1e-6, 1e-6), other, replace(other, step=1e-3)], 4).state == Verdict.AGREES, (
+        "each place for itself"
+    )
+
+
+def test_a_limit_beyond_the_tolerance_is_no_agreement() -> None:
+    """A limit of small steps that misses the tolerance by more than its doubts outweighs the errors of its steps."""
+    beyond = lucky(1e-6, 1e-6, 1e-6, verdict="differs", limit="another limit", limit_error=1e-3, limit_doubt=1e-5)
+    assert at(beyond, 4).state == Verdict.DIFFERS
+    assert "its limit of small steps is another" in at(beyond, 4).title
+    assert at(beyond, 3).state == Verdict.AGREES
+    assert at(lucky(5e-2, 2e-2, **{"limit_error": 1e-3, "limit_doubt": 1e-5}), 4).state == Verdict.DIFFERS
+    near = lucky(5e-2, 2e-2, verdict="differs", limit="another limit", limit_error=1e-4, limit_doubt=1e-5)
+    assert at(near, 2).state == Verdict.CONVERGES, "within the tolerance that a reader asks for finer steps come"
+    vague = lucky(1e-6, 1e-6, limit_error=1e-3, limit_doubt=1e-3)
+    assert at(vague, 4).state == Verdict.AGREES, "a limit that is not known so well accuses nobody"
+
+
+def test_a_floor_of_single_precision_is_no_luck() -> None:
+    """Below the best step of single precision errors grow by round-off; they do not count against larger steps."""
+    lines = lucky(
+        4e-5, 3e-5, 4e-4, limit="no limit shown", precision="single", floor="best step 5e-4 s: single precision"
+    )
+    assert at(lines, 4)[:2] == (Verdict.AGREES, "0.1")
+    assert at([replace(item, floor="") for item in lines], 4).state != Verdict.AGREES
+
+
 def test_forces_count_where_they_are_asked_for() -> None:
     """With forces the same tolerance takes a finer run; an engine that reports none says so."""
     assert at(ARM, 2)[:2] == (Verdict.AGREES, "0.01")

@@ -22,6 +22,13 @@ def test_a_curve_is_a_setting_with_its_steps() -> None:
     assert [point.verdict for point in coarse.points] == ["agrees", "agrees"]
 
 
+def test_the_front_takes_no_luck() -> None:
+    """What a picture calls held is what the first screen does: an error counts no less than those of finer steps."""
+    found = work_precision([line(error=1e-6), line(step=5e-4, error=2e-2, cost=0.02, verdict="", limit="")])
+    assert found is not None
+    assert [(point.errors[0], point.held[0]) for point in found.curves[0].points] == [(1e-6, 2e-2), (2e-2, 2e-2)]
+
+
 def test_places_are_joined_by_the_worst() -> None:
     """Error and cost are those of the worst place; a step that fails at one place is no point."""
     heavy = [line(place="mass=2", error=9e-4, cost=0.03)]

@@ -144,6 +144,16 @@ def test_luck_is_not_believed() -> None:
     assert "luck" in answer["first_failure"]["reason"]
 
 
+def test_no_step_holds_what_its_limit_of_small_steps_does_not() -> None:
+    """Errors that pass zero far from the limit are luck, too; a limit that is not known so well excludes nothing."""
+    lucky = point(1, "fast", 1e-3, 1e-6)
+    another = invented_budget(curve=lucky.curve, model_form=1e-2, model_form_bar=1e-4)
+    failure = recommend(study(lucky, MIDDLE, budgets=[another]), required(1e-3))["first_failure"]
+    assert failure["reason"] == "its error of 1e-6 m is luck: 0.01 m remain in the limit of small steps"
+    vague = study(lucky, MIDDLE, budgets=[replace(another, model_form_bar=1e-2)])
+    assert recommend(vague, required(1e-3))["choice"]["engine"] == "fast"
+
+
 @pytest.mark.parametrize(
     ("corners", "said"),
     [([corner(2e-3)], "at speed = 6"), ([corner(None)], "ended at 1 s"), (None, "not checked")],
