@@ -247,6 +247,19 @@ def test_formulas_do_nothing_but_compute(text: str) -> None:
         Formula(text)
 
 
+@pytest.mark.parametrize(
+    ("start", "strikes"), [("v0 = -1", True), ("v0 = 1", False), ("v0 = 0", False), ("q0 = 0.5\nv0 = -1", False)]
+)
+def test_no_joint_strikes_its_stop_at_the_start(tmp_path: Path, start: str, strikes: bool) -> None:
+    """On its stop a joint may rest or leave; into it would be an impact at time 0, of which engines report one side."""
+    (tmp_path / "scene.toml").write_text(PLAIN.replace('child = "b"', f'child = "b"\nlimits = [0, 2]\n{start}', 1))
+    if not strikes:
+        load_scene(str(tmp_path))
+        return
+    with pytest.raises(InputError, match=r"joints\.j\.v0 = -1\.0: the joint starts on its stop and moves into it"):
+        load_scene(str(tmp_path))
+
+
 def test_a_coupled_joint_takes_its_start_from_the_other(tmp_path: Path) -> None:
     """A dependent joint starts where its coupling has it, and the coupling takes a degree of freedom."""
     more = PLAIN.replace('child = "c"', 'child = "c"\ndependent = true').replace('child = "b"', 'child = "b"\nv0 = 2.0')

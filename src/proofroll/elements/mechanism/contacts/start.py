@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import InputError
 from proofroll.elements.mechanism.contacts.touching import Moving, Touching, touch
+from proofroll.elements.mechanism.joint import AT_STOP
 from proofroll.elements.mechanism.joint_coordinates import JointCoordinates, Solution
 from proofroll.elements.mechanism.kinematics import BodyMotion, Tree
 from proofroll.elements.mechanism.model import Mechanism
@@ -115,13 +116,21 @@ def closed_and_still(found: Sequence[Touching], lengths: FloatArray, rate: float
 
 
 def check_contacts(mechanism: Mechanism) -> None:
-    """Raises InputError if two bodies overlap or strike at the start."""
-    if not mechanism.contacts:
+    """Raises InputError if two bodies overlap or strike at the start, or a joint strikes its stop."""
+    stopped = [joint for joint in mechanism.joints if joint.limits]
+    if not (mechanism.contacts or stopped):
         return
     motion = Tree(mechanism).at(*mechanism.start())
     if not np.isfinite(extent(mechanism, motion)):
         raise InputError("geometries", "infinite", "places or sizes are too large to be computed with")
     scale = natural_scale(mechanism)
+    for joint in stopped:
+        assert joint.limits is not None
+        (low, high), (q,), (v,) = joint.limits, joint.q0, joint.v0
+        digits, still = AT_STOP * (high - low), scale.speed if joint.kind == "prismatic" else STILL * scale.rate
+        if (q <= low + digits and v < -still) or (q >= high - digits and v > still):
+            advice = "the joint starts on its stop and moves into it, an impact at time 0; correct v0 or start it apart"
+            raise InputError(f"joints.{joint.name}.v0", v, advice)
     for contact, each in zip(mechanism.contacts, touches(mechanism, motion), strict=True):
         between = f"{contact.body_a} and {contact.body_b}"
         if each.gap < -scale.gap:

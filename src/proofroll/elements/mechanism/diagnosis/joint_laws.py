@@ -150,7 +150,7 @@ def of_stops(evidence: Evidence) -> Iterator[Cause]:
         at, rated = mechanism.place_of(joint.name)
         turns, expected = (_rebounds(times, q[:, at], v[:, rated]) for q, v in ((seen, speeds), (true, rates)))
         for limit, side in zip(joint.limits, (1.0, -1.0), strict=True):
-            size = max(abs(limit), float(np.ptp(true[:, at])))
+            size = max(abs(limit), float(np.ptp(true[:, at]))) or joint.limits[1] - joint.limits[0]
             rests = (np.abs(true[:, at] - limit) <= _STILL * size) & (np.abs(rates[:, rated]) <= _STILL * size)
             does, off = "rests", seen[rests, at] - limit
             if len(off) < 2:

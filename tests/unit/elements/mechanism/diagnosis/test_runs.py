@@ -45,6 +45,22 @@ def test_a_stop_is_accused_only_where_the_true_joint_turns_back_at_it(limit: flo
     assert any("turns back" in said for said in told) == named
 
 
+def test_a_stop_at_zero_that_is_never_left_can_be_misplaced() -> None:
+    """A joint that rests on its stop at 0 from the start, where nothing has a size, is told to rest below it."""
+    scene = _resting_on(0.0)
+    times = np.arange(0.0, 0.2, 0.02)
+    (said,) = _told(scene, truth(_resting_on(-0.5), times), truth(scene, times))
+    assert said == "the joint guide rests at -0.5, not at its stop at 0"
+
+
+def _resting_on(at: float) -> Scene:
+    """A mass that rests on a stop at a height [m]."""
+    scene = _with_stop(at)
+    mechanism = scene.elements[0].mechanism  # type: ignore[attr-defined]  # it is one
+    (joint,) = mechanism.joints
+    return replace(scene, elements=(MechanismElement(replace(mechanism, joints=(replace(joint, q0=(at,)),))),))
+
+
 def _with_stop(at: float) -> Scene:
     """A mass that falls on a stop at a height [m]."""
     scene = load_scene("stop", restitution=0.5)
