@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 from flat_judging import judged_curve
-from honest import FORMULATIONS, Jointed, Rolling, Switching
+from honest import FORMULATIONS, ORDERS, Jointed, Rolling, Switching
 from liars import ALL, BALLS, EVERY, MECHANISMS, UNTIL, Lie, liar, scene_of
 from lies import table
 from tiny import Tiny, TinySettings
@@ -225,6 +225,14 @@ HONEST = [
     for place, formulation in enumerate(FORMULATIONS)
     if index == 0 or (place - index) % len(FORMULATIONS) in {0, 1}
 ]
+# Methods of other kinds, on a loop, at a joint's laws and in contact.
+HONEST += [
+    pytest.param(
+        scene, formulation, marks=() if (scene, formulation) == ("stop", "semi_implicit") else pytest.mark.drill
+    )
+    for scene in ("loop", *SWITCH)
+    for formulation in ORDERS
+]
 
 
 def _honest_scene(name: str) -> tuple[Scene, Any]:
@@ -232,7 +240,7 @@ def _honest_scene(name: str) -> tuple[Scene, Any]:
         return load_scene(name, **ROLL[name]), Rolling
     if name in SWITCH:
         return SWITCH[name](), Switching
-    return scene_of(name) if name == "driven" else load_scene(name), Jointed
+    return scene_of(name) if name in UNTIL else load_scene(name), Jointed
 
 
 @pytest.mark.parametrize(("name", "formulation"), HONEST)

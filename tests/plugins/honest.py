@@ -27,6 +27,9 @@ TABLEAUS: Mapping[int, tuple[list[list[float]], list[float]]] = {
     3: ([[], [0.5], [-1.0, 2.0]], [1 / 6, 2 / 3, 1 / 6]),
     4: ([[], [0.5], [0.0, 0.5], [0.0, 0.0, 1.0]], [1 / 6, 1 / 3, 1 / 3, 1 / 6]),
 }
+# Methods of other kinds, with their orders: semi-implicit Euler, implicit midpoint, and Adams-Bashforth of two steps.
+_ROUNDS = 20  # of the fixed-point iteration of an implicit step
+ORDERS = {"semi_implicit": 1, "implicit": 2, "multistep": 2}
 
 
 @dataclass(frozen=True)
@@ -46,7 +49,7 @@ class HonestSettings:
     @property
     def order(self) -> int | None:
         """See :class:`proofroll.core.engine.Settings`."""
-        return None if self.formulation == "adaptive" else min(self.orders)
+        return ORDERS.get(self.formulation) or (None if self.formulation == "adaptive" else min(self.orders))
 
     @property
     def orders(self) -> tuple[int, ...]:
@@ -54,22 +57,49 @@ class HonestSettings:
         return (1, 4) if self.formulation == "mixed" else (int(self.formulation[-1]),)
 
 
-def _stepped(x: FloatArray, rates: Any, settings: HonestSettings, t: float, until: float) -> FloatArray:
-    """State at the time ``until``, by alternating methods of fixed step or by DOP853."""
+def _stepped(x: FloatArray, rates: Any, settings: HonestSettings, t: float, until: float, nq: int = 0) -> FloatArray:
+    """State at the time ``until``, by alternating methods of fixed step or by DOP853; its first ``nq`` are places."""
     if settings.formulation == "adaptive":
         found = solve_ivp(lambda _, y: rates(y), (t, until), x, "DOP853", rtol=settings.rtol, atol=settings.rtol)
         return np.asarray(found.y[:, -1])
+    before: FloatArray | None = None
     for step in range(whole_steps(t, until, settings.dt)):
-        stages, weights = TABLEAUS[settings.orders[step % len(settings.orders)]]
-        slopes: list[FloatArray] = []
-        for before in stages:
-            moved = (settings.dt * w * k for w, k in zip(before, slopes, strict=True))
-            slopes.append(rates(x + sum(moved, np.zeros_like(x))))
-        x = x + settings.dt * sum((w * k for w, k in zip(weights, slopes, strict=True)), np.zeros_like(x))
+        if settings.formulation in ORDERS:
+            slope = _slope(x, rates, settings, before, nq)
+            before = rates(x)
+        else:
+            slope = _weighted(x, rates, settings, TABLEAUS[settings.orders[step % len(settings.orders)]])
+        x = x + settings.dt * slope
     return x
 
 
+def _weighted(
+    x: FloatArray, rates: Any, settings: HonestSettings, tableau: tuple[list[list[float]], list[float]]
+) -> Any:
+    """Mean slope of a step by a Runge-Kutta method."""
+    slopes: list[FloatArray] = []
+    for before in tableau[0]:
+        moved = (settings.dt * w * k for w, k in zip(before, slopes, strict=True))
+        slopes.append(rates(x + sum(moved, np.zeros_like(x))))
+    return sum((w * k for w, k in zip(tableau[1], slopes, strict=True)), np.zeros_like(x))
+
+
+def _slope(x: FloatArray, rates: Any, settings: HonestSettings, before: FloatArray | None, nq: int) -> Any:
+    """Mean slope of a step by one of :data:`ORDERS`; ``before``: slope at the start of the step before, if any."""
+    now = rates(x)
+    if settings.formulation == "semi_implicit":
+        later = rates(x + settings.dt * np.concatenate([np.zeros(nq), now[nq:]]))
+        return np.concatenate([later[:nq], now[nq:]])
+    if settings.formulation == "multistep" and before is not None:
+        return (3 * now - before) / 2
+    middle = now
+    for _ in range(1 if settings.formulation == "multistep" else _ROUNDS):
+        middle = rates(x + settings.dt / 2 * middle)
+    return middle
+
+
 FORMULATIONS = (*(f"order_{order}" for order in TABLEAUS), "adaptive", "mixed")
+ALL_KINDS = (*FORMULATIONS, *ORDERS)
 
 
 class Rolling(Tiny):
@@ -97,10 +127,10 @@ class Jointed:
 
     name: ClassVar[str] = "jointed"
     provides: ClassVar[Mapping[str, frozenset[str]]] = dict.fromkeys(
-        FORMULATIONS, Projection.provides["dependent"] - {"dry friction in joints", "stops of joints"}
+        ALL_KINDS, Projection.provides["dependent"] - {"dry friction in joints", "stops of joints"}
     )
     settings: ClassVar[type[Any]] = HonestSettings
-    presets: ClassVar[Mapping[str, Mapping[str, Any]]] = Rolling.presets
+    presets: ClassVar[Mapping[str, Mapping[str, Any]]] = {name: {"matched": HonestSettings(name)} for name in ALL_KINDS}
 
     @staticmethod
     def version() -> str:
@@ -127,7 +157,7 @@ class Jointed:
 
     def advance(self, t: float) -> None:
         """See :class:`proofroll.core.engine.Engine`."""
-        self.x = _stepped(self.x, self._rates, self.chosen, self.t, t)
+        self.x = _stepped(self.x, self._rates, self.chosen, self.t, t, self.mechanism.nq)
         self.t = t
 
     def sample(self) -> MechanismSample:
@@ -150,7 +180,7 @@ class Switching(Jointed):
     """
 
     name: ClassVar[str] = "switching"
-    provides: ClassVar[Mapping[str, frozenset[str]]] = dict.fromkeys(FORMULATIONS, frozenset(MechanismCapability))
+    provides: ClassVar[Mapping[str, frozenset[str]]] = dict.fromkeys(ALL_KINDS, frozenset(MechanismCapability))
 
     def __init__(self, scene: Scene, settings: Any) -> None:
         super().__init__(scene, settings)

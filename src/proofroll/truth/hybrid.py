@@ -208,8 +208,8 @@ def _refuse_many(legs: Sequence[Span], until: float) -> None:
     ahead = (until - end) * _LOOK / sum(spans) if sum(spans) > 0.0 else np.inf
     if len(legs) + (0.0 if calm else ahead) > _MOST and min(spans) > _SHRUNK * max(spans) and not _narrows(last):
         raise Diverged(
-            f"by t = {end:g} s there have been {len(legs)} changes, some {number(ahead, 1)} are to come, "
-            f"and the truth follows {_MOST}"
+            f"by t = {end:g} s there have been {len(legs)} changes; at this pace {number(ahead, 1)} more follow until "
+            f"{until:g} s, and the truth follows {_MOST}; ask for a shorter time"
         )
 
 

@@ -126,15 +126,16 @@ class Reference:
         return max((event.time_high - event.time_low for event in self.events_of(dataset)), default=0.0) / 2
 
     def beside(self, name: str, values: FloatArray, dataset: xr.Dataset, step: float | None) -> float:
-        """Error of an observable of a run if each of its events is one step late (:mod:`proofroll.core.beside_events`).
+        """Error of an observable of a run whose events are a step late or early (:mod:`proofroll.core.beside_events`).
 
         Args:
             name: of the observable.
             values: of the run.
-            dataset: the run; if it reports no events, those of the truth are used.
+            dataset: the run; if it reports no events, those of the truth are used, and the jumps of the true values.
             step: fixed step [s]; None: it adapts, and steps end at samples.
         """
-        if self.scene.observables[name].role == Role.EVENT:
+        role, known = self.scene.observables[name].role, self.curves.get(name)
+        if role == Role.EVENT:
             return 2 * self.own_bar(name, dataset)
         times = self.dataset["time"].to_numpy()
         times = times[len(times) - len(values) :] if len(values) <= len(times) else times
@@ -142,6 +143,9 @@ class Reference:
             return 0.0  # the values are no function of the sample times
         reported = any("event_kind" in part(self.scene, item, dataset) for item in self.scene.elements)
         events = self.events_of(dataset) if reported else self.events
+        if known is not None and not reported and role != Role.RESIDUAL and known.shape == values.shape:
+            # a run's own samples beside a true event may lie on its other side
+            values = np.where(np.isfinite(known), known, values)
         widest = max((event.time_high - event.time_low for event in events), default=0.0)
         late = min(widest if reported else 2 * self.sampled_bar, step or np.inf)
         return beside_events(times, values, [event.time for event in events], late)
