@@ -54,7 +54,7 @@ def first_steps(kind: Any, scene: Scene, settings: Any) -> list[Line]:
     for index, element in enumerate(scene.elements):
         start = element.first_motion
         soft = softness(built, scene)
-        if start is None or soft > _SPRINGS or _STEPS * (fixed_step(settings) or 0.0) > start.lasts:
+        if start is None or soft > _SPRINGS or _STEPS * (fixed_step(settings) or 0.0) >= start.lasts:
             continue
         lines += _lines(kind, scene, settings, index, start, soft)
     return lines

@@ -110,12 +110,12 @@ def struck(joints: Sequence[SwitchedJoint], q: Array, v: Array, hit: int, respon
     Raises:
         NotUnique: several stops share the impact and one of them has restitution, so that their order decides.
     """
-    resting = [k for k, j in enumerate(joints) if v[j.velocity] == 0 and j.resting(q[j.coordinate]) in {"low", "high"}]
+    resting = [k for k, j in enumerate(joints) if v[j.velocity] == 0 and j.stop_at(q[j.coordinate])]
     at_stop = sorted({hit, *resting})
     at = [joints[number].velocity for number in at_stop]
     _, response = responses(tuple("free" for _ in joints), at)
     returned = np.array([1 + joints[number].restitution for number in at_stop]) * v[at]
-    below = np.array([q[joints[k].coordinate] <= joints[k].low for k in at_stop])
+    below = np.array([joints[k].stop_at(q[joints[k].coordinate]) == "low" for k in at_stop])
     low, high = np.where(below, 0.0, -np.inf), np.where(below, np.inf, 0.0)
     _, impulse, left = complementary(returned, response[at], low, high)
     if np.count_nonzero(impulse) > 1 and any(joints[number].restitution for number in at_stop):

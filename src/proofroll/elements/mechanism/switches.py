@@ -21,6 +21,7 @@ Mode = tuple[str, ...]
 # further rebounds is summed: their height is 1e-12 of the first, less than the round-off of the coordinate. It is no
 # power of a restitution that a file is likely to have, or round-off would decide which rebound is the last.
 SETTLED = math.exp(-13.5)
+NEAR = 1e-13  # distance from a stop, in parts of the range between both, that is rounding: the joint is at it
 STOPPED = frozenset({"low", "high"})
 HOLDING = STOPPED | {"stick"}
 REDUNDANT = (
@@ -64,15 +65,24 @@ class SwitchedJoint:
 
     def resting(self, q: float) -> str:
         """Mode that can hold the joint at a coordinate; ``free`` if none can."""
-        return "low" if q <= self.low else "high" if q >= self.high else "stick" if self.friction else "free"
+        return self.stop_at(q) or ("stick" if self.friction else "free")
+
+    def stop_at(self, q: float, error: float = 0.0) -> str:
+        """The stop, ``low`` or ``high``, that a coordinate is at within rounding and its error; empty: none."""
+        if math.isinf(self.low):
+            return ""
+        near = NEAR * (self.high - self.low) + error
+        return "low" if q - self.low <= near else "high" if self.high - q <= near else ""
 
     def lasts(self, q: float, v: float, a: float) -> float:
         """Time until it reaches a stop, or turns against friction, at a constant acceleration [s]; infinite: never."""
         times = [-v / a] if self.friction and v * a < 0 else []
-        for stop in (self.low, self.high):
-            if math.isfinite(stop):
-                times += [root.real for root in np.roots([a / 2, v, q - stop]) if root.imag == 0]
-        return min((time for time in times if time > 0), default=math.inf)
+        for stop, place, outward in (("low", self.low, -v), ("high", self.high, v)):
+            if self.stop_at(q) == stop:  # it strikes at once, stays, or leaves and may come back
+                times += [0.0] if outward > 0 else [-2 * v / a] if v * a < 0 else []
+            elif math.isfinite(place):
+                times += [root.real for root in np.roots([a / 2, v, q - place]) if root.imag == 0 < root.real]
+        return min(times, default=math.inf)
 
     def push(self, mode: str) -> float:
         """Force of kinetic friction on the coordinate, N or N m."""

@@ -130,12 +130,12 @@ class SwitchedMotion(AlternatingMotion[Mode]):
         Raises:
             NotUnique: the outcome depends on the order of several impacts.
         """
-        rests = [k for k, joint in enumerate(self._joints) if not v[k] and joint.resting(q[k]) in STOPPED]
+        rests = [k for k, joint in enumerate(self._joints) if not v[k] and joint.stop_at(q[k])]
         at_stop = sorted({hit, *rests})
         at = [self._joints[k].velocity for k in at_stop]
         _, response = self._equations.responses(self._at(y), np.zeros(self._equations.nv), at)
         elastic = np.array([self._joints[k].restitution for k in at_stop])
-        below = np.array([q[k] <= self._joints[k].low for k in at_stop])
+        below = np.array([self._joints[k].stop_at(q[k]) == "low" for k in at_stop])
         low, high = np.where(below, 0.0, -np.inf), np.where(below, np.inf, 0.0)
         impulse, side = _bounded((1 + elastic) * v[at_stop], response[at], low, high)
         if np.count_nonzero(impulse) > 1 and elastic.any():

@@ -126,7 +126,9 @@ class SwitchedBodies(JointStretches):
         modes = zip(self.motors, self._wanted(state), strict=True)
         efforts = tuple(motor.mode_of(wanted) for motor, wanted in modes)
         choices = [
-            list(_candidates(joint, float(q[k]), k == turns)) if still[k] or v[k] == 0 else [joint.moving(float(v[k]))]
+            list(_candidates(joint, float(q[k]), still[k], k == turns))
+            if still[k] or v[k] == 0
+            else [joint.moving(float(v[k]))]
             for k, joint in enumerate(self.joints)
         ]
         open_ = [k for k, choice in enumerate(choices) if len(choice) > 1]
@@ -203,15 +205,13 @@ class SwitchedBodies(JointStretches):
         return best[1], max(best[0], 0.0)
 
 
-def _candidates(joint: SwitchedJoint, q: float, turns: bool) -> Iterator[str]:
-    """Modes that a joint at rest may take."""
-    near = SLACK * max(1.0, abs(joint.low) if np.isfinite(joint.low) else 0.0)
+def _candidates(joint: SwitchedJoint, q: float, came: bool, turns: bool) -> Iterator[str]:
+    """Modes that a joint at rest may take; one that came to rest has the errors of its motion."""
+    stop = joint.stop_at(q, SLACK * max(1.0, abs(joint.low)) if came else 0.0)
     if turns:
         yield from ("stick", "forward", "backward")
-    elif q <= joint.low + near:
-        yield from ("low", joint.moving(1.0))
-    elif q >= joint.high - near:
-        yield from ("high", joint.moving(-1.0))
+    elif stop:
+        yield from (stop, joint.moving(1.0 if stop == "low" else -1.0))
     elif joint.friction:
         yield from ("stick", "forward", "backward")
     else:

@@ -10,6 +10,7 @@ from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.record import gathered
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.elements.mechanism.signal import breaks
+from proofroll.elements.mechanism.switches import STOPPED
 from proofroll.truth.hybrid import follow, states_of
 from proofroll.truth.mechanism.body_switching import SwitchedBodies
 from proofroll.truth.mechanism.contact_truth import contact_truth
@@ -52,7 +53,7 @@ def _without_contacts(mechanism: Mechanism, times: Array) -> TwoRouteMotion:
         assert begun.mode is not None  # every start has a mode
         with units.said_in_seconds():
             look = scout.walk(0.0, begun.state, begun.mode, float(times[-1]) / units.time)
-        if look.guard is None and not any(own in {"least", "greatest"} for own in look.mode):
+        if look.guard is None and STOPPED.isdisjoint(look.mode) and not {"least", "greatest"} & {*look.mode}:
             return find_truth(_unlimited(mechanism), times)  # no stop is passed, no limit reached
     refuse_uncovered(mechanism)
     with units.said_in_seconds():

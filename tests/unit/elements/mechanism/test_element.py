@@ -22,6 +22,7 @@ from proofroll.files.scene_file import load_scene
 from proofroll.report.kinds import kind_of
 from proofroll.report.pen import Disc, Lettering
 from proofroll.running.simulation import simulate
+from proofroll.truth.mechanism.switched_truth import truth_of
 
 SCENES = ("pendulum", "slider_crank", "bricard", "heavy_top", "andrews_squeezer", "free_body", "gyroscope_cart")
 
@@ -334,3 +335,24 @@ def test_a_first_motion_ends_at_a_stop_or_where_friction_turns() -> None:
     swing = element_of("pendulum_friction", speed=1.0).first_motion
     assert swing.lasts == pytest.approx(1.0 / np.max(np.abs(swing.angular_acceleration)), rel=1e-12)
     assert element_of("double_pendulum").first_motion.lasts == np.inf
+
+
+@pytest.mark.parametrize("beside", [0.0, 1e-17, -1e-17, 1e-13, -1e-10])
+@pytest.mark.parametrize(
+    ("speed", "acceleration", "lasts"), [(0.0, 0, np.inf), (1.0, -9.81, 2 / 9.81), (-1.0, -9.81, 0)]
+)
+def test_a_joint_beside_its_stop_by_rounding_is_at_it(
+    beside: float, speed: float, acceleration: float, lasts: float
+) -> None:
+    """It rests there, leaves and comes back, or strikes at once; its truth rests too, with no event."""
+    mechanism = element_of("stop").mechanism
+    (guide,) = mechanism.joints
+    guide = dataclasses.replace(guide, q0=(beside,), v0=(speed,), limits=(0.0, 2.0))
+    mechanism = dataclasses.replace(mechanism, joints=(guide,))
+    first = MechanismElement(mechanism).first_motion
+    assert first.acceleration[0, 2] == acceleration
+    assert first.lasts == pytest.approx(lasts, rel=1e-9)
+    if not speed:
+        found = truth_of(mechanism, np.array([0.0, 0.05]))
+        assert (found.horizon, found.events) == (np.inf, ())
+        assert found.record.q[-1, 0] == beside
