@@ -31,7 +31,7 @@ class Bouncing(AlternatingMotion[str]):
         return np.array([y[1], -9.81])
 
     def _excess(self, y: Any) -> list[Excess]:
-        return [Excess(0, "impact", -float(y[0]), float(y[1]) < 0)]
+        return [Excess(0, "impact", -float(y[0]), -float(y[1]))]
 
     def _next(self, y: Any, which: int, kind: str) -> tuple[Any, str, list[tuple[str, str]]]:
         assert (which, kind) == (0, "impact")
@@ -77,11 +77,11 @@ class Stopping(AlternatingMotion[str]):
         return -self._heading(y) + [-y[1], y[0]] if self.mode == "slip" else np.zeros(2)
 
     def _excess(self, y: Any) -> list[Excess]:
-        return [Excess(0, "still", -float(y[:2] @ self._toward), self.mode == "slip")]
+        return [Excess(0, "still", -float(y[:2] @ self._toward), float(self.mode == "slip"))]
 
-    def _crossing(self, end: Excess) -> float:
+    def _crossing(self, end: Excess, high: float) -> float:
         self.counted = 0
-        return super()._crossing(end)
+        return super()._crossing(end, high)
 
     def _next(self, y: Any, which: int, kind: str) -> tuple[Any, str, list[tuple[str, str]]]:
         assert (which, kind) == (0, "still")

@@ -142,6 +142,15 @@ def test_a_limit_of_an_effort_is_not_stepped_across() -> None:
     assert run.sample().p_WB[0, 0] == pytest.approx(moved, abs=1e-13)
 
 
+def test_a_graze_within_a_step_is_an_impact() -> None:
+    """Spheres that overlap for a millisecond as they pass hit each other, though the step ends with them apart."""
+    run = PROJECTION.build(load_scene("two_spheres", passing=0.07999), replace(DEFAULT, dt=0.05))
+    run.advance(0.2)
+    (impact,) = run.events()
+    assert impact.kind == "impact"
+    assert impact.time == pytest.approx(0.124832443080, abs=1e-9)
+
+
 @pytest.mark.parametrize("dt", [0.01, 0.003])
 def test_an_impact_takes_an_effort_off_its_limit(dt: float) -> None:
     """A foot that falls with a servo at its limit hits the floor once, and then stands with its whole weight."""

@@ -4,6 +4,7 @@ Between two changes the equations are smooth. A change is located within a step 
 it is as accurate as these.
 """
 
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Sequence
 from typing import ClassVar, Generic, NamedTuple, TypeVar
@@ -22,6 +23,7 @@ ModeT = TypeVar("ModeT")
 # Number of successive modes of zero length that counts as an endless loop; a single one is possible.
 WITHOUT_PROGRESS = 20
 _ULPS = 4  # accuracy of located changes, in units of the last digit of the time
+_CLOSES = 1e-9  # rate at the start of a step that is no round-off, relative to that at its end
 
 
 class Excess(NamedTuple):
@@ -31,13 +33,13 @@ class Excess(NamedTuple):
         which: index of the joint or contact; motors are numbered after all of them.
         kind: kind of the end.
         size: positive where the mode has ended.
-        closing: True if the motion is towards that end.
+        closing: rate of the size where the mode ends only while it grows, as of an overlap; inf: it always ends.
     """
 
     which: int
     kind: str
     size: float
-    closing: bool
+    closing: float = math.inf
 
 
 def ends_of_efforts(
@@ -48,9 +50,9 @@ def ends_of_efforts(
     for k, (motor, mode, effort) in enumerate(zip(motors, modes, wanted, strict=True), first):
         over, under = effort - motor.bound, -motor.bound - effort
         if mode == "linear":
-            ends += [Excess(k, "least", under, True), Excess(k, "greatest", over, True)]
+            ends += [Excess(k, "least", under), Excess(k, "greatest", over)]
         else:
-            ends.append(Excess(k, "linear", -over if mode == "greatest" else -under, True))
+            ends.append(Excess(k, "linear", -over if mode == "greatest" else -under))
     return ends
 
 
@@ -128,23 +130,45 @@ class AlternatingMotion(ABC, Generic[ModeT]):
         stepper.aim(t)
         while stepper.t < t:
             stepper.step(min([t, *(at for at in self._breaks if at > stepper.t)]), np.inf)
-            ended = [end for end in self._excess(stepper.x) if end.size > 0 and end.closing]
+            beyond = [(end, self._beyond(end)) for end in self._excess(stepper.x)]
+            ended = [(self._crossing(end, at), end.which, end.kind) for end, at in beyond if at is not None]
             if ended:
-                self._switch(*min((self._crossing(end), end.which, end.kind) for end in ended))
+                self._switch(*min(ended))
                 continue
             self._idle = 0
             self._look(stepper.x)
             if stepper.t in self._breaks:
                 self._enter(stepper.t, stepper.x, self.mode)
 
-    def _crossing(self, end: Excess) -> float:
-        """Time just after a mode ended within the last step [s]."""
+    def _same(self, end: Excess, y: Array) -> Excess:
+        """Excess over the same end in another state."""
+        return next(other for other in self._excess(y) if other[:2] == end[:2])
+
+    def _beyond(self, end: Excess) -> float | None:
+        """Time within the last step at which the mode had passed an end [s]; None: it had not.
+
+        A gap may close and open again within one step: then it is the time of the smallest gap.
+        """
+        from scipy.optimize import brentq
+
+        def at(t: float) -> Excess:
+            return self._same(end, self._stepper.inside(t))
+
+        now, before = self._stepper.t, self._stepper.t_before
+        if end.closing > 0:
+            return now if end.size > 0 else None
+        if end.size < end.closing * (now - before) or at(before).closing <= -_CLOSES * end.closing:
+            return None
+        lowest = float(brentq(lambda t: at(t).closing, before, now))
+        return lowest if at(lowest).size > 0 else None
+
+    def _crossing(self, end: Excess, high: float) -> float:
+        """Time just after a mode ended within the last step, before the time ``high`` [s]."""
 
         def margin(y: Array) -> float:
-            return -next(other.size for other in self._excess(y) if other[:2] == end[:2])
+            return -self._same(end, y).size
 
-        now = self._stepper.t
-        return self._stepper.crossing(margin, now, _ULPS * float(np.spacing(now)))[1]
+        return self._stepper.crossing(margin, high, _ULPS * float(np.spacing(self._stepper.t)))[1]
 
     def _switch(self, t: float, which: int, kind: str) -> None:
         stepper = self._stepper

@@ -218,12 +218,12 @@ class ContactMotion(AlternatingMotion[ContactMode]):
         held: ContactMode = ()
         for k, (own, each) in enumerate(zip(self.mode, now.touching, strict=True)):
             if own.kind == "open":
-                ends.append(Excess(k, "impact", -each.gap, float(each.normal @ each.slide) < 0))
+                ends.append(Excess(k, "impact", -each.gap, -float(each.normal @ each.slide)))
                 continue
             N = float(each.normal @ force[k])
-            ends.append(Excess(k, "lift_off", -N, True))
+            ends.append(Excess(k, "lift_off", -N))
             if own.kind == "slip" and self.friction[k]:
-                ends.append(Excess(k, "still", -float(across(each) @ self._toward[k]), True))
+                ends.append(Excess(k, "still", -float(across(each) @ self._toward[k])))
             elif own.kind == "stick":
                 beyond = float(np.linalg.norm(force[k] - N * each.normal)) - self.friction[k] * N
                 if beyond > 0 and sum(one.kind == "stick" for one in self.mode) > 1:
@@ -232,7 +232,7 @@ class ContactMotion(AlternatingMotion[ContactMode]):
                         now, [one.kind != "open" for one in self.mode], [one.kind == "stick" for one in self.mode]
                     )
                     beyond = -beyond if held[k].kind == "stick" else beyond
-                ends.append(Excess(k, "slip", beyond, True))
+                ends.append(Excess(k, "slip", beyond))
         modes, wanted = list(self._equations.applied.modes.values()), self._equations.wanted(self._at(x))
         return ends + ends_of_efforts(self._motors.values(), modes, wanted, len(self.mode))
 

@@ -163,11 +163,11 @@ class SwitchedMotion(AlternatingMotion[Mode]):
             own, place, rate = self.mode[k], float(q[k]), float(v[k])
             if k in forces:
                 low, high = joint.bounds(own)
-                ends += [Excess(k, "up", low - forces[k], True), Excess(k, "down", forces[k] - high, True)]
+                ends += [Excess(k, "up", low - forces[k]), Excess(k, "down", forces[k] - high)]
                 continue
             if own != "free":
-                ends.append(Excess(k, "still", -rate if own == "forward" else rate, True))
-            ends += [Excess(k, "low", joint.low - place, rate < 0), Excess(k, "high", place - joint.high, rate > 0)]
+                ends.append(Excess(k, "still", -rate if own == "forward" else rate))
+            ends += [Excess(k, "low", joint.low - place, -rate), Excess(k, "high", place - joint.high, rate)]
         count, wanted = len(self._joints), self._equations.wanted(self._at(y))
         return ends + ends_of_efforts(self._motors.values(), self.mode[count:], wanted, count)
 
