@@ -123,7 +123,7 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> tuple[Outcome, Store]:
         missing = Result(Status.MISSING, "gamma is not installed here", versions={})
         runs.append(Run(rows[3], point, None, missing, [], ["gamma at this point missing"]))
     usual, file = load_scene("sphere_in_cylinder"), read_scene_file("sphere_in_cylinder")
-    return Outcome(comparison, usual, file, runs, points), store
+    return Outcome(comparison, usual, file, sorted(runs, key=lambda run: rows.index(run.row)), points), store
 
 
 @pytest.fixture(scope="session")

@@ -153,7 +153,9 @@ class StoredTrajectory:
         """The trajectory; raises as :func:`read` does. The trajectories read longest ago are dropped to make room."""
         made = read(self.file)
         with self._one_at_a_time:
-            self._held.append((weakref.ref(self), made.nbytes))
+            used = [entry for entry in self._held if entry[0]() is not None]
+            self._held.clear()
+            self._held.extend([*used, (weakref.ref(self), made.nbytes)])
             while sum(size for _, size in self._held) > MOST_HELD and len(self._held) > 1:
                 oldest = self._held.popleft()[0]()
                 if oldest is not None:

@@ -168,6 +168,18 @@ def test_what_was_read_longest_ago_makes_room(tmp_path: Path, monkeypatch: pytes
     assert runs[0].dataset is runs[0].dataset
 
 
+def test_what_nobody_uses_takes_no_room(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Many trajectories that are read once and let go of, as those of a map, do not push out one that is in use."""
+    file = tmp_path / "run.npz"
+    write(ALL_KINDS, file)
+    monkeypatch.setattr("proofroll.files.trajectory_file.MOST_HELD", int(2.5 * read(file).nbytes))
+    used = StoredTrajectory(file)
+    first = used.dataset
+    for _ in range(5):
+        assert StoredTrajectory(file).dataset.identical(first)
+    assert used.dataset is first
+
+
 def test_several_threads_may_hold_trajectories(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Each gets what it asks for, while others make room."""
     made = ALL_KINDS.copy()

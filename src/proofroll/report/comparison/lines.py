@@ -6,7 +6,7 @@ from typing import Any
 
 from proofroll.core.verdict import Judgement, Verdict
 from proofroll.report.comparison.records import Cost, rough_cost
-from proofroll.report.comparison.summary import by_row, settings_of
+from proofroll.report.comparison.summary import settings_of
 from proofroll.report.kinds import group_of
 from proofroll.report.long_table import TableLine
 from proofroll.running.case import Result, Status
@@ -19,10 +19,9 @@ _NO_LIMIT: dict[str, Any] = {"order": None, "limit": "", "limit_error": None, "l
 
 def lines_of(outcome: Outcome) -> list[TableLine]:
     """Lines for each judgement, and for each error of a rung of a ladder, which has no verdict."""
-    numbers = {key: number for number, key in enumerate(by_row(outcome))}
     lines: list[TableLine] = []
-    for run in outcome.runs:
-        plain = _plain(outcome, run, numbers[id(run.row)])
+    for number, run in ((number, run) for number, runs in enumerate(outcome.rows) for run in runs):
+        plain = _plain(outcome, run, number)
         lines += [_judged(outcome, run, plain, item) for item in run.judgements] or [plain]
         for rung in run.rungs:
             lines += _of_rung(outcome, run, plain, rung)

@@ -11,12 +11,13 @@ import numpy.typing
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.observable import Observable, Role
-from proofroll.core.turns import on_turns_of
 from proofroll.files.json_data import OPTIONAL
 from proofroll.report.comparison.summary import runs_at
 from proofroll.report.kinds import kind_of
 from proofroll.report.labels import symbol, unit
 from proofroll.studies.comparison.outcome import Outcome, Run
+from proofroll.studies.judging import run_values
+from proofroll.studies.judging.reference import Reference
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -98,7 +99,7 @@ def point_curves(outcome: Outcome) -> list[PointCurves]:
     for name, point in outcome.points.items():
         if point.reference is None or name in outcome.laws_alone:
             continue
-        scene, truth, sizes = point.scene, point.reference.dataset, point.reference.sizes
+        scene, truth = point.scene, point.reference.dataset
         kind = kind_of(scene)
         further = {item.name: item for item in kind.curves(scene, truth)} if kind is not None else {}
         known = scene.observables | further
@@ -108,7 +109,7 @@ def point_curves(outcome: Outcome) -> list[PointCurves]:
             PointCurves(
                 name,
                 rounded(truth["time"].to_numpy(), CURVE_DIGITS),
-                [_observable(item, key, truth, engines, sizes.get(key, 1.0)) for key, item in drawn.items()],
+                [_observable(item, key, point.reference, engines) for key, item in drawn.items()],
             )
         )
     return entries
@@ -143,16 +144,17 @@ def _curve(truth: xr.Dataset, name: str) -> bool:
 
 
 def _observable(
-    item: Observable, name: str, truth: xr.Dataset, engines: list[tuple[int, Run, xr.Dataset]], scale: float
+    item: Observable, name: str, reference: Reference, engines: list[tuple[int, Run, xr.Dataset]]
 ) -> ObservableCurves:
     first = 1 if item.role == Role.REACTION else 0
+    truth = reference.dataset
     true = truth[name].to_numpy()
     curves = []
     for row, run, motion in engines:
         if name not in motion:
             continue
         given = motion[name].to_numpy()[: true.size]  # a run that ended early has fewer samples
-        compared = on_turns_of(true[: given.size], given, name, (motion, truth))
+        compared = run_values.on_true_turns(reference, name, given, motion)
         if compared is None:
             continue
         values = np.full(true.shape, np.nan)
@@ -167,7 +169,7 @@ def _observable(
         symbol=symbol(name),
         meaning=truth[name].attrs.get("long_name", name),
         unit=unit(truth[name].attrs["units"]),
-        scale=float(f"{scale:.3g}"),
+        scale=float(f"{reference.sizes.get(name, 1.0):.3g}"),
         error_bar=float(f"{truth[name].attrs.get('error_bar', 0.0):.3g}"),
         truth=rounded(true, CURVE_DIGITS),
         engines=curves,

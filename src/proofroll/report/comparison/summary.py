@@ -30,14 +30,12 @@ from proofroll.studies.comparison.planning import at_point, point_name
 
 def reported_rows(outcome: Outcome) -> list[ReportedRow]:
     """Summary of each row of a comparison."""
-    return [_row(runs, outcome.comparison.until) for runs in by_row(outcome).values()]
+    return [_row(runs, outcome.comparison.until) for runs in outcome.rows]
 
 
 def outcome_content(outcome: Outcome) -> ReportedComparison:
     """Content of a comparison's section in a report."""
     comparison = outcome.comparison
-    rows = by_row(outcome)
-    numbers = {key: number for number, key in enumerate(rows)}
     first = next((point.scene for point in outcome.points.values()), outcome.scene)
     return ReportedComparison(
         name=comparison.name,
@@ -62,11 +60,14 @@ def outcome_content(outcome: Outcome) -> ReportedComparison:
             for name, band in comparison.bands.items()
         },
         rows=reported_rows(outcome),
-        runs=[_run(run, numbers[id(run.row)], outcome.comparison.until) for run in outcome.runs],
+        runs=[_run(run, number, comparison.until) for number, runs in enumerate(outcome.rows) for run in runs],
         hosts=hosts(run.result for run in outcome.runs),
         spread=[
             spread_of(
-                name, outcome.points[name], {row: own.dataset for row, _, own in runs_at(outcome, name)}, len(rows)
+                name,
+                outcome.points[name],
+                {row: own.dataset for row, _, own in runs_at(outcome, name)},
+                len(outcome.rows),
             )
             for name in outcome.laws_alone
         ],
@@ -79,18 +80,10 @@ def runs_at(outcome: Outcome, point: str) -> list[tuple[int, Run, StoredTrajecto
     """Row number, run and trajectory of every run at a point, if it has a trajectory."""
     return [
         (number, run, run.trajectory)
-        for number, runs in enumerate(by_row(outcome).values())
+        for number, runs in enumerate(outcome.rows)
         for run in runs
         if point_name(run.parameters) == point and run.trajectory is not None
     ]
-
-
-def by_row(outcome: Outcome) -> dict[int, list[Run]]:
-    """The runs of each row of the comparison file, in the file's order."""
-    rows: dict[int, list[Run]] = {}
-    for run in outcome.runs:
-        rows.setdefault(id(run.row), []).append(run)
-    return rows
 
 
 def _row(runs: list[Run], until: float) -> ReportedRow:

@@ -93,6 +93,11 @@ class ChoiceRow:
         """Engine and formulation."""
         return f"{self.engine} {self.formulation}".strip()
 
+    @property
+    def is_model(self) -> bool:
+        """True for an engine's own model with all its settings, False for equations derived for a scene."""
+        return not self.setting and not self.own_equations
+
 
 @dataclass(frozen=True)
 class ChoiceMatrix:
@@ -130,13 +135,13 @@ class ChoiceMatrix:
 
     @property
     def models(self) -> list[ChoiceRow]:
-        """Rows of engines' own models with all their settings, without equations derived for a scene."""
-        return [row for row in self.rows if not row.setting and not row.own_equations]
+        """Rows for which :attr:`ChoiceRow.is_model` is true."""
+        return [row for row in self.rows if row.is_model]
 
     def ranked(self, column: ChoiceColumn, tolerance: float, forces: bool) -> list[tuple[int, ChoiceCell]]:
         """Formulations that hold a tolerance, the cheapest first: number of the row, and its cell."""
-        rows = {id(row): place for place, row in enumerate(self.rows)}
-        cells = [(rows[id(row)], self.cell(row, column, tolerance, forces)) for row in self.models]
+        rows = [(place, row) for place, row in enumerate(self.rows) if row.is_model]
+        cells = [(place, self.cell(row, column, tolerance, forces)) for place, row in rows]
         return sorted((item for item in cells if math.isfinite(item[1].cost)), key=lambda item: item[1].cost)
 
     def best(self, tolerance: float, forces: bool) -> list[int | None]:

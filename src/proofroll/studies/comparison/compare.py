@@ -182,14 +182,14 @@ def _of_another_scene(run: Planned, result: Result, sentence: str) -> Run:
 def _judgements(
     run: Planned, band: Band, reference: Reference, trajectories: dict[float, xr.Dataset], lost: str
 ) -> tuple[list[Judgement], dict[float, dict[str, float]]]:
-    """Judgements of a run, and factor of each rung of its ladder -> observable -> error."""
+    """Judgements of a run, and factor of each other rung of its ladder -> observable -> error."""
     facts = run.facts
     assert isinstance(facts, EngineFacts)  # there are trajectories
     reference, trajectories = reference.common_span(trajectories)
     curves = {factor: run_values.observed(reference, dataset) for factor, dataset in trajectories.items()}
     main = curves[1.0]
     judgements: list[Judgement] = []
-    errors: dict[float, dict[str, float]] = {factor: {} for factor in curves}
+    errors: dict[float, dict[str, float]] = {factor: {} for factor in curves if factor != 1}
     always, given = run_values.always(reference, main), band.bounds | run.row.bound
     for name, curve in main.items():
         tolerance = given.get(name) or always.get(name)
@@ -209,9 +209,10 @@ def _judgements(
         if name not in given and judgement.verdict is not Verdict.DIFFERS:
             continue
         judgements.append(judgement)
-        for factor, observed in curves.items():
-            if name in observed:
-                errors[factor][name] = run_values.error(reference, name, observed[name], trajectories[factor])
+        for factor, own_errors in errors.items():
+            if name in curves[factor]:
+                rung = curves[factor][name]
+                own_errors[name] = run_values.error(reference, name, rung, trajectories[factor])
     return judgements, errors
 
 

@@ -3,6 +3,7 @@
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from itertools import groupby
 
 from proofroll.core.comparison import Comparison, Row
 from proofroll.core.diagnosis.of_scene import Diagnosis
@@ -122,7 +123,7 @@ class Outcome:
         comparison: the comparison that was run.
         scene: with its default parameters.
         file: of the scene, for its texts.
-        runs: with their judgements.
+        runs: with their judgements, row by row.
         points: by :func:`proofroll.studies.comparison.planning.point_name`.
         beyond_budget: texts of the cases that were left out for lack of processor time.
     """
@@ -133,6 +134,11 @@ class Outcome:
     runs: list[Run]
     points: dict[str, ComparedPoint]
     beyond_budget: list[str] = field(default_factory=list)
+
+    @cached_property
+    def rows(self) -> list[list[Run]]:
+        """Runs of each row of the comparison file, in the file's order."""
+        return [list(own) for _, own in groupby(self.runs, key=lambda run: id(run.row))]
 
     @property
     def contradictions(self) -> list[str]:

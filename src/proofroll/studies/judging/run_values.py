@@ -40,9 +40,20 @@ def observed(reference: Reference, dataset: xr.Dataset) -> dict[str, FloatArray]
         values = curves.pop(name)
         if name in reference.curves:  # the scene asks for orientations
             curves[name] = turned_alike(values, reference.curves[name])
-    both = (dataset, reference.dataset)
-    turned = {name: on_turns_of(reference.curves.get(name), values, name, both) for name, values in curves.items()}
+    turned = {name: on_true_turns(reference, name, values, dataset) for name, values in curves.items()}
     return {name: values for name, values in turned.items() if values is not None}
+
+
+def on_true_turns(reference: Reference, name: str, values: FloatArray, dataset: xr.Dataset) -> FloatArray | None:
+    """Values of a variable with the truth's whole turns, where they are uncertain; None: no comparison is possible.
+
+    See :func:`proofroll.core.turns.on_turns_of`. A run that ended early has fewer values than the truth.
+    """
+    true = reference.curves.get(name)
+    if true is None and name in reference.dataset:
+        true = reference.dataset[name].to_numpy()
+    known = None if true is None else true[: len(values)]
+    return on_turns_of(known, values, name, (dataset, reference.dataset))
 
 
 def between(reference: Reference, name: str, dataset: xr.Dataset) -> tuple[FloatArray, FloatArray] | None:

@@ -18,7 +18,6 @@ from proofroll.core.plugins import engine_names
 from proofroll.core.scene import Scene
 from proofroll.core.time_grid import off_grids, time_grid
 from proofroll.files.scene_file import load_scene
-from proofroll.files.trajectory_file import read
 from proofroll.running.asking import described, resolve, resolve_with_truth
 from proofroll.running.case import Case, EngineFacts, Result, Status
 from proofroll.running.process import WorkerDied
@@ -167,7 +166,7 @@ class Ladder:
     def _answer(self, model: LadderModel, case: Case, result: Result) -> ModelAnswer:
         if result.status != Status.DONE:
             return ModelAnswer(case, result)
-        run = read(self._runner.store.trajectory(case))
+        run = self._runner.store.stored(case).dataset
         curves = observe(self._scene_at(model.parameters), run)
         return ModelAnswer(case, result, curves.get(self.quantity), run)
 

@@ -12,7 +12,6 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from proofroll.files.scene_file import load_scene
-from proofroll.files.trajectory_file import read
 from proofroll.running.case import Case, EngineFacts, Result, Status
 from proofroll.running.runner import Runner
 from proofroll.studies.failure import TOO_SLOW, RunOutcome, run_outcome
@@ -190,7 +189,7 @@ def _search(name: str, points: Sequence[MapPoint], effort: Effort, runner: Runne
         point.results[rung] = result = known[case.key]
         if result.status == Status.TIMEOUT:  # the outcome is open: a faster machine might have finished
             return _send(point, searching, None)
-        dataset = None if result.trajectory is None else read(runner.store.trajectory(case))
+        dataset = None if result.trajectory is None else runner.store.stored(case).dataset
         return _send(point, searching, run_outcome(result, dataset, point.place.yardstick))
 
     def arrived(case: Case, result: Result) -> list[Case]:

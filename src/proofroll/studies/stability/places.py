@@ -8,7 +8,6 @@ from proofroll.core.limits import STUDY_TIME_LIMIT
 from proofroll.core.scene import Scene
 from proofroll.core.time_grid import off_grids, time_grid
 from proofroll.files.scene_file import load_scene
-from proofroll.files.trajectory_file import read
 from proofroll.running.asking import resolve_with_truth
 from proofroll.running.case import Case, EngineFacts, Status
 from proofroll.running.runner import Runner
@@ -91,7 +90,7 @@ def measure(name: str, places: Sequence[Place], runner: Runner, tell: Callable[[
     results = runner.run(cases, lambda *_: tell())
     for place, case in zip(places, cases, strict=True):
         result = results[case.key]
-        truth = read(runner.store.trajectory(case)) if result.status == Status.DONE else None
+        truth = runner.store.stored(case).dataset if result.status == Status.DONE else None
         if truth is None:
             place.problem = f"there is no truth here: {result.message}"
         place.yardstick = Yardstick.of(place.scene, truth)

@@ -17,7 +17,6 @@ from proofroll.core.limits import STUDY_TIME_LIMIT
 from proofroll.core.scene import Scene
 from proofroll.core.time_grid import off_grids, time_grid
 from proofroll.files.scene_file import load_scene
-from proofroll.files.trajectory_file import read
 from proofroll.running.case import Case, EngineFacts, Result, Status
 from proofroll.running.runner import Runner
 from proofroll.running.timing import Timing
@@ -221,7 +220,7 @@ def judged(points: Sequence[CurvePoint], references: Mapping[float, Reference], 
         runner: whose store has the trajectories.
     """
     done = (
-        measured(point, references[point.case.every], read(runner.store.trajectory(point.case)))
+        measured(point, references[point.case.every], runner.store.stored(point.case).dataset)
         if point.result.status == Status.DONE
         else point
         for point in points
