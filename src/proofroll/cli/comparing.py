@@ -23,6 +23,8 @@ if TYPE_CHECKING:
     from proofroll.studies.comparison.outcome import Outcome
     from proofroll.studies.comparison.planning import Plan
 
+    # Parts of comparisons that are run together: the number of a comparison and cases of it.
+    _Phase = list[tuple[int, list[Case]]]
 
 # Processor time that is reserved for the last page and for the start of Python [s].
 _PAGE = 8.0
@@ -226,43 +228,22 @@ class _Comparing:
         """Number of a comparison's cases that have ended, also as cases of other comparisons."""
         return sum(case.key in self.results for case in self.plans[at].cases)
 
-    def run(self, phase: list[tuple[int, list[Case]]], *, last: bool) -> None:
+    def run(self, phase: _Phase, *, last: bool) -> None:
         """Runs the cases of one phase, in order, and judges each comparison when its cases have ended.
 
-        Args:
-            phase: number of a comparison, and its cases.
-            last: True if no phase follows.
+        ``last``: True if no phase follows.
         """
         from proofroll.running.case import Status
 
-        place = {
-            case.key: 2 * number + (case.key not in self._truths)
-            for number, (_, items) in reversed([*enumerate(phase)])
-            for case in items
-        }
-        cases = {case.key: case for _, items in phase for case in items if case.key not in self.results}
-        missing = {number: {case.key for case in items} & cases.keys() for number, (_, items) in enumerate(phase)}
-        news = {number for number, (at, _) in enumerate(phase) if self._judged.get(at) != self._known(at)}
-        missing = {number: keys for number, keys in missing.items() if keys or number in news}
-
-        def end(key: str = "") -> None:
-            for number in [number for number, keys in missing.items() if keys <= {key}]:
-                del missing[number]
-                if self.finished:
-                    before = time.process_time()
-                    self.judge(phase[number][0])
-                    self.finished(self.ended, last and not missing)
-                    self._judging += time.process_time() - before
-                    self._keep_for_the_end()
-            for keys in missing.values():
-                keys.discard(key)
+        place, awaited = self._places(phase), self._awaited(phase)
+        postponed: list[Case] = []
 
         def arrived(case: Case, result: Result) -> None:
             self.results[case.key] = result
             self._tell(case)
-            end(case.key)
-
-        postponed: list[Case] = []
+            for _, keys in awaited:
+                keys.discard(case.key)
+            self._judge_ended(awaited, last=last)
 
         def arrived_first(case: Case, result: Result) -> None:
             if result.status is Status.LEFT_OUT:
@@ -270,10 +251,34 @@ class _Comparing:
             else:
                 arrived(case, result)
 
+        cases = {case.key: case for _, items in phase for case in items if case.key not in self.results}
         # Cases beyond their comparison's share are tried again with the time that the others left.
         self.runner.run(cases.values(), arrived_first if self.limit else arrived, self.limit, place)
         self.runner.run(postponed, arrived, self.limit, place)
-        end()
+        self._judge_ended(awaited, last=last)
+
+    def _places(self, phase: _Phase) -> dict[str, int]:
+        """Key of a case -> its place in the order of running: by comparison, truths first."""
+        parts = reversed([*enumerate(phase)])
+        return {case.key: 2 * number + (case.key not in self._truths) for number, (_, items) in parts for case in items}
+
+    def _awaited(self, phase: _Phase) -> list[tuple[int, set[str]]]:
+        """Number of each comparison that has to be judged in a phase, and keys of its cases without a result."""
+        parts = [(at, {case.key for case in items} - self.results.keys()) for at, items in phase]
+        return [(at, keys) for at, keys in parts if keys or self._judged.get(at) != self._known(at)]
+
+    def _judge_ended(self, awaited: list[tuple[int, set[str]]], *, last: bool) -> None:
+        """Judges comparisons that await no case any more, and removes them from ``awaited``."""
+        if self.finished is None:
+            return
+        ended = [at for at, keys in awaited if not keys]
+        awaited[:] = [part for part in awaited if part[1]]
+        for number, at in enumerate(ended, start=1):
+            before = time.process_time()
+            self.judge(at)
+            self.finished(self.ended, last and not awaited and number == len(ended))
+            self._judging += time.process_time() - before
+            self._keep_for_the_end()
 
     def _keep_for_the_end(self) -> None:
         """Reserves time in the budget for judging and writing everything once more, by the time per case so far."""
