@@ -16,7 +16,7 @@ from proofroll.cli import app
 from proofroll.conformance import run_check
 from proofroll.core.diagnosis import CLOSES, METHOD, Cause, Evidence, diagnose, hypotheses_of
 from proofroll.core.diagnosis.fitting import change_by
-from proofroll.core.diagnosis.vectors import Reported
+from proofroll.core.diagnosis.vectors import ReportedVector
 from proofroll.core.plugins import load_element_kinds
 from proofroll.core.truth import truth
 from proofroll.files.scene_file import load_scene
@@ -155,7 +155,9 @@ def test_a_jump_a_moment_later_is_no_other_clock() -> None:
     """A force that is constant but for one jump fits any shift of time, which proves none."""
     time = np.linspace(0.0, 1.0, 51)
     true, said = (np.stack([np.where(time < jump, 1.0, 0.2)] * 3, axis=-1) for jump in (0.5, 0.54))
-    assert not [cause for cause in Reported("force", "the force", "N", said, true, time).causes(1e-3) if cause.proven]
+    assert not [
+        cause for cause in ReportedVector("force", "the force", "N", said, true, time).causes(1e-3) if cause.proven
+    ]
 
 
 def test_a_ball_that_jumps_is_not_told_of_gravity() -> None:

@@ -59,7 +59,7 @@ def _onset_table(study: OnsetStudy) -> Table:
     from rich.table import Column
     from rich.text import Text
 
-    from proofroll.ball_studies.onset import first_slip_told
+    from proofroll.ball_studies.onset import first_slip_texts
     from proofroll.core.number_format import number
     from proofroll.report.terminal.screen import numeric, plain_table, unbroken
     from proofroll.running.case import Status
@@ -72,7 +72,7 @@ def _onset_table(study: OnsetStudy) -> Table:
         Column("verdict", overflow="fold"),
     )
     for item in study.engines:
-        slip_texts = first_slip_told(item.onset) if item.onset or item.status is Status.DONE else ("", "")
+        slip_texts = first_slip_texts(item.onset) if item.onset or item.status is Status.DONE else ("", "")
         verdict = item.verdict + (f": {item.message}" if item.verdict in {"failed", "refused"} else "")
         label = (item.name, *(item.settings.get(key, "") for key in ("formulation", "preset")))
         table.add_row(Text(" ".join(filter(None, label))), *slip_texts, number(item.difference), Text(verdict))

@@ -197,7 +197,7 @@ def summary(study: OnsetStudy) -> str:
     return said
 
 
-def first_slip_told(first: Event | None) -> tuple[str, str]:
+def first_slip_texts(first: Event | None) -> tuple[str, str]:
     """Texts for a person: time of the first slip, and its bracket."""
     if first is None:
         return "no slip", ""

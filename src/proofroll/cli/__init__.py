@@ -87,7 +87,7 @@ def start(
         raise typer.Exit(USAGE)
 
 
-def _told(error: typer.TyperException) -> str:
+def _usage_message(error: typer.TyperException) -> str:
     """Message of a usage error, completed by the wrong value or the names to choose from, which typer leaves out."""
     message = str(error.format_message())
     lacking: Any = error  # typer has no public type for errors with a parameter
@@ -155,7 +155,7 @@ def main() -> None:
         if error.format_message().startswith("Usage:"):  # a group of commands was called without a command
             sys.stdout.write(f"{error.format_message()}\n")
         else:
-            complain(_told(error))
+            complain(_usage_message(error))
         code = USAGE
     except InputError as error:
         complain(str(error))

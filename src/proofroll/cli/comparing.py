@@ -59,8 +59,8 @@ def compare(
     workers = Workers()
     with options.spinner(comparison):
         loaded = asked(comparison, options.assignments(settings), workers, budget, scheduler)
-    tell_of_scene(comparison, loaded)
-    tell_left_out([loaded], engine or [])
+    mention_scene(comparison, loaded)
+    list_omitted_engines([loaded], engine or [])
     outcomes = outcomes_of([loaded], engine or [], options.new_runner(out, fresh, jobs, scheduler, workers))
     content = outcome_content(outcomes[0])
     options.show(content, as_json, lambda: verdict_parts(content))
@@ -99,7 +99,7 @@ def asked(
     return load_comparison(name)
 
 
-def tell_of_scene(name: str, comparison: Comparison) -> None:
+def mention_scene(name: str, comparison: Comparison) -> None:
     """Prints on standard error that a name is also a scene's, if its comparison lacks an installed engine."""
     from proofroll.core.plugins import engine_names, parse_engine
     from proofroll.files.scene_file import is_scene
@@ -110,7 +110,7 @@ def tell_of_scene(name: str, comparison: Comparison) -> None:
         options.complain(f"{rows}; the scene alone, with every engine: proofroll compare {name} --budget 60")
 
 
-def tell_left_out(comparisons: Sequence[Comparison], engines: Sequence[str]) -> None:
+def list_omitted_engines(comparisons: Sequence[Comparison], engines: Sequence[str]) -> None:
     """Prints a line on standard error for each engine that has no rows in some of the comparisons."""
     from proofroll.core.plugins import parse_engine, plain_name
 

@@ -34,7 +34,7 @@ def judge(
 
     written: Mapping[str, object] = {}
     if named is None and scene is None:
-        scene, written = _told_by(run)
+        scene, written = _scene_of_run(run)
     if (named is None) == (not scene):
         raise InputError("scene", scene or "", "name it once: proofroll judge FILE --scene SCENE")
     if named is not None and run.suffix not in (NETCDF, CSV, STORED) and Path(named).suffix in (NETCDF, CSV, STORED):
@@ -50,7 +50,7 @@ def judge(
     raise typer.Exit(options.OK if judged.agrees else options.CONTRADICTED)
 
 
-def _told_by(run: Path) -> tuple[str, Mapping[str, object]]:
+def _scene_of_run(run: Path) -> tuple[str, Mapping[str, object]]:
     """Scene and parameters that `proofroll run --out` wrote into a file; an empty name if there are none."""
     from proofroll.files.trajectory_file import read
 

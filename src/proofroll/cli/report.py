@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from proofroll.cli import options
-from proofroll.cli.comparing import asked, exit_code, outcomes_of, tell_left_out
+from proofroll.cli.comparing import asked, exit_code, list_omitted_engines, outcomes_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -103,13 +103,13 @@ def report(
     options.require_pages()
     templates()  # read before the work, during which the files may change
     runner = options.new_runner(out, fresh, jobs, scheduler, workers)
-    tell_left_out(loaded, engine or [])
+    list_omitted_engines(loaded, engine or [])
     keys = {part.key: part.words for part in parts}
     total = len(keys) + bool(loaded)
     command = _command(studies or [], engine or [], settings or [], budget, out, only)
     with alone_in(out, lambda: options.complain(f"another report is being made in {out}; this one waits for it")):
         growing = _Growing(loaded, parts, out, lambda ended, awaited: begun(ended, command, awaited, left_out))
-        with growing.told_if_stopped():
+        with growing.resumable():
             stage = _begin(1, total, "comparisons") if loaded else ""
             spent = _processor_seconds() - before
             outcomes = outcomes_of(loaded, engine or [], runner, stage, growing.add, budget, spent) if loaded else []
@@ -169,7 +169,7 @@ class _Growing:
         self._spent += time.process_time() - begin
 
     @contextmanager
-    def told_if_stopped(self) -> Iterator[None]:
+    def resumable(self) -> Iterator[None]:
         """Context manager that, if interrupted, writes the comparisons that have ended and prints how to continue."""
         try:
             yield
@@ -260,8 +260,8 @@ def _shown(content: ReportContent, out: Path) -> Iterator[Table | str]:
     yield from change_lines(content.against)
     if content.beyond_budget:
         yield content.beyond_budget
-    if content.left_out_words:
-        yield content.left_out_words
+    if content.omission_sentences:
+        yield content.omission_sentences
     yield f"The report is in {out / 'report.html'}, the same content in {out / 'report.json'}."
     if content.choice.rows:
         yield f"{content.choice.answer(FIRST_TOLERANCE, False)} {content.choice.with_forces(FIRST_TOLERANCE)}".rstrip()

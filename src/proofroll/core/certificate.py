@@ -157,7 +157,7 @@ def first_difference(lines: list[Line]) -> str | None:
             continue
         if all(np.isnan(line.found)):
             return f"the engine's model does not say its {line.quantity}, which the scene requires"
-        built, expected = told_apart(*worst_numbers(line))
+        built, expected = distinct_texts(*worst_numbers(line))
         where = f" (the one of {len(line.found)} numbers that is furthest off)" if len(line.found) > _SHOWN else ""
         refused = f"; {line.quantity} {line.because}" if line.tolerance == EXACT and line.because else ""
         return (
@@ -182,7 +182,7 @@ def worst_numbers(line: Line, most: int = _SHOWN) -> tuple[tuple[float, ...], tu
     return (line.found[worst],), (line.expected[worst],)
 
 
-def told_apart(found: tuple[float, ...], expected: tuple[float, ...]) -> tuple[str, str]:
+def distinct_texts(found: tuple[float, ...], expected: tuple[float, ...]) -> tuple[str, str]:
     """Texts of two lists of numbers, with enough digits to differ."""
     for digits in range(6, 18):
         one, other = (", ".join(f"{value:.{digits}g}" for value in values) for values in (found, expected))

@@ -58,7 +58,7 @@ class Diverged(ProofrollError):  # noqa: N818 -- a finding about the engine
 
 
 @contextmanager
-def told_of(place: str) -> Iterator[None]:
+def error_place(place: str) -> Iterator[None]:
     """Context manager that adds the name of a file to an InputError, see :meth:`InputError.of`."""
     try:
         yield

@@ -124,11 +124,11 @@ def program(failed: FailedRun, what: str, part: str, numbers: Mapping[str, Any],
         "ALLOWED": failed.allowed,
     }
     against = "# What the run is held against; TRUE is what two independent routes say.\n"
-    lines = "\n".join(_said(failed, what, imported(head)))
+    lines = "\n".join(_docstring_lines(failed, what, imported(head)))
     return f'"""{lines}\n"""\n\n{head}\nimport sys\n\n{rest}\n{against}' + assigned(**own, **numbers) + signs + _MAIN
 
 
-def _said(failed: FailedRun, what: str, needs: list[str]) -> list[str]:
+def _docstring_lines(failed: FailedRun, what: str, needs: list[str]) -> list[str]:
     """Lines of the program's docstring: the failure, the case, and the packages that it needs."""
     numbers = ", ".join(f"{name} = {value:g}" for name, value in failed.parameters.items()) or "default parameters"
     settings = ", ".join(f"{key}={value}" for key, value in failed.settings.items())

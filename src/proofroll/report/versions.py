@@ -9,7 +9,7 @@ from proofroll.core.number_format import counted, number
 from proofroll.report.labels import SYMBOLS
 from proofroll.report.pages import environment, rendered
 from proofroll.report.terminal.screen import plain_table, unbroken
-from proofroll.running.case import told_hosts
+from proofroll.running.case import host_sentences
 from proofroll.studies.versions.difference import NumberKind
 from proofroll.studies.versions.versions import SettingDifference, VersionsStudy
 
@@ -110,7 +110,7 @@ def lines(content: VersionsStudy, most: int | None = _MOST) -> Iterator[str]:
     if came or went:
         yield f"{len(came)} options are new and {len(went)} are gone, renamed ones among them."
     yield from (f"?? {sentence}" for sentence in content.lost)
-    yield from told_hosts(content.hosts)
+    yield from host_sentences(content.hosts)
     yield answer(content)
 
 

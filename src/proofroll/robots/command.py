@@ -60,11 +60,11 @@ def check(
             accepted = [name.strip() for name in ",".join(accept or ()).split(",") if name.strip()]
             content = checked(file, engine or (), accept=accepted, progress=advance, **how)
     else:
-        from proofroll.robots.against import against as held_against
+        from proofroll.robots.against import against as compared
 
         if engine:
             raise InputError("--engine", ", ".join(engine), "--against compares two files and asks no engine; drop one")
-        content = held_against(file, against, _partners(names or ()), **how)
+        content = compared(file, against, _partners(names or ()), **how)
     if out is not None:
         from proofroll.robots.page import page
         from proofroll.running.store import write_text

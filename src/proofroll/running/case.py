@@ -220,7 +220,7 @@ def hosts(results: Iterable[Result]) -> dict[str, int]:
     return dict(sorted(Counter(result.host for result in results if result.host).items()))
 
 
-def told_hosts(counts: Mapping[str, int]) -> list[str]:
+def host_sentences(counts: Mapping[str, int]) -> list[str]:
     """Sentence about results from other machines, see :func:`hosts`; no sentence if there are none."""
     if not counts:
         return []

@@ -81,7 +81,7 @@ def in_steps(delay: float, step: float | None) -> float:
     return abs(delay) / step if step else np.inf
 
 
-def said_delay(delay: float, step: float | None) -> str:
+def delay_text(delay: float, step: float | None) -> str:
     """Text of a time shift; in steps if it is half a step, one or two."""
     word = "late" if delay > 0 else "early"
     if step:

@@ -66,7 +66,7 @@ def known_factor(factor: float) -> tuple[float, str] | None:
     return None
 
 
-def said_factor(factor: float) -> str:
+def factor_text(factor: float) -> str:
     """A factor in words."""
     known = known_factor(factor)
     return known[1] if known else f"{factor:.6g} times"

@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
-from proofroll.core.certificate import Line, told_apart, worst_numbers
+from proofroll.core.certificate import Line, distinct_texts, worst_numbers
 from proofroll.core.diagnosis import Cause, Evidence, Hypothesis, hypothesis
-from proofroll.core.diagnosis.fitting import said_factor
+from proofroll.core.diagnosis.fitting import factor_text
 
 # Lines with a larger tolerance are softened by the engine and prove nothing.
 _EXACT = 1e-6
@@ -84,12 +84,12 @@ def _otherwise(line: Mapping[str, Any]) -> str:
     """Text about a wrongly built quantity: both numbers, and their ratio if all its numbers have the same."""
     built, expected = (np.asarray(line[key], dtype=np.float64) for key in ("found", "expected"))
     own = {field.name: line[field.name] for field in dataclasses.fields(Line)}
-    one, other = told_apart(*worst_numbers(Line(**own), _SHOWN))
+    one, other = distinct_texts(*worst_numbers(Line(**own), _SHOWN))
     shown = f"{one} instead of {other}{'' if line['unit'] == '1' else ' ' + line['unit']}"
     square = float(expected @ expected) if built.shape == expected.shape else 0.0
     factor = float(built @ expected) / square if square else 0.0
     alike = square > 0 and bool(np.max(np.abs(built - factor * expected)) <= _ALIKE * np.max(np.abs(expected)))
-    return f"{line['quantity']} {said_factor(factor)} ({shown})" if alike else f"{line['quantity']} {shown}"
+    return f"{line['quantity']} {factor_text(factor)} ({shown})" if alike else f"{line['quantity']} {shown}"
 
 
 def _is_single(line: Mapping[str, Any]) -> bool:

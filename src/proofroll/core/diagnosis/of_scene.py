@@ -77,7 +77,7 @@ def diagnosed(
     judged = list(judgements)
     wrong = {item.observable for item in judged if item.verdict in _WRONG}
     right = {item.observable for item in judged if item.verdict in _RIGHT}
-    diagnoses, seen = [], what_is_right(scene, judged)
+    diagnoses, seen = [], agreement_sentence(scene, judged)
     for element in scene.elements:
         ending = f".{element.name}" if len(scene.elements) > 1 else ""
         own = [
@@ -104,7 +104,7 @@ def _closed_by_step(item: Judgement) -> bool:
     return item.limit_error is not None and item.limit_error <= CLOSES * item.error
 
 
-def what_is_right(scene: Scene, judgements: Iterable[Judgement]) -> str:
+def agreement_sentence(scene: Scene, judgements: Iterable[Judgement]) -> str:
     """Headline observables that agree and those that do not: ``the path is right and N is not``.
 
     Empty unless some are right and some are not.

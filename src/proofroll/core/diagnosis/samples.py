@@ -13,10 +13,10 @@ import numpy as np
 from proofroll.core.arrays import FloatArray, in_single_precision
 from proofroll.core.certificate import ROUNDED
 from proofroll.core.diagnosis import CLOSES, Cause, Evidence, Hypothesis, above_round_off, apart, hypothesis
-from proofroll.core.diagnosis.clocks import in_steps, late, said_delay, stretched
+from proofroll.core.diagnosis.clocks import delay_text, in_steps, late, stretched
 from proofroll.core.diagnosis.fitting import change_by
 from proofroll.core.diagnosis.lines import differing, single_precision
-from proofroll.core.diagnosis.vectors import Reported
+from proofroll.core.diagnosis.vectors import ReportedVector
 from proofroll.core.multi_element import REQUIRED
 
 if TYPE_CHECKING:
@@ -82,7 +82,7 @@ def another_clock(state: Callable[[Any, xr.Dataset], FloatArray], covers: tuple[
         moved = late(time, reported, true)
         if moved is not None:
             delay, before, after = moved
-            says = f"every sample is {said_delay(delay, evidence.step)}: the motion is right at another time"
+            says = f"every sample is {delay_text(delay, evidence.step)}: the motion is right at another time"
             remedy = "advance(t) has to end at t, neither a step before nor after it"
             change = in_steps(delay, evidence.step)
             yield Cause("late", says, "state", "m", before, after, remedy, 1, covers, _CLOCK, change=change)
@@ -120,7 +120,7 @@ def reported_vectors(
     frames: Callable[[Evidence], Mapping[str, FloatArray]],
     clock: Hypothesis,
     least: Callable[[Any, str], float] = lambda *_: 0.0,
-    besides: Callable[[Reported, Evidence], Iterable[Cause]] = lambda *_: (),
+    besides: Callable[[ReportedVector, Evidence], Iterable[Cause]] = lambda *_: (),
 ) -> Hypothesis:
     """Hypothesis: positions, velocities or angular velocities are each reported wrongly.
 
@@ -145,7 +145,7 @@ def reported_vectors(
         time, own = truth["time"].to_numpy(), frames(evidence)
         for name, (what, unit) in units.items():
             reported, true, size = run[name].to_numpy(), truth[name].to_numpy(), least(evidence.element, name)
-            vector = Reported(name, what, unit, reported, true, time, own, size).after_start()
+            vector = ReportedVector(name, what, unit, reported, true, time, own, size).after_start()
             moves, turns = moves_otherwise(evidence, name), moves_otherwise(evidence, name, "q_WB", "w_WB")
             for cause in (*vector.causes(evidence.step), *besides(vector, evidence)):
                 if not (turns if name != "w_WB" and cause.id.startswith(_OF_BOTH) else moves):
@@ -160,9 +160,9 @@ def moves_otherwise(evidence: Evidence, name: str, *others: str) -> bool:
     return any(_departure(evidence, other) > least for other in others or _WITH[name])
 
 
-def forced_otherwise(evidence: Evidence, told: Reported) -> bool:
+def forced_otherwise(evidence: Evidence, vector: ReportedVector) -> bool:
     """True if velocities are as wrong as a force: the force belongs to a different motion."""
-    least = CLOSES * told.before / (told.size or 1.0)
+    least = CLOSES * vector.before / (vector.size or 1.0)
     return any(_departure(evidence, name) > least for name in ("v_WB", "w_WB"))
 
 
@@ -238,7 +238,7 @@ def at_start(frames_of: Callable[[Any], Mapping[str, FloatArray]], follows: froz
                 if reported.shape != true.shape:
                     continue
                 frames = {key: frame[None] for key, frame in frames_of(evidence.element).items()}
-                yield from Reported(name, what, unit, reported[None], true[None], np.zeros(1), frames).causes(
+                yield from ReportedVector(name, what, unit, reported[None], true[None], np.zeros(1), frames).causes(
                     evidence.step
                 )
 

@@ -14,8 +14,8 @@ import numpy as np
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.diagnosis import CLOSES, Cause, above_round_off, apart
-from proofroll.core.diagnosis.clocks import in_steps, late, said_delay
-from proofroll.core.diagnosis.fitting import change_by, known_factor, said_factor
+from proofroll.core.diagnosis.clocks import delay_text, in_steps, late
+from proofroll.core.diagnosis.fitting import change_by, factor_text, known_factor
 
 WORLD = "world"
 _PERMUTATIONS = [
@@ -39,14 +39,14 @@ _SIGN = "an engine may give what acts on the other body: look at whose vector it
 
 
 @dataclass(frozen=True)
-class Reported:
+class ReportedVector:
     """A vector that an engine reports at each time.
 
     Attributes:
         name: of the variable, e.g. ``w_WB``.
         what: description, e.g. ``the angular velocity``.
         unit: its unit.
-        said, true: reported and true values, shape (time, …, 3); NaN where the equations do not determine them.
+        reported, true: reported and true values, shape (time, …, 3); NaN where the equations do not determine them.
         time: [s], shape (time,).
         frames: name -> rotations whose columns are the frame's axes in the world, shape (time, …, 3, 3).
         least: size below which the quantity stands still, in its unit.
@@ -56,7 +56,7 @@ class Reported:
     name: str
     what: str
     unit: str
-    said: FloatArray
+    reported: FloatArray
     true: FloatArray
     time: FloatArray
     frames: Mapping[str, FloatArray] = field(default_factory=dict)
@@ -71,21 +71,21 @@ class Reported:
     @property
     def differs(self) -> bool:
         """True if the report differs by more than round-off and the error bar of the truth."""
-        known = self.said.shape == self.true.shape and above_round_off(self.before, self.size)
+        known = self.reported.shape == self.true.shape and above_round_off(self.before, self.size)
         return known and self.before > _BARS * self.bar
 
-    def after_start(self) -> Reported:
+    def after_start(self) -> ReportedVector:
         """The vector without time 0 if it is right there: an engine may report its initial values unchanged."""
-        said, true = self.said, self.true
-        if len(said) < 2 or said.shape != true.shape or above_round_off(apart(said[0], true[0]), self.size):
+        reported, true = self.reported, self.true
+        if len(reported) < 2 or reported.shape != true.shape or above_round_off(apart(reported[0], true[0]), self.size):
             return self
         frames = {key: frame[1:] for key, frame in self.frames.items()}
-        return replace(self, said=said[1:], true=true[1:], time=self.time[1:], frames=frames)
+        return replace(self, reported=reported[1:], true=true[1:], time=self.time[1:], frames=frames)
 
     @property
     def before(self) -> float:
         """Largest difference between report and truth."""
-        return apart(self.said, self.true)
+        return apart(self.reported, self.true)
 
     def cause(
         self,
@@ -103,9 +103,9 @@ class Reported:
         Values without a determined truth are left out.
         """
         partly = np.any(np.isnan(self.true), axis=-1, keepdims=True)
-        aside = partly & (np.isnan(explained) | np.isnan(self.said))
-        said, true, explained = (np.where(aside, np.nan, each) for each in (self.said, self.true, explained))
-        before, after = apart(said, true), apart(said, explained)
+        aside = partly & (np.isnan(explained) | np.isnan(self.reported))
+        reported, true, explained = (np.where(aside, np.nan, each) for each in (self.reported, self.true, explained))
+        before, after = apart(reported, true), apart(reported, explained)
         if before < self.before / 2:
             after = np.inf  # most of the difference is in what is left aside
         proof = self.name, self.unit, before, after
@@ -147,10 +147,10 @@ class Reported:
     def _axes(self) -> Iterator[Cause]:
         for name, frame in {WORLD: None, **self.frames}.items():
             local = self.true if frame is None else into(frame, self.true)
-            said = self.said if frame is None else into(frame, self.said)
+            reported = self.reported if frame is None else into(frame, self.reported)
             for order, signs in _PERMUTATIONS:
                 changed = local[..., order] * signs
-                if apart(said, changed) * 4 > self.before:
+                if apart(reported, changed) * 4 > self.before:
                     continue
                 where = "" if frame is None else f" in {name}"
                 shown = ", ".join("-" * (s < 0) + "xyz"[k] for k, s in zip(order, signs, strict=True))
@@ -162,10 +162,10 @@ class Reported:
         square = float(np.nansum(self.true**2))
         if not square:
             return
-        factor = float(np.nansum(self.said * self.true)) / square
+        factor = float(np.nansum(self.reported * self.true)) / square
         impulse = bool(step) and abs(factor - (step or 0.0)) < 1e-3 * (step or 0.0)
         known = impulse or known_factor(factor) is not None
-        times = "times the step, as an impulse" if impulse else said_factor(factor)
+        times = "times the step, as an impulse" if impulse else factor_text(factor)
         says = f"{self.name} is {self.what} {times}"
         remedy = f"look at the unit of {self.name}"
         if known:
@@ -177,9 +177,9 @@ class Reported:
 
     def _clamped(self) -> Iterator[Cause]:
         """Causes: each component, or the length of the vector, is limited to a constant."""
-        limit = float(np.nanmax(np.abs(self.said), initial=0.0))
+        limit = float(np.nanmax(np.abs(self.reported), initial=0.0))
         sizes = np.linalg.norm(np.nan_to_num(self.true), axis=-1, keepdims=True)
-        longest = float(np.max(np.linalg.norm(np.nan_to_num(self.said), axis=-1)))
+        longest = float(np.max(np.linalg.norm(np.nan_to_num(self.reported), axis=-1)))
         shorter = self.true * np.minimum(1.0, longest / np.where(sizes > 0, sizes, 1.0))
         each = np.abs(self.true)
         for what, at, largest, explained, true in (
@@ -194,15 +194,15 @@ class Reported:
             yield self.cause("clamped", says, explained, remedy, 1, _EXACT, _distinct(above, most), change)
 
     def _late(self, step: float | None) -> Iterator[Cause]:
-        off = np.nan_to_num(np.abs(self.said - self.true))
+        off = np.nan_to_num(np.abs(self.reported - self.true))
         differs = np.max(off.reshape(len(self.time), -1), axis=-1) > _FEW * self.before
-        shift = late(self.time, self.said, self.true) if np.count_nonzero(differs) >= _SEEN else None
+        shift = late(self.time, self.reported, self.true) if np.count_nonzero(differs) >= _SEEN else None
         if shift is None:
             return
         delay, before, after = shift
         # a method of first order, x + h v, is late by half a step without any mistake
         own = self.unit == "m" and bool(step) and abs(abs(delay) / (step or 1.0) - 0.5) < _HALF
-        says = f"{self.name} is {said_delay(delay, step)}"
+        says = f"{self.name} is {delay_text(delay, step)}"
         remedy = f"sample {self.name} at the time that was asked for"
         change = 0.0 if own else in_steps(delay, step)
         yield Cause(f"late.{self.name}", says, self.name, self.unit, before, after, remedy, 1, change=change)

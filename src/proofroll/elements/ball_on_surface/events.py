@@ -129,7 +129,7 @@ def lift_off(times: Sequence[float], N: Sequence[float], faint: float) -> Event 
     return None
 
 
-def left_at(dataset: xr.Dataset) -> float:
+def lift_off_time(dataset: xr.Dataset) -> float:
     """Time at which the ball first leaves the wall [s]; inf: it does not."""
     return min((event.time for event in events_of(dataset) if event.kind == "lift_off"), default=math.inf)
 
@@ -140,12 +140,12 @@ def common_span(truth: xr.Dataset, runs: Mapping[Key, xr.Dataset]) -> tuple[xr.D
     A model that holds the ball on the wall ends its run where the ball leaves it. This is right if the truth's ball
     leaves the wall too, at most one sample later. A run that ends earlier is not cut to, and differs.
     """
-    leaves, true = left_at(truth), truth["time"].to_numpy()
+    leaves, true = lift_off_time(truth), truth["time"].to_numpy()
     if not np.isfinite(leaves):
         return truth, dict(runs)
     fewest = int(np.searchsorted(true, leaves)) - 1  # samples on the wall, less one
     count = min([len(true), *(run.sizes["time"] for run in runs.values() if run.sizes["time"] >= fewest)])
-    until = min([leaves, *(left_at(run) for run in runs.values())])
+    until = min([leaves, *(lift_off_time(run) for run in runs.values())])
 
     def cut(dataset: xr.Dataset) -> xr.Dataset:
         short = dataset.isel(time=slice(count))

@@ -14,7 +14,7 @@ from proofroll.elements.mechanism.analysis import RANK
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.elements.mechanism.signal import breaks
-from proofroll.elements.mechanism.switches import REDUNDANT, Mode, SwitchedJoint, held_by
+from proofroll.elements.mechanism.switches import REDUNDANT, Mode, SwitchedJoint, held_joints
 
 _MOST_PIVOTS = 1000  # of the complementarity problem; usually about one for each joint
 
@@ -86,7 +86,7 @@ def decided(joints: Sequence[SwitchedJoint], q: Array, v: Array, responses: Resp
         joint.resting(q[joint.coordinate]) if v[joint.velocity] == 0 else joint.moving(v[joint.velocity])
         for joint in joints
     ]
-    still = held_by(tuple(mode))
+    still = held_joints(tuple(mode))
     if not still:
         return tuple(mode), np.inf
     at = [joints[number].velocity for number in still]

@@ -23,7 +23,7 @@ from proofroll.elements.mechanism.named_forces import lengths, on_joint, taken
 from proofroll.elements.mechanism.record import Record, gathered, integrated
 from proofroll.elements.mechanism.rotations import Array, skews, to_quaternion
 from proofroll.elements.mechanism.signal import value_at, varies
-from proofroll.elements.mechanism.switches import REDUNDANT, STOPPED, Mode, held_by, switched_joints
+from proofroll.elements.mechanism.switches import REDUNDANT, STOPPED, Mode, held_joints, switched_joints
 
 _NEAR = 1e-7  # displacement of coordinates for finite differences of accelerations [m, 1]
 _EQUAL_STEP = 2e-3  # s
@@ -41,7 +41,7 @@ class Solution:
         rows: constraints of loops and couplings.
         split: (A, B) = (L⁻ᵀV, Uᵀ/S) of the locked directions: −A B r is the correction that removes a residual r.
         C: rows of the loops, then of switched joints that are held, (rows, nv).
-        holding: forces that hold switched joints, along their coordinates, in the order of ``held_by``.
+        holding: forces that hold switched joints, along their coordinates, in the order of ``held_joints``.
     """
 
     acceleration: Array
@@ -111,7 +111,7 @@ class JointCoordinates:
                 b[at] += effort
         rows = self.tree.loop_rows(motion)
         C, bias, rank = rows.C, rows.bias, self.rank
-        if held := [self.switched[number].velocity for number in held_by(mode)]:
+        if held := [self.switched[number].velocity for number in held_joints(mode)]:
             C, bias, rank = np.vstack([C, np.eye(len(v))[held]]), np.append(bias, np.zeros(len(held))), rank + len(held)
         try:
             into = np.linalg.inv(np.linalg.cholesky(M)).T  # M⁻¹ = into intoᵀ
@@ -325,7 +325,7 @@ class JointCoordinates:
         fields = {name: np.zeros(count) for name, count in lengths(self.mechanism).items()}
         fields["effort"][:] = self.efforts(time, q, v, mode)
         fields["coupling"][:] = found.multipliers[len(found.multipliers) - len(fields["coupling"]) :]
-        holding = dict(zip(held_by(mode), found.holding, strict=True))
+        holding = dict(zip(held_joints(mode), found.holding, strict=True))
         for number, (joint, own) in enumerate(zip(self.switched, mode, strict=False)):
             force = holding.get(number, joint.push(own))
             on = on_joint(own in STOPPED, joint.friction, force)

@@ -128,7 +128,7 @@ def first_change(joints: Sequence[SwitchedJoint], q: Array, v: Array, rates: Arr
     return min((j.lasts(q[j.coordinate], v[j.velocity], rates[j.velocity]) for j in joints), default=math.inf)
 
 
-def left_by(mode: str) -> str:
+def end_event(mode: str) -> str:
     """Event that ends the mode of a held joint."""
     return "slip" if mode == "stick" else "lift_off"
 
@@ -140,12 +140,12 @@ def changes(joints: Sequence[SwitchedJoint], before: Mode, after: Mode) -> tuple
         if now in HOLDING and was not in HOLDING:
             found.append(("stick" if now == "stick" else "rest", joint.name))
         elif was in HOLDING and now not in HOLDING:
-            found.append((left_by(was), joint.name))
+            found.append((end_event(was), joint.name))
         elif was != now and was not in HOLDING:
             found.append(("turn", joint.name))
     return tuple(found)
 
 
-def held_by(mode: Mode) -> list[int]:
+def held_joints(mode: Mode) -> list[int]:
     """Indices, among the switched joints, of those that are held."""
     return [number for number, own in enumerate(mode) if own in HOLDING]

@@ -17,7 +17,15 @@ from proofroll.elements.mechanism.contacts.start import natural_scale
 from proofroll.elements.mechanism.named_forces import on_joint
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.elements.mechanism.signal import breaks
-from proofroll.elements.mechanism.switches import HOLDING, REDUNDANT, STOPPED, Mode, changes, held_by, switched_joints
+from proofroll.elements.mechanism.switches import (
+    HOLDING,
+    REDUNDANT,
+    STOPPED,
+    Mode,
+    changes,
+    held_joints,
+    switched_joints,
+)
 from proofroll.engines.projection.alternating import AlternatingMotion, Excess, ends_of_efforts
 from proofroll.engines.projection.dependent import DependentCoordinates, SolvedState
 
@@ -70,7 +78,7 @@ class SwitchedMotion(AlternatingMotion[Mode]):
 
     def _holding(self, solved: SolvedState) -> dict[int, float]:
         """Holding forces of joints, by their indices among the switched ones."""
-        return dict(zip(held_by(self.mode), solved.multipliers[self._equations.coupled :].tolist(), strict=True))
+        return dict(zip(held_joints(self.mode), solved.multipliers[self._equations.coupled :].tolist(), strict=True))
 
     def _load(self, mode: Mode) -> Array:
         """Kinetic friction along the velocities ν."""
@@ -80,7 +88,7 @@ class SwitchedMotion(AlternatingMotion[Mode]):
         return load
 
     def _enter(self, t: float, y: Array, mode: Mode) -> None:
-        self._held = [self._joints[number].velocity for number in held_by(mode)]
+        self._held = [self._joints[number].velocity for number in held_joints(mode)]
         self._push = self._load(mode)
         self._equations.applied.modes = dict(zip(self._motors, mode[len(self._joints) :], strict=True))
         super()._enter(t, y, mode)
@@ -111,7 +119,7 @@ class SwitchedMotion(AlternatingMotion[Mode]):
             joint.moving(rate) if rate else joint.resting(place)
             for joint, place, rate in zip(self._joints, q.tolist(), v.tolist(), strict=True)
         ]
-        still = held_by(tuple(mode))
+        still = held_joints(tuple(mode))
         if still:
             moving = tuple("free" if k in still else own for k, own in enumerate(mode))
             at = [self._joints[k].velocity for k in still]

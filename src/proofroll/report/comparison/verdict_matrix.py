@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass
 
-from proofroll.core.number_format import counted as told
+from proofroll.core.number_format import counted as plural
 from proofroll.core.number_format import error, number
 from proofroll.core.verdict import Judgement
 from proofroll.report.comparison.records import Cost, ReportedComparison, ReportedRow, ReportedRun
@@ -89,7 +89,7 @@ def counted(content: ReportedComparison) -> str:
     verdicts = [row.verdict.value for row in content.rows]
     counts = ", ".join(f"{sign} {verdicts.count(word)} {word}" for word, sign in SYMBOLS.items() if word in verdicts)
     surprise = "nothing is contradicted" if unjudged(content) else "as expected"
-    return f"{told(len(verdicts), 'settings')}: {counts}; {surprise if content.as_expected else 'not as expected'}"
+    return f"{plural(len(verdicts), 'settings')}: {counts}; {surprise if content.as_expected else 'not as expected'}"
 
 
 def at_point(content: ReportedComparison, comparison: int, point: int, name: str) -> Matrix:

@@ -88,7 +88,7 @@ def candidates(lines: Sequence[TableLine], href: str, places: Sequence[str]) -> 
     """
     needed = list(dict.fromkeys(line.place for line in lines))
     own = lines[0].step
-    ladders, bounds = [_ladder(lines, role) for role in _ROLES], held_by(lines)
+    ladders, bounds = [_ladder(lines, role) for role in _ROLES], held_joints(lines)
     anchors = {"": href} | {place: f"{href}-r{lines[0].row}-p{number}" for number, place in enumerate(places)}
     steps = []
     for value in dict.fromkeys(line.step for line in lines):
@@ -142,7 +142,7 @@ def _blame(judged: dict[str, list[TableLine]]) -> tuple[Verdict | None, str]:
     return None, ""
 
 
-def held_by(lines: Sequence[TableLine]) -> dict[TableLine, float]:
+def held_joints(lines: Sequence[TableLine]) -> dict[TableLine, float]:
     """Smallest tolerance that each line's run holds without luck, relative to the quantity's size.
 
     The rule is that of the trade-off (:func:`proofroll.studies.tradeoff.pareto.envelope`) and that of a verdict: a

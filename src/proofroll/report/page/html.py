@@ -26,7 +26,7 @@ from proofroll.report.page.choice_matrix import DECADES, FIRST, FIRST_TOLERANCE
 from proofroll.report.pages import environment, folded, packed, rendered
 from proofroll.report.parts import Part, part_kinds
 from proofroll.report.styles import OUTLINES, styles
-from proofroll.running.case import told_hosts
+from proofroll.running.case import host_sentences
 
 if TYPE_CHECKING:
     import jinja2
@@ -142,7 +142,7 @@ def _templates(kinds: tuple[type[Part] | type[ReportKind], ...]) -> jinja2.Envir
             "tolerances": [number_format.number(10.0**-decade) for decade in DECADES],
         },
         "again": _again,
-        "told_hosts": told_hosts,
+        "host_sentences": host_sentences,
         "part_kinds": part_kinds(),
         "report_kinds": report_kinds(),
     }

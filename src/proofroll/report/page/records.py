@@ -153,7 +153,7 @@ class ReportContent:
         return f"Runs left out for lack of processor time: {left}. The same command goes on with them." if left else ""
 
     @property
-    def left_out_words(self) -> str:
+    def omission_sentences(self) -> str:
         """Sentences on the comparisons that a report of all studies leaves out; empty if there are none."""
         if not self.left_out:
             return ""

@@ -67,7 +67,7 @@ def replay_page(path: Path, run: xr.Dataset, scene_of_run: str | None = None) ->
         "run_replay.html",
         scene=scene,
         replay=Replay(three(), 0, cases, packed),
-        said=_said(run),
+        said=_caption(run),
         replay_scripts=[other.replay_script for other in report_kinds().values() if other.replay_script],
     )
 
@@ -87,7 +87,7 @@ def _drawer(path: Path, scene: Scene, element: Element, alone: Scene, run: xr.Da
     return kind.replay()
 
 
-def _said(run: xr.Dataset) -> str:
+def _caption(run: xr.Dataset) -> str:
     engine = str(run.attrs["engine"])
     if engine == "truth":
         return "The truth."

@@ -104,7 +104,7 @@ def run_content(case: Case, result: Result, trajectory: Path) -> RunContent:
     )
 
 
-def _told(event: Event) -> str:
+def _event_text(event: Event) -> str:
     """Text of an event: kind, name of its place if any, time and half width of its bracket."""
     bar = number(0.5 * (event.time_high - event.time_low), 1)
     name = f" of {event.name}" if event.name else ""
@@ -136,7 +136,7 @@ def run_lines(content: RunContent) -> list[Any]:
     for name, value in (content.smallest or {}).items():
         lines.append(Text(f"smallest {name} on the way: {value:.6g} {content.units.get(name, '')}".rstrip()))
     if content.events:
-        events = ", ".join(_told(event) for event in content.events[:_EVENTS])
+        events = ", ".join(_event_text(event) for event in content.events[:_EVENTS])
         more = len(content.events) - _EVENTS
         lines.append(Text(f"events: {events}{f' and {more} more' if more > 0 else ''}"))
     before = "" if content.build_seconds is None else f", after {number(content.build_seconds)} s before the first step"

@@ -168,7 +168,7 @@ def heat_map(study: StabilityStudy) -> HeatMap:
     return HeatMap(axes, groups, {letter: kind for kind, letter in letters(study).items() if kind in seen})
 
 
-def told(point: BoundaryPoint) -> str:
+def reporting(point: BoundaryPoint) -> str:
     """Words for how a failure was reported: before the run, by the engine, or not at all."""
     if point.failure in NOT_RUN:
         return "before the run"
@@ -185,5 +185,5 @@ def in_words(point: BoundaryPoint) -> str:
     else:
         words.append(f"1 % up to {step(point.resolution, point.largest_accurate)}")
     if point.failure:
-        words.append(f"beyond: {point.failure}, {told(point)}")
+        words.append(f"beyond: {point.failure}, {reporting(point)}")
     return "; ".join(words)

@@ -90,7 +90,7 @@ class StabilityPart(Part):
             contradictions += against
             untested = "" if against else claim.untested(study.points)
             holds, found = None if untested else not against, untested or "; ".join(against)
-            claims.append(ClaimJudgement(_says(claim, study.step_symbols), claim.because, holds, found))
+            claims.append(ClaimJudgement(_claim_text(claim, study.step_symbols), claim.because, holds, found))
         points = [
             replace(point, reproducer=f"{self.folder}/{Path(point.reproducer).name}") if point.reproducer else point
             for point in study.points
@@ -111,7 +111,7 @@ def _programs(path: Path) -> str:
     return f"{path.parent.name}/{path.stem}"
 
 
-def _says(claim: Claim, symbols: Mapping[str, str]) -> str:
+def _claim_text(claim: Claim, symbols: Mapping[str, str]) -> str:
     """A claim in one sentence."""
     text = f"{claim.engine} is {claim.boundary}"
     if claim.never:

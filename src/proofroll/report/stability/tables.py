@@ -10,7 +10,7 @@ from rich.text import Text
 from proofroll.core.number_format import counted, number
 from proofroll.report.labels import family_and_caveat, name_of, step, with_caveat
 from proofroll.report.terminal.screen import numeric, plain_table, unbroken
-from proofroll.running.case import told_hosts
+from proofroll.running.case import host_sentences
 from proofroll.studies.stability.records import BoundaryPoint, ExplainedBoundary, StabilityStudy, silent_ranking
 
 # Relative error, in ranges of the quantity, beyond which the number itself is not given.
@@ -48,7 +48,7 @@ def headline(study: StabilityStudy) -> str:
         text += f" {study.wrong_model} were not run, for what the engine built is not the scene."
     if study.never_accurate:
         text += f" At {counted(study.never_accurate, 'points')} no step or tolerance that was affordable holds 1 %."
-    return " ".join([text, *told_hosts(study.hosts)])
+    return " ".join([text, *host_sentences(study.hosts)])
 
 
 def boundary_table(study: StabilityStudy) -> Table:

@@ -16,7 +16,7 @@ from proofroll.report.comparison.tables import observables, one_scheme, remarks,
 from proofroll.report.labels import SYMBOLS, caveat_lines, step, unit, unjudged, verdict_text
 from proofroll.report.parts import part_kinds
 from proofroll.report.terminal.screen import Screen, numeric, plain_table, unbroken
-from proofroll.running.case import Status, told_hosts
+from proofroll.running.case import Status, host_sentences
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -155,7 +155,7 @@ def closing_lines(content: ReportedComparison) -> list[str]:
             else "Every verdict is as the comparison file expects."
         )
     shared = [*one_scheme(content), *caveat_lines([row for row in content.rows if row.verdict != Verdict.REFUSED])]
-    return [*lines, *budget_lines(content), *shared, *told_hosts(content.hosts)]
+    return [*lines, *budget_lines(content), *shared, *host_sentences(content.hosts)]
 
 
 def budget_lines(content: ReportedComparison) -> list[str]:

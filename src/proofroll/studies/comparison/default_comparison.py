@@ -51,7 +51,7 @@ def compared(
     engines = _stepped(able(scene, workers), file.dt, workers)
     rows = [Row(engine, _CLOSE, list(Verdict), because=_BECAUSE) for engine in engines]
     if not rows:
-        raise InputError("scene", name, _why_none(scene, workers))
+        raise InputError("scene", name, _reason_for_none(scene, workers))
     return Comparison(
         name=scene.name,
         title=file.title + rest,
@@ -129,7 +129,7 @@ def _installed(workers: Workers | None) -> list[EngineDescription]:
     return [item for item in described(engine_names(), workers).values() if isinstance(item, EngineDescription)]
 
 
-def _why_none(scene: Scene, workers: Workers | None) -> str:
+def _reason_for_none(scene: Scene, workers: Workers | None) -> str:
     """Reason why no engine can represent a scene: missing capabilities, or else the elements that each cannot build."""
     engines = _installed(workers)
     given = {item for engine in engines for items in engine.provides.values() for item in items}

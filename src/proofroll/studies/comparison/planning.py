@@ -11,7 +11,7 @@ import numpy as np
 from proofroll.core.arrays import FloatArray
 from proofroll.core.comparison import Comparison, Edge, Row
 from proofroll.core.engine import whole_steps
-from proofroll.core.errors import InputError, ProofrollError, told_of
+from proofroll.core.errors import InputError, ProofrollError, error_place
 from proofroll.core.multi_element import represents
 from proofroll.core.plugins import parse_engine, place_of, plain_name
 from proofroll.core.scene import Scene
@@ -179,7 +179,7 @@ def scene_at(comparison: Comparison, point: Mapping[str, float]) -> Scene:
     Raises:
         InputError: the scene has no such parameter, or not with this value; the text names the comparison's file.
     """
-    with told_of(f"{comparison.name}.toml"):
+    with error_place(f"{comparison.name}.toml"):
         return load_scene(comparison.scene, **point)
 
 

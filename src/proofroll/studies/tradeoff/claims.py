@@ -16,7 +16,7 @@ from typing import Any
 from proofroll.core.bounds import bounded, require_pair
 from proofroll.core.comparison import Tolerance
 from proofroll.core.engine_abilities import Level
-from proofroll.core.errors import InputError, told_of
+from proofroll.core.errors import InputError, error_place
 from proofroll.core.plugins import parse_engine
 from proofroll.core.validation import strict, validated
 from proofroll.files.scene_file import load_scene
@@ -197,13 +197,13 @@ class TradeoffClaims:
 
     def contradictions(self, study: TradeoffStudy) -> list[str]:
         """Contradicted claims, as sentences."""
-        return self._said(study, False, "contradicted")
+        return self._sentences(study, False, "contradicted")
 
     def undecided(self, study: TradeoffStudy) -> list[str]:
         """Undecided claims, as sentences."""
-        return self._said(study, None, "undecided")
+        return self._sentences(study, None, "undecided")
 
-    def _said(self, study: TradeoffStudy, verdict: bool | None, word: str) -> list[str]:
+    def _sentences(self, study: TradeoffStudy, verdict: bool | None, word: str) -> list[str]:
         judged = (item for item in self.judged(study) if item.holds is verdict)
         return [f"{self.name}, {word}: {item.claim}; {item.found}" for item in judged]
 
@@ -229,7 +229,7 @@ def _claims(path: Path, given: dict[str, Any]) -> TradeoffClaims:
                 if kind == "cheapest" and isinstance(claim.get("engine"), str):
                     claim["engine"] = [claim["engine"]]
     claims = validated(TradeoffClaims, given, where, name=path.stem)
-    with told_of(where):
+    with error_place(where):
         _check(where, claims)
     return claims
 
@@ -246,7 +246,7 @@ def _check(where: str, file: TradeoffClaims) -> None:
             if not claim.because:
                 raise InputError(f"{at}.because", "nothing", "every claim needs its reason; add it")
             for text in claim.engine if kind == "cheapest" else [claim.engine]:
-                with told_of(at):
+                with error_place(at):
                     parse_engine(text)
             if kind == "holds":
                 bounded(f"{at}.step", claim.step, above=0)

@@ -11,7 +11,7 @@ from proofroll.files.json_data import MERGED, OPTIONAL
 from proofroll.studies.study_store import Measured
 from proofroll.studies.tradeoff.pareto import tied
 from proofroll.studies.tradeoff.records import MeasuredPoint, TradeoffStudy
-from proofroll.studies.tradeoff.requirements import MARGIN, Requirements, absolute_tolerance, why_it_fails
+from proofroll.studies.tradeoff.requirements import MARGIN, Requirements, absolute_tolerance, failure_reason
 
 # Fields of a measured point that are written to JSON.
 _OF_A_POINT = (
@@ -127,7 +127,7 @@ def recommend(study: TradeoffStudy, required: Requirements) -> Recommendation:
     _require_measured(study, required)
 
     def why_not(point: MeasuredPoint) -> str | None:
-        return why_it_fails(study, point, required, absolute)
+        return failure_reason(study, point, required, absolute)
 
     def chosen(point: MeasuredPoint | None, reason: str = "") -> Choice | None:
         if point is None:
@@ -179,7 +179,7 @@ def holding(study: TradeoffStudy, required: Requirements, *, here: bool = False)
     """
     absolute = absolute_tolerance(study, required)
     within = replace(study, over={}) if here else study
-    points = [p for p in study.points if _asked(p, required) and why_it_fails(within, p, required, absolute) is None]
+    points = [p for p in study.points if _asked(p, required) and failure_reason(within, p, required, absolute) is None]
     return sorted(points, key=lambda p: p.cost)
 
 

@@ -49,18 +49,18 @@ def absolute_tolerance(study: TradeoffStudy, required: Requirements) -> float:
     return required.tolerance.absolute(scale or 1.0)
 
 
-def why_it_fails(study: TradeoffStudy, point: MeasuredPoint, required: Requirements, absolute: float) -> str | None:
+def failure_reason(study: TradeoffStudy, point: MeasuredPoint, required: Requirements, absolute: float) -> str | None:
     """Reason why a point does not hold the tolerance, in one sentence; None if it does."""
     sparse = point.sparse
-    lives = _lives_on_the_grid(study, sparse, required.quantity, absolute) if sparse else None
+    lives = _grid_dependence(study, sparse, required.quantity, absolute) if sparse else None
     return (
         lives
-        or _why_not_here(study, point, required.quantity, absolute)
-        or (_why_not_there(study, point, required, absolute) if study.over else None)
+        or _reason_here(study, point, required.quantity, absolute)
+        or (_reason_there(study, point, required, absolute) if study.over else None)
     )
 
 
-def _why_not_here(study: TradeoffStudy, point: MeasuredPoint, name: str, absolute: float) -> str | None:
+def _reason_here(study: TradeoffStudy, point: MeasuredPoint, name: str, absolute: float) -> str | None:
     """Reason why it does not hold the tolerance with margin at the scene's own parameters, or None."""
     unit = study.quantities[name].unit
     error, held = point.error.get(name), point.envelope.get(name)
@@ -89,7 +89,7 @@ def _luck(study: TradeoffStudy, point: MeasuredPoint, name: str, absolute: float
     return ""
 
 
-def _lives_on_the_grid(study: TradeoffStudy, sparse: SparseRun, name: str, absolute: float) -> str | None:
+def _grid_dependence(study: TradeoffStudy, sparse: SparseRun, name: str, absolute: float) -> str | None:
     """Sentence on a point that holds the tolerance only because many samples shorten its steps; else None."""
     dense, rare, unit = sparse.dense_error.get(name), sparse.error.get(name), study.quantities[name].unit
     if dense is None or dense * MARGIN > absolute or (rare is not None and rare * MARGIN <= absolute):
@@ -101,7 +101,7 @@ def _lives_on_the_grid(study: TradeoffStudy, sparse: SparseRun, name: str, absol
     )
 
 
-def _why_not_there(study: TradeoffStudy, point: MeasuredPoint, required: Requirements, absolute: float) -> str | None:
+def _reason_there(study: TradeoffStudy, point: MeasuredPoint, required: Requirements, absolute: float) -> str | None:
     """Reason why a point misses the tolerance at a corner of the range, or None."""
     name, unit = required.quantity, study.quantities[required.quantity].unit
     if point.corners is None:

@@ -11,7 +11,7 @@ from proofroll.core.convergence import floor_text
 from proofroll.core.number_format import counted, number
 from proofroll.core.observable import Role
 from proofroll.files.json_data import plain, record
-from proofroll.running.case import Status, hosts, told_hosts
+from proofroll.running.case import Status, host_sentences, hosts
 from proofroll.running.runner import Runner
 from proofroll.running.time_budget import TimeBudget
 from proofroll.running.timing import Timing, write_benchmarks
@@ -205,7 +205,7 @@ def _cost(timing: Timing | None) -> dict[str, Any]:
 
 def _conclusions(outcome: Tradeoff, budgets: Sequence[CurveBudget]) -> list[str]:
     """Conclusions of the study, as sentences."""
-    sentences = told_hosts(hosts(point.result for point in outcome.points))
+    sentences = host_sentences(hosts(point.result for point in outcome.points))
     quantity = outcome.question.quantity
     scale, unit = outcome.reference.scale(quantity) or 1.0, outcome.reference.scene.observables[quantity].unit
     judged = [item for item in budgets if item.quantity in outcome.quantities and item.contradicts_declaration]

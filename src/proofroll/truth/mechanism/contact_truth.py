@@ -28,7 +28,7 @@ def contact_truth(mechanism: Mechanism, times: Array) -> TwoRouteMotion:
     """
     refuse_uncovered(mechanism)
     units = natural_units(mechanism)
-    with units.said_in_seconds():
+    with units.errors_in_seconds():
         return _in_units(mechanism, units, times / units.time)
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from proofroll.core.arrays import FloatArray
 from proofroll.elements.mechanism.drives import MODES, Actuator
 from proofroll.elements.mechanism.rotations import Array
-from proofroll.elements.mechanism.switches import HOLDING, Mode, SwitchedJoint, changes, left_by
+from proofroll.elements.mechanism.switches import HOLDING, Mode, SwitchedJoint, changes, end_event
 from proofroll.truth.hybrid import Stretch, Transition
 from proofroll.truth.mechanism.stretches import Stretches
 from proofroll.truth.mechanism.two_paths import CLOSE, moment
@@ -56,7 +56,7 @@ class JointStretches(Stretches[Mode]):
         if kind in {"up", "down"}:
             # The force that held the joint has reached its bound: only this joint starts to move.
             was, mode[which] = mode[which], joint.moving(1.0 if kind == "up" else -1.0)
-            return Transition(state, tuple(mode), ((left_by(was), joint.name),))
+            return Transition(state, tuple(mode), ((end_event(was), joint.name),))
         if kind == "still":
             state, decided, margin = self._at_rest(leg, state, which)
             return Transition(state, decided, changes(self.joints, leg.mode, decided), margin)

@@ -5,7 +5,7 @@ import numpy as np
 from proofroll.core.arrays import FloatArray
 from proofroll.elements.mechanism.joint_coordinates import JointCoordinates
 from proofroll.elements.mechanism.rotations import Array
-from proofroll.elements.mechanism.switches import HOLDING, STOPPED, Mode, held_by
+from proofroll.elements.mechanism.switches import HOLDING, STOPPED, Mode, held_joints
 from proofroll.truth.hybrid import Stretch, Transition
 from proofroll.truth.mechanism.joint_stretches import JointStretches, guard_values, noise_of, turned
 from proofroll.truth.mechanism.stretches import StretchLaw
@@ -70,7 +70,7 @@ class SwitchedTree(JointStretches):
         """Force of dry friction or of a stop along each switched joint's coordinate, N or N m."""
         holding = self.equations.solve(*self._parts(state), mode, time=float(state[-1])).holding
         force = np.array([joint.push(own) for joint, own in zip(self.joints, mode, strict=False)])
-        force[held_by(mode)] = holding
+        force[held_joints(mode)] = holding
         return force
 
     def _parts(self, state: Array) -> tuple[Array, Array]:

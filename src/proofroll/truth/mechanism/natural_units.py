@@ -125,7 +125,7 @@ class Units(NamedTuple):
         )
 
     @contextmanager
-    def said_in_seconds(self) -> Iterator[None]:
+    def errors_in_seconds(self) -> Iterator[None]:
         """Context that converts the times in error messages from these units to seconds."""
         try:
             yield

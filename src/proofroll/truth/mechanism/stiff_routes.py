@@ -71,7 +71,7 @@ def run_stiff(mechanism: Mechanism, rank: int, times: Array) -> StiffRuns:
     def joints(y: Array) -> Array:
         return np.array([tree.rate(each[-1], each[:-1]) for each in y])
 
-    with units.said_in_seconds():
+    with units.errors_in_seconds():
         joined, beside = (
             _collocated(joints, each, moments, _TOLERANCES[0], tree.followed())
             for each in (start, tree.eliminated(near))

@@ -51,12 +51,12 @@ def _without_contacts(mechanism: Mechanism, times: Array) -> TwoRouteMotion:
         scout = SwitchedTree(JointCoordinates(_wider(own)), _SCOUT)
         begun = scout.begin()
         assert begun.mode is not None  # every start has a mode
-        with units.said_in_seconds():
+        with units.errors_in_seconds():
             look = scout.walk(0.0, begun.state, begun.mode, float(times[-1]) / units.time)
         if look.guard is None and STOPPED.isdisjoint(look.mode) and not {"least", "greatest"} & {*look.mode}:
             return find_truth(_unlimited(mechanism), times)  # no stop is passed, no limit reached
     refuse_uncovered(mechanism)
-    with units.said_in_seconds():
+    with units.errors_in_seconds():
         return _switched(mechanism, units, own, times / units.time)
 
 

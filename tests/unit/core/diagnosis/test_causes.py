@@ -10,7 +10,7 @@ import pytest
 
 from proofroll.core.diagnosis import Cause, Evidence, Hypothesis, diagnose
 from proofroll.core.diagnosis.fitting import possible
-from proofroll.core.diagnosis.vectors import Reported, product
+from proofroll.core.diagnosis.vectors import ReportedVector, product
 
 FITTED = Cause("x", "it does x", "motion", "m", 1.0, 1e-9, "do y", fitted=1)
 
@@ -46,9 +46,9 @@ def test_only_loads_have_a_wrong_sign() -> None:
     assert [possible(factor, signed=False) for factor in (-1.0, -0.127, 0.5)] == [False, False, True]
 
 
-def _vectors(true: Any, said: Any, **more: Any) -> Reported:
+def _vectors(true: Any, said: Any, **more: Any) -> ReportedVector:
     time = np.arange(len(true)) * 0.01
-    return Reported("w_WB", "the angular velocity", "rad/s", np.asarray(said), np.asarray(true), time, **more)
+    return ReportedVector("w_WB", "the angular velocity", "rad/s", np.asarray(said), np.asarray(true), time, **more)
 
 
 def test_a_limit_that_one_number_meets_is_none() -> None:

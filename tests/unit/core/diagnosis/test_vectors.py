@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from proofroll.core.diagnosis.vectors import Reported
+from proofroll.core.diagnosis.vectors import ReportedVector
 
 
 def test_a_frame_that_fits_by_chance_hides_no_exact_cause() -> None:
@@ -13,7 +13,7 @@ def test_a_frame_that_fits_by_chance_hides_no_exact_cause() -> None:
     angles = np.linspace(0.0, 2.0, 21)
     true = np.stack([np.cos(angles), np.sin(angles), 0 * angles], axis=-1)
     frame = Rotation.from_rotvec(np.outer(2 * angles - np.pi / 2 + 0.03, [0, 0, 1])).as_matrix()
-    told = Reported("v_WB", "the velocity", "m/s", true[:, [1, 0, 2]], true, angles, {"body axes": frame})
+    told = ReportedVector("v_WB", "the velocity", "m/s", true[:, [1, 0, 2]], true, angles, {"body axes": frame})
     proven = [cause for cause in told.causes(None) if cause.proven]
     best = min(proven, key=lambda cause: cause.left)
     assert any("in body axes" in cause.says for cause in proven)  # within a twentieth

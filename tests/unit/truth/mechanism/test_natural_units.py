@@ -237,7 +237,7 @@ def test_messages_of_routes_have_seconds() -> None:
     """A time in a message of a route in natural units is said in seconds."""
     with (
         pytest.raises(Refused, match=r"^stopped at t = 0\.75 s: step 3 of 4 s$"),
-        Units(1.0, 1.0, 0.25).said_in_seconds(),
+        Units(1.0, 1.0, 0.25).errors_in_seconds(),
     ):
         raise Refused("stopped at t = 3 s: step 3 of 4 s")
 

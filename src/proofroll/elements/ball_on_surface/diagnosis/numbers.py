@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from proofroll.core.diagnosis import Cause, Evidence, Hypothesis, hypothesis
-from proofroll.core.diagnosis.fitting import change_by, known_factor, possible, said_factor
+from proofroll.core.diagnosis.fitting import change_by, factor_text, known_factor, possible
 from proofroll.core.errors import InputError
 from proofroll.elements.ball_on_surface.diagnosis.equations import Law, has_resistance, is_bounded, residuals_of
 from proofroll.elements.ball_on_surface.model import RollingBall
@@ -67,7 +67,7 @@ def number(
         for held in residuals_of(evidence):
             factor, fitted = _snapped(held.fit(law, 1.0))
             if possible(factor, signed):
-                factor_words = f"{said_factor(factor)} ({factor * scene:.6g} instead of {scene:.6g})"
+                factor_words = f"{factor_text(factor)} ({factor * scene:.6g} instead of {scene:.6g})"
                 says = f"the engine moves a ball with {what} {factor_words}"
                 yield held.cause(name, says, law(factor), remedy, fitted, change_by(factor))
 

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from proofroll.core.arrays import FloatArray, cross
 from proofroll.core.diagnosis import Cause, Evidence, above_round_off, apart, hypothesis
-from proofroll.core.diagnosis.clocks import in_steps, said_delay
+from proofroll.core.diagnosis.clocks import delay_text, in_steps
 from proofroll.core.diagnosis.fitting import fitted
 from proofroll.core.diagnosis.lines import differing
 from proofroll.core.diagnosis.samples import (
@@ -22,7 +22,7 @@ from proofroll.core.diagnosis.samples import (
     reported_vectors,
     single_precision_run,
 )
-from proofroll.core.diagnosis.vectors import Reported, into
+from proofroll.core.diagnosis.vectors import ReportedVector, into
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.stretches import carried
 
@@ -91,18 +91,20 @@ def reported_force(evidence: Evidence) -> Iterator[Cause]:
     said, true = forces(body, run), forces(body, truth)
     known = np.all(np.isfinite(said) & np.isfinite(true), axis=-1)
     own = {name: frame[known] for name, frame in axes.items()}
-    told = Reported("force", _FORCE, "N", said[known], true[known], time[known], own).after_start()
-    if forced_otherwise(evidence, told):
+    vector = ReportedVector("force", _FORCE, "N", said[known], true[known], time[known], own).after_start()
+    if forced_otherwise(evidence, vector):
         return
-    yield _friction_reversed(told, own[SURFACE][-len(told.true) :, :, 0])
-    yield from told.causes(evidence.step)
+    yield _friction_reversed(vector, own[SURFACE][-len(vector.true) :, :, 0])
+    yield from vector.causes(evidence.step)
 
 
-def _friction_reversed(told: Reported, e1: FloatArray) -> Cause:
+def _friction_reversed(vector: ReportedVector, e1: FloatArray) -> Cause:
     """Cause that N is right and the friction points the other way."""
-    normal = np.sum(told.true * e1, axis=-1, keepdims=True) * e1
+    normal = np.sum(vector.true * e1, axis=-1, keepdims=True) * e1
     says = "the friction has the wrong sign, and N is right"
-    return told.cause("friction sign", says, 2 * normal - told.true, "give the friction on the ball, not on the wall")
+    return vector.cause(
+        "friction sign", says, 2 * normal - vector.true, "give the friction on the ball, not on the wall"
+    )
 
 
 @hypothesis("late start", "the position at time 0 is that of the true path at another time, to second order")
@@ -119,7 +121,7 @@ def starts_late(evidence: Evidence) -> Iterator[Cause]:
     start = evidence.element.first_motion
     bend = start.acceleration[0] * ahead**2 / 2 if start is not None else 0.0
     before, after = float(np.max(np.abs(off))), float(np.max(np.abs(off - v * ahead - bend)))
-    says = f"the start is {said_delay(-ahead, evidence.step)}: the ball has moved before time 0"
+    says = f"the start is {delay_text(-ahead, evidence.step)}: the ball has moved before time 0"
     remedy, change = "sample before the first step", in_steps(ahead, evidence.step)
     yield Cause("late", says, "position at time 0", "m", before, after, remedy, 1, change=change)
 
@@ -170,7 +172,7 @@ def stale_normal(evidence: Evidence) -> Iterator[Cause]:
     delay = fitted(lambda x: np.ravel(turned(x) - said), 0.0, evidence.step or 1e-3)
     if 2 * apart(run["p_WB"].to_numpy()[1:], p) > float(np.max(np.abs(delay * v))):
         return  # the ball itself is as far off, which explains its force
-    moment = said_delay(delay, evidence.step).removesuffix(" late")
+    moment = delay_text(delay, evidence.step).removesuffix(" late")
     says = f"the force is along the axes of the normal of {moment} before"
     after, remedy = apart(said, turned(delay)), "take the normal where the ball is when the force is read"
     change = in_steps(delay, evidence.step)
@@ -189,9 +191,9 @@ def force_at_start(evidence: Evidence) -> Iterator[Cause]:
         frame @ np.array([-lines["N"][key][0], lines["F2"][key][0], lines["F3"][key][0]])
         for key in ("found", "expected")
     )
-    told = Reported("force", _FORCE, "N", said[None], true[None], np.zeros(1), {SURFACE: frame[None]})
-    yield _friction_reversed(told, frame[None, :, 0])
-    yield from told.causes(evidence.step)
+    vector = ReportedVector("force", _FORCE, "N", said[None], true[None], np.zeros(1), {SURFACE: frame[None]})
+    yield _friction_reversed(vector, frame[None, :, 0])
+    yield from vector.causes(evidence.step)
 
 
 def _attitudes(evidence: Evidence) -> FloatArray:

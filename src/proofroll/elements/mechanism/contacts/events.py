@@ -60,9 +60,9 @@ class ContactWatch:
         turning = np.abs(placed.w_WB).max(axis=(1, 2)) * self._element.length
         speeds = np.maximum(np.abs(placed.v_WB).max(axis=(1, 2)), turning)
         seen = self._events(times[:count], followed(placed), pressed, speeds)
-        return SeenInRun(count, self._told(located or (), seen), None)
+        return SeenInRun(count, self._reconciled(located or (), seen), None)
 
-    def _told(self, located: Sequence[Event], seen: Sequence[Event]) -> Sequence[Event]:
+    def _reconciled(self, located: Sequence[Event], seen: Sequence[Event]) -> Sequence[Event]:
         """The engine's own events of contacts, unless its samples show one that is not among them."""
         names = {contact.name for contact in self._element.mechanism.contacts}
         own = [event for event in located if event.name in names]

@@ -74,7 +74,7 @@ class Geometry:
         for key in ("radius", "axes", "size", "orientation", "normal"):
             value, asked = getattr(self, key), key in _KEYS[self.kind]
             if not asked and value != usual.get(key):
-                raise InputError(f"{place}.{key}", value, f"{_a(self.kind)} has none; it has {_said(self.kind)}")
+                raise InputError(f"{place}.{key}", value, f"{_a(self.kind)} has none; it has {_key_list(self.kind)}")
             if asked and value is None:
                 raise InputError(f"{place}.{key}", "nothing", f"{_a(self.kind)} needs it; add it")
         if self.radius is not None:
@@ -198,5 +198,5 @@ def _a(kind: str) -> str:
     return f"an {kind}" if kind == "ellipsoid" else f"a {kind}"
 
 
-def _said(kind: str) -> str:
+def _key_list(kind: str) -> str:
     return " and ".join(_KEYS[kind])

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.diagnosis import Cause, Evidence, hypothesis
-from proofroll.core.diagnosis.fitting import change_by, once, said_factor
+from proofroll.core.diagnosis.fitting import change_by, factor_text, once
 from proofroll.core.diagnosis.samples import both
-from proofroll.core.diagnosis.vectors import Reported
+from proofroll.core.diagnosis.vectors import ReportedVector
 from proofroll.core.errors import Refused
 from proofroll.elements.mechanism.contacts.observables import PRESSES, SLIDES, Followed, followed, normal_forces
 from proofroll.elements.mechanism.diagnosis.equations import is_motion, of_start, placed_of
@@ -126,7 +126,7 @@ def contact_forces(evidence: Evidence) -> Iterator[Cause]:
         reported, true = touch.force[1:, known], touch.true_force[1:, known]
         if known.any() and "contact_forces" not in evidence.settled:
             what, least = "the force of a contact on its first body", evidence.element.force
-            yield from Reported("contact_forces", what, "N", reported, true, touch.time[1:], {}, least).causes(
+            yield from ReportedVector("contact_forces", what, "N", reported, true, touch.time[1:], {}, least).causes(
                 evidence.step
             )
 
@@ -146,7 +146,7 @@ def friction_factor(evidence: Evidence) -> Iterator[Cause]:
                 continue
             factor = float(np.sum(T * full) / np.sum(full * full))
             off = abs(factor) <= _OFF
-            says = f"friction of {name} is {'off' if off else said_factor(factor)}"
+            says = f"friction of {name} is {'off' if off else factor_text(factor)}"
             after = float(np.abs(T - (0.0 if off else factor) * full).max())
             proof = "friction of what slides", "N", float(np.abs(T - full).max()), after
             remedy, change = "give each pair its own coefficient", change_by(factor)
@@ -238,7 +238,7 @@ def forces_at_start(evidence: Evidence) -> Iterator[Cause]:
     if all(other["holds"] for key, other in lines.items() if key != name) and known.any():
         what = "the force of a contact on its first body"
         values = reported[None, known], true[None, known], np.zeros(1)
-        yield from Reported("contact_forces", what, "N", *values, {}, element.force).causes(evidence.step)
+        yield from ReportedVector("contact_forces", what, "N", *values, {}, element.force).causes(evidence.step)
     found = followed(element.start)
     n, friction = found.normal[0], np.array([contact.friction for contact in element.mechanism.contacts])
     N = np.sum(reported * n, axis=-1)
@@ -323,7 +323,7 @@ def at_start(evidence: Evidence) -> Iterator[Cause]:
         lambda factor: off(scaled(factor)), bounds=(0.0, 3.0), method="bounded", options={"xatol": 1e-6}
     )
     yield cause(
-        f"friction of all contacts is {said_factor(float(fit.x))}",
+        f"friction of all contacts is {factor_text(float(fit.x))}",
         float(fit.fun),
         "give each pair its own coefficient",
         1,

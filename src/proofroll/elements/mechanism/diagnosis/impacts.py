@@ -6,8 +6,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from proofroll.core.diagnosis import CLOSES, Cause, Evidence, hypothesis
-from proofroll.core.diagnosis.clocks import said_delay
-from proofroll.core.diagnosis.fitting import change_by, said_factor
+from proofroll.core.diagnosis.clocks import delay_text
+from proofroll.core.diagnosis.fitting import change_by, factor_text
 from proofroll.elements.mechanism.diagnosis.contacts import SeenContact, contact_cause, touch_of
 
 _DELAY, _RATIO = 0.05, 1e-3  # largest delay, in steps, and error of restitution that count as none
@@ -32,7 +32,7 @@ def impacts(evidence: Evidence) -> Iterator[Cause]:
         size = float(np.abs(delays).max())
         if evidence.step and size > _DELAY * evidence.step:
             steps = np.round(2 * np.mean(delays) / evidence.step) / 2
-            says = f"impacts come {said_delay(float(np.mean(delays)), evidence.step)}"
+            says = f"impacts come {delay_text(float(np.mean(delays)), evidence.step)}"
             after = float(np.max(np.abs(delays - steps * evidence.step) + delay_bars))
             proof = "time of impacts", "s", size, after
             remedy = "let the impact act in the step in which the gap closes"
@@ -50,7 +50,7 @@ def impacts(evidence: Evidence) -> Iterator[Cause]:
             says = f"restitution is of another pair: {swaps}"
             yield contact_cause("restitution", says, "restitution", "1", before, after, "give each pair its own")
         factor = float(seen @ own / (own @ own)) if own.any() else np.nan
-        says = f"restitution of all pairs is {said_factor(factor)}"
+        says = f"restitution of all pairs is {factor_text(factor)}"
         after = float(np.max(np.abs(seen - factor * own) + seen_bars))
         proof = "restitution", "1", before, after
         remedy, change = "look at what the engine makes of it", change_by(factor)

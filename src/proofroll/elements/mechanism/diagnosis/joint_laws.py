@@ -6,7 +6,7 @@ import numpy as np
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.diagnosis import Cause, Evidence, above_round_off, hypothesis
-from proofroll.core.diagnosis.fitting import change_by, possible, said_factor
+from proofroll.core.diagnosis.fitting import change_by, factor_text, possible
 from proofroll.core.diagnosis.samples import both
 from proofroll.elements.mechanism.diagnosis.equations import Change, is_motion, of_start, placed_of
 from proofroll.elements.mechanism.diagnosis.residuals import COVERED, best, residuals_of
@@ -89,7 +89,7 @@ def of_actuators(evidence: Evidence) -> Iterator[Cause]:
             if what in {"the limits", "the gears"} and count:  # the equations are not linear in these
                 factor = held.fit(lambda x, law=law: Change(mechanism, effort=law(x)), 1.0)  # type: ignore[misc]  # bound now
             if possible(factor, signed=what != "the limits"):
-                says = f"the engine moves it with {what} of the actuators {said_factor(factor)}"
+                says = f"the engine moves it with {what} of the actuators {factor_text(factor)}"
                 model = Change(mechanism, effort=law(factor))
                 yield held.cause(f"actuators: {what}", says, model, remedy, count, change_by(factor))
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.diagnosis import Cause, Evidence, Hypothesis, hypothesis
-from proofroll.core.diagnosis.fitting import Residuals, change_by, possible, said_factor
+from proofroll.core.diagnosis.fitting import Residuals, change_by, factor_text, possible
 from proofroll.elements.mechanism.diagnosis.equations import Change
 from proofroll.elements.mechanism.diagnosis.residuals import best, residuals_of
 from proofroll.elements.mechanism.joint_coordinates import JointCoordinates
@@ -40,7 +40,7 @@ def factor_of_all(
         for held in residuals_of(evidence) if has(mechanism) else ():
             factor, fitted = best(held, lambda x: change(mechanism, x))
             if possible(factor, signed):
-                says = f"the engine moves it with {what} {said_factor(factor)}"
+                says = f"the engine moves it with {what} {factor_text(factor)}"
                 yield held.cause(name, says, change(mechanism, factor), remedy, fitted, change_by(factor))
 
     return test
@@ -138,7 +138,7 @@ def of_each_body(evidence: Evidence) -> Iterator[Cause]:
                 factor, number = best(held, change)
                 if not possible(factor, False):
                     continue
-                says = f"the engine moves the body {body.name} with its {what} {said_factor(factor)}"
+                says = f"the engine moves the body {body.name} with its {what} {factor_text(factor)}"
                 model, remedy = change(factor), f"give {body.name} its {what} once"
                 yield held.cause(f"{what} of {body.name}", says, model, remedy, number, change_by(factor))
         yield from _reordered(held, mechanism, inertia)

@@ -13,7 +13,7 @@ from scipy.optimize import linear_sum_assignment
 from proofroll.core.arrays import FloatArray
 from proofroll.core.diagnosis import Cause, Evidence, hypothesis
 from proofroll.core.diagnosis.samples import both, forced_otherwise
-from proofroll.core.diagnosis.vectors import Reported, product
+from proofroll.core.diagnosis.vectors import ReportedVector, product
 from proofroll.elements.mechanism.diagnosis.equations import placed_of
 from proofroll.elements.mechanism.diagnosis.reporting_errors import BODY
 from proofroll.elements.mechanism.model import Mechanism
@@ -42,7 +42,7 @@ class Reactions:
         force: the true forces of the same connections [N].
     """
 
-    reported: Reported
+    reported: ReportedVector
     which: list[int]
     placed: Placed
     force: FloatArray
@@ -62,7 +62,7 @@ class Reactions:
 
     def _of_other_joints(self) -> Iterator[Cause]:
         """Hypothesis: reactions are reported at other joints than their own."""
-        given, true = self.reported.said, self.reported.true
+        given, true = self.reported.reported, self.reported.true
         off = np.abs(given[:, :, None] - true[:, None])
         shared = np.any(np.isfinite(off), axis=(0, 3))
         distance = np.where(shared, np.max(np.nan_to_num(off), axis=(0, 3)), np.inf)
@@ -115,7 +115,7 @@ def _reactions(
         }
         own = np.where(known, said[kind], np.nan)[:, which], true[kind][:, which]
         least = force if kind == "force" else force * element.length
-        reported = Reported(kind, what, unit, *own, placed.time, frames, least, bars.get(kind, 0.0))
+        reported = ReportedVector(kind, what, unit, *own, placed.time, frames, least, bars.get(kind, 0.0))
         yield Reactions(reported, which, placed, true["force"][:, which])
 
 

@@ -17,7 +17,7 @@ from proofroll.core.diagnosis.samples import (
     reported_vectors,
     single_precision_run,
 )
-from proofroll.core.diagnosis.vectors import Reported
+from proofroll.core.diagnosis.vectors import ReportedVector
 from proofroll.core.first_steps import OF_FIRST_STEPS
 from proofroll.elements.mechanism.diagnosis.equations import placed_of
 
@@ -39,17 +39,19 @@ def _state(element: Any, data: xr.Dataset) -> FloatArray:
     return np.concatenate(parts, axis=-1)
 
 
-def _of_centres(told: Reported, evidence: Evidence) -> Iterator[Cause]:
+def _of_centres(vector: ReportedVector, evidence: Evidence) -> Iterator[Cause]:
     """Hypothesis: positions or velocities are those of the centres of mass."""
     com = np.array([body.com for body in evidence.element.mechanism.bodies])
-    if told.name == "w_WB" or not np.any(com) or told.said.shape != told.true.shape:
+    if vector.name == "w_WB" or not np.any(com) or vector.reported.shape != vector.true.shape:
         return
     placed = placed_of(evidence.element.mechanism, evidence.truth)
     arm = np.einsum("tnij,nj->tni", placed.R_WB[:, :-1], com)
-    shift = arm if told.name == "p_WB" else np.cross(placed.w_WB, arm)
-    what = "position" if told.name == "p_WB" else "velocity"
-    says = f"{told.name} is the {what} of the centres of mass, not of the origins of the bodies' frames"
-    yield told.cause("centre of mass", says, told.true + shift[-len(told.true) :], "give the origins of the frames")
+    shift = arm if vector.name == "p_WB" else np.cross(placed.w_WB, arm)
+    what = "position" if vector.name == "p_WB" else "velocity"
+    says = f"{vector.name} is the {what} of the centres of mass, not of the origins of the bodies' frames"
+    yield vector.cause(
+        "centre of mass", says, vector.true + shift[-len(vector.true) :], "give the origins of the frames"
+    )
 
 
 @hypothesis(
