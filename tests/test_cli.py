@@ -16,7 +16,7 @@ import pytest
 
 from proofroll.cli.options import require_pages
 from proofroll.core.errors import Missing
-from proofroll.files.scene_file import scene_names
+from proofroll.files.scene_file import load_scene, scene_names
 from proofroll.running.process import Worker
 
 RUN = ["run", "sphere_in_cylinder", "--engine", "oracle", "--until", "0.1", "--every", "0.05"]
@@ -163,6 +163,8 @@ def test_run_json(proofroll: Proofroll) -> None:
     assert set(found) >= KEYS
     assert set(found["final"]) >= FINAL
     assert found["engine"] == "oracle"
+    assert found["parameters"].keys() == load_scene("sphere_in_cylinder").parameters.keys()  # with the defaults
+    assert (found["parameters"]["speed"], found["parameters"]["radius"]) == (5.0, 0.025)
     assert found["settings"] == {"formulation": "only", "preset": "matched", "dt": 0.01}
     assert (found["status"], found["until"], found["events"]) == ("done", 0.1, [])
     assert found["final"]["time"] == pytest.approx(0.1)
