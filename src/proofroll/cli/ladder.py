@@ -11,7 +11,9 @@ from proofroll.cli import options
 def ladder(
     scene: options.SceneName,
     settings: options.Set = None,
-    quantity: Annotated[str | None, typer.Option(help="Observable; by default what decides the scene.")] = None,
+    quantity: Annotated[
+        str | None, typer.Option(help="Observable; by default the scene's deciding observable.")
+    ] = None,
     tolerance: Annotated[float | None, typer.Option(help="Error of it that is allowed, in its unit.")] = None,
     until: options.Until = None,
     engine: options.Engines = None,
@@ -25,7 +27,7 @@ def ladder(
     scheduler: options.Scheduler = None,
     as_json: options.Json = False,
 ) -> None:
-    """Run one quantity up the ladder of models, and switch each optional term on and off."""
+    """Compare one quantity across models of increasing detail, then with each optional term off and on."""
     from proofroll.report.ladder.ladder import ladder_content
     from proofroll.report.ladder.tables import ladder_parts
     from proofroll.studies.ladder.ladder import Ladder

@@ -40,11 +40,14 @@ _MOMENT = 1e-7
 
 
 def first_steps_fit_the_scene(subject: Subject) -> None:
-    """Check: the initial acceleration, derived from the first steps, is the scene's."""
+    """Check: the initial acceleration, derived from the first steps, is the scene's.
+
+    Skipped for contacts too soft to show it, and for motions at rest or at a switch within these steps.
+    """
     subject.build()
     lines = first_steps(subject.engine, subject.scene, subject.settings)
     if not lines:
-        raise SkipTest("its contact is so soft that its springs move first; the run against the truth judges it")
+        raise SkipTest("the first steps cannot show it (soft contact, or rest); the run against the truth judges it")
     difference = first_difference([dataclasses.replace(line, tolerance=min(line.tolerance, MOST)) for line in lines])
     if difference is not None:
         raise UnlikeSceneError(subject, str(difference))

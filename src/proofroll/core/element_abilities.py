@@ -93,7 +93,7 @@ class KnowsAnotherScene(Protocol):
     """Ability of an element that can tell when an engine built a different kind of model with admissible numbers."""
 
     def another_scene(self, lines: Sequence[Mapping[str, Any]], truth: xr.Dataset) -> str | None:
-        """Reason why the engine's model is of a different kind, as one clause; None: it is of the same kind.
+        """Reason why the engine's model represents another kind of scene than the one asked for; None: it does not.
 
         Args:
             lines: of a stored certificate (:meth:`proofroll.core.certificate.Line.as_dict`).

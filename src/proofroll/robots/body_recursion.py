@@ -58,7 +58,10 @@ def newton_euler(robot: Robot, states: RobotStates, v: Array, a: Array, gravity:
 
 
 def _subspace(joint: RobotJoint, R: Array) -> Array:
-    """Motion subspace of the joint: its spatial velocities (rotation first), shape (states, 6, velocities)."""
+    """Joint motion subspace at the child's origin, child axes, angular part first; shape (states, 6, velocities).
+
+    A free joint's velocities are in world axes, linear first.
+    """
     zero = np.zeros((3, 3))
     if joint.kind == "free":
         E = R.transpose(0, 2, 1)

@@ -122,11 +122,11 @@ def _row(engines: Sequence[str], entry: Entry, workers: Workers | None = None) -
         return GalleryRow(entry.name, entry.package, None if path is None else str(path))
     readings, unexpected = [], []
     for item in check(path, wanted, base=entry.base, workers=workers).engines:
-        does = outcome(item)
-        readings.append(GalleryReading(item.engine, item.version, item.status, item.causes, item.message, does))
-        if item.status != "missing" and set(does) != set(entry.engines[item.engine]):
+        found = outcome(item)
+        readings.append(GalleryReading(item.engine, item.version, item.status, item.causes, item.message, found))
+        if item.status != "missing" and set(found) != set(entry.engines[item.engine]):
             expected = ", ".join(entry.engines[item.engine]) or "to hold the file"
-            unexpected.append(f"{item.named}: expected {expected}; found {', '.join(does) or 'holds the file'}")
+            unexpected.append(f"{item.named}: expected {expected}; found {', '.join(found) or 'holds the file'}")
     return GalleryRow(entry.name, entry.package, str(path), readings, unexpected)
 
 

@@ -150,14 +150,19 @@ class AgainstCheck(RobotCheck):
 
 @dataclass(frozen=True)
 class GalleryReading:
-    """Reading of a robot by an engine; ``does`` is its outcome in the words of the gallery's file."""
+    """Reading of a robot by an engine.
+
+    Attributes:
+        engine, version, status, causes, message: as of :class:`ImporterRow`.
+        outcome: causes, "open", "refuses" or a status, as in the gallery's file; empty: the engine holds the file.
+    """
 
     engine: str
     version: str | None
     status: str
     causes: Sequence[RobotCause]
     message: str | None
-    does: list[str]
+    outcome: list[str]
 
 
 @dataclass(frozen=True)

@@ -154,14 +154,14 @@ def gallery_lines(content: GalleryContent) -> Iterator[str]:
         if row.file is None:
             yield from wrapped(f"{row.name}: not here: pip install {row.package}")
             continue
-        does = (f"{item.engine}: {', '.join(item.does) or 'holds'}" for item in row.engines)
-        yield from wrapped(f"{row.name}: {'; '.join(does)}")
+        outcomes = (f"{item.engine}: {', '.join(item.outcome) or 'holds'}" for item in row.engines)
+        yield from wrapped(f"{row.name}: {'; '.join(outcomes)}")
         for sentence in row.unexpected:
             yield from wrapped(f"!! {row.name}: {sentence}")
     unexpected = sum(len(row.unexpected) for row in content.robots)
     checked = [item for row in content.robots for item in row.engines]
     named = sum(bool(item.causes) for item in checked)
-    unnamed = sum("open" in item.does for item in checked)
+    unnamed = sum("open" in item.outcome for item in checked)
     refused = sum(item.status == "refused" for item in checked)
     sizes = f"{counted(len(content.robots), 'robots')}, {counted(len(checked), 'readings')}"
     yield from wrapped(

@@ -58,7 +58,8 @@ class RunOutcome:
     """Outcome of a run.
 
     Attributes:
-        stable: True if it reached the end without a sign of failure, and was not wrong by the whole range.
+        stable: True if the run reached the end without a sign of failure and its error stayed below the quantity's
+            range.
         accurate: True if it is stable and the deciding observable was wrong by at most 1 % of its range; without a
             truth the same as stable.
         failure: first sign of failure, if it was not accurate.
@@ -169,9 +170,9 @@ def _failed(
 
 
 def _errors(dataset: xr.Dataset, yardstick: Yardstick) -> FloatArray | None:
-    """Error of the deciding observable at each sample, of its worst component, as a part of the range.
+    """Largest error of a component of the deciding observable at each sample, as a part of the range; shape (time,).
 
-    Errors off the grid count at the sample after them.
+    A larger error off the grid, in the interval before the sample, takes its place.
     """
     if yardstick.true is None:
         return None

@@ -121,8 +121,8 @@ class Residuals(Generic[M]):
         return np.asarray(changed[:, seen] / sizes[seen])
 
     @property
-    def alone(self) -> bool:
-        """True if there is only one equation, which any single fitted parameter closes."""
+    def single_equation(self) -> bool:
+        """True for a single equation: any one fitted parameter closes it, so a fit proves nothing."""
         return len(self.left(self.plain)) < 2
 
     def explained(self, model: M | None) -> int:

@@ -126,7 +126,7 @@ def _expected(body: RollingBall, built: BallBuilt) -> tuple[FloatArray, FloatArr
 
 
 def another_scene(lines: Iterable[Mapping[str, Any]], needed: float) -> str | None:
-    """Reason that the engine's model counts as another scene, as one clause; None: it does not.
+    """Reason why the engine's model represents another kind of scene than the one asked for; None: it does not.
 
     A scene with unbounded friction may be built with a finite coefficient. It changes nothing while the motion needs
     less friction than that; where the motion needs more, the ball slips in the engine though it cannot in the scene.

@@ -206,9 +206,9 @@ def stays(body: RollingBall, p_WB: FloatArray) -> bool:
 
 
 def setting_off(body: RollingBall, p_WB: FloatArray) -> FloatArray:
-    """Velocity down the slope at ``p_WB`` [m], shape (3,) [m/s]: a direction for the resistance, too small for effects.
+    """Negligible velocity down the slope at ``p_WB`` [m], shape (3,) [m/s].
 
-    Only where the ball does not stay (:func:`stays`).
+    It gives rolling resistance a direction where a resting ball starts to move, and does not :func:`stays`.
     """
     pull, _ = _pull(body, p_WB)
     strength = float(np.linalg.norm(pull))

@@ -19,7 +19,7 @@ from proofroll.elements.mechanism.analysis import BRANCHES, RANK, RowSign, analy
 from proofroll.elements.mechanism.complementarity import decided, load_of, refuse_switching, struck
 from proofroll.elements.mechanism.kinematics import BodyMotion, Rows, Tree
 from proofroll.elements.mechanism.model import Mechanism
-from proofroll.elements.mechanism.named_forces import lengths, on_joint, taken
+from proofroll.elements.mechanism.named_forces import joint_force_shares, lengths, taken
 from proofroll.elements.mechanism.record import Record, gathered, integrated
 from proofroll.elements.mechanism.rotations import Array, skews, to_quaternion
 from proofroll.elements.mechanism.signal import value_at, varies
@@ -328,7 +328,7 @@ class JointCoordinates:
         holding = dict(zip(held_joints(mode), found.holding, strict=True))
         for number, (joint, own) in enumerate(zip(self.switched, mode, strict=False)):
             force = holding.get(number, joint.push(own))
-            on = on_joint(own in STOPPED, joint.friction, force)
+            on = joint_force_shares(own in STOPPED, joint.friction, force)
             fields["friction"][joint.number], fields["stop"][joint.number] = on
         return taken(self.mechanism, fields)
 

@@ -66,10 +66,15 @@ def taken(mechanism: Mechanism, fields: Mapping[str, Array]) -> Array:
     return np.array([fields[item.field][item.place] for item in named_forces(mechanism)], dtype=float)
 
 
-def on_joint(at_stop: bool, friction: float, force: float) -> tuple[float, float]:
-    """Shares (dry friction, stop) of the force that holds or rubs on a joint.
+def joint_force_shares(at_stop: bool, friction: float, force: float) -> tuple[float, float]:
+    """Shares (dry friction, stop) of the force that holds or rubs on a joint [N, N m].
 
     Both are NaN where a stop and friction hold together, for then neither is determinate.
+
+    Args:
+        at_stop: True if the force may be that of a stop.
+        friction: largest dry friction of the joint [N, N m]; 0: none.
+        force: along the coordinate [N, N m].
     """
     if not at_stop:
         return force, 0.0

@@ -127,7 +127,7 @@ class Placed:
         return np.asarray(self.energies().sum(-1))
 
     def energies(self) -> FloatArray:
-        """Parts of the energy [J], shape (time, parts); they may cancel in the sum, as height and motion do."""
+        """Kinetic, gravitational and elastic energies [J], shape (time, parts); they may cancel in the sum."""
         found: list[FloatArray] = []
         for body in self.mechanism.bodies:
             R, w = self.R_WB[:, self.mechanism.body_index[body.name]], self.spin(body.name)

@@ -14,7 +14,7 @@ import numpy as np
 
 from proofroll.elements.mechanism import Body, Joint, Mechanism
 from proofroll.elements.mechanism.drives import Actuator
-from proofroll.elements.mechanism.named_forces import lengths, on_joint
+from proofroll.elements.mechanism.named_forces import joint_force_shares, lengths
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.elements.mechanism.signal import value_at, varies
 from proofroll.engines.exudyn.native import Output, add_renamed, data_node, items
@@ -149,7 +149,7 @@ class JointLaws:
         for law, push in pushes:
             if law.field == "joint":
                 joint = self._mechanism.joints[law.number]
-                parts = on_joint(bool(joint.limits), joint.friction, push)
+                parts = joint_force_shares(bool(joint.limits), joint.friction, push)
                 forces["friction"][law.number], forces["stop"][law.number] = parts
             elif law.field:
                 forces[law.field][law.place] = push

@@ -6,7 +6,7 @@ import numpy as np
 import pinocchio as pin
 
 from proofroll.elements.mechanism.joint import AT_STOP
-from proofroll.elements.mechanism.named_forces import on_joint
+from proofroll.elements.mechanism.named_forces import joint_force_shares
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.elements.mechanism.switches import SwitchedJoint, switched_joints
 from proofroll.engines.pinocchio.joint_tree import JointTree
@@ -84,6 +84,6 @@ class JointRows:
             if item.limit is None or item.joint.number in closed:
                 total[item.joint.number] += item.sign * float(size)
         for joint in self.switched:
-            on = on_joint(joint.number in closed, joint.friction, total[joint.number])
+            on = joint_force_shares(joint.number in closed, joint.friction, total[joint.number])
             along["friction"][joint.number], along["stop"][joint.number] = on
         return along

@@ -188,7 +188,10 @@ class JointTree:
         return pin.getFrameVelocity(self.model, data, frame, pin.LOCAL_WORLD_ALIGNED)
 
     def put(self, forces: Any, data: Any, frame: int, place: Array, force: Array, torque: Array | None = None) -> None:
-        """Adds a force and a moment at a point, in world axes, to the forces on the joint that carries a frame."""
+        """Adds to ``forces``, in place, a world-frame force and moment on the body that carries ``frame``.
+
+        They act at the world point ``place`` [m]; ``force`` [N], ``torque`` [N m].
+        """
         joint = self.model.frames[frame].parentJoint
         at = data.oMi[joint].inverse() * pin.SE3(np.eye(3), place)
         forces[joint] = forces[joint] + at.act(pin.Force(force, np.zeros(3) if torque is None else torque))

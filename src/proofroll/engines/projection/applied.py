@@ -133,7 +133,10 @@ class Applied:
         ]
 
     def _motor(self, place: int, actuator: Actuator, number: int, joint: Joint) -> _Law:
-        """Force law of an actuator: spring, damper and drive at its joint; a push if it has a limit or varies."""
+        """Force law of an actuator at its joint: linear spring, damper and drive.
+
+        A function of t, q and v if the actuator is limited or varies with time.
+        """
         n, target = actuator.gear, actuator.target
         axis = "slide" if joint.kind == "prismatic" else "z"
         if actuator.limit is not None or not isinstance(target, float):

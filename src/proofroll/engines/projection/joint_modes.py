@@ -14,7 +14,7 @@ from proofroll.core.errors import NotUnique, Refused
 from proofroll.core.integrators import Integrator
 from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.contacts.start import natural_scale
-from proofroll.elements.mechanism.named_forces import on_joint
+from proofroll.elements.mechanism.named_forces import joint_force_shares
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.elements.mechanism.signal import breaks
 from proofroll.elements.mechanism.switches import (
@@ -72,7 +72,7 @@ class SwitchedMotion(AlternatingMotion[Mode]):
         along = {"friction": np.full(count, np.nan), "stop": np.full(count, np.nan)}
         for k, joint in enumerate(self._joints):
             own = self.mode[k]
-            on = on_joint(own in STOPPED, joint.friction, forces.get(k, joint.push(own)))
+            on = joint_force_shares(own in STOPPED, joint.friction, forces.get(k, joint.push(own)))
             along["friction"][joint.number], along["stop"][joint.number] = on
         return along
 

@@ -39,8 +39,8 @@ class EngineCurve:
         row: number of its row.
         difference: from the truth, None where it is not finite.
         tolerance: of its judgement, or None.
-        limit: of small steps, if the judgement has one: its distance from the truth, that distance's uncertainty, and
-            the observed order or None.
+        limit: [distance of the limit of small steps from the truth, its uncertainty, observed order]; None without a
+            ladder.
         at: indices of the samples drawn, unless all are.
     """
 

@@ -48,7 +48,7 @@ class StabilityPart(Part):
 
     @classmethod
     def load(cls, path: Path, engines: Sequence[str]) -> StabilityPart:
-        """See the protocol."""
+        """See :meth:`proofroll.report.parts.Part.load`."""
         return cls(file_for(str(path)), tuple(engines))
 
     @staticmethod

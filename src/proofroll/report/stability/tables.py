@@ -36,7 +36,10 @@ def stability_parts(study: StabilityStudy, path: Path) -> Iterator[Table | str]:
 
 
 def headline(study: StabilityStudy) -> str:
-    """Sentences with counts of points, boundaries, and silent ones among them."""
+    """Summary of a map: points, boundaries, those that the engine does not report (silent), and kinds of failure.
+
+    It counts refused and skipped points, and names the machines of a cluster.
+    """
     counts = ", ".join(f"{count} {kind}" for kind, count in sorted(study.failures.items(), key=lambda i: -i[1]))
     sizes = f"{counted(len(study.points), 'points')}, {counted(study.boundaries, 'boundaries')}"
     text = f"{sizes}, {study.silent} of them silent ({counted(study.runs, 'runs')})."

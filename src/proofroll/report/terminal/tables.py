@@ -99,7 +99,7 @@ def _beyond(item: WorstJudgement) -> float:
 
 
 def columns(content: ReportedComparison) -> list[tuple[str, str]]:
-    """Observables that fit on the terminal: headline motions, and the first headline reaction."""
+    """(name, unit) of the observables shown on a terminal: headline motions, and the first headline reaction."""
     units = observables(content)
     shown = [name for name in content.headlines("motion") if name in units]
     shown += [name for name in content.headlines("reaction") if name in units][:1]

@@ -84,7 +84,7 @@ class Run:
         parameters: the point.
         facts: the engine with complete settings, or None if it could not be asked.
         result: of the run itself.
-        judgements: one per observable; empty if there is no trajectory.
+        judgements: one per observable; empty if there is no trajectory or no truth, and for another scene.
         contradictions: sentences about unexpected results.
         case: the run's case, or None.
         missing: observables that the claim's tolerances judge and the run does not report.

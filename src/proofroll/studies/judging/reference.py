@@ -51,7 +51,7 @@ class Reference:
         return replace(self, dataset=truth, curves=observe(self.scene, truth)), runs
 
     def another_scene(self, lines: Sequence[Mapping[str, Any]]) -> str | None:
-        """Reason, as a clause, why a model with this certificate is of a different kind than the scene; or None."""
+        """Reason why a model with this certificate represents another kind of scene than the one asked for; or None."""
         for element in self.scene.elements:
             if isinstance(element, KnowsAnotherScene):
                 why = element.another_scene(lines, part(self.scene, element, self.dataset))

@@ -16,10 +16,11 @@ class MeasuredCost:
 
     Attributes:
         seconds_per_second: median of wall time per simulated second; None: not measured.
-        interval: lowest and highest, with ``confidence``; None if it was measured once.
-        rounds: the measurements, one per round; the rounds are the same for all points, so that a ratio of two costs
-            can be taken round by round.
-        measurements: number of measurements.
+        interval: lowest and highest; None if it was measured once.
+        confidence: of the interval.
+        rounds: cost measured in each round [s/s]; all points share the rounds, so that a ratio of two costs can be
+            taken round by round.
+        measurements: their number.
     """
 
     seconds_per_second: float | None = None

@@ -27,7 +27,10 @@ _STILL = 1e-9  # time left until standstill, relative to the pace, below which t
 
 
 class Polar(Sliding):
-    """Route in (u, u̇, ω1); see :class:`Sliding`."""
+    """Route in surface coordinates u, their rates, and the spin ω1 about the normal.
+
+    While slipping also slip speed and direction; see :class:`Sliding`.
+    """
 
     name = "surface coordinates with direction of slip, DOP853"
 

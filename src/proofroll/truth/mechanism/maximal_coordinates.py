@@ -18,7 +18,7 @@ from scipy.spatial.transform import Rotation
 from proofroll.core.errors import Missing
 from proofroll.elements.mechanism.complementarity import refuse_switching
 from proofroll.elements.mechanism.model import Mechanism
-from proofroll.elements.mechanism.named_forces import lengths, on_joint, taken
+from proofroll.elements.mechanism.named_forces import joint_force_shares, lengths, taken
 from proofroll.elements.mechanism.record import Record, gathered, integrated
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.truth.mechanism.constraint_rows import ConstraintRow
@@ -346,6 +346,6 @@ class MaximalCoordinates:
         holding = dict(zip(switched.held, solved.multipliers[held:], strict=True))
         for number, joint in enumerate(self.mechanism.joints):
             force = holding.get(number, switched.push.get(number, 0.0))
-            on = on_joint(number in switched.stopped, joint.friction, force)
+            on = joint_force_shares(number in switched.stopped, joint.friction, force)
             fields["friction"][number], fields["stop"][number] = on
         return taken(self.mechanism, fields)

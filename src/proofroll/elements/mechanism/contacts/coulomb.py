@@ -19,7 +19,8 @@ _SWEEPS = 1000
 _SETTLED = 1e-12  # largest change in the last sweep, relative to the largest force
 _RESTS = 1e-10  # motion of a contact that counts as none, relative to the loads
 # Margin, relative to friction's bound, above which a contact slides: closer to the bound round-off decides, and no
-# direction of slip would be found. :func:`sure` tells if an outcome depends on less than the parameters are known to.
+# direction of slip would be found. :func:`sure` tells if an outcome depends on a change within the accuracy of the
+# parameters.
 _AT_BOUND = 1e-9
 # Relative change of loads and friction with which an outcome is tried on both sides; an outcome that changes is not
 # unique. Each further contact gets an extra 0.382 of it: equal changes would cancel between two walls.

@@ -127,7 +127,7 @@ def best(held: Residuals[Change], change: Callable[[float], Change]) -> tuple[fl
         return float(np.max(np.abs(left), initial=0.0))
 
     known = min(FACTORS, key=left_by)
-    if held.alone or left_by(known) <= held.closes * held.before:
+    if held.single_equation or left_by(known) <= held.closes * held.before:
         return known, 0
     square = float(slope @ slope)
     return (1.0 - float(slope @ at) / square if square else 1.0), 1
