@@ -245,8 +245,8 @@ def _at_run_time(tree: ast.AST) -> Iterator[ast.ImportFrom]:
             yield from _at_run_time(node)
 
 
-def circle(root: Path) -> list[str]:
-    """Modules of a package below ``root`` that import each other in a circle; empty: there is none."""
+def leading(root: Path) -> dict[str, set[str]]:
+    """Each module of a package below ``root`` -> those of the package that it imports when it runs."""
     modules = {
         ".".join([root.name, *file.relative_to(root).with_suffix("").parts]).removesuffix(".__init__"): file
         for file in root.rglob("*.py")
@@ -260,6 +260,24 @@ def circle(root: Path) -> list[str]:
             for alias in node.names
         ]
         leads[name] = {inner if inner in modules else str(outer) for outer, inner in asked} & modules.keys() - {name}
+    return leads
+
+
+def folders_of(leads: dict[str, set[str]], package: str) -> dict[str, set[str]]:
+    """Each folder or module directly in a package -> the others there that it imports."""
+    folders: dict[str, set[str]] = {}
+    for name, others in leads.items():
+        if name.startswith(f"{package}."):
+            inside = [
+                other[len(package) + 1 :].partition(".")[0] for other in others if other.startswith(f"{package}.")
+            ]
+            own = name[len(package) + 1 :].partition(".")[0]
+            folders.setdefault(own, set()).update(set(inside) - {own})
+    return folders
+
+
+def circle(leads: dict[str, set[str]]) -> list[str]:
+    """Modules or folders that import each other in a circle; empty: there is none."""
     try:
         graphlib.TopologicalSorter(leads).prepare()
     except graphlib.CycleError as error:
@@ -269,7 +287,23 @@ def circle(root: Path) -> list[str]:
 
 def test_no_modules_import_each_other() -> None:
     """No module imports, even inside a function, one that leads back to it."""
-    assert circle(ROOT) == []
+    assert circle(leading(ROOT)) == []
+
+
+def test_no_folders_of_studies_import_each_other() -> None:
+    """A study of one folder builds on another's, and never the other way round as well."""
+    assert circle(folders_of(leading(ROOT), "proofroll.studies")) == []
+
+
+@pytest.mark.parametrize("folder", MAY)
+def test_the_map_says_what_a_folder_may_import(folder: str) -> None:
+    """The map in CONTRIBUTING has the folders that each may import; *the above*: all in the rows above it."""
+    text = (ROOT.parents[1] / "CONTRIBUTING.md").read_text(encoding="utf-8")
+    rows = dict(re.findall(r"^\| `(\w+)/` \|.*\| ([^|]*) \|$", text, flags=re.MULTILINE))
+    names = set(re.findall(r"`(\w+)`", rows[folder].partition(";")[0]))
+    if "the above" in rows[folder]:
+        names |= set(list(rows)[: list(rows).index(folder)])
+    assert names == MAY[folder] - {folder}
 
 
 def test_a_circle_is_seen(tmp_path: Path) -> None:
@@ -279,6 +313,8 @@ def test_a_circle_is_seen(tmp_path: Path) -> None:
     (package / "__init__.py").write_text("")
     (package / "a.py").write_text("from pack.b import f\n")
     (package / "b.py").write_text("if TYPE_CHECKING:\n    from pack.a import g\n")
-    assert circle(package) == []
+    assert circle(leading(package)) == []
     (package / "b.py").write_text("def f():\n    from pack import a\n")
-    assert set(circle(package)) == {"pack.a", "pack.b"}
+    assert set(circle(leading(package))) == {"pack.a", "pack.b"}
+    inner = {"pack.x.a": {"pack.y.b"}, "pack.y.b": set(), "pack.y.c": {"pack.x.d"}, "pack.x.d": set()}
+    assert set(circle(folders_of(inner, "pack"))) == {"x", "y"}, "of folders, though no two modules do"

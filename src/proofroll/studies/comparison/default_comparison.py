@@ -1,4 +1,4 @@
-"""Default comparison of a scene that has no comparison file, and default axes of its stability map."""
+"""Default comparison of a scene that has no comparison file."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -6,7 +6,7 @@ from typing import Any
 
 from proofroll.core.comparison import Band, Comparison, Row, Tolerance
 from proofroll.core.engine_abilities import offered
-from proofroll.core.errors import InputError, ProofrollError
+from proofroll.core.errors import InputError
 from proofroll.core.multi_element import each_alone, represents
 from proofroll.core.observable import Role
 from proofroll.core.plugins import engine_names, parse_engine
@@ -17,15 +17,12 @@ from proofroll.running.asking import described, resolve
 from proofroll.running.case import EngineDescription, EngineFacts
 from proofroll.running.process import processor_seconds
 from proofroll.running.worker_pool import Workers
-from proofroll.studies.stability.axes import Axis, AxisTerm
 
 _UNTIL, _FIRST, _SAMPLES = 1.0, 2.0, 50  # default length [s], longest length [s], number of samples
 _STEP = 4e-3  # s: sampling intervals are multiples of it, so that a ladder of steps down to 1e-3 s divides them
 BUDGET = 60.0  # default processor time of all runs [s]
 _CLOSE = "close"
 _BECAUSE = "no file says what to expect of this scene"
-# Values of a parameter along an axis, relative to its default, as far as its bounds allow.
-_PARTS = (0.1, 1.0, 10.0)
 
 
 def compared(
@@ -145,25 +142,3 @@ def _reason_for_none(scene: Scene, workers: Workers | None) -> str:
         lacking_for = " and ".join(none) or "all elements of one kind at once"
         reasons.append(f"{engine.name} has no formulation for {lacking_for}")
     return f"no installed engine can represent all of the scene: {'; '.join(reasons)}"
-
-
-def axes_of(name: str) -> list[Axis]:
-    """Axes of a stability map: each continuous parameter of the scene that is not zero, and the length of the run."""
-    file = read_scene_file(name)
-    values = load_scene(name).parameters
-    axes = []
-    for key, item in file.parameters.items():
-        if item.integer or not values[key]:
-            continue
-        allowed = [part for part in _PARTS if _loads(name, key, part * values[key])]
-        if len(allowed) > 1:
-            axes.append(Axis(key, "1", f"{item.meaning}, in parts of the default", allowed, {key: AxisTerm(key)}))
-    return [*axes, Axis("horizon", "swings", "length of the run in natural times", [1.0, 3.0], horizon=True)]
-
-
-def _loads(name: str, key: str, value: float) -> bool:
-    try:
-        load_scene(name, **{key: value})
-    except ProofrollError:
-        return False
-    return True

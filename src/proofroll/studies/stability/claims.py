@@ -14,9 +14,9 @@ from proofroll.core.plugins import parse_engine
 from proofroll.core.validation import strict, validated
 from proofroll.files.scene_file import is_scene, load_scene, read_scene_file
 from proofroll.files.toml import study_content, study_files
-from proofroll.studies.comparison.default_comparison import axes_of
 from proofroll.studies.failure import meanings
 from proofroll.studies.stability.axes import Axis, AxisTerm
+from proofroll.studies.stability.default_axes import axes_of
 from proofroll.studies.stability.records import Boundary, BoundaryPoint, StabilityStudy, dependence
 from proofroll.studies.stability.step_numbers import step_numbers
 
