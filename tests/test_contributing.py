@@ -62,3 +62,27 @@ def test_every_folder_of_the_package_is_on_the_map() -> None:
     """Each folder of the package has a row of the map."""
     folders = {path.parent.name for path in SOURCE.glob("*/__init__.py")}
     assert [name for name in sorted(folders) if f"| `{name}/` |" not in TEXT] == []
+
+
+def test_a_test_lies_where_its_module_does() -> None:
+    """A test file with the name of one module of the package, of two words or more, lies in that module's folder."""
+    homes: dict[str, list[Path]] = {}
+    for file in SOURCE.rglob("*_*.py"):
+        homes.setdefault(f"test_{file.name}", []).append(file.parent.relative_to(SOURCE))
+    tests = ROOT / "tests" / "unit"
+    astray = [
+        f"{file.relative_to(tests)} tests a module of {homes[file.name][0]}"
+        for file in tests.rglob("test_*_*.py")
+        if len(homes.get(file.name, [])) == 1 and homes[file.name] != [file.parent.relative_to(tests)]
+    ]
+    assert astray == []
+
+
+def test_every_path_in_the_text_is_there() -> None:
+    """A file or folder that a sentence names by a path is in the repository."""
+    text = re.sub(r"^ *```.*?^ *```$", "", TEXT, flags=re.DOTALL | re.MULTILINE)
+    named = {name.rstrip("/") for name in re.findall(r"`([\w./-]+(?:\.py|\.md|\.toml|/))`", text)}
+    tops = ("findings", "src", "models", "comparisons", "docs", "examples", "papers", "benchmarks", "tests")
+    there = [f"/{path.relative_to(ROOT)}" for top in tops for path in (ROOT / top, *(ROOT / top).rglob("*"))]
+    there += [f"/{path.name}" for path in ROOT.iterdir()]
+    assert [name for name in sorted(named) if not any(path.endswith(f"/{name}") for path in there)] == []

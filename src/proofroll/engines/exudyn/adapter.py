@@ -1,0 +1,180 @@
+"""Exudyn (https://github.com/jgerstmayr/EXUDYN), an engine for flexible and rigid multibody systems.
+
+It has no joint for a sphere on a curved wall. Four formulations of one are built from its items: :mod:`generic` (on a
+wall that moves, or that no rigid motion slides along itself, :mod:`world_coordinates`), :mod:`carrier`,
+:mod:`rolling_disc` and :mod:`contact`. The first and the last let the ball slip. In all but the first the ball is a
+rigid body; its orientation is always in the model, as Euler parameters of its node.
+
+Mechanisms are bodies in redundant coordinates (:mod:`redundant`) or its kinematic tree (:mod:`tree`).
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from importlib.metadata import version
+from typing import Any, ClassVar
+
+from proofroll.core.engine_abilities import Level, Term, require_provided
+from proofroll.core.errors import Refused
+from proofroll.core.scene import Scene
+from proofroll.elements.ball_on_surface.element import rolling_ball
+from proofroll.elements.ball_on_surface.model import ALL_OF_A_BALL, ROLLS, BallCapability, RollingBall
+from proofroll.elements.mechanism.capabilities import MechanismCapability
+from proofroll.elements.mechanism.sampling import mechanism_of
+from proofroll.engines.exudyn import redundant, spheres, tree
+from proofroll.engines.exudyn.carrier import Carrier
+from proofroll.engines.exudyn.contact import PenaltyContact
+from proofroll.engines.exudyn.generic import Generic
+from proofroll.engines.exudyn.integration import ExudynModel
+from proofroll.engines.exudyn.local_frame import slides
+from proofroll.engines.exudyn.native import exu
+from proofroll.engines.exudyn.redundant import Redundant
+from proofroll.engines.exudyn.rolling_disc import RollingDisc
+from proofroll.engines.exudyn.settings import PRESETS, ExudynSettings
+from proofroll.engines.exudyn.spheres import Spheres
+from proofroll.engines.exudyn.tree import KinematicTree
+from proofroll.engines.exudyn.world_coordinates import WorldCoordinates
+
+OF_BALLS: Mapping[str, Callable[[RollingBall, ExudynSettings], ExudynModel]] = {
+    "generic": lambda body, settings: (Generic if slides(body) else WorldCoordinates)(body, settings),
+    "carrier": Carrier,
+    "rolling_disc": RollingDisc,
+    "contact": PenaltyContact,
+}
+OF_MECHANISMS: Mapping[str, type[Redundant | KinematicTree]] = {
+    "redundant": Redundant,
+    "spheres": Spheres,
+    "tree": KinematicTree,
+}
+_HELD = "its constraint holds the ball on the wall"
+_ROLLS_AT_REST: Mapping[str, str] = {
+    BallCapability.IMPACTS: _HELD,
+    BallCapability.BOUNDED_FRICTION: "its joint rolls without slip",
+    BallCapability.MOVING_WALL: "its joint rolls on what is at rest",
+}
+# Formulations whose joints are given by whole frames (exudyn.HT).
+_WITH_FRAMES = {"carrier", *OF_MECHANISMS}
+
+
+_SWITCHES = (MechanismCapability.JOINT_FRICTION, MechanismCapability.STOPS, MechanismCapability.SATURATION)
+
+
+class Exudyn:
+    """Exudyn's implicit integration of multibody systems with constraints, or with its penalty contact."""
+
+    name: ClassVar[str] = "exudyn"
+    oldest: ClassVar[str] = "1.11"  # the oldest that was tried
+    provides: ClassVar[Mapping[str, frozenset[str]]] = {
+        "generic": (ALL_OF_A_BALL | {BallCapability.MOVING_WALL}) - {BallCapability.ORIENTATION},
+        "carrier": ROLLS | {BallCapability.ORIENTATION},
+        "rolling_disc": ROLLS | {BallCapability.ORIENTATION},
+        "contact": ALL_OF_A_BALL | {BallCapability.IMPACTS},
+        "redundant": redundant.PROVIDES,
+        "spheres": spheres.PROVIDES,
+        "tree": tree.PROVIDES,
+    }
+    made_for: ClassVar[Mapping[str, frozenset[str]]] = {"spheres": frozenset({MechanismCapability.CONTACT})}
+    lacking: ClassVar[Mapping[str, Mapping[str, str]]] = {
+        "generic": {
+            BallCapability.ORIENTATION: "the spin of generic is a quasi-velocity, the rate of no orientation",
+            BallCapability.IMPACTS: _HELD,
+        },
+        "contact": {
+            BallCapability.TANGENTIAL_RESTITUTION: "its friction stops the contact point, and has no restitution",
+            BallCapability.MOVING_WALL: "its hollow sphere has no velocity",
+        },
+        "carrier": _ROLLS_AT_REST,
+        "rolling_disc": _ROLLS_AT_REST,
+        "redundant": redundant.LACKING,
+        "spheres": spheres.LACKING,
+        "tree": tree.LACKING,
+    }
+    settings: ClassVar[type[ExudynSettings]] = ExudynSettings
+    presets: ClassVar[Mapping[str, Mapping[str, ExudynSettings]]] = PRESETS
+    levels: ClassVar[Mapping[str, Level]] = {
+        "generic": Level.CONSTRAINT,
+        "carrier": Level.CONSTRAINT,
+        "rolling_disc": Level.CONSTRAINT,
+        "contact": Level.CONTACT,
+        "redundant": Level.CONSTRAINT,
+        "spheres": Level.CONTACT,
+        "tree": Level.REDUCED,
+    }
+    terms: ClassVar[Sequence[Term]] = (
+        Term(
+            "new Jacobian at every step",
+            ("carrier", "rolling_disc", "contact", "redundant", "spheres"),
+            {"jacobian": "step"},
+            {"jacobian": "reused"},
+            "lets Newton's method end after two or three iterations where an old Jacobian needs seven",
+        ),
+        Term(
+            "halving of steps",
+            ("contact", "spheres"),
+            {"halvings": 10},
+            {"halvings": 0},
+            "goes on where Newton's method fails at the edge of the friction zone",
+        ),
+    )
+    inherent: ClassVar[Mapping[str, Mapping[str, str]]] = {
+        formulation: {BallCapability.ORIENTATION: "the rigid body's Euler parameters are coordinates of its node"}
+        for formulation in ("carrier", "rolling_disc", "contact")
+    }
+
+    @staticmethod
+    def caveat(settings: ExudynSettings) -> str:
+        """See :class:`proofroll.core.engine_abilities.TellsCaveats`; a step that halves itself has no order."""
+        if settings.preset != "default" or settings.halvings:
+            return ""
+        return "Exudyn's adaptive step, which it has on by default, is off, so that the step is the one given"
+
+    family = staticmethod(spheres.family)
+
+    @staticmethod
+    def lowered(_: ExudynSettings) -> Mapping[str, int]:
+        """See :class:`proofroll.core.engine_abilities.LowersOrder`; a joint may begin to slip anywhere in a step."""
+        return dict.fromkeys(_SWITCHES, 1)
+
+    @staticmethod
+    def version() -> str:
+        """Version of the installed package; on some platforms the extension module reports a different one."""
+        return version("exudyn")
+
+    @staticmethod
+    def defaults() -> Mapping[str, Any]:
+        """See :class:`proofroll.core.engine_abilities.TellsDefaults`: the settings of a simulation."""
+        import exudyn
+
+        defaults: dict[str, Any] = {}
+
+        def flatten(where: str, values: Mapping[str, Any]) -> None:
+            for name, value in values.items():
+                if isinstance(value, Mapping):
+                    flatten(f"{where}{name}.", value)
+                else:
+                    defaults[where + name] = value.tolist() if hasattr(value, "tolist") else str(value)
+
+        flatten("", exudyn.SimulationSettings().GetDictionary())
+        return defaults
+
+    @classmethod
+    def build(cls, scene: Scene, settings: ExudynSettings) -> ExudynModel:
+        """See :class:`proofroll.core.engine.Engine`; builds a run of the formulation."""
+        if settings.formulation in _WITH_FRAMES and not hasattr(exu, "HT"):
+            raise Refused(
+                f"{settings.formulation} needs the frames of markers of exudyn 1.13, and this is {cls.version()}"
+            )
+        if settings.formulation in OF_MECHANISMS:
+            return OF_MECHANISMS[settings.formulation](scene, settings)
+        require_provided(cls, settings.formulation, scene)
+        return OF_BALLS[settings.formulation](rolling_ball(scene), settings)
+
+    @classmethod
+    def reproducer(cls, scene: Scene, settings: ExudynSettings) -> str:
+        """See :class:`proofroll.core.engine_abilities.Reproduces`."""
+        from proofroll.engines.exudyn.reproducer import mechanism_source, source
+
+        model = cls.build(scene, settings)
+        if settings.formulation == "spheres":
+            raise Refused("programs hold no contacts between bodies yet")
+        if settings.formulation in OF_MECHANISMS:
+            return mechanism_source(model, mechanism_of(scene), settings)
+        return source(model, rolling_ball(scene), settings)
