@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from proofroll.core.errors import Refused
+from proofroll.core.plugins import load_engine
 from proofroll.elements.mechanism import Body, Joint, Mechanism
 
 pytest.importorskip("exudyn")
@@ -13,9 +14,9 @@ CUBE = Body("mass", 2.0, inertia=(0.1, 0.1, 0.1))
 G = 9.81
 
 
-def slider(**law):
-    """A mass of 2 kg on a vertical guide."""
-    return Mechanism((CUBE,), (Joint("guide", "prismatic", "world", "mass", **law),))
+def slider(cube=CUBE, **law):
+    """A cube on a vertical guide."""
+    return Mechanism((cube,), (Joint("guide", "prismatic", "world", "mass", **law),))
 
 
 def test_a_mass_rests_on_its_stop():
@@ -26,6 +27,15 @@ def test_a_mass_rests_on_its_stop():
     assert sample.p_WB[0, 2] == pytest.approx(-G * 1e-6, rel=1e-3)
     assert sample.stop == pytest.approx([2 * G], rel=1e-4)
     np.testing.assert_allclose(sample.joint_force[0], [0, 0, 2 * G], atol=1e-3)
+
+
+def test_a_ton_rests_on_its_stop():
+    """Newton's method ends where round-off of the forces on a heavy mass is larger than it is for 1 kg."""
+    ton = Body("mass", 1000.0, inertia=(50.0, 50.0, 50.0))
+    matched = load_engine("exudyn").presets["redundant"]["matched"]
+    run = load_engine("exudyn").build(slider(ton, q0=(1.0,), limits=(0.0, 2.0)), matched)
+    run.advance(1.0)
+    assert run.sample().stop == pytest.approx([1000 * G], rel=1e-4)
 
 
 def test_friction_slows_a_mass_and_holds_it():

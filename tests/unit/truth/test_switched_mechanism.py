@@ -235,6 +235,19 @@ def test_complementarity_holds_on_random_problems() -> None:
         assert np.all(a[state > 0] <= 1e-12)
 
 
+def test_forces_exactly_at_their_bounds_are_found() -> None:
+    """Where round-off decides whether a force is within its bound or at it, both are the solution."""
+    random = np.random.default_rng(5)
+    for _ in range(200):
+        n = int(random.integers(2, 6))
+        root, high = random.normal(size=(n, n)), random.uniform(0.5, 2, n)
+        G, low = root @ root.T + 0.1 * np.eye(n), np.where(random.random(n) < 0.3, 0.0, -high)
+        expected = np.clip(random.uniform(2 * low, 2 * high), low, high)
+        _, f, a = complementary(-G @ expected, G, low, high)
+        assert f == pytest.approx(expected, abs=1e-9)
+        assert a == pytest.approx(0.0, abs=1e-9)
+
+
 @pytest.mark.arithmetic
 @pytest.mark.parametrize(
     ("scene", "parameters", "edge"),

@@ -16,7 +16,12 @@ from proofroll.elements.mechanism.rotations import Array
 from proofroll.elements.mechanism.signal import breaks
 from proofroll.elements.mechanism.switches import REDUNDANT, Mode, SwitchedJoint, held_joints
 
+_ROUND_OFF = 1e-12  # of accelerations, in parts of what they are the sum of: no pivot, or round-off alternates for ever
 _MOST_PIVOTS = 1000  # of the complementarity problem; usually about one for each joint
+_UNDECIDED = (
+    "which joints with friction or stops hold is within rounding, for their masses or inertias lie too far apart: "
+    "make them alike, or leave out the friction or the stop of one joint"
+)
 
 
 def complementary(free: Array, G: Array, low: Array, high: Array) -> tuple[NDArray[np.int_], Array, Array]:
@@ -28,7 +33,7 @@ def complementary(free: Array, G: Array, low: Array, high: Array) -> tuple[NDArr
         Side of each force (-1 at its lower bound, 0 between, 1 at its upper bound), the forces f, the accelerations a.
 
     Raises:
-        Refused: G is singular but for round-off, so that the forces are not determinate, or the pivots do not end.
+        Refused: G is singular but for round-off, so that the forces are not determinate or not found.
     """
     scale = np.sqrt(np.maximum(np.diag(G), 0.0))
     if np.any(scale <= RANK * scale.max()) or np.linalg.matrix_rank(G / np.outer(scale, scale), tol=RANK) < len(G):
@@ -39,12 +44,14 @@ def complementary(free: Array, G: Array, low: Array, high: Array) -> tuple[NDArr
         f = np.where(state > 0, high, np.where(state < 0, low, 0.0))
         f[held] = -np.linalg.solve(G[np.ix_(held, held)], free[held] + G[np.ix_(held, ~held)] @ f[~held])
         a = np.where(held, 0.0, free + G @ f)
-        wrong = np.flatnonzero((held & ((f > high) | (f < low))) | ((state > 0) & (a > 0)) | ((state < 0) & (a < 0)))
+        rounded = _ROUND_OFF * (np.abs(free) + scale * (scale @ np.abs(f)))  # of the accelerations
+        beyond = np.maximum(f - high, low - f) * scale**2
+        wrong = np.flatnonzero(np.where(held, beyond, state * a) > rounded)
         if not len(wrong):
-            return state, f, a
+            return state, np.clip(f, low, high), np.where(state * a > 0, 0.0, a)
         k = int(wrong[0])
         state[k] = 0 if state[k] else (1 if f[k] > high[k] else -1)
-    raise Refused("which joints hold is not found: the complementarity problem has no solution by pivots")
+    raise Refused(_UNDECIDED)
 
 
 def margin(free: Array, G: Array, low: Array, high: Array, f: Array, a: Array) -> float:

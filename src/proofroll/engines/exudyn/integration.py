@@ -42,11 +42,14 @@ class ExudynModel:
         return list(self.integration.events)
 
 
-def simulation_settings(settings: ExudynSettings, *, dependent: bool = False, impacts: bool = False) -> Any:
+def simulation_settings(
+    settings: ExudynSettings, *, dependent: bool = False, impacts: bool = False, mass: float = 1.0
+) -> Any:
     """Settings in Exudyn's own structure: no files, one thread, a step that only ``halvings`` may shorten.
 
     ``dependent``: constraints may depend on each other, so the linear solver must handle a singular matrix.
-    ``impacts``: steps are halved more often, to end where contacts close and open.
+    ``impacts``: steps are halved more often, to end where contacts close and open. ``mass``: of all that moves [kg];
+    Newton's absolute tolerance is a force [N], and round-off of the forces grows with what they move.
     """
     kind = getattr(exu.DynamicSolverType, settings.integrator.upper()) if settings.integrator in EXPLICIT else None
     result = new_settings(dependent=dependent, explicit=kind)
@@ -58,7 +61,7 @@ def simulation_settings(settings: ExudynSettings, *, dependent: bool = False, im
     if settings.halvings:
         time.minimumStepSize = settings.dt / 2 ** (settings.halvings + (_FOR_IMPACTS if impacts else 0))
     time.newton.relativeTolerance = settings.newton_tolerance
-    time.newton.absoluteTolerance = settings.newton_tolerance / 100
+    time.newton.absoluteTolerance = settings.newton_tolerance / 100 * max(1.0, mass)
     time.newton.useModifiedNewton = True  # off by default in 1.11, which explains every difference from 1.13
     time.newton.modifiedNewtonJacUpdatePerStep = settings.jacobian == "step"
     alpha = time.generalizedAlpha
@@ -91,11 +94,12 @@ class Integration:
         *,
         dependent: bool = False,
         impacts: bool = False,
+        mass: float = 1.0,
     ) -> None:
         """Initialises the solver in the initial configuration of an assembled system, at the time ``at`` [s].
 
-        For ``turning`` see :func:`consistent_start`; without it, Exudyn finds the start itself. For ``dependent`` and
-        ``impacts`` see :func:`simulation_settings`.
+        For ``turning`` see :func:`consistent_start`; without it, Exudyn finds the start itself. For ``dependent``,
+        ``impacts`` and ``mass`` see :func:`simulation_settings`.
 
         Raises:
             Refused: the engine does not accept the model.
@@ -105,7 +109,7 @@ class Integration:
         self.events: list[Event] = []
         self.dt = settings.dt
         self.system = system
-        self.options = simulation_settings(settings, dependent=dependent, impacts=impacts)
+        self.options = simulation_settings(settings, dependent=dependent, impacts=impacts, mass=mass)
         explicit = settings.integrator in EXPLICIT
         start = None if turning is None else consistent_start(system, settings, turning)
         self.solver = exu.MainSolverExplicit() if explicit else exu.MainSolverImplicitSecondOrder()

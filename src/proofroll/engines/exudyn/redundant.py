@@ -77,7 +77,8 @@ class Redundant(ExudynModel):
         self.system.Assemble()
         self._rows = self._constraint_rows(settings)
         self._rank = independent(self._rows)
-        self.integration = Integration(self.system, settings, dependent=self._rank < len(self._rows))
+        dependent = self._rank < len(self._rows)
+        self.integration = Integration(self.system, settings, dependent=dependent, mass=mechanism.mass)
 
     def marker(self, body: str, position: Any) -> Any:
         """Adds a marker at a place in a body's frame [m]."""

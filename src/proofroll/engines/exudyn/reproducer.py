@@ -47,7 +47,7 @@ for add, items in ((mbs.AddNode, NODES), (mbs.AddObject, OBJECTS), (mbs.AddMarke
 """
 _STATE = '''
 mbs.Assemble()
-integration = Integration(mbs, SETTINGS, dependent=DEPENDENT)
+integration = Integration(mbs, SETTINGS, dependent=DEPENDENT, mass=MASS)
 
 
 def run(times):
@@ -112,6 +112,7 @@ def mechanism_source(model: Any, mechanism: Mechanism, settings: ExudynSettings)
     text.append(f"GRAVITY = {list(mechanism.gravity)!r}\n# Markers of what is followed, and of the centres of mass.\n")
     text.append(f"PLACES = {places!r}\nCENTRES = {centres!r}\n{_SYSTEM}SETTINGS = {cut.literal(settings)}\n")
     text.append(f"DEPENDENT = {model.integration.options.linearSolver.ignoreSingularJacobian!r}\n")
+    text.append(f"MASS = {mechanism.mass!r}\n")
     return "".join([*text, _STATE])
 
 

@@ -27,7 +27,8 @@ class ExudynSettings:
         spectral_radius: of the generalized-alpha method at infinite frequency [1]; 1 damps nothing. None: the engine's
             own, 0.9. The trapezoidal rule has no damping and ignores it.
         newton_tolerance: relative tolerance of Newton's method [1]; the absolute one is a hundredth of it, which is
-            the engine's own ratio. Explicit integrators ignore it and ``jacobian``.
+            the engine's own ratio, and as much for each kilogram of a mechanism heavier than 1 kg. Explicit integrators
+            ignore it and ``jacobian``.
         jacobian: ``reused`` while Newton's method contracts, or computed anew at every ``step``.
         halvings: number of times a step is halved where Newton's method fails, before the run ends. With 0, and in
             formulations other than ``contact`` and ``spheres``, all steps are dt.
