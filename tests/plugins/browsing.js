@@ -40,7 +40,7 @@ window.reading = (() => {
     document.querySelectorAll("details").forEach((fold) => { fold.open = false; });
     for (const link of links.values()) {
       link.click();
-      const there = () => document.getElementById(link.hash.slice(1));
+      const there = () => document.getElementById(decodeURIComponent(link.hash.slice(1)));
       const seen = () => there()?.checkVisibility() && (!there().matches("details") || there().open);
       for (let tries = 0; !seen() && tries < 50; ++tries) await pause(0);
       if (!seen()) found.push(link.hash);

@@ -13,7 +13,8 @@ import pytest
 from browsing import UNDRAWN, Visit
 
 from proofroll.report.page.advice import advice
-from proofroll.report.page.choice_matrix import DECADES, FIRST, ChoiceMatrix
+from proofroll.report.page.choice_matrix import DECADES, FIRST, ChoiceMatrix, ChoiceStudy, choice_matrix
+from proofroll.report.page.html import templates
 
 Visiting = Callable[..., AbstractContextManager[Visit]]
 SHOWN = """[...document.querySelectorAll('#choice tbody tr')].map((row) =>
@@ -59,7 +60,7 @@ def test_the_slider_chooses_the_tolerance(seen: Visit, matrix: ChoiceMatrix) -> 
         assert seen.page.evaluate(SHOWN) == expected(matrix, decade, False)
         assert seen.page.locator("#answer").inner_text() == matrix.answer(10.0**-decade, False)
         assert seen.page.locator("#also").inner_text() == matrix.with_forces(10.0**-decade)
-        words = seen.page.locator("#words li").all_inner_texts()
+        words = seen.page.locator("#words li").all_text_contents()
         assert words == [item.sentence for item in advice(matrix, 10.0**-decade, False)]
         assert slider.get_attribute("aria-valuetext") == f"1e-{decade}"
     seen.page.get_by_label("forces count, too").check()
@@ -130,7 +131,7 @@ def test_the_answer_and_the_frames_are_of_the_chosen_engines(seen: Visit, matrix
     wanted = [at for at in others.best(10.0**-decade, forces) if at is not None]
     assert framed.count() == len(wanted)
     assert framed.locator("xpath=..").evaluate_all("rows => rows.every((row) => row.dataset.engine !== 'alpha')")
-    words = seen.page.locator("#words li").all_inner_texts()
+    words = seen.page.locator("#words li").all_text_contents()
     vars(others)["unjudged"] = matrix.unjudged  # what is judged in a scene hangs on no choice
     sentences = [item.sentence for item in advice(others, 10.0**-decade, forces)]
     assert words[:-1] == sentences[:-1]
@@ -165,3 +166,20 @@ def test_the_matrix_is_there_without_a_program(report_page: Path, matrix: Choice
         for column in matrix.columns:
             cell = matrix.cell(row, column, 1e-4, False)
             assert cell.state == "none" or f'class="cell {cell.state}' in table
+
+
+def test_small_groups_are_unfolded_and_large_ones_name_their_scenes(everything: Any) -> None:
+    """At any width and on paper: a group of two has its scenes as columns, of five four are named and one counted."""
+    lines = everything.content.table.lines
+    own = [item for item in lines if item.study == "invented"]
+    more = [replace(item, study=f"s{n}", group="pair" if n < 2 else "many") for n in range(7) for item in own]
+    studies = {f"s{n}": ChoiceStudy(f"Scene {n}", "") for n in range(7)}
+    found = choice_matrix(more, studies)
+    assert found.unfolded == ["pair"]
+    module: Any = templates().get_template("choice.html").module
+    html = str(module.matrix(found))
+    heads = re.findall(r"<th scope=\"col\"[^>]*>.*?</th>", html, flags=re.DOTALL)
+    shown = [re.sub("<[^>]*>", "", head).strip() for head in heads if " hidden" not in head]
+    assert shown == ["engine and formulation", "pair s0, s1", "s0", "s1", "many s2, s3, s4, s5 and 1 more"]
+    assert 'data-group="pair" title="s0, s1" aria-expanded="true"' in html
+    assert 'title="s2, s3, s4, s5, s6" aria-expanded="false"' in html

@@ -105,3 +105,69 @@ def test_a_table_shows_that_it_has_columns_beyond_its_edge(report_page: Path, vi
         opened.wait(f"getComputedStyle({region}).maskImage !== 'none'")
         opened.page.emulate_media(media="print")
         assert opened.page.evaluate(f"getComputedStyle({region}).maskImage") == "none"
+
+
+@pytest.fixture
+def matrix(report_page: Path, visit: Visiting) -> Iterator[Visit]:
+    """The page with its first matrix enlivened."""
+    with visit(report_page, viewport={"width": 1280, "height": 900}) as opened:
+        opened.wait("document.querySelector('.choice').dataset.sorts === ''")
+        yield opened
+
+
+ROWS = """[...document.querySelectorAll('#choice tbody tr')].map(
+  (row) => `${row.dataset.of ?? ''} ${row.cells[0].textContent}`.trim())"""
+KEYS = """[...document.querySelectorAll('#choice tbody tr:not([data-of])')].map(
+  (row) => Number(row.cells[1].dataset.order))"""
+
+
+def test_the_first_matrix_sorts_with_its_settings(matrix: Visit) -> None:
+    """By keys: formulations go by the cost of a column, the held ones first, each with its settings below it."""
+    before = matrix.page.evaluate(ROWS)
+    head = matrix.page.locator("#choice thead th").nth(1)
+    head.locator(".dt-column-order").press("Enter")
+    matrix.wait("document.querySelectorAll('#choice thead th')[1].ariaSort === 'ascending'")
+    after = matrix.page.evaluate(ROWS)
+    assert sorted(after) == sorted(before)
+    models = [name for name in after if name in {"alpha fine", "beta only", "gamma"}]
+    assert models == ["alpha fine", "beta only", "gamma"]
+    head.locator(".dt-column-order").press("Enter")
+    matrix.wait("document.querySelectorAll('#choice thead th')[1].ariaSort === 'descending'")
+    turned = matrix.page.evaluate(ROWS)
+    assert turned[0] == "gamma"
+    for rows in (after, turned):
+        at = rows.index("alpha fine")
+        assert [name.split()[-1] for name in rows[at + 1 : at + 3]] == ["matched", "default"]
+
+
+def test_a_head_of_the_first_matrix_unfolds_without_sorting(matrix: Visit) -> None:
+    """The name of a group is for its scenes, the sign beside it sorts; rows follow the slider all the same."""
+    for button in matrix.page.locator("#choice thead button[data-group]").all():
+        before = button.get_attribute("aria-expanded")
+        button.press("Enter")
+        assert button.get_attribute("aria-expanded") != before
+    assert matrix.page.locator("#choice thead [aria-sort=ascending], #choice thead [aria-sort=descending]").count() == 0
+    matrix.page.locator("#choice thead .dt-column-order").nth(1).click()
+    matrix.page.locator("#tolerance").press("End")
+    matrix.wait("document.getElementById('choice').dataset.at === '6'")
+    shown = matrix.page.evaluate(KEYS)
+    assert shown == sorted(shown), "sorted anew by what the slider made of the column"
+
+
+def test_the_first_matrix_filters_and_downloads(matrix: Visit, tmp_path: Path) -> None:
+    """A word finds formulations by their settings, too; the file has every row by its whole name, and the tolerance."""
+    box = matrix.page.get_by_label("Filter: Which engine for which scenes")
+    box.fill("matched")
+    matrix.wait("document.querySelectorAll('#choice tbody tr').length < 4")
+    assert matrix.page.evaluate(ROWS)[0] == "alpha fine"
+    box.fill("")
+    matrix.wait("document.querySelectorAll('#choice tbody tr').length > 4")
+    with matrix.page.expect_download() as got:
+        matrix.page.get_by_label("CSV: Which engine for which scenes").click()
+    assert "to 1e-4" in got.value.suggested_filename
+    got.value.save_as(tmp_path / "matrix.csv")
+    head, *rows = filter(None, csv.reader((tmp_path / "matrix.csv").read_text(encoding="utf-8-sig").splitlines()))
+    assert head[0] == "engine and formulation"
+    assert {"alpha fine", "alpha fine matched", "alpha fine default", "beta only"} <= {row[0] for row in rows}
+    assert all(len(row) == len(head) for row in rows)
+    assert any("agrees" in cell for row in rows for cell in row[1:])

@@ -4,13 +4,25 @@ from __future__ import annotations
 
 import base64
 import gzip
+import html as markup
 import json
 import re
+from collections import Counter
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     import jinja2
+
+
+# What decides the address of a row: ids around its table, the label of that, the engine of a part of it, the row.
+_PLACES = re.compile(
+    r'<(?:section|details|h[1-4])\b[^>]*? id="(?P<section>[^"]+)"'
+    r'|<div class="scroll\b[^>]*? aria-label="(?P<label>[^"]*)"'
+    r'|<thead>.*?</thead>|<tbody(?: data-engine="(?P<engine>[^"]*)")?>'
+    r'|<tr(?P<row>(?! class="group")[^>]*)>(?P<cell>.*?)(?=</t[hd]>)',
+    re.DOTALL,
+)
 
 
 def environment(*folders: Path) -> jinja2.Environment:
@@ -32,8 +44,41 @@ def environment(*folders: Path) -> jinja2.Environment:
 
 
 def rendered(templates: jinja2.Environment, name: str, **said: Any) -> str:
-    """Rendered page; a lone surrogate from an engine's message becomes a question mark."""
-    return templates.get_template(name).render(**said).encode("utf-8", "replace").decode("utf-8")
+    """Rendered page with addressed rows; a lone surrogate from an engine's message becomes a question mark."""
+    return addressed(templates.get_template(name).render(**said).encode("utf-8", "replace").decode("utf-8"))
+
+
+def addressed(html: str) -> str:
+    """Page whose rows of tables each have an id and, in their first cell, a link to it.
+
+    The id is made from the id of the section, the label of the table and the text of the first cell, so that the row
+    has it again in a page of other runs.
+    """
+    at = {"section": "", "label": "", "engine": ""}
+    taken: Counter[str] = Counter()
+
+    def address(found: re.Match[str]) -> str:
+        parts = found.groupdict()
+        if parts["cell"] is None:
+            at.update({name: parts[name] for name in at if parts[name] is not None})
+            if found[0].startswith(("<thead", "<tbody>")):
+                at["engine"] = ""
+            return found[0]
+        own = re.search(r' id="([^"]*)"', parts["row"])
+        of = re.search(r' data-of="([^"]*)"', parts["row"])
+        name = f"{at['engine']} {of[1] if of else ''} {re.sub('<[^>]*>', '', parts['cell'])}"
+        place = ".".join(filter(None, (at["section"], _slug(at["label"]), _slug(name) or "row")))
+        taken[place] += 1
+        place += f"-{taken[place]}" if taken[place] > 1 else ""
+        start = found[0] if own else f'<tr id="{place}"{parts["row"]}>{parts["cell"]}'
+        return f'{start}<a class="row" href="#{own[1] if own else place}" aria-label="link to this row"></a>'
+
+    return _PLACES.sub(address, html)
+
+
+def _slug(text: str) -> str:
+    """Text as a part of an address: its first twelve words in lower case, joined by hyphens."""
+    return "-".join(re.findall(r"\w+", markup.unescape(text).lower())[:12])
 
 
 def packed(content: bytes) -> str:

@@ -108,6 +108,11 @@ class ChoiceMatrix:
     titles: dict[str, str]
 
     @property
+    def unfolded(self) -> list[str]:
+        """Groups whose scenes are columns from the start: those of at most two."""
+        return [column.group for column in self.columns if column.whole and len(column.studies) <= 2]
+
+    @property
     def engines(self) -> list[str]:
         """Names of the engines, in the order of the rows."""
         return list(dict.fromkeys(row.engine for row in self.rows))

@@ -71,6 +71,7 @@
     const words = advised(JSON.parse(await unpack("all-words"))[place]);
     document.querySelectorAll("#words li").forEach((line, i) => { line.textContent = words[i]; });
     table.dataset.at = place;
+    table.dispatchEvent(new Event("filled"));
   }
   slider.addEventListener("input", show);
   form.addEventListener("change", (event) => {
@@ -87,19 +88,22 @@
   addEventListener("load", () => {
     if (innerWidth <= 800) return;
     const scenes = (button) => button.title.split(", ").length;
-    for (const button of [...table.querySelectorAll("button[data-group]")].sort((one, other) => scenes(one) - scenes(other))) {
+    for (const button of [...table.querySelectorAll("button[data-group][aria-expanded=false]")].sort((one, other) => scenes(one) - scenes(other))) {
       button.click();
       if (table.offsetWidth > table.parentElement.clientWidth) button.click();
     }
   });
 
+  // Before the head itself hears of it, which would sort its column.
+  table.addEventListener("keypress", (event) => { if (event.target.closest("thead :is([data-group], a)")) event.stopPropagation(); }, true);
   table.addEventListener("click", (event) => {
-    const button = event.target.closest("button");
+    const button = event.target.closest("[data-group], [data-model]");
+    if (event.target.closest("thead :is([data-group], a)")) event.stopPropagation();
     if (!button) return;
     const open = button.getAttribute("aria-expanded") !== "true";
     const { group, model } = button.dataset;
     button.setAttribute("aria-expanded", open);
     const parts = group === undefined ? "tr" : "th, td";
     table.querySelectorAll(parts).forEach((part) => { if (part.dataset.of === (group ?? model)) part.hidden = !open; });
-  });
+  }, true);
 })();

@@ -61,6 +61,7 @@ const folds = (() => {
     if (!target) return;
     for (let fold = target.closest("details"); fold; fold = fold.parentElement.closest("details")) fold.open = true;
     for (const fold of target.querySelectorAll(":scope > details:only-of-type")) fold.open = true;
+    if (target.hidden) document.querySelector(`#choice [data-model="${CSS.escape(target.dataset.of)}"]`).click();
     target.classList.add("target");
     target.scrollIntoView();
   }

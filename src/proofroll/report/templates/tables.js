@@ -9,7 +9,7 @@
     });
     return library;
   }
-  const regular = (table) => table.tHead?.rows.length === 1 && !table.matches("#choice, .heat")
+  const regular = (table) => table.tHead?.rows.length === 1 && !table.matches(".heat")
     && ![...table.querySelectorAll("[rowspan], thead [colspan], tbody:not([data-engine]) [colspan]")].length;
   const few = (table) => table.querySelectorAll("tbody tr:not(.group)").length < 4;
 
@@ -45,27 +45,47 @@
     const found = text.replace("−", "-").match(/-?\d[\d.]*(?:e[-+]?\d+)?/i);
     return found ? Number(found[0]) : text.includes("∞") ? 1e300 : 1e301;
   }
+  // In the first matrix settings stay below their formulation, whose keys they share, and are found by its name.
+  function keyMatrix(rows) {
+    let model;
+    for (const row of rows) {
+      if (!row.dataset.of) model = row;
+      [...row.cells].forEach((cell, at) => {
+        const of = model.cells[at], state = order.indexOf(of.classList[1]);
+        cell.dataset.order = !at ? of.textContent.trim() : state < 0 ? 1e301 : 1e6 * state + Math.min(rank(of, true), 9e5);
+      });
+      row.cells[0].dataset.search = `${row.dataset.of ?? ""} ${row.cells[0].textContent}`;
+      if (row !== model) model.cells[0].dataset.search += ` ${row.cells[0].textContent}`;
+    }
+  }
+  function keyTable(rows, heads) {
+    for (const row of rows) {
+      heads.forEach((head, at) => { row.cells[at].dataset.order = rank(row.cells[at], head.classList.contains("n") || row.cells[at].classList.contains("step")); });
+    }
+  }
   function said(cell) {
     const copy = cell.cloneNode(true);
     copy.querySelectorAll("[aria-hidden], .dt-column-order").forEach((part) => part.remove());
     copy.querySelectorAll("br, small, b").forEach((part) => part.before(" "));
-    return copy.textContent.replace(/\s+/g, " ").trim();
+    const setting = cell.scope === "row" ? cell.parentElement.dataset.of ?? "" : "";
+    return `${setting} ${copy.textContent}`.replace(/\s+/g, " ").trim();
   }
   async function enliven(table) {
     const { default: DataTable } = await load();
     const region = table.closest(".scroll");
     const label = region.getAttribute("aria-label");
-    flatten(table);
-    const heads = [...table.tHead.rows[0].cells];
-    for (const row of table.tBodies[0].rows) {
-      heads.forEach((head, at) => { row.cells[at].dataset.order = rank(row.cells[at], head.classList.contains("n") || row.cells[at].classList.contains("step")); });
-    }
+    const form = table.id === "choice" ? document.getElementById("choose") : null;
+    if (!form) flatten(table);
+    const heads = [...table.tHead.rows[0].cells], rows = [...table.tBodies[0].rows];
+    const key = form ? keyMatrix : keyTable;
+    key(rows, heads);
+    const asked = () => form ? ` to ${form.querySelector("output").textContent}${form.querySelector("#forces").checked ? " with forces" : ""}` : "";
     const made = new DataTable(table, {
-      paging: false, info: false, autoWidth: false, order: [],
+      paging: false, info: false, autoWidth: false, order: [], orderDescReverse: false,
       language: { search: "Filter", zeroRecords: "no row has this" },
       layout: {
         topStart: "search",
-        topEnd: { buttons: [{ extend: "csv", text: "CSV", filename: label, title: null,
+        topEnd: { buttons: [{ extend: "csv", text: "CSV", filename: () => `${label}${asked()}`, title: null,
           exportOptions: { format: { body: (_, __, ___, cell) => said(cell), header: (_, __, cell) => said(cell ?? heads[__]) } } }] },
         bottomStart: null, bottomEnd: null,
       },
@@ -74,13 +94,14 @@
     tools.classList.add("tools");
     tools.querySelector("input").setAttribute("aria-label", `Filter: ${label}`);
     tools.querySelector("button").setAttribute("aria-label", `CSV: ${label}`);
-    region.before(tools);
+    if (form) form.append(tools); else region.before(tools);
+    table.addEventListener("filled", () => { key(rows, heads); made.rows().invalidate("dom").draw(false); });
     region.dataset.sorts = "";
   }
   const near = new IntersectionObserver((entries) => entries.forEach((entry) => {
     if (!entry.isIntersecting) return;
     near.unobserve(entry.target);
-    enliven(entry.target);
+    (window.requestIdleCallback ?? setTimeout)(() => enliven(entry.target));
   }), { rootMargin: "400px" });
   everywhere((part) => part.querySelectorAll(".scroll > table").forEach((table) => { if (regular(table) && !few(table)) near.observe(table); }));
 })();
