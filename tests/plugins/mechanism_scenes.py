@@ -1,4 +1,4 @@
-"""Scenes with mechanisms, as their folders hold them."""
+"""Fixture of scenes with mechanisms, as their folders hold them."""
 
 from collections.abc import Callable
 
