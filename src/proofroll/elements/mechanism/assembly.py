@@ -127,7 +127,9 @@ def check_start(mechanism: Mechanism) -> None:
     _check_inertia(mechanism, equations.inertial(motion)[1])
     if analysed(mechanism).mobility == 0:
         raise InputError("mechanism", f"{len(mechanism.joints)} joints", IMMOBILE)
-    if not np.isfinite(equations.solve(q, v, ("free",) * len(equations.switched)).acceleration).all():
+    with np.errstate(all="ignore"):  # the line below says it
+        found = equations.solve(q, v, ("free",) * len(equations.switched)).acceleration
+    if not np.isfinite(found).all():
         advice = "forces, gains or velocities are too large to be computed with"
         raise InputError("accelerations", "infinite", advice)
 

@@ -19,8 +19,8 @@ from proofroll.elements.mechanism.switches import REDUNDANT, Mode, SwitchedJoint
 _ROUND_OFF = 1e-12  # of accelerations, in parts of what they are the sum of: no pivot, or round-off alternates for ever
 _MOST_PIVOTS = 1000  # of the complementarity problem; usually about one for each joint
 _UNDECIDED = (
-    "which joints with friction or stops hold is within rounding, for their masses or inertias lie too far apart: "
-    "make them alike, or leave out the friction or the stop of one joint"
+    "which joints with friction or stops hold is not found by pivots, as where it is within rounding: "
+    "change the parameters, or leave out the friction or the stop of one joint"
 )
 
 

@@ -52,8 +52,6 @@ _ROLLS_AT_REST: Mapping[str, str] = {
 }
 # Formulations whose joints are given by whole frames (exudyn.HT).
 _WITH_FRAMES = {"carrier", *OF_MECHANISMS}
-
-
 _SWITCHES = (MechanismCapability.JOINT_FRICTION, MechanismCapability.STOPS, MechanismCapability.SATURATION)
 
 
