@@ -196,3 +196,26 @@ def test_a_ball_that_hardly_falls_comes_to_rest() -> None:
     run.advance(0.01)
     impacts = [event.kind for event in run.events()].count("impact")
     assert 1 < impacts < 10
+
+
+def test_an_impact_leaves_a_distant_contact_closed() -> None:
+    """A ball that rests on a slope turned in space feels nothing of another ball's impact, and stays."""
+    bodies = tuple(Body(name, 1.0, inertia=(1e-3, 1e-3, 1e-3)) for name in ("resting", "falling"))
+    up = (0.36, 0.48, 0.8)
+    joints = tuple(
+        Joint(f"guide_of_{body.name}", "prismatic", "world", body.name, axis=up, q0=(q,))
+        for body, q in zip(bodies, (0.1, 0.13), strict=True)
+    )
+    scene = Mechanism(
+        bodies=bodies,
+        joints=joints,
+        geometries=(
+            Geometry("slope", "world", "plane", normal=up),
+            *(Geometry(f"ball_{body.name}", body.name, "sphere", radius=0.1) for body in bodies),
+        ),
+        pairs=tuple(Pair(body.name, ("slope", f"ball_{body.name}"), friction=0.0) for body in bodies),
+        gravity=(-0.36 * 9.81, -0.48 * 9.81, -0.8 * 9.81),
+    )
+    run = PROJECTION.build(scene, replace(DEFAULT, dt=1e-3))
+    run.advance(0.1)
+    assert {event.name for event in run.events()} == {"falling"}

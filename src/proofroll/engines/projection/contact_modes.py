@@ -290,9 +290,9 @@ class ContactMotion(AlternatingMotion[ContactMode]):
         c[3 * which.index(hit)] *= 1 + e
         impulse, _ = self._law(J @ response, c, which, [None] * len(which))
         x = self._pushed(x, response @ impulse.ravel())
-        closed = [False] * len(self.mode)
-        for place, k in enumerate(which):
-            closed[k] = bool(impulse[place, 0] > 0 and not (k == hit and e))
+        # by the speed, not the impulse: of a contact that the impact leaves alone that is round-off, of either sign
+        leaves = [float(each.normal @ each.slide) > self._still for each in self.at(x).touching]
+        closed = [k in which and not leaves[k] and not (k == hit and e) for k in range(len(self.mode))]
         return x, closed, settles
 
     def _framed(self, now: ContactsThere, which: Sequence[int]) -> tuple[list[Array], Array, Array]:
