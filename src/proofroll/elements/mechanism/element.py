@@ -31,6 +31,7 @@ from proofroll.elements.mechanism.joint import TURNING
 from proofroll.elements.mechanism.joint_coordinates import JointCoordinates, Solution
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.named_forces import named_forces
+from proofroll.elements.mechanism.natural_sizes import natural_sizes
 from proofroll.elements.mechanism.optional_terms import optional_terms
 from proofroll.elements.mechanism.placed import Placed
 from proofroll.elements.mechanism.sampling import MechanismSample
@@ -152,8 +153,12 @@ class MechanismElement:
     def length(self) -> float:
         """Largest distance between joints, centres of mass, tracked points and contacts at the start [m].
 
-        Where all of these are at one place, a length of :func:`.natural_length`.
+        Where all of these are at one place, a length of :func:`.natural_length`, or 1 m.
         """
+        return self._own_length or 1.0
+
+    @cached_property
+    def _own_length(self) -> float:
         found = self._solution
         return extent(self.mechanism, found.motion) or natural_length(self.mechanism, found)
 
@@ -190,18 +195,14 @@ class MechanismElement:
         fall = float(np.sqrt(self.length * np.linalg.norm(self.mechanism.gravity)))
         return max(moving, fall) or self.length / self.natural_time
 
+    @cached_property
+    def _sizes(self) -> dict[str, float]:
+        return natural_sizes(self.mechanism, self.length, self.speed)
+
     @property
     def force(self) -> float:
         """Weight, or if larger the centripetal force of its mass at its speed and length [N]."""
-        return self.mechanism.mass * max(float(np.linalg.norm(self.mechanism.gravity)), self.speed**2 / self.length)
-
-    @cached_property
-    def _sizes(self) -> dict[str, float]:
-        """Natural size of a quantity, by its unit."""
-        length, speed, force = self.length, self.speed, self.force
-        momentum = self.mechanism.mass * speed
-        sizes = {"m": length, "m/s": speed, "N": force, "J": force * length}
-        return sizes | {"N s": momentum, "N m s": momentum * length, "1": 1.0}
+        return self._sizes["N"]
 
     @cached_property
     def conservative(self) -> bool:
@@ -216,7 +217,9 @@ class MechanismElement:
     @cached_property
     def observables(self) -> tuple[Observable, ...]:
         """See the protocol."""
-        a, force = _LEAST * self.length, _LEAST * self.force
+        # A point at rest has no size but that of its motion, see `scales`.
+        least = {unit: _LEAST * size if self._own_length else 0.0 for unit, size in self._sizes.items()}
+        a, force = least["m"], least["N"]
         what = "tracked points" if self.mechanism.points else "origins of the bodies' frames"
         found = [Observable("positions", "m", f"the {what}", Role.MOTION, floor=a, headline=True, decides=True)]
         found += [
@@ -231,31 +234,23 @@ class MechanismElement:
                 found.append(
                     Observable(f"q.{joint.name}", unit, f"coordinate of {joint.name}", Role.MOTION, floor=floor)
                 )
-        speed = _LEAST * self.speed
-        found += [
-            Observable(
-                "v_WB", "m/s", "velocities of the origins of the bodies' frames", Role.MOTION,
-                floor=speed, asked_for=False, watched=True,
-            ),
-            Observable(
-                "w_WB", "rad/s", "angular velocities of the bodies", Role.MOTION,
-                floor=speed / self.length, asked_for=False, watched=True,
-            ),
-        ]  # fmt: skip
+        more: dict[str, Any] = {"asked_for": False, "watched": True}
+        meaning, turn = "velocities of the origins of the bodies' frames", _LEAST * self.speed / self.length
+        found.append(Observable("v_WB", "m/s", meaning, Role.MOTION, floor=least["m/s"], **more))
+        found.append(Observable("w_WB", "rad/s", "angular velocities of the bodies", Role.MOTION, floor=turn, **more))
         found.append(Observable("attitudes", "1", "quaternions of the bodies", Role.MOTION, floor=1.0, asked_for=False))
         if np.any(self.analysis.determinate[:, :3]):
             meaning = "determinate components of the forces on children"
             found.append(Observable("forces", "N", meaning, Role.REACTION, floor=force, headline=True, column=True))
         if np.any(self.analysis.determinate[:, 3:]):
             meaning = "determinate components of the moments on children at their joints"
-            found.append(Observable("torques", "N m", meaning, Role.REACTION, floor=force * self.length))
+            found.append(Observable("torques", "N m", meaning, Role.REACTION, floor=least["N m"]))
         found += contact_observables(self.mechanism, self._sizes, _LEAST)
         for item in named_forces(self.mechanism):
-            floor = force if item.unit == "N" else force * self.length
-            column = item.field == "coupling"
+            floor, column = least[str(item.unit)], item.field == "coupling"
             found.append(Observable(item.name, str(item.unit), item.meaning, Role.REACTION, floor=floor, column=column))
         if self.conservative:
-            meaning, floor = "energy now minus energy at the start", force * self.length
+            meaning, floor = "energy now minus energy at the start", least["J"]
             never: dict[str, Any] = {"hangs_on_events": False, "difference_of": "energy"}
             found.append(Observable("energy_error", "J", meaning, Role.RESIDUAL, "ΔE", floor, column=True, **never))
         meaning = "how far joints and loops are open"
@@ -345,8 +340,11 @@ class MechanismElement:
 
     def scales(self, truth: xr.Dataset) -> dict[str, float]:
         """See the protocol: ranges, largest reactions, and natural sizes of what should be zero."""
-        natural = {"attitudes": 1.0, "energy_error": self.force * self.length, "drift": self.length}
-        natural |= {name: self._sizes[unit] for name, unit, _ in (*RESIDUALS, *LAWS)} | {"unpressed": 1.0}
+        reach, speed = (float(np.max(np.ptp(truth[name].to_numpy(), axis=0))) for name in ("positions", "v_WB"))
+        by_motion = not self._own_length and reach and speed
+        own = natural_sizes(self.mechanism, reach, speed) if by_motion else self._sizes
+        natural = {"attitudes": 1.0, "energy_error": own["J"], "drift": own["m"]}
+        natural |= {name: own[unit] for name, unit, _ in (*RESIDUALS, *LAWS)} | {"unpressed": 1.0}
         sizes = {}
         for item in self.observables:
             if item.role == Role.EVENT:
@@ -356,6 +354,8 @@ class MechanismElement:
                 sizes[item.name] = float(np.nanmax(np.abs(values), initial=0.0))
             else:
                 sizes[item.name] = natural.get(item.name) or float(np.max(np.ptp(values, axis=0)))
+            if not self._own_length:
+                sizes[item.name] = max(sizes[item.name], _LEAST * own.get(item.unit, 0.0))
         return sizes
 
     def watch(self, asks: Sequence[str]) -> RunWatch:  # noqa: ARG002 -- the protocol's

@@ -200,11 +200,15 @@ class Joint:
                     f"{place}.limits", self.limits, "give [least, greatest] of a joint with one coordinate"
                 )
             checks.assign(self, limits=(low, high))
-            digits = AT_STOP * (high - low)
-            if not low - digits <= self.q0[0] <= high + digits:
+            if not low - self.stop_digits <= self.q0[0] <= high + self.stop_digits:
                 advice = f"the joint starts beyond a stop; its limits are {low:g} and {high:g}"
                 raise InputError(f"{place}.q0", self.q0[0], advice)
         self._check_restitution(place)
+
+    @property
+    def stop_digits(self) -> float:
+        """Distance from a stop that counts as none [rad or m]; 0 without stops."""
+        return AT_STOP * (self.limits[1] - self.limits[0]) if self.limits else 0.0
 
     def _check_restitution(self, place: str) -> None:
         value = checks.number(f"{place}.restitution", self.restitution, at_least=0)

@@ -25,7 +25,7 @@ _APPROACH = 0.5  # fraction of the time left until standstill that one step may 
 _CLOSE = 0.99  # and near it, where that time is known accurately
 _FURTHER = 1.2  # how far a polynomial is extrapolated, relative to its own step
 _MANY = 300  # steps of a rolling leg; the rest of a longer one is left to a compiled Taylor series
-_STILL = 1e-9  # time left until standstill, relative to the pace, below which the state is extrapolated
+_STILL = 1e-11  # time left until standstill, relative to the pace, below which the state is extrapolated
 
 
 class Implicit(Route):

@@ -23,7 +23,7 @@ from proofroll.truth.ball_on_surface.sliding import Sliding
 
 _Stop = tuple[End, Callable[[FloatArray], float]]
 _APPROACH = 0.6  # fraction of the time left until the centre stops that one step may take
-_STILL = 1e-9  # time left until standstill, relative to the pace, below which the state is extrapolated
+_STILL = 1e-11  # time left until standstill, relative to the pace, below which the state is extrapolated
 
 
 class Polar(Sliding):

@@ -11,7 +11,7 @@ from proofroll.elements.ball_on_surface.motion import BallMotion
 from proofroll.truth.ball_on_surface.impact import by_coefficients
 from proofroll.truth.ball_on_surface.route import End, Leg, Route, World, joined
 
-_FLOOR = 1e-4  # |u| below which the rest of a slip is extrapolated, relative to |u| at the handover
+_FLOOR = 1e-6  # |u| below which the rest of a slip is extrapolated, relative to |u| at the handover
 _BEGUN = 1e-8  # smallest handover of a slip that does not start from rest, relative to its initial |u|
 _ROUNDS = 50  # Newton iterations for τ at a given time
 

@@ -6,17 +6,24 @@ import json
 import numpy as np
 import pytest
 
+from proofroll.core.dataset import scales
 from proofroll.core.element import FirstMotion
 from proofroll.core.engine import Regularised
 from proofroll.core.errors import Diverged, InputError
 from proofroll.core.observable import Role
+from proofroll.core.scene import Scene
+from proofroll.core.truth import truth
 from proofroll.elements.mechanism.certificate import CAPS
 from proofroll.elements.mechanism.contacts.dynamics import ContactDynamics
 from proofroll.elements.mechanism.dataset import UNDETERMINED, UNSAID
 from proofroll.elements.mechanism.drives import Actuator
 from proofroll.elements.mechanism.element import ENERGY_GAIN, OPENED, MechanismElement
+from proofroll.elements.mechanism.joint import Joint
+from proofroll.elements.mechanism.model import Mechanism
+from proofroll.elements.mechanism.parts import Body
 from proofroll.elements.mechanism.report.drawing import drawn
 from proofroll.elements.mechanism.sampling import MechanismBuilt, MechanismSample
+from proofroll.elements.mechanism.signal import Formula
 from proofroll.files.json_data import plain
 from proofroll.files.scene_file import load_scene
 from proofroll.report.kinds import kind_of
@@ -326,6 +333,19 @@ def test_the_natural_time_knows_servos_and_what_they_move() -> None:
     pair = element_of("double_pendulum").mechanism
     servo = Actuator("servo", pair.joints[0].name, "position", kp=1e6)
     assert MechanismElement(dataclasses.replace(pair, actuators=(servo,))).natural_time > 1.0
+
+
+@pytest.mark.parametrize("force", [1e-6, 1.0])
+def test_a_point_at_rest_is_as_large_as_its_motion(force: float) -> None:
+    """Sizes that tolerances refer to grow with the force that moves a point from rest: no metre of ours decides."""
+    slide = Joint("slide", "prismatic", "world", "b", axis=(1, 0, 0), torque=Formula(f"{force}*sin(t)", ()))
+    scene = Scene("shaken", "", (MechanismElement(Mechanism((Body("b", 1.0),), (slide,), gravity=(0, 0, 0))),))
+    found = scales(scene, truth(scene, np.linspace(0.0, 2.0, 5)))
+    way = force * (2.0 - np.sin(2.0))
+    assert found["q.slide"] == found["positions"] == pytest.approx(way)
+    assert found["drift"] == pytest.approx(way)
+    assert found["v_WB"] == pytest.approx(force * (1 - np.cos(2.0)))
+    assert 0 < found["torques"] < force * way
 
 
 def test_a_first_motion_ends_at_a_stop_or_where_friction_turns() -> None:

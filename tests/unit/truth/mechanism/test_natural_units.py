@@ -233,6 +233,18 @@ def test_a_mechanism_at_one_place_has_a_length_that_follows_it(scene: str, point
     assert other.length == pytest.approx(100.0 * one.length)
 
 
+@pytest.mark.parametrize("height", [1e-3, 1e-12])
+def test_a_point_at_rest_falls_on_its_stop_from_any_height(height: float) -> None:
+    """A body without size or speed has the way to its stop for a length: it strikes at sqrt(2 h/g), within its bars."""
+    slide = Joint("slide", "prismatic", "world", "b", axis=(0, 0, 1), limits=(-height, height), restitution=0.5)
+    mechanism = Mechanism((Body("b", 1.0),), (slide,))
+    falls = float(np.sqrt(2 * height / 9.81))
+    found = truth_of(mechanism, np.array([0.0, 0.5, 2.5]) * falls)
+    assert [event.time / falls for event in found.events] == pytest.approx([1.0, 2.0], rel=SAME)
+    assert found.record.p_WB[1, 0, 2] == pytest.approx(-height / 4, rel=SAME)
+    assert found.bars["p_WB"][-1] < SAME * height
+
+
 def test_messages_of_routes_have_seconds() -> None:
     """A time in a message of a route in natural units is said in seconds."""
     with (

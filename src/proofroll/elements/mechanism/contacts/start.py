@@ -9,7 +9,6 @@ from numpy.typing import ArrayLike
 from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import InputError
 from proofroll.elements.mechanism.contacts.touching import Moving, Touching, touch
-from proofroll.elements.mechanism.joint import AT_STOP
 from proofroll.elements.mechanism.joint_coordinates import JointCoordinates, Solution
 from proofroll.elements.mechanism.kinematics import BodyMotion, Tree
 from proofroll.elements.mechanism.model import Mechanism
@@ -62,16 +61,19 @@ class Scale(NamedTuple):
 
 
 def natural_length(mechanism: Mechanism, found: Solution) -> float:
-    """Largest of extent, prismatic travel and radii of gyration at one instant [m].
+    """Largest of extent, prismatic travel and radii of gyration at one instant [m]; 0: it has none.
 
-    That of a point at its place is how far its speed carries it against its acceleration; without these 1 m, by which
-    nothing that it does is large or small.
+    That of a point at its place is the way to its nearest stop, or how far its speed carries it against its
+    acceleration.
     """
     motion = found.motion
-    ways = [abs(way) for joint in mechanism.joints if joint.kind == "prismatic" for way in (*joint.q0, joint.rest)]
+    slides = [joint for joint in mechanism.joints if joint.kind == "prismatic"]
+    ways = [abs(way) for joint in slides for way in (*joint.q0, joint.rest)]
     radii = [np.sqrt(np.trace(body.inertia) / body.mass) for body in mechanism.bodies if body.mass]
     length, pull = max([extent(mechanism, motion), *ways, *radii]), _largest(_rates(found)[:, :3])
-    return float(length or (pull and _largest(motion.v_WB) ** 2 / pull) or 1.0)
+    stops = [abs(at - j.q0[0]) for j in slides for at in j.limits or () if abs(at - j.q0[0]) > j.stop_digits]
+    nearest = min(stops, default=0.0)
+    return float(length or nearest or (pull and _largest(motion.v_WB) ** 2 / pull))
 
 
 def natural_scale(mechanism: Mechanism) -> Scale:
@@ -80,7 +82,7 @@ def natural_scale(mechanism: Mechanism) -> Scale:
     Both are powers of two, so that a change of units causes no round-off.
     """
     found = JointCoordinates(mechanism).solve(*mechanism.start())
-    motion, rates, length = found.motion, _rates(found), natural_length(mechanism, found)
+    motion, rates, length = found.motion, _rates(found), natural_length(mechanism, found) or 1.0
     pulls = _largest(mechanism.gravity) / length, _largest(rates[:, :3]) / length, _largest(rates[:, 3:])
     rate = max(np.sqrt(max(pulls)), _largest(motion.v_WB) / length, _largest(motion.w_WB)) or 1.0
     return Scale(*(2.0 ** round(np.log2(size)) for size in (length, rate)))
@@ -127,7 +129,7 @@ def check_contacts(mechanism: Mechanism) -> None:
     for joint in stopped:
         assert joint.limits is not None
         (low, high), (q,), (v,) = joint.limits, joint.q0, joint.v0
-        digits, still = AT_STOP * (high - low), scale.speed if joint.kind == "prismatic" else STILL * scale.rate
+        digits, still = joint.stop_digits, scale.speed if joint.kind == "prismatic" else STILL * scale.rate
         if (q <= low + digits and v < -still) or (q >= high - digits and v > still):
             advice = "the joint starts on its stop and moves into it, an impact at time 0; correct v0 or start it apart"
             raise InputError(f"joints.{joint.name}.v0", v, advice)
