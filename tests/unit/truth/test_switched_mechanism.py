@@ -7,6 +7,7 @@ import pytest
 
 from proofroll.core.errors import InputError, NotUnique, Refused
 from proofroll.elements.mechanism.complementarity import complementary
+from proofroll.elements.mechanism.drives import Coupling
 from proofroll.elements.mechanism.joint import Joint
 from proofroll.elements.mechanism.joint_coordinates import JointCoordinates
 from proofroll.elements.mechanism.model import Mechanism
@@ -211,12 +212,46 @@ def test_bad_laws_are_one_line(more: dict[str, object], said: str) -> None:
     assert said in str(raised.value)
 
 
-@pytest.mark.parametrize(("round_off", "second"), [(0.0, 2.0), (1e-12, 2.0), (-1e-12, 3.0)])
-def test_forces_that_are_not_determinate_are_refused(round_off: float, second: float) -> None:
+@pytest.mark.parametrize("round_off", [0.0, 1e-12, -1e-12])
+def test_forces_that_are_not_determinate_are_refused(round_off: float) -> None:
     """Two rows of one velocity have no unique forces, and round-off between them gives the same reason."""
     rows = np.array([[1.0, 1.0], [1.0, 1.0 - round_off]])
     with pytest.raises(Refused, match="hold one degree of freedom"):
-        complementary(np.array([3.0, second]), rows, -5 * np.ones(2), 5 * np.ones(2))
+        complementary(np.array([3.0, 3.0]), rows, -5 * np.ones(2), 5 * np.ones(2))
+
+
+@pytest.mark.arithmetic
+@pytest.mark.parametrize("round_off", [0.0, 1e-13, -1e-13])
+def test_joints_that_share_one_freedom_move_where_their_friction_does_not_hold_it(round_off: float) -> None:
+    """Two rows of one velocity have unique forces where both are at their bounds."""
+    rows = np.array([[1.0, -2.0], [-2.0, 4.0 - round_off]])
+    side, f, a = complementary(np.array([30.0, -60.0]), rows, -5 * np.ones(2), 5 * np.ones(2))
+    assert side.tolist() == [-1, 1]
+    assert f.tolist() == [-5.0, 5.0]
+    assert a == pytest.approx([15.0, -30.0], abs=1e-10)
+
+
+@pytest.mark.arithmetic
+@pytest.mark.parametrize("ratio", [-0.7, 1.3])
+def test_joints_that_share_one_freedom_turn_together(ratio: float) -> None:
+    """A mass thrown upwards and one that it draws along, both rubbing, turn at once: parabolas before and after."""
+    lift = Joint("lift", "prismatic", "world", "a", axis=(0, 0, 1), v0=(2.0,), friction=1.3)
+    rail = Joint("rail", "prismatic", "world", "b", axis=(1, 0, 0), v0=(2.0 * ratio,), friction=0.9)
+    drawn = Mechanism(
+        tuple(Body(name, mass, inertia=(1.0, 1.0, 1.0)) for name, mass in (("a", 1.5), ("b", 0.8))),
+        (lift, rail),
+        couplings=(Coupling("belt", "lift", "rail", ratio),),
+        gravity=(0.0, 0.0, -9.81),
+    )
+    inertia, rubbing = 1.5 + ratio**2 * 0.8, 1.3 + 0.9 * abs(ratio)
+    slows, falls = ((1.5 * 9.81 + side * rubbing) / inertia for side in (1, -1))
+    turns = 2.0 / slows
+    found = truth_of(drawn, np.array([0.0, turns + 0.2]))
+    assert [(event.kind, event.name) for event in found.events] == [("turn", "lift"), ("turn", "rail")]
+    assert [event.time for event in found.events] == pytest.approx([turns] * 2, abs=TIGHT)
+    height = turns - falls * 0.2**2 / 2
+    assert found.record.q[1] == pytest.approx([height, ratio * height], abs=TIGHT)
+    assert np.isinf(found.horizon)
 
 
 def test_complementarity_holds_on_random_problems() -> None:

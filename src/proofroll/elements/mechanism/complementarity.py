@@ -3,6 +3,7 @@
 Engines decide modes with code of their own: sharing this code would make their agreement worthless as evidence.
 """
 
+import itertools
 import math
 from collections.abc import Callable, Sequence
 
@@ -17,6 +18,7 @@ from proofroll.elements.mechanism.signal import breaks
 from proofroll.elements.mechanism.switches import REDUNDANT, Mode, SwitchedJoint, held_joints
 
 _ROUND_OFF = 1e-12  # of accelerations, in parts of what they are the sum of: no pivot, or round-off alternates for ever
+_MOST_TRIED = 6  # largest number of joints at rest of which some share one degree of freedom
 _MOST_PIVOTS = 1000  # of the complementarity problem; usually about one for each joint
 _UNDECIDED = (
     "which joints with friction or stops hold is not found by pivots, as where it is within rounding: "
@@ -27,31 +29,61 @@ _UNDECIDED = (
 def complementary(free: Array, G: Array, low: Array, high: Array) -> tuple[NDArray[np.int_], Array, Array]:
     """Solves a = free + G f, with a = 0 where f is between its bounds.
 
-    At the lower bound a ≥ 0, at the upper one a ≤ 0. G is positive definite; pivots by least index (Murty, 1974).
+    At the lower bound a ≥ 0, at the upper one a ≤ 0. G is positive definite; pivots by least index (Murty, 1974). Or
+    it is singular, where joints share one degree of freedom: then all sides are tried, and these joints must move.
 
     Returns:
         Side of each force (-1 at its lower bound, 0 between, 1 at its upper bound), the forces f, the accelerations a.
 
     Raises:
-        Refused: G is singular but for round-off, so that the forces are not determinate or not found.
+        Refused: joints that share one degree of freedom are held, so that their forces are not determinate; or none are
+            found.
     """
     scale = np.sqrt(np.maximum(np.diag(G), 0.0))
-    if np.any(scale <= RANK * scale.max()) or np.linalg.matrix_rank(G / np.outer(scale, scale), tol=RANK) < len(G):
+    if np.any(scale <= RANK * scale.max()):
         raise Refused(REDUNDANT)
-    state = np.zeros(len(free), dtype=int)
+    alike = G / np.outer(scale, scale)
+    if np.linalg.matrix_rank(alike, tol=RANK) < len(G):
+        if len(G) > _MOST_TRIED:
+            raise Refused(REDUNDANT)
+        return _turning(free, G, low, high, scale)
+    side = np.zeros(len(free), dtype=int)
     for _ in range(_MOST_PIVOTS):
-        held = state == 0
-        f = np.where(state > 0, high, np.where(state < 0, low, 0.0))
-        f[held] = -np.linalg.solve(G[np.ix_(held, held)], free[held] + G[np.ix_(held, ~held)] @ f[~held])
-        a = np.where(held, 0.0, free + G @ f)
-        rounded = _ROUND_OFF * (np.abs(free) + scale * (scale @ np.abs(f)))  # of the accelerations
-        beyond = np.maximum(f - high, low - f) * scale**2
-        wrong = np.flatnonzero(np.where(held, beyond, state * a) > rounded)
+        f, a, beyond, rounded = _at_sides(free, G, low, high, scale, side)
+        wrong = np.flatnonzero(beyond > rounded)
         if not len(wrong):
-            return state, np.clip(f, low, high), np.where(state * a > 0, 0.0, a)
+            return side, np.clip(f, low, high), np.where(side * a > 0, 0.0, a)
         k = int(wrong[0])
-        state[k] = 0 if state[k] else (1 if f[k] > high[k] else -1)
+        side[k] = 0 if side[k] else (1 if f[k] > high[k] else -1)
     raise Refused(_UNDECIDED)
+
+
+def _at_sides(
+    free: Array, G: Array, low: Array, high: Array, scale: Array, side: Array
+) -> tuple[Array, Array, Array, Array]:
+    """Forces and accelerations with each force on its side; violation of each inequality, and its round-off."""
+    held = side == 0
+    f = np.where(side > 0, high, np.where(side < 0, low, 0.0))
+    f[held] = -np.linalg.solve(G[np.ix_(held, held)], free[held] + G[np.ix_(held, ~held)] @ f[~held])
+    a = np.where(held, 0.0, free + G @ f)
+    beyond = np.where(held, np.maximum(f - high, low - f) * scale**2, side * a)
+    return f, a, beyond, _ROUND_OFF * (np.abs(free) + scale * (scale @ np.abs(f)))
+
+
+def _turning(free: Array, G: Array, low: Array, high: Array, scale: Array) -> tuple[NDArray[np.int_], Array, Array]:
+    """Solution for joints of which some share one degree of freedom, if these move on; see :func:`complementary`."""
+    for sides in itertools.product((-1, 0, 1), repeat=len(free)):
+        side = np.array(sides)
+        held = side == 0
+        unbounded = np.isinf(np.where(side > 0, high, low)) & ~held
+        alike = G[np.ix_(held, held)] / np.outer(scale[held], scale[held])
+        if unbounded.any() or (held.any() and np.linalg.matrix_rank(alike, tol=RANK) < len(alike)):
+            continue
+        f, a, beyond, rounded = _at_sides(free, G, low, high, scale, side)
+        # what moves does so by more than round-off, or it shares the degree of freedom of what is held
+        if np.all(np.where(held, beyond <= rounded, beyond < -rounded)):
+            return side, np.clip(f, low, high), a
+    raise Refused(REDUNDANT)
 
 
 def margin(free: Array, G: Array, low: Array, high: Array, f: Array, a: Array) -> float:

@@ -50,9 +50,9 @@ class SwitchedBodies(JointStretches):
             noise_of(self.joints, self.motors, mode, self._along(state)[0], self._wanted(state)),
         )
 
-    def _at_rest(self, leg: Stretch[Mode], state: Array, which: int) -> tuple[Array, Mode, float]:
-        still = [own in HOLDING or k == which for k, own in enumerate(leg.mode[: len(self.joints)])]
-        return state, *self._decided(state, still, which)
+    def _at_rest(self, leg: Stretch[Mode], state: Array, stopped: Sequence[int]) -> tuple[Array, Mode, float]:
+        still = [own in HOLDING or k in stopped for k, own in enumerate(leg.mode[: len(self.joints)])]
+        return state, *self._decided(state, still, stopped)
 
     def _hit(self, leg: Stretch[Mode], state: Array, which: int, _: float) -> tuple[Array, Mode, float, float]:
         last, joint, delay = state, self.joints[which], 0.0
@@ -110,13 +110,13 @@ class SwitchedBodies(JointStretches):
         rows = self.equations.equations.rate_rows(state[:-1].tolist(), self._numbers)
         return np.array([sum(c * acceleration[k] for k, c in r.coefficients.items()) + r.bias for r in rows], float)
 
-    def _decided(self, state: Array, still: Sequence[bool], turns: int | None = None) -> tuple[Mode, float]:
+    def _decided(self, state: Array, still: Sequence[bool], stopped: Sequence[int] = ()) -> tuple[Mode, float]:
         """Mode that satisfies all inequalities, and its margin: relative distance from violating one.
 
         Args:
             state: with velocity zero, within round-off, of the joints at rest.
             still: True for switched joints at rest; those with velocity zero count too.
-            turns: joint just stopped by friction: it is not at a stop, even if close to one.
+            stopped: joints just stopped by friction: they are not at a stop, even if close to one.
 
         Raises:
             Refused: no mode does, too many joints are at rest, or friction and joints hold a coordinate twice.
@@ -126,7 +126,7 @@ class SwitchedBodies(JointStretches):
         modes = zip(self.motors, self._wanted(state), strict=True)
         efforts = tuple(motor.mode_of(wanted) for motor, wanted in modes)
         choices = [
-            list(_candidates(joint, float(q[k]), still[k], k == turns))
+            list(_candidates(joint, float(q[k]), still[k], k in stopped))
             if still[k] or v[k] == 0
             else [joint.moving(float(v[k]))]
             for k, joint in enumerate(self.joints)
@@ -136,15 +136,18 @@ class SwitchedBodies(JointStretches):
             raise Refused(f"{len(open_)} joints with friction or stops come to rest at once; at most {_MOST} are tried")
         if not open_:
             return tuple(choice[0] for choice in choices) + efforts, np.inf
-        best: tuple[float, Mode] = (-np.inf, ())
+        best, redundant = tuple[float, Mode]((-np.inf, ())), False
         for joints in itertools.product(*choices):
             mode = joints + efforts
             equations = self.equations.switched(state[:-1], self.switched(mode))
             if equations.rank < self.equations.rank + sum(own in HOLDING for own in mode):
-                raise Refused(REDUNDANT)
+                redundant = True  # where joints that share one degree of freedom hold it; they may turn together
+                continue
             force, acceleration = self.holding(equations, state, mode), self._accelerations(equations, state)
             kept = min(self._kept(k, mode[k], float(force[k]), float(acceleration[k]), state) for k in open_)
             best = max(best, (kept, mode))
+        if redundant and best[0] <= SLACK:
+            raise Refused(REDUNDANT)
         if best[0] < -SLACK:
             raise Refused("no mode of the joints with friction or stops keeps all its inequalities")
         return best[1], max(best[0], 0.0)

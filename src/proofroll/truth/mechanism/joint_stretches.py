@@ -20,6 +20,7 @@ from proofroll.truth.mechanism.two_paths import CLOSE, moment
 Motors = tuple[Actuator, ...]
 _NEAR = 1e-12  # relative difference from a stop below which a coordinate is at it
 _DIGITS = 8  # round-off of a coordinate, in units of its last digit
+_STILL = 1e-13  # natural speed below which a joint stops together with another one, as where a loop links both
 
 
 class JointStretches(Stretches[Mode]):
@@ -32,8 +33,8 @@ class JointStretches(Stretches[Mode]):
     motors: Motors
 
     @abstractmethod
-    def _at_rest(self, leg: Stretch[Mode], state: Array, which: int) -> tuple[Array, Mode, float]:
-        """State, mode and margin after a joint that moved against friction has stopped."""
+    def _at_rest(self, leg: Stretch[Mode], state: Array, stopped: Sequence[int]) -> tuple[Array, Mode, float]:
+        """State, mode and margin after joints that moved against friction have stopped."""
 
     @abstractmethod
     def _hit(self, leg: Stretch[Mode], state: Array, which: int, stop: float) -> tuple[Array, Mode, float, float]:
@@ -58,7 +59,9 @@ class JointStretches(Stretches[Mode]):
             was, mode[which] = mode[which], joint.moving(1.0 if kind == "up" else -1.0)
             return Transition(state, tuple(mode), ((end_event(was), joint.name),))
         if kind == "still":
-            state, decided, margin = self._at_rest(leg, state, which)
+            rates = np.abs(self._along(state)[1])
+            slides = [k for k, own in enumerate(leg.mode) if own in {"forward", "backward"}]
+            state, decided, margin = self._at_rest(leg, state, [k for k in slides if k == which or rates[k] <= _STILL])
             return Transition(state, decided, changes(self.joints, leg.mode, decided), margin)
         q, before = self._along(state.copy())
         state, decided, margin, delay = self._hit(leg, state, which, joint.low if kind == "low" else joint.high)

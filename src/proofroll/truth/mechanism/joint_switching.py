@@ -1,5 +1,7 @@
 """Route 1 for mechanisms with dry friction, stops or effort limits: joint coordinates, modes by complementarity."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
@@ -40,9 +42,9 @@ class SwitchedTree(JointStretches):
             noise_of(self.joints, self.motors, mode, q[at_q], self._wanted(float(state[-1]), q, v)),
         )
 
-    def _at_rest(self, leg: Stretch[Mode], state: Array, which: int) -> tuple[Array, Mode, float]:
+    def _at_rest(self, leg: Stretch[Mode], state: Array, stopped: Sequence[int]) -> tuple[Array, Mode, float]:
         q, v = self._parts(state)
-        v[self.joints[which].velocity] = 0.0
+        v[[self.joints[k].velocity for k in stopped]] = 0.0
         return state, *self.equations.decided(q, v, leg.end)
 
     def _hit(self, leg: Stretch[Mode], state: Array, which: int, stop: float) -> tuple[Array, Mode, float, float]:
