@@ -18,7 +18,7 @@ from proofroll.elements.mechanism.signal import breaks
 from proofroll.elements.mechanism.switches import REDUNDANT, Mode, SwitchedJoint, held_joints
 
 _ROUND_OFF = 1e-12  # of accelerations, in parts of what they are the sum of: no pivot, or round-off alternates for ever
-_MOST_TRIED = 6  # largest number of joints at rest of which some share one degree of freedom
+_MOST_TRIED = 6  # largest number of joints at rest where some share one degree of freedom
 _MOST_PIVOTS = 1000  # of the complementarity problem; usually about one for each joint
 _UNDECIDED = (
     "which joints with friction or stops hold is not found by pivots, as where it is within rounding: "
@@ -71,7 +71,7 @@ def _at_sides(
 
 
 def _turning(free: Array, G: Array, low: Array, high: Array, scale: Array) -> tuple[NDArray[np.int_], Array, Array]:
-    """Solution for joints of which some share one degree of freedom, if these move on; see :func:`complementary`."""
+    """Solution where joints share one degree of freedom, if these move on; see :func:`complementary`."""
     for sides in itertools.product((-1, 0, 1), repeat=len(free)):
         side = np.array(sides)
         held = side == 0
