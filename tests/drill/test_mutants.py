@@ -22,7 +22,8 @@ from proofroll.core.truth import truth
 from proofroll.files.scene_file import load_scene
 from proofroll.running.simulation import simulate
 from proofroll_drill.mutants import ball_models, contact_models, joint_laws
-from proofroll_drill.mutants.drilling import ENOUGH, mutants, tried
+from proofroll_drill.mutants.base import Mutant
+from proofroll_drill.mutants.drilling import ENOUGH, judged_without_fault, mutants, tried, without_fault
 
 
 @functools.cache
@@ -46,6 +47,17 @@ def test_every_mutant_is_detected_and_most_are_named() -> None:
     assert all(row["said"] for row in rows if row["named"])
     of_laws = {kind.__name__ for kind in mutants() if kind.__module__ in {contact_models.__name__, joint_laws.__name__}}
     assert [row for row in rows if row["mutant"] in of_laws and not row["named"]] == []
+
+
+WITHOUT_FAULT = {(kind.__bases__, repr(kind.scene), kind.until): kind for kind in map(without_fault, mutants())}
+
+
+@pytest.mark.parametrize("kind", WITHOUT_FAULT.values(), ids=lambda kind: kind.__name__)
+def test_an_engine_without_a_fault_is_not_detected(kind: type[Mutant]) -> None:
+    """What a mutant's engine does without its fault is no sign of one, and small on every scene."""
+    found = tried(type("Harmless", (kind,), {"fault": "none"}))
+    assert not found.detected, found.by
+    assert [item for item in judged_without_fault(kind) if item.error > 2e-3 * item.scale] == []
 
 
 def test_a_fault_of_contacts_is_detected_and_named() -> None:

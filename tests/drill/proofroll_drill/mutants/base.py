@@ -25,7 +25,7 @@ class Mutant:
         fault: what is planted, in a few words.
         scene: on which it is tried, with its parameters.
         named: the cause in plain words; the diagnosis must have one of these words.
-        until, every: length of the run and interval of its samples [s].
+        until, every, step: length of the run, interval of its samples, and step [s].
         asks: what is wanted besides the motion.
     """
 
@@ -39,6 +39,7 @@ class Mutant:
     named: ClassVar[tuple[str, ...]] = ()
     until: ClassVar[float] = 0.3
     every: ClassVar[float] = 0.01
+    step: ClassVar[float] = STEP
     asks: ClassVar[tuple[str, ...]] = ()
 
     @staticmethod

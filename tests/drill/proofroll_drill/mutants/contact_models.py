@@ -8,6 +8,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from proofroll.core.events import Event
 from proofroll.core.scene import Scene
 from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.contacts.acting import Acting, heading_of
@@ -27,12 +28,17 @@ _TOLERANCE = 1e-12
 
 
 class ContactMutant(MechanismMutant):
-    """Follows the changed mechanism by the truth's first route."""
+    """Follows the changed mechanism by the truth's first route.
+
+    Attributes:
+        late: how much later it tells its events [s].
+    """
 
     scene: ClassVar[Any] = SLED
     until, every = 0.05, 0.005  # its faults show at once
     honest: ClassVar[bool] = False  # reads back what it built
     law: ClassVar[type[ContactDynamics]] = ContactDynamics
+    late: ClassVar[float] = 0.0
 
     def __init__(self, scene: Scene, settings: Any) -> None:  # noqa: ARG002 -- it has no settings
         self.scenes, self.t = scene, 0.0
@@ -56,6 +62,11 @@ class ContactMutant(MechanismMutant):
         motion = {name: record[name] for name in ("p_WB", "v_WB", "w_WB", "q_WB")}
         sample: MechanismSample = self.misreport(MechanismSample(**motion, contact_force=force))
         return sample
+
+    def events(self) -> list[Event]:
+        """Events of its own path: samples show their times to an interval alone."""
+        times = {each: each.time + self.late for each in self.path.happenings if each.time + self.late <= self.t}
+        return [Event(each.kind, time, time, time, each.name) for each, time in times.items()]
 
     def built(self) -> MechanismBuilt:
         """Contacts as the scene has them, or as it built them; accelerations are derived from its steps."""
@@ -205,6 +216,7 @@ class LateImpact(ContactMutant):
     scene = BALLS
     until, every = 0.4, 0.02
     named = ("impacts come one step",)
+    late = STEP
 
     def sample(self) -> MechanismSample:
         """Free flight from where the ball is a step after it has come to the floor."""

@@ -5,14 +5,15 @@ from __future__ import annotations
 import dataclasses
 import functools
 import inspect
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from proofroll.core.certificate import first_difference
+from proofroll.core.certificate import Line, first_difference
 from proofroll.core.diagnosis.of_scene import diagnosed
 from proofroll.core.errors import Diverged
 from proofroll.core.first_steps import certificate as certificate_of
@@ -35,7 +36,7 @@ from proofroll_drill.mutants import (
     mechanism_samples,
     mechanism_settings,
 )
-from proofroll_drill.mutants.base import STEP, Mutant
+from proofroll_drill.mutants.base import Mutant
 
 if TYPE_CHECKING:
     from proofroll.running.cluster import Cluster
@@ -51,8 +52,9 @@ MODULES: tuple[ModuleType, ...] = (
     mechanism_samples,
     mechanism_settings,
 )
-# Tolerance of every observable, relative to its size: the projection method at this step is right to 1e-8.
-_TOLERANCE = 1e-6
+# Least tolerance of every observable: relative to its size, and in errors of the engine without the fault.
+_TOLERANCE, _OF_METHOD = 1e-6, 10.0
+_plain: dict[Any, Sequence[Judgement]] = {}  # by bases of an engine and what it is asked
 # Part of the mutants whose fault has to be named.
 ENOUGH = 0.9
 
@@ -102,24 +104,22 @@ def mutant_drill(progress: Callable[[str], None] = lambda _: None, cluster: Clus
 
 def tried(kind: type[Mutant]) -> Mutated:
     """One mutant: certificate, run, verdicts, diagnosis."""
-    scene, reference = _reference(kind)
-    settings = dataclasses.replace(kind.presets[kind.formulation]["default"], dt=STEP)
-    engine = kind.build(scene, settings)
-    certificate = certificate_of(kind, engine, scene, settings)
+    scene, reference = _truth(*_asked(kind))
+    engine, certificate = _built(kind, scene)
     lines = [line.as_dict() for line in certificate]
     by, ended = first_difference(certificate) or "", ""
     if by:
-        causes = diagnosed(scene, lines, step=STEP)
+        causes = diagnosed(scene, lines, step=kind.step)
     else:
         try:
             recording = record(engine, scene, reference.dataset["time"].to_numpy())
         except Diverged as error:
             return Mutated(kind.fault, kind.__name__, scene.name, True, str(error), False, "")
-        judgements = judged(reference, recording.dataset)
+        judgements = _judged(reference, recording.dataset, judged_without_fault(kind))
         wrong = [item for item in judgements if item.verdict == Verdict.DIFFERS]
         ended = recording.failure or ""  # which says why
         by = ended or "; ".join(f"{item.observable} {item.reason.partition(';')[0]}" for item in wrong[:2])
-        causes = diagnosed(scene, lines, recording.dataset, reference.dataset, STEP, judgements) if by else []
+        causes = diagnosed(scene, lines, recording.dataset, reference.dataset, kind.step, judgements) if by else []
     said = "; ".join(item.sentence for item in causes) or ended
     # The first cause, and what looks the same from outside, are the answer; what is said after it does not count.
     answer = " ".join(item.sentence for item in causes[:1] + [item for item in causes[1:] if item.cause.alternative])
@@ -127,21 +127,52 @@ def tried(kind: type[Mutant]) -> Mutated:
     return Mutated(kind.fault, kind.__name__, scene.name, bool(by), by, named, said)
 
 
-def judged(reference: Reference, dataset: Any) -> list[Judgement]:
-    """Verdicts of all observables that a run has."""
-    found = []
+def without_fault(kind: type[Mutant]) -> type[Mutant]:
+    """The engine of a mutant without its fault, on its scene: of all its bases those without a fault."""
+    bases = tuple(each for each in kind.__mro__ if getattr(each, "fault", None) == "")
+    same = {name: getattr(kind, name) for name in ("scene", "until", "every", "step", "asks")}
+    return type(f"{bases[0].__name__}Of_{Path(kind.scene[0]).name}", bases, same)
+
+
+def judged_without_fault(kind: type[Mutant]) -> Sequence[Judgement]:
+    """All observables of the mutant's engine without its fault on its scene, whose errors are no sign of the fault.
+
+    Raises:
+        ValueError: that engine does not build the scene, or fails in it.
+    """
+    plain = without_fault(kind)
+    key = (plain.__bases__, plain.step, _asked(plain))
+    if key not in _plain:
+        scene, reference = _truth(*_asked(plain))
+        engine, certificate = _built(plain, scene)
+        recording = record(engine, scene, reference.dataset["time"].to_numpy())
+        if wrong := first_difference(certificate) or recording.failure:
+            raise ValueError(f"{plain.__name__} without a fault: {wrong}")
+        _plain[key] = _judged(reference, recording.dataset, ())
+    return _plain[key]
+
+
+def _built(kind: type[Mutant], scene: Scene) -> tuple[Any, list[Line]]:
+    settings = dataclasses.replace(kind.presets[kind.formulation]["default"], dt=kind.step)
+    engine = kind.build(scene, settings)
+    return engine, certificate_of(kind, engine, scene, settings)
+
+
+def _judged(reference: Reference, dataset: Any, plain: Sequence[Judgement]) -> list[Judgement]:
+    """Verdicts of all observables that a run has; ``plain``: of the engine without the fault."""
+    found, of_method = [], {item.observable: item.error for item in plain}
     for name, values in run_values.observed(reference, dataset).items():
-        true = reference.true(name, values)
-        size = reference.sizes.get(name, 1.0)
-        unit = reference.scene.observables[name].unit
-        allowance = Allowance(name, unit, max(_TOLERANCE * size, 4 * true.error_bar), size)
+        true, size = reference.true(name, values), reference.sizes.get(name, 1.0)
+        least = max(_TOLERANCE * size, _OF_METHOD * of_method.get(name, 0.0), 4 * true.error_bar)
+        allowance = Allowance(name, reference.scene.observables[name].unit, least, size)
         found.append(judge_curve(allowance, RunCurve(values), true))
     return found
 
 
-def _reference(kind: type[Mutant]) -> tuple[Scene, Reference]:
+def _asked(kind: type[Mutant]) -> tuple[Any, ...]:
+    """Scene, its parameters, what is asked of it, end and interval of the run of a mutant."""
     name, parameters = kind.scene
-    return _truth(name, tuple(sorted(parameters.items())), kind.asks, kind.until, kind.every)
+    return name, tuple(sorted(parameters.items())), kind.asks, kind.until, kind.every
 
 
 @functools.cache

@@ -182,8 +182,8 @@ class JointsMutant(MechanismMutant):
         self.y = np.concatenate(self.element.mechanism.start())
 
     def faulty(self, mechanism: Mechanism) -> JointCoordinates:
-        """The equations."""
-        raise NotImplementedError
+        """The equations; without a fault here."""
+        return JointCoordinates(mechanism)
 
     def advance(self, t: float) -> None:
         """See :class:`proofroll.core.engine.Engine`."""
