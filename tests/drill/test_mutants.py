@@ -54,7 +54,7 @@ WITHOUT_FAULT = {(kind.__bases__, repr(kind.scene), kind.until): kind for kind i
 
 @pytest.mark.parametrize("kind", WITHOUT_FAULT.values(), ids=lambda kind: kind.__name__)
 def test_an_engine_without_a_fault_is_not_detected(kind: type[Mutant]) -> None:
-    """What a mutant's engine does without its fault is no sign of one, and small on every scene."""
+    """Errors of an engine without the fault are no sign of it, and are small on every scene."""
     found = tried(type("Harmless", (kind,), {"fault": "none"}))
     assert not found.detected, found.by
     assert [item for item in judged_without_fault(kind) if item.error > 2e-3 * item.scale] == []
