@@ -14,7 +14,7 @@ from proofroll.files.comparison_file import load_comparison
 from proofroll.files.data_folders import data_folder
 from proofroll.running.asking import resolve
 from proofroll.running.case import EngineFacts
-from proofroll.running.worker_pool import Workers
+from proofroll.running.idle_workers import Workers
 
 ROOT = Path(__file__).resolve().parents[1]
 # Extras without which nothing is simulated otherwise.

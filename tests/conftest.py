@@ -26,7 +26,7 @@ from xdist.scheduler import LoadScopeScheduling
 from proofroll import cli
 from proofroll.core.scene import Scene
 from proofroll.files.scene_file import load_scene
-from proofroll.running import stopwatch, worker_pool
+from proofroll.running import idle_workers, stopwatch
 from proofroll.running.case import Case, EngineFacts
 from proofroll.studies.tradeoff import tradeoff
 
@@ -152,13 +152,13 @@ def pytest_unconfigure() -> None:
 def started_workers(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     """For whom worker processes were started since: engines by name, the truth, or a format that one defines."""
     names: list[str] = []
-    begin = worker_pool.start
+    begin = idle_workers.start
 
-    def start(engine: str, memory: float | None) -> worker_pool.Worker:
+    def start(engine: str, memory: float | None) -> idle_workers.Worker:
         names.append(engine)
         return begin(engine, memory)
 
-    monkeypatch.setattr(worker_pool, "start", start)
+    monkeypatch.setattr(idle_workers, "start", start)
     return names
 
 

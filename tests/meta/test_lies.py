@@ -37,7 +37,7 @@ from proofroll.studies.judging import judge as judging
 from proofroll.studies.judging import run_values
 from proofroll.studies.judging.judge import judge as judge_run
 from proofroll.studies.judging.reference import Reference
-from proofroll.studies.tradeoff.curve import CurvePoint, measured
+from proofroll.studies.tradeoff.curve import CurvePoint, with_errors
 
 # A truth of its own at other times, of what switches.
 SLOW = {"a clock 1 % slow", "a clock 1 % slow from the start of a slide"}
@@ -99,7 +99,7 @@ def hear(scene: Scene, kind: Any, band: dict[str, str], until: float, **settings
 
 def _errors(scene: Scene, run: Any, asked: Iterable[str]) -> dict[str, float]:
     reference = Reference.of(scene, _true(scene, run))
-    errors = measured(_POINT, reference, run).errors
+    errors = with_errors(_POINT, reference, run).errors
     known = [name for name in asked if name in reference.curves]
     return {name: errors.get(name, np.inf) / (reference.scale(name) or 1.0) for name in known}
 

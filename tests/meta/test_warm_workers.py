@@ -6,7 +6,7 @@ import pytest
 from warm_workers import WarmWorkers
 
 from proofroll.running import process
-from proofroll.running.worker_pool import Workers
+from proofroll.running.idle_workers import Workers
 
 
 def test_a_worker_is_lent_again_in_the_environment_in_which_it_began(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -27,7 +27,7 @@ def test_a_worker_is_lent_again_in_the_environment_in_which_it_began(monkeypatch
         asked.append(process.safe_environment())
         return Started()
 
-    monkeypatch.setattr("proofroll.running.worker_pool.start", start)
+    monkeypatch.setattr("proofroll.running.idle_workers.start", start)
     monkeypatch.setenv("PYTHONPATH", "engines")
     with shared.lent():
         workers = Workers()

@@ -18,8 +18,8 @@ import pytest
 from hostile import ENTRY_POINTS
 
 from proofroll.running import process
+from proofroll.running.idle_workers import Workers
 from proofroll.running.process import Worker
-from proofroll.running.worker_pool import Workers
 
 # Largest number of idle workers, some hundred MB each; beyond it, the one idle for longest is ended.
 _MOST = 12
@@ -84,7 +84,7 @@ class WarmWorkers:
         with pytest.MonkeyPatch.context() as patch:
             patch.setattr(Workers, "take", warm)
             patch.setattr(process, "safe_environment", noted)
-            patch.setattr("proofroll.running.worker_pool._close", give_back)
+            patch.setattr("proofroll.running.idle_workers._close", give_back)
             yield
 
     def _take(self, place: _Place) -> Worker | None:

@@ -18,9 +18,9 @@ from rich.console import Console
 from proofroll.core.convergence import Limit, richardson
 from proofroll.core.verdict import Verdict
 from proofroll.report.comparison import tables
+from proofroll.report.comparison.conclusions import conclusions
 from proofroll.report.comparison.plots import point_curves
 from proofroll.report.comparison.records import ReportedComparison
-from proofroll.report.comparison.sentences import conclusions
 from proofroll.report.comparison.summary import outcome_content
 from proofroll.report.comparison.verdict_matrix import Cell, counted, overview
 from proofroll.report.labels import SYMBOLS, detail, verdict_text

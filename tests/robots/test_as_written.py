@@ -12,7 +12,7 @@ from robot_templates import mjcf, urdf
 
 from proofroll.core.errors import InputError
 from proofroll.robots import check
-from proofroll.robots.importer_row import with_the_copy
+from proofroll.robots.importer_row import row_with_copy
 from proofroll.robots.protocol import Whole
 from proofroll.robots.reading import AsWritten
 from proofroll.robots.records import ImporterRow
@@ -81,7 +81,7 @@ def test_files_elsewhere(tmp_path: Path) -> None:
 def test_another_model(whole: Whole | None, said: str) -> None:
     """A file that an engine holds with other velocities or another mass than its copy is not called read."""
     row = ImporterRow(engine="e", status="holds", held=Whole(3, 2.0))
-    found = with_the_copy(AsWritten(whole, "" if whole else "why"), row)
+    found = row_with_copy(AsWritten(whole, "" if whole else "why"), row)
     assert said in found
     assert (found == "read") == (said == "read")
 

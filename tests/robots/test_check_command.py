@@ -196,14 +196,14 @@ def test_who_compiles_a_file_also_reads_it(proofroll: Proofroll, tmp_path: Path,
 
 def test_an_answer_that_cannot_be_judged(monkeypatch: pytest.MonkeyPatch, arm: Path) -> None:
     """A mistake while one engine's answer is judged is that engine's row; the other rows arrive."""
-    honest = check.judged
+    honest = check.importer_row
 
-    def judged(*given: Any) -> ImporterRow:
+    def importer_row(*given: Any) -> ImporterRow:
         if given[3].name == "exudyn":
             raise ZeroDivisionError("planted")
         return honest(*given)
 
-    monkeypatch.setattr(check, "judged", judged)
+    monkeypatch.setattr(check, "importer_row", importer_row)
     odd, other = check.check(arm, ["exudyn", "pinocchio"], states=2).engines
     assert odd.status == "crashed"
     assert "ZeroDivisionError: planted" in str(odd.message)

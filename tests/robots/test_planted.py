@@ -16,7 +16,7 @@ from proofroll.core.plugins import parse_engine
 from proofroll.robots import defining, reading
 from proofroll.robots.against import reading_of
 from proofroll.robots.check import check
-from proofroll.robots.importer_row import judged
+from proofroll.robots.importer_row import importer_row
 from proofroll.robots.layers import RobotTruth
 from proofroll.robots.model import Robot
 from proofroll.robots.opening import open_robot
@@ -303,7 +303,7 @@ def test_real_engines(
         asked = dataclasses.replace(request, path=path)
         return reading.ask(robot_workers(spec.name), spec.name, asked, place, 60)
 
-    row = judged(file, truth, 1e-14, spec, ask(written), ask=ask)
+    row = importer_row(file, truth, 1e-14, spec, ask(written), ask=ask)
     assert row.message is None
     assert row.unexplained is None, row.layers
     assert {cause.id for cause in row.causes} == expected
@@ -411,7 +411,7 @@ def _row(text: str, change: Callable[[str], str], base: str, folder: Path) -> Im
     robot, held = (read_urdf(file) for file in files)
     truth = RobotTruth.of(robot, random_states(robot, 5, 1))
     answer = reading.ReaderAnswer("1", "", {}, reading_of(held, truth), "")
-    return judged(files[0], truth, 1e-14, parse_engine("planted"), answer)
+    return importer_row(files[0], truth, 1e-14, parse_engine("planted"), answer)
 
 
 @pytest.mark.parametrize("base", ["fixed", "free"])
@@ -483,7 +483,7 @@ def test_planted_causes_in_mjcf(
         robots.append(defining.compiled(robot_workers("mujoco"), files[-1], written, 60)[0])
     truth = RobotTruth.of(robots[0], random_states(robots[0], 5, 1))
     answer = reading.ReaderAnswer("1", "", {}, reading_of(robots[1], truth), "")
-    row = judged(files[0], truth, 1e-14, parse_engine("planted"), answer)
+    row = importer_row(files[0], truth, 1e-14, parse_engine("planted"), answer)
     assert [found.id for found in row.causes] == [cause]
     assert row.status == "explained"
 
@@ -496,6 +496,6 @@ def test_free_base_that_was_fixed(tmp_path: Path) -> None:
     robot, held = read_urdf(free), read_urdf(fixed)
     truth = RobotTruth.of(robot, random_states(robot, 5, 1))
     answer = reading.ReaderAnswer("1", "", {}, dataclasses.replace(reading_of(held, truth)), "")
-    row = judged(free, truth, 1e-14, parse_engine("planted"), answer)
+    row = importer_row(free, truth, 1e-14, parse_engine("planted"), answer)
     assert [cause.id for cause in row.causes] == ["free_base_is_fixed"]
     assert row.status == "explained"

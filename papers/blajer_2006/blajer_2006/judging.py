@@ -30,7 +30,7 @@ _BOUNDS: dict[str, tuple[str, Callable[[float, float], bool]]] = {
 _HALF = Decimal("0.5") * (1 + Decimal("1e-9"))
 
 
-def judged(study: FigureRuns) -> list[dict[str, Any]]:
+def judgements(study: FigureRuns) -> list[dict[str, Any]]:
     """One entry for each statement and run, or for each statement about the order of runs.
 
     Each has ``says``, ``source``, ``ours``, ``defined`` (definition of its measure), ``because``, ``runs``, ``of``,

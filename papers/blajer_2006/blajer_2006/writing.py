@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from blajer_2006 import style
 from blajer_2006.drawing import picture
-from blajer_2006.judging import judged
+from blajer_2006.judging import judgements
 from blajer_2006.statement_tables import count
 from blajer_2006.study import FigureRuns, study_content
 from proofroll.ball_studies.report.regime_map import counts
@@ -36,7 +36,7 @@ def figures_content(study: FigureRuns, maps: Maps) -> dict[str, Any]:
         else:
             entry["runs"] = list(dict.fromkeys(run for panel in figure.panels for run in panel.runs))
         entries.append(entry)
-    return dict(plain(study_content(study) | {"figures": entries, "statements": judged(study)}))
+    return dict(plain(study_content(study) | {"figures": entries, "statements": judgements(study)}))
 
 
 def write_figures(study: FigureRuns, maps: Maps, out: Path, forms: Sequence[str]) -> dict[str, Any]:

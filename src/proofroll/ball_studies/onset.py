@@ -19,9 +19,9 @@ from proofroll.files.scene_file import load_scene
 from proofroll.files.trajectory_file import read_columns
 from proofroll.running.asking import described, resolve
 from proofroll.running.case import Case, EngineFacts, Result, Status
+from proofroll.running.idle_workers import Workers
 from proofroll.running.process import WorkerDied
 from proofroll.running.runner import Runner
-from proofroll.running.worker_pool import Workers
 from proofroll.studies.cases import case_of
 
 if TYPE_CHECKING:

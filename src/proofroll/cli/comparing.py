@@ -17,9 +17,9 @@ from proofroll.core.number_format import number as written
 if TYPE_CHECKING:
     from proofroll.core.comparison import Comparison
     from proofroll.running.case import Case, Result
+    from proofroll.running.idle_workers import Workers
     from proofroll.running.runner import Runner
     from proofroll.running.time_budget import TimeBudget
-    from proofroll.running.worker_pool import Workers
     from proofroll.studies.comparison.outcome import Outcome
     from proofroll.studies.comparison.planning import Plan
 
@@ -54,7 +54,7 @@ def compare(
     """
     from proofroll.report.comparison.summary import outcome_content
     from proofroll.report.terminal.tables import verdict_parts
-    from proofroll.running.worker_pool import Workers
+    from proofroll.running.idle_workers import Workers
 
     workers = Workers()
     with options.spinner(comparison):

@@ -21,8 +21,8 @@ if TYPE_CHECKING:
     from rich.console import Console, RenderableType
 
     from proofroll.running.cluster import Cluster
+    from proofroll.running.idle_workers import Workers
     from proofroll.running.runner import Runner
-    from proofroll.running.worker_pool import Workers
 
 _SAID_EVERY = 10.0  # interval between lines of progress if no bar can be shown [s]
 OK, CONTRADICTED, USAGE, ENGINE, INTERRUPTED = 0, 1, 2, 3, 130

@@ -77,8 +77,8 @@ def report(
     from proofroll.report.page.growing import begun
     from proofroll.report.page.html import templates
     from proofroll.report.parts import all_parts, parts_of
+    from proofroll.running.idle_workers import Workers
     from proofroll.running.store import alone_in
-    from proofroll.running.worker_pool import Workers
 
     before = _processor_seconds()
     if history:

@@ -45,7 +45,7 @@ def run(
     import threading
 
     from proofroll.running.asking import prepare
-    from proofroll.running.worker_pool import Workers
+    from proofroll.running.idle_workers import Workers
 
     workers = Workers()  # one process resolves the settings and makes the run
     # It imports the engine while this process imports the modules that read scenes and results.

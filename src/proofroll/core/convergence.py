@@ -11,6 +11,8 @@ from proofroll.core.arrays import FloatArray
 from proofroll.core.engine import EPSILON
 from proofroll.core.number_format import number
 
+# Number of steps in a ladder: the fewest that show an order.
+LADDER_RUNGS = 3
 # A ladder is asymptotic if its observed order differs from the scheme's by at most this.
 _ASYMPTOTIC = 0.1
 # Range of orders in which the observed one is searched.

@@ -2,36 +2,18 @@
 
 import math
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
-from proofroll.core.crossing import first_rise, stays_negative
 from proofroll.core.errors import Diverged
 
 # Called after each step with its time and state; returns the state to go on from, the very same object if unchanged.
 Accept = Callable[[float, FloatArray], FloatArray]
-Guards = Callable[[FloatArray], FloatArray]
 
 # Smallest relative tolerance that scipy accepts; the method itself could go lower.
 TIGHTEST = 100 * float(np.finfo(float).eps)
-
-
-class Rise(NamedTuple):
-    """First rise of a guard through zero within a step.
-
-    Attributes:
-        time: time of the rise [s].
-        width: half the width of its bracket [s].
-        state: state at that time.
-        guard: index of the guard.
-    """
-
-    time: float
-    width: float
-    state: FloatArray
-    guard: int
 
 
 def solver_from(
@@ -123,48 +105,3 @@ def integrated_to(
     while part.t < t:
         controlled_step(part, None, t)
     return np.asarray(part.y)
-
-
-def located(solver: Any, guards: Guards, noise: FloatArray | float = 0.0, leaving: bool = False) -> Rise | None:
-    """First rise of a guard through zero in the last step, even if it falls again in that step; None: there is none.
-
-    The dense output is less accurate than a step: it gives a first guess, which Newton's method refines with states
-    integrated afresh from the start of the step.
-
-    Args:
-        solver: after a step.
-        guards: state -> values, shape (guards,).
-        noise: a guard counts as risen when it exceeds this.
-        leaving: True if guards that are positive at the start of the step count as zero there.
-    """
-    dense, start, end = solver.dense_output(), float(solver.t_old), float(solver.t)
-    known: dict[float, FloatArray] = {}
-
-    def at(time: float) -> FloatArray:
-        if time not in known:
-            values = guards(dense(time)) - noise
-            known[time] = np.minimum(values, 0.0) if leaving and time <= start else values
-        return known[time]
-
-    rises = []
-    below = stays_negative(lambda times: np.array([at(float(t)) for t in times]), start, end)
-    for number in np.flatnonzero(np.logical_not(below)).tolist():
-        rise = first_rise(lambda times, k=number: np.array([at(float(t))[k] for t in times]), start, end)  # type: ignore[misc]  # mypy cannot type a default
-        if rise is not None:
-            rises.append((rise, number))
-    if not rises:
-        return None
-    (time, number), width = min(rises), 1e-4 * (end - start)
-    span = width
-    state = inside_last_step(solver, time)
-    for _ in range(4):
-        rates = solver.fun(time, state)
-        slope = float(guards(state + span * rates)[number] - guards(state - span * rates)[number]) / (2 * span)
-        better = time - float(guards(state)[number]) / slope if slope > 0 else time
-        if not start - span <= better <= end + span or abs(better - time) > 0.1 * (end - start):
-            break  # a crest that only touches zero has no slope to go by
-        width = abs(better - time)
-        if width <= 2 * np.spacing(time):
-            break
-        time, state = better, inside_last_step(solver, better)
-    return Rise(time, max(width, 2 * float(np.spacing(time))), state, number)

@@ -1,4 +1,4 @@
-"""Limits of wall time for one run [s]; time in which other processes had the processor does not count."""
+"""Limits of wall time [s]; time in which other processes had the processor does not count."""
 
 # A run of a comparison, or an engine's reading of a robot file.
 TIME_LIMIT = 120.0
@@ -6,3 +6,5 @@ TIME_LIMIT = 120.0
 RUN_TIME_LIMIT = 600.0
 # One of the many runs of a study.
 STUDY_TIME_LIMIT = 60.0
+# The first answer of a worker, which may have to read packages from a cold disk.
+HELLO_TIME_LIMIT = 60.0

@@ -8,6 +8,7 @@ from typing import Any
 
 from proofroll.core.bounds import bounded, require_pair
 from proofroll.core.comparison import Band, Comparison, Edge, ExceptAt, Row, Tolerance
+from proofroll.core.convergence import LADDER_RUNGS
 from proofroll.core.errors import InputError, error_place, require_known
 from proofroll.core.observable import Observable
 from proofroll.core.plugins import parse_engine, require_engine
@@ -18,7 +19,6 @@ from proofroll.files.data_folders import study_folders
 from proofroll.files.scene_file import load_scene
 from proofroll.files.toml import named_file, read_toml, study_of
 
-_LADDER_RUNGS = 3
 # Most combinations of parameters; a run takes about a second, so more are a mistake.
 _MOST_POINTS = 10_000
 
@@ -202,7 +202,7 @@ def _check_points(where: str, comparison: Comparison, chosen: Mapping[str, list[
 
 def _check_ladder(where: str, ladder: list[float]) -> None:
     falling = all(0 < finer < coarser < math.inf for coarser, finer in itertools.pairwise(ladder))
-    if len(ladder) != _LADDER_RUNGS or not falling or 1.0 not in ladder:
+    if len(ladder) != LADDER_RUNGS or not falling or 1.0 not in ladder:
         raise InputError(f"{where}.ladder", ladder, "give three positive factors, largest first, one of them 1; or [1]")
     if not math.isclose(ladder[0] / ladder[1], ladder[1] / ladder[2]):
         raise InputError(f"{where}.ladder", ladder, "neighbouring factors must have the same ratio")

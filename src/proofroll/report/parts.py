@@ -167,7 +167,7 @@ def absent(part: Part, reason: str) -> PartEntry:
     return PartEntry(**part.head, missing=missing)
 
 
-def held(claims: Sequence[Any]) -> str:
+def claims_sentence(claims: Sequence[Any]) -> str:
     """Count of the decided claims that hold, and of the undecided ones; empty without claims."""
     if not claims:
         return ""

@@ -16,7 +16,7 @@ from proofroll.core.plugins import EngineSpec
 from proofroll.robots import reading
 from proofroll.robots.body_recursion import body_recursion
 from proofroll.robots.check import bar_of, drawn
-from proofroll.robots.importer_row import judged
+from proofroll.robots.importer_row import importer_row
 from proofroll.robots.layers import LAYERS, RobotTruth
 from proofroll.robots.lint import lint
 from proofroll.robots.meaning import meaning, opened
@@ -27,7 +27,7 @@ from proofroll.robots.robot_file import LintRemark, RobotFile
 from proofroll.robots.states import random_states
 from proofroll.robots.two_formulations import passive, poses
 from proofroll.running.asking import lent_workers
-from proofroll.running.worker_pool import Workers
+from proofroll.running.idle_workers import Workers
 
 # Relative difference of two values above which it is reported: files are written with different rounding.
 _ROUNDING = 1e-9
@@ -68,10 +68,10 @@ def against(
         truth = RobotTruth.of(robot, random_states(robot, states, seed))
         bar = bar_of(truth)
         other_label, label = (each.name if path.name != other.name else str(each) for each in (other, path))
-        rows = [judged(file, truth, bar, EngineSpec(other_label, {}), _answer(renamed, truth), workers)]
+        rows = [importer_row(file, truth, bar, EngineSpec(other_label, {}), _answer(renamed, truth), workers)]
         if rows[0].unexplained:  # with the second file as truth, causes in that file can be found
             turned = RobotTruth.of(renamed, random_states(renamed, states, seed))
-            row = judged(second, turned, bar_of(turned), EngineSpec(label, {}), _answer(robot, turned), workers)
+            row = importer_row(second, turned, bar_of(turned), EngineSpec(label, {}), _answer(robot, turned), workers)
             rows = [row] if row.status == "explained" else rows
     ours, theirs = ({joint.name for joint in each.moving} for each in (robot, other_robot))
     return AgainstCheck(

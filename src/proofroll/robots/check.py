@@ -19,7 +19,7 @@ from proofroll.robots import reading
 from proofroll.robots.body_recursion import body_recursion
 from proofroll.robots.defining import Compiler
 from proofroll.robots.hypotheses import hypotheses
-from proofroll.robots.importer_row import judged, with_the_copy
+from proofroll.robots.importer_row import importer_row, row_with_copy
 from proofroll.robots.layers import LAYERS, RobotTruth
 from proofroll.robots.lint import lint
 from proofroll.robots.meaning import meaning, opened
@@ -30,8 +30,8 @@ from proofroll.robots.states import RobotStates, random_states
 from proofroll.robots.two_formulations import poses
 from proofroll.robots.urdf import BASE_JOINT
 from proofroll.running.asking import lent_workers
+from proofroll.running.idle_workers import Workers
 from proofroll.running.process import Worker, WorkerDied
-from proofroll.running.worker_pool import Workers
 
 
 def check(
@@ -154,7 +154,7 @@ class _Checked:
         except WorkerDied as error:
             return ImporterRow(engine=str(spec), status=str(error.status), message=str(error))
         try:
-            importer = judged(self.file, self.truth, self.bar, spec, answer, self.workers, ask)
+            importer = importer_row(self.file, self.truth, self.bar, spec, answer, self.workers, ask)
         except Exception as error:  # one engine's odd answer must not end the rows of the others
             said = f"its answer could not be judged; please report this: {type(error).__name__}: {error}"
             return ImporterRow(engine=str(spec), status="crashed", version=answer.version, message=said)
@@ -175,7 +175,7 @@ class _Checked:
                 given = reading.ask_as_written(worker, spec.name, own, self.path, place, self.time_limit)
         except WorkerDied as error:
             return f"its process ended ({error})"
-        return None if given is None else with_the_copy(given, importer)
+        return None if given is None else row_with_copy(given, importer)
 
     @contextmanager
     def _lent(self, spec: EngineSpec) -> Iterator[tuple[Worker, Path]]:

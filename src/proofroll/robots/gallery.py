@@ -25,7 +25,7 @@ from proofroll.running.asking import lent_workers
 
 if TYPE_CHECKING:
     from proofroll.running.cluster import Cluster
-    from proofroll.running.worker_pool import Workers
+    from proofroll.running.idle_workers import Workers
 
 # Outcomes of an engine other than causes of its differences.
 REFUSES, CRASHED, OPEN = "refuses", "crashed", "open"

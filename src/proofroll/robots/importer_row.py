@@ -23,14 +23,14 @@ from proofroll.robots.places import worst_place
 from proofroll.robots.protocol import Reading, Whole
 from proofroll.robots.records import HeldLayer, ImporterRow
 from proofroll.robots.robot_file import RobotFile
+from proofroll.running.idle_workers import Workers
 from proofroll.running.process import WorkerDied
-from proofroll.running.worker_pool import Workers
 
 # The two formulations must agree to a tenth of any tolerance; else their difference raises it.
 _MARGIN = 10.0
 
 
-def judged(
+def importer_row(
     file: RobotFile,
     truth: RobotTruth,
     bar: float,
@@ -91,7 +91,7 @@ def judged(
 _SAME_MASS = 1e-4
 
 
-def with_the_copy(given: reading.AsWritten, row: ImporterRow) -> str:
+def row_with_copy(given: reading.AsWritten, row: ImporterRow) -> str:
     """Clause on an engine's reading of the unchanged file, compared with its reading of the copy."""
     if given.whole is None:
         return f"refused ({given.refused})"

@@ -15,8 +15,8 @@ from proofroll.robots.opening import open_robot
 from proofroll.robots.robot_file import RobotFile
 from proofroll.robots.urdf import read_urdf
 from proofroll.running.asking import lent_workers
+from proofroll.running.idle_workers import Workers
 from proofroll.running.process import Worker, WorkerDied
-from proofroll.running.worker_pool import Workers
 
 _Answer = TypeVar("_Answer")
 # Format -> engine that was last found to define it, whose idle process is asked first. Until it is known, the process

@@ -11,7 +11,7 @@ from proofroll.core.engine_abilities import Term
 from proofroll.core.errors import ProofrollError, Refused
 from proofroll.core.plugins import parse_engine
 from proofroll.running.case import Case, EngineDescription, EngineFacts
-from proofroll.running.worker_pool import Workers
+from proofroll.running.idle_workers import Workers
 
 _START_UP_SECONDS = 60.0
 _WRITING_SECONDS = 300.0

@@ -23,9 +23,9 @@ from proofroll.files.trajectory_file import STORED
 from proofroll.running.asking import resolve
 from proofroll.running.case import Case, EngineFacts, Status
 from proofroll.running.identity import digest
+from proofroll.running.idle_workers import Workers
 from proofroll.running.process import WorkerDied
 from proofroll.running.runner import ended, run_one
-from proofroll.running.worker_pool import Workers
 
 # Engines and commands for which a Dask worker keeps processes between cases.
 _ENGINES, _COMMANDS = 2, 3

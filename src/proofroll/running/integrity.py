@@ -21,7 +21,7 @@ def watch() -> None:
     """Records the functions that judge engines in this process, before any engine is loaded."""
     for name in _EARLY:
         importlib.import_module(f"proofroll.{name}")
-    _watched.update(_held())
+    _watched.update(_judging_members())
 
 
 def changed(kind: Any) -> str | None:
@@ -33,7 +33,7 @@ def changed(kind: Any) -> str | None:
         return None
     package = kind.__module__.partition(".")[0]
     foreign = package != OWN.name
-    for name, held in _held().items():
+    for name, held in _judging_members().items():
         if not all(map(operator.is_, _watched.setdefault(name, held), held)):
             return name
         if foreign and str(getattr(held[0], "__module__", "")).partition(".")[0] == package:
@@ -41,7 +41,7 @@ def changed(kind: Any) -> str | None:
     return None
 
 
-def _held() -> dict[str, tuple[Any, ...]]:
+def _judging_members() -> dict[str, tuple[Any, ...]]:
     """Functions, classes with their members, and constants of all judging modules, by full name."""
     modules = [module for name, module in list(sys.modules.items()) if name.startswith(_JUDGING)]
     return {name: held for module in modules for name, held in _of_module(module)}

@@ -8,6 +8,7 @@ import subprocess
 from pathlib import Path
 
 from proofroll.core.errors import InputError, Missing, ProofrollError, choices
+from proofroll.core.limits import HELLO_TIME_LIMIT
 from proofroll.core.plugins import place_of, plain_name
 from proofroll.running import environments
 from proofroll.running.case import Status
@@ -15,8 +16,6 @@ from proofroll.running.handshake import mismatch
 from proofroll.running.process import Worker, WorkerDied, environment_of_another
 from proofroll.running.program import PREFIX
 
-# Time limit for the first answer, which may have to read packages from a cold disk [s].
-HELLO_SECONDS = 60.0
 # Program, valid in any Python 3, that asks a Python that did not answer as a worker for its version and proofroll's.
 _PROBE = """
 import sys, json
@@ -45,7 +44,7 @@ def start(engine: str, memory: float | None = None) -> Worker:
     python = python_at(engine)
     worker = Worker(memory, python)
     try:
-        answer = worker.request({"do": "hello", "place": place}, HELLO_SECONDS)
+        answer = worker.request({"do": "hello", "place": place}, HELLO_TIME_LIMIT)
     except ProofrollError as error:
         worker.close()
         raise _explained(engine, python, error) from None
@@ -98,7 +97,7 @@ def _install(engine: str) -> str:
 def _explained(engine: str, python: Path, error: ProofrollError) -> ProofrollError:
     """Error that says why a worker did not identify itself, after probing its Python."""
     if isinstance(error, WorkerDied) and error.status == Status.TIMEOUT:
-        return WorkerDied(error.status, f"{engine}: {python} did not answer within {HELLO_SECONDS:g} s")
+        return WorkerDied(error.status, f"{engine}: {python} did not answer within {HELLO_TIME_LIMIT:g} s")
     with contextlib.suppress(OSError, subprocess.SubprocessError, ValueError, TypeError, LookupError):
         told = subprocess.run(
             [python, "-c", _PROBE],

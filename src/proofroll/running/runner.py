@@ -18,11 +18,11 @@ from proofroll.core.errors import InputError, Missing, ProofrollError
 from proofroll.core.plugins import plain_name
 from proofroll.running.asking import lent_workers
 from proofroll.running.case import Case, Result, Status
+from proofroll.running.idle_workers import Workers
 from proofroll.running.process import Worker, WorkerDied
 from proofroll.running.store import Store
 from proofroll.running.time_budget import TimeBudget
 from proofroll.running.waiting_cases import WaitingCases
-from proofroll.running.worker_pool import Workers
 
 if TYPE_CHECKING:
     from proofroll.running.cluster import Cluster

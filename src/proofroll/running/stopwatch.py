@@ -6,8 +6,8 @@ from typing import Self
 from proofroll.core.errors import ProofrollError
 from proofroll.core.limits import STUDY_TIME_LIMIT
 from proofroll.running.case import Case
+from proofroll.running.idle_workers import Workers
 from proofroll.running.process import Worker, WorkerDied
-from proofroll.running.worker_pool import Workers
 
 # Default length of a measurement [s]: long enough for the clock and the caches, short enough for many rounds.
 SECONDS = 0.05

@@ -11,7 +11,7 @@ from proofroll.core.time_grid import sampling_interval
 from proofroll.files.scene_file import load_scene, read_scene_file
 from proofroll.running.asking import resolve
 from proofroll.running.case import Case, EngineFacts
-from proofroll.running.worker_pool import Workers
+from proofroll.running.idle_workers import Workers
 
 _USUAL = 2.0  # s
 

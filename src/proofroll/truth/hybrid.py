@@ -11,8 +11,9 @@ from typing import Any, Generic, Protocol, TypeVar
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
-from proofroll.core.dop853 import controlled_step, corrected_by, go_on_from, integrated_to, located, solver_from
+from proofroll.core.dop853 import controlled_step, corrected_by, go_on_from, integrated_to, solver_from
 from proofroll.core.errors import Diverged, Refused
+from proofroll.core.event_location import locate_rise
 from proofroll.core.number_format import number
 
 State = FloatArray
@@ -265,7 +266,7 @@ def walked(
         if visited is not None:
             visited.append((solver.t, solver.y.copy()))
         controlled_step(solver, None, until)
-        if rise := located(solver, guards, 0.0 if noise is None else noise, leaving=solver.t_old == time):
+        if rise := locate_rise(solver, guards, 0.0 if noise is None else noise, leaving=solver.t_old == time):
             return rise.time, corrected(rise.state), rise.guard
         go_on_from(solver, back(solver.t, solver.y))
     return until, np.asarray(solver.y), None

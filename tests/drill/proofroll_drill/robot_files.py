@@ -13,7 +13,7 @@ from proofroll.core.errors import InputError
 from proofroll.robots.check import check
 from proofroll.robots.records import RobotCheck
 from proofroll.running.asking import lent_workers
-from proofroll.running.worker_pool import Workers
+from proofroll.running.idle_workers import Workers
 
 # Worst first.
 OUTCOMES = ("traceback", "unexplained", "refused", "known causes", "clean", "part of a file")

@@ -19,9 +19,9 @@ from proofroll.files.comparison_file import load_comparison
 from proofroll.files.scene_file import load_scene
 from proofroll.running.asking import resolve
 from proofroll.running.case import Case, EngineFacts
+from proofroll.running.idle_workers import Workers
 from proofroll.running.runner import Runner
 from proofroll.running.store import Store
-from proofroll.running.worker_pool import Workers
 from proofroll.studies.comparison.compare import compare
 from proofroll_drill.engines import DEEDS, FOLDER
 

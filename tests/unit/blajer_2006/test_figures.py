@@ -15,7 +15,7 @@ import xarray as xr
 from blajer_2006 import style
 from blajer_2006.definition import Figures
 from blajer_2006.drawing import drawn, inline, picture
-from blajer_2006.judging import judged, rounds_to
+from blajer_2006.judging import judgements, rounds_to
 from blajer_2006.reading import load_figures
 from blajer_2006.statement_tables import count
 from blajer_2006.study import FigureRuns, run_figures
@@ -69,7 +69,7 @@ def study(whole: FigureRuns) -> FigureRuns:
 
 def test_what_the_paper_states_holds(study: FigureRuns) -> None:
     """Every statement about the two runs at 4 m/s holds, by the projection method and by the truth alike."""
-    entries = judged(study)
+    entries = judgements(study)
     assert len(entries) > 15
     assert [entry["says"] for entry in entries if entry["holds"] is not True] == []
     for entry in entries:
@@ -88,7 +88,7 @@ def test_a_wrong_number_does_not_hold(study: FigureRuns) -> None:
             wrong.append(dataclasses.replace(item, above=None, below=item.above))
         elif item.below == 0:
             wrong.append(dataclasses.replace(item, below=None, above=0.0))
-    entries = judged(dataclasses.replace(study, figures=dataclasses.replace(study.figures, statements=wrong)))
+    entries = judgements(dataclasses.replace(study, figures=dataclasses.replace(study.figures, statements=wrong)))
     assert len(entries) > 8
     assert {entry["holds"] for entry in entries} == {False}
 
@@ -142,13 +142,13 @@ WRONGS = [_values(np.negative), _values(lambda v: v[::-1]), _values(lambda v: 1.
 
 def test_no_statement_is_one_that_no_run_can_contradict(whole: FigureRuns) -> None:
     """For each statement about each run there is a wrong run that contradicts it, and the right one does not."""
-    right = judged(whole)
+    right = judgements(whole)
     assert [entry["says"] for entry in right if entry["holds"] is not True] == []
     names = list(whole.runs)
     mixed = dataclasses.replace(
         whole, runs=dict(zip(names, [whole.runs[name] for name in names[2::-1] + names[3:]], strict=True))
     )
-    verdicts = [judged(wrong) for wrong in (*(_changed(whole, change) for change in WRONGS), mixed)]
+    verdicts = [judgements(wrong) for wrong in (*(_changed(whole, change) for change in WRONGS), mixed)]
     unassailable = [
         (entry["says"], entry["runs"]) for index, entry in enumerate(right)
         if not any(wrong[index]["holds"] is False for wrong in verdicts)
@@ -158,7 +158,7 @@ def test_no_statement_is_one_that_no_run_can_contradict(whole: FigureRuns) -> No
 
 def test_statements_are_counted_by_whose_they_are(study: FigureRuns) -> None:
     """What this project adds is not counted as the article's, and each measure of an amplitude says what that is."""
-    entries = judged(study)
+    entries = judgements(study)
     own = [entry for entry in entries if entry["ours"]]
     assert [entry["stated"] for entry in own] == ["0.2102"]
     assert (
@@ -233,7 +233,7 @@ def test_past_the_first_slip_by_the_truth(runner: Runner) -> None:
         figures=[dataclasses.replace(figure, panels=panels)],
     )  # fmt: skip
     study = run_figures(mine, runner, "truth")
-    first, second = judged(study)
+    first, second = judgements(study)
     assert (first["holds"], second["holds"]) == (True, None)
     assert second["why"] == "truth does not tell theta"
     text = picture(mine.figures[0], study, "svg").decode()

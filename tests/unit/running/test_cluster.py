@@ -30,9 +30,9 @@ from proofroll.files.trajectory_file import read
 from proofroll.running import cluster
 from proofroll.running.case import Case, EngineFacts, Status
 from proofroll.running.cluster import Cluster
+from proofroll.running.idle_workers import Workers
 from proofroll.running.runner import Runner
 from proofroll.running.store import Store
-from proofroll.running.worker_pool import Workers
 from proofroll.studies.cases import single_case
 from proofroll_benchmarks.cluster import idle
 from proofroll_drill.processes import alive

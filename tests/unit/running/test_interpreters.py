@@ -19,11 +19,11 @@ from proofroll.running import interpreters
 from proofroll.running.asking import describe, resolve
 from proofroll.running.case import Case, EngineFacts, Status
 from proofroll.running.handshake import mismatch, own
+from proofroll.running.idle_workers import Workers
 from proofroll.running.process import WorkerDied
 from proofroll.running.runner import Runner, run_one
 from proofroll.running.simulation import simulate
 from proofroll.running.store import Store
-from proofroll.running.worker_pool import Workers
 from proofroll.studies.cases import single_case
 
 SHORT = {"until": 0.02, "every": 0.01, "time_limit": 60.0}
@@ -158,7 +158,7 @@ def test_what_does_not_serve_says_why(
     (tmp_path / "text").write_text("no program")
     place = make(tmp_path)
     if "0.5 s" in says:
-        monkeypatch.setattr(interpreters, "HELLO_SECONDS", 0.5)
+        monkeypatch.setattr(interpreters, "HELLO_TIME_LIMIT", 0.5)
     with pytest.raises(error, match=says) as caught:
         describe(f"aged@{place}")
     assert str(place) in str(caught.value)

@@ -18,10 +18,10 @@ from proofroll.core.errors import InputError, Missing
 from proofroll.files.trajectory_file import read
 from proofroll.running.asking import describe, resolve
 from proofroll.running.case import Case, EngineFacts, Result, Status
+from proofroll.running.idle_workers import Workers
 from proofroll.running.process import WorkerDied
 from proofroll.running.runner import Runner, run_one
 from proofroll.running.store import Store
-from proofroll.running.worker_pool import Workers
 from proofroll.studies.cases import single_case
 
 MakeCase = Callable[..., Case]
@@ -170,7 +170,7 @@ from pathlib import Path
 from proofroll.running.case import Case
 from proofroll.running.runner import Runner
 from proofroll.running.store import Store
-from proofroll.running.worker_pool import Workers
+from proofroll.running.idle_workers import Workers
 
 store, cases = Store(Path(sys.argv[1])), [Case.from_dict(content) for content in json.loads(sys.argv[2])]
 first = Runner(store, jobs=1).run(cases)

@@ -8,10 +8,10 @@ from typing import Any
 
 import pytest
 
+from proofroll.running.idle_workers import Workers
 from proofroll.running.process import Worker
 from proofroll.running.stopwatch import Stopwatch
 from proofroll.running.time_case import time_once
-from proofroll.running.worker_pool import Workers
 from proofroll.studies.cases import single_case
 
 

@@ -63,7 +63,7 @@ class ExudynRobots:
             return AtState(T, drift, M, g, h, None, forward)
 
         arrays = evaluate(request, joints, dofs, at)
-        mass, com, inertia = tree.held()
+        mass, com, inertia = tree.body_numbers()
         return Reading(
             joints, dofs, mass, com, inertia,
             {name: np.array([frame[name][0] for frame in frames]) for name in joints},
@@ -197,7 +197,7 @@ class _Tree:
             frames[name] = (np.array(p), R @ self.turn[name].T)
         return frames
 
-    def held(self) -> tuple[dict[str, float], dict[str, Array], dict[str, Array]]:
+    def body_numbers(self) -> tuple[dict[str, float], dict[str, Array], dict[str, Array]]:
         """Mass, centre of mass and inertia of each link, read back."""
         parameters = self.mbs.GetObject(self.tree)
         mass, com, inertia = {}, {}, {}

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
-from proofroll.core.dop853 import Rise, located
+from proofroll.core.event_location import Rise, locate_rise
 from proofroll.core.events import Event
 from proofroll.elements.ball_on_surface.events import EventKind
 from proofroll.elements.ball_on_surface.model import Contact
@@ -198,18 +198,18 @@ class AdaptiveStickSlip(Adaptive):
             # The excess lies in [-1, 1] and its peaks are many steps wide, so far below zero no event is missed.
             if max(before[0], after[0]) < -0.1 - abs(after[0] - before[0]):
                 return None
-            return located(solver, lambda y: np.array([self._excess(y) - _GRAZE]))
+            return locate_rise(solver, lambda y: np.array([self._excess(y) - _GRAZE]))
         if self._mode is FrictionLaw.CREEPING:
             if after[0] >= self._handover:
-                return located(solver, lambda y: np.array([self._speed(y)[0] - self._handover]))
+                return locate_rise(solver, lambda y: np.array([self._speed(y)[0] - self._handover]))
             # Below zero by more than round-off, or the zero at the start would be found again.
             if after[0] < -self._least and after[1] < 0:
-                return located(solver, lambda y: np.array([-self._speed(y)[0] - self._least]))
+                return locate_rise(solver, lambda y: np.array([-self._speed(y)[0] - self._least]))
         return None
 
     def _leave(self, solver: Any, stop: Rise | None) -> None:
         """Ends the run if N falls through zero and the ball leaves the wall before the mode ends."""
-        lift = located(solver, lambda y: np.array([-self._monitor(y)[2]]))
+        lift = locate_rise(solver, lambda y: np.array([-self._monitor(y)[2]]))
         time, width = lift[:2] if lift else (float(solver.t), float(solver.step_size))
         if stop is None or time <= stop[0]:
             self._record("lift_off", time, width)

@@ -31,7 +31,9 @@ def scores(content: ReportedComparison, choice: ChoiceMatrix) -> list[Candidate]
 
 def closest(content: ReportedComparison, choice: ChoiceMatrix) -> Candidate | None:
     """Row closest to the truth in motion and forces without luck, rows with the truth's own equations left out."""
-    known = [(item.held(forces=True), item) for item in scores(content, choice) if not content.rows[item.row].shared]
+    known = [
+        (item.tolerance(forces=True), item) for item in scores(content, choice) if not content.rows[item.row].shared
+    ]
     return min(((size, item) for size, item in known if size is not None), key=lambda pair: pair[0], default=(0, None))[
         1
     ]

@@ -71,7 +71,7 @@ class Candidate:
         """Error at its own step, of motion or of both; None: something is not reported."""
         return _worst([self.motion, self.forces] if forces else [self.motion])
 
-    def held(self, forces: bool) -> float | None:
+    def tolerance(self, forces: bool) -> float | None:
         """Smallest tolerance that it holds without luck, of motion or of both; None: something is not reported."""
         return _worst([self.motion_held, self.forces_held] if forces else [self.motion_held])
 

@@ -265,7 +265,7 @@ def choice_matrix(lines: Iterable[TableLine], studies: Mapping[str, ChoiceStudy]
 def _cell(steps: Sequence[Candidate], tolerance: float, forces: bool) -> ChoiceCell:
     """Cell of one study: the cheapest candidate that holds the tolerance, else the closest, else why there is none."""
     whole = [item for item in steps if item.blame is None]
-    known = [(size, item) for item in whole if (size := item.held(forces)) is not None]
+    known = [(size, item) for item in whole if (size := item.tolerance(forces)) is not None]
     held = [(item.cost if item.cost is not None else math.inf, size, item) for size, item in known if size <= tolerance]
     if held:
         cost, size, item = min(held, key=lambda entry: entry[:2])

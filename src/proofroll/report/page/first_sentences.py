@@ -4,9 +4,9 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 
 from proofroll.core.number_format import counted, number
+from proofroll.report.comparison.conclusions import standings
 from proofroll.report.comparison.records import ReportedComparison
 from proofroll.report.comparison.scores import closest, furthest_off
-from proofroll.report.comparison.sentences import standings
 from proofroll.report.comparison.spread import ALONE
 from proofroll.report.labels import off_by, with_caveat
 from proofroll.report.page.choice_matrix import FIRST_TOLERANCE, ChoiceMatrix

@@ -14,10 +14,10 @@ from typing import Any
 import proofroll
 from proofroll.files.json_data import MERGED, OPTIONAL
 from proofroll.report.against import Against
+from proofroll.report.comparison.conclusions import Conclusions, conclusions
 from proofroll.report.comparison.growth import Growth, growth
 from proofroll.report.comparison.lines import lines_of
 from proofroll.report.comparison.records import ReportedComparison
-from proofroll.report.comparison.sentences import Conclusions, conclusions
 from proofroll.report.comparison.summary import outcome_content
 from proofroll.report.kinds import kind_of
 from proofroll.report.long_table import LongTable, TableLine

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 from proofroll.core.number_format import number
-from proofroll.report.parts import Part, PartEntry, Tell, held
+from proofroll.report.parts import Part, PartEntry, Tell, claims_sentence
 from proofroll.report.stability import map as stability_map
 from proofroll.report.stability.tables import silent_lines
 from proofroll.running.runner import Runner
@@ -55,7 +55,7 @@ class StabilityPart(Part):
     def line(entry: StabilityEntry) -> str:
         """Count of silent boundaries, and of the claims that hold."""
         study = entry.study
-        return f"{study.silent} of {study.boundaries} boundaries are silent{held(entry.claims)}"
+        return f"{study.silent} of {study.boundaries} boundaries are silent{claims_sentence(entry.claims)}"
 
     def keeps(self, out: Path) -> bool:
         """True if a map is stored; the full one is preferred to quick ones, of all axes or of some."""

@@ -13,7 +13,7 @@ from proofroll.core.verdict import LimitResult
 from proofroll.files.json_data import MERGED
 from proofroll.report.kinds import group_of
 from proofroll.report.long_table import TableLine
-from proofroll.report.parts import Part, PartEntry, Tell, held
+from proofroll.report.parts import Part, PartEntry, Tell, claims_sentence
 from proofroll.report.tradeoff import tables as tradeoff_tables
 from proofroll.report.tradeoff.tables import default_quantities
 from proofroll.running.case import Status
@@ -78,7 +78,7 @@ class TradeoffPart(Part):
     @staticmethod
     def line(entry: TradeoffEntry) -> str:
         """Count of points, and of the claims that hold."""
-        return f"{counted(len(entry.study.points), 'points')}{held(entry.claims)}"
+        return f"{counted(len(entry.study.points), 'points')}{claims_sentence(entry.claims)}"
 
     def keeps(self, out: Path) -> bool:
         """True if a study is stored; the full one is preferred to a brief one."""
@@ -102,7 +102,7 @@ class TradeoffPart(Part):
             study=study,
             shown=default_quantities(study),
             advice=advice(study, self.asked),
-            claims=[] if self.engines else self.asked.judged(study),
+            claims=[] if self.engines else self.asked.judgements(study),
             contradictions=[] if self.engines else self.asked.contradictions(study),
         )
 

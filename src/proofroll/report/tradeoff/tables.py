@@ -123,7 +123,9 @@ def point_table(
     caption = Text("cost: wall seconds per simulated second through this adapter")
     if ties:
         caption += Text("; ≈ a tie: the cost cannot be told from that of the next line, which is more accurate")
-    lucky = [name for p in points for name in quantities if name in p.error and p.held(name) > (p.error[name] or 0.0)]
+    lucky = [
+        name for p in points for name in quantities if name in p.error and p.envelope_of(name) > (p.error[name] or 0.0)
+    ]
     if lucky and ties is not None:
         caption += Text("; errors: where a run comes close by luck that of the next finer ones, which are worse")
     errors = numeric(*(f"{study.quantities[name].symbol} [{study.quantities[name].unit}]" for name in quantities))

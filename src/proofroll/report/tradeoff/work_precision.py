@@ -97,7 +97,7 @@ def _front(panel: Any, study: TradeoffStudy, quantity: str) -> None:
         if not chosen or (key == "pareto" and chosen == study.front("pareto_engines", quantity)):
             continue  # there are no equations of the scene's own, or none that is better
         costs = [point.seconds_per_second for point in chosen]
-        errors = [max(point.held(quantity), floor) for point in chosen]
+        errors = [max(point.envelope_of(quantity), floor) for point in chosen]
         panel.step(
             [costs[0], *costs, right],
             [panel.get_ylim()[1], *errors, errors[-1]],

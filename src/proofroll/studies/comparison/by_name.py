@@ -6,9 +6,9 @@ from pathlib import Path
 from proofroll.core.errors import InputError
 from proofroll.files.comparison_file import load_comparison
 from proofroll.files.scene_file import means_scene
+from proofroll.running.idle_workers import Workers
 from proofroll.running.runner import Runner
 from proofroll.running.store import Store
-from proofroll.running.worker_pool import Workers
 from proofroll.studies.comparison import compare as comparing
 from proofroll.studies.comparison.default_comparison import BUDGET, compared
 from proofroll.studies.comparison.outcome import Outcome

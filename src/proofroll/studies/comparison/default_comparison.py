@@ -15,8 +15,8 @@ from proofroll.core.verdict import Verdict
 from proofroll.files.scene_file import SceneFile, load_scene, read_scene_file
 from proofroll.running.asking import described, resolve
 from proofroll.running.case import EngineDescription, EngineFacts
+from proofroll.running.idle_workers import Workers
 from proofroll.running.process import processor_seconds
-from proofroll.running.worker_pool import Workers
 
 _UNTIL, _FIRST, _SAMPLES = 1.0, 2.0, 50  # default length [s], longest length [s], number of samples
 _STEP = 4e-3  # s: sampling intervals are multiples of it, so that a ladder of steps down to 1e-3 s divides them

@@ -20,8 +20,8 @@ from proofroll.core.truth import edge_between
 from proofroll.files.scene_file import SceneFile, load_scene, read_scene_file
 from proofroll.running.asking import described, resolve, resolve_with_truth
 from proofroll.running.case import Case, EngineFacts
+from proofroll.running.idle_workers import Workers
 from proofroll.running.process import processor_seconds
-from proofroll.running.worker_pool import Workers
 from proofroll.studies.cases import case_of
 
 # Expected verdicts that allow a formulation that cannot represent the scene.

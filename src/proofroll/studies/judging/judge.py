@@ -22,9 +22,9 @@ from proofroll.core.verdict import Allowance, Judgement, RunCurve, TrueCurve, Ve
 from proofroll.files.scene_file import load_scene
 from proofroll.studies.html_table import gauge, html_table
 from proofroll.studies.judging import run_values
-from proofroll.studies.judging.given_run import GivenRun, RunInput, read_run
 from proofroll.studies.judging.reference import Reference
 from proofroll.studies.judging.run_values import turned_alike
+from proofroll.studies.judging.user_trajectory import GivenRun, RunInput, read_run
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -8,8 +8,8 @@ from proofroll.core.element_abilities import WritesPrograms
 from proofroll.core.program_text import FailedRun, imported
 from proofroll.running.asking import programs
 from proofroll.running.case import Case
+from proofroll.running.idle_workers import Workers
 from proofroll.running.store import write_text
-from proofroll.running.worker_pool import Workers
 from proofroll.studies.failure import ACCURATE, REFUSED, TOO_SLOW, WRONG, WRONG_MODEL
 from proofroll.studies.stability.map import MapPoint, StabilityMap
 from proofroll.studies.stability.records import BOUNDARIES, BoundaryPoint, StabilityStudy

@@ -45,7 +45,7 @@ class Holds:
     step: float
     because: str
 
-    def judged(self, study: TradeoffStudy, quantity: str) -> ClaimJudgement:
+    def judgement(self, study: TradeoffStudy, quantity: str) -> ClaimJudgement:
         """Judgement of the claim; exact in a brief study, too."""
         claim = f"{self.engine} holds {_to(quantity, self.tolerance)} up to a step of {self.step:g}"
         if unknown := _unknown(study, [self.engine]):
@@ -72,7 +72,7 @@ class Converges:
     order: tuple[float, float]
     because: str
 
-    def judged(self, study: TradeoffStudy, quantity: str) -> ClaimJudgement:
+    def judgement(self, study: TradeoffStudy, quantity: str) -> ClaimJudgement:
         """Judgement of the claim; exact in a brief study, too."""
         lowest, highest = self.order
         claim = f"{self.engine} converges in {quantity} with order {lowest:g} to {highest:g}"
@@ -104,7 +104,7 @@ class Cheapest:
     because: str
     levels: list[Level] = field(default_factory=list)
 
-    def judged(self, study: TradeoffStudy, quantity: str) -> ClaimJudgement:
+    def judgement(self, study: TradeoffStudy, quantity: str) -> ClaimJudgement:
         """Judgement by the ratio of its cost to that of the cheapest rival that holds the tolerance.
 
         It holds if the whole interval of the ratio is at most 1. It is contradicted if the interval lies above
@@ -190,10 +190,10 @@ class TradeoffClaims:
         """Question that is swept."""
         return Question(self.scene, self.parameters, self.until, self.quantity)
 
-    def judged(self, study: TradeoffStudy) -> list[ClaimJudgement]:
+    def judgements(self, study: TradeoffStudy) -> list[ClaimJudgement]:
         """Judgement of each claim by a study."""
         claims: list[Holds | Converges | Cheapest] = [*self.holds, *self.converges, *self.cheapest]
-        return [claim.judged(study, self.quantity) for claim in claims]
+        return [claim.judgement(study, self.quantity) for claim in claims]
 
     def contradictions(self, study: TradeoffStudy) -> list[str]:
         """Contradicted claims, as sentences."""
@@ -204,7 +204,7 @@ class TradeoffClaims:
         return self._sentences(study, None, "undecided")
 
     def _sentences(self, study: TradeoffStudy, verdict: bool | None, word: str) -> list[str]:
-        judged = (item for item in self.judged(study) if item.holds is verdict)
+        judged = (item for item in self.judgements(study) if item.holds is verdict)
         return [f"{self.name}, {word}: {item.claim}; {item.found}" for item in judged]
 
 

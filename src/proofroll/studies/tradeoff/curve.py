@@ -211,7 +211,7 @@ class Curve:
         return bool(np.isfinite(loosest) and abs(loosest - other) <= max(bar, _SAME * loosest))
 
 
-def judged(points: Sequence[CurvePoint], references: Mapping[float, Reference], runner: Runner) -> CurvePoint:
+def judge_point(points: Sequence[CurvePoint], references: Mapping[float, Reference], runner: Runner) -> CurvePoint:
     """Point with its observables and their errors, if its run reached the end.
 
     Args:
@@ -220,7 +220,7 @@ def judged(points: Sequence[CurvePoint], references: Mapping[float, Reference], 
         runner: whose store has the trajectories.
     """
     done = (
-        measured(point, references[point.case.every], runner.store.stored(point.case).dataset)
+        with_errors(point, references[point.case.every], runner.store.stored(point.case).dataset)
         if point.result.status == Status.DONE
         else point
         for point in points
@@ -238,7 +238,7 @@ def judged(points: Sequence[CurvePoint], references: Mapping[float, Reference], 
     return replace(point, errors=errors, dense=point.errors, sparse=sparse)
 
 
-def measured(point: CurvePoint, reference: Reference, run: xr.Dataset) -> CurvePoint:
+def with_errors(point: CurvePoint, reference: Reference, run: xr.Dataset) -> CurvePoint:
     """Point with its observables and their errors; the error of an event is at least half the width of its bracket."""
     given = run_values.observed(reference, run)
     curves = {name: values for name, values in given.items() if np.isfinite(reference.true(name, values).error_bar)}

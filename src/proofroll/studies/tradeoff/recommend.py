@@ -135,7 +135,7 @@ def recommend(study: TradeoffStudy, required: Requirements) -> Recommendation:
         return Choice(point, point.error.get(required.quantity), reason or _holds(study, point, required, absolute))
 
     def best(points: Iterable[MeasuredPoint]) -> MeasuredPoint | None:
-        return min(points, key=lambda p: p.held(required.quantity), default=None)
+        return min(points, key=lambda p: p.envelope_of(required.quantity), default=None)
 
     asked = [p for p in timed if _asked(p, required)]
     choice = next((p for p in asked if why_not(p) is None), None)
@@ -227,7 +227,7 @@ def _same(value: object, text: str) -> bool:
 
 def _holds(study: TradeoffStudy, point: MeasuredPoint, required: Requirements, absolute: float) -> str:
     """Text on the margin with which a point holds the tolerance."""
-    held, bar = point.held(required.quantity), study.quantities[required.quantity].truth_error_bar or 0.0
+    held, bar = point.envelope_of(required.quantity), study.quantities[required.quantity].truth_error_bar or 0.0
     if not max(held, bar):
         return "no error is seen"
     # An error below the truth's error bar is known only to be below it.

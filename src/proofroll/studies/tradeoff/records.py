@@ -106,7 +106,7 @@ class MeasuredPoint(MeasuredCost):
     sparse: SparseRun | None = None
     corners: list[Corner] | None
 
-    def held(self, quantity: str) -> float:
+    def envelope_of(self, quantity: str) -> float:
         """Envelope of an observable; infinite if it is not finite."""
         error = self.envelope.get(quantity)
         return math.inf if error is None else error

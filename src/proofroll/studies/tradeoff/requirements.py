@@ -82,8 +82,8 @@ def _reason_here(study: TradeoffStudy, point: MeasuredPoint, name: str, absolute
 def _luck(study: TradeoffStudy, point: MeasuredPoint, name: str, absolute: float) -> str:
     """Reason why an error within the tolerance is luck: finer steps, or their limit, are beyond it; else empty."""
     unit, budget = study.quantities[name].unit, _budget(study, point, name)
-    if point.held(name) > absolute:
-        return f"finer steps of the same model are off by {number(point.held(name))} {unit}"
+    if point.envelope_of(name) > absolute:
+        return f"finer steps of the same model are off by {number(point.envelope_of(name))} {unit}"
     if budget and budget.model_form is not None and budget.model_form - budget.doubt > absolute:
         return f"{number(budget.model_form)} {unit} remain in the limit of small steps"
     return ""
@@ -121,7 +121,7 @@ def _reason_there(study: TradeoffStudy, point: MeasuredPoint, required: Requirem
 def _finer_holds(study: TradeoffStudy, point: MeasuredPoint, quantity: str, absolute: float) -> bool:
     """True if a finer step of the same curve was measured that holds the tolerance with margin."""
     finer = (p for p in study.points if p.curve == point.curve and (p.step or 0.0) < (point.step or 0.0))
-    return any(p.held(quantity) * MARGIN <= absolute for p in finer)
+    return any(p.envelope_of(quantity) * MARGIN <= absolute for p in finer)
 
 
 def _budget(study: TradeoffStudy, point: MeasuredPoint, quantity: str) -> CurveBudget | None:

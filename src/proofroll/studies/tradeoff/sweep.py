@@ -13,11 +13,11 @@ from proofroll.core.plugins import EngineSpec, engine_names, parse_engine
 from proofroll.core.verdict import round_off_of
 from proofroll.running.asking import described, resolve, resolve_with_truth
 from proofroll.running.case import Case, EngineDescription, EngineFacts, Result, Status
+from proofroll.running.idle_workers import Workers
 from proofroll.running.runner import Runner
 from proofroll.running.time_budget import TimeBudget
-from proofroll.running.worker_pool import Workers
 from proofroll.studies.judging.reference import Reference
-from proofroll.studies.tradeoff.curve import Curve, CurvePoint, Question, judged
+from proofroll.studies.tradeoff.curve import Curve, CurvePoint, Question, judge_point
 
 # Steps in sampling intervals: those of every curve, and those by which it may be extended.
 _STEPS = (1.0, 1 / 2, 1 / 5, 1 / 10, 1 / 25, 1 / 50, 1 / 100, 1 / 250)
@@ -239,7 +239,7 @@ def _run(
             points = [CurvePoint(case, results[case.key]) for case in both]
             lost = next((point for point in points if point.result.status is Status.LEFT_OUT), None)
             if lost is None:
-                curve.points.append(judged(points, references, runner))
+                curve.points.append(judge_point(points, references, runner))
             else:
                 curve.dropped[lost.step or 0.0] = lost.result.message
 

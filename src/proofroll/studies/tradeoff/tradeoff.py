@@ -18,13 +18,13 @@ import numpy as np
 from proofroll.core.errors import Missing
 from proofroll.running.asking import resolve_with_truth
 from proofroll.running.case import Case, EngineFacts, Result, Status
+from proofroll.running.idle_workers import Workers
 from proofroll.running.runner import Runner
 from proofroll.running.stopwatch import Stopwatch
 from proofroll.running.time_budget import TimeBudget
 from proofroll.running.timing import ROUNDS, Timing, interleaved
-from proofroll.running.worker_pool import Workers
 from proofroll.studies.judging.reference import Reference
-from proofroll.studies.tradeoff.curve import Curve, CurvePoint, Question, judged
+from proofroll.studies.tradeoff.curve import Curve, CurvePoint, Question, judge_point
 from proofroll.studies.tradeoff.pareto import front
 from proofroll.studies.tradeoff.recommend import chosen_by
 from proofroll.studies.tradeoff.records import Corner
@@ -196,7 +196,7 @@ def _check(tradeoff: Tradeoff, truth: EngineFacts, runner: Runner, arrived: Call
         intervals = {case.every for both in runs.values() for case in both}
         references = {every: question.reference(scene, dataset, every) for every in intervals}
         for key, both in runs.items():
-            point = judged([CurvePoint(case, results[case.key]) for case in both], references, runner)
+            point = judge_point([CurvePoint(case, results[case.key]) for case in both], references, runner)
             corners[key].append(_corner(place, point, references[both[0].every]))
     for point in tradeoff.points:
         point.corners = corners.get(point.case.key)

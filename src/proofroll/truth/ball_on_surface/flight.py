@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from proofroll.core.arrays import FloatArray, cross
-from proofroll.core.crossing import first_rise
 from proofroll.core.errors import Diverged, Refused
+from proofroll.core.event_location import first_rise
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.motion import BallMotion
 from proofroll.truth.ball_on_surface.route import End, Leg, Route, World

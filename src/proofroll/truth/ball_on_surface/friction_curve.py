@@ -12,7 +12,7 @@ import numpy as np
 from numpy.polynomial import chebyshev
 
 from proofroll.core.arrays import FloatArray
-from proofroll.core.crossing import first_rise
+from proofroll.core.event_location import first_rise
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.truth.ball_on_surface.stick_slip import first_route
 

@@ -9,8 +9,8 @@ from functools import partial
 import numpy as np
 
 from proofroll.core.arrays import FloatArray, cross
-from proofroll.core.crossing import first_rise
 from proofroll.core.errors import Diverged
+from proofroll.core.event_location import first_rise
 from proofroll.elements.ball_on_surface.mechanics import always_pressed
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.motion import BallMotion

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
-from proofroll.core.dop853 import located
+from proofroll.core.event_location import locate_rise
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.motion import BallMotion, world_motion
 from proofroll.elements.ball_on_surface.rolling_equations import reduced_rates, start
@@ -234,5 +234,5 @@ class Polar(Sliding):
 
 def _first(solver: Any, stops: Sequence[_Stop]) -> tuple[float, FloatArray, End] | None:
     """First of some stops within the last step: time or τ, state and reason; None: there is none."""
-    rise = located(solver, lambda y: np.array([g(y) for _, g in stops])) if stops else None
+    rise = locate_rise(solver, lambda y: np.array([g(y) for _, g in stops])) if stops else None
     return (rise.time, rise.state, stops[rise.guard][0]) if rise else None

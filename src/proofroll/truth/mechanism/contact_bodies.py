@@ -14,7 +14,7 @@ from proofroll.truth.hybrid import Stretch, Transition
 from proofroll.truth.mechanism.body_switching import SLACK
 from proofroll.truth.mechanism.contact_equations import BodiesSolution, BodiesState, ContactEquations
 from proofroll.truth.mechanism.contact_guards import AT_REST, STOPPED, striking
-from proofroll.truth.mechanism.contact_stretches import ContactStretches, SolvedContacts, held
+from proofroll.truth.mechanism.contact_stretches import ContactStretches, SolvedContacts, modes_of
 from proofroll.truth.mechanism.maximal_coordinates import RANK
 
 _MOST = 6  # largest number of contacts closed at the same time: each has up to four candidate modes
@@ -37,7 +37,7 @@ class ContactBodies(ContactStretches):
         """See the protocol."""
         state = np.append(self.equations.equations.equations.start(), 0.0)
         closed, still = closed_and_still(self.equations.at(state).touching, np.ones(len(self.contacts)), 1.0)
-        state = self.equations.eliminated(state, held(closed, still))
+        state = self.equations.eliminated(state, modes_of(closed, still))
         mode, margin = self._decided(state, closed, still)
         return Transition(state, mode, (), margin)
 

@@ -12,7 +12,7 @@ from proofroll.elements.mechanism.contacts.geometry import BodyContact
 from proofroll.elements.mechanism.contacts.joint_laws import JointContact
 from proofroll.elements.mechanism.contacts.touching import Touching
 from proofroll.elements.mechanism.rotations import Array
-from proofroll.truth.mechanism.two_paths import moment
+from proofroll.truth.mechanism.two_paths import time_accuracy
 
 # In natural units (natural_units.py): speeds that count as rest, and accelerations too small to start a motion. Both
 # routes stop there, so that they do not integrate the round-off of a state at rest.
@@ -91,7 +91,7 @@ def striking(mode: ContactMode, touching: Sequence[Touching], hit: int, time: fl
 
     def closes(touch: Touching) -> bool:
         closing = -float(touch.normal @ touch.slide)
-        return closing > 0 and touch.gap <= closing * moment(time)
+        return closing > 0 and touch.gap <= closing * time_accuracy(time)
 
     return [
         k

@@ -220,7 +220,7 @@ class ContactStretches(Stretches[ContactMode]):
         """Transition to the mode that follows from the forces; contacts not faster than ``stopped`` are at rest."""
         slips = [float(np.linalg.norm(across(each))) for each in self._touching(state)]
         still = [shut and slip <= stopped for shut, slip in zip(closed, slips, strict=True)]
-        state = self._equations.eliminated(state, held(closed, still))
+        state = self._equations.eliminated(state, modes_of(closed, still))
         mode, sure = self._decided(state, closed, still)
         changed = changes(self.contacts, leg.mode, mode, self._stands(state, mode))
         struck = {name for _, name in happened}
@@ -244,7 +244,7 @@ def _headed(own: Acting, touch: Touching) -> Acting:
     return own._replace(heading=(x, y, z))
 
 
-def held(closed: Sequence[bool], still: Sequence[bool]) -> ContactMode:
+def modes_of(closed: Sequence[bool], still: Sequence[bool]) -> ContactMode:
     """Modes of contacts: stick if closed and still, slip if only closed, else open."""
     return tuple(
         Acting("stick" if stands else "slip" if shut else "open") for shut, stands in zip(closed, still, strict=True)

@@ -15,7 +15,7 @@ from proofroll.elements.mechanism.rotations import Array
 from proofroll.elements.mechanism.switches import HOLDING, Mode, SwitchedJoint, changes, end_event
 from proofroll.truth.hybrid import Stretch, Transition
 from proofroll.truth.mechanism.stretches import Stretches
-from proofroll.truth.mechanism.two_paths import CLOSE, moment
+from proofroll.truth.mechanism.two_paths import CLOSE, time_accuracy
 
 Motors = tuple[Actuator, ...]
 _NEAR = 1e-12  # relative difference from a stop below which a coordinate is at it
@@ -154,7 +154,7 @@ def order_decides(
     Another joint would reach its stop within the accuracy of times, and the impact changes its rate. ``q``: coordinates
     of the switched joints at the impact; ``before``, ``after``: their rates.
     """
-    speed, within = abs(float(before[hit])), moment(leg.end)
+    speed, within = abs(float(before[hit])), time_accuracy(leg.end)
     for k, kind in guards_of(joints, leg.mode):
         if k >= len(joints) or k == hit or kind not in {"low", "high"}:
             continue

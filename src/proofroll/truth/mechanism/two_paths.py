@@ -15,7 +15,7 @@ from proofroll.elements.mechanism.rotations import Array
 from proofroll.truth import SAFETY
 from proofroll.truth.hybrid import HybridPath, Stretch, first_close
 from proofroll.truth.mechanism.natural_units import Units
-from proofroll.truth.mechanism.two_routes import JUDGED, ROUND_OFF, TwoRouteMotion, judged, largest, round_off
+from proofroll.truth.mechanism.two_routes import JUDGED, ROUND_OFF, TwoRouteMotion, fields_with_bars, largest, round_off
 
 # Tolerances of each step of the two routes, in natural units. With equal tolerances their steps, and so their errors,
 # are nearly equal, and the difference hides them: three free bodies of twelve were 1.7 times their bars off.
@@ -65,7 +65,7 @@ def two_route_motion(
     """
     parted, determinate = _parted(*paths, kinds) * units.time, analysed(mechanism).determinate
     masked = replace(one, wrench=np.where(determinate, one.wrench, np.nan))
-    fields, others = judged(mechanism, masked), judged(mechanism, two)
+    fields, others = fields_with_bars(mechanism, masked), fields_with_bars(mechanism, two)
     if pressed is not None:
         fields["pressed"], others["pressed"] = pressed
     placed = masked.placed(mechanism)
@@ -110,10 +110,10 @@ def _parted(one: Path, two: Path, kinds: Callable[[Any], Any]) -> float:
 
 def _instant(leg: Stretch[Any]) -> bool:
     """True if a leg is shorter than the accuracy of times."""
-    return bool(leg.end - leg.start <= moment(leg.end))
+    return bool(leg.end - leg.start <= time_accuracy(leg.end))
 
 
-def moment(time: float) -> float:
+def time_accuracy(time: float) -> float:
     """Accuracy of event times, in natural units: relative to the time, at least to the unit of time."""
     return CLOSE * max(1.0, time)
 

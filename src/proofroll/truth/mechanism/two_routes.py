@@ -100,11 +100,11 @@ def find_truth(mechanism: Mechanism, times: Array, tolerance: float = 1e-15) -> 
         routes = (f"closed form: {form.title}", *routes)
     _check_limits(mechanism, best)
     masked = replace(best, wrench=np.where(analysis.determinate, best.wrench, np.nan))
-    placed, fields = masked.placed(mechanism), judged(mechanism, masked)
+    placed, fields = masked.placed(mechanism), fields_with_bars(mechanism, masked)
     bars, differences, least = {}, {}, round_off(fields, placed)
     late = np.flatnonzero(chaotic)
     horizon = float(times[late[0]]) if len(late) else np.inf
-    rest = [judged(mechanism, record) for record in (one, two, precise)]
+    rest = [fields_with_bars(mechanism, record) for record in (one, two, precise)]
     for field, values in fields.items():
         others = [np.where(np.isnan(values), np.nan, other[field]) for other in rest]
         difference = np.maximum(largest(others[0] - values), largest(others[0] - others[2]))
@@ -139,7 +139,7 @@ def _runs(
     return one, two, precise, second.growth(times), (name, "joint coordinates, DOP853")
 
 
-def judged(mechanism: Mechanism, record: Record) -> dict[str, Array]:
+def fields_with_bars(mechanism: Mechanism, record: Record) -> dict[str, Array]:
     """Fields with an error bar: those of the record, and tracked points and energy, which follow from the poses."""
     placed = record.placed(mechanism)
     fields = {name: getattr(record, name) for name in JUDGED}

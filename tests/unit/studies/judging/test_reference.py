@@ -18,7 +18,7 @@ from proofroll.running.case import Result, Status
 from proofroll.running.identity import resolve
 from proofroll.studies.judging import run_values
 from proofroll.studies.judging.reference import Reference
-from proofroll.studies.tradeoff.curve import CurvePoint, measured
+from proofroll.studies.tradeoff.curve import CurvePoint, with_errors
 from proofroll.truth.ball_on_surface.polar import Polar
 from proofroll.truth.ball_on_surface.rolling import reduced
 from proofroll.truth.ball_on_surface.taylor import SlidingTaylor
@@ -64,7 +64,7 @@ def test_a_trade_off_leaves_out_what_the_truth_does_not_tell(monkeypatch: pytest
     given = {"positions": np.full(2, 0.5), "contact_forces": np.ones(2)}
     monkeypatch.setattr(run_values, "observed", lambda *_: given)
     point = CurvePoint(None, Result(Status.DONE, ""))  # type: ignore[arg-type]
-    assert measured(point, held, places).errors == {"positions": 0.5}
+    assert with_errors(point, held, places).errors == {"positions": 0.5}
 
 
 def against(formulation: str, **parameters: float) -> str:

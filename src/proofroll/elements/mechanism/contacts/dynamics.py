@@ -189,7 +189,7 @@ class ContactDynamics:
         state = self.at(q, v)
         normals = np.array([state.touching[k].normal @ state.J[k] for k in closed])
         gaps = np.array([state.touching[k].gap for k in closed])
-        q = self.equations.tree.moved(q, -_held(state.W, normals, gaps))
+        q = self.equations.tree.moved(q, -_least_motion_for(state.W, normals, gaps))
         state = self.at(q, v)
         return np.concatenate([q, v - self._brought(state, v, mode), [time]])
 
@@ -202,7 +202,7 @@ class ContactDynamics:
             elif own.kind == "slip":
                 rows.append(state.touching[k].normal[None] @ state.J[k])
         K = np.concatenate(rows)
-        return _held(state.W, K, K @ v)
+        return _least_motion_for(state.W, K, K @ v)
 
     def begin(self) -> tuple[ContactMode, float]:
         """Mode at the start, and its margin to another one: inf, or 0 if it is not unique."""
@@ -301,6 +301,6 @@ class ContactDynamics:
         return record, np.where(found.determinate[:count], pressed, np.nan)
 
 
-def _held(W: Array, K: Array, violation: Array) -> Array:
+def _least_motion_for(W: Array, K: Array, violation: Array) -> Array:
     """Motion of least kinetic energy that makes these violations of rows K, (nv)."""
     return np.asarray(W @ K.T @ (np.linalg.pinv(K @ W @ K.T, RANK, hermitian=True) @ violation))

@@ -66,13 +66,13 @@ def residuals_of(evidence: Evidence) -> Iterator[Residuals[Change]]:
         def contradicted(change: Change) -> bool:
             return first is not None and not float(np.max(np.abs(first.left(change)), initial=0.0)) <= allowed
 
-        yield _held(seen, "along the run", before, CLOSES, contradicted, tells)
+        yield _residuals_at(seen, "along the run", before, CLOSES, contradicted, tells)
 
 
 def balanced_at_start(start: MechanismStates) -> Residuals[Change]:
     """Residuals at time 0, for the accelerations of the certificate."""
     before = float(np.max(np.abs(start.left(Change(start.mechanism))), initial=0.0))
-    return _held(start, "at time 0", before, 1e3 * CLOSES_EXACTLY)
+    return _residuals_at(start, "at time 0", before, 1e3 * CLOSES_EXACTLY)
 
 
 def _doubt(evidence: Evidence, start: MechanismStates | None) -> float:
@@ -83,7 +83,7 @@ def _doubt(evidence: Evidence, start: MechanismStates | None) -> float:
     return max([float(np.max(np.abs(start.left(Change(start.mechanism))), initial=0.0)), *allowed])
 
 
-def _held(
+def _residuals_at(
     states: MechanismStates,
     at: str,
     before: float,

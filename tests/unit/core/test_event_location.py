@@ -1,7 +1,8 @@
 import numpy as np
 import pytest
 
-from proofroll.core.crossing import first_rise, stays_negative
+from proofroll.core.dop853 import controlled_step, solver_from
+from proofroll.core.event_location import first_rise, locate_rise, stays_negative
 
 
 def functions(times):
@@ -27,3 +28,14 @@ def test_an_oscillation_is_left_to_more_points(frequency):
         rises = (np.sin(frequency * times + phase) > 0.5).any()
         stays = stays_negative(lambda t, at=phase: np.sin(frequency * t + at)[:, None] - 0.5, 0.0, 1.0)
         assert not (rises and stays)
+
+
+@pytest.mark.parametrize(("level", "rises"), [(0.0, 0.0), (0.16, 0.2)])
+def test_a_rise_is_known_to_a_bracket_that_is_not_empty(level: float, rises: float) -> None:
+    """Where a parabola of time passes a level lies in a bracket of some width."""
+    solver = solver_from(lambda t, _: np.array([1.0 - 2.0 * t]), 0.0, np.zeros(1), 1e-13, 1e-13, 1.0)
+    controlled_step(solver, None, 1.0)
+    rise = locate_rise(solver, lambda y: np.array([y[0] - level]))
+    assert rise is not None
+    assert rise.width > 0
+    assert abs(rise.time - rises) <= 4 * max(rise.width, float(np.spacing(0.5)))

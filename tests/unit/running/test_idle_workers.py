@@ -7,10 +7,10 @@ from pathlib import Path
 import pytest
 
 from proofroll.running.asking import prepare, resolve
+from proofroll.running.idle_workers import Workers
 from proofroll.running.process import Worker
 from proofroll.running.runner import Runner
 from proofroll.running.store import Store
-from proofroll.running.worker_pool import Workers
 from proofroll.studies.cases import single_case
 
 pytestmark = pytest.mark.own_workers
