@@ -6,14 +6,20 @@ from itertools import count
 import mechanism_examples
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
 
 from proofroll.core.errors import Refused
 from proofroll.elements.mechanism import Body, Joint, Loop, Mechanism, Tree
 from proofroll.elements.mechanism.analysis import analysed
 from proofroll.elements.mechanism.assembly import check_start
+from proofroll.elements.mechanism.joint import FACTS
 from proofroll.elements.mechanism.joint_coordinates import JointCoordinates
 from proofroll.elements.mechanism.placed import Placed
+from proofroll.elements.mechanism.record import gathered
 from proofroll.elements.mechanism.rotations import to_rpy
+from proofroll.truth.mechanism.maximal_bodies import Planar, made_bodies
 from proofroll.truth.mechanism.maximal_coordinates import MaximalCoordinates
 
 # What independent programs (Pinocchio, heyoka, closed forms) agree on: end time, point, its place, tolerance.
@@ -129,6 +135,88 @@ def test_routes_agree_on_every_kind_of_loop(kind):
     assert max(place, attitude) < 1e-12
     assert wrench < 1e-10 * max(1.0, np.abs(one.wrench).max())
     assert max(one.residual.max(), two.residual.max()) < 1e-12
+
+
+def moved(joint, time):
+    """Turn and slide of a child in its frame at zero, a time after the start at the first rates of its joint."""
+    q, v, turn = np.array(joint.q0), np.array(joint.v0), Rotation.from_rotvec
+    z = np.array(joint.axis) / np.linalg.norm(joint.axis)
+    x = np.array(joint.second_axis or np.cross(z, np.eye(3)[np.argmin(np.abs(z))]))
+    x, none = (x - z * (z @ x)) / np.linalg.norm(x - z * (z @ x)), np.zeros(3)
+    if joint.kind in {"spherical", "free"}:
+        whole = Rotation.from_quat(q[-4:], scalar_first=True)
+        return whole * turn(v[-3:] * time), q[:3] + whole.apply(v[:3]) * time if joint.kind == "free" else none
+    q = q + v * time
+    return {
+        "fixed": lambda: (turn(none), none),
+        "revolute": lambda: (turn(q[0] * z), none),
+        "prismatic": lambda: (turn(none), q[0] * z),
+        "universal": lambda: (turn(q[0] * z) * turn(q[1] * x), none),
+        "planar": lambda: (turn(q[2] * z), q[0] * x + q[1] * np.cross(z, x)),
+    }[joint.kind]()
+
+
+def by_definition(mechanism, time):
+    """Rotations and places of the bodies of a chain, a time after the start at the first rates of its joints."""
+    turns, places = [Rotation.identity()], [np.zeros(3)]
+    for joint in mechanism.joints:
+        turned, slid = moved(joint, time)
+        at_zero = turns[-1] * Rotation.from_euler("xyz", joint.orientation)
+        places.append(places[-1] + turns[-1].apply(joint.position) + at_zero.apply(slid))
+        turns.append(at_zero * turned)
+        places[-1] -= turns[-1].apply(joint.child_position)
+    return Rotation.concatenate(turns[1:]), np.array(places[1:])
+
+
+numbers = st.floats(-1.2, 1.2)
+vectors = st.tuples(numbers, numbers, numbers)
+
+
+@st.composite
+def turned_joints(draw, kind, name, parent, along=None):
+    """A joint whose frames, places, coordinates and rates are any; ``along``: its axis in the world at q = 0."""
+    orientation = draw(vectors)
+    axis = np.array(draw(vectors.filter(lambda v: np.linalg.norm(v) > 0.1)))
+    if along is not None:
+        before, way = along
+        axis = (before * Rotation.from_euler("xyz", orientation)).inv().apply(way)
+    across = np.cross(axis, np.eye(3)[np.argmin(np.abs(axis))])
+    facts = FACTS[kind]
+    q = np.array(draw(st.tuples(*[numbers] * facts.nq)))
+    if facts.nq >= 4:
+        q[-4:] += [2.0, 0.0, 0.0, 0.0]  # no quaternion of zeros
+        q[-4:] /= np.linalg.norm(q[-4:])
+    options = {"axis": tuple(axis)} if kind in {"revolute", "prismatic", "universal", "planar"} else {}
+    options |= {"second_axis": tuple(across)} if kind in {"universal", "planar"} else {}
+    rates = draw(st.tuples(*[numbers] * facts.nv))
+    there = draw(vectors)
+    return Joint(name, kind, parent, name, draw(vectors), orientation, child_position=there, q0=tuple(q), v0=rates,
+                 **options)  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("kind", "in_plane"), [*((kind, False) for kind in FACTS), ("revolute", True), ("planar", True)]
+)
+@settings(max_examples=4)
+@given(st.data())
+def test_both_routes_start_where_a_joints_definition_says(kind, in_plane, data):
+    """Poses, velocities and spins of two bodies on turned frames at time 0: by formulas of their own."""
+    first = data.draw(turned_joints("revolute", "a", "world"))
+    before = Rotation.from_euler("xyz", first.orientation)
+    along = (before, before.apply(first.axis)) if in_plane else None
+    second = data.draw(turned_joints(kind, "b", "a", along))
+    mechanism = Mechanism(tuple(Body(name, **mechanism_examples.SOLID) for name in "ab"), (first, second))
+    if in_plane:
+        assert {type(body) for body in made_bodies(mechanism, allow_planar=True)} == {Planar}
+    h = 1e-5
+    (turns, places), (later, there), (earlier, here) = (by_definition(mechanism, time) for time in (0.0, h, -h))
+    rates, spins = (there - here) / (2 * h), (later * earlier.inv()).as_rotvec() / (2 * h)
+    equations = JointCoordinates(mechanism)
+    one = gathered(np.zeros(1), [equations.sample(*mechanism.start())])
+    for record in (one, MaximalCoordinates(mechanism).at_start()):
+        apart = Rotation.from_quat(record.q_WB[0], scalar_first=True) * turns.inv()
+        assert max(np.abs(record.p_WB[0] - places).max(), apart.magnitude().max()) < 1e-13
+        assert max(np.abs(record.v_WB[0] - rates).max(), np.abs(record.w_WB[0] - spins).max()) < 1e-8
 
 
 def test_springs_and_dampers_along_joints_act_alike():

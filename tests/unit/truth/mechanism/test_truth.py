@@ -10,7 +10,7 @@ from proofroll.elements.mechanism import Body, Joint, Mechanism
 from proofroll.elements.mechanism.element import MechanismElement
 from proofroll.elements.mechanism.joint_coordinates import JointCoordinates
 from proofroll.truth.mechanism import maximal_taylor
-from proofroll.truth.mechanism.maximal_bodies import Planar, made_bodies
+from proofroll.truth.mechanism.maximal_bodies import GeneralBody, Planar, made_bodies
 from proofroll.truth.mechanism.maximal_coordinates import MaximalCoordinates
 from proofroll.truth.mechanism.plug_in import MechanismTruth
 from proofroll.truth.mechanism.two_routes import CHAOS, find_truth
@@ -224,48 +224,44 @@ def test_bodies_without_inertia_are_carried_by_others(monkeypatch):
     assert np.abs(still).max() < 1e-12  # nothing pulls at a tool without mass
 
 
-@pytest.mark.drill
-def test_moving_bodies_without_inertia_are_moved_by_what_they_carry():
-    """Massless bodies and points between joints: both routes agree on the motion and on every wrench."""
-    bodies = (
-        Body("hub", 0.0),
-        Body("ring", 0.0),
-        Body("hand", 0.7, (0, 0.1, 0.05), INERTIA),
-        Body("point", 0.5, (0, 0.3, 0.1)),
-        Body("wheel", 0.0),
-    )
-    joints = (
-        Joint("shaft", "revolute", "world", "hub", axis=(1, 2, 0), q0=(0.4,), v0=(1.0,)),
-        Joint("gimbal", "revolute", "hub", "ring", (0.3, 0, 0), axis=(0, 1, 0.2), q0=(0.3,), damping=0.1),
-        Joint("slide", "prismatic", "ring", "hand", axis=(0, 0, 1), q0=(0.1,), v0=(0.5,)),
-        Joint("thread", "revolute", "hub", "point", (-0.1, 0, 0), axis=(1, 0, 0), v0=(2.0,)),
-        Joint("axle", "revolute", "point", "wheel", (0, 0.3, 0), axis=(0, 0, 1), armature=0.02, v0=(3.0,)),
-    )
-    agreed(Mechanism(bodies, joints))
+IN_SPACE = (
+    Joint("shaft", "revolute", "world", "hub", axis=(1, 2, 0), q0=(0.4,), v0=(1.0,)),
+    Joint("gimbal", "revolute", "hub", "ring", (0.3, 0, 0), axis=(0, 1, 0.2), q0=(0.3,), damping=0.1),
+    Joint("slide", "prismatic", "ring", "hand", axis=(0, 0, 1), q0=(0.1,), v0=(0.5,)),
+    Joint("thread", "revolute", "hub", "point", (-0.1, 0, 0), axis=(1, 0, 0), v0=(2.0,)),
+    Joint("axle", "revolute", "point", "wheel", (0, 0.3, 0), axis=(0, 0, 1), armature=0.02, v0=(3.0,)),
+)
+IN_PLANE = (
+    Joint("shaft", "revolute", "world", "hub", axis=(0, 0, 1), q0=(0.4,), v0=(1.0,)),
+    Joint("slide", "prismatic", "hub", "ring", axis=(1, 0, 0), q0=(0.1,), v0=(0.5,)),
+    Joint("wrist", "revolute", "ring", "hand", (0.3, 0, 0), axis=(0, 0, 1), q0=(0.3,), damping=0.1),
+    Joint("thread", "revolute", "hub", "point", (0, -0.1, 0), axis=(0, 0, 1), v0=(2.0,)),
+    Joint("axle", "revolute", "point", "wheel", (0.3, 0, 0), axis=(0, 0, 1), armature=0.02, v0=(3.0,)),
+)
 
 
-def test_plane_bodies_without_inertia_are_moved_by_what_they_carry(monkeypatch):
-    """Massless bodies and points with three coordinates each: both routes agree on the motion and on every wrench.
+@pytest.mark.parametrize(
+    ("joints", "hand", "point", "gravity", "body", "compiled"),
+    [
+        pytest.param(
+            IN_SPACE, (0, 0.1, 0.05), (0, 0.3, 0.1), (0, 0, -9.81), GeneralBody, True, marks=pytest.mark.drill
+        ),
+        (IN_PLANE, (0.1, 0.05, 0), (0.3, 0, 0), (0.0, -9.81, 0.0), Planar, False),
+    ],
+)
+def test_moving_bodies_without_inertia_are_moved_by_what_they_carry(
+    joints, hand, point, gravity, body, compiled, monkeypatch
+):
+    """Massless bodies and points between joints, with six coordinates each or three: both routes agree on everything.
 
-    By the second route's equations in numbers, too.
+    In a plane by the second route's equations in numbers, too.
     """
-    monkeypatch.setattr(maximal_taylor, "heyoka", None)
-    bodies = (
-        Body("hub", 0.0),
-        Body("carriage", 0.0),
-        Body("hand", 0.7, (0.1, 0.05, 0), INERTIA),
-        Body("point", 0.5, (0.3, 0, 0)),
-        Body("wheel", 0.0),
-    )
-    joints = (
-        Joint("shaft", "revolute", "world", "hub", axis=(0, 0, 1), q0=(0.4,), v0=(1.0,)),
-        Joint("slide", "prismatic", "hub", "carriage", axis=(1, 0, 0), q0=(0.1,), v0=(0.5,)),
-        Joint("wrist", "revolute", "carriage", "hand", (0.3, 0, 0), axis=(0, 0, 1), q0=(0.3,), damping=0.1),
-        Joint("thread", "revolute", "hub", "point", (0, -0.1, 0), axis=(0, 0, 1), v0=(2.0,)),
-        Joint("axle", "revolute", "point", "wheel", (0.3, 0, 0), axis=(0, 0, 1), armature=0.02, v0=(3.0,)),
-    )
-    mechanism = Mechanism(bodies, joints, gravity=(0.0, -9.81, 0.0))
-    assert [type(body) for body in made_bodies(mechanism, allow_planar=True)] == [Planar] * 5
+    if not compiled:
+        monkeypatch.setattr(maximal_taylor, "heyoka", None)
+    bodies = [Body(name, 0.0) for name in ("hub", "ring", "wheel")]
+    bodies += [Body("hand", 0.7, hand, INERTIA), Body("point", 0.5, point)]
+    mechanism = Mechanism(tuple(bodies), joints, gravity=gravity)
+    assert {type(each) for each in made_bodies(mechanism, allow_planar=True)} == {body}
     agreed(mechanism)
 
 
