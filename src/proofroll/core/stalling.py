@@ -1,4 +1,4 @@
-"""Detects that an adaptive step has collapsed: many steps in a row, each tiny against the largest."""
+"""Early end of integrations whose adaptive step has collapsed, or that would take too many steps."""
 
 from proofroll.core.errors import Diverged
 
@@ -6,6 +6,8 @@ from proofroll.core.errors import Diverged
 # such steps: a slide of a million times the crank's mass drives it through its dead point in a thousandth of the usual
 # time, and is not stalled.
 _PART, _STEPS = 1e-7, 20
+_MOST = 200_000  # largest number of steps of an integration
+_PACE = 2000  # number of steps by which the number of all is predicted
 
 
 class Stalled(Diverged):
@@ -33,3 +35,26 @@ class StepWatch:
         self._small = 0 if landing or length > _PART * self._largest else self._small + 1
         if self._small > _STEPS:
             raise Stalled(f"DOP853 stalls at t = {t:.6g} s: its steps shrink, as at a singular pose")
+
+
+class StepCount:
+    """Counts the steps of an integration from ``start`` to ``until`` [s]."""
+
+    def __init__(self, start: float, until: float) -> None:
+        self._steps, self._before, self._until = 0, start, until
+
+    def took(self, t: float) -> None:
+        """Records a step that ended at time t [s].
+
+        Raises:
+            Diverged: at the pace of the last steps there will be too many.
+        """
+        self._steps += 1
+        if self._steps % _PACE:
+            return
+        ahead, self._before = _PACE * (self._until - t) / (t - self._before), t
+        if self._steps + ahead > _MOST:
+            raise Diverged(
+                f"at the pace of its first {self._steps} steps, which reached t = {t:.6g} s, DOP853 needs more than "
+                f"{_MOST}: soften what swings fastest, or ask for a shorter time"
+            )

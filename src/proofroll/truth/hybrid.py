@@ -15,6 +15,7 @@ from proofroll.core.dop853 import controlled_step, corrected_by, go_on_from, int
 from proofroll.core.errors import Diverged, Refused
 from proofroll.core.event_location import locate_rise
 from proofroll.core.number_format import number
+from proofroll.core.stalling import StepCount
 
 State = FloatArray
 ModeT = TypeVar("ModeT")
@@ -255,17 +256,19 @@ def walked(
         Time [s] and state at the end, and index of the guard that rose; None: the time limit.
 
     Raises:
-        Diverged: the integration fails.
+        Diverged: the integration fails, or would take too many steps.
     """
     if not until > time:
         return time, state, None
     solver, back = solver_from(rates, time, state, float(np.min(tolerance)), tolerance), corrected_by(corrected)
+    count = StepCount(time, until)
     if first_step is not None:
         solver.h_abs = min(solver.h_abs, max(first_step, 16 * float(np.spacing(time))))
     while solver.t < until:
         if visited is not None:
             visited.append((solver.t, solver.y.copy()))
         controlled_step(solver, None, until)
+        count.took(solver.t)
         if rise := locate_rise(solver, guards, 0.0 if noise is None else noise, leaving=solver.t_old == time):
             return rise.time, corrected(rise.state), rise.guard
         go_on_from(solver, back(solver.t, solver.y))
