@@ -151,12 +151,12 @@ class HybridPath(Generic[LegT]):
 
 
 def follow(
-    route: Legs[ModeT, LegT], until: float, breaks: Sequence[float] = (), close: float = 0.0
+    route: Legs[ModeT, LegT], until: float, breaks: Sequence[float] = (), close: float = 0.0, edge: float = np.inf
 ) -> HybridPath[LegT]:
     """Path from time 0 to ``until`` [s]; legs also end at the rising ``breaks`` [s], where the rates are not smooth.
 
-    After a decision with a margin below ``close``, where round-off decides, a refusal ends the path instead of being
-    raised.
+    After a decision with a margin below ``close``, where round-off decides, or from the time ``edge`` [s] on, at which
+    another route came to such a decision, a refusal ends the path instead of being raised.
 
     Raises:
         Diverged: the route fails, or makes no progress.
@@ -191,7 +191,7 @@ def follow(
                 _refuse_many(legs, until)
             time, change = leg.end, route.change(leg)
         except (Diverged, Refused):
-            if min(margin for _, margin in margins) < close:
+            if leg.end >= edge or min(margin for _, margin in margins) < close:
                 return HybridPath(tuple(legs), tuple(happenings), tuple(margins), known=False)
             raise
 
@@ -297,9 +297,10 @@ def between(
 def states_of(
     route: HybridRoute[ModeT], path: HybridPath[Stretch[ModeT]], times: FloatArray, legs: Sequence[int]
 ) -> FloatArray:
-    """States at rising times [s], each within the leg of the given index, shape (times, state)."""
-    at = np.asarray(legs)
-    parts = [route.within(path.legs[number], times[at == number]) for number in sorted(set(legs))]
+    """States at rising times [s], each within the leg of the given index or at its end, shape (times, state)."""
+    at, ends = np.asarray(legs), np.array([path.legs[number].end for number in legs])
+    within = np.minimum(times, ends)  # beyond the end of a path that is not known further, rates may be of any size
+    parts = [route.within(path.legs[number], within[at == number]) for number in sorted(set(legs))]
     return np.concatenate(parts)
 
 

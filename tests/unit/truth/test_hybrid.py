@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from proofroll.core.arrays import FloatArray
-from proofroll.core.errors import Diverged
-from proofroll.truth.hybrid import Stretch, Transition, between, follow, walked
+from proofroll.core.errors import Diverged, Refused
+from proofroll.truth.hybrid import Stretch, Transition, between, follow, states_of, walked
 
 TOLERANCE = np.full(2, 1e-13)
 
@@ -158,3 +158,40 @@ def test_rebounds_that_shrink_by_a_hundredth_make_progress() -> None:
     route = Rebounding()
     follow(route, 1.0)
     assert route.count > 2000
+
+
+class Stopping:
+    """A route that is refused at its first change, at 0.5 s; states within are the times asked for."""
+
+    def begin(self) -> Transition[str]:
+        """See the protocol."""
+        return Transition(np.zeros(1), "flight", (), np.inf)
+
+    def walk(self, time: float, state: FloatArray, mode: str, until: float) -> Stretch[str]:
+        """See the protocol."""
+        return Stretch(time, min(0.5, until), mode, state, state, 0)
+
+    def change(self, leg: Stretch[str]) -> Transition[str]:
+        """See the protocol."""
+        raise Refused(f"no outcome at {leg.end} s")
+
+    def within(self, leg: Stretch[str], times: FloatArray) -> FloatArray:
+        """See the protocol."""
+        return np.clip(times, leg.start, None)[:, None]
+
+
+@pytest.mark.parametrize("edge", [0.5, np.inf])
+def test_a_refusal_after_another_routes_close_decision_ends_the_path(edge: float) -> None:
+    """Where the question is ill-posed by one route, the other may find no outcome; before, its refusal is raised."""
+    if edge == np.inf:
+        with pytest.raises(Refused, match="no outcome"):
+            follow(Stopping(), 1.0, (), 1e-9, edge)
+    else:
+        assert not follow(Stopping(), 1.0, (), 1e-9, edge).known
+
+
+def test_a_path_that_ends_is_not_followed_further() -> None:
+    """States asked for after the last known one are the last known one: rates beyond it may be of any size."""
+    path = follow(Stopping(), 1.0, (), 1e-9, 0.0)
+    times = np.array([0.25, 0.5, 1.0])
+    assert states_of(Stopping(), path, times, path.leg_at(times))[:, 0].tolist() == [0.25, 0.5, 0.5]

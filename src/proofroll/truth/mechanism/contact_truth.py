@@ -8,13 +8,13 @@ from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.record import gathered
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.elements.mechanism.signal import breaks
-from proofroll.truth.hybrid import follow, states_of
+from proofroll.truth.hybrid import states_of
 from proofroll.truth.mechanism.contact_bodies import ContactBodies
 from proofroll.truth.mechanism.contact_equations import ContactEquations
 from proofroll.truth.mechanism.contact_tree import ContactTree
 from proofroll.truth.mechanism.maximal_coordinates import MaximalCoordinates
 from proofroll.truth.mechanism.natural_units import Units, natural_units
-from proofroll.truth.mechanism.two_paths import CLOSE, TOLERANCES, refuse_uncovered, two_route_motion
+from proofroll.truth.mechanism.two_paths import TOLERANCES, followed, refuse_uncovered, two_route_motion
 from proofroll.truth.mechanism.two_routes import TwoRouteMotion, check_start, matched
 
 
@@ -42,7 +42,7 @@ def _in_units(mechanism: Mechanism, units: Units, times: Array) -> TwoRouteMotio
     equations = ContactEquations(own, second.lean)
     bodies = ContactBodies(equations, TOLERANCES[1], size)
     until, kinks = float(times[-1]), breaks(own.signals)
-    paths = follow(tree, until, kinks, CLOSE), follow(bodies, until, kinks, CLOSE)
+    paths = followed(tree, bodies, until, kinks)
     legs = paths[0].leg_at(times)
     others = [min(number, len(paths[1].legs) - 1) for number in legs]
     samples = [

@@ -11,13 +11,13 @@ from proofroll.elements.mechanism.record import gathered
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.elements.mechanism.signal import breaks
 from proofroll.elements.mechanism.switches import STOPPED
-from proofroll.truth.hybrid import follow, states_of
+from proofroll.truth.hybrid import states_of
 from proofroll.truth.mechanism.body_switching import SwitchedBodies
 from proofroll.truth.mechanism.contact_truth import contact_truth
 from proofroll.truth.mechanism.joint_switching import SwitchedTree
 from proofroll.truth.mechanism.maximal_coordinates import MaximalCoordinates
 from proofroll.truth.mechanism.natural_units import Units, natural_units
-from proofroll.truth.mechanism.two_paths import CLOSE, TOLERANCES, refuse_uncovered, two_route_motion
+from proofroll.truth.mechanism.two_paths import TOLERANCES, followed, refuse_uncovered, two_route_motion
 from proofroll.truth.mechanism.two_routes import TwoRouteMotion, check_start, find_truth, matched
 
 # rad, natural lengths, or part of a limit: how far a stop or a limit must be exceeded to act; more than the error of
@@ -87,7 +87,7 @@ def _switched(mechanism: Mechanism, units: Units, own: Mechanism, times: Array) 
         SwitchedBodies(second.lean, equations.switched, TOLERANCES[1]),
     )
     until, kinks = float(times[-1]), breaks(own.signals)
-    paths = follow(tree, until, kinks, CLOSE), follow(bodies, until, kinks, CLOSE)
+    paths = followed(tree, bodies, until, kinks)
     legs = [min(number, len(paths[1].legs) - 1) for number in paths[0].leg_at(times)]
     q_and_v = states_of(tree, paths[0], times, paths[0].leg_at(times))
     nq = mechanism.nq

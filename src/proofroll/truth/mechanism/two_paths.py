@@ -13,7 +13,7 @@ from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.record import Record
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.truth import SAFETY
-from proofroll.truth.hybrid import HybridPath, Stretch, first_close
+from proofroll.truth.hybrid import HybridPath, HybridRoute, ModeT, Stretch, first_close, follow
 from proofroll.truth.mechanism.natural_units import Units
 from proofroll.truth.mechanism.two_routes import JUDGED, ROUND_OFF, TwoRouteMotion, fields_with_bars, largest, round_off
 
@@ -36,6 +36,14 @@ def refuse_uncovered(mechanism: Mechanism) -> None:
         raise Refused(f"no route of the truth has {', '.join(mechanism.unmodelled)}")
     if analysed(mechanism).singular_start:
         raise Refused("the start is a singular pose, where the motion may branch")
+
+
+def followed(
+    first: HybridRoute[ModeT], second: HybridRoute[ModeT], until: float, kinks: Sequence[float]
+) -> tuple[HybridPath[Stretch[ModeT]], HybridPath[Stretch[ModeT]]]:
+    """Paths of two routes to ``until``, in natural units; ``kinks``: times at which the rates are not smooth."""
+    one = follow(first, until, kinks, CLOSE)
+    return one, follow(second, until, kinks, CLOSE, first_close([one], CLOSE))
 
 
 def two_route_motion(
