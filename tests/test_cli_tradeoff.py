@@ -18,10 +18,10 @@ from proofroll.report import labels
 from proofroll.report.tradeoff.tables import corner_table
 from proofroll.report.tradeoff.work_precision import svg
 from proofroll.studies import study_store
-from proofroll.studies.study_store import keep
+from proofroll.studies.study_store import keep_study
 from proofroll.studies.tradeoff.curve import Question
 from proofroll.studies.tradeoff.records import MeasuredPoint, TradeoffStudy
-from proofroll.studies.tradeoff.tradeoff import stored
+from proofroll.studies.tradeoff.tradeoff import study_path
 
 Proofroll = Callable[..., tuple[int, str, str]]
 ENGINE = "exudyn[formulation=generic,preset=matched]"
@@ -46,14 +46,14 @@ def measured(tmp_path_factory: pytest.TempPathFactory) -> TradeoffStudy:
 @pytest.fixture
 def folder(measured: TradeoffStudy, tmp_path: Path) -> Path:
     """A folder with that study in it, as if it had just been made with this code on a machine without noise."""
-    path = stored(tmp_path, Question("sphere_in_cylinder", {"rolling_resistance": 5e-4}, 0.5, "z"))
+    path = study_path(tmp_path, Question("sphere_in_cylinder", {"rolling_resistance": 5e-4}, 0.5, "z"))
     path.parent.mkdir()
     points = []
     for point in measured.points:
         cost = 1e-5 / (point.step or 1.0)
         steady = replace(point, seconds_per_second=cost, interval=(0.99 * cost, 1.01 * cost))
         points.append(point if point.seconds_per_second is None else steady)
-    keep(replace(measured, measured=study_store.measured(), points=points), path)
+    keep_study(replace(measured, measured=study_store.conditions_now(), points=points), path)
     return tmp_path
 
 
@@ -199,8 +199,8 @@ def test_curves_of_another_version_are_not_answered_from(
 ) -> None:
     """Curves measured with another version of an engine, or on another machine, are named stale, and why."""
     (path,) = (folder / "tradeoff").iterdir()
-    old = replace(study_store.measured(), versions=study_store.versions() | {"mujoco": "1.0"})
-    keep(replace(measured, measured=old), path)
+    old = replace(study_store.conditions_now(), versions=study_store.versions() | {"mujoco": "1.0"})
+    keep_study(replace(measured, measured=old), path)
     code, _, err = proofroll(*asked(folder))
     assert code == 2
     assert "mujoco 1.0 then" in err

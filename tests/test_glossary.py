@@ -14,7 +14,7 @@ from proofroll.core.plugins import engine_names
 from proofroll.core.verdict import Verdict
 from proofroll.elements.ball_on_surface.surfaces import surface_kinds
 from proofroll.files.scene_file import load_scene
-from proofroll.running.asking import described
+from proofroll.running.asking import describe_each
 from proofroll.running.case import EngineDescription
 
 DOCS = Path(__file__).resolve().parents[1] / "docs"
@@ -32,7 +32,7 @@ def words(text: str) -> list[str]:
 def test_every_formulation_is_explained() -> None:
     """Each engine of this project has a section, and in it each of its formulations once, and no other."""
     sections = dict(re.findall(r"^### `(\w+)`\n(.*?)(?=^##)", GLOSSARY, flags=re.DOTALL | re.MULTILINE))
-    told = described(engine_names(), None)
+    told = describe_each(engine_names(), None)
     for engine, text in sections.items():
         facts = told[engine]
         if isinstance(facts, EngineDescription):

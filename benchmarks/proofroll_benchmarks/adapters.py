@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from proofroll.core.errors import ProofrollError, Refused
-from proofroll.running.timing import Interval, Timing, interleaved, ratio
+from proofroll.running.timing import Interval, Timing, ratio, time_in_rounds
 
 SCENE = "sphere_in_cylinder"
 # A tree of one joint, where an adapter's own cost shows most, and one with loops that depend on each other.
@@ -128,7 +128,7 @@ def measure_adapter(
     }
     if not distance <= prepared.tolerance:
         return answer
-    timings = interleaved({"adapter": lambda: repeated(adapter), "bare": lambda: repeated(bare)}, rounds)
+    timings = time_in_rounds({"adapter": lambda: repeated(adapter), "bare": lambda: repeated(bare)}, rounds)
     return answer | {name: list(timing.values) for name, timing in timings.items()}
 
 

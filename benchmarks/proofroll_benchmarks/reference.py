@@ -22,7 +22,7 @@ from proofroll.running.runner import Runner
 from proofroll.running.simulation import simulate
 from proofroll.running.stopwatch import Stopwatch
 from proofroll.running.store import Store
-from proofroll.running.timing import Interval, Timing, interleaved, machine, ratio
+from proofroll.running.timing import Interval, Timing, machine, ratio, time_in_rounds
 from proofroll.truth.ball_on_surface.onset import first_slip as true_first_slip
 from proofroll.truth.ball_on_surface.rolling import unreduced
 from proofroll_benchmarks.compiled import Onsets, Timed, compiled, numeric
@@ -85,7 +85,7 @@ def reference(rounds: int, progress: Callable[[str], None]) -> dict[str, Any]:
         tasks: dict[str, Callable[[], float | None]] = {name: model.measure for name, model in models.items()}
         tasks |= {name: timed(item) for name, item in finalists.items()}
         tasks["onsets"] = onsets.measure
-        timings = interleaved(tasks, rounds, lambda name: progress(f"timing {name}"))
+        timings = time_in_rounds(tasks, rounds, lambda name: progress(f"timing {name}"))
     return _content(slip, models, finalists, timings, onsets, first_slip(scene, _ONSETS_UNTIL))
 
 

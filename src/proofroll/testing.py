@@ -11,7 +11,7 @@ from typing import Any
 from proofroll.core.errors import InputError
 from proofroll.core.scene import Scene
 from proofroll.files.scene_file import load_scene
-from proofroll.running.simulation import recorded, simulate
+from proofroll.running.simulation import simulate, simulate_built
 from proofroll.studies.judging.judge import Judged, judge
 
 __all__ = ["Judged", "assert_agrees"]
@@ -56,7 +56,7 @@ def assert_agrees(
     if isinstance(engine, os.PathLike | Mapping) or hasattr(engine, "data_vars"):
         run, name = engine, "the trajectory"
     elif hasattr(engine, "advance") and not isinstance(engine, type):
-        run, name = recorded(engine, scene, until=until, every=every), type(engine).__name__
+        run, name = simulate_built(engine, scene, until=until, every=every), type(engine).__name__
     else:
         run = simulate(scene, engine, until=until, every=every, **settings)
         name = engine if isinstance(engine, str) else engine.name

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from proofroll.core.scene import Scene
-from proofroll.elements.ball_on_surface.element import changed
+from proofroll.elements.ball_on_surface.element import scene_with
 from proofroll_drill.mutants import mechanism_models as models
 from proofroll_drill.mutants import mechanism_numbers as numbers
 from proofroll_drill.mutants import mechanism_samples as samples
@@ -57,7 +57,7 @@ class SilentBall(Mutant):
     def misread(self, scene: Scene) -> Scene:
         """A little stiffer."""
         ball = scene.elements[0].ball  # type: ignore[attr-defined]  # it is a ball
-        return changed(scene, ball=dataclasses.replace(ball, inertia_ratio=1.01 * ball.inertia_ratio))
+        return scene_with(scene, ball=dataclasses.replace(ball, inertia_ratio=1.01 * ball.inertia_ratio))
 
     def built(self) -> Any:
         """Nothing but how close to the wall it is."""

@@ -10,11 +10,11 @@ import pytest
 from proofroll.core.truth import truth
 from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.elements.mechanism import Mechanism
-from proofroll.elements.mechanism.analysis import analysed
+from proofroll.elements.mechanism.analysis import analyse
 from proofroll.elements.mechanism.assembly import check_start
 from proofroll.elements.mechanism.joint import FACTS
 from proofroll.elements.mechanism.joint_coordinates import JointCoordinates
-from proofroll.elements.mechanism.record import Record, gathered
+from proofroll.elements.mechanism.record import Record, record_of
 from proofroll.truth.mechanism import maximal_taylor
 from proofroll.truth.mechanism.maximal_bodies import Planar, made_bodies
 from proofroll.truth.mechanism.maximal_coordinates import MaximalCoordinates
@@ -31,7 +31,7 @@ STARTS = range(40)
 def starts(mechanism: Mechanism) -> list[Record]:
     """Both routes at time 0."""
     first = JointCoordinates(mechanism)
-    return [gathered(np.zeros(1), [first.sample(*mechanism.start())]), MaximalCoordinates(mechanism).at_start()]
+    return [record_of(np.zeros(1), [first.sample(*mechanism.start())]), MaximalCoordinates(mechanism).at_start()]
 
 
 @pytest.mark.parametrize("seed", STARTS)
@@ -40,7 +40,7 @@ def test_both_routes_start_where_the_joints_definition_says(seed: int) -> None:
     _, mechanism = random_mechanism(seed)
     check_start(mechanism)
     for record in starts(mechanism):
-        found = errors(mechanism, record, analysed(mechanism).determinate)
+        found = errors(mechanism, record, analyse(mechanism).determinate)
         assert max(found[name][0] for name in ("p_WB", "q_WB", "v_WB", "w_WB", "q")) < 1e-13
         assert max(found[name][0] for name in ("energy", "wrench")) < 1e-10
 
@@ -74,7 +74,7 @@ def test_the_referee_notices_what_is_wrong() -> None:
         replace(mechanism, joints=(turned, *mechanism.joints[1:])),
     ]
     record = [starts(each)[0] for each in wrong]
-    known = analysed(mechanism).determinate
+    known = analyse(mechanism).determinate
     assert errors(mechanism, record[0], known)["wrench"][0] > 1e-8
     assert errors(mechanism, record[1], known)["p_WB"][0] > 1e-2
 

@@ -19,7 +19,7 @@ from tiny import Tiny, TinySettings
 
 from proofroll.core.convergence import richardson, tightest
 from proofroll.core.dataset import BETWEEN
-from proofroll.core.diagnosis.of_scene import diagnosed
+from proofroll.core.diagnosis.of_scene import diagnose_scene
 from proofroll.core.errors import Diverged, InputError, Refused
 from proofroll.core.first_steps import certificate
 from proofroll.core.multi_element import build
@@ -110,7 +110,7 @@ def _causes(
     chosen = resolve_settings(kind, settings, scene.requires)
     lines = [line.as_dict() for line in certificate(kind, kind.build(scene, chosen), scene, chosen)]
     step = getattr(chosen, chosen.resolution) if chosen.resolution == "dt" else None
-    return tuple(item.sentence for item in diagnosed(scene, lines, run, _true(scene, run), step, judgements))
+    return tuple(item.sentence for item in diagnose_scene(scene, lines, run, _true(scene, run), step, judgements))
 
 
 def _true(scene: Scene, run: Any) -> Any:
@@ -126,7 +126,7 @@ def band_of(about: str) -> dict[str, str]:
     run = simulate(scene, liar(about, Lie("nothing", (about,))), until=UNTIL[about], every=EVERY)
     true = _true(scene, run)
     reference = Reference.of(scene, true)
-    given = [*run_values.observed(reference, run), *(name for name in _STATE if name in run and name in true)]
+    given = [*run_values.observables_of(reference, run), *(name for name in _STATE if name in run and name in true)]
     items = {name: scene.observables.get(name) for name in given}
     return {name: "1 %" if item and item.role is Role.RESIDUAL else "0.1 %" for name, item in items.items()}
 
@@ -256,7 +256,7 @@ def test_an_honest_engine(name: str, formulation: str) -> None:
     }
     assert {run.attrs["status"] for run in runs.values()} == {"done"}
     reference = Reference.of(scene, _true(scene, runs[1.0]))
-    curves = {factor: run_values.observed(reference, run) for factor, run in runs.items()}
+    curves = {factor: run_values.observables_of(reference, run) for factor, run in runs.items()}
     judgements = []
     for item, curve in curves[1.0].items():
         ladder = [curves[factor][item] for factor in factors]
@@ -266,7 +266,7 @@ def test_an_honest_engine(name: str, formulation: str) -> None:
         limit = replace(limit, beside=reference.beside(item, limit.values, runs[factors[-1]], smallest))
         size = reference.sizes.get(item, 1.0)
         allowance = Allowance(item, scene.observables[item].unit, 0.01 * size, size)
-        off_grid, magnitude = run_values.between(reference, item, runs[1.0]), reference.magnitude(item)
+        off_grid, magnitude = run_values.values_off_grid(reference, item, runs[1.0]), reference.magnitude(item)
         own = RunCurve(curve, between=off_grid, magnitude=magnitude)
         judgements.append(judge_curve(allowance, own, reference.true(item, curve), Refinement(limit, ladder=True)))
     assert not [item for item in judgements if item.limit is LimitResult.ANOTHER or item.remarks]

@@ -17,7 +17,7 @@ import numpy as np
 from proofroll.core.arrays import FloatArray
 from proofroll.core.gravity import Gravity
 from proofroll.core.scene import Scene
-from proofroll.elements.ball_on_surface.element import changed
+from proofroll.elements.ball_on_surface.element import scene_with
 from proofroll.elements.ball_on_surface.sampling import BallBuilt, BallSample
 from proofroll.engines.projection import Projection
 
@@ -26,26 +26,26 @@ def _ball(**factors: float) -> Callable[[Scene], Scene]:
     def change(scene: Scene) -> Scene:
         ball = scene.elements[0].ball
         values = {name: getattr(ball, name) * factor for name, factor in factors.items()}
-        return changed(scene, ball=dataclasses.replace(ball, **values))
+        return scene_with(scene, ball=dataclasses.replace(ball, **values))
 
     return change
 
 
 def _gravity(scene: Scene) -> Scene:
-    return changed(
+    return scene_with(
         scene, gravity=Gravity(scene.elements[0].gravity.magnitude * 1.001, scene.elements[0].gravity.direction)
     )
 
 
 def _resistance(scene: Scene) -> Scene:
     contact = dataclasses.replace(scene.elements[0].contact, rolling_resistance=0.0)
-    return changed(scene, contact=contact)
+    return scene_with(scene, contact=contact)
 
 
 def _slippery(scene: Scene) -> Scene:
     contact = scene.elements[0].contact
     less = {name: getattr(contact, name) * 0.9 for name in ("mu_static", "mu_kinetic")}
-    return changed(scene, contact=dataclasses.replace(contact, **less))
+    return scene_with(scene, contact=dataclasses.replace(contact, **less))
 
 
 def _same(scene: Scene) -> Scene:

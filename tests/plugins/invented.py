@@ -49,7 +49,7 @@ def invented_study(*points: MeasuredPoint, **more: Any) -> TradeoffStudy:
         "quantities": {"z": MeasuredQuantity("m", 0.1, 1e-13, "z", column=True)}, "absent": {}, "budgets": [],
         "pareto": {},
         "pareto_engines": {}, "truth": TruthCost(route=""), "over": {}, "findings": [], "brief": False,
-        "measured": study_store.measured(),
+        "measured": study_store.conditions_now(),
     }  # fmt: skip
     return TradeoffStudy(points=list(points), **(values | more))
 
@@ -120,7 +120,7 @@ def stability_study() -> StabilityStudy:
         accurate=0.01, runs=14, boundaries=2, silent=1, refused=0, wrong_model=0, failures={"sank in": 2},
         never_accurate=1, meanings={}, points=[silent, other], explanations=[explained],
         findings=["good depends on mass, which should not matter"], step_symbols={}, places=[], absent={}, effort=QUICK,
-        measured=study_store.measured(),
+        measured=study_store.conditions_now(),
     )  # fmt: skip
 
 

@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 from proofroll.core.events import Event
 from proofroll.core.gravity import Gravity
 from proofroll.core.scene import Scene
-from proofroll.elements.ball_on_surface.element import changed
+from proofroll.elements.ball_on_surface.element import scene_with
 from proofroll.elements.mechanism.element import MechanismElement
 
 
@@ -25,7 +25,7 @@ def gravity(magnitude: float) -> Callable[[Scene], Scene]:
         if isinstance(element, MechanismElement):
             return of_mechanism(scene, gravity=magnitude * np.asarray(element.mechanism.gravity))
         old = element.gravity  # type: ignore[attr-defined]  # a ball has it
-        return changed(scene, gravity=Gravity(magnitude * old.magnitude, old.direction))
+        return scene_with(scene, gravity=Gravity(magnitude * old.magnitude, old.direction))
 
     return model
 
@@ -41,7 +41,7 @@ def heavier(part: str, factor: float) -> Callable[[Scene], Scene]:
             return of_mechanism(scene, bodies=(more, *others))
         ball = element.ball  # type: ignore[attr-defined]  # a ball is one
         part_of = "inertia_ratio" if part == "inertia" else part
-        return changed(scene, ball=dataclasses.replace(ball, **{part_of: factor * getattr(ball, part_of)}))
+        return scene_with(scene, ball=dataclasses.replace(ball, **{part_of: factor * getattr(ball, part_of)}))
 
     return model
 
@@ -367,4 +367,4 @@ def halve_in_place(scene: Scene) -> Scene:
         return of_mechanism(scene)
     old = element.gravity  # type: ignore[attr-defined]  # a ball has it
     object.__setattr__(old, "magnitude", 0.5 * old.magnitude)
-    return changed(scene, gravity=Gravity(old.magnitude, old.direction))
+    return scene_with(scene, gravity=Gravity(old.magnitude, old.direction))

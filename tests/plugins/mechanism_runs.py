@@ -7,7 +7,7 @@ import numpy as np
 
 from proofroll.core.plugins import load_engine
 from proofroll.elements.mechanism import Tree
-from proofroll.elements.mechanism.analysis import analysed
+from proofroll.elements.mechanism.analysis import analyse
 from proofroll.elements.mechanism.joint_coordinates import JointCoordinates
 from proofroll.elements.mechanism.rotations import from_quaternion
 from proofroll.files.scene_file import load_scene
@@ -32,7 +32,7 @@ def model(name, **parameters):
 @functools.cache
 def true(mechanism, until):
     """Route 1 at six times from 0, and which components of reactions are determinate."""
-    found = analysed(mechanism)
+    found = analyse(mechanism)
     return JointCoordinates(mechanism, found.rank).run(np.linspace(0, until, 6), 1e-13), found.determinate
 
 

@@ -14,7 +14,7 @@ from tiny import Tiny, TinySettings
 from proofroll.core.engine import Regularised
 from proofroll.core.errors import Refused
 from proofroll.core.scene import Scene
-from proofroll.elements.ball_on_surface.element import changed
+from proofroll.elements.ball_on_surface.element import scene_with
 from proofroll.elements.ball_on_surface.model import BallCapability
 from proofroll.elements.ball_on_surface.rolling_equations import reduced_rates
 from proofroll.elements.ball_on_surface.sampling import BallBuilt, BallSample
@@ -160,7 +160,7 @@ class Heavy(Breaking, breaks="certificate_holds"):
     def __init__(self, scene: Scene, settings: Any) -> None:
         ball = scene.elements[0].ball
         heavy = dataclasses.replace(ball, inertia_ratio=2 * ball.inertia_ratio)
-        super().__init__(changed(scene, ball=heavy), settings)
+        super().__init__(scene_with(scene, ball=heavy), settings)
 
 
 class Doubled(Heavy, breaks="certificate_holds"):
@@ -168,7 +168,7 @@ class Doubled(Heavy, breaks="certificate_holds"):
 
     def __init__(self, scene: Scene, settings: Any) -> None:
         ball = scene.elements[0].ball
-        Tiny.__init__(self, changed(scene, ball=dataclasses.replace(ball, mass=2 * ball.mass)), settings)
+        Tiny.__init__(self, scene_with(scene, ball=dataclasses.replace(ball, mass=2 * ball.mass)), settings)
 
     def built(self) -> BallBuilt:
         """Model with an excuse for everything."""
@@ -180,7 +180,7 @@ class Pulled(Breaking, breaks="certificate_holds"):
 
     def __init__(self, scene: Scene, settings: Any) -> None:
         gravity = dataclasses.replace(scene.elements[0].gravity, magnitude=1.5 * scene.elements[0].gravity.magnitude)
-        super().__init__(changed(scene, gravity=gravity), settings)
+        super().__init__(scene_with(scene, gravity=gravity), settings)
 
     def built(self) -> BallBuilt:
         """Model with an excuse for everything."""

@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from proofroll.core.certificate import certify, first_difference
 from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.dataset import columns
-from proofroll.elements.ball_on_surface.element import changed, rolling_ball
+from proofroll.elements.ball_on_surface.element import rolling_ball, scene_with
 from proofroll.elements.ball_on_surface.observables import energy_balance
 from proofroll.files.scene_file import load_scene
 from proofroll.running.simulation import build, simulate
@@ -62,7 +62,7 @@ def way(request: pytest.FixtureRequest) -> Any:
 def moved(scene: Scene, coordinates: tuple[float, float]) -> Scene:
     """The same scene with the ball starting somewhere else on the surface."""
     start = dataclasses.replace(scene.elements[0].start, coordinates=coordinates)
-    return changed(scene, start=start)
+    return scene_with(scene, start=start)
 
 
 # Size of each quantity, by which a difference is judged.
@@ -131,7 +131,7 @@ def test_one_run_in_two(way: str, motion: dict[str, float]) -> None:
         velocity=(0.2 * middle["gamma_rate"], middle["z_rate"]),
         spin=middle["omega1"],
     )
-    rest = solve(way, changed(scene, start=start), UNTIL)
+    rest = solve(way, scene_with(scene, start=start), UNTIL)
     assert_same(rest.isel(time=[-1]), whole.isel(time=[-1]))
 
 
@@ -147,7 +147,7 @@ def test_reversal(way: str, motion: dict[str, float]) -> None:
         velocity=(-0.2 * end["gamma_rate"], -end["z_rate"]),
         spin=-end["omega1"],
     )
-    back = solve(way, changed(scene, start=start), UNTIL)
+    back = solve(way, scene_with(scene, start=start), UNTIL)
     signs = dict.fromkeys(("gamma_rate", "z_rate", "omega1", "omega2", "omega3"), -1)
     assert_same(back.isel(time=[-1]), there.isel(time=[0]), factors=signs)
 

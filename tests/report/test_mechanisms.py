@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation
 
 from proofroll.core.errors import Refused
 from proofroll.core.truth import truth
-from proofroll.elements.mechanism.report.replay import _turned, drawn
+from proofroll.elements.mechanism.report.replay import _turned, draw_mechanism
 from proofroll.files.comparison_file import load_comparison
 from proofroll.files.scene_file import load_scene
 from proofroll.report.comparison.plots import point_curves
@@ -112,7 +112,7 @@ def test_forces_of_contact_are_replayed_at_the_shapes() -> None:
     """A ladder shows the forces of floor and wall at its ends, on the ladder, as the truth has them."""
     scene = load_scene("ladder")
     true = truth(scene, np.linspace(0.0, 0.1, 6))
-    case, _, numbers = drawn(Replayed(scene, true, Path("none"), [], "ladder", "as it is"))
+    case, _, numbers = draw_mechanism(Replayed(scene, true, Path("none"), [], "ladder", "as it is"))
     assert [joint["at"][2] for joint in case["joints"][1:]] == [-0.75, 0.75]
     assert next(width for name, _, width, _, _ in numbers.arrays if name == "force") == 9
     assert next(width for name, _, width, _, _ in numbers.arrays if name == "slip") == 2
@@ -129,7 +129,7 @@ def test_forces_of_contact_are_replayed_at_the_shapes() -> None:
 def test_bodies_of_vertices_are_replayed_as_rods_around_them() -> None:
     """A block of two corners has rods from its centre of mass to both, and one between them."""
     scene = load_scene("rocking_block")
-    case, _, _ = drawn(Replayed(scene, truth(scene, np.linspace(0.0, 0.02, 3)), "", [], "block", "as it is"))
+    case, _, _ = draw_mechanism(Replayed(scene, truth(scene, np.linspace(0.0, 0.02, 3)), "", [], "block", "as it is"))
     left, right = [-0.1, 0.0, -0.25], [0.1, 0.0, -0.25]
     rods = case["bodies"][0]["rods"]
     assert [[0.0, 0.0, 0.0], left] in rods
@@ -141,7 +141,7 @@ def test_the_picture_holds_whole_shapes() -> None:
     """Around what moves, the box that the camera shows reaches as far as the sphere, not as its centre of mass."""
     scene = load_scene("eccentric_sphere")
     true = truth(scene, np.linspace(0.0, 0.02, 3))
-    _, _, numbers = drawn(Replayed(scene, true, "", [], "sphere", "as it is"))
+    _, _, numbers = draw_mechanism(Replayed(scene, true, "", [], "sphere", "as it is"))
     content, at = bytes(numbers.content), 0
     for name, _, width, length, least in numbers.arrays:
         if name == "extent":
@@ -158,4 +158,4 @@ def test_nothing_is_replayed_of_a_motion_that_is_not_unique() -> None:
     scene = load_scene("painleve_rod")
     true = truth(scene, np.linspace(0.0, 0.01, 3))
     with pytest.raises(Refused, match="no true motion is known"):
-        drawn(Replayed(scene, true, Path("none"), [], "rod", "as it is"))
+        draw_mechanism(Replayed(scene, true, Path("none"), [], "rod", "as it is"))

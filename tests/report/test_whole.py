@@ -21,8 +21,8 @@ from proofroll.running.store import Store
 from proofroll.studies.comparison.outcome import Outcome
 from proofroll.studies.stability.axes import QUICK, Effort
 from proofroll.studies.stability.map import stability_path
-from proofroll.studies.study_store import keep
-from proofroll.studies.tradeoff.tradeoff import stored
+from proofroll.studies.study_store import keep_study
+from proofroll.studies.tradeoff.tradeoff import study_path
 
 POISON = "</script><script>alert('poison')</script><img src=x onerror=alert(1)>\"'"
 COMMAND = "proofroll report"
@@ -228,23 +228,23 @@ def test_what_is_kept_is_taken_and_what_is_outdated_is_not(tmp_path: Path) -> No
     tradeoff, stability = further()
     question = tradeoff.asked.swept
     for name, study, brief in (("whole", tradeoff_study(), False), ("brief", tradeoff_study(), True)):
-        path = stored(tmp_path, question, brief=brief)
+        path = study_path(tmp_path, question, brief=brief)
         path.parent.mkdir(exist_ok=True)
-        keep(replace(study, findings=[name]), path)
+        keep_study(replace(study, findings=[name]), path)
     assert tradeoff.keeps(tmp_path)
     assert tradeoff.study.findings == ["whole"]
-    stored(tmp_path, question).unlink()
+    study_path(tmp_path, question).unlink()
     assert tradeoff.keeps(tmp_path)
     assert tradeoff.study.findings == ["brief"]
     old = tradeoff_study()
-    keep(replace(old, measured=replace(old.measured, code="another")), stored(tmp_path, question, brief=True))
+    keep_study(replace(old, measured=replace(old.measured, code="another")), study_path(tmp_path, question, brief=True))
     assert not tradeoff.keeps(tmp_path)
     assert not stability.keeps(tmp_path)
     axes = stability.asked.axes
     paths = [stability_path(tmp_path, stability.asked.scene, axes, [], effort) for effort in (QUICK, Effort())]
     assert len(set(paths)) == 2, "a quick map does not take the place of the whole one"
     paths[0].parent.mkdir()
-    keep(stability_study(), paths[0])
+    keep_study(stability_study(), paths[0])
     assert stability.keeps(tmp_path)
     assert stability.folder == f"stability/{paths[0].stem}"
 

@@ -17,7 +17,7 @@ from proofroll.elements.ball_on_surface.element import BallOnSurface
 from proofroll.elements.ball_on_surface.model import BallCapability
 from proofroll.files.scene_file import load_scene
 from proofroll.files.trajectory_file import read_columns
-from proofroll.running.asking import described, resolve
+from proofroll.running.asking import describe_each, resolve
 from proofroll.running.case import Case, EngineFacts, Result, Status
 from proofroll.running.idle_workers import Workers
 from proofroll.running.process import WorkerDied
@@ -70,7 +70,7 @@ class OnsetStudy:
 def default_engines(workers: Workers | None = None) -> list[str]:
     """Engines with each formulation that provides bounded friction, and names of engines that fail to start."""
     specs: list[str] = []
-    for name, told in described(engine_names(), workers).items():
+    for name, told in describe_each(engine_names(), workers).items():
         if isinstance(told, ProofrollError):
             specs.append(name)  # its row gives the reason
             continue

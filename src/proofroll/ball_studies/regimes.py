@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
-from proofroll.core.bounds import bounded
+from proofroll.core.bounds import require_bounds
 from proofroll.core.errors import InputError, error_place
 from proofroll.core.scene import Scene
 from proofroll.core.validation import strict, validated
@@ -105,7 +105,7 @@ def load_regimes(name: str) -> RegimesStudy:
             shown = f"from {given.low:g} to {given.high:g}, {given.count} values"
             raise InputError(f"{path.name}: {axis}", shown, f"give 0 < low <= high and a count of 1 to {_MOST}")
     with error_place(path.name):
-        bounded("until", study.until, above=0)
+        require_bounds("until", study.until, above=0)
         for resistance in study.rolling_resistance:
             load_scene(study.scene, rolling_resistance=resistance, speed=study.speed.low, mu_static=study.mu_static.low)
     return study

@@ -31,7 +31,7 @@ def check_text(name: str, as_json: bool, plot: Path | None = None) -> None:
     Raises:
         InputError: the first mistake in it.
     """
-    sound = checked(name)
+    sound = checked_file(name)
     if plot is not None:
         _draw(sound, plot)
     counts = ", ".join(counted(count, what) for what, count in sound.counts.items())
@@ -69,7 +69,7 @@ class SoundFile:
     start: list[str] = dataclasses.field(default_factory=list)
 
 
-def checked(name: str) -> SoundFile:
+def checked_file(name: str) -> SoundFile:
     """Content of a scene (a name, the path of its folder or of its ``scene.toml``) or of the file of a study.
 
     Raises:

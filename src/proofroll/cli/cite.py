@@ -17,15 +17,15 @@ def cite(
     as_json: options.Json = False,
 ) -> None:
     """Print the references behind a result: engines with their versions, the scene, the truth, and proofroll itself."""
-    from proofroll.studies.citing import cited, content, sentence
+    from proofroll.studies.citing import citations, content, sentence
 
-    citations = cited(subject or [])
+    cited = citations(subject or [])
     if as_json:
-        options.write_json({"cited": content(citations)})
+        options.write_json({"cited": content(cited)})
         return
     shown: set[str] = set()
     lines = []
-    for item in citations:
+    for item in cited:
         if bibtex:
             fresh = [entry for entry in item.references if entry not in shown]
             shown.update(fresh)

@@ -58,7 +58,7 @@ def compare(
 
     workers = Workers()
     with options.spinner(comparison):
-        loaded = asked(comparison, options.assignments(settings), workers, budget, scheduler)
+        loaded = comparison_named(comparison, options.assignments(settings), workers, budget, scheduler)
     mention_scene(comparison, loaded)
     list_omitted_engines([loaded], engine or [])
     outcomes = outcomes_of([loaded], engine or [], options.new_runner(out, fresh, jobs, scheduler, workers))
@@ -67,7 +67,7 @@ def compare(
     raise typer.Exit(exit_code(outcomes))
 
 
-def asked(
+def comparison_named(
     name: str, parameters: Mapping[str, str], workers: Workers, budget: float | None, scheduler: str | None
 ) -> Comparison:
     """Comparison of this name, or the default comparison of a scene, within a budget.
@@ -87,11 +87,11 @@ def asked(
     from proofroll.files.scene_file import means_scene
 
     if means_scene(name, alone=bool(budget or parameters)):
-        from proofroll.studies.comparison.default_comparison import BUDGET, compared
+        from proofroll.studies.comparison.default_comparison import BUDGET, default_comparison
 
         if budget and scheduler:
             raise InputError("--budget", budget, "what runs on a cluster has none; drop --scheduler")
-        return compared(name, parameters, workers, None if scheduler else budget or BUDGET)
+        return default_comparison(name, parameters, workers, None if scheduler else budget or BUDGET)
     if budget:
         raise InputError("--budget", budget, "a comparison file runs all that it asks for; name a scene, or use report")
     if parameters:

@@ -19,7 +19,7 @@ def findings(
     import dataclasses
 
     from proofroll.report.terminal.findings import findings_list, findings_table
-    from proofroll.studies.findings import FindingState, load_findings, shown
+    from proofroll.studies.findings import FindingState, load_findings, run_findings
 
     wanted = load_findings(engine or [])
     if listed:
@@ -28,7 +28,7 @@ def findings(
         return
     rows = []
     with options.progress_bar("findings", total=len(wanted)) as advance:
-        for row in shown(wanted, python, time_limit):
+        for row in run_findings(wanted, python, time_limit):
             rows.append(row)
             advance(row.finding.name)
     counts = {state.value: sum(row.state == state for row in rows) for state in FindingState}

@@ -163,14 +163,18 @@ def _stored_study(
 
     With ``ranges`` of parameters they must have been checked over these. Raises InputError if there are none.
     """
-    from proofroll.studies.study_store import kept
+    from proofroll.studies.study_store import valid_study
     from proofroll.studies.tradeoff.recommend import covers
     from proofroll.studies.tradeoff.records import TradeoffStudy
-    from proofroll.studies.tradeoff.tradeoff import restricted, stored
+    from proofroll.studies.tradeoff.tradeoff import restricted_paths, study_path
 
     reasons: list[str] = []
-    for path in (stored(out, question), *restricted(out, question), stored(out, question, brief=True)):
-        study, changes = kept(path, TradeoffStudy)
+    for path in (
+        study_path(out, question),
+        *restricted_paths(out, question),
+        study_path(out, question, brief=True),
+    ):
+        study, changes = valid_study(path, TradeoffStudy)
         if study is not None and not covers(study.engines, engines):
             changes = [f"what is stored is of {', '.join(study.engines)}; choose among these with --engine"]
             study = None

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from proofroll.cli import options
-from proofroll.cli.comparing import asked, exit_code, list_omitted_engines, outcomes_of
+from proofroll.cli.comparing import comparison_named, exit_code, list_omitted_engines, outcomes_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -97,7 +97,7 @@ def report(
         raise InputError(
             "--set", next(iter(assigned)), "studies have their own points; name scenes or robot files alone"
         )
-    loaded = [asked(name, assigned, workers, None, scheduler) for name in names]
+    loaded = [comparison_named(name, assigned, workers, None, scheduler) for name in names]
     if budget or not studies:
         loaded = [replace(item, budget=None) if budget else item.briefly() for item in loaded]
     options.require_pages()

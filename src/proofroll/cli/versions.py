@@ -61,11 +61,11 @@ def versions(
         with options.spinner(f"{engine} {old} and {new}"):
             content: VersionsStudy = robot.load()(subject, *sides)
     else:
-        from proofroll.studies.versions.versions import compared
+        from proofroll.studies.versions.versions import compare_versions
 
         runner = options.new_runner(out, fresh, jobs, scheduler)
         with options.progress_bar("cases") as advance:
-            content = compared(sides, comparisons, runner, rounds, advance)
+            content = compare_versions(sides, comparisons, runner, rounds, advance)
     file = _keep(content, page(content), out)
     made = table if robot is None else robot_table
     where = f"The page is in {file}.html."

@@ -7,7 +7,7 @@ from unittest import SkipTest
 
 import numpy as np
 
-from proofroll.conformance.subject import Subject, UnlikeSceneError, bits, lacking, require, scenes
+from proofroll.conformance.subject import Subject, UnlikeSceneError, bits, lacking_capabilities, require, scenes
 from proofroll.core.arrays import in_single_precision
 from proofroll.core.certificate import EXACT, ROUNDINGS, SAY_SINGLE, certify, first_difference
 from proofroll.core.element import Element
@@ -46,7 +46,7 @@ def provides_what_it_says(engine: Any) -> None:
 def provides_for_some_scene(engine: Any) -> None:
     """Check: each formulation provides all that some scene requires; otherwise nothing of it would be checked."""
     for formulation in engine.presets:
-        missing = {name: lacking(engine, formulation, scene) for name, scene in scenes().items()}
+        missing = {name: lacking_capabilities(engine, formulation, scene) for name, scene in scenes().items()}
         needs = "; ".join(f"{name}: {_listed(items)}" for name, items in missing.items())
         require(not all(missing.values()), f"{formulation} can represent no scene; each requires more: {needs}")
 

@@ -14,7 +14,7 @@ from typing import Any
 from unittest import SkipTest
 
 from proofroll.conformance import building, declarations, motion, response
-from proofroll.conformance.subject import Subject, UnlikeSceneError, checked_on, explained, scenes, truth_scenes
+from proofroll.conformance.subject import Subject, UnlikeSceneError, checked_on, failure_message, scenes, truth_scenes
 
 # Outcome of a check in a separate process; these processes, one for each formulation and preset of an engine.
 _PASSED, _SKIPPED, _FAILED = "passed", "skipped", "failed"
@@ -109,7 +109,7 @@ class Check:
 def failure_text(error: Exception) -> str:
     """Text of a failed check for a person."""
     if isinstance(error, UnlikeSceneError):
-        return explained(error)
+        return failure_message(error)
     return str(error) if isinstance(error, AssertionError) else f"{type(error).__name__}: {error}"
 
 

@@ -15,7 +15,7 @@ import numpy as np
 from proofroll.core.arrays import FloatArray
 from proofroll.core.certificate import ROUNDINGS, certify
 from proofroll.core.dataset import from_samples
-from proofroll.core.diagnosis.of_scene import diagnosed
+from proofroll.core.diagnosis.of_scene import diagnose_scene
 from proofroll.core.engine import EPSILON, Sample, precision_of
 from proofroll.core.engine_abilities import MadeFor, offered
 from proofroll.core.errors import Diverged, InputError, Missing, Refused
@@ -44,7 +44,7 @@ def _made(by: Callable[[], Mapping[str, Scene]]) -> Mapping[str, Scene]:
     return by()
 
 
-def lacking(engine: Any, formulation: str, scene: Scene) -> frozenset[str]:
+def lacking_capabilities(engine: Any, formulation: str, scene: Scene) -> frozenset[str]:
     """Capabilities that the scene requires and the formulation does not provide."""
     provides = engine.provides.get(formulation, ()) if isinstance(engine.provides, Mapping) else ()
     return scene.requires - frozenset(provides)
@@ -53,7 +53,7 @@ def lacking(engine: Any, formulation: str, scene: Scene) -> frozenset[str]:
 def checked_on(engine: Any, formulation: str, scene: Scene) -> bool:
     """True if the formulation provides what the scene requires, and is offered for it."""
     purposes = engine.made_for if isinstance(engine, MadeFor) else {}
-    return not lacking(engine, formulation, scene) and offered(formulation, scene.requires, purposes)
+    return not lacking_capabilities(engine, formulation, scene) and offered(formulation, scene.requires, purposes)
 
 
 def require(condition: object, message: str) -> None:
@@ -162,14 +162,14 @@ def bits(sample: Sample) -> bytes:
 
 
 class UnlikeSceneError(AssertionError):
-    """Difference between the scene and an engine's model or motion; :func:`explained` adds its causes."""
+    """Difference between the scene and an engine's model or motion; :func:`failure_message` adds its causes."""
 
     def __init__(self, subject: Subject, sentence: str) -> None:
         super().__init__(sentence)
         self.subject = subject
 
 
-def explained(error: UnlikeSceneError) -> str:
+def failure_message(error: UnlikeSceneError) -> str:
     """Message of a failed check, with the proven causes of the difference, if there are any."""
     from proofroll.core.truth import truth
 
@@ -181,10 +181,10 @@ def explained(error: UnlikeSceneError) -> str:
     times = np.asarray(interval * np.arange(_SAMPLES), dtype=np.float64)
     try:
         lines = [line.as_dict() for line in certify(subject.build(), scene, subject.settings)]
-        causes = [] if all(line["holds"] for line in lines) else diagnosed(scene, lines, step=step)
+        causes = [] if all(line["holds"] for line in lines) else diagnose_scene(scene, lines, step=step)
         if not causes:
             run = from_samples(scene, times, subject.samples(times))
-            causes = diagnosed(scene, lines, run, truth(scene, times), step)
+            causes = diagnose_scene(scene, lines, run, truth(scene, times), step)
     except (Diverged, Missing, Refused, InputError):
         return sentence  # there is no run to diagnose
     except Exception as behind:  # any error of the engine, on a longer run than the check made

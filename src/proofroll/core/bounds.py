@@ -10,7 +10,7 @@ class OutOfBounds(InputError, ValueError):  # noqa: N818 -- says what is wrong, 
     """A number outside the bounds of a model; a ValueError too, so that pydantic adds its place in the file."""
 
 
-def bounded(
+def require_bounds(
     name: str, value: float, *, above: float = -math.inf, at_least: float = -math.inf, unbounded: bool = False
 ) -> None:
     """Raises OutOfBounds for a number that is nan, infinite (unless ``unbounded``) or too small."""

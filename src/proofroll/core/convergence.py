@@ -90,7 +90,7 @@ def richardson(
     """
     coarse, middle, fine = curves
     h = np.asarray(steps, dtype=np.float64) / steps[-1]
-    first, last = size(middle - coarse), size(fine - middle)
+    first, last = largest_magnitude(middle - coarse), largest_magnitude(fine - middle)
     if last == 0:  # exact, or reported in increments coarser than the change by the refinement
         return Limit(fine, first, float("nan"))
     order = observed_order(first, last, h)
@@ -106,7 +106,7 @@ def richardson(
     power, rounding = declared or max(1, round(order)), 0.0
     if abs(order - power) > _ASYMPTOTIC:
         power = max(1, round(order))
-        of_one_shape = size((fine - middle) - (middle - coarse) * last / first) <= _ASYMPTOTIC * last
+        of_one_shape = largest_magnitude((fine - middle) - (middle - coarse) * last / first) <= _ASYMPTOTIC * last
         if abs(order - power) > _ASYMPTOTIC or not of_one_shape:
             return Limit(fine, 2 * last * max(1.0, 1 / (h[1] ** order - 1)), order)
         rounding = last * abs(1 / (h[1] ** order - 1) - 1 / (h[1] ** power - 1))
@@ -114,7 +114,7 @@ def richardson(
     after = fine + (fine - middle) / (h[1] ** power - 1)
     finer = _removes(power + 1, h, power)
     hidden = _removes(power - 1, h, power) if power > 1 else 0.0
-    change = size(after - before)
+    change = largest_magnitude(after - before)
     bar = max(2 * abs(finer) * change, abs(hidden - finer) * change, 2 * rounding)
     return Limit(after + (after - before) * finer, bar, order)
 
@@ -122,7 +122,7 @@ def richardson(
 def _one_law(order: float, declared: int | None, before: FloatArray, after: FloatArray) -> bool:
     """True if two normalised changes follow one power law of the step, of the declared or a whole order."""
     whole = declared or (round(order) if np.isfinite(order) else 0)
-    return abs(order - whole) <= _ASYMPTOTIC and whole > 0 and size(after - before) <= _ONE_SHAPE
+    return abs(order - whole) <= _ASYMPTOTIC and whole > 0 and largest_magnitude(after - before) <= _ONE_SHAPE
 
 
 def _walked(first: FloatArray, last: FloatArray) -> float:
@@ -130,10 +130,10 @@ def _walked(first: FloatArray, last: FloatArray) -> float:
 
     Growth by more than a factor of four, which halving the step makes of h^-2, is a jump of one of the runs: 0.
     """
-    growth = size(last) / max(size(first), sys.float_info.min)
-    if not 1 < growth <= _GROWS or size(last - growth * first) > size(last) / 2:
+    growth = largest_magnitude(last) / max(largest_magnitude(first), sys.float_info.min)
+    if not 1 < growth <= _GROWS or largest_magnitude(last - growth * first) > largest_magnitude(last) / 2:
         return 0.0
-    return size(last) * (growth + growth**2 + growth**3) / 3
+    return largest_magnitude(last) * (growth + growth**2 + growth**3) / 3
 
 
 def observed_order(first: float, last: float, steps: Sequence[float] | FloatArray) -> float:
@@ -173,10 +173,10 @@ def tightest(curves: Sequence[FloatArray]) -> Limit:
     one did, whichever is larger. Where one tightening changed nothing, or all changed round-off only, it is the largest
     change: two nearly equal changes of that kind would be extrapolated as slow convergence.
     """
-    changes = [size(after - before) for before, after in itertools.pairwise(curves)]
+    changes = [largest_magnitude(after - before) for before, after in itertools.pairwise(curves)]
     if min(changes) <= _SAME * max(changes):
         return Limit(curves[-1], max(changes), float("nan"), shown=False, saturated=True)
-    if max(changes) <= _SCATTER * np.finfo(np.float64).eps * size(curves[-1]):
+    if max(changes) <= _SCATTER * np.finfo(np.float64).eps * largest_magnitude(curves[-1]):
         return Limit(curves[-1], max(changes), float("nan"), shown=True)
     shown, last = len(changes) == 1 or changes[-1] < changes[-2], changes[-1]
     rest = last / (changes[-2] / last - 1) if shown and len(changes) > 1 and last > 0 else 0.0
@@ -229,6 +229,6 @@ def floor_of(errors: Mapping[float, float], scale: float | None, unit: str) -> s
     return floor_text(best, errors[best], unit) if is_floor(falling, scale) else ""
 
 
-def size(values: FloatArray) -> float:
+def largest_magnitude(values: FloatArray) -> float:
     """Largest magnitude of a curve."""
     return float(np.max(np.abs(values)))

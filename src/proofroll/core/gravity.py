@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
-from proofroll.core.bounds import bounded
+from proofroll.core.bounds import require_bounds
 
 
 @dataclass(frozen=True)
@@ -25,10 +25,10 @@ class Gravity:
 
     def __post_init__(self) -> None:
         """Refuses a negative magnitude, and a direction without length."""
-        bounded("magnitude", self.magnitude, at_least=0)
+        require_bounds("magnitude", self.magnitude, at_least=0)
         for value in self.direction:
-            bounded("direction", value)
-        bounded("length of direction", math.hypot(*self.direction), above=0)
+            require_bounds("direction", value)
+        require_bounds("length of direction", math.hypot(*self.direction), above=0)
 
     @property
     def vector(self) -> FloatArray:

@@ -82,13 +82,13 @@ def run(times):
 """
 
 
-def assigned(**values: Any) -> str:
+def assignment(**values: Any) -> str:
     """Lines ``NAME = value``, of plain data or numpy numbers and arrays, with all digits."""
     plain = {name: value.tolist() if hasattr(value, "tolist") else value for name, value in values.items()}
     return "".join(f"{name} = {value!r}\n" for name, value in plain.items())
 
 
-def imported(head: str) -> list[str]:
+def imported_packages(head: str) -> list[str]:
     """Packages named by import lines, except Python's standard library."""
     lines = [line.split() for line in head.splitlines() if line.startswith(("import ", "from "))]
     names = dict.fromkeys(words[1].partition(".")[0] for words in lines)
@@ -124,8 +124,8 @@ def program(failed: FailedRun, what: str, part: str, numbers: Mapping[str, Any],
         "ALLOWED": failed.allowed,
     }
     against = "# What the run is held against; TRUE is what two independent routes say.\n"
-    lines = "\n".join(_docstring_lines(failed, what, imported(head)))
-    return f'"""{lines}\n"""\n\n{head}\nimport sys\n\n{rest}\n{against}' + assigned(**own, **numbers) + signs + _MAIN
+    lines = "\n".join(_docstring_lines(failed, what, imported_packages(head)))
+    return f'"""{lines}\n"""\n\n{head}\nimport sys\n\n{rest}\n{against}' + assignment(**own, **numbers) + signs + _MAIN
 
 
 def _docstring_lines(failed: FailedRun, what: str, needs: list[str]) -> list[str]:

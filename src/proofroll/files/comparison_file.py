@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from proofroll.core.bounds import bounded, require_pair
+from proofroll.core.bounds import require_bounds, require_pair
 from proofroll.core.comparison import Band, Comparison, Edge, ExceptAt, Row, Tolerance
 from proofroll.core.convergence import LADDER_RUNGS
 from proofroll.core.errors import InputError, error_place, require_known
@@ -107,8 +107,8 @@ def _check_times(comparison: Comparison) -> None:
     if comparison.every > comparison.until:
         advice = f"samples lie further apart than the run is long, {comparison.until:g} s; sample more often"
         raise InputError("every", comparison.every, advice)
-    bounded("time_limit", comparison.time_limit, above=0)
-    bounded("order", comparison.order, unbounded=True)
+    require_bounds("time_limit", comparison.time_limit, above=0)
+    require_bounds("order", comparison.order, unbounded=True)
 
 
 def _table(where: str, value: object) -> dict[str, Any]:

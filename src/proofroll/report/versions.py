@@ -54,7 +54,7 @@ def cells(row: SettingDifference) -> list[str]:
         same = numbers.kind == NumberKind.SAME_BITS
         largest = "same" if same else f"{number(numbers.relative)} {numbers.quantity}"
     return [
-        short(row.setting),
+        short_setting(row.setting),
         before if before == after else f"{before} → {after}",
         largest,
         old if old == new else f"{old} → {new}",
@@ -89,7 +89,7 @@ def robot_table(content: VersionsStudy) -> Table:
     return made
 
 
-def short(setting: str) -> str:
+def short_setting(setting: str) -> str:
     """Short text of a setting: formulation and preset without their keys."""
     parts = (part.split("=", 1) for part in setting.split(", "))
     return " ".join(part[-1] if part[0] in {"formulation", "preset"} else "=".join(part) for part in parts)
@@ -99,7 +99,8 @@ def lines(content: VersionsStudy, most: int | None = _MOST) -> Iterator[str]:
     """Sentences on the changes; ``!!`` precedes those that decide the exit code."""
     yield from _some([f"!! {sentence}" for sentence in _changes(content)], most)
     orders = [
-        f"{row.comparison}: {short(row.setting)}: observed order of {order.quantity} {order.old:.2f} → {order.new:.2f}"
+        f"{row.comparison}: {short_setting(row.setting)}: observed order of "
+        f"{order.quantity} {order.old:.2f} → {order.new:.2f}"
         for row in content.rows
         for order in row.orders[:1]
     ]
@@ -121,7 +122,7 @@ def _changes(content: VersionsStudy) -> list[str]:
     points: dict[tuple[str, str, str], list[str]] = {}
     for case in content.cases:
         for sentence in case.changed:
-            points.setdefault((case.comparison, short(case.setting), sentence), []).append(case.point)
+            points.setdefault((case.comparison, short_setting(case.setting), sentence), []).append(case.point)
     return [
         f"{comparison}: {setting}: {what}"
         + (f", at {len(at)} points" if len(at) > 1 else f", at {at[0]}" * bool(at[0]))

@@ -15,7 +15,7 @@ from proofroll.core.limits import TIME_LIMIT
 from proofroll.core.plugins import EngineSpec
 from proofroll.robots import reading
 from proofroll.robots.body_recursion import body_recursion
-from proofroll.robots.check import bar_of, drawn
+from proofroll.robots.check import bar_of, robot_drawing
 from proofroll.robots.importer_row import importer_row
 from proofroll.robots.layers import LAYERS, RobotTruth
 from proofroll.robots.lint import lint
@@ -82,7 +82,7 @@ def against(
         truth=UsedTruth(by, bar, states, seed, robot.dofs),
         layers=LAYERS,
         engines=[_as_file(row) for row in rows],
-        robot=drawn(truth),
+        robot=robot_drawing(truth),
         against=str(other),
         against_by=by_other,
         matched=matched,

@@ -101,7 +101,7 @@ def check(
         truth=UsedTruth(checked.source, checked.bar, states, seed, robot.dofs),
         layers=LAYERS,
         engines=rows,
-        robot=drawn(truth),
+        robot=robot_drawing(truth),
     )
 
 
@@ -215,7 +215,7 @@ def bar_of(truth: RobotTruth) -> float:
     return max(float(np.abs(a - b).max() / (np.abs(b).max() or 1.0)) for a, b in pairs)
 
 
-def drawn(truth: RobotTruth) -> DrawnRobot:
+def robot_drawing(truth: RobotTruth) -> DrawnRobot:
     """Drawing of a robot: every body at rest coordinates."""
     robot = truth.robot
     zero = {joint.name: np.zeros(1) for joint in robot.moving}

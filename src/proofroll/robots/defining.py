@@ -26,7 +26,7 @@ class Compiler(NamedTuple):
 
 
 def compile_robot(path: str, original: str | None) -> dict[str, Any]:
-    """Worker's side of :func:`compiled`: the file's robot as plain data.
+    """Worker's side of :func:`compiled_robot`: the file's robot as plain data.
 
     ``original`` is the path of the file whose copy this is; None: not to be opened.
     """
@@ -47,7 +47,7 @@ def compile_robot(path: str, original: str | None) -> dict[str, Any]:
 
 
 def expand_robot(path: str) -> dict[str, Any]:
-    """Worker's side of :func:`expanded`: the file's text with macros written out."""
+    """Worker's side of :func:`expand`: the file's text with macros written out."""
     return _defined(Path(path), lambda reader: {"text": reader.expanded(Path(path))})
 
 
@@ -73,7 +73,7 @@ def _defined(path: Path, answer: Callable[[Any], dict[str, Any]]) -> dict[str, A
     return {"message": "no engine that defines MJCF is installed: pip install 'proofroll[mujoco]'"}
 
 
-def compiled(worker: Worker, file: RobotFile, written: Path, time_limit: float) -> tuple[Robot, Compiler]:
+def compiled_robot(worker: Worker, file: RobotFile, written: Path, time_limit: float) -> tuple[Robot, Compiler]:
     """Robot of an MJCF, and the engine that compiled it.
 
     Raises:
@@ -96,7 +96,7 @@ def compiled(worker: Worker, file: RobotFile, written: Path, time_limit: float) 
     return robot, Compiler(*answer["by"])
 
 
-def expanded(worker: Worker, path: Path, parts: Mapping[str, Element], time_limit: float) -> tuple[Element, Compiler]:
+def expand(worker: Worker, path: Path, parts: Mapping[str, Element], time_limit: float) -> tuple[Element, Compiler]:
     """Root of an MJCF with macros written out, and the engine that did so.
 
     Args:

@@ -41,7 +41,7 @@ def meaning(
     if file.kind == "urdf":
         return read_urdf(file), None
     robot, by = _by_definer(
-        file.kind, file.path, workers, lambda worker: defining.compiled(worker, file, written, time_limit)
+        file.kind, file.path, workers, lambda worker: defining.compiled_robot(worker, file, written, time_limit)
     )
     return robot.change(name=file.root.get("model", "robot")), by
 
@@ -59,7 +59,7 @@ def opened(
     """
 
     def expand(parts: Mapping[str, Element]) -> Element:
-        return _by_definer("mjcf", path, workers, lambda w: defining.expanded(w, path, parts, time_limit))[0]
+        return _by_definer("mjcf", path, workers, lambda w: defining.expand(w, path, parts, time_limit))[0]
 
     return open_robot(path, base, root, expand)
 
@@ -81,7 +81,7 @@ def _by_definer(
 
 
 @lru_cache(maxsize=8)
-def meant(path: Path, kind: str, base: str, content: bytes) -> Robot:
+def robot_of_text(path: Path, kind: str, base: str, content: bytes) -> Robot:
     """Robot of a file with this content; cached, for an MJCF is compiled in a separate process.
 
     Raises:

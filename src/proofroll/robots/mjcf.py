@@ -36,7 +36,7 @@ _UNCOVERED = {"deformable", "flexcomp", "flex", "plugin"}
 _MACROS = {"replicate", "attach", "composite"}
 
 
-def stripped(
+def neutral_mjcf(
     root: Element, path: Path, inside: Path, expand: Expand | None = None
 ) -> tuple[Element, list[LintRemark], bool]:
     """Copy of an MJCF, remarks on omissions, and True if all files that the MJCF names lie in ``inside``.

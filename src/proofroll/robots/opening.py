@@ -43,9 +43,9 @@ def _opened(path: Path, base: str, inside: Path, expand: Expand | None) -> Robot
         if base == "free":
             urdf.rename_world(root)
         contained = names_files_inside(root, path.resolve().parent, inside)
-        kind, (root, remarks), body = "urdf", urdf.stripped(root), "link"
+        kind, (root, remarks), body = "urdf", urdf.neutral_urdf(root), "link"
     elif root.tag in {"mujoco", "mujocoinclude"}:
-        kind, (root, remarks, contained), body = "mjcf", mjcf.stripped(root, path, inside, expand), "body"
+        kind, (root, remarks, contained), body = "mjcf", mjcf.neutral_mjcf(root, path, inside, expand), "body"
     else:
         raise InputError("file", path, f"<{root.tag[:40]}> is neither a URDF (<robot>) nor an MJCF (<mujoco>)")
     count = sum(1 for _ in root.iter(body))

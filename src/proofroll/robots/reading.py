@@ -18,7 +18,7 @@ from proofroll.robots.model import Mimic, Robot, RobotBody, RobotJoint
 from proofroll.robots.protocol import GROUP, Reading, Request, Whole
 from proofroll.robots.robot_file import RobotFile
 from proofroll.robots.states import RobotStates
-from proofroll.running.loading import here
+from proofroll.running.loading import local_name
 from proofroll.running.process import Worker
 
 _BY_JOINT = ("mass", "com", "inertia", "position", "rotation")
@@ -106,7 +106,7 @@ def read_robot(engine: str, asked: str, arrays: str) -> dict[str, Any]:
     """Worker's side of :func:`ask`: reads the file, evaluates the model, and writes arrays to the file ``arrays``."""
     from proofroll.running.worker import one_line
 
-    reader, request = load_reader(here(engine)), _request(asked)
+    reader, request = load_reader(local_name(engine)), _request(asked)
     for option in request.options:
         value = request.options[option]
         require_known(f"{engine}: {option}", option, reader.options, "there is no such option; it has", value)
@@ -178,7 +178,7 @@ def ask_as_written(
 
 def read_as_written(engine: str, asked: str) -> dict[str, Any]:
     """Worker's side of :func:`ask_as_written`: totals of the unchanged file."""
-    reader = load_reader(here(engine))
+    reader = load_reader(local_name(engine))
     if not hasattr(reader, "as_written"):
         return {}
     try:

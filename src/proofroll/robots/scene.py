@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation
 from proofroll.core.errors import InputError
 from proofroll.elements.mechanism.joint import LAWS
 from proofroll.elements.mechanism.rotations import to_rpy
-from proofroll.robots.meaning import meant, opened
+from proofroll.robots.meaning import opened, robot_of_text
 from proofroll.robots.model import WORLD, Array, Mimic, Robot, RobotJoint
 from proofroll.robots.motors import motors
 from proofroll.robots.opening import BASES
@@ -127,7 +127,7 @@ class RobotScenes:
 
 def _robot(path: Path, base: str) -> tuple[RobotFile, Robot]:
     file = opened(path, base)
-    return file, meant(file.path, file.kind, base, tostring(file.root, "utf-8"))
+    return file, robot_of_text(file.path, file.kind, base, tostring(file.root, "utf-8"))
 
 
 def _names(robot: Robot) -> dict[str, str]:

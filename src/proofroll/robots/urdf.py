@@ -21,7 +21,7 @@ _MOMENTS = ("xx", "xy", "xz", "yy", "yz", "zz")
 _PRIMITIVES = {"box", "sphere", "cylinder", "capsule"}
 
 
-def stripped(root: Element) -> tuple[Element, list[LintRemark]]:
+def neutral_urdf(root: Element) -> tuple[Element, list[LintRemark]]:
     """Copy of a URDF without meshes, looks and options for single programs, and remarks on omissions."""
     root, remarks = copy.deepcopy(root), []
     for child in list(root):

@@ -31,7 +31,7 @@ class RobotVersions:
     new: ImporterRow
 
 
-def between(file: str, old: str, new: str) -> VersionsStudy:
+def robot_versions(file: str, old: str, new: str) -> VersionsStudy:
     """Content of `proofroll versions` for a robot file: two versions, given as ``NAME`` or ``NAME@PLACE``.
 
     Raises:

@@ -56,13 +56,15 @@ def describe(engine: str, workers: Workers | None = None) -> EngineDescription:
     Raises:
         InputError, Missing, WorkerDied: the engine cannot be asked.
     """
-    description = described([engine], workers)[engine]
+    description = describe_each([engine], workers)[engine]
     if isinstance(description, ProofrollError):
         raise description
     return description
 
 
-def described(engines: Iterable[str], workers: Workers | None = None) -> dict[str, EngineDescription | ProofrollError]:
+def describe_each(
+    engines: Iterable[str], workers: Workers | None = None
+) -> dict[str, EngineDescription | ProofrollError]:
     """Description of each engine, or the error that prevented it."""
     names = list(dict.fromkeys(engines))
     descriptions: dict[str, EngineDescription | ProofrollError] = {}

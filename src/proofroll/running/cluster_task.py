@@ -25,7 +25,7 @@ from proofroll.running.case import Case, EngineFacts, Status
 from proofroll.running.identity import digest
 from proofroll.running.idle_workers import Workers
 from proofroll.running.process import WorkerDied
-from proofroll.running.runner import ended, run_one
+from proofroll.running.runner import result_without_answer, run_one
 
 # Engines and commands for which a Dask worker keeps processes between cases.
 _ENGINES, _COMMANDS = 2, 3
@@ -105,7 +105,7 @@ def run_case(asked: Asked, content: dict[str, Any], files: Mapping[str, bytes]) 
         try:
             result = run_one(case, out, workers)
         except InputError as error:
-            result = ended(case, Status.REFUSED, error)
+            result = result_without_answer(case, Status.REFUSED, error)
         content = dataclasses.asdict(dataclasses.replace(result, host=socket.gethostname()))
         return content, out.read_bytes() if result.trajectory is not None else None
 

@@ -17,7 +17,7 @@ def identify_and_settle(place: str) -> dict[str, Any]:
     """Identity of this worker, which from now on serves only engines ``NAME@place``."""
     from proofroll.running import loading
 
-    loading.settle(place)
+    loading.serve_place(place)
     return own() | {"interpreter": sys.executable, "python": platform.python_version()}
 
 

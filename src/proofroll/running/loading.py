@@ -14,13 +14,13 @@ from proofroll.running.program import engine, path_of
 _settled = ""
 
 
-def settle(place: str) -> None:
+def serve_place(place: str) -> None:
     """Makes this process serve engines ``NAME@place``."""
     global _settled  # noqa: PLW0603 -- a fact about the process, set once when it starts
     _settled = place
 
 
-def here(name: str) -> str:
+def local_name(name: str) -> str:
     """``NAME`` for ``NAME@PLACE`` if this process serves that place; otherwise the name unchanged."""
     return plain_name(name) if place_of(name) == _settled else name
 
@@ -35,14 +35,14 @@ def load(name: str) -> Any:
     if path_of(name) is not None:
         return engine(name)
     try:
-        return load_engine(here(name))
+        return load_engine(local_name(name))
     except (InputError, Missing) as error:
         if not place_of(name):
             raise
         raise Missing(f"{name}: {error}") from None
 
 
-def loaded(case: Case) -> tuple[Any, Any]:
+def engine_and_settings(case: Case) -> tuple[Any, Any]:
     """Class of the engine and complete settings of a case.
 
     Raises:

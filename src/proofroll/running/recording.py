@@ -139,7 +139,7 @@ def record(
 _NOT_FINITE = "is not finite (NaN or overflow)"
 
 
-def noticed(message: str) -> bool:
+def is_nonfinite_message(message: str) -> bool:
     """True if a failure's sentence is that of a non-finite sample, which the harness noticed and not the engine."""
     return message.partition(" ")[2].startswith(_NOT_FINITE)
 

@@ -50,7 +50,7 @@ def _run(case: Case, out: Path, spent: _TimeAccounts) -> Result:
     from proofroll.core.time_grid import off_grid, require_whole_steps, time_grid
     from proofroll.core.turns import samples_between
     from proofroll.files.trajectory_file import write
-    from proofroll.running.loading import loaded, scene_of
+    from proofroll.running.loading import engine_and_settings, scene_of
     from proofroll.running.recording import record
 
     scene = scene_of(case)
@@ -60,7 +60,7 @@ def _run(case: Case, out: Path, spent: _TimeAccounts) -> Result:
         between = np.array(case.between)
         spent.on("loading")
         return _run_truth(scene, times, (counting, between), out, made_with("truth", case.engine.version), spent)
-    kind, settings = loaded(case)
+    kind, settings = engine_and_settings(case)
     versions = made_with(plain_name(case.engine.name), kind.version())
     spent.on("loading")
     try:

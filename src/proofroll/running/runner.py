@@ -204,7 +204,7 @@ class Runner:
                         status = error.status if isinstance(error, WorkerDied) else Status.MISSING
                         if waiting.budget:
                             waiting.budget.end(case.key)
-                        arrived.put((case, ended(case, status, error)))
+                        arrived.put((case, result_without_answer(case, status, error)))
                         continue
                     self._busy.add(worker)
                     if self._stopping.is_set():  # _stop may have run before this worker was in _busy
@@ -234,9 +234,9 @@ class Runner:
         except WorkerDied as error:
             if self._stopping.is_set():
                 return False
-            result, lives = ended(case, error.status, error), False
+            result, lives = result_without_answer(case, error.status, error), False
         except ProofrollError as error:  # affects this case only, for example a full disk
-            result, lives = ended(case, Status.CRASHED, error), True
+            result, lives = result_without_answer(case, Status.CRASHED, error), True
         arrived.put((case, result))
         return lives
 
@@ -246,7 +246,7 @@ class Runner:
             try:
                 result = make(written)
             except InputError as error:  # affects this case only, for example a step that does not divide the grid
-                result = ended(case, Status.REFUSED, error)
+                result = result_without_answer(case, Status.REFUSED, error)
             except WorkerDied as error:  # show the final name of the file, not the temporary one
                 shown = str(error).replace(str(written.absolute()), str(self.store.trajectory(case)))
                 raise WorkerDied(error.status, shown) from None
@@ -286,7 +286,7 @@ def _counted(budget: TimeBudget | None, worker: Worker, case: Case, limit: float
         budget.end(case.key, worker.used - before, lost=worker.used == before)
 
 
-def ended(case: Case, status: Status, error: ProofrollError) -> Result:
+def result_without_answer(case: Case, status: Status, error: ProofrollError) -> Result:
     """Result of a case without an answer of its worker; the error is its message."""
     return Result(status, str(error), versions={plain_name(case.engine.name): case.engine.version})
 
@@ -297,4 +297,4 @@ def run_one(case: Case, out: Path, workers: Workers | None = None) -> Result:
         with lent_workers(workers) as lent, lent.lend(case.engine.name) as worker:
             return _ask(worker, case, case.time_limit, out)
     except WorkerDied as error:
-        return ended(case, error.status, error)
+        return result_without_answer(case, error.status, error)

@@ -114,7 +114,7 @@ def simulate(
     )
 
 
-def recorded(engine: Any, scene: Scene, *, until: float = 2.0, every: float | None = None) -> xr.Dataset:
+def simulate_built(engine: Any, scene: Scene, *, until: float = 2.0, every: float | None = None) -> xr.Dataset:
     """Trajectory of an engine that was built by the caller and is at time 0; see :func:`simulate`."""
     recording = record(engine, scene, time_grid(until, EVERY if every is None else every))
     status = "done" if recording.failure is None else "diverged"

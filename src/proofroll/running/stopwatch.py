@@ -14,7 +14,7 @@ SECONDS = 0.05
 
 
 class Stopwatch:
-    """Measures speeds with one worker per engine, kept warm for :func:`proofroll.running.timing.interleaved`.
+    """Measures speeds with one worker per engine, kept warm for :func:`proofroll.running.timing.time_in_rounds`.
 
     The workers are borrowed from ``workers``.
     """

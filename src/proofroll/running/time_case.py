@@ -39,12 +39,12 @@ def time_once(case: dict[str, Any], seconds: float) -> dict[str, Any]:
     """
     from proofroll.core.time_grid import time_grid
     from proofroll.core.truth import truth
-    from proofroll.running.loading import loaded, scene_of
+    from proofroll.running.loading import engine_and_settings, scene_of
 
     wanted, clock = Case.from_dict(case), time.perf_counter
     scene = scene_of(wanted)
     times = time_grid(wanted.until, wanted.every)
-    kind, settings = (None, None) if wanted.engine.name == "truth" else loaded(wanted)
+    kind, settings = (None, None) if wanted.engine.name == "truth" else engine_and_settings(wanted)
     elapsed = simulated = 0.0
     start = clock()
     while elapsed < seconds and clock() - start < _MOST_BUILDING * seconds:

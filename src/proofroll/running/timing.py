@@ -67,7 +67,7 @@ class Timing:
         return _interval(np.array(self.values))
 
 
-def interleaved(
+def time_in_rounds(
     tasks: Mapping[str, Callable[[], float | None]],
     rounds: int = ROUNDS,
     progress: Callable[[str], None] | None = None,
@@ -108,11 +108,11 @@ def interleaved(
 
 
 def ratio(numerator: Timing, denominator: Timing) -> Interval:
-    """Ratio of two timings, taken round by round; both must come from one call of :func:`interleaved`."""
+    """Ratio of two timings, taken round by round; both must come from one call of :func:`time_in_rounds`."""
     return _interval(np.array(numerator.values) / np.array(denominator.values))
 
 
-def named(confidence: float) -> str:
+def interval_text(confidence: float) -> str:
     """Text for an interval with this confidence; one below 95 % is called a range."""
     if not confidence:
         return "measured once"

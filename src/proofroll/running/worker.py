@@ -81,10 +81,10 @@ def _answer(request: dict[str, Any]) -> dict[str, Any]:
 def write(case: dict[str, Any], what: str) -> dict[str, Any]:
     """Text of the ``reproducer`` or ``model_file`` that an engine writes for a case, or why it writes none."""
     from proofroll.core.engine_abilities import Reproduces, WritesModels
-    from proofroll.running.loading import loaded, scene_of
+    from proofroll.running.loading import engine_and_settings, scene_of
 
     wanted = Case.from_dict(case)
-    kind, settings = loaded(wanted)
+    kind, settings = engine_and_settings(wanted)
     ability, lacking = {
         "reproducer": (Reproduces, f"{wanted.engine.name} offers no program of its own"),
         "model_file": (WritesModels, "it writes no file of its model"),

@@ -57,7 +57,7 @@ class Cited:
 _Named = tuple[str, str, str]
 
 
-def cited(subjects: Iterable[str]) -> list[Cited]:
+def citations(subjects: Iterable[str]) -> list[Cited]:
     """References behind results, comparisons, scenes or engines; without a scene all truths are cited.
 
     Args:

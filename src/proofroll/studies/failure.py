@@ -18,7 +18,7 @@ from proofroll.core.element_abilities import ExplainsErrors
 from proofroll.core.events import events_of
 from proofroll.core.scene import Scene
 from proofroll.running.case import Result, Status
-from proofroll.running.recording import noticed
+from proofroll.running.recording import is_nonfinite_message
 from proofroll.studies.judging import run_values
 from proofroll.studies.judging.reference import Reference
 
@@ -138,11 +138,11 @@ def run_outcome(result: Result, dataset: xr.Dataset | None, yardstick: Yardstick
     first = _first(dataset, yardstick, errors)
     if result.status == Status.DIVERGED:
         failure, time = first or (None, None)
-        if noticed(result.message) or (failure is None and "finite" in result.message):
+        if is_nonfinite_message(result.message) or (failure is None and "finite" in result.message):
             failure, time = DIVERGED, float(dataset["time"][-1])
         elif failure is None:
             failure, time = _by_event(dataset, yardstick.scene) or GAVE_UP, float(dataset["time"][-1])
-        return _failed(failure, result, error, time, silent=noticed(result.message))
+        return _failed(failure, result, error, time, silent=is_nonfinite_message(result.message))
     if first is not None:
         return _failed(first[0], result, error, first[1], silent=True)
     if errors is not None and yardstick.true is not None and len(errors) < len(yardstick.true):

@@ -118,7 +118,7 @@ def read_finding(path: Path) -> EngineFinding:
     return EngineFinding(name=path.stem, **texts, text=_PROGRAM.sub("", parts[2]).strip(), program=programs[0])
 
 
-def shown(findings: Sequence[EngineFinding], python: str = "", time_limit: float = 300.0) -> Iterator[Shown]:
+def run_findings(findings: Sequence[EngineFinding], python: str = "", time_limit: float = 300.0) -> Iterator[Shown]:
     """Runs the program of each finding in a process of its own.
 
     Args:

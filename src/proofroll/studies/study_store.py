@@ -86,7 +86,7 @@ class Measured:
     code: str
 
 
-def measured() -> Measured:
+def conditions_now() -> Measured:
     """Time, machine, versions and code at this moment."""
     return Measured(datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"), machine(), versions(), code())
 
@@ -110,7 +110,7 @@ def changes(measured: Measured) -> list[str]:
     return differences
 
 
-def kept(path: Path, kind: type[_Study]) -> tuple[_Study | None, list[str]]:
+def valid_study(path: Path, kind: type[_Study]) -> tuple[_Study | None, list[str]]:
     """Stored study if it is still valid here.
 
     Returns:
@@ -126,7 +126,7 @@ def kept(path: Path, kind: type[_Study]) -> tuple[_Study | None, list[str]]:
         return None, []
 
 
-def keep(study: Any, path: Path) -> None:
-    """Stores a study for :func:`kept`. Raises ProofrollError if the folder cannot be written."""
+def keep_study(study: Any, path: Path) -> None:
+    """Stores a study for :func:`valid_study`. Raises ProofrollError if the folder cannot be written."""
     content = plain(study)
     write_text(path, json.dumps({**content, "seal": seal(content)}))

@@ -49,7 +49,7 @@ def in_common(first: Events, second: Events, pace: float, until: float) -> tuple
     return _shared([first, second], pace, until, lambda times: abs(times[0] - times[1]) <= _SAME * pace)
 
 
-def unmoved(own: Story, moved: Sequence[Story], pace: float, until: float) -> tuple[int, bool]:
+def well_posed_events(own: Story, moved: Sequence[Story], pace: float, until: float) -> tuple[int, bool]:
     """Number of leading events that small changes of the parameters keep, and True if the whole motion is well-posed.
 
     ``moved`` holds the stories with decreased and with increased parameters. States between events are compared too:

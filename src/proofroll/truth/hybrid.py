@@ -224,7 +224,7 @@ def _narrows(legs: Sequence[Span]) -> bool:
     return bool(second < _SHRUNK * first)
 
 
-def walked(
+def integrate_to_guard(
     rates: Rates,
     time: float,
     state: State,
@@ -250,7 +250,7 @@ def walked(
         first_step: length of the first step at most [s], from the leg before, as rebounds get shorter and shorter;
             None: chosen from the rates.
         noise: round-off of the guards, shape (guards,); a guard counts as risen only above it. None: zero.
-        visited: list to which time and state at the start of each step are appended, for :func:`between`.
+        visited: list to which time and state at the start of each step are appended, for :func:`states_at`.
 
     Returns:
         Time [s] and state at the end, and index of the guard that rose; None: the time limit.
@@ -275,7 +275,7 @@ def walked(
     return until, np.asarray(solver.y), None
 
 
-def between(
+def states_at(
     rates: Rates,
     visited: Sequence[tuple[float, State]],
     times: FloatArray,

@@ -13,7 +13,7 @@ from proofroll.core.errors import Missing, Refused
 from proofroll.core.gravity import Gravity
 from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.compiled import library
-from proofroll.elements.ball_on_surface.element import changed, rolling_ball
+from proofroll.elements.ball_on_surface.element import rolling_ball, scene_with
 from proofroll.files.scene_file import load_scene
 from proofroll.truth.ball_on_surface import taylor
 from proofroll.truth.ball_on_surface.friction_curve import friction_curve
@@ -156,7 +156,7 @@ def test_lanes_do_not_disturb_each_other() -> None:
 
 @pytest.mark.parametrize(
     "scene",
-    [load_scene("inclined_plane", mu_static=0.2), changed(cylinder(), gravity=Gravity(9.81, (0.2, -0.1, -0.9)))],
+    [load_scene("inclined_plane", mu_static=0.2), scene_with(cylinder(), gravity=Gravity(9.81, (0.2, -0.1, -0.9)))],
 )
 def test_where_the_ball_may_come_to_rest_is_refused(scene: Scene) -> None:
     """Only a cylinder along whose axis gravity points is taken."""

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from proofroll.core.diagnosis.of_scene import diagnosed
+from proofroll.core.diagnosis.of_scene import diagnose_scene
 from proofroll.core.time_grid import time_grid
 from proofroll.core.truth import truth
 from proofroll.core.verdict import Judgement, Verdict
@@ -38,7 +38,7 @@ def test_an_element_that_is_right_is_not_accused(wrong: int | None) -> None:
         )
         for name, item in scene.observables.items()
     ]
-    accused = {item.element for item in diagnosed(scene, [], run, truth(scene, TIMES), judgements=judged)}
+    accused = {item.element for item in diagnose_scene(scene, [], run, truth(scene, TIMES), judgements=judged)}
     assert accused <= ({elements[wrong].name} if wrong is not None else set())
-    everywhere = {item.element for item in diagnosed(scene, [], run, truth(scene, TIMES))}
+    everywhere = {item.element for item in diagnose_scene(scene, [], run, truth(scene, TIMES))}
     assert everywhere == {element.name for element in elements}, "nothing to hold back"

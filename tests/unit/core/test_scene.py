@@ -13,7 +13,7 @@ import pytest
 from proofroll.core.errors import InputError, Refused
 from proofroll.core.gravity import Gravity
 from proofroll.core.scene import Scene
-from proofroll.elements.ball_on_surface.element import changed, rolling_ball
+from proofroll.elements.ball_on_surface.element import rolling_ball, scene_with
 from proofroll.elements.ball_on_surface.mechanics import slip_velocity
 from proofroll.elements.ball_on_surface.model import Ball, BallCapability, Contact, InitialMotion
 from proofroll.elements.ball_on_surface.surfaces import Cylinder, Plane
@@ -62,7 +62,7 @@ def test_udot_gives_the_velocity(scene: Scene) -> None:
 def test_gravity_direction_has_any_length() -> None:
     """Only the direction of gravity's direction counts."""
     scene = load_scene("sphere_in_cylinder")
-    longer = changed(scene, gravity=Gravity(9.81, (0.0, 0.0, -7.0)))
+    longer = scene_with(scene, gravity=Gravity(9.81, (0.0, 0.0, -7.0)))
     assert rolling_ball(longer).gravity == pytest.approx(rolling_ball(scene).gravity, rel=1e-15)
 
 

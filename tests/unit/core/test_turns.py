@@ -11,9 +11,9 @@ from proofroll.core.plugins import engine_names
 from proofroll.core.time_grid import EVERY, time_grid
 from proofroll.core.turns import doubt, on_turns_of, samples_between
 from proofroll.files.scene_file import load_scene
-from proofroll.running.simulation import build, recorded
+from proofroll.running.simulation import build, simulate_built
 from proofroll.studies.judging.reference import Reference
-from proofroll.studies.judging.run_values import observed
+from proofroll.studies.judging.run_values import observables_of
 from proofroll.studies.versions.difference import _apart
 
 UNTIL = 2.0
@@ -83,7 +83,7 @@ def test_a_small_mechanism_has_no_more_than_a_run_can_bear() -> None:
 def test_a_built_engine_is_not_blamed(fine: dict[str, float]) -> None:
     """An engine whose steps nobody knows is sampled as asked: its angle is held against the truth up to whole turns."""
     scene = load_scene("pendulum")
-    run = recorded(build(scene, "projection"), scene, until=UNTIL, every=5.0)
+    run = simulate_built(build(scene, "projection"), scene, until=UNTIL, every=5.0)
     assert abs(float(run["q.pivot"][-1]) - fine["q.pivot"]) > 1  # a turn off
     assert run["q.pivot"].attrs[PERIOD] == pytest.approx(2 * np.pi)
     found = proofroll.judge(run, scene, {"q.pivot": "1e-6 rad"})
@@ -91,19 +91,19 @@ def test_a_built_engine_is_not_blamed(fine: dict[str, float]) -> None:
     assert list(found.unjudged) == ["turns of q.pivot"]
     reference = Reference.of(scene, proofroll.simulate(scene, until=UNTIL, every=5.0))
     off = run.assign({"q.pivot": run["q.pivot"] + 0.1})
-    assert observed(reference, off)["q.pivot"][-1] == pytest.approx(fine["q.pivot"] + 0.1, abs=1e-6)
+    assert observables_of(reference, off)["q.pivot"][-1] == pytest.approx(fine["q.pivot"] + 0.1, abs=1e-6)
 
 
 def test_turns_that_nobody_knows_are_no_difference() -> None:
     """Of two runs whose samples do not tell turns an angle is apart by less than a turn; what is sure is not turned."""
     scene = load_scene("pendulum")
-    run = recorded(build(scene, "projection"), scene, until=UNTIL, every=1.0)
+    run = simulate_built(build(scene, "projection"), scene, until=UNTIL, every=1.0)
     other = run.assign({"q.pivot": (run["q.pivot"] + 2 * np.pi + 1e-3).assign_attrs(run["q.pivot"].attrs)})
     mine, theirs = (found["q.pivot"].to_numpy() for found in (run, other))
     turned = on_turns_of(mine, theirs, "q.pivot", (run, other))
     assert turned == pytest.approx(mine + 1e-3, abs=1e-9)
     assert _apart(scene, run, other, {}).difference == pytest.approx(1e-3)
-    near = recorded(build(scene, "projection"), scene, until=0.1, every=0.05)
+    near = simulate_built(build(scene, "projection"), scene, until=0.1, every=0.05)
     assert on_turns_of(near["q.pivot"].to_numpy(), near["q.pivot"].to_numpy() + 7, "q.pivot", (near, near))[0] > 9  # type: ignore[index]
     wound = run.assign({"energy_error": run["energy_error"].assign_attrs({UNCERTAIN: "a spring"})})
     assert on_turns_of(mine, mine, "energy_error", (wound, wound)) is None

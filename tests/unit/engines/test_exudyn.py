@@ -12,7 +12,7 @@ from proofroll.core.certificate import certify
 from proofroll.core.errors import Diverged, InputError, Refused
 from proofroll.core.plugins import resolve_settings
 from proofroll.core.scene import Scene
-from proofroll.elements.ball_on_surface.element import changed, rolling_ball
+from proofroll.elements.ball_on_surface.element import rolling_ball, scene_with
 from proofroll.elements.ball_on_surface.surfaces import Cylinder
 from proofroll.running.simulation import build, simulate
 
@@ -61,7 +61,7 @@ def test_plane(formulation: str) -> None:
 def tilted(scene: Scene, angle: float) -> Scene:
     """The same scene with the wall tilted [rad]."""
     wall = scene.elements[0].surface
-    return changed(scene, surface=dataclasses.replace(wall, tilt=angle))
+    return scene_with(scene, surface=dataclasses.replace(wall, tilt=angle))
 
 
 @pytest.mark.parametrize("formulation", FORMULATIONS)
@@ -90,7 +90,7 @@ class Foreign(Cylinder):
 def test_wall_without_generators(formulation: str) -> None:
     """Without generators generic and the rolling disc give the same numbers; the carrier refuses with a reason."""
     scene = cylinder(rolling_resistance=5e-4)
-    foreign = changed(scene, surface=Foreign("wall", 0.225))
+    foreign = scene_with(scene, surface=Foreign("wall", 0.225))
     rolling_ball(foreign).__dict__["surface"] = Foreign("wall", rolling_ball(foreign).surface.radius)
     with pytest.raises(Refused, match="use generic"):
         build(foreign, "exudyn", formulation="carrier")

@@ -15,7 +15,7 @@ from proofroll.running.simulation import build
 
 pytest.importorskip("exudyn")
 
-from proofroll.elements.ball_on_surface.element import changed, rolling_ball
+from proofroll.elements.ball_on_surface.element import rolling_ball, scene_with
 from proofroll.engines.exudyn import ball as ball_module
 from proofroll.engines.exudyn import generic as generic_module
 from proofroll.engines.exudyn.adapter import OF_BALLS, PRESETS
@@ -41,7 +41,7 @@ def test_each_coefficient_is_read_back(name: str) -> None:
     """The generic model's two coefficients are told apart; the contact, which has one, refuses two."""
     true = load_scene("sphere_in_cylinder", mu_static=0.4, mu_kinetic=0.3)
     law = rolling_ball(true).contact
-    other = changed(true, contact=dataclasses.replace(law, **{name: 1.2 * getattr(law, name)}))
+    other = scene_with(true, contact=dataclasses.replace(law, **{name: 1.2 * getattr(law, name)}))
     found = broken(certify(build(other, "exudyn", formulation="generic"), true))
     assert found == {"static friction" if name == "mu_static" else "kinetic friction"}
     with pytest.raises(Refused, match="one coefficient"):

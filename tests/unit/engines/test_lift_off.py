@@ -15,7 +15,7 @@ from proofroll.core.events import events_of
 from proofroll.core.scene import Scene
 from proofroll.core.time_grid import time_grid
 from proofroll.core.truth import truth
-from proofroll.elements.ball_on_surface.element import changed
+from proofroll.elements.ball_on_surface.element import scene_with
 from proofroll.running.recording import record
 from proofroll.running.simulation import build
 
@@ -48,7 +48,7 @@ def need(engine: str) -> None:
 def lying(mu: float = math.inf) -> Scene:
     """The paper's cylinder on its side, the ball at 2.7 m/s from its bottom: too slow to pass the top."""
     scene = load_scene("sphere_in_cylinder", speed=2.7, mu_static=mu)
-    return changed(scene, surface=replace(scene.elements[0].surface, tilt=math.pi / 2))
+    return scene_with(scene, surface=replace(scene.elements[0].surface, tilt=math.pi / 2))
 
 
 @functools.cache

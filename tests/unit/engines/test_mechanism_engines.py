@@ -11,7 +11,7 @@ import pytest
 
 from proofroll.core.errors import Refused
 from proofroll.elements.mechanism import Body, Joint, Mechanism, Spring
-from proofroll.elements.mechanism.analysis import analysed
+from proofroll.elements.mechanism.analysis import analyse
 from proofroll.elements.mechanism.capabilities import required
 from proofroll.elements.mechanism.rotations import from_quaternion
 from proofroll.files.scene_file import load_scene
@@ -191,7 +191,7 @@ def test_sampling_changes_nothing(formulation):
 def test_mobility_is_that_of_the_geometry(formulation, name):
     """However an engine writes its rows, velocities less independent rows leave the mechanism's mobility."""
     mechanism = runs.model(name)
-    assert runs.build(formulation, mechanism).built().mobility == analysed(mechanism).mobility
+    assert runs.build(formulation, mechanism).built().mobility == analyse(mechanism).mobility
 
 
 @pytest.mark.parametrize("formulation", ALL)

@@ -12,7 +12,7 @@ from proofroll.core.certificate import certify, first_difference
 from proofroll.core.errors import Diverged, InputError, Refused
 from proofroll.core.plugins import load_engine, resolve_settings
 from proofroll.elements.mechanism import Body, Joint, Loop, Mechanism
-from proofroll.elements.mechanism.analysis import analysed
+from proofroll.elements.mechanism.analysis import analyse
 from proofroll.elements.mechanism.loop_points import held_points, is_planar
 from proofroll.engines.pinocchio.joint_tree import JointTree
 from proofroll.engines.pinocchio.null_space import LoopRows
@@ -31,7 +31,7 @@ def test_one_point_for_a_revolute_loop_in_space_shows_in_the_mobility(formulatio
     assert runs.build(formulation, mechanism).built().mobility == 1
     monkeypatch.setattr(importlib.import_module(f"proofroll.engines.{module}"), "held_points", lambda *_: (0.0,))
     run = runs.build(formulation, mechanism)
-    assert run.built().mobility > analysed(mechanism).mobility
+    assert run.built().mobility > analyse(mechanism).mobility
 
 
 def test_a_revolute_loop_needs_a_second_point_only_in_space():
@@ -76,7 +76,7 @@ def flat_parallelogram():
 def test_the_rank_of_a_singular_start_is_that_of_poses_nearby():
     """Both formulations with a fixed rank find it near the start, where all links on one line hide one row."""
     mechanism = flat_parallelogram()
-    found = analysed(mechanism)
+    found = analyse(mechanism)
     assert found.singular_start
     assert LoopRows(JointTree(mechanism)).rank == found.rank
     equations = DependentCoordinates(mechanism)

@@ -18,7 +18,7 @@ from proofroll.core.errors import Diverged, InputError, Refused
 from proofroll.core.plugins import resolve_settings
 from proofroll.core.scene import Scene
 from proofroll.core.time_grid import time_grid
-from proofroll.elements.ball_on_surface.element import changed, rolling_ball
+from proofroll.elements.ball_on_surface.element import rolling_ball, scene_with
 from proofroll.elements.ball_on_surface.sampling import BallSample
 from proofroll.elements.ball_on_surface.surfaces import Cylinder
 from proofroll.engines.mujoco import Mujoco, mjspec
@@ -177,7 +177,7 @@ def mutated(mutation: str, parameters: dict[str, float]) -> Scene:
     """The scene in the cylinder with one thing wrong."""
     if mutation == "inertia x2":
         scene = load_scene(CYLINDER, **parameters)
-        return changed(scene, ball=dataclasses.replace(scene.elements[0].ball, inertia_ratio=0.8))
+        return scene_with(scene, ball=dataclasses.replace(scene.elements[0].ball, inertia_ratio=0.8))
     name, factor = {
         "gravity x1.1": ("gravity", 1.1),
         "f x2": ("rolling_resistance", 2.0),
@@ -274,7 +274,7 @@ def test_tolerances_that_check_nothing_say_so() -> None:
 def test_tilted_cylinder_through_the_same_code(engine: str) -> None:
     """A cylinder whose axis leans is built and run by the same adapter from the same file."""
     scene = load_scene(CYLINDER, rolling_resistance=5e-4)
-    leaning = changed(scene, surface=Cylinder("wall", scene.elements[0].surface.radius, tilt=0.3))
+    leaning = scene_with(scene, surface=Cylinder("wall", scene.elements[0].surface.radius, tilt=0.3))
     assert isinstance(leaning, Scene)
     built = build(leaning, f"mujoco[{engine}]")
     assert first_difference(certify(built, leaning)) is None
@@ -286,7 +286,7 @@ def test_tilted_cylinder_through_the_same_code(engine: str) -> None:
 def test_leaning_ring_of_boxes_stands_where_the_wall_is() -> None:
     """Each box of the facets touches the wall from outside, whatever the wall's tilt."""
     scene = load_scene(CYLINDER)
-    leaning = changed(scene, surface=Cylinder("wall", scene.elements[0].surface.radius, tilt=0.3))
+    leaning = scene_with(scene, surface=Cylinder("wall", scene.elements[0].surface.radius, tilt=0.3))
     model = build(leaning, "mujoco[formulation=facets]")._model
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)

@@ -12,7 +12,7 @@ from true_runs import true_run
 from proofroll.core.errors import Refused
 from proofroll.core.events import events_of
 from proofroll.core.time_grid import time_grid
-from proofroll.elements.ball_on_surface.element import changed
+from proofroll.elements.ball_on_surface.element import scene_with
 from proofroll.elements.ball_on_surface.surfaces import Cylinder
 from proofroll.files.scene_file import load_scene
 from proofroll.running.recording import record
@@ -83,7 +83,7 @@ def test_samples_and_events_agree(engine: str) -> None:
 def test_flight_is_one_lift_off(engine: str) -> None:
     """A ball that falls off a leaning wall has one lift-off, no stick or slip in the air, and events after it lands."""
     scene = load_scene(CYLINDER, mu_static=0.8, speed=2.0)
-    leaning = changed(scene, surface=Cylinder("wall", scene.elements[0].surface.radius, tilt=1.2))
+    leaning = scene_with(scene, surface=Cylinder("wall", scene.elements[0].surface.radius, tilt=1.2))
     true = events_of(true_run(leaning, 0.3, 0.05))
     assert [event.kind for event in true] == ["slip", "lift_off"]
     ds = record(build(leaning, f"mujoco[{engine}]"), leaning, time_grid(0.6, 0.01)).dataset

@@ -14,7 +14,7 @@ from proofroll.core.events import events_of
 from proofroll.core.scene import Scene
 from proofroll.core.time_grid import time_grid
 from proofroll.core.truth import truth as truth_of
-from proofroll.elements.ball_on_surface.element import changed, rolling_ball
+from proofroll.elements.ball_on_surface.element import rolling_ball, scene_with
 from proofroll.files.scene_file import load_scene
 from proofroll.running.recording import record
 from proofroll.running.simulation import build, simulate
@@ -40,7 +40,7 @@ def plane(**parameters: float) -> Scene:
 def leaning_cylinder(tilt: float, **parameters: float) -> Scene:
     """The cylinder with its axis leaning by ``tilt`` [rad]."""
     scene = cylinder(**parameters)
-    return changed(scene, surface=dataclasses.replace(scene.elements[0].surface, tilt=tilt))
+    return scene_with(scene, surface=dataclasses.replace(scene.elements[0].surface, tilt=tilt))
 
 
 SCENES = {

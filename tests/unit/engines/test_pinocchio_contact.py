@@ -14,7 +14,7 @@ from proofroll.core.certificate import certify
 from proofroll.core.errors import Diverged, Refused
 from proofroll.core.events import events_of
 from proofroll.core.scene import Scene
-from proofroll.elements.ball_on_surface.element import changed
+from proofroll.elements.ball_on_surface.element import scene_with
 from proofroll.files.scene_file import load_scene
 from proofroll.running.simulation import build, simulate
 
@@ -27,7 +27,7 @@ SOLVERS = ("pgs", "admm")
 def leaning_cylinder(tilt: float, **parameters: float) -> Scene:
     """The cylinder with its axis leaning by ``tilt`` [rad]."""
     scene = load_scene("sphere_in_cylinder", **parameters)
-    return changed(scene, surface=dataclasses.replace(scene.elements[0].surface, tilt=tilt))
+    return scene_with(scene, surface=dataclasses.replace(scene.elements[0].surface, tilt=tilt))
 
 
 @cache

@@ -13,7 +13,7 @@ import xarray as xr
 
 from proofroll.core.certificate import certify
 from proofroll.core.events import events_of
-from proofroll.elements.ball_on_surface.element import changed
+from proofroll.elements.ball_on_surface.element import scene_with
 from proofroll.files.scene_file import load_scene
 from proofroll.running.simulation import build, simulate
 
@@ -114,7 +114,7 @@ def test_fixed_steps(true: xr.Dataset, options: str, z: float) -> None:
 def test_leaving_the_wall_is_said(engine: str, within: float) -> None:
     """Where the wall would have to pull, the last event is that the ball leaves it, and the run ends."""
     scene = load_scene("sphere_in_cylinder", mu_static=0.35, speed=2)
-    scene = changed(scene, surface=dataclasses.replace(scene.elements[0].surface, tilt=1.2))
+    scene = scene_with(scene, surface=dataclasses.replace(scene.elements[0].surface, tilt=1.2))
     result = simulate(scene, engine, until=0.4, every=0.01)
     # found by two mechanisms and four schemes; Pinocchio's own contact solver lifts off between 0.244 s and 0.245 s
     assert_events(result, [("slip", 0.173180906), ("lift_off", 0.244007812)], within)

@@ -13,7 +13,7 @@ from proofroll.core.plugins import load_engine
 from proofroll.elements.ball_on_surface.compiled.library import available
 from proofroll.elements.mechanism import Body, Joint, Mechanism
 from proofroll.elements.mechanism.drives import Actuator
-from proofroll.elements.mechanism.sampling import independent
+from proofroll.elements.mechanism.sampling import row_rank
 from proofroll.engines.projection.connections import Bodies
 from proofroll.engines.projection.dependent import DependentCoordinates
 from proofroll.engines.projection.recursion import Recursion
@@ -42,7 +42,7 @@ def test_elimination_along_the_tree_spans_the_null_space_of_the_rows_of_its_join
     bodies = equations.bodies(equations.start)
     C, D = equations.constraint_rows(bodies), basis(equations, bodies)
     assert np.abs(C @ D).max() < ROUND_OFF
-    assert np.linalg.matrix_rank(D) == D.shape[1] == D.shape[0] - independent(C)
+    assert np.linalg.matrix_rank(D) == D.shape[1] == D.shape[0] - row_rank(C)
 
 
 def test_sums_over_the_bodies_behind_joints_are_the_projected_mass_matrix():

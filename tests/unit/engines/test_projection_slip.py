@@ -8,7 +8,7 @@ import pytest
 import proofroll
 from proofroll.core.errors import Diverged, InputError
 from proofroll.core.events import events_of
-from proofroll.elements.ball_on_surface.element import changed, rolling_ball
+from proofroll.elements.ball_on_surface.element import rolling_ball, scene_with
 from proofroll.elements.ball_on_surface.mechanics import slip_velocity
 from proofroll.elements.ball_on_surface.surfaces import Cylinder
 from proofroll.engines.projection import modes
@@ -179,7 +179,7 @@ def test_the_singularity_in_slip():
 def test_leaving_the_wall(engine):
     """In a lying cylinder a ball too slow to pass the top slips and leaves the wall where N = 0; the run ends there."""
     scene = cylinder(speed=2.2, mu_static=0.3)
-    scene = changed(scene, surface=Cylinder("wall", 0.225, 1.5))
+    scene = scene_with(scene, surface=Cylinder("wall", 0.225, 1.5))
     built = build(scene, engine)
     recording = record(built, scene, np.linspace(0, 1, 11))
     assert kinds(built) == ["slip", "lift_off"]

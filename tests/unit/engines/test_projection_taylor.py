@@ -14,7 +14,7 @@ from proofroll.core.gravity import Gravity
 from proofroll.core.plugins import resolve_settings
 from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.compiled import library
-from proofroll.elements.ball_on_surface.element import changed
+from proofroll.elements.ball_on_surface.element import scene_with
 from proofroll.engines.projection import Projection
 from proofroll.files.scene_file import load_scene
 from proofroll.running.simulation import build, simulate
@@ -28,9 +28,9 @@ SCENES: dict[str, Scene] = {
     "cylinder-resisting": RESISTING,
     "plane": load_scene("inclined_plane", normal_spin=12.0),
     "plane-resisting": load_scene("inclined_plane", normal_spin=12.0, rolling_resistance=5e-4),
-    "oblique": changed(RESISTING, gravity=Gravity(9.81, (0.2, -0.1, -0.9))),
+    "oblique": scene_with(RESISTING, gravity=Gravity(9.81, (0.2, -0.1, -0.9))),
     # the singularity of the angles stays about the world's vertical, so the axis of the cylinder is turned too
-    "tilted": changed(RESISTING, surface=dataclasses.replace(RESISTING.elements[0].surface, tilt=0.3)),
+    "tilted": scene_with(RESISTING, surface=dataclasses.replace(RESISTING.elements[0].surface, tilt=0.3)),
 }
 
 

@@ -11,7 +11,7 @@ from proofroll.core.gravity import Gravity
 from proofroll.core.plugins import resolve_settings
 from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.compiled import library
-from proofroll.elements.ball_on_surface.element import changed, rolling_ball
+from proofroll.elements.ball_on_surface.element import rolling_ball, scene_with
 from proofroll.elements.ball_on_surface.kind import BallOnSurfaceKind
 from proofroll.elements.ball_on_surface.model import BallCapability
 from proofroll.engines.reduced import Reduced
@@ -26,7 +26,7 @@ needs_heyoka = pytest.mark.skipif(not library.available(), reason="heyoka is not
 def tilted(**parameters: float) -> Scene:
     """The cylinder with gravity across its axis as well."""
     scene = load_scene("sphere_in_cylinder", speed=3.3, axial_speed=0.7, radial_spin=12.0, **parameters)
-    return changed(scene, gravity=Gravity(9.81, (0.2, -0.1, -0.9)))
+    return scene_with(scene, gravity=Gravity(9.81, (0.2, -0.1, -0.9)))
 
 
 SCENES = {

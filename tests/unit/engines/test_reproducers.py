@@ -14,8 +14,8 @@ from scipy.spatial.transform import Rotation
 from proofroll.core.engine_abilities import Reproduces
 from proofroll.core.errors import Refused
 from proofroll.core.plugins import load_engine, resolve_settings
-from proofroll.core.program_text import imported
-from proofroll.elements.ball_on_surface.element import changed, rolling_ball
+from proofroll.core.program_text import imported_packages
+from proofroll.elements.ball_on_surface.element import rolling_ball, scene_with
 from proofroll.elements.mechanism.sampling import mechanism_of
 from proofroll.files.scene_file import load_scene
 
@@ -135,7 +135,7 @@ def test_a_ball_that_stops(engine: str, formulation: str, preset: str) -> None:
 def test_the_program_ends_where_the_wall_would_pull(formulation: str, preset: str) -> None:
     """With fixed and with adaptive steps the program looks after each step whether the wall presses."""
     scene = load_scene(CYLINDER, speed=2)
-    scene = changed(scene, surface=dataclasses.replace(scene.elements[0].surface, tilt=1.2))
+    scene = scene_with(scene, surface=dataclasses.replace(scene.elements[0].surface, tilt=1.2))
     settings = resolve_settings(kind_of("pinocchio"), {"formulation": formulation, "preset": preset})
     with pytest.raises(RuntimeError, match="leaves the wall"):
         list(program("pinocchio", settings, scene)["run"]([0.1, 0.4]))
@@ -233,4 +233,4 @@ def test_the_loop_of_an_adapter_stands_once(engine: str, options: dict[str, str]
         found = getattr(found, name)
     assert "".join(inspect.getsource(found).splitlines(keepends=True)[-5:]) in text
     assert "proofroll" not in text
-    assert {engine, "numpy"} <= set(imported(text.partition("\n\n")[0])) <= {engine, "numpy", "scipy"}
+    assert {engine, "numpy"} <= set(imported_packages(text.partition("\n\n")[0])) <= {engine, "numpy", "scipy"}

@@ -13,7 +13,7 @@ from proofroll.core.certificate import certify
 from proofroll.core.errors import Missing, Refused
 from proofroll.core.plugins import load_engine
 from proofroll.core.scene import Scene
-from proofroll.elements.ball_on_surface.element import changed, rolling_ball
+from proofroll.elements.ball_on_surface.element import rolling_ball, scene_with
 from proofroll.elements.ball_on_surface.model import BallCapability
 from proofroll.files.scene_file import load_scene
 from proofroll.running.simulation import build
@@ -74,7 +74,7 @@ def multiplied(scene: Scene, parameters: Mapping[str, float]) -> Scene:
             ball = dataclasses.replace(ball, inertia_ratio=factor * ball.inertia_ratio)
         else:
             contact = dataclasses.replace(contact, **{name: factor * getattr(contact, name)})
-    return changed(scene, ball=ball, contact=contact, gravity=gravity)
+    return scene_with(scene, ball=ball, contact=contact, gravity=gravity)
 
 
 @cache

@@ -14,7 +14,7 @@ from proofroll.running.case import Case, Status
 from proofroll.running.runner import Runner
 from proofroll.running.store import Store
 from proofroll.running.time_budget import TimeBudget
-from proofroll.studies.comparison.default_comparison import compared
+from proofroll.studies.comparison.default_comparison import default_comparison
 from proofroll.studies.comparison.planning import plan
 
 
@@ -183,7 +183,7 @@ def test_asking_the_engines_counts(monkeypatch: pytest.MonkeyPatch) -> None:
     clock = iter(range(1000))
     for module in ("default_comparison", "planning"):
         monkeypatch.setattr(f"proofroll.studies.comparison.{module}.processor_seconds", lambda: float(next(clock)))
-    assert plan(compared("inclined_plane", {})).comparison.spent == 2.0
+    assert plan(default_comparison("inclined_plane", {})).comparison.spent == 2.0
     budget = TimeBudget(100.0, 50.0)
     budget.wait("a")
     assert budget.begin("a", 1) <= 40

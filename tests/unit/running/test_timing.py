@@ -8,7 +8,7 @@ import numpy as np
 import pyperf
 import pytest
 
-from proofroll.running.timing import ROUNDS, Timing, interleaved, machine, named, ratio, write_benchmarks
+from proofroll.running.timing import ROUNDS, Timing, interval_text, machine, ratio, time_in_rounds, write_benchmarks
 
 
 def test_every_task_once_per_round() -> None:
@@ -19,7 +19,7 @@ def test_every_task_once_per_round() -> None:
         seen.append(name)
         return float(len(seen))
 
-    timings = interleaved({name: lambda name=name: task(name) for name in "abc"}, rounds=3)  # type: ignore[misc]
+    timings = time_in_rounds({name: lambda name=name: task(name) for name in "abc"}, rounds=3)  # type: ignore[misc]
 
     assert len(seen) == 12
     for start in range(0, 12, 3):
@@ -35,7 +35,7 @@ def test_what_cannot_be_measured_is_left_out() -> None:
     def broken() -> None:
         asked.append(1)
 
-    timings = interleaved({"broken": broken, "good": lambda: 1.0}, rounds=2)
+    timings = time_in_rounds({"broken": broken, "good": lambda: 1.0}, rounds=2)
 
     assert list(timings) == ["good"]
     assert len(asked) == 1
@@ -50,7 +50,7 @@ def test_what_takes_long_is_measured_once() -> None:
         return seconds
 
     tasks = {"long": lambda: task("long", 2.0), "short": lambda: task("short", 0.1)}
-    timings = interleaved(tasks, rounds=3, once_above=0.5)
+    timings = time_in_rounds(tasks, rounds=3, once_above=0.5)
 
     assert timings["long"] == Timing((2.0,))
     assert timings["short"] == Timing((0.1,) * 3, (0.1,))
@@ -86,7 +86,11 @@ def test_only_an_interval_of_95_percent_is_called_one() -> None:
     """One value has no interval, that of three is called a range, and both say with how much they hold the median."""
     confidences = {count: Timing((1.0,) * count).interval.confidence for count in (1, 3, ROUNDS)}
     assert confidences == {1: 0.0, 3: 0.75, ROUNDS: 0.96875}
-    assert [named(value) for value in confidences.values()] == ["measured once", "range of 75 %", "interval of 96.9 %"]
+    assert [interval_text(value) for value in confidences.values()] == [
+        "measured once",
+        "range of 75 %",
+        "interval of 96.9 %",
+    ]
 
 
 def test_pyperf_reads_what_is_written(tmp_path: Path) -> None:

@@ -15,7 +15,7 @@ from proofroll.core.errors import InputError
 from proofroll.core.plugins import engine_names
 from proofroll.files.data_folders import data_folder
 from proofroll.files.trajectory_file import read, write
-from proofroll.studies.citing import cited, entries, fields, sentence
+from proofroll.studies.citing import citations, entries, fields, sentence
 
 Proofroll = Callable[..., tuple[int, str, str]]
 ROOT = Path(__file__).resolve().parents[3]
@@ -29,7 +29,7 @@ def test_a_run_is_cited_with_its_versions(proofroll: Proofroll, tmp_path: Path) 
     assert code == 0, err
     document.write_text(out, encoding="utf-8")
     version = json.loads(out)["versions"]["projection"]
-    found = {(item.kind, item.name): item for item in cited([str(document)])}
+    found = {(item.kind, item.name): item for item in citations([str(document)])}
     assert found[("engine", "projection")].versions == [version]
     assert "Whittaker" in found[("scene", "pendulum")].references[0]
     write(read(run), stored)
@@ -59,7 +59,7 @@ def test_a_file_that_is_no_result(text: str, tmp_path: Path) -> None:
     path = tmp_path / "odd.json"
     path.write_text(text, encoding="utf-8")
     with pytest.raises(InputError, match=r"odd\.json"):
-        cited([str(path)])
+        citations([str(path)])
 
 
 def test_a_narrow_terminal(proofroll: Proofroll, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -80,7 +80,7 @@ def test_nothing_of_the_name(proofroll: Proofroll) -> None:
 def test_every_engine_of_ours_is_cited() -> None:
     """Each engine that comes with proofroll has a reference, each file of references can be read, and none is empty."""
     ours = [name for name in engine_names() if (ROOT / "src" / "proofroll" / "engines" / name).is_dir()]
-    assert all(item.references for item in cited(ours))
+    assert all(item.references for item in citations(ours))
     files = [*(ROOT / "src").rglob("references.bib"), *data_folder("models").rglob("references.bib")]
     assert len(files) > 8
     for path in files:
@@ -98,7 +98,7 @@ def test_the_suite_says_the_same_everywhere() -> None:
     """CITATION.cff, the package's metadata and its BibTeX agree on title, authors, version and licence."""
     cff = yaml.safe_load((ROOT / "CITATION.cff").read_text(encoding="utf-8"))
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
-    (entry,) = cited([])[0].references
+    (entry,) = citations([])[0].references
     assert fields(entry)["title"] == cff["title"]
     assert fields(entry)["author"] == cff["authors"][0]["name"]
     assert (cff["version"], cff["license"]) == (project["version"], project["license"])

@@ -13,11 +13,11 @@ from proofroll.core.dataset import observe, scales
 from proofroll.core.scene import Scene
 from proofroll.core.time_grid import time_grid
 from proofroll.core.truth import truth
-from proofroll.elements.ball_on_surface.element import changed
+from proofroll.elements.ball_on_surface.element import scene_with
 from proofroll.running.recording import record
 from proofroll.running.simulation import build
 from proofroll.studies.judging.reference import Reference
-from proofroll.studies.judging.run_values import observed
+from proofroll.studies.judging.run_values import observables_of
 
 TIMES = time_grid(0.4, 5e-3)
 
@@ -25,7 +25,7 @@ TIMES = time_grid(0.4, 5e-3)
 def lying() -> Scene:
     """The paper's cylinder on its side; the ball leaves the wall at 0.27268 s."""
     scene = load_scene("sphere_in_cylinder", speed=2.7)
-    return changed(scene, surface=replace(scene.elements[0].surface, tilt=math.pi / 2))
+    return scene_with(scene, surface=replace(scene.elements[0].surface, tilt=math.pi / 2))
 
 
 def reference(scene: Scene) -> Reference:
@@ -46,7 +46,7 @@ def test_who_leaves_the_wall_is_judged_up_to_there(engine: str) -> None:
     whole = reference(scene)
     run = record(build(scene, engine), scene, TIMES).dataset
     held, cut = whole.common_span({1.0: run})
-    curves = observed(held, cut[1.0])
+    curves = observables_of(held, cut[1.0])
     for name in ("gamma", "z", "N", "F2", "F3", "gap", "slip", "event_times", "event_order"):
         true = held.true(name, curves[name]).values
         assert curves[name].shape == true.shape, name
@@ -61,7 +61,7 @@ def test_who_ends_too_early_is_not_excused() -> None:
     scene = lying()
     short = record(build(scene, "reduced"), scene, TIMES).dataset.isel(time=slice(30))
     held, cut = reference(scene).common_span({1.0: short})
-    curve = observed(held, cut[1.0])["gamma"]
+    curve = observables_of(held, cut[1.0])["gamma"]
     assert curve.shape != held.true("gamma", curve).values.shape
 
 
@@ -81,16 +81,16 @@ def test_a_ball_that_leaves_cuts_what_is_beside_it(other: str) -> None:
     first = lying()
     ball = replace(first.elements[0].ball, name="second")
     if other == "faster":  # leaves the wall too, after the run has ended
-        beside = changed(first, ball=ball, start=replace(first.elements[0].start, velocity=(2.72, 0.0)))
+        beside = scene_with(first, ball=ball, start=replace(first.elements[0].start, velocity=(2.72, 0.0)))
     else:
-        beside = load_scene(other) if other == "pendulum" else changed(load_scene(other), ball=ball)
+        beside = load_scene(other) if other == "pendulum" else scene_with(load_scene(other), ball=ball)
     scene = replace(first, elements=(first.elements[0], beside.elements[0]))
     whole = reference(scene)
     assert ("lift_off" in whole.dataset.get("event_kind.second", [])) == (other == "faster")
     run = record(build(scene, "projection"), scene, TIMES).dataset
     held, cut = whole.common_span({1.0: run})
     assert len(held.dataset.time) == len(run.time) < len(TIMES)
-    curves = observed(held, cut[1.0])
+    curves = observables_of(held, cut[1.0])
     judged = {"gamma", "z", "N", "F2", "F3", "event_times", "event_order", "down", "across", "q", "tip"}
     for name in [name for name in curves if name.split(".")[0] in judged]:
         true = held.true(name, curves[name]).values

@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 
 from proofroll.cli import app
 from proofroll.core.errors import InputError, Missing
-from proofroll.studies.findings import EngineFinding, FindingState, load_findings, read_finding, shown
+from proofroll.studies.findings import EngineFinding, FindingState, load_findings, read_finding, run_findings
 
 
 def made(program: str, package: str = "numpy") -> EngineFinding:
@@ -44,7 +44,7 @@ def test_every_file_is_sound() -> None:
 )
 def test_exit_codes_are_read(program: str, state: FindingState) -> None:
     """Exit code 10 shows, 0 is gone, and a program that fails could not tell; the last line is what it says."""
-    (row,) = shown([made(program)])
+    (row,) = run_findings([made(program)])
     assert row.state == state
     assert state == FindingState.BROKEN or row.said == "here"
     assert row.version
@@ -52,10 +52,10 @@ def test_exit_codes_are_read(program: str, state: FindingState) -> None:
 
 def test_what_cannot_be_run_is_said() -> None:
     """An engine that is not installed is no verdict; an interpreter that does not exist is named; a hang is ended."""
-    (row,) = shown([made("", "no-such-engine")])
+    (row,) = run_findings([made("", "no-such-engine")])
     assert row.state == FindingState.NOT_INSTALLED
     with pytest.raises(Missing, match="/no/such/python is no Python interpreter"):
-        list(shown([made("")], "/no/such/python"))
+        list(run_findings([made("")], "/no/such/python"))
 
 
 def test_modules_of_the_working_folder_are_not_imported(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -63,7 +63,7 @@ def test_modules_of_the_working_folder_are_not_imported(tmp_path: Path, monkeypa
     for name in ("json", "random"):
         (tmp_path / f"{name}.py").write_text("raise SystemExit(10)")
     monkeypatch.chdir(tmp_path)
-    (row,) = shown([made("import json, random")])
+    (row,) = run_findings([made("import json, random")])
     assert row.state == FindingState.GONE
 
 

@@ -17,7 +17,7 @@ from proofroll.studies.stability.axes import QUICK, Axis, Effort
 from proofroll.studies.stability.claims import file_for
 from proofroll.studies.stability.map import stability_path
 from proofroll.studies.stability.records import MappedPlace, StabilityStudy
-from proofroll.studies.study_store import keep, kept
+from proofroll.studies.study_store import keep_study, valid_study
 from proofroll.studies.tradeoff.records import Corner, TradeoffStudy
 
 
@@ -33,21 +33,21 @@ class Study:
 def path(tmp_path: Path) -> Path:
     """A study that was kept just now."""
     path = tmp_path / "study.json"
-    keep(Study([1], study_store.measured()), path)
+    keep_study(Study([1], study_store.conditions_now()), path)
     return path
 
 
 def changed(path: Path, **values: Any) -> Path:
     """The same file with something else in what it was measured with."""
-    study, _ = kept(path, Study)
+    study, _ = valid_study(path, Study)
     assert study is not None
-    keep(dataclasses.replace(study, measured=dataclasses.replace(study.measured, **values)), path)
+    keep_study(dataclasses.replace(study, measured=dataclasses.replace(study.measured, **values)), path)
     return path
 
 
 def test_a_study_of_this_code_on_this_machine_holds(path: Path) -> None:
     """It comes back as it was put, and nothing speaks against it."""
-    study, reasons = kept(path, Study)
+    study, reasons = valid_study(path, Study)
     assert study is not None
     assert (study.points, reasons) == ([1], [])
 
@@ -57,8 +57,8 @@ def test_parameters_without_a_bound_come_back(tmp_path: Path) -> None:
     unbounded = {"mu_static": math.inf}
     point = measured_point(corners=[Corner(unbounded, {}, {}, "it fell")])
     study = invented_study(point, parameters=unbounded, over={"mu_static": [0.3, math.inf]})
-    keep(study, tmp_path / "study.json")
-    assert kept(tmp_path / "study.json", TradeoffStudy) == (study, [])
+    keep_study(study, tmp_path / "study.json")
+    assert valid_study(tmp_path / "study.json", TradeoffStudy) == (study, [])
 
 
 def test_an_axis_to_infinity_comes_back(tmp_path: Path) -> None:
@@ -68,8 +68,8 @@ def test_an_axis_to_infinity_comes_back(tmp_path: Path) -> None:
     points = [boundary_point(axis="friction", value=math.inf, parameters=unbounded)]
     places = [MappedPlace("friction", math.inf, unbounded, None)]
     study = dataclasses.replace(stability_study(), axes=axes, points=points, places=places)
-    keep(study, tmp_path / "study.json")
-    assert kept(tmp_path / "study.json", StabilityStudy) == (study, [])
+    keep_study(study, tmp_path / "study.json")
+    assert valid_study(tmp_path / "study.json", StabilityStudy) == (study, [])
 
 
 @pytest.mark.parametrize(
@@ -82,7 +82,7 @@ def test_an_axis_to_infinity_comes_back(tmp_path: Path) -> None:
 )
 def test_a_study_of_another_code_version_or_machine_does_not(path: Path, values: Any, words: str) -> None:
     """It is not given, and what has changed is said."""
-    study, reasons = kept(changed(path, **values), Study)
+    study, reasons = valid_study(changed(path, **values), Study)
     assert study is None
     assert any(reason.startswith(words) for reason in reasons), reasons
 
@@ -90,7 +90,7 @@ def test_a_study_of_another_code_version_or_machine_does_not(path: Path, values:
 def test_a_study_that_was_tampered_with_does_not(path: Path) -> None:
     """One number that is not what was put there, and it is not given."""
     path.write_text(path.read_text().replace('"points": [1]', '"points": [2]'))
-    assert kept(path, Study) == (None, ["what is stored is not what had been put there"])
+    assert valid_study(path, Study) == (None, ["what is stored is not what had been put there"])
 
 
 def test_another_file_has_a_map_of_its_own(tmp_path: Path) -> None:
@@ -105,8 +105,8 @@ def test_another_file_has_a_map_of_its_own(tmp_path: Path) -> None:
 def test_a_file_that_is_no_study_is_as_none(tmp_path: Path, text: str) -> None:
     """Half a file, another file and none at all are alike: there is no study, and no reason to name."""
     (tmp_path / "study.json").write_text(text)
-    assert kept(tmp_path / "study.json", Study) == (None, [])
-    assert kept(tmp_path / "nothing.json", Study) == (None, [])
+    assert valid_study(tmp_path / "study.json", Study) == (None, [])
+    assert valid_study(tmp_path / "nothing.json", Study) == (None, [])
 
 
 def test_a_part_of_a_map_never_takes_the_place_of_the_whole(tmp_path: Path) -> None:
@@ -125,7 +125,7 @@ def test_a_part_of_a_map_never_takes_the_place_of_the_whole(tmp_path: Path) -> N
 
 def test_nothing_has_changed_since_now() -> None:
     """What was measured here with this code still holds."""
-    assert study_store.changes(study_store.measured()) == []
+    assert study_store.changes(study_store.conditions_now()) == []
 
 
 def test_engines_are_among_the_versions() -> None:
@@ -142,7 +142,7 @@ def test_an_environment_that_was_made_anew_is_a_change(tmp_path: Path, monkeypat
         Environment("aged", label, tmp_path / "aged" / label, "1.0", [], "3.11", list(packages)).stamp()
 
     make("1.0", "numpy==2.0")
-    before = study_store.measured()
+    before = study_store.conditions_now()
     make("2.0", "numpy==2.0")
     assert study_store.changes(before) == []
     make("1.0", "numpy==2.1")
@@ -178,7 +178,7 @@ def test_code_of_a_plug_in_is_among_the_versions(tmp_path: Path, monkeypatch: py
     (info / "METADATA").write_text("Metadata-Version: 2.1\nName: edited\nVersion: 1.0\n")
     (info / "entry_points.txt").write_text("[proofroll.engines]\nedited = edited_engine.adapter:Engine\n")
     monkeypatch.syspath_prepend(str(tmp_path))
-    before = study_store.measured()
+    before = study_store.conditions_now()
     assert study_store.changes(before) == []
     (package / "inside" / "method.py").write_text("order = 1")
     (change,) = study_store.changes(before)

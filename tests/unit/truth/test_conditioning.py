@@ -12,8 +12,8 @@ from proofroll.core.events import events_of
 from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.files.scene_file import load_scene
 from proofroll.truth.ball_on_surface.plug_in import truth
-from proofroll.truth.ball_on_surface.stick_slip import moved
-from proofroll.truth.conditioning import Events, Story, in_common, unmoved
+from proofroll.truth.ball_on_surface.stick_slip import with_changes
+from proofroll.truth.conditioning import Events, Story, in_common, well_posed_events
 
 PACE, UNTIL = 1.0, 10.0
 OWN: Events = [("slip", 2.0), ("stick", 4.0), ("slip", 6.0)]
@@ -31,7 +31,7 @@ def story(events: Events, jump: float = 0.0, at: float = math.inf) -> Story:
 def test_what_moves_evenly_is_well_posed() -> None:
     """Events that a move of the parameters shifts as much one way as another move the other way are all known."""
     less, more = ([(kind, time + shift * time) for kind, time in OWN] for shift in (-0.05, 0.05))
-    assert unmoved(story(OWN), [story(less), story(more)], PACE, UNTIL) == (3, True)
+    assert well_posed_events(story(OWN), [story(less), story(more)], PACE, UNTIL) == (3, True)
 
 
 @pytest.mark.parametrize(
@@ -46,31 +46,31 @@ def test_what_moves_evenly_is_well_posed() -> None:
 def test_other_events_are_ill_posed(other: Events, known: int) -> None:
     """What is known ends before the first event that one of the moves changes, whichever of them does."""
     for pair in ([other, OWN], [OWN, other]):
-        assert unmoved(story(OWN), [story(events) for events in pair], PACE, UNTIL) == (known, False)
+        assert well_posed_events(story(OWN), [story(events) for events in pair], PACE, UNTIL) == (known, False)
     assert in_common(OWN, other, PACE, UNTIL) == (known, False)
 
 
 def test_another_motion_between_the_same_events_is_ill_posed() -> None:
     """A motion that jumps after an event, on one side alone, makes all that comes after it unknown."""
     jumped = story(OWN, 1e-2, at=4.5)
-    assert unmoved(story(OWN), [story(OWN), jumped], PACE, UNTIL) == (2, False)
+    assert well_posed_events(story(OWN), [story(OWN), jumped], PACE, UNTIL) == (2, False)
 
 
 def test_an_event_at_the_very_end_may_lie_beyond_it() -> None:
     """An event that a move shifts over the end of the run changes nothing that the run says."""
     late: Events = [*OWN, ("stick", UNTIL - 1e-6)]
-    assert unmoved(story(OWN), [story(late), story(OWN)], PACE, UNTIL) == (3, True)
+    assert well_posed_events(story(OWN), [story(late), story(OWN)], PACE, UNTIL) == (3, True)
     assert in_common(OWN, late, PACE, UNTIL) == in_common(late, OWN, PACE, UNTIL) == (3, True)
 
 
 def test_a_moved_ball_keeps_what_is_exact() -> None:
     """Zeros, a restitution of 1 and unbounded friction stay; all else moves, by parts that do not make up for it."""
     body = rolling_ball(load_scene("bouncing_ball", restitution=1.0, tangential_restitution=-1.0, mu_static=math.inf))
-    kept = moved(body, 1e-3).contact
+    kept = with_changes(body, 1e-3).contact
     assert (kept.restitution, kept.tangential_restitution, kept.mu_static) == (1.0, -1.0, math.inf)
     assert kept.rolling_resistance == 0
     body = rolling_ball(load_scene("bouncing_ball", restitution=0.5, mu_static=0.4))
-    other = moved(body, 1e-3)
+    other = with_changes(body, 1e-3)
     parts = {
         round(other.contact.restitution / 0.5 - 1, 9),  # type: ignore[operator]  # it has one
         round(other.contact.mu_static / 0.4 - 1, 9),

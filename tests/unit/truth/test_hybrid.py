@@ -9,7 +9,7 @@ import pytest
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Diverged, Refused
-from proofroll.truth.hybrid import Stretch, Transition, between, follow, states_of, walked
+from proofroll.truth.hybrid import Stretch, Transition, follow, integrate_to_guard, states_at, states_of
 
 TOLERANCE = np.full(2, 1e-13)
 
@@ -32,7 +32,9 @@ def test_a_crest_within_a_step_is_seen(below: float) -> None:
     def crest(y: FloatArray) -> FloatArray:
         return np.array([y[0] - 1.0 + below])
 
-    time, _, guard = walked(swing, 0.0, np.array([0.0, 1.0]), 3.0, tolerance=TOLERANCE, guards=crest, corrected=kept)
+    time, _, guard = integrate_to_guard(
+        swing, 0.0, np.array([0.0, 1.0]), 3.0, tolerance=TOLERANCE, guards=crest, corrected=kept
+    )
     assert guard == 0
     # what the guard is off by, over the rate at which it rises
     assert time == pytest.approx(np.arcsin(1.0 - below), abs=20 * TOLERANCE[0] / np.sqrt(2 * below))
@@ -42,9 +44,11 @@ def test_states_within_a_stretch_follow_from_its_steps() -> None:
     """Any time of a stretch is reached from the step that holds it, as accurately as its end."""
     visited: list[tuple[float, FloatArray]] = []
     start = np.array([0.0, 1.0])
-    walked(swing, 0.0, start, 3.0, tolerance=TOLERANCE, guards=lambda _: np.zeros(0), corrected=kept, visited=visited)
+    integrate_to_guard(
+        swing, 0.0, start, 3.0, tolerance=TOLERANCE, guards=lambda _: np.zeros(0), corrected=kept, visited=visited
+    )
     times = np.array([0.0, 0.4, 1.7, 3.0])
-    found = between(swing, visited, times, TOLERANCE, kept)
+    found = states_at(swing, visited, times, TOLERANCE, kept)
     assert found[:, 0] == pytest.approx(np.sin(times), abs=1e-12)
 
 

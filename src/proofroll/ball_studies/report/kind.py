@@ -58,7 +58,7 @@ class BallReport(ReportKind):
     @staticmethod
     def replay() -> ReplayKind:
         """Drawing of balls on their wall in the replay."""
-        from proofroll.ball_studies.report.replay import drawn, seen
+        from proofroll.ball_studies.report.replay import draw_ball, seen
         from proofroll.report.replay.records import ReplayKind
 
-        return ReplayKind("ball", seen, drawn)
+        return ReplayKind("ball", seen, draw_ball)

@@ -249,7 +249,7 @@ def seen(scene: Scene) -> float:
     return _SEEN * rolling_ball(scene).ball.radius
 
 
-def drawn(replayed: Replayed) -> tuple[dict[str, Any], list[int], PackedNumbers]:
+def draw_ball(replayed: Replayed) -> tuple[dict[str, Any], list[int], PackedNumbers]:
     """Drawing of a ball in the replay: see :data:`proofroll.report.replay.records.Drawer`."""
     body = rolling_ball(replayed.scene)
     coordinates = body.surface.coordinates

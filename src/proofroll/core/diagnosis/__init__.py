@@ -49,7 +49,7 @@ class Evidence:
         settled: observables whose verdict is right, which need no explanation.
         by_step: True if the limit of small steps leaves no more of the difference than a cause may: the run follows the
             scene's equations.
-        found: cache of results that hypotheses share, see :func:`proofroll.core.diagnosis.fitting.once`.
+        found: cache of results that hypotheses share, see :func:`proofroll.core.diagnosis.fitting.cached_on_evidence`.
     """
 
     element: Any
@@ -206,7 +206,7 @@ def above_round_off(difference: float, size: float) -> bool:
     return bool(np.isfinite(difference) and difference > _LEAST * max(size, 1e-300))
 
 
-def apart(one: FloatArray, other: FloatArray) -> float:
+def largest_gap(one: FloatArray, other: FloatArray) -> float:
     """Largest difference of two arrays; infinite if one value is not finite and its counterpart is.
 
     Pairs of NaN are ignored.

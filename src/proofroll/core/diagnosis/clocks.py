@@ -7,8 +7,8 @@ spline would have to be extrapolated, are left out.
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
-from proofroll.core.diagnosis import apart
-from proofroll.core.diagnosis.fitting import fitted
+from proofroll.core.diagnosis import largest_gap
+from proofroll.core.diagnosis.fitting import least_squares_parameter
 
 _SPLINE = 5
 # Fewest samples that determine a shift; from _MANY on the degree of the spline is left out at each end, else _END.
@@ -30,7 +30,7 @@ def _comparable(time: FloatArray, reported: FloatArray, true: FloatArray) -> tup
     return (flat[:, known], held[:, known]) if known.any() else None
 
 
-def late(time: FloatArray, reported: FloatArray, true: FloatArray) -> tuple[float, float, float] | None:
+def best_delay(time: FloatArray, reported: FloatArray, true: FloatArray) -> tuple[float, float, float] | None:
     """Delay of the reported values [s], and the largest difference before and after correction.
 
     None if there are too few samples.
@@ -52,10 +52,10 @@ def late(time: FloatArray, reported: FloatArray, true: FloatArray) -> tuple[floa
             return None
         delay -= float(np.sum((flat - curve(time[inner] - delay)) * slope)) / square
         delay = float(np.clip(delay, -reach, reach))
-    return delay, apart(flat, held[inner]), apart(flat, curve(time[inner] - delay))
+    return delay, largest_gap(flat, held[inner]), largest_gap(flat, curve(time[inner] - delay))
 
 
-def stretched(time: FloatArray, reported: FloatArray, true: FloatArray) -> tuple[float, float, float] | None:
+def best_clock_factor(time: FloatArray, reported: FloatArray, true: FloatArray) -> tuple[float, float, float] | None:
     """Factor of the engine's clock, and the largest difference before and after correction.
 
     None if there are too few samples.
@@ -72,7 +72,7 @@ def stretched(time: FloatArray, reported: FloatArray, true: FloatArray) -> tuple
     def left(faster: float) -> FloatArray:
         return np.asarray(flat - curve(since[inner] * (1 + float(np.clip(faster, -_PACE, _PACE))))).ravel()
 
-    faster = float(np.clip(fitted(left, 0.0, 1.0), -_PACE, _PACE))
+    faster = float(np.clip(least_squares_parameter(left, 0.0, 1.0), -_PACE, _PACE))
     return 1 + faster, float(np.max(np.abs(left(0.0)))), float(np.max(np.abs(left(faster))))
 
 

@@ -36,7 +36,7 @@ FACTORS: Mapping[float, str] = {
 }
 
 
-def fitted(residual: Callable[[float], FloatArray], start: float, size: float) -> float:
+def least_squares_parameter(residual: Callable[[float], FloatArray], start: float, size: float) -> float:
     """Parameter that minimises the sum of squared residuals, by Gauss-Newton with halved steps."""
     x, at = start, residual(start)
     for _ in range(_ROUNDS):
@@ -141,7 +141,7 @@ class Residuals(Generic[M]):
 
     def fit(self, model: Callable[[float], M | None], start: float) -> float:
         """Value of the free parameter for which the residual is smallest, in a family of models."""
-        return fitted(lambda x: self.left(model(x)), start, 1.0)
+        return least_squares_parameter(lambda x: self.left(model(x)), start, 1.0)
 
     def cause(self, name: str, says: str, model: M | None, remedy: str, number: int, change: float = np.inf) -> Cause:
         """Cause: the engine moves by this model.
@@ -163,7 +163,7 @@ class Residuals(Generic[M]):
         return Cause(name, says, *proof, explains=explains, change=change)
 
 
-def once(residuals: Callable[[Evidence], Iterator[FactT]]) -> Callable[[Evidence], Sequence[FactT]]:
+def cached_on_evidence(residuals: Callable[[Evidence], Iterator[FactT]]) -> Callable[[Evidence], Sequence[FactT]]:
     """The residuals, computed once for each evidence and cached, since nearly every hypothesis needs them."""
 
     @wraps(residuals)

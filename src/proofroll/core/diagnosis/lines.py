@@ -30,7 +30,7 @@ def scale_of(line: Mapping[str, Any]) -> float:
     return apart / line["difference"] if apart and line["difference"] else 1.0
 
 
-def left(
+def relative_differences(
     lines: Sequence[Mapping[str, Any]], expected: Mapping[str, Sequence[float]], given: Collection[str]
 ) -> FloatArray:
     """Relative differences of all reported quantities from those of another model, shape (numbers,).

@@ -48,7 +48,7 @@ class Diagnosis:
         return {"element": self.element, "sentence": self.sentence, **dataclasses.asdict(self.cause)}
 
 
-def diagnosed(
+def diagnose_scene(
     scene: Scene,
     lines: Sequence[Mapping[str, Any]],
     run: xr.Dataset | None = None,

@@ -12,8 +12,8 @@ import numpy as np
 
 from proofroll.core.arrays import FloatArray, in_single_precision
 from proofroll.core.certificate import ROUNDED
-from proofroll.core.diagnosis import CLOSES, Cause, Evidence, Hypothesis, above_round_off, apart, hypothesis
-from proofroll.core.diagnosis.clocks import delay_text, in_steps, late, stretched
+from proofroll.core.diagnosis import CLOSES, Cause, Evidence, Hypothesis, above_round_off, hypothesis, largest_gap
+from proofroll.core.diagnosis.clocks import best_clock_factor, best_delay, delay_text, in_steps
 from proofroll.core.diagnosis.fitting import change_by
 from proofroll.core.diagnosis.lines import differing, single_precision
 from proofroll.core.diagnosis.vectors import ReportedVector
@@ -36,7 +36,7 @@ _PART = 1e-2
 _START = 1e-6
 
 
-def both(evidence: Evidence) -> tuple[xr.Dataset, xr.Dataset] | None:
+def run_and_truth(evidence: Evidence) -> tuple[xr.Dataset, xr.Dataset] | None:
     """Run and truth; None unless both have enough samples, at the same times."""
     run, truth = evidence.run, evidence.truth
     if run is None or truth is None or run.sizes["time"] != truth.sizes["time"] or run.sizes["time"] < _FEWEST:
@@ -55,7 +55,7 @@ def single_precision_run(evidence: Evidence) -> Iterator[Cause]:
     required = [run[name].to_numpy() for name in REQUIRED]
     if all(in_single_precision(reported) for reported in required):
         true, says = truth[REQUIRED[0]].to_numpy(), "every number of the run is a single-precision one (float32)"
-        before = apart(required[0], true) if required[0].shape == true.shape else np.inf
+        before = largest_gap(required[0], true) if required[0].shape == true.shape else np.inf
         yield Cause("float32", says, REQUIRED[0], "m", before, 0.0, "compute and report in double precision")
 
 
@@ -71,22 +71,24 @@ def another_clock(state: Callable[[Any, xr.Dataset], FloatArray], covers: tuple[
         "late", "the whole state is the true one, at times that are shifted by one time or stretched by one factor"
     )
     def test(evidence: Evidence) -> Iterator[Cause]:
-        pair = both(evidence)
+        pair = run_and_truth(evidence)
         if pair is None:
             return
         reported, true = (state(evidence.element, data) for data in pair)
-        if reported.shape != true.shape or not above_round_off(apart(reported, true), float(np.max(np.abs(true)))):
+        if reported.shape != true.shape or not above_round_off(
+            largest_gap(reported, true), float(np.max(np.abs(true)))
+        ):
             return
         time, weights = pair[1]["time"].to_numpy(), _alike(reported, true)
         reported, true = reported * weights, true * weights
-        moved = late(time, reported, true)
+        moved = best_delay(time, reported, true)
         if moved is not None:
             delay, before, after = moved
             says = f"every sample is {delay_text(delay, evidence.step)}: the motion is right at another time"
             remedy = "advance(t) has to end at t, neither a step before nor after it"
             change = in_steps(delay, evidence.step)
             yield Cause("late", says, "state", "m", before, after, remedy, 1, covers, _CLOCK, change=change)
-        paced = stretched(time, reported, true)
+        paced = best_clock_factor(time, reported, true)
         if paced is not None:
             rate, before, after = paced
             says = f"the engine's time runs {rate:.6g} times as fast as it says: the motion is right at other times"
@@ -138,7 +140,7 @@ def reported_vectors(
         "sample by sample; no equation is needed",
     )
     def test(evidence: Evidence) -> Iterator[Cause]:
-        pair = both(evidence)
+        pair = run_and_truth(evidence)
         if pair is None or clock.proven(evidence):
             return
         run, truth = pair
@@ -172,10 +174,10 @@ def _departure(evidence: Evidence, name: str) -> float:
     if run is None or truth is None or name not in run or name not in truth or run[name].shape != truth[name].shape:
         return 0.0
     reported, true = run[name].to_numpy(), truth[name].to_numpy()
-    off = _turned(reported, true) if name == "q_WB" else apart(reported, true)
+    off = _turned(reported, true) if name == "q_WB" else largest_gap(reported, true)
     length, time = element.length, element.natural_time
     natural = {"p_WB": length, "v_WB": length / time, "w_WB": 1 / time, "q_WB": 1.0}[name]
-    return off / max(apart(true, np.broadcast_to(true[:1], true.shape)), float(_STILL * natural))
+    return off / max(largest_gap(true, np.broadcast_to(true[:1], true.shape)), float(_STILL * natural))
 
 
 def reported_quaternions(true_ones: Callable[[Evidence], FloatArray]) -> Hypothesis:
@@ -186,13 +188,13 @@ def reported_quaternions(true_ones: Callable[[Evidence], FloatArray]) -> Hypothe
 
     @hypothesis("quaternion", "the true quaternions in another order or inverted are what is said, up to their sign")
     def test(evidence: Evidence) -> Iterator[Cause]:
-        pair = both(evidence)
+        pair = run_and_truth(evidence)
         if pair is None or "q_WB" not in pair[0]:
             return
         reported, true = pair[0]["q_WB"].to_numpy(), true_ones(evidence)
         if reported.shape != true.shape or moves_otherwise(evidence, "q_WB"):
             return
-        if len(reported) > 1 and apart(np.abs(reported[0]), np.abs(true[0])) < _START:
+        if len(reported) > 1 and largest_gap(np.abs(reported[0]), np.abs(true[0])) < _START:
             reported, true = reported[1:], true[1:]  # an engine may give at time 0 what it was given
         before = _turned(reported, true)
         if not above_round_off(before, 1.0):
@@ -213,7 +215,7 @@ def reported_quaternions(true_ones: Callable[[Evidence], FloatArray]) -> Hypothe
 def _turned(reported: FloatArray, other: FloatArray) -> float:
     """Largest difference of quaternions, up to their signs."""
     signs = np.where(np.sum(reported * other, axis=-1, keepdims=True) < 0, -1.0, 1.0)
-    return apart(reported * signs, other)
+    return largest_gap(reported * signs, other)
 
 
 def at_start(frames_of: Callable[[Any], Mapping[str, FloatArray]], follows: frozenset[str]) -> Hypothesis:

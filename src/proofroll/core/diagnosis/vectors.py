@@ -13,8 +13,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
-from proofroll.core.diagnosis import CLOSES, Cause, above_round_off, apart
-from proofroll.core.diagnosis.clocks import delay_text, in_steps, late
+from proofroll.core.diagnosis import CLOSES, Cause, above_round_off, largest_gap
+from proofroll.core.diagnosis.clocks import best_delay, delay_text, in_steps
 from proofroll.core.diagnosis.fitting import change_by, factor_text, known_factor
 
 WORLD = "world"
@@ -77,7 +77,11 @@ class ReportedVector:
     def after_start(self) -> ReportedVector:
         """The vector without time 0 if it is right there: an engine may report its initial values unchanged."""
         reported, true = self.reported, self.true
-        if len(reported) < 2 or reported.shape != true.shape or above_round_off(apart(reported[0], true[0]), self.size):
+        if (
+            len(reported) < 2
+            or reported.shape != true.shape
+            or above_round_off(largest_gap(reported[0], true[0]), self.size)
+        ):
             return self
         frames = {key: frame[1:] for key, frame in self.frames.items()}
         return replace(self, reported=reported[1:], true=true[1:], time=self.time[1:], frames=frames)
@@ -85,7 +89,7 @@ class ReportedVector:
     @property
     def before(self) -> float:
         """Largest difference between report and truth."""
-        return apart(self.reported, self.true)
+        return largest_gap(self.reported, self.true)
 
     def cause(
         self,
@@ -105,7 +109,7 @@ class ReportedVector:
         partly = np.any(np.isnan(self.true), axis=-1, keepdims=True)
         aside = partly & (np.isnan(explained) | np.isnan(self.reported))
         reported, true, explained = (np.where(aside, np.nan, each) for each in (self.reported, self.true, explained))
-        before, after = apart(reported, true), apart(reported, explained)
+        before, after = largest_gap(reported, true), largest_gap(reported, explained)
         if before < self.before / 2:
             after = np.inf  # most of the difference is in what is left aside
         proof = self.name, self.unit, before, after
@@ -138,7 +142,7 @@ class ReportedVector:
     def _frames(self) -> Iterator[Cause]:
         remedy = f"give {self.name} along the axes of the world"
         for name, frame in self.frames.items():
-            local = into(frame, self.true)
+            local = components_along(frame, self.true)
             yield self.cause("frame", f"{self.name} looks like {self.what} in {name}", local, remedy)
             yield self.cause("frame", f"{self.name} looks like minus {self.what} in {name}", -local, remedy)
             turned = product(frame, self.true)
@@ -146,11 +150,11 @@ class ReportedVector:
 
     def _axes(self) -> Iterator[Cause]:
         for name, frame in {WORLD: None, **self.frames}.items():
-            local = self.true if frame is None else into(frame, self.true)
-            reported = self.reported if frame is None else into(frame, self.reported)
+            local = self.true if frame is None else components_along(frame, self.true)
+            reported = self.reported if frame is None else components_along(frame, self.reported)
             for order, signs in _PERMUTATIONS:
                 changed = local[..., order] * signs
-                if apart(reported, changed) * 4 > self.before:
+                if largest_gap(reported, changed) * 4 > self.before:
                     continue
                 where = "" if frame is None else f" in {name}"
                 shown = ", ".join("-" * (s < 0) + "xyz"[k] for k, s in zip(order, signs, strict=True))
@@ -196,7 +200,7 @@ class ReportedVector:
     def _late(self, step: float | None) -> Iterator[Cause]:
         off = np.nan_to_num(np.abs(self.reported - self.true))
         differs = np.max(off.reshape(len(self.time), -1), axis=-1) > _FEW * self.before
-        shift = late(self.time, self.reported, self.true) if np.count_nonzero(differs) >= _SEEN else None
+        shift = best_delay(self.time, self.reported, self.true) if np.count_nonzero(differs) >= _SEEN else None
         if shift is None:
             return
         delay, before, after = shift
@@ -208,7 +212,7 @@ class ReportedVector:
         yield Cause(f"late.{self.name}", says, self.name, self.unit, before, after, remedy, 1, change=change)
 
 
-def into(frame: FloatArray, vectors: FloatArray) -> FloatArray:
+def components_along(frame: FloatArray, vectors: FloatArray) -> FloatArray:
     """Components of vectors along the axes of frames; NaN if they depend on a NaN."""
     return product(np.swapaxes(frame, -1, -2), vectors)
 

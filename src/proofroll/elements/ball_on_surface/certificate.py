@@ -13,8 +13,8 @@ from proofroll.elements.ball_on_surface.mechanics import (
     initial_angular_acceleration,
     initial_response,
     natural_acceleration,
+    resistance_undirected,
     slip_velocity,
-    stands,
     wall_velocity,
 )
 from proofroll.elements.ball_on_surface.model import RollingBall
@@ -119,7 +119,7 @@ def _expected(body: RollingBall, built: BallBuilt) -> tuple[FloatArray, FloatArr
     resistance until the ball moves. Expected are the values of the alternative that is closer to its acceleration.
     """
     assumed, reported = body, built.acceleration
-    if stands(body, body.v0) and reported is not None:
+    if resistance_undirected(body, body.v0) and reported is not None:
         free = dataclasses.replace(body, contact=dataclasses.replace(body.contact, rolling_resistance=0.0))
         assumed = min((body, free), key=lambda one: float(np.linalg.norm(initial_response(one)[0] - reported)))
     return *initial_response(assumed), initial_angular_acceleration(assumed)

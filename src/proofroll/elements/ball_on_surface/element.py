@@ -238,7 +238,7 @@ def rolling_ball(scene: Scene) -> RollingBall:
     return element.rolling
 
 
-def changed(scene: Scene, **parts: Any) -> Scene:
+def scene_with(scene: Scene, **parts: Any) -> Scene:
     """Copy of a scene with another ``ball``, ``surface``, ``contact``, ``start`` or ``gravity``."""
     (element,) = scene.elements
     assert isinstance(element, BallOnSurface)

@@ -3,7 +3,7 @@
 import numpy as np
 
 from proofroll.core import program_text
-from proofroll.core.program_text import FailedRun, asking, assigned
+from proofroll.core.program_text import FailedRun, asking, assignment
 from proofroll.elements.ball_on_surface.failure import (
     BACKWARDS,
     GAIN,
@@ -53,7 +53,7 @@ def through_proofroll(body: RollingBall, failed: FailedRun) -> str:
     head += "from proofroll.elements.ball_on_surface.element import rolling_ball\n\n"
     return (
         head
-        + assigned(**ball_numbers(body))
+        + assignment(**ball_numbers(body))
         + "\n"
         + asking(failed, "p_WB", "v_WB", "w_WB")
         + f"\n\nBODY = rolling_ball(SCENE)\n{WALL}"

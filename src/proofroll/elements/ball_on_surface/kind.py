@@ -14,7 +14,7 @@ from proofroll.core.gravity import Gravity
 from proofroll.core.parameters import Parameters
 from proofroll.core.scene import Scene
 from proofroll.core.validation import strict, units_of, validated
-from proofroll.elements.ball_on_surface.element import BallOnSurface, changed
+from proofroll.elements.ball_on_surface.element import BallOnSurface, scene_with
 from proofroll.elements.ball_on_surface.model import Ball, Contact, InitialMotion
 from proofroll.elements.ball_on_surface.surfaces import Declared, Surface, surface_kinds
 
@@ -121,7 +121,7 @@ def _turned(scene: Scene, gamma: float, tilt: float, **motion: Any) -> Scene:
     (element,) = scene.elements
     assert isinstance(element, BallOnSurface)
     start = dataclasses.replace(element.start, coordinates=(gamma, 0.1), **motion)
-    return changed(scene, start=start, surface=dataclasses.replace(cast(Any, element.surface), tilt=tilt))
+    return scene_with(scene, start=start, surface=dataclasses.replace(cast(Any, element.surface), tilt=tilt))
 
 
 def _check_names(found: BallTables, where: str) -> None:

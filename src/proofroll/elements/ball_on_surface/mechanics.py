@@ -105,7 +105,7 @@ def initial_response(body: RollingBall) -> tuple[FloatArray, FloatArray]:
     if np.any(body.slip0):
         force = _slipping_force(body)
         return force / body.ball.mass + body.gravity, force
-    if stands(body, body.v0) and stays(body, body.p0):
+    if resistance_undirected(body, body.v0) and can_rest(body, body.p0):
         return np.zeros(3), -body.ball.mass * body.gravity
     acceleration, _, force = newton_euler(body, body.p0, _way(body), body.w0)
     e1 = body.surface.normal(body.p0)
@@ -123,7 +123,7 @@ def initial_response(body: RollingBall) -> tuple[FloatArray, FloatArray]:
 
 def initial_angular_acceleration(body: RollingBall) -> FloatArray:
     """Angular acceleration at time 0 in the world [rad/s²], shape (3,): moments of contact and resistance over J."""
-    if body.gap0 or (stands(body, body.v0) and stays(body, body.p0)):
+    if body.gap0 or (resistance_undirected(body, body.v0) and can_rest(body, body.p0)):
         return np.zeros(3)
     _, force = initial_response(body)
     e1 = body.surface.normal(body.p0)
@@ -142,7 +142,7 @@ def _slipping_force(body: RollingBall) -> FloatArray:
 
 def _way(body: RollingBall) -> FloatArray:
     """Velocity at time 0 [m/s]; for a ball at rest that will not stay, a tiny one along its coming motion."""
-    return setting_off(body, body.p0) if stands(body, body.v0) else body.v0
+    return setting_off(body, body.p0) if resistance_undirected(body, body.v0) else body.v0
 
 
 def newton_euler(
@@ -191,12 +191,12 @@ def newton_euler(
 # rest. There it is a bound, like static friction: a moment of at most f N, which must hold gravity along the wall.
 
 
-def stands(body: RollingBall, v_WB: FloatArray) -> bool:
+def resistance_undirected(body: RollingBall, v_WB: FloatArray) -> bool:
     """True if there is rolling resistance without a direction, for the centre's velocity ``v_WB`` [m/s] is zero."""
     return body.contact.rolling_resistance > 0 and not np.any(v_WB)
 
 
-def stays(body: RollingBall, p_WB: FloatArray) -> bool:
+def can_rest(body: RollingBall, p_WB: FloatArray) -> bool:
     """True if friction and resistance can hold a ball whose centre stands still at ``p_WB`` [m]."""
     pull, press = _pull(body, p_WB)
     strength, contact = float(np.linalg.norm(pull)), body.contact
@@ -208,7 +208,7 @@ def stays(body: RollingBall, p_WB: FloatArray) -> bool:
 def setting_off(body: RollingBall, p_WB: FloatArray) -> FloatArray:
     """Negligible velocity down the slope at ``p_WB`` [m], shape (3,) [m/s].
 
-    It gives rolling resistance a direction where a resting ball starts to move, and does not :func:`stays`.
+    It gives rolling resistance a direction where a resting ball starts to move, and does not :func:`can_rest`.
     """
     pull, _ = _pull(body, p_WB)
     strength = float(np.linalg.norm(pull))

@@ -11,7 +11,7 @@ from typing import Literal
 import numpy as np
 
 from proofroll.core.arrays import FloatArray, read_only
-from proofroll.core.bounds import OutOfBounds, bounded
+from proofroll.core.bounds import OutOfBounds, require_bounds
 from proofroll.elements.ball_on_surface.surfaces import Surface
 
 
@@ -60,7 +60,7 @@ class Ball:
 
     def __post_init__(self) -> None:
         for name in ("radius", "mass", "inertia_ratio", "inertia"):
-            bounded(name, getattr(self, name), above=0)
+            require_bounds(name, getattr(self, name), above=0)
 
     @property
     def inertia(self) -> float:
@@ -92,9 +92,9 @@ class Contact:
     tangential_restitution: float = field(default=0.0, metadata={"unit": "1"})
 
     def __post_init__(self) -> None:
-        bounded("rolling_resistance", self.rolling_resistance, at_least=0)
-        bounded("mu_static", self.mu_static, at_least=0, unbounded=True)
-        bounded("mu_kinetic", self.mu_kinetic, at_least=0, unbounded=True)
+        require_bounds("rolling_resistance", self.rolling_resistance, at_least=0)
+        require_bounds("mu_static", self.mu_static, at_least=0, unbounded=True)
+        require_bounds("mu_kinetic", self.mu_kinetic, at_least=0, unbounded=True)
         for name, least in (("restitution", 0), ("tangential_restitution", -1)):
             value = getattr(self, name)
             if value is not None and not least <= value <= 1:
@@ -129,9 +129,9 @@ class InitialMotion:
     def __post_init__(self) -> None:
         for name in ("coordinates", "velocity", "tangential_spin"):
             for value in getattr(self, name) or ():
-                bounded(name, value)
-        bounded("spin", self.spin)
-        bounded("gap", self.gap, at_least=0)
+                require_bounds(name, value)
+        require_bounds("spin", self.spin)
+        require_bounds("gap", self.gap, at_least=0)
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,7 @@ from proofroll.elements.ball_on_surface.mechanics import (
     initial_angular_acceleration,
     initial_response,
     natural_acceleration,
-    stands,
+    resistance_undirected,
 )
 from proofroll.elements.ball_on_surface.model import RollingBall
 
@@ -81,7 +81,7 @@ def step_numbers(body: RollingBall, h: float, truth: xr.Dataset | None) -> tuple
 
 def first_motion(body: RollingBall) -> FirstMotion | None:
     """See :class:`proofroll.core.element.Element`; None for a ball at rest under rolling resistance."""
-    if stands(body, body.v0):
+    if resistance_undirected(body, body.v0):
         return None
     speed = float(np.linalg.norm(body.v0)) or float(np.sqrt(body.ball.radius * np.linalg.norm(body.gravity)))
     acceleration, turning = initial_response(body)[0], initial_angular_acceleration(body)

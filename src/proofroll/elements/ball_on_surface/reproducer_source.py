@@ -9,7 +9,7 @@ from typing import Any
 from proofroll.core.arrays import FloatArray
 from proofroll.core.cut_out import CutOut
 from proofroll.core.errors import Refused
-from proofroll.core.program_text import assigned
+from proofroll.core.program_text import assignment
 from proofroll.elements.ball_on_surface.model import RollingBall
 
 # Functions of the wall of a ``BODY``, with which a program checks a run against the laws.
@@ -56,7 +56,7 @@ def cut_program(
     uses = {*uses, "triad", "nearby", "surface"}
     cut = CutOut([*wanted, type(body.surface)], uses, instead)
     given = f"\n\nBODY = {cut.literal(body)}\nSETTINGS = {cut.literal(settings)}\n"
-    return f"{cut.head}\n{assigned(**ball_numbers(body), **values)}\n\n{cut.text}{given}{WALL}{run}"
+    return f"{cut.head}\n{assignment(**ball_numbers(body), **values)}\n\n{cut.text}{given}{WALL}{run}"
 
 
 def ball_numbers(body: RollingBall) -> dict[str, float | FloatArray]:

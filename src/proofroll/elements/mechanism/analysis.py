@@ -25,7 +25,7 @@ _ZERO = 1e-9  # relative: a component of a null vector that is zero but for roun
 
 @dataclass(frozen=True)
 class Analysis:
-    """Result of :func:`analysed`.
+    """Result of :func:`analyse`.
 
     Attributes:
         rows: number of constraint rows of all loops.
@@ -47,7 +47,7 @@ class Analysis:
     determinate: NDArray[np.bool_]
 
 
-def analysed(mechanism: Mechanism) -> Analysis:
+def analyse(mechanism: Mechanism) -> Analysis:
     """Rank, redundancy, mobility and determinate reactions, at the start and at a general pose near it."""
     tree = Tree(mechanism)
     q, v = mechanism.start()
@@ -85,7 +85,7 @@ def singular_values(C: Array) -> Array:
     return np.asarray(np.linalg.svd(C, compute_uv=False) if C.size else np.zeros(0), dtype=np.float64)
 
 
-def least(matrix: Array, right: Array) -> Array:
+def least_norm_solution(matrix: Array, right: Array) -> Array:
     """Vector x of least norm that minimises abs(matrix·x − right); singular values below RANK count as zero."""
     return np.asarray(np.linalg.lstsq(matrix, right, rcond=RANK)[0], dtype=np.float64)
 

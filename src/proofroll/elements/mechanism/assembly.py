@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from proofroll.core.errors import InputError
-from proofroll.elements.mechanism.analysis import analysed, least
+from proofroll.elements.mechanism.analysis import analyse, least_norm_solution
 from proofroll.elements.mechanism.contacts.start import extent
 from proofroll.elements.mechanism.joint import FACTS
 from proofroll.elements.mechanism.joint_coordinates import JointCoordinates
@@ -23,7 +23,7 @@ IMMOBILE = "it cannot move; free a joint or a loop"
 ADVICE = "correct q0, or give the joints that follow from the loops dependent = true and q0 as a guess"
 
 
-def assembled(mechanism: Mechanism) -> Mechanism:
+def assemble(mechanism: Mechanism) -> Mechanism:
     """Mechanism with q0 and v0 of the dependent joints found from its loops; their own q0 are guesses.
 
     Raises:
@@ -41,12 +41,12 @@ def assembled(mechanism: Mechanism) -> Mechanism:
     for _ in range(_ROUNDS):
         rows = _finite(tree.loop_rows(tree.at(q, v)))
         dv = np.zeros(len(v))
-        dv[free] = -least(rows.C[:, free], rows.residual)
+        dv[free] = -least_norm_solution(rows.C[:, free], rows.residual)
         q = tree.moved(q, dv * min(1.0, _LARGEST / max(np.abs(dv).max(initial=0.0), 1e-300)))
         if np.abs(dv).max(initial=0.0) < 1e-15:
             break
     C = _finite(tree.loop_rows(tree.at(q, v))).C
-    v[free] = -least(C[:, free], C[:, ~free] @ v[~free])
+    v[free] = -least_norm_solution(C[:, free], C[:, ~free] @ v[~free])
     joints = tuple(
         replace(joint, q0=tuple(q[at_q]), v0=tuple(v[at_v]), dependent=False)
         for joint, at_q, at_v in zip(mechanism.joints, mechanism.q_slices, mechanism.v_slices, strict=True)
@@ -125,7 +125,7 @@ def check_start(mechanism: Mechanism) -> None:
             raise InputError(field, between, advice)
     equations = JointCoordinates(mechanism)
     _check_inertia(mechanism, equations.inertial(motion)[1])
-    if analysed(mechanism).mobility == 0:
+    if analyse(mechanism).mobility == 0:
         raise InputError("mechanism", f"{len(mechanism.joints)} joints", IMMOBILE)
     with np.errstate(all="ignore"):  # the line below says it
         found = equations.solve(q, v, ("free",) * len(equations.switched)).acceleration

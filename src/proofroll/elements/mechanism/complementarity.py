@@ -115,7 +115,7 @@ def load_of(joints: Sequence[SwitchedJoint], mode: Mode, nv: int) -> Array:
 Responses = Callable[[Mode, Sequence[int]], tuple[Array, Array]]
 
 
-def decided(joints: Sequence[SwitchedJoint], q: Array, v: Array, responses: Responses) -> tuple[Mode, float]:
+def decided_mode(joints: Sequence[SwitchedJoint], q: Array, v: Array, responses: Responses) -> tuple[Mode, float]:
     """Mode of the switched joints that follows from the forces, and its relative margin to another mode.
 
     A joint at rest stays at rest if the force that this needs lies between its bounds. All joints at rest are solved
@@ -138,7 +138,9 @@ def decided(joints: Sequence[SwitchedJoint], q: Array, v: Array, responses: Resp
     return tuple(mode), margin(free[at], response[at], low, high, force, acceleration)
 
 
-def struck(joints: Sequence[SwitchedJoint], q: Array, v: Array, hit: int, responses: Responses) -> tuple[Array, float]:
+def after_impact(
+    joints: Sequence[SwitchedJoint], q: Array, v: Array, hit: int, responses: Responses
+) -> tuple[Array, float]:
     """Velocities after switched joint number ``hit`` strikes its stop, by Newton's law of impact.
 
     Other joints that rest at a stop take part; friction has no impulse.

@@ -15,14 +15,14 @@ from proofroll.core.turns import doubt
 from proofroll.elements.mechanism.contacts.observables import (
     LAWS,
     RESIDUALS,
-    followed,
+    follow_contacts,
     given_forces,
     kept_laws,
     normal_forces,
     residuals,
 )
 from proofroll.elements.mechanism.joint import TURNING
-from proofroll.elements.mechanism.named_forces import lengths, named_forces, taken
+from proofroll.elements.mechanism.named_forces import lengths, named_forces, pick_named
 from proofroll.elements.mechanism.placed import TURN, Placed
 from proofroll.elements.mechanism.sampling import MechanismSample
 
@@ -60,7 +60,7 @@ def placed_from(element: MechanismElement, times: FloatArray, samples: Sequence[
 
 def _named(element: MechanismElement, sample: MechanismSample) -> FloatArray:
     counts = lengths(element.mechanism)
-    return taken(element.mechanism, {name: along(sample, name, count) for name, count in counts.items()})
+    return pick_named(element.mechanism, {name: along(sample, name, count) for name, count in counts.items()})
 
 
 def along(sample: MechanismSample, name: str, count: int) -> FloatArray:
@@ -171,7 +171,7 @@ def columns(
 
 def _put_contacts(element: MechanismElement, placed: Placed, pressed: FloatArray, put: Callable[..., None]) -> None:
     """Puts gaps, slips, forces and residuals of Coulomb's law, of each contact and of all together."""
-    found = followed(placed)
+    found = follow_contacts(placed)
     for index, contact in enumerate(placed.mechanism.contacts):
         for axis, letter in enumerate("xyz"):
             component = pressed[:, index, axis]

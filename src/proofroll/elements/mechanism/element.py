@@ -20,7 +20,7 @@ from proofroll.core.observable import Observable, Role
 from proofroll.core.program_text import FailedRun
 from proofroll.core.time_grid import EVERY
 from proofroll.core.turns import PART
-from proofroll.elements.mechanism.analysis import Analysis, analysed
+from proofroll.elements.mechanism.analysis import Analysis, analyse
 from proofroll.elements.mechanism.capabilities import MechanismCapability, required
 from proofroll.elements.mechanism.certificate import CAPS, certify
 from proofroll.elements.mechanism.contacts.observables import LAWS, RESIDUALS, contact_observables
@@ -89,7 +89,7 @@ class MechanismElement:
     @cached_property
     def analysis(self) -> Analysis:
         """Rank, mobility, and which reactions are determinate."""
-        return read_only(analysed(self.mechanism))
+        return read_only(analyse(self.mechanism))
 
     @cached_property
     def requires(self) -> frozenset[str]:

@@ -15,12 +15,17 @@ import numpy as np
 
 from proofroll.core.arrays import cross
 from proofroll.core.errors import Diverged, Refused
-from proofroll.elements.mechanism.analysis import BRANCHES, RANK, RowSign, analysed, reactions
-from proofroll.elements.mechanism.complementarity import decided, load_of, refuse_switching, struck
+from proofroll.elements.mechanism.analysis import BRANCHES, RANK, RowSign, analyse, reactions
+from proofroll.elements.mechanism.complementarity import (
+    after_impact,
+    decided_mode,
+    load_of,
+    refuse_switching,
+)
 from proofroll.elements.mechanism.kinematics import BodyMotion, Rows, Tree
 from proofroll.elements.mechanism.model import Mechanism
-from proofroll.elements.mechanism.named_forces import joint_force_shares, lengths, taken
-from proofroll.elements.mechanism.record import Record, gathered, integrated
+from proofroll.elements.mechanism.named_forces import joint_force_shares, lengths, pick_named
+from proofroll.elements.mechanism.record import Record, integrate, record_of
 from proofroll.elements.mechanism.rotations import Array, skews, to_quaternion
 from proofroll.elements.mechanism.signal import value_at, varies
 from proofroll.elements.mechanism.switches import REDUNDANT, STOPPED, Mode, held_joints, switched_joints
@@ -61,7 +66,7 @@ class JointCoordinates:
 
     def __init__(self, mechanism: Mechanism, rank: int | None = None) -> None:
         self.mechanism, self.tree, self.switched = mechanism, Tree(mechanism), switched_joints(mechanism)
-        self.rank = analysed(mechanism).rank if rank is None else rank
+        self.rank = analyse(mechanism).rank if rank is None else rank
         self._mass = np.array([body.mass for body in mechanism.bodies])
         self._com = np.array([body.com for body in mechanism.bodies])
         self._inertia = np.array([body.inertia for body in mechanism.bodies])
@@ -84,7 +89,7 @@ class JointCoordinates:
     ) -> Solution:
         """Accelerations and multipliers for coordinates (nq) and velocities (nv), with drives at ``time`` [s].
 
-        ``mode``: of switched joints and limited efforts; None: it follows from the forces, see :meth:`decided`.
+        ``mode``: of switched joints and limited efforts; None: it follows from the forces, see :meth:`decided_mode`.
         ``load``: additional force along the velocities, (nv).
 
         Raises:
@@ -152,12 +157,12 @@ class JointCoordinates:
 
     def decided(self, q: Array, v: Array, time: float = 0.0) -> tuple[Mode, float]:
         """Mode, of joints by complementarity and of limited efforts by size; relative margin of the joints."""
-        mode, apart = decided(self.switched, q, v, partial(self._responses, time, q, v))
+        mode, apart = decided_mode(self.switched, q, v, partial(self._responses, time, q, v))
         return mode + tuple(item.mode(time, float(q[at_q]), float(v[at_v])) for item, at_q, at_v in self.limited), apart
 
     def struck(self, q: Array, v: Array, hit: int) -> tuple[Array, float]:
-        """See :func:`proofroll.elements.mechanism.complementarity.struck`."""
-        return struck(self.switched, q, v, hit, partial(self._responses, 0.0, q, v))
+        """See :func:`proofroll.elements.mechanism.complementarity.after_impact`."""
+        return after_impact(self.switched, q, v, hit, partial(self._responses, 0.0, q, v))
 
     def _responses(self, time: float, q: Array, v: Array, mode: Mode, at: Sequence[int]) -> tuple[Array, Array]:
         """Accelerations in a mode, (nv), and how much a unit force along each velocity ``at`` adds, (nv, forces)."""
@@ -174,8 +179,8 @@ class JointCoordinates:
         """
         refuse_switching(self.mechanism)
         nq, start = self.mechanism.nq, np.concatenate(self.mechanism.start())
-        states = integrated(self.rate, start, times, tolerance, self.followed(), least=self._least(tolerance))
-        return gathered(times, [self.sample(y[:nq], y[nq:], None, t) for t, y in zip(times, states, strict=True)])
+        states = integrate(self.rate, start, times, tolerance, self.followed(), least=self._least(tolerance))
+        return record_of(times, [self.sample(y[:nq], y[nq:], None, t) for t, y in zip(times, states, strict=True)])
 
     def followed(self, mode: Mode | None = None) -> Callable[[Array], Array]:
         """Correction of the state after each step of one motion, by elimination of violations.
@@ -258,7 +263,7 @@ class JointCoordinates:
         """
         nq = self.mechanism.nq
         states = zip(times, self.rk4_states(times, _EQUAL_STEP), strict=True)
-        return gathered(times, [self.sample(y[:nq], y[nq:], None, t) for t, y in states])
+        return record_of(times, [self.sample(y[:nq], y[nq:], None, t) for t, y in states])
 
     def rk4_states(self, times: Array, step: float) -> Iterator[Array]:
         """States (q, v) at the given times [s], by Runge-Kutta 4 in equal steps of at most ``step`` [s]."""
@@ -330,7 +335,7 @@ class JointCoordinates:
             force = holding.get(number, joint.push(own))
             on = joint_force_shares(own in STOPPED, joint.friction, force)
             fields["friction"][joint.number], fields["stop"][joint.number] = on
-        return taken(self.mechanism, fields)
+        return pick_named(self.mechanism, fields)
 
     def inertial(self, motion: BodyMotion) -> tuple[Array, Array, Array]:
         """Jacobians at the centres of mass, (bodies, 6, nv), mass matrix, inertial minus gravity wrenches at v̇ = 0."""

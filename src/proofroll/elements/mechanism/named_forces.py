@@ -61,7 +61,7 @@ def lengths(mechanism: Mechanism) -> Mapping[str, int]:
     return dict(zip(FIELDS, counts, strict=True))
 
 
-def taken(mechanism: Mechanism, fields: Mapping[str, Array]) -> Array:
+def pick_named(mechanism: Mechanism, fields: Mapping[str, Array]) -> Array:
     """Named forces [N, N m] picked from the fields of a sample, in the order of :func:`named_forces`, (forces,)."""
     return np.array([fields[item.field][item.place] for item in named_forces(mechanism)], dtype=float)
 

@@ -14,7 +14,7 @@ from proofroll.core.errors import InputError, no_such_key
 from proofroll.core.parameters import Parameters
 from proofroll.core.validation import strict, units_of_kind, validated
 from proofroll.elements.mechanism import checks
-from proofroll.elements.mechanism.assembly import assembled, check_start
+from proofroll.elements.mechanism.assembly import assemble, check_start
 from proofroll.elements.mechanism.contacts.geometry import Geometry, Pair
 from proofroll.elements.mechanism.contacts.start import check_contacts
 from proofroll.elements.mechanism.drives import Actuator, Coupling
@@ -60,7 +60,7 @@ def made_mechanism(content: Mapping[str, Any], gravity: checks.Vector, numbers: 
     if not made["bodies"]:
         raise InputError("bodies", "none", "a mechanism needs a body; add a [[bodies]] table")
     parts = {kind: tuple(items) for kind, items in made.items()}
-    mechanism = assembled(Mechanism(gravity=gravity, unmodelled=_texts(content, "unmodelled"), **parts))
+    mechanism = assemble(Mechanism(gravity=gravity, unmodelled=_texts(content, "unmodelled"), **parts))
     check_start(mechanism)
     check_contacts(mechanism)
     return mechanism

@@ -46,13 +46,13 @@ class Record:
         return Placed(mechanism, self.time, self.p_WB, self.v_WB, self.w_WB, self.q_WB, known_q)
 
 
-def gathered(time: Array, samples: list[dict[str, Any]]) -> Record:
+def record_of(time: Array, samples: list[dict[str, Any]]) -> Record:
     """Record of samples; each is a dictionary of the record's other fields at one time."""
     names = [item.name for item in fields(Record) if item.name != "time"]
     return Record(time=time, **{name: np.array([sample[name] for sample in samples]) for name in names})
 
 
-def integrated(
+def integrate(
     rate: Callable[[float, Array], Array],
     start: Array,
     times: Array,

@@ -107,7 +107,7 @@ def mechanism_of(scene: Any) -> Mechanism:
     return found[0]
 
 
-def independent(rows: Array) -> int:
+def row_rank(rows: Array) -> int:
     """Rank of constraint rows, each first scaled to length 1, shape (rows, velocities)."""
     if not rows.size:
         return 0
@@ -121,7 +121,7 @@ def independent_anywhere(
 ) -> int:
     """Number of independent constraint rows at the start or, where it is larger, at a :func:`general_place` near it."""
     near = general_place(start, rows, moved)
-    return max(independent(rows(start)[1]), independent(rows(near)[1]))
+    return max(row_rank(rows(start)[1]), row_rank(rows(near)[1]))
 
 
 def unsaid(mechanism: Mechanism) -> tuple[Array, Array]:

@@ -19,8 +19,8 @@ from proofroll.elements.mechanism.sampling import (
     WITH_AXIS,
     MechanismBuilt,
     MechanismSample,
-    independent,
     mechanism_of,
+    row_rank,
     unsaid,
 )
 from proofroll.elements.mechanism.signal import varies
@@ -76,7 +76,7 @@ class Redundant(ExudynModel):
         self._add_contacts(mechanism, settings)
         self.system.Assemble()
         self._rows = self._constraint_rows(settings)
-        self._rank = independent(self._rows)
+        self._rank = row_rank(self._rows)
         dependent = self._rank < len(self._rows)
         self.integration = Integration(self.system, settings, dependent=dependent, mass=mechanism.mass)
 

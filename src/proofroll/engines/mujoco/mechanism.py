@@ -18,8 +18,8 @@ from proofroll.elements.mechanism.sampling import (
     WITH_AXIS,
     MechanismBuilt,
     MechanismSample,
-    independent,
     mechanism_of,
+    row_rank,
     unsaid,
 )
 from proofroll.elements.mechanism.signal import Signal, value_at, varies
@@ -212,7 +212,7 @@ class MujocoMechanism(SteppedModel):
             mujoco.mju_quat2Mat(flat, model.body_iquat[body])
         R = axes.reshape(-1, 3, 3)
         rows = self._rows(data, data.ne)
-        rank = independent(rows)
+        rank = row_rank(rows)
         accelerations = self._accelerations(data)
         return MechanismBuilt(
             mass=model.body_mass[bodies].copy(),

@@ -11,7 +11,7 @@ import numpy as np
 from proofroll.core.arrays import FloatArray
 from proofroll.core.cut_out import CutOut
 from proofroll.core.errors import Refused
-from proofroll.core.program_text import assigned
+from proofroll.core.program_text import assignment
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.reproducer_source import cut_program
 from proofroll.elements.mechanism import Mechanism
@@ -85,7 +85,7 @@ def mechanism_source(xml: str, mechanism: Mechanism) -> str:
     """Part of the program that runs a mechanism, given as MJCF whose first keyframe is the start."""
     places = [(point.body, [float(x) for x in point.position]) for point in mechanism.points]
     places = places or [(body.name, [0.0, 0.0, 0.0]) for body in mechanism.bodies]
-    asks = "# Places that are followed: body, and where on it [m].\n" + assigned(PLACES=places)
+    asks = "# Places that are followed: body, and where on it [m].\n" + assignment(PLACES=places)
     cut = CutOut([followed], [])
     return f'{cut.head}\n{cut.text}\n\nMODEL = """{xml}"""\n{asks}{_MECHANISM}'
 

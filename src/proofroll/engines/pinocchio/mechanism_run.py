@@ -11,7 +11,7 @@ from proofroll.core.stalling import Stalled
 from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.pose_words import pose
 from proofroll.elements.mechanism.rotations import Array
-from proofroll.elements.mechanism.sampling import MechanismBuilt, MechanismSample, independent, unsaid
+from proofroll.elements.mechanism.sampling import MechanismBuilt, MechanismSample, row_rank, unsaid
 from proofroll.engines.pinocchio.constraint_dynamics import ConstraintDynamics
 from proofroll.engines.pinocchio.integrators import require_tangent_map
 from proofroll.engines.pinocchio.joint_tree import AXIS_COLUMN, JointTree
@@ -127,7 +127,7 @@ class MechanismRun(MechanismMotion):
         data, q, v, *_ = self._evaluated()
         inertias = [model.frames[frame].inertia for frame in self.tree.body]
         rows = self.dynamics.constraint_rows(model.createData(), q, v)
-        rank = independent(rows)
+        rank = row_rank(rows)
         accelerations = [
             pin.getFrameClassicalAcceleration(model, data, frame, pin.LOCAL_WORLD_ALIGNED) for frame in self.tree.body
         ]

@@ -6,7 +6,7 @@ from typing import Any
 from proofroll.core.cut_out import CutOut
 from proofroll.core.errors import Refused
 from proofroll.core.integrators import INTEGRATORS
-from proofroll.core.program_text import assigned
+from proofroll.core.program_text import assignment
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.reproducer_source import cut_program
 from proofroll.elements.mechanism.drives import Actuator
@@ -114,7 +114,7 @@ def mechanism_source(run: MechanismRun, settings: PinocchioSettings) -> str:
     instead |= {never: f"{never} = None", "held_points": "def held_points(_, loop):\n    return HELD[loop.name]"}
     uses = ("advance", "motion", "tree", "rows", "at", "residual", "body", "sprung", "springs", "closed", "length")
     cut = CutOut(wanted, uses, instead)
-    numbers = assigned(
+    numbers = assignment(
         START=[part.tolist() for part in mechanism.start()],
         PLACES_OF={joint.name: mechanism.place_of(joint.name) for joint in mechanism.joints if joint.nq == 1},
         HELD={loop.name: held_points(mechanism, loop) for loop in mechanism.loops},

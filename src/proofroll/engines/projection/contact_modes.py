@@ -17,8 +17,8 @@ from proofroll.core.dop853 import Accept
 from proofroll.core.errors import Diverged, Refused
 from proofroll.core.integrators import Integrator
 from proofroll.elements.mechanism import Mechanism
-from proofroll.elements.mechanism.contacts.acting import OPEN, Acting, ContactMode, across, acting, changes
-from proofroll.elements.mechanism.contacts.coulomb import PAINLEVE, solved
+from proofroll.elements.mechanism.contacts.acting import OPEN, Acting, ContactMode, changes, first_mode, slip_velocity
+from proofroll.elements.mechanism.contacts.coulomb import PAINLEVE, contact_forces
 from proofroll.elements.mechanism.contacts.start import closed_and_still, natural_scale
 from proofroll.elements.mechanism.contacts.touching import Moving, Touching, touch
 from proofroll.elements.mechanism.rotations import Array, frame_of_axis
@@ -169,7 +169,7 @@ class ContactMotion(AlternatingMotion[ContactMode]):
 
     def _heading(self, k: int, there: Touching) -> Array:
         """Direction of a slip; after the end of the slip within a step, the direction before."""
-        slip, toward = across(there), self._toward[k]
+        slip, toward = slip_velocity(there), self._toward[k]
         speed = float(np.linalg.norm(slip))
         if speed <= np.finfo(float).tiny:
             return toward
@@ -223,7 +223,7 @@ class ContactMotion(AlternatingMotion[ContactMode]):
             N = float(each.normal @ force[k])
             ends.append(Excess(k, "lift_off", -N))
             if own.kind == "slip" and self.friction[k]:
-                ends.append(Excess(k, "still", -float(across(each) @ self._toward[k])))
+                ends.append(Excess(k, "still", -float(slip_velocity(each) @ self._toward[k])))
             elif own.kind == "stick":
                 beyond = float(np.linalg.norm(force[k] - N * each.normal)) - self.friction[k] * N
                 if beyond > 0 and sum(one.kind == "stick" for one in self.mode) > 1:
@@ -249,9 +249,9 @@ class ContactMotion(AlternatingMotion[ContactMode]):
             self._limit_efforts(x)  # the effort that a servo requires jumps with the velocity
             happened = [("settle" if settles else "impact", self.contacts[k].name)]
             now = self.at(x)
-            still = [bool(np.linalg.norm(across(each)) <= self._still) for each in now.touching]
+            still = [bool(np.linalg.norm(slip_velocity(each)) <= self._still) for each in now.touching]
         elif kind == "still":
-            slips = [float(np.linalg.norm(across(each))) for each in now.touching]
+            slips = [float(np.linalg.norm(slip_velocity(each))) for each in now.touching]
             still = [stuck or own == k or slips[own] <= self._faint for own, stuck in enumerate(still)]
         mode = self._leaving(now, k) if kind == "slip" else self._decided(now, closed, still)
         if kind == "still" and slips[k] > self._still and mode[k].kind == "slip":  # it has turned, not stopped
@@ -304,7 +304,7 @@ class ContactMotion(AlternatingMotion[ContactMode]):
 
     def _law(self, G: Array, c: Array, which: Sequence[int], sliding: Sequence[Array | None]) -> tuple[Array, Any]:
         try:
-            return solved(G, c, self.friction[list(which)], sliding, [self.contacts[k].name for k in which])
+            return contact_forces(G, c, self.friction[list(which)], sliding, [self.contacts[k].name for k in which])
         except Refused as error:
             raise Diverged(f"at t = {self.t if hasattr(self._stepper, 't') else 0.0:.6g} s: {error}") from None
 
@@ -325,7 +325,7 @@ class ContactMotion(AlternatingMotion[ContactMode]):
         force, done = self._law(G, c, which, sliding)
         for place, (frame, k) in enumerate(zip(frames, which, strict=True)):
             own, slides = slice(3 * place, 3 * place + 3), sliding[place]
-            mode[k] = acting(done[place], frame, -force[place, 1:] if slides is None else slides, G[own, own])
+            mode[k] = first_mode(done[place], frame, -force[place, 1:] if slides is None else slides, G[own, own])
         return tuple(mode)
 
 

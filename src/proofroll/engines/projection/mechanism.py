@@ -18,8 +18,8 @@ from proofroll.elements.mechanism.sampling import (
     WITH_AXIS,
     MechanismBuilt,
     MechanismSample,
-    independent,
     mechanism_of,
+    row_rank,
     unsaid,
 )
 from proofroll.elements.mechanism.signal import breaks, varies
@@ -174,7 +174,7 @@ class ProjectionMechanism:
         arm = np.einsum("nij,nj->ni", R, equations.com)
         turning = np.einsum("nij,nj->ni", R, solved.angular)
         ends, rows = equations.connections.ends(bodies), equations.constraint_rows(bodies)
-        rank = independent(rows)
+        rank = row_rank(rows)
         axes = np.full((joints, 3), np.nan)
         for number, joint in enumerate(self._mechanism.joints):
             if joint.kind in WITH_AXIS:

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from proofroll.core.columns import SMALLEST, UNCERTAIN
-from proofroll.core.diagnosis.of_scene import Diagnosis, diagnosed
+from proofroll.core.diagnosis.of_scene import Diagnosis, diagnose_scene
 from proofroll.core.events import Event, events_of
 from proofroll.core.number_format import number
 from proofroll.files.json_data import OPTIONAL
@@ -65,7 +65,7 @@ class RunContent:
 def run_content(case: Case, result: Result, trajectory: Path) -> RunContent:
     """Content of a case and its result; ``trajectory``: path of its stored trajectory."""
     scene = load_scene(case.scene, asks=case.asks, **case.parameters)
-    causes = diagnosed(scene, result.certificate) if result.trajectory is None and result.certificate else []
+    causes = diagnose_scene(scene, result.certificate) if result.trajectory is None and result.certificate else []
     content = RunContent(
         scene=case.scene,
         parameters=dict(scene.parameters),

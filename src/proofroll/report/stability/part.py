@@ -18,7 +18,7 @@ from proofroll.studies.stability.claims import STUDY, Claim, StabilityFile, file
 from proofroll.studies.stability.map import stability_path
 from proofroll.studies.stability.records import StabilityStudy
 from proofroll.studies.stability.study import make_stability
-from proofroll.studies.study_store import kept
+from proofroll.studies.study_store import valid_study
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -61,7 +61,7 @@ class StabilityPart(Part):
         """True if a map is stored; the full one is preferred to quick ones, of all axes or of some."""
         for effort, axes in ((Effort(), self.asked.axes), (QUICK, self.asked.axes), (QUICK, self._quick_axes)):
             path = stability_path(out, self.asked.scene, axes, self.engines, effort)
-            self.study, _ = kept(path, StabilityStudy)
+            self.study, _ = valid_study(path, StabilityStudy)
             if self.study is not None:
                 self.folder = _programs(path)
                 return True

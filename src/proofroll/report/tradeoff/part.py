@@ -20,13 +20,13 @@ from proofroll.running.case import Status
 from proofroll.running.runner import Runner
 from proofroll.studies.claim_judgement import ClaimJudgement
 from proofroll.studies.comparison.planning import point_name
-from proofroll.studies.study_store import kept
+from proofroll.studies.study_store import valid_study
 from proofroll.studies.tradeoff.claims import STUDY, TradeoffClaims, load_claims
 from proofroll.studies.tradeoff.recommend import Answer, by_hand, recommend
 from proofroll.studies.tradeoff.records import CurveBudget, TradeoffStudy
 from proofroll.studies.tradeoff.requirements import Requirements
 from proofroll.studies.tradeoff.study import make_tradeoff
-from proofroll.studies.tradeoff.tradeoff import stored
+from proofroll.studies.tradeoff.tradeoff import study_path
 
 # Tolerances, relative to the quantity's scale, for advice without claims: visible errors, engineering, reference
 # solutions, and orders of methods.
@@ -82,8 +82,8 @@ class TradeoffPart(Part):
 
     def keeps(self, out: Path) -> bool:
         """True if a study is stored; the full one is preferred to a brief one."""
-        paths = (stored(out, self.asked.swept, self.engines, brief=brief) for brief in (False, True))
-        self.study = next((study for path in paths if (study := kept(path, TradeoffStudy)[0]) is not None), None)
+        paths = (study_path(out, self.asked.swept, self.engines, brief=brief) for brief in (False, True))
+        self.study = next((study for path in paths if (study := valid_study(path, TradeoffStudy)[0]) is not None), None)
         return self.study is not None
 
     def make(self, runner: Runner, out: Path, tell: Tell) -> None:

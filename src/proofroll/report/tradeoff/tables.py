@@ -13,7 +13,7 @@ from proofroll.core.number_format import error, number
 from proofroll.report.labels import family_and_caveat, listed, name_of, step, with_caveat
 from proofroll.report.terminal.screen import numeric, plain_table, unbroken
 from proofroll.running.timing import CONFIDENCE
-from proofroll.studies.tradeoff.pareto import tied
+from proofroll.studies.tradeoff.pareto import costs_overlap
 
 if TYPE_CHECKING:
     from proofroll.report.tradeoff.part import Advice
@@ -153,7 +153,7 @@ def front_tables(study: TradeoffStudy, quantities: Sequence[str]) -> Iterator[Ta
 
 
 def _front(study: TradeoffStudy, points: Sequence[MeasuredPoint], quantities: Sequence[str], title: str) -> Table:
-    ties = {cheap.id for cheap, fine in itertools.pairwise(points) if tied(cheap.interval, fine.interval)}
+    ties = {cheap.id for cheap, fine in itertools.pairwise(points) if costs_overlap(cheap.interval, fine.interval)}
     return point_table(study, points, quantities, title, ties)
 
 

@@ -10,7 +10,7 @@ from proofroll.running.idle_workers import Workers
 from proofroll.running.runner import Runner
 from proofroll.running.store import Store
 from proofroll.studies.comparison import compare as comparing
-from proofroll.studies.comparison.default_comparison import BUDGET, compared
+from proofroll.studies.comparison.default_comparison import BUDGET, default_comparison
 from proofroll.studies.comparison.outcome import Outcome
 
 
@@ -38,7 +38,7 @@ def compare(
     """
     workers = Workers()
     if means_scene(name, alone=bool(parameters or budget)):
-        comparison = compared(name, parameters, workers, budget or BUDGET)
+        comparison = default_comparison(name, parameters, workers, budget or BUDGET)
     elif parameters or budget:
         given = next(iter(parameters), "budget")
         raise InputError(given, parameters.get(given, budget), "a comparison file has its own; name a scene instead")

@@ -11,7 +11,7 @@ import numpy as np
 from proofroll.core.arrays import FloatArray, largest_difference
 from proofroll.core.comparison import Band, Comparison
 from proofroll.core.convergence import Limit, floor_of, richardson, scatter_of, tightest
-from proofroll.core.diagnosis.of_scene import diagnosed
+from proofroll.core.diagnosis.of_scene import diagnose_scene
 from proofroll.core.errors import Missing, ProofrollError
 from proofroll.core.verdict import Allowance, Judgement, Refinement, Verdict, judge_curve
 from proofroll.files.trajectory_file import StoredTrajectory
@@ -81,7 +81,7 @@ def evaluate(planned: Plan, results: dict[str, Result], runner: Runner) -> Outco
         )
         if judged_run.verdict == Verdict.DIFFERS:
             true, main = reference.dataset, trajectories[1.0]
-            causes = diagnosed(reference.scene, result.certificate, main, true, run.facts.step, judgements)
+            causes = diagnose_scene(reference.scene, result.certificate, main, true, run.facts.step, judgements)
             judged_run = replace(judged_run, diagnosis=causes)
         judged.append(judged_run)
     judged = [run if run.result.trajectory is None else _with_trajectory(run, held) for run in judged]
@@ -152,7 +152,7 @@ def _absent(run: Planned) -> Run:
 
 def _without_result(run: Planned, point: ComparedPoint, result: Result) -> Run:
     """Row that was refused, failed, or was left out for lack of time, which contradicts no claim."""
-    causes = diagnosed(point.scene, result.certificate, step=run.ladder[1.0].engine.step)
+    causes = diagnose_scene(point.scene, result.certificate, step=run.ladder[1.0].engine.step)
     failed = _run(run, result, diagnosis=causes)
     expected = run.row.expected(run.parameters)
     if failed.verdict in expected or result.status is Status.LEFT_OUT:
@@ -186,11 +186,11 @@ def _judgements(
     facts = run.facts
     assert isinstance(facts, EngineFacts)  # there are trajectories
     reference, trajectories = reference.common_span(trajectories)
-    curves = {factor: run_values.observed(reference, dataset) for factor, dataset in trajectories.items()}
+    curves = {factor: run_values.observables_of(reference, dataset) for factor, dataset in trajectories.items()}
     main = curves[1.0]
     judgements: list[Judgement] = []
     errors: dict[float, dict[str, float]] = {factor: {} for factor in curves if factor != 1}
-    always, given = run_values.always(reference, main), band.bounds | run.row.bound
+    always, given = run_values.always_judged(reference, main), band.bounds | run.row.bound
     for name, curve in main.items():
         tolerance = given.get(name) or always.get(name)
         if tolerance is None:

@@ -13,7 +13,7 @@ from proofroll.core.plugins import engine_names, parse_engine
 from proofroll.core.scene import Scene
 from proofroll.core.verdict import Verdict
 from proofroll.files.scene_file import SceneFile, load_scene, read_scene_file
-from proofroll.running.asking import described, resolve
+from proofroll.running.asking import describe_each, resolve
 from proofroll.running.case import EngineDescription, EngineFacts
 from proofroll.running.idle_workers import Workers
 from proofroll.running.process import processor_seconds
@@ -25,7 +25,7 @@ _CLOSE = "close"
 _BECAUSE = "no file says what to expect of this scene"
 
 
-def compared(
+def default_comparison(
     name: str, parameters: Mapping[str, Any], workers: Workers | None = None, budget: float | None = BUDGET
 ) -> Comparison:
     """Comparison of every able formulation of every installed engine with the truth of a scene; it makes no claims.
@@ -123,7 +123,7 @@ def able(scene: Scene, workers: Workers | None = None, *, first: bool = False) -
 
 def _installed(workers: Workers | None) -> list[EngineDescription]:
     """Descriptions of the installed engines."""
-    return [item for item in described(engine_names(), workers).values() if isinstance(item, EngineDescription)]
+    return [item for item in describe_each(engine_names(), workers).values() if isinstance(item, EngineDescription)]
 
 
 def _reason_for_none(scene: Scene, workers: Workers | None) -> str:

@@ -18,7 +18,7 @@ from proofroll.core.scene import Scene
 from proofroll.core.time_grid import off_grids, time_grid
 from proofroll.core.truth import edge_between
 from proofroll.files.scene_file import SceneFile, load_scene, read_scene_file
-from proofroll.running.asking import described, resolve, resolve_with_truth
+from proofroll.running.asking import describe_each, resolve, resolve_with_truth
 from proofroll.running.case import Case, EngineFacts
 from proofroll.running.idle_workers import Workers
 from proofroll.running.process import processor_seconds
@@ -141,7 +141,7 @@ def plan(comparison: Comparison, engines: Iterable[str] = (), workers: Workers |
         )
     asked = scene_at(comparison, next(iter(comparison.variations(rows[0])), {}))
     resolved, truth_facts = row_facts(comparison, numbered, asked.requires, workers)
-    comparison = settled(comparison)
+    comparison = with_edges(comparison)
     times = time_grid(comparison.until, comparison.every)
     steps = [facts.step if isinstance(facts, EngineFacts) else None for facts in resolved]
     rows = [_fitting(row, step, times) for row, step in zip(rows, steps, strict=True)]
@@ -221,7 +221,7 @@ def require_fit(comparison: Comparison, facts: Sequence[EngineFacts | ProofrollE
     Raises:
         InputError: the first that does not fit.
     """
-    known = described([item.name for item in facts if isinstance(item, EngineFacts)], workers)
+    known = describe_each([item.name for item in facts if isinstance(item, EngineFacts)], workers)
     times = time_grid(comparison.until, comparison.every)
     for point in comparison.combinations():
         ends = product(*(value.edge_between if isinstance(value, Edge) else (value,) for value in point.values()))
@@ -286,7 +286,7 @@ def _case(
     return case_of(comparison.scene, scene, point, facts, comparison.until, comparison.every, **limits)
 
 
-def settled(comparison: Comparison) -> Comparison:
+def with_edges(comparison: Comparison) -> Comparison:
     """The comparison with the value of every edge found.
 
     Raises:

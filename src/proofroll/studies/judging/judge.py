@@ -158,11 +158,13 @@ def judge(
     observed: dict[str, FloatArray] = {}
     if "scene_digest" in dataset.attrs:  # all variables of a run
         reference, cut = reference.common_span({0: dataset})
-        dataset, observed = cut[0], run_values.observed(reference, cut[0])
+        dataset, observed = cut[0], run_values.observables_of(reference, cut[0])
     sure = [str(name) for name, variable in dataset.data_vars.items() if UNCERTAIN not in variable.attrs]
     bounds = _bounds(tolerance, reference, observed, sure)
     compared = [_compared(name, bound, reference, observed, dataset) for name, bound in bounds.items()]
-    further = {name: bound for name, bound in run_values.always(reference, observed).items() if name not in bounds}
+    further = {
+        name: bound for name, bound in run_values.always_judged(reference, observed).items() if name not in bounds
+    }
     unasked = [_compared(name, bound, reference, observed, dataset) for name, bound in further.items()]
     compared += [item for item in unasked if item.judgement.verdict is Verdict.DIFFERS]
     compared.sort(key=lambda item: item.judgement.error / item.judgement.tolerance, reverse=True)
@@ -301,7 +303,7 @@ def _compared(
             known, values = known[1:], values[1:]  # several engines define reactions only after a first step
         if truth_of.dims[-1:] == ("wxyz",):
             values = turned_alike(values, known)
-        run = RunCurve(values, between=run_values.between(reference, name, dataset))
+        run = RunCurve(values, between=run_values.values_off_grid(reference, name, dataset))
         true, scale = TrueCurve(known, float(truth_of.attrs["error_bar"])), _size(reference, name, known, unit)
     judgement = judge_curve(Allowance(name, unit, bound.absolute(scale), scale), run, true)
     return Compared(judgement, _farthest(run.values, true.values, dataset["time"].to_numpy()))

@@ -21,14 +21,14 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
-def always(reference: Reference, names: Iterable[str]) -> dict[str, Tolerance]:
+def always_judged(reference: Reference, names: Iterable[str]) -> dict[str, Tolerance]:
     """Tolerances of the observables that are judged even without one in the file; only differences are shown."""
     items = {name: reference.scene.observables[name] for name in names if reference.scene.observables[name].always}
     end = Tolerance(float(reference.dataset["time"][-1]), False, "s")
     return {name: end if item.role is Role.EVENT else Tolerance(0.5, True) for name, item in items.items()}
 
 
-def observed(reference: Reference, dataset: xr.Dataset) -> dict[str, FloatArray]:
+def observables_of(reference: Reference, dataset: xr.Dataset) -> dict[str, FloatArray]:
     """Observables of an engine's trajectory, by name."""
     curves = observe(reference.scene, dataset)
     for element in reference.scene.elements:
@@ -56,7 +56,7 @@ def on_true_turns(reference: Reference, name: str, values: FloatArray, dataset: 
     return on_turns_of(known, values, name, (dataset, reference.dataset))
 
 
-def between(reference: Reference, name: str, dataset: xr.Dataset) -> tuple[FloatArray, FloatArray] | None:
+def values_off_grid(reference: Reference, name: str, dataset: xr.Dataset) -> tuple[FloatArray, FloatArray] | None:
     """Values of :func:`off_grid` with their true values, where the truth knows them; None: nothing to compare."""
     found = off_grid(reference, name, dataset)
     return None if found is None else (found[1][known := np.isfinite(found[2])], found[2][known])
@@ -93,7 +93,7 @@ def run_curve(
         values,
         own_bar=reference.own_bar(name, dataset),
         sampled_bar=reference.sampled_bar,
-        between=between(reference, name, dataset),
+        between=values_off_grid(reference, name, dataset),
         magnitude=reference.magnitude(name),
         precision=precision,
     )
@@ -101,7 +101,7 @@ def run_curve(
 
 def error(reference: Reference, name: str, values: FloatArray, dataset: xr.Dataset) -> float:
     """Largest distance of an observable from the truth, at the samples and off the grid."""
-    apart = between(reference, name, dataset)
+    apart = values_off_grid(reference, name, dataset)
     on_grid = largest_difference(values, reference.true(name, values).values)
     return on_grid if apart is None else max(on_grid, largest_difference(*apart))
 

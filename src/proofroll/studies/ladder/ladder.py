@@ -18,12 +18,12 @@ from proofroll.core.plugins import engine_names
 from proofroll.core.scene import Scene
 from proofroll.core.time_grid import off_grids, time_grid
 from proofroll.files.scene_file import load_scene
-from proofroll.running.asking import described, resolve, resolve_with_truth
+from proofroll.running.asking import describe_each, resolve, resolve_with_truth
 from proofroll.running.case import Case, EngineFacts, Result, Status
 from proofroll.running.process import WorkerDied
 from proofroll.running.runner import Runner
 from proofroll.running.stopwatch import Stopwatch
-from proofroll.running.timing import ROUNDS, Timing, interleaved
+from proofroll.running.timing import ROUNDS, Timing, time_in_rounds
 from proofroll.studies.cases import case_of, usual_length
 from proofroll.studies.judging import run_values
 from proofroll.studies.judging.reference import Reference
@@ -105,7 +105,7 @@ class Ladder:
         self.quantity = quantity or self.scene.deciding
         require_known("quantity", self.quantity, curves)
         self.unit = self.scene.observables[self.quantity].unit
-        self.engines = described(engines or engine_names(), runner.workers)
+        self.engines = describe_each(engines or engine_names(), runner.workers)
         for error in self.engines.values():
             if isinstance(error, InputError):
                 raise error
@@ -185,7 +185,7 @@ class Ladder:
     def _time(self, progress: Callable[[str], None]) -> None:
         timed = {key: answer.case for key, answer in self.answers.items() if answer.values is not None}
         with Stopwatch(self._runner.workers) as stopwatch:
-            timings = interleaved(
+            timings = time_in_rounds(
                 {key: partial(stopwatch, case) for key, case in timed.items() if case is not None},
                 self._rounds,
                 lambda _: progress("timing"),

@@ -14,7 +14,7 @@ from proofroll.core.multi_element import represents
 from proofroll.core.number_format import number
 from proofroll.core.scene import Scene
 from proofroll.running.case import EngineDescription
-from proofroll.running.timing import Interval, named
+from proofroll.running.timing import Interval, interval_text
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -236,7 +236,6 @@ def need_of_term(
     moved = f"without it the answer moves by {number(change)}, no more than {allowed}"
     if cost is None:
         return Need.FREE, f"{moved}; its price is not known"
-    price = (
-        f"it takes {cost.value:.2f} times as long with it ({cost.low:.2f} … {cost.high:.2f}, {named(cost.confidence)})"
-    )
+    interval = f"{cost.low:.2f} … {cost.high:.2f}, {interval_text(cost.confidence)}"
+    price = f"it takes {cost.value:.2f} times as long with it ({interval})"
     return (Need.NOT_NEEDED if cost.low > _FELT else Need.FREE), f"{moved}; {price}"

@@ -69,7 +69,7 @@ def chosen(axes: Sequence[Axis], names: Sequence[str]) -> list[Axis]:
     return [known[name] for name in dict.fromkeys(names)] if names else list(axes)
 
 
-def thinned(values: Sequence[float], count: int) -> list[float]:
+def evenly_chosen(values: Sequence[float], count: int) -> list[float]:
     """Selection of at most ``count`` of the values, evenly spread, with both ends."""
     if len(values) <= count:
         return list(values)
@@ -102,7 +102,7 @@ class Effort:
         """Values of an axis that are mapped."""
         cut = axis.horizon and self.longest is not None
         values = [value for value in axis.values if value <= self.longest] if cut else axis.values  # type: ignore[operator]
-        return thinned(values, self.values) if self.values else values
+        return evenly_chosen(values, self.values) if self.values else values
 
 
 # A quick map leaves out the longest runs and the finest steps, which take most of the time.

@@ -5,7 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from proofroll.core.element_abilities import WritesPrograms
-from proofroll.core.program_text import FailedRun, imported
+from proofroll.core.program_text import FailedRun, imported_packages
 from proofroll.running.asking import programs
 from proofroll.running.case import Case
 from proofroll.running.idle_workers import Workers
@@ -51,7 +51,7 @@ def with_programs(
         path = folder / f"{_file_name(point)}.py"
         text = element.failure_program(_failed(made, point, case, name, note), engine)
         write_text(path, text)
-        needs = [package for package in imported(text) if package != "sys"]
+        needs = [package for package in imported_packages(text) if package != "sys"]
         points[index] = replace(point, reproducer=str(path), reproducer_needs=needs, reproducer_note=note)
     return replace(study, points=points)
 

@@ -24,7 +24,7 @@ from proofroll.studies.stability.records import (
 )
 from proofroll.studies.stability.reproducers import with_programs
 from proofroll.studies.stability.step_numbers import explanation, step_numbers, values
-from proofroll.studies.study_store import keep, measured
+from proofroll.studies.study_store import conditions_now, keep_study
 
 
 def make_stability(
@@ -50,7 +50,7 @@ def make_stability(
     path = stability_path(folder, asked.scene, axes, engines, effort)
     study = with_programs(stability_map, stability_study(stability_map), path.with_suffix(""), runner.workers)
     study = replace(study, claims=JudgedFile(asked.name, asked.contradictions(study)))
-    keep(study, path)
+    keep_study(study, path)
     return study, path
 
 
@@ -80,7 +80,7 @@ def stability_study(stability_map: StabilityMap) -> StabilityStudy:
         absent=stability_map.absent,
         hosts=hosts(result for point in stability_map.points for result in point.results.values()),
         effort=stability_map.effort,
-        measured=measured(),
+        measured=conditions_now(),
     )
 
 

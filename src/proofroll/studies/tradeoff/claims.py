@@ -13,7 +13,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from proofroll.core.bounds import bounded, require_pair
+from proofroll.core.bounds import require_bounds, require_pair
 from proofroll.core.comparison import Tolerance
 from proofroll.core.engine_abilities import Level
 from proofroll.core.errors import InputError, error_place
@@ -21,7 +21,7 @@ from proofroll.core.plugins import parse_engine
 from proofroll.core.validation import strict, validated
 from proofroll.files.scene_file import load_scene
 from proofroll.files.toml import study_content, study_files
-from proofroll.running.timing import FACTOR, Timing, named, ratio
+from proofroll.running.timing import FACTOR, Timing, interval_text, ratio
 from proofroll.studies.claim_judgement import ClaimJudgement
 from proofroll.studies.tradeoff.curve import Question
 from proofroll.studies.tradeoff.recommend import fits, holding
@@ -132,7 +132,7 @@ class Cheapest:
         cost = ratio(Timing(tuple(best.rounds)), Timing(tuple(rival.rounds)))
         measured = (
             f"{_name(best)} takes {cost.value:.3g} times as long as {_name(rival)} "
-            f"({cost.low:.3g} to {cost.high:.3g}, {named(cost.confidence)})"
+            f"({cost.low:.3g} to {cost.high:.3g}, {interval_text(cost.confidence)})"
         )
         if cost.high <= 1:
             return True, measured
@@ -235,7 +235,7 @@ def _claims(path: Path, given: dict[str, Any]) -> TradeoffClaims:
 
 
 def _check(where: str, file: TradeoffClaims) -> None:
-    bounded("until", file.until, above=0)
+    require_bounds("until", file.until, above=0)
     unit = file.swept.loaded.observable(file.quantity, f"{where}: quantity").unit
     if not (file.cheapest or file.holds or file.converges):
         advice = "the file claims nothing; add [[cheapest]] with tolerance, engine and because"
@@ -249,7 +249,7 @@ def _check(where: str, file: TradeoffClaims) -> None:
                 with error_place(at):
                     parse_engine(text)
             if kind == "holds":
-                bounded(f"{at}.step", claim.step, above=0)
+                require_bounds(f"{at}.step", claim.step, above=0)
             if kind == "converges":
                 require_pair(f"{at}.order", claim.order)
             tolerance = getattr(claim, "tolerance", None)

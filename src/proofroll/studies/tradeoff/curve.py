@@ -240,7 +240,7 @@ def judge_point(points: Sequence[CurvePoint], references: Mapping[float, Referen
 
 def with_errors(point: CurvePoint, reference: Reference, run: xr.Dataset) -> CurvePoint:
     """Point with its observables and their errors; the error of an event is at least half the width of its bracket."""
-    given = run_values.observed(reference, run)
+    given = run_values.observables_of(reference, run)
     curves = {name: values for name, values in given.items() if np.isfinite(reference.true(name, values).error_bar)}
     return replace(
         point,

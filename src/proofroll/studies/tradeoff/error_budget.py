@@ -13,7 +13,15 @@ from typing import NamedTuple
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
-from proofroll.core.convergence import Limit, floor_text, observed_order, richardson, scatter_of, size, tightest
+from proofroll.core.convergence import (
+    Limit,
+    floor_text,
+    largest_magnitude,
+    observed_order,
+    richardson,
+    scatter_of,
+    tightest,
+)
 from proofroll.core.number_format import number
 from proofroll.core.observable import Observable, Role
 from proofroll.core.verdict import round_off_of
@@ -92,7 +100,7 @@ def budget(
         )
     values = [point.curves[quantity] for point in used]
     steps = [point.step or 0.0 for point in used]
-    differences = [size(a - b) for a, b in itertools.pairwise(values)]
+    differences = [largest_magnitude(a - b) for a, b in itertools.pairwise(values)]
     if curve.fixed_step:
         scatter = scatter_of(curve.facts.precision, magnitude, used[-1].case.until / steps[-1])
         limit = richardson(values[-3:], steps[-3:], curve.facts.order, scatter)
@@ -114,7 +122,7 @@ def budget(
         floor = single.error
     if curve.facts.precision == "single":
         limit = replace(limit, error_bar=max(limit.error_bar, floor or 0.0, round_off_of("single", magnitude)))
-    model_form, error = size(limit.values - true), used[-1].errors[quantity]
+    model_form, error = largest_magnitude(limit.values - true), used[-1].errors[quantity]
     first, departure = _coarse_end(curve, quantity, every, limit) or (used[0], values[0] - limit.values)
     coarse, fine = (_dominant(away, limit, model_form, floor, bar) for away in (departure, values[-1] - limit.values))
     budget_of_curve = replace(
@@ -216,7 +224,7 @@ def _coarse_end(curve: Curve, quantity: str, every: float, limit: Limit) -> tupl
 def _dominant(departure: FloatArray, limit: Limit, model_form: float, floor: float | None, truth: float) -> str:
     """Name of the dominating part of the error of a run with this departure from the limit of small steps."""
     # While runs still approach one another, the uncertainty of the limit counts as error of the time step.
-    time_step = max(size(departure), limit.error_bar if floor is None else 0.0)
+    time_step = max(largest_magnitude(departure), limit.error_bar if floor is None else 0.0)
     parts = {TIME_STEP: time_step, TRUTH: truth, FLOOR: floor or 0.0}
     # A limit that differs from the truth by no more than its uncertainty shows no error of the model.
     parts[MODEL_FORM] = model_form if model_form > limit.error_bar + truth else 0.0

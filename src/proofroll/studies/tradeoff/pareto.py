@@ -27,7 +27,7 @@ def envelope(errors: Sequence[float], floor: int | None = None) -> list[float]:
     return [*held, *errors[last:]]
 
 
-def tied(one: Sequence[float] | None, other: Sequence[float] | None) -> bool:
+def costs_overlap(one: Sequence[float] | None, other: Sequence[float] | None) -> bool:
     """True if the intervals (low, high) of two costs overlap; False if one is missing."""
     return one is not None and other is not None and one[0] <= other[1] and other[0] <= one[1]
 

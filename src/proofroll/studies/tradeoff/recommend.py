@@ -9,7 +9,7 @@ from proofroll.core.errors import InputError
 from proofroll.core.plugins import parse_engine
 from proofroll.files.json_data import MERGED, OPTIONAL
 from proofroll.studies.study_store import Measured
-from proofroll.studies.tradeoff.pareto import tied
+from proofroll.studies.tradeoff.pareto import costs_overlap
 from proofroll.studies.tradeoff.records import MeasuredPoint, TradeoffStudy
 from proofroll.studies.tradeoff.requirements import MARGIN, Requirements, absolute_tolerance, failure_reason
 
@@ -149,7 +149,7 @@ def recommend(study: TradeoffStudy, required: Requirements) -> Recommendation:
         tolerance=absolute,
         margin=MARGIN,
         choice=chosen(choice),
-        ties=[tie for p in others if choice and tied(p.interval, choice.interval) and (tie := chosen(p))],
+        ties=[tie for p in others if choice and costs_overlap(p.interval, choice.interval) and (tie := chosen(p))],
         runner_up=chosen(next((p for p in others if choice and _model(p) != _model(choice)), None)),
         first_failure=chosen(failing, why_not(failing) or "") if failing is not None else None,
         least_model=None if hand is not None and choice is not None and hand.id == choice.id else chosen(hand),

@@ -16,7 +16,7 @@ from proofroll.running.runner import Runner
 from proofroll.running.time_budget import TimeBudget
 from proofroll.running.timing import Timing, write_benchmarks
 from proofroll.studies.claim_judgement import JudgedFile
-from proofroll.studies.study_store import keep, measured
+from proofroll.studies.study_store import conditions_now, keep_study
 from proofroll.studies.tradeoff.claims import TradeoffClaims
 from proofroll.studies.tradeoff.curve import Curve, CurvePoint, Question
 from proofroll.studies.tradeoff.error_budget import budget
@@ -32,7 +32,7 @@ from proofroll.studies.tradeoff.records import (
     TruthCost,
 )
 from proofroll.studies.tradeoff.sweep import BROKEN
-from proofroll.studies.tradeoff.tradeoff import Tradeoff, pareto_entries, stored, tradeoff
+from proofroll.studies.tradeoff.tradeoff import Tradeoff, pareto_entries, study_path, tradeoff
 
 
 def make_tradeoff(
@@ -81,8 +81,8 @@ def make_tradeoff(
         judged.undecided(study) if judged else [],
     )
     study = dataclasses.replace(study, engines=sorted(engines), claims=judgement)
-    path = stored(folder, question, engines, brief=outcome.brief)
-    keep(study, path)
+    path = study_path(folder, question, engines, brief=outcome.brief)
+    keep_study(study, path)
     timings = {
         f"{curve.engine} {point.step or ''}".strip(): point.timing
         for curve in outcome.curves
@@ -128,7 +128,7 @@ def tradeoff_study(outcome: Tradeoff) -> TradeoffStudy:
         over=outcome.over,
         findings=_conclusions(outcome, budgets),
         brief=outcome.brief,
-        measured=measured(),
+        measured=conditions_now(),
     )
     return record(TradeoffStudy, plain(study))
 

@@ -11,7 +11,7 @@ from proofroll.core.engine_abilities import offered
 from proofroll.core.errors import InputError, ProofrollError
 from proofroll.core.plugins import EngineSpec, engine_names, parse_engine
 from proofroll.core.verdict import round_off_of
-from proofroll.running.asking import described, resolve, resolve_with_truth
+from proofroll.running.asking import describe_each, resolve, resolve_with_truth
 from proofroll.running.case import Case, EngineDescription, EngineFacts, Result, Status
 from proofroll.running.idle_workers import Workers
 from proofroll.running.runner import Runner
@@ -56,7 +56,7 @@ def curves_of(
     wanted: list[tuple[str, str | None]] = []
     absent: dict[str, str] = {}
     asked = [(text, parse_engine(text)) for text in list(engines) or engine_names()]
-    descriptions = described((spec.name for _, spec in asked), workers)
+    descriptions = describe_each((spec.name for _, spec in asked), workers)
     for text, spec in asked:
         answer = descriptions[spec.name]
         if isinstance(answer, InputError):

@@ -22,7 +22,7 @@ from proofroll.running.idle_workers import Workers
 from proofroll.running.runner import Runner
 from proofroll.running.stopwatch import Stopwatch
 from proofroll.running.time_budget import TimeBudget
-from proofroll.running.timing import ROUNDS, Timing, interleaved
+from proofroll.running.timing import ROUNDS, Timing, time_in_rounds
 from proofroll.studies.judging.reference import Reference
 from proofroll.studies.tradeoff.curve import Curve, CurvePoint, Question, judge_point
 from proofroll.studies.tradeoff.pareto import front
@@ -148,7 +148,7 @@ def _time(
     cases[truth.key] = truth
     seconds = BRIEF_SECONDS if tradeoff.brief else None
     with Stopwatch(workers) as stopwatch:
-        timings = interleaved(
+        timings = time_in_rounds(
             {key: partial(stopwatch, case, seconds) for key, case in cases.items()},
             min(rounds, BRIEF_ROUNDS) if tradeoff.brief else rounds,
             once_above=BRIEF_ONCE if tradeoff.brief else ONCE,
@@ -219,7 +219,7 @@ def pareto_entries(curves: Iterable[Curve], quantity: str) -> list[tuple[CurvePo
     return entries
 
 
-def stored(folder: Path, question: Question, engines: Sequence[str] = (), *, brief: bool = False) -> Path:
+def study_path(folder: Path, question: Question, engines: Sequence[str] = (), *, brief: bool = False) -> Path:
     """File of a question's study below the folder of results; brief and restricted studies have their own."""
     scene = question.loaded
     parts = [[scene.digest, question.until], *([sorted(engines)] if engines else [])]
@@ -227,8 +227,8 @@ def stored(folder: Path, question: Question, engines: Sequence[str] = (), *, bri
     return folder / "tradeoff" / f"{'-'.join([scene.name, *digests])}{'-brief' if brief else ''}.json"
 
 
-def restricted(folder: Path, question: Question) -> list[Path]:
+def restricted_paths(folder: Path, question: Question) -> list[Path]:
     """Files of the studies of a question that are restricted to some engines."""
-    whole = stored(folder, question)
+    whole = study_path(folder, question)
     paths = whole.parent.glob(f"{whole.stem}-*.json")
     return sorted(path for path in paths if not path.stem.endswith("-brief") and path.suffixes == [".json"])

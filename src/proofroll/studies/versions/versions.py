@@ -18,7 +18,7 @@ from proofroll.running.asking import describe
 from proofroll.running.case import EngineDescription, Status, hosts
 from proofroll.running.runner import Runner
 from proofroll.running.stopwatch import Stopwatch
-from proofroll.running.timing import Interval, interleaved, ratio
+from proofroll.running.timing import Interval, ratio, time_in_rounds
 from proofroll.studies.comparison import default_comparison as first_look
 from proofroll.studies.comparison.compare import evaluate
 from proofroll.studies.comparison.outcome import Outcome, Run
@@ -67,7 +67,7 @@ def _rows_of(comparison: Comparison, engine: str) -> list[Row]:
 
 def _of_scene(name: str, engine: str) -> Comparison:
     """Rows of one engine in the default comparison of a scene."""
-    looked = first_look.compared(name, {})
+    looked = first_look.default_comparison(name, {})
     rows = _rows_of(looked, engine)
     if not rows:
         why = f"no comparison about {name} has rows of it, and no formulation of it that is installed here can"
@@ -152,7 +152,7 @@ class VersionsStudy:
     lost: list[str]
 
 
-def compared(
+def compare_versions(
     sides: tuple[str, str],
     comparisons: Sequence[Comparison],
     runner: Runner,
@@ -253,7 +253,7 @@ def _speeds(
         for key, (before, after) in chosen.items():
             assert before.case is not None  # both ran
             assert after.case is not None
-            timings = interleaved({"old": partial(watch, before.case), "new": partial(watch, after.case)}, rounds)
+            timings = time_in_rounds({"old": partial(watch, before.case), "new": partial(watch, after.case)}, rounds)
             progress(f"timing {key[1]}")
             if timings.keys() == {"old", "new"} and len(timings["old"].values) == len(timings["new"].values):
                 speeds[key] = ratio(timings["new"], timings["old"])

@@ -26,7 +26,7 @@ _NEAR = 0.01
 _POINTS, _WEIGHTS = (1 + np.polynomial.legendre.leggauss(3)[0]) / 2, np.polynomial.legendre.leggauss(3)[1] / 2
 
 
-def pressed(body: RollingBall, p_WB: FloatArray, v_WB: FloatArray) -> float:
+def normal_force_per_mass(body: RollingBall, p_WB: FloatArray, v_WB: FloatArray) -> float:
     """Normal force divided by mass that keeps the centre on its surface [m/s²]."""
     e1, bend = body.surface.normal(p_WB), body.surface.normal_gradient(p_WB)
     return float(e1 @ body.gravity + v_WB @ bend @ v_WB)
@@ -63,7 +63,7 @@ class Landed:
     slip: FloatArray | None
 
 
-def landed(body: RollingBall, route: Route, flight: Leg) -> Bounce | Landed | None:
+def landing_outcome(body: RollingBall, route: Route, flight: Leg) -> Bounce | Landed | None:
     """Outcome of a landing: a bounce, or lasting contact.
 
     A ball that leaves each impact with e times its speed bounces infinitely often in a finite time. Below the speed
@@ -87,7 +87,7 @@ def landed(body: RollingBall, route: Route, flight: Leg) -> Bounce | Landed | No
     natural = np.sqrt(body.ball.radius * np.linalg.norm(body.gravity))
     p, v, w = flight.at_end()
     e1 = body.surface.normal(p)
-    approach, weight = float(v @ e1), pressed(body, p, v - (v @ e1) * e1)
+    approach, weight = float(v @ e1), normal_force_per_mass(body, p, v - (v @ e1) * e1)
     if e * approach > _LOW * natural or weight < 0:
         return Bounce((p, *route.impact(body, p, v, w, e, e_t)), bool(e * approach > _SEEN * natural))
     bounced = np.isinf(body.contact.mu_static) and e_t == 1 and 0 < e < 1
@@ -119,7 +119,7 @@ def _slip(body: RollingBall, v: FloatArray, w: FloatArray, e1: FloatArray) -> Fl
     return slip if size > _STANDS * (np.sqrt(a * gravity) + np.linalg.norm(v) + a * np.linalg.norm(w)) else None
 
 
-def flown(body: RollingBall, world: World, time: float, until: float, state: FloatArray) -> Leg:
+def fly(body: RollingBall, world: World, time: float, until: float, state: FloatArray) -> Leg:
     """Free fall from ``time`` [s] with constant spin until the ball lands, or to ``until`` [s].
 
     ``world``: position, velocity and spin at take-off. ``state``: the same in the route's variables, handed on to the

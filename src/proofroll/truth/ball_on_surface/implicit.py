@@ -17,7 +17,7 @@ from proofroll.elements.ball_on_surface.motion import BallMotion
 from proofroll.truth.ball_on_surface import unreduced_taylor
 from proofroll.truth.ball_on_surface.contact import ContactRates
 from proofroll.truth.ball_on_surface.impact import by_equations
-from proofroll.truth.ball_on_surface.route import End, Leg, Route, World, joined
+from proofroll.truth.ball_on_surface.route import End, Leg, Route, World, join_motions
 from proofroll.truth.collocation import Step, System, next_length, nodes, take
 
 _TOLERANCE = 1e-13  # of a step, relative to the scale of each variable
@@ -109,7 +109,7 @@ class Implicit(Route):
         early = walk.leg(self, True, begun, y, End.TIME).motion
 
         def motion(times: FloatArray) -> BallMotion:
-            return joined(times, [(-np.inf, early), (begun, lambda late: self.motion(at(late), True))], self.name)
+            return join_motions(times, [(-np.inf, early), (begun, lambda late: self.motion(at(late), True))], self.name)
 
         return Leg(walk.start, end, True, at(np.array([end]))[0], End.CONE if slips else End.TIME, motion)
 

@@ -7,7 +7,7 @@ import numpy as np
 from proofroll.core.arrays import FloatArray
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.surfaces import Cylinder
-from proofroll.truth.ball_on_surface.flight import pressed
+from proofroll.truth.ball_on_surface.flight import normal_force_per_mass
 from proofroll.truth.ball_on_surface.route import End
 from proofroll.truth.ball_on_surface.stick_slip import first_route
 from proofroll.truth.ball_on_surface.switching import follow
@@ -41,7 +41,7 @@ def _carries(body: RollingBall, p_WB: FloatArray, v_WB: FloatArray) -> bool:
     """True if friction, pointing straight up along the surface, could carry the weight."""
     e1 = body.surface.normal(p_WB)
     weight = np.linalg.norm(body.gravity - float(e1 @ body.gravity) * e1)
-    return bool(body.contact.mu_kinetic * pressed(body, p_WB, v_WB) >= weight)
+    return bool(body.contact.mu_kinetic * normal_force_per_mass(body, p_WB, v_WB) >= weight)
 
 
 def analytic_boundaries(body: RollingBall, speeds: FloatArray) -> tuple[FloatArray, FloatArray] | None:

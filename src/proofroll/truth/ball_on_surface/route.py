@@ -122,7 +122,7 @@ class Route(ABC):
         return np.asarray(state + span / 6 * (k1 + 2 * k2 + 2 * k3 + k4))
 
 
-def joined(times: FloatArray, parts: Sequence[tuple[float, Motion]], route: str) -> BallMotion:
+def join_motions(times: FloatArray, parts: Sequence[tuple[float, Motion]], route: str) -> BallMotion:
     """Motion at rising times [s]: each by the last part that has started; parts are (start [s], motion)."""
     index = np.searchsorted([start for start, _ in parts], times, side="right") - 1
     columns = {key: np.empty((len(times), 3)) for key in ("p_WB", "v_WB", "w_WB", "force")}
@@ -152,7 +152,7 @@ class Path:
 
     def motion(self, times: FloatArray, route: str) -> BallMotion:
         """Motion at rising ``times`` [s]; the time of an event belongs to the later leg."""
-        return joined(times, [(leg.start, leg.motion) for leg in self.legs], route)
+        return join_motions(times, [(leg.start, leg.motion) for leg in self.legs], route)
 
     def sticking(self, times: FloatArray) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
         """Mask of the ``times`` [s] at which the ball sticks, shape (n,)."""

@@ -9,7 +9,7 @@ from proofroll.core.arrays import FloatArray
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.motion import BallMotion
 from proofroll.truth.ball_on_surface.impact import by_coefficients
-from proofroll.truth.ball_on_surface.route import End, Leg, Route, World, joined
+from proofroll.truth.ball_on_surface.route import End, Leg, Route, World, join_motions
 
 _FLOOR = 1e-6  # |u| below which the rest of a slip is extrapolated, relative to |u| at the handover
 _BEGUN = 1e-8  # smallest handover of a slip that does not start from rest, relative to its initial |u|
@@ -122,7 +122,7 @@ class Sliding(Route):
             return self._motion(y[:, :5], np.exp(y[:, 5]), y[:, 6])
 
         def motion(times: FloatArray) -> BallMotion:
-            return joined(times, [(-np.inf, creeping), (creep.end, slipping)], self.name)
+            return join_motions(times, [(-np.inf, creeping), (creep.end, slipping)], self.name)
 
         y = self._stood_still(run.last) if run.why is End.STILL else run.last
         if run.why is End.TIME or y[7] >= until:

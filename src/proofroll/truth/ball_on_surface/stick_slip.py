@@ -22,7 +22,7 @@ from proofroll.truth.ball_on_surface.orientation import MATRICES, QUATERNIONS, Q
 from proofroll.truth.ball_on_surface.polar import Polar
 from proofroll.truth.ball_on_surface.route import Path, Route
 from proofroll.truth.ball_on_surface.switching import follow
-from proofroll.truth.conditioning import MOVE, Story, in_common, unmoved
+from proofroll.truth.conditioning import MOVE, Story, in_common, well_posed_events
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -48,8 +48,8 @@ def stick_slip(scene: Scene, times: FloatArray) -> tuple[xr.Dataset, list[Event]
         Dataset of :func:`.error_bars.dataset_of`, each variable with the attribute ``error_bar`` in its own unit, and
         ``sticking`` (bool per sample; a sample at an event belongs to the later leg); events up to the last sample,
         each with a bracket that contains both routes. If relative changes of the parameters by
-        :data:`proofroll.truth.conditioning.MOVE` (:func:`moved`) change the events, the attribute ``ill_posed`` says
-        from which time on; only earlier events are returned, and the error bars cover the difference of the routes.
+        :data:`proofroll.truth.conditioning.MOVE` (:func:`with_changes`) change the events, the attribute ``ill_posed``
+        says from which time on; only earlier events are returned, and error bars cover the difference of the routes.
 
     Raises:
         Diverged: a route could not be integrated.
@@ -93,7 +93,7 @@ def stick_slip(scene: Scene, times: FloatArray) -> tuple[xr.Dataset, list[Event]
     return result, events
 
 
-def moved(body: RollingBall, part: float) -> RollingBall:
+def with_changes(body: RollingBall, part: float) -> RollingBall:
     """Ball with friction, rolling resistance, restitution and gravity changed by this relative amount or less.
 
     Zero stays zero, and a restitution of 1 stays 1. The amounts differ, so that two changes cannot cancel.
@@ -115,7 +115,7 @@ def moved(body: RollingBall, part: float) -> RollingBall:
 
 
 def _unmoved(body: RollingBall, own: Path, pace: float, until: float) -> tuple[int, bool]:
-    """See :func:`proofroll.truth.conditioning.unmoved`; by the second route, which takes few steps near an edge."""
+    """See :func:`~proofroll.truth.conditioning.well_posed_events`; the second route takes few steps near an edge."""
     contact = body.contact
     if always_pressed(body) and not (body.gap0 or contact.rolling_resistance or np.isfinite(contact.mu_static)):
         return len(own.events), True  # nothing can switch
@@ -130,10 +130,10 @@ def _unmoved(body: RollingBall, own: Path, pace: float, until: float) -> tuple[i
         return Story(path.events, states)
 
     try:
-        others = [follow(ball, Implicit(ball), until) for ball in (moved(body, -MOVE), moved(body, MOVE))]
+        others = [follow(ball, Implicit(ball), until) for ball in (with_changes(body, -MOVE), with_changes(body, MOVE))]
     except (Diverged, Refused):
         return 0, False  # a changed ball has no known motion to the end
-    return unmoved(story(own), [story(path) for path in others], pace, until)
+    return well_posed_events(story(own), [story(path) for path in others], pace, until)
 
 
 def _dataset(scene: Scene, times: FloatArray, path: Path, route: str, quadrature: Quadrature) -> xr.Dataset:

@@ -12,11 +12,16 @@ import numpy as np
 from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Refused
 from proofroll.elements.ball_on_surface.events import EventKind
-from proofroll.elements.ball_on_surface.mechanics import natural_acceleration, setting_off, stands, stays
+from proofroll.elements.ball_on_surface.mechanics import (
+    can_rest,
+    natural_acceleration,
+    resistance_undirected,
+    setting_off,
+)
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.motion import BallMotion
 from proofroll.truth import hybrid
-from proofroll.truth.ball_on_surface.flight import Bounce, flown, landed, pressed
+from proofroll.truth.ball_on_surface.flight import Bounce, fly, landing_outcome, normal_force_per_mass
 from proofroll.truth.ball_on_surface.route import End, Leg, Path, Route, World
 from proofroll.truth.hybrid import Transition
 
@@ -80,18 +85,18 @@ class SwitchedBall:
         if body.gap0:
             return Transition(state, Mode(flight=(body.p0, body.v0, body.w0)), ())
         # A route's state lacks an initial slip and the velocity that goes with it; hence ``body.v0``.
-        if stands(body, body.v0) and not np.any(body.slip0):
-            if stays(body, body.p0):
+        if resistance_undirected(body, body.v0) and not np.any(body.slip0):
+            if can_rest(body, body.p0):
                 return Transition(state, RESTS, ())
             state = route.nudged(state, setting_off(body, body.p0))
-        if pressed(body, body.p0, body.v0) < -_OFF_WALL * natural_acceleration(body):
+        if normal_force_per_mass(body, body.p0, body.v0) < -_OFF_WALL * natural_acceleration(body):
             return Transition(state, Mode(flight=(body.p0, body.v0, body.w0)), (("lift_off", ""),))
         return self._touching(state, body.slip0 if np.any(body.slip0) else None)
 
     def walk(self, time: float, state: FloatArray, mode: Mode, until: float) -> Leg:
         """See the protocol."""
         if mode.flight is not None:
-            leg = flown(self.body, mode.flight, time, until, state)
+            leg = fly(self.body, mode.flight, time, until, state)
         elif mode.rests:
             leg = _rest(self.body, self.route, state, time, until)
         elif mode.sticking:
@@ -130,7 +135,7 @@ class SwitchedBall:
         return Transition(state, Mode() if slips else ROLLS, (("slip" if slips else "stick", ""),))
 
     def _landed(self, leg: Leg) -> Transition[Mode]:
-        outcome = landed(self.body, self.route, leg)
+        outcome = landing_outcome(self.body, self.route, leg)
         if outcome is None:
             return Transition(leg.state, None, ())
         if isinstance(outcome, Bounce):
@@ -170,7 +175,7 @@ def _comes_to_rest(body: RollingBall, route: Route, leg: Leg) -> bool:
     p, v, _ = route.world(leg.state)
     speed = np.sqrt(body.ball.radius * np.linalg.norm(body.gravity)) + np.linalg.norm(body.v0)
     settled = leg.why is End.STILL and np.linalg.norm(v) <= _AT_REST * speed
-    return body.contact.rolling_resistance > 0 and bool(leg.why is End.HALT or settled) and stays(body, p)
+    return body.contact.rolling_resistance > 0 and bool(leg.why is End.HALT or settled) and can_rest(body, p)
 
 
 def _rest(body: RollingBall, route: Route, state: FloatArray, time: float, until: float) -> Leg:

@@ -11,7 +11,7 @@ from proofroll.elements.mechanism.drives import MODES
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.elements.mechanism.switches import HOLDING, REDUNDANT, STOPPED, Mode, SwitchedJoint
 from proofroll.truth.hybrid import Stretch, Transition
-from proofroll.truth.mechanism.joint_stretches import JointStretches, guard_values, noise_of, turned
+from proofroll.truth.mechanism.joint_stretches import JointStretches, guard_values, noise_of, reversed_mode
 from proofroll.truth.mechanism.maximal_coordinates import NumericEquations
 from proofroll.truth.mechanism.maximal_equations import Switched
 from proofroll.truth.mechanism.stretches import StretchLaw
@@ -59,7 +59,10 @@ class SwitchedBodies(JointStretches):
         speed = abs(float(self._along(last)[1][which]))
         state, margin = self._struck(last, leg.mode, which, joint.restitution)
         if self._settles(which, speed, joint.restitution):
-            laws = (self.equations.switched(state[:-1], self.switched(m)) for m in (turned(leg.mode, which), leg.mode))
+            laws = (
+                self.equations.switched(state[:-1], self.switched(m))
+                for m in (reversed_mode(leg.mode, which), leg.mode)
+            )
             pull, falling = (abs(float(self._accelerations(law, state)[which])) for law in laws)
             delay = self._bouncing(speed * joint.restitution, pull, joint.restitution, falling)
             state, margin = self._struck(last, leg.mode, which, 0.0)

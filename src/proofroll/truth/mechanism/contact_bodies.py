@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator, Sequence
 import numpy as np
 
 from proofroll.core.errors import NotUnique, Refused
-from proofroll.elements.mechanism.contacts.acting import OPEN, Acting, ContactMode, Direction, across, acting
+from proofroll.elements.mechanism.contacts.acting import OPEN, Acting, ContactMode, Direction, first_mode, slip_velocity
 from proofroll.elements.mechanism.contacts.start import closed_and_still
 from proofroll.elements.mechanism.contacts.touching import Touching
 from proofroll.elements.mechanism.rotations import Array, cross, frame_of_axis
@@ -145,7 +145,7 @@ class ContactBodies(ContactStretches):
             ways = np.linalg.solve(root, J.T @ frame)
             if joints.size:
                 ways = ways - joints @ np.linalg.lstsq(joints, ways, rcond=RANK)[0]
-            modes.append(acting("stick", frame, np.zeros(2), ways.T @ ways) if shut else OPEN)
+            modes.append(first_mode("stick", frame, np.zeros(2), ways.T @ ways) if shut else OPEN)
         return modes
 
     def _tried(
@@ -185,7 +185,7 @@ class ContactBodies(ContactStretches):
         if own.kind == "open":
             return
         if not still or not (mu or bound):
-            u = across(bodies.touching[k])
+            u = slip_velocity(bodies.touching[k])
             x, y, z = (u / (float(np.linalg.norm(u)) or 1.0)).tolist()
             yield Acting("slip", None if own.along is None else (x, y, z), (x, y, z))
             return

@@ -7,7 +7,7 @@ import numpy as np
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Refused
-from proofroll.elements.mechanism.contacts.acting import FAINT, Acting, ContactMode, across, heading_of
+from proofroll.elements.mechanism.contacts.acting import FAINT, Acting, ContactMode, heading_of, slip_velocity
 from proofroll.elements.mechanism.contacts.geometry import BodyContact
 from proofroll.elements.mechanism.contacts.joint_laws import JointContact
 from proofroll.elements.mechanism.contacts.touching import Touching
@@ -82,7 +82,7 @@ def guard_value(
 def _stopping(own: Acting, touch: Touching) -> float:
     """Guard of the end of a slip [m/s]: minus the speed along a known line; in the plane, FAINT minus the speed."""
     if own.along is None:
-        return FAINT - float(np.linalg.norm(across(touch)))
+        return FAINT - float(np.linalg.norm(slip_velocity(touch)))
     return -float(heading_of(own, touch) @ touch.slide)
 
 
@@ -107,7 +107,7 @@ def noise_of(guards: Sequence[ContactGuard], size: float) -> FloatArray:
 
 def faint_time(touch: Touching, slide_rate: Array) -> float:
     """Time until a slip stops at its present rate [s]."""
-    u = across(touch)
+    u = slip_velocity(touch)
     return max(0.0, -float(u @ slide_rate) / float(slide_rate @ slide_rate))
 
 

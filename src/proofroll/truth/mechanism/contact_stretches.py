@@ -11,12 +11,12 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
-from proofroll.elements.mechanism.contacts.acting import FAINT, OPEN, Acting, ContactMode, across, changes
+from proofroll.elements.mechanism.contacts.acting import FAINT, OPEN, Acting, ContactMode, changes, slip_velocity
 from proofroll.elements.mechanism.contacts.touching import Touching
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.elements.mechanism.signal import varies
-from proofroll.truth.hybrid import Stretch, Transition, between
+from proofroll.truth.hybrid import Stretch, Transition, states_at
 from proofroll.truth.mechanism.contact_guards import (
     AT_REST,
     STANDS,
@@ -151,7 +151,7 @@ class ContactStretches(Stretches[ContactMode]):
             return faint_time(touching[k], self._solved(y, now).slide_rate[k]) * self._equations.rate(y, now)
 
         for _ in range(_MOST_DECAYS):
-            if np.linalg.norm(across(self._touching(state)[k])) < _NOTHING:
+            if np.linalg.norm(slip_velocity(self._touching(state)[k])) < _NOTHING:
                 break
             one = decay(state)
             two = decay(state + _DECAY / 2 * one)
@@ -164,7 +164,7 @@ class ContactStretches(Stretches[ContactMode]):
         solved, wait = self._solved(state, mode), 0.0
         for k, own in enumerate(mode):
             begins = own.kind == "slip" and own.along is None and self.contacts[k].friction
-            if begins and np.linalg.norm(across(solved.touching[k])) < FAINT:
+            if begins and np.linalg.norm(slip_velocity(solved.touching[k])) < FAINT:
                 wait = max(wait, 2 * FAINT / float(np.linalg.norm(solved.slide_rate[k])))
         return (state, time) if not wait else (state + wait * self._equations.rate(state, mode), time + wait)
 
@@ -173,7 +173,7 @@ class ContactStretches(Stretches[ContactMode]):
         if not leg.visited:
             return np.array([leg.first for _ in times])
         law = self._law(leg.first, leg.mode)
-        return between(lambda _, y: law.rates(y), leg.visited, times, self._tolerance, law.corrected)
+        return states_at(lambda _, y: law.rates(y), leg.visited, times, self._tolerance, law.corrected)
 
     def change(self, leg: Stretch[ContactMode]) -> Transition[ContactMode]:
         """See the protocol."""
@@ -200,7 +200,7 @@ class ContactStretches(Stretches[ContactMode]):
         """
         closed, solved = [own.kind != "open" for own in leg.mode], self._solved(leg.last, leg.mode)
         slides = [k for k, own in enumerate(leg.mode) if own.kind == "slip"]
-        slips = np.linalg.norm([across(solved.touching[k]) for k in slides], axis=1)
+        slips = np.linalg.norm([slip_velocity(solved.touching[k]) for k in slides], axis=1)
         if slips.max() <= FAINT:
             ended = self._after(leg, leg.last, closed, (), stopped=FAINT)
             if ended.mode is not None and self._stands(ended.state, ended.mode):
@@ -218,7 +218,7 @@ class ContactStretches(Stretches[ContactMode]):
         stopped: float = STOPPED,
     ) -> Transition[ContactMode]:
         """Transition to the mode that follows from the forces; contacts not faster than ``stopped`` are at rest."""
-        slips = [float(np.linalg.norm(across(each))) for each in self._touching(state)]
+        slips = [float(np.linalg.norm(slip_velocity(each))) for each in self._touching(state)]
         still = [shut and slip <= stopped for shut, slip in zip(closed, slips, strict=True)]
         state = self._equations.eliminated(state, modes_of(closed, still))
         mode, sure = self._decided(state, closed, still)
@@ -237,7 +237,7 @@ class ContactStretches(Stretches[ContactMode]):
 
 def _headed(own: Acting, touch: Touching) -> Acting:
     """Mode of a contact with the present direction of its slip in the plane, however slow."""
-    slip = across(touch)
+    slip = slip_velocity(touch)
     if own.kind != "slip" or own.along is not None or not slip.any():
         return own
     x, y, z = (slip / np.linalg.norm(slip)).tolist()

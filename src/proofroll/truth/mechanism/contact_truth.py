@@ -5,7 +5,7 @@ import numpy as np
 from proofroll.elements.mechanism.contacts.acting import kinds
 from proofroll.elements.mechanism.contacts.dynamics import ContactDynamics
 from proofroll.elements.mechanism.model import Mechanism
-from proofroll.elements.mechanism.record import gathered
+from proofroll.elements.mechanism.record import record_of
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.elements.mechanism.signal import breaks
 from proofroll.truth.hybrid import states_of
@@ -15,7 +15,7 @@ from proofroll.truth.mechanism.contact_tree import ContactTree
 from proofroll.truth.mechanism.maximal_coordinates import MaximalCoordinates
 from proofroll.truth.mechanism.natural_units import Units, natural_units
 from proofroll.truth.mechanism.two_paths import TOLERANCES, followed, refuse_uncovered, two_route_motion
-from proofroll.truth.mechanism.two_routes import TwoRouteMotion, check_start, matched
+from proofroll.truth.mechanism.two_routes import TwoRouteMotion, check_start, on_same_turns
 
 
 def contact_truth(mechanism: Mechanism, times: Array) -> TwoRouteMotion:
@@ -49,14 +49,14 @@ def _in_units(mechanism: Mechanism, units: Units, times: Array) -> TwoRouteMotio
         dynamics.sample(*dynamics.parts(state)[:2], paths[0].legs[number].mode, float(state[-1]))
         for state, number in zip(states_of(tree, paths[0], times, legs), legs, strict=True)
     ]
-    one, pressed = gathered(times, [record for record, _ in samples]), np.array([force for _, force in samples])
+    one, pressed = record_of(times, [record for record, _ in samples]), np.array([force for _, force in samples])
     states = states_of(bodies, paths[1], times, others)
     applied = [bodies.forces(state, paths[1].legs[number].mode) for state, number in zip(states, others, strict=True)]
     wrenches = [wrench for _, wrench in applied]
     switched = [
         equations.switched(state, paths[1].legs[number].mode) for state, number in zip(states, others, strict=True)
     ]
-    two = matched(own, one, second.recorded(times, states[:, :-1], switched, wrenches))
+    two = on_same_turns(own, one, second.recorded(times, states[:, :-1], switched, wrenches))
     routes = (
         "joint coordinates, DOP853, contacts by Coulomb's law at all of them at once",
         "bodies alone, DOP853, contacts by trial of what they can do",

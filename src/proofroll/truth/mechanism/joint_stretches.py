@@ -73,7 +73,7 @@ class JointStretches(Stretches[Mode]):
         return Transition(state, decided, happened, np.inf if settles else margin, delay)
 
 
-def turned(mode: Mode, which: int) -> Mode:
+def reversed_mode(mode: Mode, which: int) -> Mode:
     """Mode with the direction of one joint reversed."""
     back = {"forward": "backward", "backward": "forward"}
     return tuple(back.get(own, own) if k == which else own for k, own in enumerate(mode))

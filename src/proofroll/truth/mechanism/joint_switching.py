@@ -9,7 +9,7 @@ from proofroll.elements.mechanism.joint_coordinates import JointCoordinates
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.elements.mechanism.switches import HOLDING, STOPPED, Mode, held_joints
 from proofroll.truth.hybrid import Stretch, Transition
-from proofroll.truth.mechanism.joint_stretches import JointStretches, guard_values, noise_of, turned
+from proofroll.truth.mechanism.joint_stretches import JointStretches, guard_values, noise_of, reversed_mode
 from proofroll.truth.mechanism.stretches import StretchLaw
 
 
@@ -61,7 +61,7 @@ class SwitchedTree(JointStretches):
         if self._settles(which, speed, joint.restitution):
             pull, falling = (
                 abs(float(self.equations.solve(q, v, mode, time=leg.end).acceleration[joint.velocity]))
-                for mode in (turned(leg.mode, which), leg.mode)
+                for mode in (reversed_mode(leg.mode, which), leg.mode)
             )
             v[joint.velocity] = 0.0
             delay = self._bouncing(rebound, pull, joint.restitution, falling)

@@ -18,8 +18,8 @@ from scipy.spatial.transform import Rotation
 from proofroll.core.errors import Missing
 from proofroll.elements.mechanism.complementarity import refuse_switching
 from proofroll.elements.mechanism.model import Mechanism
-from proofroll.elements.mechanism.named_forces import joint_force_shares, lengths, taken
-from proofroll.elements.mechanism.record import Record, gathered, integrated
+from proofroll.elements.mechanism.named_forces import joint_force_shares, lengths, pick_named
+from proofroll.elements.mechanism.record import Record, integrate, record_of
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.truth.mechanism.constraint_rows import ConstraintRow
 from proofroll.truth.mechanism.maximal_bodies import BodyInScalars
@@ -268,7 +268,7 @@ class MaximalCoordinates:
         return apart
 
     def _dop853(self, start: Array, times: Array, tolerance: float) -> Array:
-        return np.array(list(integrated(self.lean.rate, start, times, tolerance, self.lean.eliminated)))
+        return np.array(list(integrate(self.lean.rate, start, times, tolerance, self.lean.eliminated)))
 
     def at_start(self) -> Record:
         """Poses of this route at time 0."""
@@ -288,7 +288,7 @@ class MaximalCoordinates:
         modes = [None] * len(states) if switched is None else switched
         more = [None] * len(states) if applied is None else applied
         each = zip(times, states, modes, more, strict=True)
-        record = gathered(times, [self._sample(float(t), self.lean.normalised(y), mode, w) for t, y, mode, w in each])
+        record = record_of(times, [self._sample(float(t), self.lean.normalised(y), mode, w) for t, y, mode, w in each])
         q, v = record.placed(self.mechanism).of_tree()
         return replace(record, q=q, v=v)
 
@@ -348,4 +348,4 @@ class MaximalCoordinates:
             force = holding.get(number, switched.push.get(number, 0.0))
             on = joint_force_shares(number in switched.stopped, joint.friction, force)
             fields["friction"][number], fields["stop"][number] = on
-        return taken(self.mechanism, fields)
+        return pick_named(self.mechanism, fields)

@@ -14,7 +14,7 @@ import numpy as np
 from proofroll.core.errors import Diverged, Missing
 from proofroll.elements.mechanism.joint_coordinates import JointCoordinates
 from proofroll.elements.mechanism.model import Mechanism
-from proofroll.elements.mechanism.record import Record, gathered
+from proofroll.elements.mechanism.record import Record, record_of
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.truth.collocation import Step, System, by_states, next_length, nodes, take
 from proofroll.truth.mechanism.maximal_coordinates import BESIDE, MaximalCoordinates, NumericEquations
@@ -77,7 +77,7 @@ def run_stiff(mechanism: Mechanism, rank: int, times: Array) -> StiffRuns:
             for each in (start, tree.eliminated(near))
         )
         alone = _collocated(_rates(lean), lean.equations.start(), moments, _TOLERANCES[1], lean.eliminated)
-    one = gathered(moments, [tree.sample(y[:nq], y[nq:], None, t) for t, y in zip(moments, joined, strict=True)])
+    one = record_of(moments, [tree.sample(y[:nq], y[nq:], None, t) for t, y in zip(moments, joined, strict=True)])
     growth = np.abs(beside - joined)[:, :nq].max(axis=1) / BESIDE
     one, precise = (units.record(mechanism, each) for each in (one, bodies.recorded(moments, alone)))
     return StiffRuns(one, precise, growth)

@@ -9,10 +9,10 @@ import numpy as np
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Refused
-from proofroll.elements.mechanism.record import integrated
+from proofroll.elements.mechanism.record import integrate
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.elements.mechanism.switches import Settling
-from proofroll.truth.hybrid import Stretch, walked
+from proofroll.truth.hybrid import Stretch, integrate_to_guard
 
 ModeT = TypeVar("ModeT")
 
@@ -63,7 +63,7 @@ class Stretches(ABC, Generic[ModeT]):
     def walk(self, time: float, state: Array, mode: ModeT, until: float) -> Stretch[ModeT]:
         """See the protocol."""
         law, visited = self._law(state, mode), list[tuple[float, Array]]()
-        end, last, guard = walked(
+        end, last, guard = integrate_to_guard(
             lambda _, y: law.rates(y),
             time,
             state,
@@ -82,4 +82,4 @@ class Stretches(ABC, Generic[ModeT]):
         """See the protocol."""
         law, spans = self._law(leg.first, leg.mode), np.maximum(times - leg.start, 0.0)
         tolerance = float(self._tolerance[0])
-        return np.array(list(integrated(lambda _, y: law.rates(y), leg.first, spans, tolerance, law.corrected)))
+        return np.array(list(integrate(lambda _, y: law.rates(y), leg.first, spans, tolerance, law.corrected)))

@@ -7,7 +7,7 @@ import numpy as np
 from proofroll.core.errors import Diverged, Refused
 from proofroll.elements.mechanism.joint_coordinates import JointCoordinates
 from proofroll.elements.mechanism.model import Mechanism
-from proofroll.elements.mechanism.record import gathered
+from proofroll.elements.mechanism.record import record_of
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.elements.mechanism.signal import breaks
 from proofroll.elements.mechanism.switches import STOPPED
@@ -18,7 +18,7 @@ from proofroll.truth.mechanism.joint_switching import SwitchedTree
 from proofroll.truth.mechanism.maximal_coordinates import MaximalCoordinates
 from proofroll.truth.mechanism.natural_units import Units, natural_units
 from proofroll.truth.mechanism.two_paths import TOLERANCES, followed, refuse_uncovered, two_route_motion
-from proofroll.truth.mechanism.two_routes import TwoRouteMotion, check_start, find_truth, matched
+from proofroll.truth.mechanism.two_routes import TwoRouteMotion, check_start, find_truth, on_same_turns
 
 # rad, natural lengths, or part of a limit: how far a stop or a limit must be exceeded to act; more than the error of
 # the scouting run
@@ -91,7 +91,7 @@ def _switched(mechanism: Mechanism, units: Units, own: Mechanism, times: Array) 
     legs = [min(number, len(paths[1].legs) - 1) for number in paths[0].leg_at(times)]
     q_and_v = states_of(tree, paths[0], times, paths[0].leg_at(times))
     nq = mechanism.nq
-    one = gathered(
+    one = record_of(
         times,
         [
             equations.sample(state[:nq], state[nq:-1], paths[0].legs[number].mode, float(state[-1]))
@@ -99,7 +99,7 @@ def _switched(mechanism: Mechanism, units: Units, own: Mechanism, times: Array) 
         ],
     )
     modes = [bodies.switched(paths[1].legs[number].mode) for number in legs]
-    two = matched(own, one, second.recorded(times, states_of(bodies, paths[1], times, legs)[:, :-1], modes))
+    two = on_same_turns(own, one, second.recorded(times, states_of(bodies, paths[1], times, legs)[:, :-1], modes))
     routes = ("joint coordinates, DOP853, modes by complementarity", "maximal coordinates, DOP853, modes by trial")
     reason = "a change of the parameters within their accuracy changes which joints hold"
     one, two = units.record(mechanism, one), units.record(mechanism, two)

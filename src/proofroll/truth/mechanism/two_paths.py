@@ -8,7 +8,7 @@ import numpy as np
 
 from proofroll.core.errors import Refused
 from proofroll.core.events import Event
-from proofroll.elements.mechanism.analysis import analysed
+from proofroll.elements.mechanism.analysis import analyse
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.record import Record
 from proofroll.elements.mechanism.rotations import Array
@@ -34,7 +34,7 @@ def refuse_uncovered(mechanism: Mechanism) -> None:
     """
     if mechanism.unmodelled:
         raise Refused(f"no route of the truth has {', '.join(mechanism.unmodelled)}")
-    if analysed(mechanism).singular_start:
+    if analyse(mechanism).singular_start:
         raise Refused("the start is a singular pose, where the motion may branch")
 
 
@@ -71,7 +71,7 @@ def two_route_motion(
         kinds: part of a mode in which both routes must agree.
         pressed: contact forces by both routes [N], (times, contacts, 3).
     """
-    parted, determinate = _parted(*paths, kinds) * units.time, analysed(mechanism).determinate
+    parted, determinate = _parted(*paths, kinds) * units.time, analyse(mechanism).determinate
     masked = replace(one, wrench=np.where(determinate, one.wrench, np.nan))
     fields, others = fields_with_bars(mechanism, masked), fields_with_bars(mechanism, two)
     if pressed is not None:

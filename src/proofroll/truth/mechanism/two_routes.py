@@ -14,12 +14,12 @@ from numpy.typing import NDArray
 
 from proofroll.core.errors import Diverged, Missing, Refused
 from proofroll.core.events import Event
-from proofroll.elements.mechanism.analysis import analysed
+from proofroll.elements.mechanism.analysis import analyse
 from proofroll.elements.mechanism.complementarity import refuse_switching
 from proofroll.elements.mechanism.joint_coordinates import JointCoordinates
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.placed import Placed
-from proofroll.elements.mechanism.record import Record, gathered
+from proofroll.elements.mechanism.record import Record, record_of
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.truth import SAFETY
 from proofroll.truth.mechanism.closed_forms import ClosedForm, closed_form
@@ -78,7 +78,7 @@ def find_truth(mechanism: Mechanism, times: Array, tolerance: float = 1e-15) -> 
     if mechanism.unmodelled:
         raise Refused(f"no route of the truth has {', '.join(mechanism.unmodelled)}")
     times = np.asarray(times, dtype=float)
-    analysis, form = analysed(mechanism), closed_form(mechanism)
+    analysis, form = analyse(mechanism), closed_form(mechanism)
     first = JointCoordinates(mechanism, analysis.rank)
     exact = _from_form(first, form, times) if form is not None and form.motion is not None else None
     if exact is None and analysis.singular_start:
@@ -89,12 +89,12 @@ def find_truth(mechanism: Mechanism, times: Array, tolerance: float = 1e-15) -> 
         one, two, precise, growth, routes = _runs(first, second, times, tolerance)
         chaotic = growth * NUDGE > CHAOS
         _check_branch(one, precise, chaotic)
-        best = precise if exact is None else matched(mechanism, one, exact)
+        best = precise if exact is None else on_same_turns(mechanism, one, exact)
     except Diverged as stopped:
         if exact is None:
             poses = _singular(mechanism, float(times[-1]))
             raise Refused(f"no truth to the end: {stopped}; end before it{poses}") from None
-        one = two = precise = matched(mechanism, exact, first.run_rk4(times))
+        one = two = precise = on_same_turns(mechanism, exact, first.run_rk4(times))
         best, routes, chaotic = exact, ("joint coordinates, RK4",), np.zeros(len(times), dtype=bool)
     if exact is not None and form is not None:
         routes = (f"closed form: {form.title}", *routes)
@@ -130,12 +130,12 @@ def _runs(
     if stiff(first, float(times[-1])):
         runs = run_stiff(mechanism, first.rank, times)
         names = "maximal coordinates, implicit collocation", "joint coordinates, implicit collocation"
-        best = matched(mechanism, runs.one, runs.precise)
+        best = on_same_turns(mechanism, runs.one, runs.precise)
         return runs.one, best, best, runs.growth, names
     one = first.run(times, tolerance)
     two, precise, name = _second(second, times, tolerance)
     # route 1 alone counts turns; angles of the others are put on the same turns
-    two, precise = matched(mechanism, one, two), matched(mechanism, one, precise)
+    two, precise = on_same_turns(mechanism, one, two), on_same_turns(mechanism, one, precise)
     return one, two, precise, second.growth(times), (name, "joint coordinates, DOP853")
 
 
@@ -176,8 +176,8 @@ def check_start(first: JointCoordinates, second: MaximalCoordinates, unit: float
         Refused: they do not.
     """
     at = np.zeros(1)
-    one, two = gathered(at, [first.sample(*first.mechanism.start())]), second.at_start()
-    two = matched(first.mechanism, one, two)
+    one, two = record_of(at, [first.sample(*first.mechanism.start())]), second.at_start()
+    two = on_same_turns(first.mechanism, one, two)
     apart = unit * max(float(largest(getattr(one, name) - getattr(two, name))[0]) for name in ("p_WB", "q_WB"))
     if apart > SAME_START * unit * max(1.0, float(largest(one.p_WB)[0])):
         raise Refused(
@@ -219,7 +219,7 @@ def _from_form(equations: JointCoordinates, form: ClosedForm, times: Array) -> R
         raise Refused(
             "its closed form has no finite numbers here: masses, lengths or gravity are too large or too small"
         )
-    return gathered(times, [equations.sample(q, v) for q, v in zip(*moves, strict=True)])
+    return record_of(times, [equations.sample(q, v) for q, v in zip(*moves, strict=True)])
 
 
 def _second(route: MaximalCoordinates, times: Array, tolerance: float) -> tuple[Record, Record, str]:
@@ -232,7 +232,7 @@ def _second(route: MaximalCoordinates, times: Array, tolerance: float) -> tuple[
     return double, long, "maximal coordinates, Taylor series in long doubles"
 
 
-def matched(mechanism: Mechanism, guide: Record, other: Record) -> Record:
+def on_same_turns(mechanism: Mechanism, guide: Record, other: Record) -> Record:
     """Record with quaternions of the same sign and angles on the same turn as in ``guide``."""
     q_WB = _same_sign(guide.q_WB, other.q_WB)
     q = other.q.copy()

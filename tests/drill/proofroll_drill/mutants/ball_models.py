@@ -9,7 +9,7 @@ import numpy as np
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.scene import Scene
-from proofroll.elements.ball_on_surface.element import changed, rolling_ball
+from proofroll.elements.ball_on_surface.element import rolling_ball, scene_with
 from proofroll.elements.ball_on_surface.mechanics import newton_euler, slip_velocity
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.sampling import BallSample
@@ -20,16 +20,16 @@ SLIPPING = ("sphere_in_cylinder", {"mu_static": 0.2, "mu_kinetic": 0.15})
 
 
 def _ball(scene: Scene, **numbers: float) -> Scene:
-    return changed(scene, ball=dataclasses.replace(scene.elements[0].ball, **numbers))  # type: ignore[attr-defined]
+    return scene_with(scene, ball=dataclasses.replace(scene.elements[0].ball, **numbers))  # type: ignore[attr-defined]
 
 
 def _contact(scene: Scene, **numbers: float) -> Scene:
-    return changed(scene, contact=dataclasses.replace(scene.elements[0].contact, **numbers))  # type: ignore[attr-defined]
+    return scene_with(scene, contact=dataclasses.replace(scene.elements[0].contact, **numbers))  # type: ignore[attr-defined]
 
 
 def _gravity(scene: Scene, factor: float, direction: tuple[float, float, float] = (0, 0, -1)) -> Scene:
     gravity = scene.elements[0].gravity  # type: ignore[attr-defined]
-    return changed(
+    return scene_with(
         scene, gravity=dataclasses.replace(gravity, magnitude=factor * gravity.magnitude, direction=direction)
     )
 

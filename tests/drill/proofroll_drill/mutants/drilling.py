@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from proofroll.core.certificate import Line, first_difference
-from proofroll.core.diagnosis.of_scene import diagnosed
+from proofroll.core.diagnosis.of_scene import diagnose_scene
 from proofroll.core.errors import Diverged
 from proofroll.core.first_steps import certificate as certificate_of
 from proofroll.core.scene import Scene
@@ -109,7 +109,7 @@ def tried(kind: type[Mutant]) -> Mutated:
     lines = [line.as_dict() for line in certificate]
     by, ended = first_difference(certificate) or "", ""
     if by:
-        causes = diagnosed(scene, lines, step=kind.step)
+        causes = diagnose_scene(scene, lines, step=kind.step)
     else:
         try:
             recording = record(engine, scene, reference.dataset["time"].to_numpy())
@@ -119,7 +119,7 @@ def tried(kind: type[Mutant]) -> Mutated:
         wrong = [item for item in judgements if item.verdict == Verdict.DIFFERS]
         ended = recording.failure or ""  # which says why
         by = ended or "; ".join(f"{item.observable} {item.reason.partition(';')[0]}" for item in wrong[:2])
-        causes = diagnosed(scene, lines, recording.dataset, reference.dataset, kind.step, judgements) if by else []
+        causes = diagnose_scene(scene, lines, recording.dataset, reference.dataset, kind.step, judgements) if by else []
     said = "; ".join(item.sentence for item in causes) or ended
     # The first cause, and what looks the same from outside, are the answer; what is said after it does not count.
     answer = " ".join(item.sentence for item in causes[:1] + [item for item in causes[1:] if item.cause.alternative])
@@ -161,7 +161,7 @@ def _built(kind: type[Mutant], scene: Scene) -> tuple[Any, list[Line]]:
 def _judged(reference: Reference, dataset: Any, plain: Sequence[Judgement]) -> list[Judgement]:
     """Verdicts of all observables that a run has; ``plain``: of the engine without the fault."""
     found, of_method = [], {item.observable: item.error for item in plain}
-    for name, values in run_values.observed(reference, dataset).items():
+    for name, values in run_values.observables_of(reference, dataset).items():
         true, size = reference.true(name, values), reference.sizes.get(name, 1.0)
         least = max(_TOLERANCE * size, _OF_METHOD * of_method.get(name, 0.0), 4 * true.error_bar)
         allowance = Allowance(name, reference.scene.observables[name].unit, least, size)

@@ -10,7 +10,7 @@ from proofroll.core.dataset import from_samples
 from proofroll.core.scene import Scene
 from proofroll.core.truth import truth
 from proofroll.elements.ball_on_surface.dataset import columns
-from proofroll.elements.ball_on_surface.element import changed, rolling_ball
+from proofroll.elements.ball_on_surface.element import rolling_ball, scene_with
 from proofroll.elements.ball_on_surface.rolling_equations import closed_form
 from proofroll.elements.ball_on_surface.sampling import BallSample
 from proofroll.files.scene_file import load_scene
@@ -36,7 +36,7 @@ def test_angle_starts_on_the_branch_of_the_scene() -> None:
     """An initial γ beyond half a turn stays what it is."""
     scene = load_scene("sphere_in_cylinder")
     start = dataclasses.replace(scene.elements[0].start, coordinates=(40.0, 0.1))
-    found = exact(changed(scene, start=start), np.array([0, 0.1]))["gamma"]
+    found = exact(scene_with(scene, start=start), np.array([0, 0.1]))["gamma"]
     assert found.to_numpy() == pytest.approx([40.0, 42.0], abs=1e-12)
 
 

@@ -21,7 +21,7 @@ from proofroll.elements.mechanism.element import ENERGY_GAIN, OPENED, MechanismE
 from proofroll.elements.mechanism.joint import Joint
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.parts import Body
-from proofroll.elements.mechanism.report.drawing import drawn
+from proofroll.elements.mechanism.report.drawing import mechanism_drawing
 from proofroll.elements.mechanism.sampling import MechanismBuilt, MechanismSample
 from proofroll.elements.mechanism.signal import Formula
 from proofroll.files.json_data import plain
@@ -302,7 +302,7 @@ def test_drives_and_stops_are_drawn(scene: str, marks: list[str]) -> None:
         actuators=(),
         couplings=(),
     )
-    full, bare = drawn(element), drawn(dataclasses.replace(element, mechanism=without))
+    full, bare = mechanism_drawing(element), mechanism_drawing(dataclasses.replace(element, mechanism=without))
     letters = ["".join(part.text for part in mark.parts) for mark in full.marks if isinstance(mark, Lettering)]
     assert set(marks) <= set(letters)
     assert len(full.marks) > len(bare.marks)
@@ -316,7 +316,7 @@ def test_shapes_that_may_touch_are_drawn(scene: str, shapes: int, names: list[st
     """Each shape has an outline and each plane one patch, also where contacts share it; what touches has its name."""
     element = load_scene(scene).elements[0]
     smooth = dataclasses.replace(element.mechanism, geometries=(), pairs=())
-    full, bare = drawn(element), drawn(dataclasses.replace(element, mechanism=smooth))
+    full, bare = mechanism_drawing(element), mechanism_drawing(dataclasses.replace(element, mechanism=smooth))
     letters = ["".join(part.text for part in mark.parts) for mark in full.marks if isinstance(mark, Lettering)]
     assert set(names) <= set(letters)
     assert len(full.marks) - len(bare.marks) == shapes + len(names)

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from proofroll.core.plugins import load_engine, resolve_settings
-from proofroll.core.program_text import FailedRun, imported
+from proofroll.core.program_text import FailedRun, imported_packages
 from proofroll.elements.mechanism.element import MechanismElement
 from proofroll.files.scene_file import load_scene
 from proofroll.running.simulation import simulate
@@ -58,7 +58,7 @@ def written(engine: str, options: dict[str, Any]) -> str:
 def test_a_program_shows_the_failure(tmp_path: Path, engine: str, options: dict[str, Any], needs: set[str]) -> None:
     """It runs with the engine alone and ends with 1."""
     text = written(engine, options)
-    assert set(imported(text)) == needs
+    assert set(imported_packages(text)) == needs
     assert "proofroll" not in text
     program = tmp_path / "program.py"
     program.write_text(text, encoding="utf-8")
@@ -70,7 +70,7 @@ def test_a_program_shows_the_failure(tmp_path: Path, engine: str, options: dict[
 def test_equations_of_ours_ask_proofroll() -> None:
     """Where the equations that fail are this package's, the program runs them through it and says why."""
     text = written("projection", {"formulation": "dependent", "preset": "matched"})
-    assert set(imported(text)) == {"numpy", "proofroll"}
+    assert set(imported_packages(text)) == {"numpy", "proofroll"}
     assert "Why proofroll: its equations are proofroll's." in text
 
 

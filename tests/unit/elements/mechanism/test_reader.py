@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from proofroll.core.errors import InputError
-from proofroll.elements.mechanism.analysis import analysed
+from proofroll.elements.mechanism.analysis import analyse
 from proofroll.files.scene_file import load_scene
 
 LENGTH = 'unit = "m"\nsource = "this test"'
@@ -114,7 +114,7 @@ def test_joints_are_sorted_depth_first(read):
 
 def test_analysis_of_a_planar_loop_closed_by_a_revolute(read):
     """It has one degree of freedom, three redundant rows, and only Fx, Fy, Mz are determinate."""
-    found = analysed(read())
+    found = analyse(read())
     assert (found.rows, found.rank, found.redundant, found.mobility, found.singular_start) == (5, 2, 3, 1, False)
     assert (found.determinate == [True, True, False, False, False, True]).all()
 

@@ -9,7 +9,7 @@ import pytest
 from proofroll.core.errors import Refused
 from proofroll.elements.mechanism import Body, Joint, Mechanism
 from proofroll.elements.mechanism.capabilities import MechanismCapability, require, required
-from proofroll.elements.mechanism.sampling import independent, mechanism_of
+from proofroll.elements.mechanism.sampling import mechanism_of, row_rank
 
 
 def wheel(**law):
@@ -63,6 +63,6 @@ def test_the_mechanism_of_a_scene_is_its_only_element():
 def test_rows_of_any_size_count_alike():
     """The number of independent rows does not depend on the units in which each is written."""
     rows = np.array([[1.0, 2.0, 0.0], [0.0, 1.0, 1.0], [1.0, 3.0, 1.0], [0.0, 0.0, 0.0]])
-    assert independent(rows) == 2
-    assert independent(np.array([[1e-9], [1.0], [1e9], [1.0]]) * rows) == 2
-    assert independent(np.zeros((0, 3))) == 0
+    assert row_rank(rows) == 2
+    assert row_rank(np.array([[1e-9], [1.0], [1e9], [1.0]]) * rows) == 2
+    assert row_rank(np.zeros((0, 3))) == 0

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from proofroll.elements.mechanism import Tree
-from proofroll.elements.mechanism.analysis import analysed
+from proofroll.elements.mechanism.analysis import analyse
 from proofroll.elements.mechanism.reader import KINDS
 
 MODELS = Path(__file__).parents[4] / "models"
@@ -30,7 +30,7 @@ EXPECTED = {
 def test_rank_and_mobility(scene, name):
     """Each scene has the rank, redundancy, mobility and determinate reactions that mechanics gives it."""
     rows, rank, mobility, determinate = EXPECTED[name]
-    found = analysed(scene(name))
+    found = analyse(scene(name))
     assert (found.rows, found.rank, found.rank_at_start, found.mobility) == (rows, rank, rank, mobility)
     assert found.redundant == rows - rank
     assert determinate is None or found.determinate.sum() == determinate
@@ -39,7 +39,7 @@ def test_rank_and_mobility(scene, name):
 def test_no_reaction_of_bricards_mechanism_is_determinate(scene):
     """Of each hinge, only the moment about its own axis is known, where that axis keeps a direction of the world."""
     mechanism = scene("bricard")
-    mask = analysed(mechanism).determinate
+    mask = analyse(mechanism).determinate
     assert not mask[:, :3].any()
     assert mask[0].tolist() == [False, False, False, False, True, False]  # hinge0 turns about -y of the world
 

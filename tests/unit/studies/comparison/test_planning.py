@@ -21,7 +21,7 @@ def test_a_wrong_setting_is_found_before_anything_runs(monkeypatch: pytest.Monke
     def ran(*_: object) -> None:
         raise AssertionError("the truth was run first")
 
-    monkeypatch.setattr(planning, "settled", ran)
+    monkeypatch.setattr(planning, "with_edges", ran)
     comparison = load_comparison("stick_slip")
     rows = [Row(engine, comparison.rows[0].tolerance) for engine in ("projection", "projection[step=1]")]
     said = r"stick_slip\.toml: rows\.1\.engine = 'projection\[step=1\]'.*no such setting"
@@ -59,7 +59,7 @@ def test_a_ladder_fits_between_the_samples(step: float, factors: list[float]) ->
 
 def test_a_first_look_takes_the_step_that_a_scene_asks_for() -> None:
     """Engines with a fixed step have that of the scene's file where their own is longer; adaptive ones have theirs."""
-    engines = [row.engine for row in first_look.compared("andrews_squeezer", {}).rows]
+    engines = [row.engine for row in first_look.default_comparison("andrews_squeezer", {}).rows]
     assert "exudyn[formulation=redundant,dt=0.0001]" in engines
     assert "projection[formulation=dependent]" in engines
 

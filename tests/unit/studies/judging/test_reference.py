@@ -62,7 +62,7 @@ def test_a_trade_off_leaves_out_what_the_truth_does_not_tell(monkeypatch: pytest
     places = xr.Dataset({"positions": ("time", np.zeros(2), {"error_bar": 0.0})}, {"time": [0.0, 1.0]})
     held = Reference(load_scene("falling_rod"), places, {"positions": np.zeros(2)}, {})
     given = {"positions": np.full(2, 0.5), "contact_forces": np.ones(2)}
-    monkeypatch.setattr(run_values, "observed", lambda *_: given)
+    monkeypatch.setattr(run_values, "observables_of", lambda *_: given)
     point = CurvePoint(None, Result(Status.DONE, ""))  # type: ignore[arg-type]
     assert with_errors(point, held, places).errors == {"positions": 0.5}
 

@@ -25,7 +25,7 @@ from proofroll.running.case import Status
 from proofroll.running.runner import Runner
 from proofroll.running.store import Store
 from proofroll.studies.failure import meanings
-from proofroll.studies.stability.axes import Axis, AxisTerm, Effort, chosen, thinned
+from proofroll.studies.stability.axes import Axis, AxisTerm, Effort, chosen, evenly_chosen
 from proofroll.studies.stability.claims import Claim, file_for
 from proofroll.studies.stability.map import _refused, stability
 from proofroll.studies.stability.places import places_of
@@ -296,8 +296,8 @@ def test_axes_as_data() -> None:
         Axis("x", "1", "", [1.0], {"nothing": AxisTerm()}).at(scene, 1.0)
     with pytest.raises(InputError, match="no such axis"):
         chosen([size], ["mass"])
-    assert thinned([1, 2, 3, 4, 5, 6, 7], 3) == [1, 4, 7]
-    assert thinned([1, 2], 3) == [1, 2]
+    assert evenly_chosen([1, 2, 3, 4, 5, 6, 7], 3) == [1, 4, 7]
+    assert evenly_chosen([1, 2], 3) == [1, 2]
 
 
 def test_scale_free_axes() -> None:

@@ -7,7 +7,7 @@ import math
 from hypothesis import given
 from hypothesis import strategies as st
 
-from proofroll.studies.tradeoff.pareto import envelope, front, tied
+from proofroll.studies.tradeoff.pareto import costs_overlap, envelope, front
 
 NUMBERS = st.floats(min_value=1e-12, max_value=1e6)
 
@@ -42,5 +42,5 @@ def test_round_off_of_much_finer_steps_is_not_luck() -> None:
 def test_costs_tie_where_their_intervals_overlap() -> None:
     """A tie is mutual, holds where the intervals touch, and cannot be seen where there is no interval."""
     for other, expected in (([2.5, 4.0], True), ([3.0, 4.0], True), ([3.1, 4.0], False), (None, False)):
-        assert tied([1.0, 3.0], other) is expected
-        assert tied(other, [1.0, 3.0]) is expected
+        assert costs_overlap([1.0, 3.0], other) is expected
+        assert costs_overlap(other, [1.0, 3.0]) is expected

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from proofroll.core.errors import InputError, Refused
 from proofroll.core.events import events_of
-from proofroll.elements.ball_on_surface.element import changed
+from proofroll.elements.ball_on_surface.element import scene_with
 from proofroll.files.scene_file import load_scene
 from proofroll.truth.ball_on_surface.plug_in import truth
 
@@ -122,7 +122,7 @@ def test_superball_loses_nothing() -> None:
 def test_landing_in_a_lying_cylinder(e: float) -> None:
     """Where the contact has a restitution, a ball that left the wall lands, and goes on to where the energy lets it."""
     scene = load_scene("tilted_cylinder", tilt=math.pi / 2, speed=2.4, mu_static=0.5)
-    scene = changed(scene, contact=replace(scene.elements[0].contact, restitution=e))  # type: ignore[attr-defined]
+    scene = scene_with(scene, contact=replace(scene.elements[0].contact, restitution=e))  # type: ignore[attr-defined]
     found = truth(scene, np.linspace(0, 2.5, 26))
     kinds = [event.kind for event in events_of(found)]
     assert kinds[:2] == ["slip", "lift_off"]
@@ -161,7 +161,7 @@ def test_a_start_in_the_air_beside_a_curved_wall() -> None:
     """A ball in the air with a spin of its own does not leave the wall: its bounces are told, by both routes alike."""
     wall = load_scene("tilted_cylinder", radius=0.05, cylinder_radius=0.5, tilt=1.0, mu_static=0.5)
     ball = wall.elements[0]
-    scene = changed(
+    scene = scene_with(
         wall,
         contact=replace(ball.contact, restitution=0.5),
         start=replace(ball.start, coordinates=(3.1, 0.0), velocity=(3.0, 0.0), tangential_spin=(0.0, 0.0), gap=0.05),
@@ -186,7 +186,7 @@ def test_a_slip_after_bounces_begins_where_they_end() -> None:
 def test_a_start_in_the_air_without_a_law_of_impacts_is_refused() -> None:
     """A ball that starts in the air, and of whose landing nothing is said, is refused with the time of the landing."""
     scene = load_scene("bouncing_ball")
-    scene = changed(scene, contact=replace(scene.elements[0].contact, restitution=None))
+    scene = scene_with(scene, contact=replace(scene.elements[0].contact, restitution=None))
     with pytest.raises(Refused, match=r"^the ball lands at t = 0.4515236\d+ s; a restitution law would be needed"):
         truth(scene, np.array([0.0, 1.0]))
 

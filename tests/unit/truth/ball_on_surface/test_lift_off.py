@@ -14,7 +14,7 @@ from proofroll.core.errors import Refused
 from proofroll.core.events import events_of
 from proofroll.core.scene import Scene
 from proofroll.core.truth import truth
-from proofroll.elements.ball_on_surface.element import changed, rolling_ball
+from proofroll.elements.ball_on_surface.element import rolling_ball, scene_with
 from proofroll.truth.ball_on_surface.implicit import Implicit
 from proofroll.truth.ball_on_surface.polar import Polar
 from proofroll.truth.ball_on_surface.switching import follow
@@ -28,7 +28,7 @@ LEAST = math.sqrt(27 * G * C / 7)
 def lying(speed: float, mu: float = math.inf, **parameters: float) -> Scene:
     """The paper's cylinder on its side; a ball starts at its bottom, across the axis."""
     scene = load_scene("sphere_in_cylinder", speed=speed, mu_static=mu, **parameters)
-    return changed(scene, surface=replace(scene.elements[0].surface, tilt=math.pi / 2))
+    return scene_with(scene, surface=replace(scene.elements[0].surface, tilt=math.pi / 2))
 
 
 def test_the_start_is_at_the_bottom() -> None:
@@ -92,7 +92,7 @@ def test_with_a_bound_the_ball_slips_first(route: Any, mu: float) -> None:
 def test_a_ball_under_a_ceiling_falls_at_once() -> None:
     """Where nothing presses at time 0 the ball leaves then, and does not hang."""
     plane = load_scene("inclined_plane")
-    plane = changed(plane, gravity=replace(plane.elements[0].gravity, direction=(0.0, 0.0, 1.0)))
+    plane = scene_with(plane, gravity=replace(plane.elements[0].gravity, direction=(0.0, 0.0, 1.0)))
     dataset = truth(plane, np.linspace(0, 0.5, 6))
     assert [(event.kind, event.time) for event in events_of(dataset)] == [("lift_off", 0.0)]
     assert not np.any(dataset.N)

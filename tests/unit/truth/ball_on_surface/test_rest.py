@@ -11,7 +11,7 @@ import xarray as xr
 from proofroll.core.errors import Refused
 from proofroll.core.events import events_of
 from proofroll.elements.ball_on_surface.element import rolling_ball
-from proofroll.elements.ball_on_surface.mechanics import setting_off, stays
+from proofroll.elements.ball_on_surface.mechanics import can_rest, setting_off
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.observables import energy_balance
 from proofroll.files.scene_file import load_scene
@@ -140,7 +140,7 @@ def test_what_holds_a_ball_at_rest() -> None:
         (1, 0.36, False),
     ):
         ball = body(rolling_resistance=f, mu_static=mu)
-        assert stays(ball, ball.p0) == expected
+        assert can_rest(ball, ball.p0) == expected
     level = body(tilt=0, rolling_resistance=1e-9, mu_static=0)
-    assert stays(level, level.p0)
+    assert can_rest(level, level.p0)
     assert not np.any(setting_off(level, level.p0))

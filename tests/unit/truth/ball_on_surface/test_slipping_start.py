@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from proofroll.core.errors import InputError
 from proofroll.core.events import events_of
-from proofroll.elements.ball_on_surface.element import changed
+from proofroll.elements.ball_on_surface.element import scene_with
 from proofroll.elements.ball_on_surface.model import InitialMotion
 from proofroll.files.scene_file import load_scene
 from proofroll.truth.ball_on_surface.plug_in import truth
@@ -87,5 +87,5 @@ def test_what_has_no_motion_is_refused() -> None:
     with pytest.raises(InputError, match=r"tangential_spin = nan: the value must be a number"):
         InitialMotion("ball", tangential_spin=(0.0, math.nan))
     with pytest.raises(InputError, match=r"needs a number for mu_static") as error:
-        changed(load_scene("inclined_plane"), start=InitialMotion("ball", tangential_spin=(0.0, 3.0)))
+        scene_with(load_scene("inclined_plane"), start=InitialMotion("ball", tangential_spin=(0.0, 3.0)))
     assert "\n" not in str(error.value)

@@ -14,7 +14,7 @@ from proofroll.core.events import Event, events_of
 from proofroll.core.gravity import Gravity
 from proofroll.core.scene import Scene
 from proofroll.core.truth import truth
-from proofroll.elements.ball_on_surface.element import BallOnSurface, changed, rolling_ball
+from proofroll.elements.ball_on_surface.element import BallOnSurface, rolling_ball, scene_with
 from proofroll.elements.ball_on_surface.model import Ball, Contact, InitialMotion
 from proofroll.elements.ball_on_surface.surfaces import Plane
 from proofroll.truth.ball_on_surface import implicit, taylor
@@ -47,7 +47,7 @@ LATER = np.linspace(2.5, 4.0, 301)
 def cylinder(tilt: float = 0.0, **parameters: float) -> Scene:
     """The paper's scene with other parameters, its axis tilted from the vertical [rad]."""
     scene = load_scene("sphere_in_cylinder", **parameters)
-    return changed(scene, surface=replace(scene.elements[0].surface, tilt=tilt))
+    return scene_with(scene, surface=replace(scene.elements[0].surface, tilt=tilt))
 
 
 def events(route: Any, scene: Scene, until: float) -> list[tuple[str, float]]:

@@ -11,7 +11,7 @@ from proofroll.core.errors import Diverged
 from proofroll.core.scene import Scene
 from proofroll.core.truth import truth
 from proofroll.elements.ball_on_surface.dataset import columns
-from proofroll.elements.ball_on_surface.element import changed, rolling_ball
+from proofroll.elements.ball_on_surface.element import rolling_ball, scene_with
 from proofroll.elements.ball_on_surface.model import Ball
 from proofroll.elements.ball_on_surface.motion import BallMotion
 from proofroll.elements.ball_on_surface.rolling_equations import closed_form
@@ -155,7 +155,7 @@ def test_both_routes_agree_with_resistance(speed: float) -> None:
 def test_other_balls_and_surfaces() -> None:
     """A thin shell on a tilted cylinder has no closed form; its two routes agree."""
     scene = load_scene("sphere_in_cylinder", axial_speed=0.3, rolling_resistance=2e-4)
-    shell = changed(scene, ball=Ball("ball", A, M, inertia_ratio=2 / 3), surface=Cylinder("wall", 0.225, tilt=0.5))
+    shell = scene_with(scene, ball=Ball("ball", A, M, inertia_ratio=2 / 3), surface=Cylinder("wall", 0.225, tilt=0.5))
     body, t = rolling_ball(shell), np.linspace(0, 0.5, 3)
     assert closed_form(body, t) is None
     assert max(difference(reduced(body, t), unreduced(body, t)).values()) <= 1e-11
@@ -164,7 +164,7 @@ def test_other_balls_and_surfaces() -> None:
 def test_closed_form_of_a_thin_shell() -> None:
     """The closed form holds for any ratio of inertias."""
     scene = load_scene("sphere_in_cylinder", axial_speed=0.3, radial_spin=2.0)
-    body = rolling_ball(changed(scene, ball=Ball("ball", A, M, inertia_ratio=2 / 3)))
+    body = rolling_ball(scene_with(scene, ball=Ball("ball", A, M, inertia_ratio=2 / 3)))
     t = np.linspace(0, 0.5, 3)
     motion = closed_form(body, t)
     assert motion is not None
@@ -176,7 +176,7 @@ def test_closed_form_only_where_it_holds() -> None:
     t = np.zeros(1)
     assert closed_form(rolling_ball(load_scene("sphere_in_cylinder", rolling_resistance=1e-6)), t) is None
     assert closed_form(rolling_ball(load_scene("inclined_plane", rolling_resistance=1e-6)), t) is None
-    tilted = changed(load_scene("sphere_in_cylinder"), surface=Cylinder("wall", 0.225, tilt=0.1))
+    tilted = scene_with(load_scene("sphere_in_cylinder"), surface=Cylinder("wall", 0.225, tilt=0.1))
     assert closed_form(rolling_ball(tilted), t) is None
 
 
@@ -257,7 +257,7 @@ needs_heyoka = pytest.mark.skipif(not unreduced_taylor.library.available(), reas
     [
         load_scene("sphere_in_cylinder", axial_speed=1.0, radial_spin=20.0),
         load_scene("inclined_plane", normal_spin=9.0),
-        changed(load_scene("sphere_in_cylinder"), surface=Cylinder("wall", 0.225, tilt=0.5)),
+        scene_with(load_scene("sphere_in_cylinder"), surface=Cylinder("wall", 0.225, tilt=0.5)),
     ],
     ids=["cylinder", "plane", "tilted cylinder"],
 )

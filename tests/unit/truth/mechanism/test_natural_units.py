@@ -11,7 +11,7 @@ import pytest
 from proofroll.core.errors import InputError, Refused
 from proofroll.core.quantity import powers_of
 from proofroll.core.validation import units_of_kind
-from proofroll.elements.mechanism.assembly import assembled, check_start
+from proofroll.elements.mechanism.assembly import assemble, check_start
 from proofroll.elements.mechanism.contacts.dynamics import ContactDynamics
 from proofroll.elements.mechanism.contacts.geometry import Geometry
 from proofroll.elements.mechanism.drives import Actuator, Coupling
@@ -21,7 +21,7 @@ from proofroll.elements.mechanism.joint_coordinates import JointCoordinates
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.parts import Body, Loop, Point, Spring
 from proofroll.elements.mechanism.reader import KINDS
-from proofroll.elements.mechanism.record import gathered
+from proofroll.elements.mechanism.record import record_of
 from proofroll.elements.mechanism.signal import Formula, Table
 from proofroll.files.scene_file import load_scene
 from proofroll.truth.mechanism.contact_tree import ContactTree
@@ -123,7 +123,7 @@ def test_a_mechanism_in_other_units_has_the_same_equations() -> None:
     records = []
     for one, at in ((mechanism, time), (own, time / units.time)):
         sample = JointCoordinates(one).sample(*one.start(), (), at)
-        records.append(gathered(np.array([at]), [sample]))
+        records.append(record_of(np.array([at]), [sample]))
     found = units.record(mechanism, records[1])
     for name in ("time", "p_WB", "v_WB", "q_WB", "w_WB", "q", "v", "wrench", "named"):
         assert getattr(found, name) == pytest.approx(getattr(records[0], name), rel=1e-12, abs=1e-12, nan_ok=True), name
@@ -207,7 +207,7 @@ def test_a_small_mechanism_far_from_the_origin_closes(turn: float) -> None:
         for k, joint in enumerate(base.joints)
     ]
     joints[0] = replace(joints[0], q0=(joints[0].q0[0] + turn,), dependent=False)
-    check_start(assembled(replace(base, joints=tuple(joints))))
+    check_start(assemble(replace(base, joints=tuple(joints))))
 
 
 def test_natural_units_follow_the_scene() -> None:

@@ -12,12 +12,12 @@ from scipy.spatial.transform import Rotation
 
 from proofroll.core.errors import Refused
 from proofroll.elements.mechanism import Body, Joint, Loop, Mechanism, Tree
-from proofroll.elements.mechanism.analysis import analysed
+from proofroll.elements.mechanism.analysis import analyse
 from proofroll.elements.mechanism.assembly import check_start
 from proofroll.elements.mechanism.joint import FACTS
 from proofroll.elements.mechanism.joint_coordinates import JointCoordinates
 from proofroll.elements.mechanism.placed import Placed
-from proofroll.elements.mechanism.record import gathered
+from proofroll.elements.mechanism.record import record_of
 from proofroll.elements.mechanism.rotations import to_rpy
 from proofroll.truth.mechanism.maximal_bodies import Planar, made_bodies
 from proofroll.truth.mechanism.maximal_coordinates import MaximalCoordinates
@@ -78,7 +78,7 @@ def test_both_routes_agree(scene, name):
     times = np.array([0.0, end / 2, end])
     one = JointCoordinates(mechanism).run(times)
     two = MaximalCoordinates(mechanism).run_taylor(times)
-    place, attitude, wrench = apart(one, two, analysed(mechanism).determinate)
+    place, attitude, wrench = apart(one, two, analyse(mechanism).determinate)
     assert place < 1e-11
     assert attitude < 1e-11
     assert wrench < of_forces
@@ -92,7 +92,7 @@ def test_maximal_coordinates_without_taylor_series(scene):
     times = np.array([0.0, 0.05])
     one = JointCoordinates(mechanism).run(times)
     two = MaximalCoordinates(mechanism).run_dop853(times)
-    assert max(apart(one, two, analysed(mechanism).determinate)[:2]) < 1e-12
+    assert max(apart(one, two, analyse(mechanism).determinate)[:2]) < 1e-12
     assert two.residual.max() < 1e-13
 
 
@@ -101,7 +101,7 @@ def test_routes_agree_on_every_kind_of_joint():
     mechanism = replace(mechanism_examples.every_kind(), loops=())
     times = np.array([0.0, 0.02])
     one, two = JointCoordinates(mechanism).run(times), MaximalCoordinates(mechanism).run_dop853(times)
-    place, attitude, wrench = apart(one, two, analysed(mechanism).determinate)
+    place, attitude, wrench = apart(one, two, analyse(mechanism).determinate)
     assert max(place, attitude) < 1e-12
     assert wrench < 1e-10
     assert np.abs(one.v - two.v).max() < 1e-11
@@ -131,7 +131,7 @@ def test_routes_agree_on_every_kind_of_loop(kind):
     check_start(mechanism)
     times = np.array([0.0, 0.005])
     one, two = JointCoordinates(mechanism).run(times), MaximalCoordinates(mechanism).run_dop853(times)
-    place, attitude, wrench = apart(one, two, analysed(mechanism).determinate)
+    place, attitude, wrench = apart(one, two, analyse(mechanism).determinate)
     assert max(place, attitude) < 1e-12
     assert wrench < 1e-10 * max(1.0, np.abs(one.wrench).max())
     assert max(one.residual.max(), two.residual.max()) < 1e-12
@@ -212,7 +212,7 @@ def test_both_routes_start_where_a_joints_definition_says(kind, in_plane, data):
     (turns, places), (later, there), (earlier, here) = (by_definition(mechanism, time) for time in (0.0, h, -h))
     rates, spins = (there - here) / (2 * h), (later * earlier.inv()).as_rotvec() / (2 * h)
     equations = JointCoordinates(mechanism)
-    one = gathered(np.zeros(1), [equations.sample(*mechanism.start())])
+    one = record_of(np.zeros(1), [equations.sample(*mechanism.start())])
     for record in (one, MaximalCoordinates(mechanism).at_start()):
         apart = Rotation.from_quat(record.q_WB[0], scalar_first=True) * turns.inv()
         assert max(np.abs(record.p_WB[0] - places).max(), apart.magnitude().max()) < 1e-13
@@ -233,7 +233,7 @@ def test_springs_and_dampers_along_joints_act_alike():
     )
     times = np.array([0.0, 0.1])
     one, two = JointCoordinates(mechanism).run(times), MaximalCoordinates(mechanism).run_dop853(times)
-    assert max(apart(one, two, analysed(mechanism).determinate)) < 1e-10
+    assert max(apart(one, two, analyse(mechanism).determinate)) < 1e-10
     energy = placed(mechanism, one).energy()
     assert energy == pytest.approx(placed(mechanism, two).energy(), abs=1e-11)
     assert energy[1] < energy[0]

@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from proofroll.core.errors import Diverged, Refused
 from proofroll.elements.mechanism import Body, Joint, Loop, Mechanism
-from proofroll.elements.mechanism.analysis import RowSign, analysed
+from proofroll.elements.mechanism.analysis import RowSign, analyse
 from proofroll.elements.mechanism.element import MechanismElement
 from proofroll.elements.mechanism.joint_coordinates import JointCoordinates
 from proofroll.truth.hybrid import follow
@@ -132,4 +132,4 @@ def test_a_stop_elsewhere_ends_no_other_way_at_a_singular_pose(scene):
 def test_a_start_that_lengths_cannot_tell_from_a_singular_pose_is_one(scene, away, singular):
     """Crank and rod in line but for less than the root of 1e-9 rad: a length that differs by 1e-9 starts there."""
     mechanism = scene("slider_crank", crank=0.4 * (1 - 1e-13), angle=np.pi / 2 - away - 1e-12)
-    assert analysed(mechanism).singular_start == singular
+    assert analyse(mechanism).singular_start == singular

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
-from proofroll.core.diagnosis import Cause, Evidence, Hypothesis, apart, hypothesis
+from proofroll.core.diagnosis import Cause, Evidence, Hypothesis, hypothesis, largest_gap
 from proofroll.core.events import events_of
 from proofroll.elements.ball_on_surface.diagnosis.equations import (
     COVERED,
@@ -92,7 +92,7 @@ def pyramidal_cone(evidence: Evidence) -> Iterator[Cause]:
         return
     if max(np.ptp(np.unwrap(np.arctan2(of[:, 1], of[:, 0]))) for of in (slip, reported)) < _TURNS:
         return
-    before = apart(reported, -most * slip / sizes)
+    before = largest_gap(reported, -most * slip / sizes)
     if not before > _PYRAMID * float(np.max(np.abs(most))):
         return
     after = np.inf
@@ -101,7 +101,7 @@ def pyramidal_cone(evidence: Evidence) -> Iterator[Cause]:
         along = slip @ turn
         corner = np.abs(along) == np.max(np.abs(along), axis=-1, keepdims=True)
         for kind in (corner, 1.0):
-            after = min(after, apart(reported, -most * (np.sign(along) * kind) @ turn.T))
+            after = min(after, largest_gap(reported, -most * (np.sign(along) * kind) @ turn.T))
     says = "the friction cone is a pyramid: the friction depends on the direction of the slip"
     remedy = "choose an elliptic (quadratic) cone"
     covered = ("motion", *COVERED)

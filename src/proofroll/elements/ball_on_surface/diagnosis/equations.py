@@ -16,8 +16,8 @@ from scipy.interpolate import make_interp_spline
 
 from proofroll.core.arrays import FloatArray, cross
 from proofroll.core.diagnosis import CLOSES, CLOSES_EXACTLY, Evidence
-from proofroll.core.diagnosis.fitting import ABOVE, Residuals, once
-from proofroll.core.diagnosis.lines import differing, left
+from proofroll.core.diagnosis.fitting import ABOVE, Residuals, cached_on_evidence
+from proofroll.core.diagnosis.lines import differing, relative_differences
 from proofroll.core.first_steps import OF_FIRST_STEPS
 from proofroll.elements.ball_on_surface.mechanics import (
     natural_acceleration,
@@ -142,7 +142,7 @@ def response(
     return (force + applied) / m, (a * cross(e1, force) + resisting + turning) / J, force
 
 
-@once
+@cached_on_evidence
 def residuals_of(evidence: Evidence) -> Iterator[Residuals[Law]]:
     """Residuals of the certificate if a line of it differs, and of the run if it balances worse than the truth.
 
@@ -179,11 +179,15 @@ def held_at_start(evidence: Evidence, body: RollingBall, wrong: Sequence[Mapping
     """Residuals of the certificate's lines, relative to their scales; ``wrong`` are the lines that differ."""
 
     def left_of_lines(law: Law | None) -> FloatArray:
-        plain = left(evidence.lines, {}, GIVEN)
-        return np.full_like(plain, np.inf) if law is None else left(evidence.lines, at_start(body, law), GIVEN)
+        plain = relative_differences(evidence.lines, {}, GIVEN)
+        return (
+            np.full_like(plain, np.inf)
+            if law is None
+            else relative_differences(evidence.lines, at_start(body, law), GIVEN)
+        )
 
     what = " and ".join(str(line["quantity"]) for line in wrong[:2]) + (" and more" if len(wrong) > 2 else "")
-    before = float(np.max(np.abs(left(evidence.lines, {}, GIVEN)), initial=0.0))
+    before = float(np.max(np.abs(relative_differences(evidence.lines, {}, GIVEN)), initial=0.0))
     return Residuals(
         left_of_lines, f"at time 0 {what}, relative,", "1", before, CLOSES_EXACTLY, COVERED, Law(body),
         lambda: _others(body), lambda law: _contradicted(evidence.lines, body, law, CLOSES_EXACTLY * before),

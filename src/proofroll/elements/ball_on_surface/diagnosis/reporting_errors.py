@@ -9,20 +9,20 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from proofroll.core.arrays import FloatArray, cross
-from proofroll.core.diagnosis import Cause, Evidence, above_round_off, apart, hypothesis
+from proofroll.core.diagnosis import Cause, Evidence, above_round_off, hypothesis, largest_gap
 from proofroll.core.diagnosis.clocks import delay_text, in_steps
-from proofroll.core.diagnosis.fitting import fitted
+from proofroll.core.diagnosis.fitting import least_squares_parameter
 from proofroll.core.diagnosis.lines import differing
 from proofroll.core.diagnosis.samples import (
     another_clock,
     at_start,
-    both,
     forced_otherwise,
     reported_quaternions,
     reported_vectors,
+    run_and_truth,
     single_precision_run,
 )
-from proofroll.core.diagnosis.vectors import ReportedVector, into
+from proofroll.core.diagnosis.vectors import ReportedVector, components_along
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.stretches import carried
 
@@ -81,7 +81,7 @@ CLOCK = another_clock(_state, ("p_WB", "v_WB", "w_WB", "force", "motion"))
 @hypothesis("said force", "the true force with another sign, unit, frame or time is what the engine says")
 def reported_force(evidence: Evidence) -> Iterator[Cause]:
     """Hypotheses on the wall's force along the run, and on its friction alone."""
-    pair, body = both(evidence), evidence.element.rolling
+    pair, body = run_and_truth(evidence), evidence.element.rolling
     if pair is None or "N" not in pair[0] or "N" not in pair[1] or CLOCK.proven(evidence):
         return
     if body.flies:  # its force comes and goes: a late impact must not be taken for a force that is reported late
@@ -145,9 +145,9 @@ def at_the_contact(evidence: Evidence) -> Iterator[Cause]:
         said, true = run[name].to_numpy(), truth[name].to_numpy()
         if said.shape == true.shape and len(said) > 1:
             said, true = said[1:], true[1:]
-            before = apart(said, true)
+            before = largest_gap(said, true)
             remedy = f"give {name} of the ball's centre, along the axes of the world"
-            yield Cause("contact point", says, name, _UNITS[name][1], before, apart(said, changed[1:]), remedy)
+            yield Cause("contact point", says, name, _UNITS[name][1], before, largest_gap(said, changed[1:]), remedy)
 
 
 @hypothesis("stale normal", "N, F2 and F3 of the truth along e1, e2, e3 of one time before give the force that is said")
@@ -161,22 +161,22 @@ def stale_normal(evidence: Evidence) -> Iterator[Cause]:
     if (
         said.shape != true.shape
         or not np.all(np.isfinite(said))
-        or not above_round_off(apart(said, true), float(np.max(abs(true))))
+        or not above_round_off(largest_gap(said, true), float(np.max(abs(true))))
     ):
         return
-    local = into(body.surface.frame(body.surface.locate(p)), true)
+    local = components_along(body.surface.frame(body.surface.locate(p)), true)
 
     def turned(delay: float) -> FloatArray:
         return np.asarray(np.einsum("tij,tj->ti", body.surface.frame(body.surface.locate(p - delay * v)), local))
 
-    delay = fitted(lambda x: np.ravel(turned(x) - said), 0.0, evidence.step or 1e-3)
-    if 2 * apart(run["p_WB"].to_numpy()[1:], p) > float(np.max(np.abs(delay * v))):
+    delay = least_squares_parameter(lambda x: np.ravel(turned(x) - said), 0.0, evidence.step or 1e-3)
+    if 2 * largest_gap(run["p_WB"].to_numpy()[1:], p) > float(np.max(np.abs(delay * v))):
         return  # the ball itself is as far off, which explains its force
     moment = delay_text(delay, evidence.step).removesuffix(" late")
     says = f"the force is along the axes of the normal of {moment} before"
-    after, remedy = apart(said, turned(delay)), "take the normal where the ball is when the force is read"
+    after, remedy = largest_gap(said, turned(delay)), "take the normal where the ball is when the force is read"
     change = in_steps(delay, evidence.step)
-    yield Cause("stale normal", says, "force", "N", apart(said, true), after, remedy, 1, change=change)
+    yield Cause("stale normal", says, "force", "N", largest_gap(said, true), after, remedy, 1, change=change)
 
 
 @hypothesis("force at time 0", "the scene's own force with another sign, unit or axes is the one of the certificate")

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from proofroll.core.arrays import FloatArray
-from proofroll.core.bounds import bounded
+from proofroll.core.bounds import require_bounds
 from proofroll.core.errors import InputError
 from proofroll.elements.ball_on_surface.surfaces.declared import Declared
 from proofroll.elements.ball_on_surface.surfaces.formula import sqrt
@@ -37,7 +37,7 @@ class Bowl(Declared):
     units = ("m", "m")
 
     def __post_init__(self) -> None:
-        bounded("radius", self.radius, above=0)
+        require_bounds("radius", self.radius, above=0)
 
     @property
     def domain(self) -> tuple[tuple[float, float], tuple[float, float]]:

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from proofroll.core.arrays import FloatArray
-from proofroll.core.bounds import bounded
+from proofroll.core.bounds import require_bounds
 from proofroll.core.errors import InputError
 from proofroll.elements.ball_on_surface.surfaces.surface import Generator, components, tilted
 
@@ -42,8 +42,8 @@ class Cylinder:
     wall_rate = (0.0, 0.0, 0.0)
 
     def __post_init__(self) -> None:
-        bounded("radius", self.radius, above=0)
-        bounded("tilt", self.tilt)
+        require_bounds("radius", self.radius, above=0)
+        require_bounds("tilt", self.tilt)
 
     @property
     def length_scales(self) -> tuple[float, float]:

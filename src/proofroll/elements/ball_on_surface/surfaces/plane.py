@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from proofroll.core.arrays import FloatArray, read_only
-from proofroll.core.bounds import bounded
+from proofroll.core.bounds import require_bounds
 from proofroll.elements.ball_on_surface.surfaces.surface import Generator, components, tilted
 
 
@@ -38,9 +38,9 @@ class Plane:
     length_scales = (1.0, 1.0)
 
     def __post_init__(self) -> None:
-        bounded("tilt", self.tilt)
-        bounded("height", self.height)
-        bounded("turning", self.turning)
+        require_bounds("tilt", self.tilt)
+        require_bounds("height", self.height)
+        require_bounds("turning", self.turning)
 
     @property
     def wall_rate(self) -> tuple[float, float, float]:

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from proofroll.core.arrays import FloatArray
-from proofroll.core.bounds import OutOfBounds, bounded
+from proofroll.core.bounds import OutOfBounds, require_bounds
 from proofroll.core.errors import InputError
 from proofroll.elements.ball_on_surface.surfaces.declared import Declared
 from proofroll.elements.ball_on_surface.surfaces.formula import Jet, cos, sin, sqrt, variables
@@ -167,11 +167,11 @@ class Cone(Revolved):
     coordinates = ("gamma", "s")
 
     def __post_init__(self) -> None:
-        bounded("slope", self.slope, above=0)
+        require_bounds("slope", self.slope, above=0)
         if not self.slope < math.pi / 2:
             raise OutOfBounds("slope", self.slope, "the value must be below a right angle")
-        bounded("length", self.length, above=0)
-        bounded("tip", self.tip)
+        require_bounds("length", self.length, above=0)
+        require_bounds("tip", self.tip)
 
     @property
     def extent(self) -> tuple[float, float]:
@@ -217,8 +217,8 @@ class Torus(Revolved):
     extent = (-math.pi, math.pi)
 
     def __post_init__(self) -> None:
-        bounded("ring_radius", self.ring_radius, above=0)
-        bounded("wire_radius", self.wire_radius, above=0)
+        require_bounds("ring_radius", self.ring_radius, above=0)
+        require_bounds("wire_radius", self.wire_radius, above=0)
         if not self.wire_radius < self.ring_radius:
             raise OutOfBounds("wire_radius", self.wire_radius, f"the value must be below {self.ring_radius:g}")
 

@@ -40,7 +40,7 @@ def kinds(mode: ContactMode) -> tuple[str, ...]:
     return tuple(own.kind for own in mode)
 
 
-def across(found: Touching) -> Array:
+def slip_velocity(found: Touching) -> Array:
     """Slip velocity of a contact, tangential to its surfaces [m/s], shape (3,)."""
     return np.asarray(found.slide - found.normal * (found.normal @ found.slide))
 
@@ -51,7 +51,7 @@ def heading_of(own: Acting, found: Touching) -> Array:
     Raises:
         Refused: the line of a slip has turned too far to be known.
     """
-    slip = across(found)
+    slip = slip_velocity(found)
     speed = float(np.linalg.norm(slip))
     if own.along is None and speed > FAINT / 2:
         return np.asarray(slip / speed)
@@ -80,7 +80,7 @@ def held_directions(own: Acting, found: Touching, presses: bool) -> Array:
     return np.vstack([normal, line / np.linalg.norm(line)])
 
 
-def acting(kind: Literal["open", "slip", "stick"], frame: Array, heading: Array, G: Array) -> Acting:
+def first_mode(kind: Literal["open", "slip", "stick"], frame: Array, heading: Array, G: Array) -> Acting:
     """Mode in which a contact begins.
 
     Args:

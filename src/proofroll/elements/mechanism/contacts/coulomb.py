@@ -19,8 +19,8 @@ _SWEEPS = 1000
 _SETTLED = 1e-12  # largest change in the last sweep, relative to the largest force
 _RESTS = 1e-10  # motion of a contact that counts as none, relative to the loads
 # Margin, relative to friction's bound, above which a contact slides: closer to the bound round-off decides, and no
-# direction of slip would be found. :func:`sure` tells if an outcome depends on a change within the accuracy of the
-# parameters.
+# direction of slip would be found. :func:`robust_forces` tells if an outcome depends on a change within the accuracy
+# of the parameters.
 _AT_BOUND = 1e-9
 # Relative change of loads and friction with which an outcome is tried on both sides; an outcome that changes is not
 # unique. Each further contact gets an extra 0.382 of it: equal changes would cancel between two walls.
@@ -33,7 +33,7 @@ PAINLEVE = (
 )
 
 
-def solved(
+def contact_forces(
     G: Array,
     c: Array,
     friction: Array,
@@ -78,7 +78,7 @@ def solved(
     raise Refused(f"the forces of the contacts {', '.join(names)} are not found in {_SWEEPS} sweeps")
 
 
-def sure(
+def robust_forces(
     G: Array,
     c: Array,
     friction: Array,
@@ -87,12 +87,12 @@ def sure(
     bounds: Array | None = None,
     least: float = 0.0,
 ) -> tuple[Array, list[Outcome], bool]:
-    """Solution as of :func:`solved`, and True if slightly changed pressure and friction give the same outcomes.
+    """Solution as of :func:`contact_forces`, and True if slightly changed pressure and friction give the same outcomes.
 
     A contact whose force is at most a ``least`` part of the largest force counts as open.
     """
     bounds = np.zeros(len(friction)) if bounds is None else bounds
-    force, done = solved(G, c, friction, sliding, names, bounds)
+    force, done = contact_forces(G, c, friction, sliding, names, bounds)
     own = np.diag(G)[::3]
     # as a force at each contact, which the holds of the other contacts balance
     lift = np.where(own > 0, (1 + _APART * np.arange(len(own))) / np.where(own > 0, own, 1), 0.0)
@@ -104,7 +104,7 @@ def sure(
 
     nominal = outcome(force, done)
     same = all(
-        outcome(*solved(G, c + side * nudge, friction * part, sliding, names, bounds * part)) == nominal
+        outcome(*contact_forces(G, c + side * nudge, friction * part, sliding, names, bounds * part)) == nominal
         for side, part in ((1.0, 1 - _NUDGE), (-1.0, 1 + _NUDGE))
     )
     return force, done, same

@@ -12,8 +12,15 @@ import numpy as np
 
 from proofroll.core.errors import NotUnique
 from proofroll.elements.mechanism.analysis import RANK
-from proofroll.elements.mechanism.contacts.acting import OPEN, Acting, ContactMode, acting, heading_of, held_directions
-from proofroll.elements.mechanism.contacts.coulomb import sure
+from proofroll.elements.mechanism.contacts.acting import (
+    OPEN,
+    Acting,
+    ContactMode,
+    first_mode,
+    heading_of,
+    held_directions,
+)
+from proofroll.elements.mechanism.contacts.coulomb import robust_forces
 from proofroll.elements.mechanism.contacts.geometry import BodyContact
 from proofroll.elements.mechanism.contacts.joint_laws import JointContact, joint_contacts, mode_of_joints
 from proofroll.elements.mechanism.contacts.start import closed_and_still, natural_scale, touches
@@ -239,12 +246,12 @@ class ContactDynamics:
             across = frames[k][:, 1:].T @ found.slide
             sliding.append(None if still[k] else across / np.linalg.norm(across))
         G, names = J @ state.W @ J.T, [self.contacts[k].name for k in which]
-        force, done, same = sure(G, c, self.friction[which], sliding, names, self._bounds[which])
+        force, done, same = robust_forces(G, c, self.friction[which], sliding, names, self._bounds[which])
         mode = [OPEN for _ in closed]
         for place, k in enumerate(which):
             own = slice(3 * place, 3 * place + 3)
             slides = sliding[place]
-            mode[k] = acting(done[place], frames[k], -force[place, 1:] if slides is None else slides, G[own, own])
+            mode[k] = first_mode(done[place], frames[k], -force[place, 1:] if slides is None else slides, G[own, own])
         return tuple(mode), np.inf if same else 0.0
 
     def struck(self, q: Array, v: Array, closed: Sequence[int], restitution: Array) -> tuple[Array, Array, float]:
@@ -269,7 +276,7 @@ class ContactDynamics:
         c[::3] += restitution * np.minimum(c[::3], 0.0)
         G, names = J @ state.W @ J.T, [self.contacts[k].name for k in closed]
         sliding = [None] * len(closed)
-        impulse, _, same = sure(G, c, self.friction[list(closed)], sliding, names, least=_NO_IMPULSE)
+        impulse, _, same = robust_forces(G, c, self.friction[list(closed)], sliding, names, least=_NO_IMPULSE)
         pressed = [k for k in range(len(closed)) if impulse[k, 0] > 0]
         for a in pressed:
             for b in pressed:

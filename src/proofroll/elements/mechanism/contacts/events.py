@@ -11,7 +11,13 @@ from numpy.typing import NDArray
 from proofroll.core.arrays import FloatArray
 from proofroll.core.element_abilities import SeenInRun
 from proofroll.core.events import Event
-from proofroll.elements.mechanism.contacts.observables import PRESSES, Followed, followed, given_forces, normal_forces
+from proofroll.elements.mechanism.contacts.observables import (
+    PRESSES,
+    Followed,
+    follow_contacts,
+    given_forces,
+    normal_forces,
+)
 from proofroll.elements.mechanism.dataset import placed_from
 
 if TYPE_CHECKING:
@@ -59,7 +65,7 @@ class ContactWatch:
         placed = placed_from(self._element, times[:count], samples)
         turning = np.abs(placed.w_WB).max(axis=(1, 2)) * self._element.length
         speeds = np.maximum(np.abs(placed.v_WB).max(axis=(1, 2)), turning)
-        seen = self._events(times[:count], followed(placed), pressed, speeds)
+        seen = self._events(times[:count], follow_contacts(placed), pressed, speeds)
         return SeenInRun(count, self._reconciled(located or (), seen), None)
 
     def _reconciled(self, located: Sequence[Event], seen: Sequence[Event]) -> Sequence[Event]:

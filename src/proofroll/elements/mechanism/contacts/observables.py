@@ -57,7 +57,7 @@ class Followed(NamedTuple):
     slide: FloatArray
 
 
-def followed(placed: Placed) -> Followed:
+def follow_contacts(placed: Placed) -> Followed:
     """Gaps, speeds of slip and normals of all contacts at all times."""
     mechanism = placed.mechanism
     shape = (len(placed.time), len(mechanism.contacts))

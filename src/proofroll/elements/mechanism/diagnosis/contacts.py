@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.diagnosis import Cause, Evidence, hypothesis
-from proofroll.core.diagnosis.fitting import change_by, factor_text, once
-from proofroll.core.diagnosis.samples import both
+from proofroll.core.diagnosis.fitting import cached_on_evidence, change_by, factor_text
+from proofroll.core.diagnosis.samples import run_and_truth
 from proofroll.core.diagnosis.vectors import ReportedVector
 from proofroll.core.errors import Refused
-from proofroll.elements.mechanism.contacts.observables import PRESSES, SLIDES, Followed, followed, normal_forces
+from proofroll.elements.mechanism.contacts.observables import PRESSES, SLIDES, Followed, follow_contacts, normal_forces
 from proofroll.elements.mechanism.diagnosis.equations import is_motion, of_start, placed_of
 from proofroll.elements.mechanism.model import Mechanism
 
@@ -85,14 +85,14 @@ class SeenContact:
         return np.asarray(-(self.friction * self.N / slip)[..., None] * self.across)
 
 
-@once
+@cached_on_evidence
 def touch_of(evidence: Evidence) -> Iterator[SeenContact]:
     """Contacts of the run; nothing if it has none or does not report their forces."""
-    pair, element = both(evidence), evidence.element
+    pair, element = run_and_truth(evidence), evidence.element
     if pair is None or not element.mechanism.contacts or "contact_forces" not in pair[0] or not is_motion(pair[0]):
         return
     run, truth = pair
-    found = followed(placed_of(element.mechanism, run))
+    found = follow_contacts(placed_of(element.mechanism, run))
     force = run["contact_forces"].to_numpy()
     if np.isnan(force[1:]).any():
         return
@@ -100,7 +100,7 @@ def touch_of(evidence: Evidence) -> Iterator[SeenContact]:
     presses = np.asarray(PRESSES * element.force < N)
     presses[0] = False  # several engines know no force there
     slides = presses & np.asarray(found.slip > SLIDES * element.speed)
-    true = followed(placed_of(element.mechanism, truth))
+    true = follow_contacts(placed_of(element.mechanism, truth))
     u_n = np.sum(found.normal * found.slide, axis=-1)
     yield SeenContact(
         evidence,
@@ -239,7 +239,7 @@ def forces_at_start(evidence: Evidence) -> Iterator[Cause]:
         what = "the force of a contact on its first body"
         values = reported[None, known], true[None, known], np.zeros(1)
         yield from ReportedVector("contact_forces", what, "N", *values, {}, element.force).causes(evidence.step)
-    found = followed(element.start)
+    found = follow_contacts(element.start)
     n, friction = found.normal[0], np.array([contact.friction for contact in element.mechanism.contacts])
     N = np.sum(reported * n, axis=-1)
     slides = known & (PRESSES * element.force < N) & (found.slip[0] > SLIDES * element.speed) & (friction > 0)

@@ -7,7 +7,7 @@ import numpy as np
 from proofroll.core.arrays import FloatArray
 from proofroll.core.diagnosis import Cause, Evidence, above_round_off, hypothesis
 from proofroll.core.diagnosis.fitting import change_by, factor_text, possible
-from proofroll.core.diagnosis.samples import both
+from proofroll.core.diagnosis.samples import run_and_truth
 from proofroll.elements.mechanism.diagnosis.equations import Change, is_motion, of_start, placed_of
 from proofroll.elements.mechanism.diagnosis.residuals import COVERED, best, residuals_of
 from proofroll.elements.mechanism.drives import Actuator
@@ -104,7 +104,7 @@ def of_couplings(evidence: Evidence) -> Iterator[Cause]:
 
     The ratio is fitted to a run; from the start alone it is chosen among the ratios that known mistakes give.
     """
-    mechanism, found = evidence.element.mechanism, both(evidence)
+    mechanism, found = evidence.element.mechanism, run_and_truth(evidence)
     if not mechanism.couplings:
         return
     moving: FloatArray | None = None
@@ -139,7 +139,7 @@ def of_stops(evidence: Evidence) -> Iterator[Cause]:
     Its place is where the joint rests, or where it rebounds. The latter counts only if the true joint rebounds at its
     stop, for contacts of bodies and other stops turn joints back, too.
     """
-    mechanism, found = evidence.element.mechanism, both(evidence)
+    mechanism, found = evidence.element.mechanism, run_and_truth(evidence)
     if found is None or not is_motion(found[0]) or not any(joint.limits for joint in mechanism.joints):
         return
     (seen, speeds), (true, rates) = (placed_of(mechanism, dataset).of_tree() for dataset in found)

@@ -12,7 +12,7 @@ from scipy.optimize import linear_sum_assignment
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.diagnosis import Cause, Evidence, hypothesis
-from proofroll.core.diagnosis.samples import both, forced_otherwise
+from proofroll.core.diagnosis.samples import forced_otherwise, run_and_truth
 from proofroll.core.diagnosis.vectors import ReportedVector, product
 from proofroll.elements.mechanism.diagnosis.equations import placed_of
 from proofroll.elements.mechanism.diagnosis.reporting_errors import BODY
@@ -125,7 +125,7 @@ def _reactions(
 )
 def reactions(evidence: Evidence) -> Iterator[Cause]:
     """Hypotheses on forces and moments of joints and loops along the run, where they are determinate."""
-    found = both(evidence)
+    found = run_and_truth(evidence)
     if found is None:
         return
     run, truth = (data.isel(time=slice(1, None)) for data in found)

@@ -8,7 +8,7 @@ import numpy as np
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.diagnosis import CLOSES, CLOSES_EXACTLY, Evidence
-from proofroll.core.diagnosis.fitting import ABOVE, FACTORS, Residuals, once
+from proofroll.core.diagnosis.fitting import ABOVE, FACTORS, Residuals, cached_on_evidence
 from proofroll.core.diagnosis.lines import differing
 from proofroll.core.first_steps import OF_FIRST_STEPS
 from proofroll.elements.mechanism.diagnosis.equations import Change, MechanismStates, of_run, of_start, stretch
@@ -31,7 +31,7 @@ GIVEN = (
 _KNOWN = 10.0
 
 
-@once
+@cached_on_evidence
 def residuals_of(evidence: Evidence) -> Iterator[Residuals[Change]]:
     """Residuals at the start if its accelerations differ, and along the run if it balances worse than the truth.
 

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 from proofroll.core.arrays import FloatArray
 from proofroll.core.diagnosis import CLOSES, Cause, Evidence, above_round_off, hypothesis
 from proofroll.core.diagnosis.lines import differing, scale_of
-from proofroll.core.diagnosis.samples import both
+from proofroll.core.diagnosis.samples import run_and_truth
 from proofroll.core.errors import InputError
 from proofroll.core.first_steps import OF_FIRST_STEPS
 from proofroll.elements.mechanism.diagnosis.equations import Change, is_motion, of_run, placed_of, stretch
@@ -31,7 +31,7 @@ def other_axis(evidence: Evidence) -> Iterator[Cause]:
     """Hypothesis: a joint turns about another axis than the scene's."""
     mechanism = evidence.element.mechanism
     yield from _axes_at_start(evidence)
-    found = both(evidence)
+    found = run_and_truth(evidence)
     if found is None or not is_motion(found[0]):
         return
     placed = placed_of(mechanism, found[0])

@@ -22,7 +22,7 @@ _TEETH = 8  # of the zigzag of a spring
 _OUTLINE, _PATCH = 97, 0.6  # points of a shape's outline; half of a plane's patch, over the mechanism's length
 
 
-def drawn(element: MechanismElement) -> Drawing:
+def mechanism_drawing(element: MechanismElement) -> Drawing:
     """Drawing of a mechanism: lines from centres of mass to the fastenings of bodies, and marks of joints and parts."""
     mechanism, start, picture = element.mechanism, element.start, Drawing()
     at = View(*direction(element), _SIZE / _reach(element))

@@ -61,9 +61,9 @@ class MechanismReport(ReportKind):
     @staticmethod
     def drawings(scenes: Sequence[Scene]) -> tuple[list[Picture], str]:
         """Picture of the first case at its start."""
-        from proofroll.elements.mechanism.report.drawing import drawn
+        from proofroll.elements.mechanism.report.drawing import mechanism_drawing
 
-        return [drawn(the_mechanism(scenes[0])).picture("at the start")], ""
+        return [mechanism_drawing(the_mechanism(scenes[0])).picture("at the start")], ""
 
     @staticmethod
     def curves(scene: Scene, truth: xr.Dataset) -> Sequence[Observable]:
@@ -73,10 +73,10 @@ class MechanismReport(ReportKind):
     @staticmethod
     def replay() -> ReplayKind:
         """Replay of bodies and joints in motion."""
-        from proofroll.elements.mechanism.report.replay import drawn, seen
+        from proofroll.elements.mechanism.report.replay import draw_mechanism, seen
         from proofroll.report.replay.records import ReplayKind
 
-        return ReplayKind("mechanism", seen, drawn)
+        return ReplayKind("mechanism", seen, draw_mechanism)
 
 
 def _reactions(element: MechanismElement, truth: xr.Dataset) -> list[Observable]:

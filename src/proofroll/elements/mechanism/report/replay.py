@@ -45,7 +45,7 @@ def seen(scene: Scene) -> float:
     return _SEEN * the_mechanism(scene).length
 
 
-def drawn(replayed: Replayed) -> tuple[dict[str, Any], list[int], PackedNumbers]:
+def draw_mechanism(replayed: Replayed) -> tuple[dict[str, Any], list[int], PackedNumbers]:
     """Drawing of a mechanism in the replay: see :data:`proofroll.report.replay.records.Drawer`.
 
     Raises:

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from proofroll.core.errors import Refused
-from proofroll.elements.mechanism.contacts.coulomb import solved, sure
+from proofroll.elements.mechanism.contacts.coulomb import contact_forces, robust_forces
 
 SMALL = 1e-9  # of the loads: where the sweeps end
 
@@ -37,7 +37,7 @@ def test_the_forces_obey_coulomb(seed: int, mu: float, count: int) -> None:
     G = np.eye(size) + 0.15 * mixed @ mixed.T / size  # couplings for which any friction up to 0.6 is well-posed
     c = rng.normal(size=size)
     friction = np.full(count, mu)
-    f, done = solved(G, c, friction, [None] * count, ["c"] * count)
+    f, done = contact_forces(G, c, friction, [None] * count, ["c"] * count)
     obeys(G, c, f, friction)
     assert [kind == "open" for kind in done] == [force[0] == 0 for force in f]
 
@@ -45,7 +45,7 @@ def test_the_forces_obey_coulomb(seed: int, mu: float, count: int) -> None:
 def test_what_slides_keeps_its_direction() -> None:
     """A contact that slides is pressed by what its load needs, friction against its slip, whatever the loads along."""
     G, t = np.diag([2.0, 1.0, 1.0]), np.array([0.6, 0.8])
-    f, done = solved(G, np.array([-4.0, 50.0, 0.0]), np.array([0.3]), [t], ["c"])
+    f, done = contact_forces(G, np.array([-4.0, 50.0, 0.0]), np.array([0.3]), [t], ["c"])
     assert done == ["slip"]
     assert f[0] == pytest.approx([2.0, -0.36, -0.48])
 
@@ -54,19 +54,19 @@ def test_friction_that_tears_is_told() -> None:
     """Where friction lifts more than the normal force presses, there is no unique answer."""
     G = np.array([[1.0, 1.0, 0.0], [1.0, 2.0, 0.0], [0.0, 0.0, 1.0]])
     with pytest.raises(Refused, match=r"friction at foot .*\(Painlevé\)"):
-        solved(G, np.array([-1.0, 0.0, 0.0]), np.array([1.5]), [np.array([1.0, 0.0])], ["foot"])
+        contact_forces(G, np.array([-1.0, 0.0, 0.0]), np.array([1.5]), [np.array([1.0, 0.0])], ["foot"])
 
 
 def test_a_tie_is_no_answer() -> None:
     """A load exactly on the bound of friction may stick or slip; a thousandth beside it, the answer is sure."""
     G, mu = np.eye(3), np.array([0.3])
-    assert not sure(G, np.array([-1.0, 0.3, 0.0]), mu, [None], ["c"])[2]
-    assert sure(G, np.array([-1.0, 0.2997, 0.0]), mu, [None], ["c"])[1:] == (["stick"], True)
-    assert sure(G, np.array([-1.0, 0.3003, 0.0]), mu, [None], ["c"])[1:] == (["slip"], True)
+    assert not robust_forces(G, np.array([-1.0, 0.3, 0.0]), mu, [None], ["c"])[2]
+    assert robust_forces(G, np.array([-1.0, 0.2997, 0.0]), mu, [None], ["c"])[1:] == (["stick"], True)
+    assert robust_forces(G, np.array([-1.0, 0.3003, 0.0]), mu, [None], ["c"])[1:] == (["slip"], True)
 
 
 def test_what_two_walls_may_jam_is_no_answer() -> None:
     """A ball between two walls that press it equally, or not at all, may fall or hold: nothing says which."""
     J = np.concatenate([np.eye(3), np.diag([-1.0, 1.0, 1.0])])  # normals against each other
     loads = J @ np.array([0.0, 0.0, -9.81])
-    assert not sure(J @ J.T, loads, np.full(2, 0.5), [None] * 2, ["left", "right"])[2]
+    assert not robust_forces(J @ J.T, loads, np.full(2, 0.5), [None] * 2, ["left", "right"])[2]

@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from proofroll.core.certificate import Line
 from proofroll.core.diagnosis import Evidence, diagnose, hypotheses_of
-from proofroll.core.diagnosis.of_scene import diagnosed
+from proofroll.core.diagnosis.of_scene import diagnose_scene
 from proofroll.core.scene import Scene
 from proofroll.core.truth import truth
 from proofroll.core.verdict import Judgement, Verdict
@@ -303,9 +303,9 @@ def test_what_vanishes_with_the_step_is_no_cause() -> None:
     scene, true = _true_top()
     run = _top(true, 5e-3)
     judged = Judgement("positions", "m", 1e-2, 0.0, 1e-6, 1.0, Verdict.DIFFERS)
-    (cause,) = diagnosed(scene, [], run, true, 5e-3, [replace(judged, limit_error=1e-2)])
+    (cause,) = diagnose_scene(scene, [], run, true, 5e-3, [replace(judged, limit_error=1e-2)])
     assert "armature" in cause.sentence
-    assert not diagnosed(scene, [], run, true, 5e-3, [replace(judged, limit_error=1e-4)])
+    assert not diagnose_scene(scene, [], run, true, 5e-3, [replace(judged, limit_error=1e-4)])
 
 
 def test_a_run_that_stands_still_has_no_other_gravity() -> None:
