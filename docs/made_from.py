@@ -12,8 +12,8 @@ from typing import Any
 from proofroll.core.plugins import parse_engine
 from proofroll.files.comparison_file import load_comparison
 from proofroll.files.data_folders import data_folder
-from proofroll.running.asking import resolve
 from proofroll.running.case import EngineFacts
+from proofroll.running.engine_questions import resolve
 from proofroll.running.idle_workers import Workers
 
 ROOT = Path(__file__).resolve().parents[1]

@@ -45,6 +45,12 @@ def test_every_path_of_a_table_is_there(line: str) -> None:
     assert missing(line) == []
 
 
+@pytest.mark.parametrize("line", rows(), ids=lambda line: line.split("|")[1].strip()[:50])
+def test_every_row_of_a_table_is_short(line: str) -> None:
+    """A row of a table in CONTRIBUTING.md has at most 200 characters; a longer one is two rows."""
+    assert len(line) <= 200
+
+
 def test_a_wrong_path_is_seen() -> None:
     """A path that is not there is named, and the others of its line are not."""
     assert missing("| a | `core/verdict.py`, `convergence.py`, `nowhere.py`, `studies/none/` |") == [

@@ -14,8 +14,8 @@ from proofroll.core.plugins import engine_names
 from proofroll.core.verdict import Verdict
 from proofroll.elements.ball_on_surface.surfaces import surface_kinds
 from proofroll.files.scene_file import load_scene
-from proofroll.running.asking import describe_each
 from proofroll.running.case import EngineDescription
+from proofroll.running.engine_questions import describe_each
 
 DOCS = Path(__file__).resolve().parents[1] / "docs"
 GLOSSARY = (DOCS / "glossary.md").read_text(encoding="utf-8")

@@ -14,8 +14,8 @@ from proofroll.core.errors import ProofrollError
 from proofroll.core.plugins import engine_names
 from proofroll.core.scene import Scene
 from proofroll.files.trajectory_file import read
-from proofroll.running.asking import describe, resolve
 from proofroll.running.case import Case, EngineFacts, Result, Status
+from proofroll.running.engine_questions import describe, resolve
 from proofroll.running.runner import Runner
 from proofroll.studies.cases import case_of
 

@@ -13,8 +13,8 @@ from typing import Any
 
 from proofroll.core.errors import ProofrollError
 from proofroll.files.scene_file import load_scene
-from proofroll.running.asking import describe, resolve
 from proofroll.running.case import Case, EngineFacts, Result
+from proofroll.running.engine_questions import describe, resolve
 from proofroll.running.process import Worker
 from proofroll.running.runner import Runner
 from proofroll.running.stopwatch import Stopwatch

@@ -110,14 +110,14 @@ def in_place(path):
 proofroll.files.atomic.replacing = in_place
 """,
     "the watch over the parent": """
-import proofroll.running.ending
+import proofroll.running.process_end
 
-proofroll.running.ending.end_with = lambda parent: None
+proofroll.running.process_end.end_with = lambda parent: None
 """,
     "the end by the system": """
-import proofroll.running.ending
+import proofroll.running.process_end
 
-proofroll.running.ending.end_with_pipe = lambda pipe: None
+proofroll.running.process_end.end_with_pipe = lambda pipe: None
 """,
 }
 

@@ -19,7 +19,7 @@ from tiny import Tiny, TinySettings
 
 from proofroll.core.convergence import richardson, tightest
 from proofroll.core.dataset import BETWEEN
-from proofroll.core.diagnosis.of_scene import diagnose_scene
+from proofroll.core.diagnosis.scene_diagnosis import diagnose_scene
 from proofroll.core.errors import Diverged, InputError, Refused
 from proofroll.core.first_steps import certificate
 from proofroll.core.multi_element import build

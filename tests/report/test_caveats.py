@@ -19,8 +19,8 @@ from proofroll.files.scene_file import load_scene
 from proofroll.report.labels import caveat_lines, family_and_caveat, with_caveat
 from proofroll.report.stability.tables import silent_lines
 from proofroll.report.tradeoff.tables import answer_lines
-from proofroll.running.asking import resolve
 from proofroll.running.case import EngineFacts
+from proofroll.running.engine_questions import resolve
 from proofroll.studies.tradeoff.recommend import recommend
 from proofroll.studies.tradeoff.requirements import Requirements
 

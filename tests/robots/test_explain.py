@@ -11,13 +11,13 @@ import pytest
 from robot_templates import inertial, urdf
 
 from proofroll.robots import layers
-from proofroll.robots.against import reading_of
 from proofroll.robots.explain import Search
 from proofroll.robots.layers import LAYERS, RobotTruth
 from proofroll.robots.model import Robot
 from proofroll.robots.opening import open_robot
 from proofroll.robots.robot_file import RobotFile
 from proofroll.robots.states import random_states
+from proofroll.robots.two_files import reading_of
 from proofroll.robots.two_formulations import Dynamics
 from proofroll.robots.urdf import read_urdf
 

@@ -13,7 +13,7 @@ from proofroll.robots.check import check
 from proofroll.robots.explain import RobotCause
 from proofroll.robots.gallery import locate, outcome, read_gallery
 from proofroll.robots.records import HeldLayer, ImporterRow
-from proofroll.running.asking import lent_workers
+from proofroll.running.engine_questions import lent_workers
 
 Proofroll = Callable[..., tuple[int, str, str]]
 

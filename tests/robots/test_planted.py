@@ -13,8 +13,7 @@ from robot_templates import inertial, mjcf, spherical, urdf
 from scipy.spatial.transform import Rotation
 
 from proofroll.core.plugins import parse_engine
-from proofroll.robots import defining, reading
-from proofroll.robots.against import reading_of
+from proofroll.robots import mjcf_compiler, reading
 from proofroll.robots.check import check
 from proofroll.robots.importer_row import importer_row
 from proofroll.robots.layers import RobotTruth
@@ -24,6 +23,7 @@ from proofroll.robots.protocol import Request
 from proofroll.robots.records import ImporterRow
 from proofroll.robots.robot_file import RobotFile
 from proofroll.robots.states import random_states
+from proofroll.robots.two_files import reading_of
 from proofroll.robots.urdf import BASE_JOINT, read_urdf
 from proofroll.running.process import Worker
 
@@ -295,7 +295,7 @@ def test_real_engines(
     place.mkdir()
     written = reading.write(file, place)
     if robot is None:
-        robot, _ = defining.compiled_robot(robot_workers("mujoco"), file, written, 60)
+        robot, _ = mjcf_compiler.compiled_robot(robot_workers("mujoco"), file, written, 60)
     truth = RobotTruth.of(robot, random_states(robot, 5, 1))
     request = _request(written, file, truth, reading.options_of(spec.options, spec.name))
 
@@ -480,7 +480,7 @@ def test_planted_causes_in_mjcf(
         files.append(open_robot(path))
         (tmp_path / f"{name}-given").mkdir()
         written = reading.write(files[-1], tmp_path / f"{name}-given")
-        robots.append(defining.compiled_robot(robot_workers("mujoco"), files[-1], written, 60)[0])
+        robots.append(mjcf_compiler.compiled_robot(robot_workers("mujoco"), files[-1], written, 60)[0])
     truth = RobotTruth.of(robots[0], random_states(robots[0], 5, 1))
     answer = reading.ReaderAnswer("1", "", {}, reading_of(robots[1], truth), "")
     row = importer_row(files[0], truth, 1e-14, parse_engine("planted"), answer)

@@ -15,8 +15,8 @@ from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.elements.ball_on_surface.model import BallCapability, RollingBall
 from proofroll.files.scene_file import load_scene
 from proofroll.files.trajectory_file import read
-from proofroll.running.asking import describe, resolve
 from proofroll.running.case import Case, EngineFacts, Result, Status
+from proofroll.running.engine_questions import describe, resolve
 from proofroll.running.runner import Runner
 from proofroll.studies.cases import case_of
 

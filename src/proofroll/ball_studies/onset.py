@@ -17,8 +17,8 @@ from proofroll.elements.ball_on_surface.element import BallOnSurface
 from proofroll.elements.ball_on_surface.model import BallCapability
 from proofroll.files.scene_file import load_scene
 from proofroll.files.trajectory_file import read_columns
-from proofroll.running.asking import describe_each, resolve
 from proofroll.running.case import Case, EngineFacts, Result, Status
+from proofroll.running.engine_questions import describe_each, resolve
 from proofroll.running.idle_workers import Workers
 from proofroll.running.process import WorkerDied
 from proofroll.running.runner import Runner

@@ -32,7 +32,7 @@ from proofroll.cli.tradeoff import tradeoff
 from proofroll.cli.versions import versions
 from proofroll.core.announced import broken, leave_out, loaded
 from proofroll.core.errors import InputError, Missing, ProofrollError, choices
-from proofroll.running.ending import INTERRUPTS, end_at_once
+from proofroll.running.process_end import INTERRUPTS, end_at_once
 
 app = typer.Typer(
     help="Which multibody engine, formulation and time step can you trust for a scene?",

@@ -110,7 +110,7 @@ def _scene(name: str) -> SoundFile:
 def _comparison(path: Path) -> SoundFile:
     from proofroll.files.comparison_file import load_comparison
     from proofroll.files.scene_file import load_scene
-    from proofroll.running.asking import lent_workers
+    from proofroll.running.engine_questions import lent_workers
     from proofroll.studies.comparison.planning import require_fit, row_facts
 
     comparison = load_comparison(str(path))

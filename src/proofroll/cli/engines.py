@@ -85,7 +85,7 @@ def remove(
 
 
 def _described(name: str) -> dict[str, Any]:
-    from proofroll.running.asking import describe
+    from proofroll.running.engine_questions import describe
 
     try:
         return {"status": "installed", **dataclasses.asdict(describe(name))}

@@ -151,7 +151,7 @@ def _now_and_then(line: Callable[[], str]) -> Iterator[None]:
 
 def _waited_for() -> str:
     """End of a line of progress with the engines that have not answered yet."""
-    asking = sys.modules.get("proofroll.running.asking")  # not imported: no engine was asked
+    asking = sys.modules.get("proofroll.running.engine_questions")  # not imported: no engine was asked
     names = dict.fromkeys(asking.waited_for) if asking else ()
     what = "what they are" if len(names) > 1 else "what it is"
     return f": waiting for {', '.join(names)} to say {what}" if names else ""

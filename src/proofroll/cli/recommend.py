@@ -95,7 +95,7 @@ def _from_report(
     names: list[str], tolerance: str, engines: list[str], path: Path, *, forces: bool, as_json: bool
 ) -> None:
     """Prints advice for several scenes from the runs of a report; exit code 1 if in one nothing holds the tolerance."""
-    from proofroll.report.against import EarlierReport
+    from proofroll.report.changes import EarlierReport
     from proofroll.report.page.advice import advice
     from proofroll.report.page.choice_matrix import FIRST_TOLERANCE, ChoiceStudy, choice_matrix
 

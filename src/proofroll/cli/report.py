@@ -73,7 +73,7 @@ def report(
 
     from proofroll.core.errors import InputError
     from proofroll.files.comparison_file import comparison_names, further_comparison_names
-    from proofroll.report.against import EarlierReport
+    from proofroll.report.changes import EarlierReport
     from proofroll.report.page.growing import begun
     from proofroll.report.page.html import templates
     from proofroll.report.parts import all_parts, parts_of

@@ -44,7 +44,7 @@ def run(
     import tempfile
     import threading
 
-    from proofroll.running.asking import prepare
+    from proofroll.running.engine_questions import prepare
     from proofroll.running.idle_workers import Workers
 
     workers = Workers()  # one process resolves the settings and makes the run

@@ -108,7 +108,7 @@ def _place(engine: str, text: str) -> str:
     """Engine ``NAME`` or ``NAME@PLACE`` for a version, a label or a path; its environment is made if necessary."""
     from proofroll.core.plugins import engine_names
     from proofroll.running import environments
-    from proofroll.running.asking import describe
+    from proofroll.running.engine_questions import describe
 
     if text == engine:
         return engine  # the installed one

@@ -15,7 +15,7 @@ import numpy as np
 from proofroll.core.arrays import FloatArray
 from proofroll.core.certificate import ROUNDINGS, certify
 from proofroll.core.dataset import from_samples
-from proofroll.core.diagnosis.of_scene import diagnose_scene
+from proofroll.core.diagnosis.scene_diagnosis import diagnose_scene
 from proofroll.core.engine import EPSILON, Sample, precision_of
 from proofroll.core.engine_abilities import MadeFor, offered
 from proofroll.core.errors import Diverged, InputError, Missing, Refused

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 from proofroll.core.errors import InputError
 from proofroll.core.verdict import Verdict
 from proofroll.files.json_data import plain
-from proofroll.report.against import Against, EarlierReport, against, runs_of
+from proofroll.report.changes import Against, EarlierReport, against, runs_of
 from proofroll.report.figure import panels, svg_text
 from proofroll.report.labels import SYMBOLS
 from proofroll.report.pages import element, environment, rendered

@@ -17,19 +17,19 @@ from proofroll.core.plugins import EngineSpec, parse_engine, place_of, plain_nam
 from proofroll.files.toml import read_toml
 from proofroll.robots import reading
 from proofroll.robots.body_recursion import body_recursion
-from proofroll.robots.defining import Compiler
 from proofroll.robots.hypotheses import hypotheses
 from proofroll.robots.importer_row import importer_row, row_with_copy
 from proofroll.robots.layers import LAYERS, RobotTruth
 from proofroll.robots.lint import lint
 from proofroll.robots.meaning import meaning, opened
+from proofroll.robots.mjcf_compiler import Compiler
 from proofroll.robots.protocol import Request
 from proofroll.robots.records import DrawnBody, DrawnJoint, DrawnRobot, ImporterRow, RobotCheck, UsedTruth
 from proofroll.robots.robot_file import RobotFile
 from proofroll.robots.states import RobotStates, random_states
 from proofroll.robots.two_formulations import poses
 from proofroll.robots.urdf import BASE_JOINT
-from proofroll.running.asking import lent_workers
+from proofroll.running.engine_questions import lent_workers
 from proofroll.running.idle_workers import Workers
 from proofroll.running.process import Worker, WorkerDied
 

@@ -60,7 +60,7 @@ def check(
             accepted = [name.strip() for name in ",".join(accept or ()).split(",") if name.strip()]
             content = checked(file, engine or (), accept=accepted, progress=advance, **how)
     else:
-        from proofroll.robots.against import against as compared
+        from proofroll.robots.two_files import against as compared
 
         if engine:
             raise InputError("--engine", ", ".join(engine), "--against compares two files and asks no engine; drop one")

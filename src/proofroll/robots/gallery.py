@@ -21,7 +21,7 @@ from proofroll.robots import reading
 from proofroll.robots.check import check
 from proofroll.robots.hypotheses import hypotheses
 from proofroll.robots.records import GalleryContent, GalleryReading, GalleryRow, ImporterRow
-from proofroll.running.asking import lent_workers
+from proofroll.running.engine_questions import lent_workers
 
 if TYPE_CHECKING:
     from proofroll.running.cluster import Cluster

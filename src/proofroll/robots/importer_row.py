@@ -19,10 +19,10 @@ from proofroll.robots import reading
 from proofroll.robots.explain import Search
 from proofroll.robots.layers import LAYERS, TOLERANCE, RobotTruth, differences, first_failing
 from proofroll.robots.meaning import meaning
-from proofroll.robots.places import worst_place
 from proofroll.robots.protocol import Reading, Whole
 from proofroll.robots.records import HeldLayer, ImporterRow
 from proofroll.robots.robot_file import RobotFile
+from proofroll.robots.worst_place import worst_place
 from proofroll.running.idle_workers import Workers
 from proofroll.running.process import WorkerDied
 

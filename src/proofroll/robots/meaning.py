@@ -9,12 +9,12 @@ from xml.etree.ElementTree import Element, fromstring
 
 from proofroll.core.errors import InputError
 from proofroll.core.limits import TIME_LIMIT
-from proofroll.robots import defining, reading
+from proofroll.robots import mjcf_compiler, reading
 from proofroll.robots.model import Robot
 from proofroll.robots.opening import open_robot
 from proofroll.robots.robot_file import RobotFile
 from proofroll.robots.urdf import read_urdf
-from proofroll.running.asking import lent_workers
+from proofroll.running.engine_questions import lent_workers
 from proofroll.running.idle_workers import Workers
 from proofroll.running.process import Worker, WorkerDied
 
@@ -26,7 +26,7 @@ _defines: dict[str, str] = {}
 
 def meaning(
     file: RobotFile, written: Path, time_limit: float, workers: Workers | None = None
-) -> tuple[Robot, defining.Compiler | None]:
+) -> tuple[Robot, mjcf_compiler.Compiler | None]:
     """The robot that a file describes, and the engine whose compiler says so; None: our own reading (URDF).
 
     Args:
@@ -41,7 +41,7 @@ def meaning(
     if file.kind == "urdf":
         return read_urdf(file), None
     robot, by = _by_definer(
-        file.kind, file.path, workers, lambda worker: defining.compiled_robot(worker, file, written, time_limit)
+        file.kind, file.path, workers, lambda worker: mjcf_compiler.compiled_robot(worker, file, written, time_limit)
     )
     return robot.change(name=file.root.get("model", "robot")), by
 
@@ -59,14 +59,14 @@ def opened(
     """
 
     def expand(parts: Mapping[str, Element]) -> Element:
-        return _by_definer("mjcf", path, workers, lambda w: defining.expand(w, path, parts, time_limit))[0]
+        return _by_definer("mjcf", path, workers, lambda w: mjcf_compiler.expand(w, path, parts, time_limit))[0]
 
     return open_robot(path, base, root, expand)
 
 
 def _by_definer(
-    kind: str, path: Path, workers: Workers | None, ask: Callable[[Worker], tuple[_Answer, defining.Compiler]]
-) -> tuple[_Answer, defining.Compiler]:
+    kind: str, path: Path, workers: Workers | None, ask: Callable[[Worker], tuple[_Answer, mjcf_compiler.Compiler]]
+) -> tuple[_Answer, mjcf_compiler.Compiler]:
     """Answer of the engine that defines a format, and its name. Raises InputError if its process dies."""
     asked = _defines.get(kind, kind)
     with lent_workers(workers) as lent:

@@ -7,7 +7,7 @@ from proofroll.core.plugins import plain_name
 from proofroll.robots.check import check
 from proofroll.robots.records import ImporterRow
 from proofroll.robots.terminal import amount
-from proofroll.running.asking import describe
+from proofroll.running.engine_questions import describe
 from proofroll.studies.versions.versions import EngineVersion, VersionsStudy
 
 

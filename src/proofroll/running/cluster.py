@@ -27,9 +27,9 @@ from proofroll.files.scene_file import read_scene_file, scene_folder
 from proofroll.files.scene_sources import source_of
 from proofroll.running import cluster_task
 from proofroll.running.case import Case, Result, Status
-from proofroll.running.ending import interrupt_held
 from proofroll.running.memory import VARIABLE, memory_limit
 from proofroll.running.process import WorkerDied
+from proofroll.running.process_end import interrupt_held
 
 # Most cases that the scheduler holds: _AHEAD per thread (one runs, one waits) plus _AT_LEAST, so that a cluster that
 # grows with its load sees waiting work.

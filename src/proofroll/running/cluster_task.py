@@ -20,8 +20,8 @@ from proofroll.core.errors import InputError, ProofrollError
 from proofroll.core.plugins import GROUP
 from proofroll.files.scene_file import load_scene
 from proofroll.files.trajectory_file import STORED
-from proofroll.running.asking import resolve
 from proofroll.running.case import Case, EngineFacts, Status
+from proofroll.running.engine_questions import resolve
 from proofroll.running.identity import digest
 from proofroll.running.idle_workers import Workers
 from proofroll.running.process import WorkerDied

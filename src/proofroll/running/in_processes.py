@@ -5,7 +5,7 @@ from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import active_children, get_context, parent_process
 from typing import TypeVar
 
-from proofroll.running.ending import end_with, interrupt_held
+from proofroll.running.process_end import end_with, interrupt_held
 
 Item = TypeVar("Item")
 Found = TypeVar("Found")
@@ -34,7 +34,7 @@ def in_processes(function: Callable[[Item], Found], items: Sequence[Item], worke
 
 
 def end_with_pool() -> None:
-    """Makes a process of a ``ProcessPoolExecutor`` end with its parent (:func:`proofroll.running.ending.end_with`).
+    """Makes a process of a ``ProcessPoolExecutor`` end with its parent (:func:`.process_end.end_with`).
 
     Otherwise it would wait for ever, on a pipe that all of the pool's processes hold open, if the parent is killed.
     """

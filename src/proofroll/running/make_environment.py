@@ -21,7 +21,7 @@ from proofroll.core.announced import announced
 from proofroll.core.errors import InputError, ProofrollError
 from proofroll.core.plugins import GROUP, release
 from proofroll.running import environments
-from proofroll.running.asking import describe
+from proofroll.running.engine_questions import describe
 from proofroll.running.environments import Environment
 from proofroll.running.interpreters import OLDEST
 from proofroll.running.process import environment_of_another

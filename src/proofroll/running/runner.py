@@ -16,8 +16,8 @@ from typing import TYPE_CHECKING
 
 from proofroll.core.errors import InputError, Missing, ProofrollError
 from proofroll.core.plugins import plain_name
-from proofroll.running.asking import lent_workers
 from proofroll.running.case import Case, Result, Status
+from proofroll.running.engine_questions import lent_workers
 from proofroll.running.idle_workers import Workers
 from proofroll.running.process import Worker, WorkerDied
 from proofroll.running.store import Store

@@ -15,11 +15,11 @@ from typing import Any
 
 from proofroll.core.errors import Diverged, InputError, Missing, ProofrollError, Refused, raised_at, require_known
 from proofroll.running.case import Case
-from proofroll.running.ending import end_with, end_with_pipe
 from proofroll.running.handshake import identify_and_settle
 from proofroll.running.identity import describe, resolve
 from proofroll.running.integrity import watch
 from proofroll.running.memory import volunteer
+from proofroll.running.process_end import end_with, end_with_pipe
 from proofroll.running.run_case import run
 from proofroll.running.time_case import time_once
 

@@ -9,8 +9,8 @@ from proofroll.core.plugins import parse_engine
 from proofroll.core.scene import Scene
 from proofroll.core.time_grid import sampling_interval
 from proofroll.files.scene_file import load_scene, read_scene_file
-from proofroll.running.asking import resolve
 from proofroll.running.case import Case, EngineFacts
+from proofroll.running.engine_questions import resolve
 from proofroll.running.idle_workers import Workers
 
 _USUAL = 2.0  # s

@@ -12,7 +12,7 @@ from rich.table import Table
 from proofroll.core.errors import InputError
 from proofroll.robots.check import check
 from proofroll.robots.records import RobotCheck
-from proofroll.running.asking import lent_workers
+from proofroll.running.engine_questions import lent_workers
 from proofroll.running.idle_workers import Workers
 
 # Worst first.

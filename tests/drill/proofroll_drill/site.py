@@ -17,8 +17,8 @@ from pathlib import Path
 from proofroll.files.atomic import ordinary_content
 from proofroll.files.comparison_file import load_comparison
 from proofroll.files.scene_file import load_scene
-from proofroll.running.asking import resolve
 from proofroll.running.case import Case, EngineFacts
+from proofroll.running.engine_questions import resolve
 from proofroll.running.idle_workers import Workers
 from proofroll.running.runner import Runner
 from proofroll.running.store import Store

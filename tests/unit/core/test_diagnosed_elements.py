@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from proofroll.core.diagnosis.of_scene import diagnose_scene
+from proofroll.core.diagnosis.scene_diagnosis import diagnose_scene
 from proofroll.core.time_grid import time_grid
 from proofroll.core.truth import truth
 from proofroll.core.verdict import Judgement, Verdict

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from proofroll.running.asking import prepare, resolve
+from proofroll.running.engine_questions import prepare, resolve
 from proofroll.running.idle_workers import Workers
 from proofroll.running.process import Worker
 from proofroll.running.runner import Runner

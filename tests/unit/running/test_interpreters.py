@@ -16,8 +16,8 @@ from proofroll.core.errors import InputError, Missing, ProofrollError
 from proofroll.core.plugins import load_engine, release
 from proofroll.files.scene_file import load_scene
 from proofroll.running import interpreters
-from proofroll.running.asking import describe, resolve
 from proofroll.running.case import Case, EngineFacts, Status
+from proofroll.running.engine_questions import describe, resolve
 from proofroll.running.handshake import mismatch, own
 from proofroll.running.idle_workers import Workers
 from proofroll.running.process import WorkerDied

@@ -16,8 +16,8 @@ from hostile import ENTRY_POINTS
 
 from proofroll.core.errors import InputError, Missing
 from proofroll.files.trajectory_file import read
-from proofroll.running.asking import describe, resolve
 from proofroll.running.case import Case, EngineFacts, Result, Status
+from proofroll.running.engine_questions import describe, resolve
 from proofroll.running.idle_workers import Workers
 from proofroll.running.process import WorkerDied
 from proofroll.running.runner import Runner, run_one

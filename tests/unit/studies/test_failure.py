@@ -14,7 +14,7 @@ from proofroll.core.events import Event, with_events
 from proofroll.core.truth import truth
 from proofroll.elements.ball_on_surface.dataset import columns
 from proofroll.elements.ball_on_surface.element import rolling_ball
-from proofroll.elements.ball_on_surface.natural import natural_time
+from proofroll.elements.ball_on_surface.natural_scales import natural_time
 from proofroll.files.scene_file import load_scene
 from proofroll.running.case import Result, Status
 from proofroll.studies.failure import LOST_PHASE, Yardstick, meanings, run_outcome

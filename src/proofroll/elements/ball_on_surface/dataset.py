@@ -9,7 +9,7 @@ from proofroll.core.columns import SMALLEST, Columns, Variable, axes
 from proofroll.core.turns import doubt
 from proofroll.elements.ball_on_surface.mechanics import energy, slip_velocity, wall_velocity
 from proofroll.elements.ball_on_surface.model import RollingBall
-from proofroll.elements.ball_on_surface.natural import turn_interval
+from proofroll.elements.ball_on_surface.natural_scales import turn_interval
 from proofroll.elements.ball_on_surface.sampling import BallSample
 
 

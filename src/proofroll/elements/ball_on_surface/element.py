@@ -20,7 +20,7 @@ from proofroll.core.gravity import Gravity
 from proofroll.core.observable import Observable
 from proofroll.core.program_text import FailedRun
 from proofroll.core.scene import Scene
-from proofroll.elements.ball_on_surface import certificate, events, failure, natural, observables
+from proofroll.elements.ball_on_surface import certificate, events, failure, natural_scales, observables
 from proofroll.elements.ball_on_surface.dataset import from_samples
 from proofroll.elements.ball_on_surface.failure_program import program
 from proofroll.elements.ball_on_surface.model import Ball, BallCapability, Contact, InitialMotion, RollingBall
@@ -157,21 +157,21 @@ class BallOnSurface:
     @property
     def natural_time(self) -> float:
         """See the protocol."""
-        return natural.natural_time(self.rolling)
+        return natural_scales.natural_time(self.rolling)
 
     @property
     def turn_interval(self) -> float | None:
         """See :class:`proofroll.core.element_abilities.CountsTurns`."""
-        return natural.turn_interval(self.rolling)
+        return natural_scales.turn_interval(self.rolling)
 
     def step_numbers(self, h: float, truth: xr.Dataset | None) -> Sequence[StepNumber]:
         """See the protocol."""
-        return natural.step_numbers(self.rolling, h, truth)
+        return natural_scales.step_numbers(self.rolling, h, truth)
 
     @cached_property
     def first_motion(self) -> FirstMotion | None:
         """See the protocol; None for a ball at rest under rolling resistance, which has no direction yet."""
-        return natural.first_motion(self.rolling)
+        return natural_scales.first_motion(self.rolling)
 
     def another_scene(self, lines: Sequence[Mapping[str, Any]], truth: xr.Dataset) -> str | None:
         """See :class:`proofroll.core.element_abilities.KnowsAnotherScene`."""

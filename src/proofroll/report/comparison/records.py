@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from proofroll.core.comparison import ExceptAt, Row, Tolerance
-from proofroll.core.diagnosis.of_scene import Diagnosis
+from proofroll.core.diagnosis.scene_diagnosis import Diagnosis
 from proofroll.core.number_format import counted, number
 from proofroll.core.verdict import Judgement, Verdict
 from proofroll.files.json_data import MERGED

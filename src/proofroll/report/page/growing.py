@@ -8,7 +8,7 @@ from pathlib import Path
 
 from proofroll.core.errors import ProofrollError
 from proofroll.files.json_data import plain
-from proofroll.report.against import EarlierReport, against
+from proofroll.report.changes import EarlierReport, against
 from proofroll.report.comparison.plots import PointCurves, point_curves
 from proofroll.report.kinds import kind_of
 from proofroll.report.long_table import LongTable, TableLine

@@ -13,7 +13,7 @@ from typing import Any
 
 import proofroll
 from proofroll.files.json_data import MERGED, OPTIONAL
-from proofroll.report.against import Against
+from proofroll.report.changes import Against
 from proofroll.report.comparison.conclusions import Conclusions, conclusions
 from proofroll.report.comparison.growth import Growth, growth
 from proofroll.report.comparison.lines import lines_of

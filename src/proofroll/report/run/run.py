@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from proofroll.core.columns import SMALLEST, UNCERTAIN
-from proofroll.core.diagnosis.of_scene import Diagnosis, diagnose_scene
+from proofroll.core.diagnosis.scene_diagnosis import Diagnosis, diagnose_scene
 from proofroll.core.events import Event, events_of
 from proofroll.core.number_format import number
 from proofroll.files.json_data import OPTIONAL

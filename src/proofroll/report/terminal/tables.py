@@ -21,7 +21,7 @@ from proofroll.running.case import Status, host_sentences
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from proofroll.report.against import Against
+    from proofroll.report.changes import Against
     from proofroll.report.comparison.records import ReportedComparison, WorstJudgement
     from proofroll.report.comparison.spread import Spread
     from proofroll.report.page.records import ReportContent

@@ -11,7 +11,7 @@ import numpy as np
 from proofroll.core.arrays import FloatArray, largest_difference
 from proofroll.core.comparison import Band, Comparison
 from proofroll.core.convergence import Limit, floor_of, richardson, scatter_of, tightest
-from proofroll.core.diagnosis.of_scene import diagnose_scene
+from proofroll.core.diagnosis.scene_diagnosis import diagnose_scene
 from proofroll.core.errors import Missing, ProofrollError
 from proofroll.core.verdict import Allowance, Judgement, Refinement, Verdict, judge_curve
 from proofroll.files.trajectory_file import StoredTrajectory

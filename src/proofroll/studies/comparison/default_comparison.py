@@ -13,8 +13,8 @@ from proofroll.core.plugins import engine_names, parse_engine
 from proofroll.core.scene import Scene
 from proofroll.core.verdict import Verdict
 from proofroll.files.scene_file import SceneFile, load_scene, read_scene_file
-from proofroll.running.asking import describe_each, resolve
 from proofroll.running.case import EngineDescription, EngineFacts
+from proofroll.running.engine_questions import describe_each, resolve
 from proofroll.running.idle_workers import Workers
 from proofroll.running.process import processor_seconds
 

@@ -6,7 +6,7 @@ from functools import cached_property
 from itertools import groupby
 
 from proofroll.core.comparison import Comparison, Row
-from proofroll.core.diagnosis.of_scene import Diagnosis
+from proofroll.core.diagnosis.scene_diagnosis import Diagnosis
 from proofroll.core.number_format import number
 from proofroll.core.observable import Role
 from proofroll.core.scene import Scene

@@ -18,8 +18,8 @@ from proofroll.core.scene import Scene
 from proofroll.core.time_grid import off_grids, time_grid
 from proofroll.core.truth import edge_between
 from proofroll.files.scene_file import SceneFile, load_scene, read_scene_file
-from proofroll.running.asking import describe_each, resolve, resolve_with_truth
 from proofroll.running.case import Case, EngineFacts
+from proofroll.running.engine_questions import describe_each, resolve, resolve_with_truth
 from proofroll.running.idle_workers import Workers
 from proofroll.running.process import processor_seconds
 from proofroll.studies.cases import case_of

@@ -18,8 +18,8 @@ from proofroll.core.plugins import engine_names
 from proofroll.core.scene import Scene
 from proofroll.core.time_grid import off_grids, time_grid
 from proofroll.files.scene_file import load_scene
-from proofroll.running.asking import describe_each, resolve, resolve_with_truth
 from proofroll.running.case import Case, EngineFacts, Result, Status
+from proofroll.running.engine_questions import describe_each, resolve, resolve_with_truth
 from proofroll.running.process import WorkerDied
 from proofroll.running.runner import Runner
 from proofroll.running.stopwatch import Stopwatch

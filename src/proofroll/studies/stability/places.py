@@ -8,8 +8,8 @@ from proofroll.core.limits import STUDY_TIME_LIMIT
 from proofroll.core.scene import Scene
 from proofroll.core.time_grid import off_grids, time_grid
 from proofroll.files.scene_file import load_scene
-from proofroll.running.asking import resolve_with_truth
 from proofroll.running.case import Case, EngineFacts, Status
+from proofroll.running.engine_questions import resolve_with_truth
 from proofroll.running.runner import Runner
 from proofroll.studies.failure import Yardstick
 from proofroll.studies.stability.axes import Axis, Effort

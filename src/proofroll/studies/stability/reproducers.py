@@ -6,8 +6,8 @@ from pathlib import Path
 
 from proofroll.core.element_abilities import WritesPrograms
 from proofroll.core.program_text import FailedRun, imported_packages
-from proofroll.running.asking import programs
 from proofroll.running.case import Case
+from proofroll.running.engine_questions import programs
 from proofroll.running.idle_workers import Workers
 from proofroll.running.store import write_text
 from proofroll.studies.failure import ACCURATE, REFUSED, TOO_SLOW, WRONG, WRONG_MODEL

@@ -11,8 +11,8 @@ from proofroll.core.engine_abilities import offered
 from proofroll.core.errors import InputError, ProofrollError
 from proofroll.core.plugins import EngineSpec, engine_names, parse_engine
 from proofroll.core.verdict import round_off_of
-from proofroll.running.asking import describe_each, resolve, resolve_with_truth
 from proofroll.running.case import Case, EngineDescription, EngineFacts, Result, Status
+from proofroll.running.engine_questions import describe_each, resolve, resolve_with_truth
 from proofroll.running.idle_workers import Workers
 from proofroll.running.runner import Runner
 from proofroll.running.time_budget import TimeBudget

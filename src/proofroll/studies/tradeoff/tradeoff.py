@@ -16,8 +16,8 @@ from pathlib import Path
 import numpy as np
 
 from proofroll.core.errors import Missing
-from proofroll.running.asking import resolve_with_truth
 from proofroll.running.case import Case, EngineFacts, Result, Status
+from proofroll.running.engine_questions import resolve_with_truth
 from proofroll.running.idle_workers import Workers
 from proofroll.running.runner import Runner
 from proofroll.running.stopwatch import Stopwatch

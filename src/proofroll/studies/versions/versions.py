@@ -14,8 +14,8 @@ from proofroll.files.comparison_file import comparison_names, load_comparison
 from proofroll.files.data_folders import study_folders
 from proofroll.files.scene_file import scene_folder
 from proofroll.files.toml import study_of
-from proofroll.running.asking import describe
 from proofroll.running.case import EngineDescription, Status, hosts
+from proofroll.running.engine_questions import describe
 from proofroll.running.runner import Runner
 from proofroll.running.stopwatch import Stopwatch
 from proofroll.running.timing import Interval, ratio, time_in_rounds

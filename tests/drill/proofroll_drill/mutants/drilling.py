@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from proofroll.core.certificate import Line, first_difference
-from proofroll.core.diagnosis.of_scene import diagnose_scene
+from proofroll.core.diagnosis.scene_diagnosis import diagnose_scene
 from proofroll.core.errors import Diverged
 from proofroll.core.first_steps import certificate as certificate_of
 from proofroll.core.scene import Scene

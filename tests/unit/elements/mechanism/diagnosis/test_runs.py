@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from proofroll.core.certificate import Line
 from proofroll.core.diagnosis import Evidence, diagnose, hypotheses_of
-from proofroll.core.diagnosis.of_scene import diagnose_scene
+from proofroll.core.diagnosis.scene_diagnosis import diagnose_scene
 from proofroll.core.scene import Scene
 from proofroll.core.truth import truth
 from proofroll.core.verdict import Judgement, Verdict

@@ -13,7 +13,7 @@ import pytest
 
 from proofroll.core.errors import InputError
 from proofroll.files.json_data import plain
-from proofroll.report.against import Against, EarlierReport, against
+from proofroll.report.changes import Against, EarlierReport, against
 from proofroll.report.long_table import LongTable, TableLine
 
 LINE = TableLine(

@@ -26,7 +26,7 @@ from proofroll.robots.records import AgainstCheck, ImporterRow, UnlikeValue, Use
 from proofroll.robots.robot_file import LintRemark, RobotFile
 from proofroll.robots.states import random_states
 from proofroll.robots.two_formulations import passive, poses
-from proofroll.running.asking import lent_workers
+from proofroll.running.engine_questions import lent_workers
 from proofroll.running.idle_workers import Workers
 
 # Relative difference of two values above which it is reported: files are written with different rounding.

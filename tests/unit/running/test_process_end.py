@@ -11,8 +11,8 @@ from pathlib import Path
 
 import pytest
 
-from proofroll.running.ending import interrupt_held
 from proofroll.running.memory import descendants
+from proofroll.running.process_end import interrupt_held
 from proofroll_drill.processes import alive, wait_until
 
 pytestmark = pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="the system has no /proc")
@@ -33,7 +33,7 @@ if __name__ == "__main__":
 CHILD = """
 import os, subprocess, sys, time
 from pathlib import Path
-from proofroll.running.ending import end_with
+from proofroll.running.process_end import end_with
 
 end_with(os.getppid())
 subprocess.Popen([sys.executable, "-c", "import time; time.sleep(600)"], start_new_session=True)
@@ -43,7 +43,7 @@ time.sleep(600)
 PIPED = """
 import ctypes, os, subprocess, sys
 from pathlib import Path
-from proofroll.running.ending import end_with_pipe
+from proofroll.running.process_end import end_with_pipe
 
 end_with_pipe(int(sys.argv[2]))
 subprocess.Popen([sys.executable, "-c", "import time; time.sleep(600)"])
@@ -62,7 +62,7 @@ PARENT = "import subprocess, sys; subprocess.run([sys.executable, *sys.argv[1:]]
 def test_a_time_limit_waits_until_processes_have_begun() -> None:
     """So does a signal from outside; a second one ends the command at once, with one line."""
     program = (
-        "import signal, sys\nfrom proofroll.running.ending import interrupt_held\n"
+        "import signal, sys\nfrom proofroll.running.process_end import interrupt_held\n"
         "signal.signal(signal.SIGTERM, lambda *_: sys.exit('handled'))\n"
         "with interrupt_held():\n for _ in range(int(sys.argv[1])): signal.raise_signal(signal.SIGTERM)\n"
         " print('begun', flush=True)\n"

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from robot_templates import urdf
 
-from proofroll.robots.against import against
+from proofroll.robots.two_files import against
 
 Proofroll = Callable[..., tuple[int, str, str]]
 URDF = """<robot name="arm"><link name="base"/><link name="upper"><inertial><origin xyz="0.1 0 0"/><mass value="1.5"/>
