@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import subprocess
 import sys
 import tomllib
@@ -30,6 +31,7 @@ from proofroll_drill.arithmetic.differences import beyond_bars, differences, lat
 from proofroll_drill.arithmetic.kinds import PYTHONS, REPOSITORY, Arithmetic, kinds, took_effect
 from proofroll_drill.arithmetic.matrix import Tried, comparison_files, matrix
 from proofroll_drill.arithmetic.record import WRONG, decided, unhurried, until_wrong
+from proofroll_drill.arithmetic.studies import decided_by, is_study
 from proofroll_drill.table import arithmetic_lines
 
 # A ball that rolls, one that slips and sticks, one on a curved wall; a body in space, a tree, a loop.
@@ -160,6 +162,60 @@ def test_what_a_comparison_decides_is_recorded(tmp_path: Path) -> None:
     assert run["events"]["ball"][0] == "slip"
     assert found["limits"][place]["down"][1] > 0
     assert (tmp_path / found["truths"]["point 0"]["file"]).exists()
+
+
+REGIMES = """study = "regimes"
+title = "Four runs"
+question = "Which slip?"
+scene = "sphere_in_cylinder"
+until = 0.2
+rolling_resistance = [0.0]
+speed = {low = 1.0, high = 4.0, count = 2}
+mu_static = {low = 0.05, high = 0.5, count = 2}
+"""
+
+
+def test_what_a_map_of_regimes_decides_is_recorded(tmp_path: Path) -> None:
+    """Regimes and slips of each place of a map, brief; another regime is a difference."""
+    (tmp_path / "map.toml").write_text(REGIMES, encoding="utf-8")
+    assert is_study(str(tmp_path / "map.toml"))
+    found = {"map": decided_by(str(tmp_path / "map.toml"), Runner(Store(tmp_path / "out"), jobs=1))}
+    assert [len(said["regime"]) for said in found["map"]["decisions"].values()] == [2, 2]
+    other = json.loads(json.dumps(found))
+    place = next(iter(other["map"]["decisions"]))
+    other["map"]["decisions"][place]["regime"][0] += 1
+    (parted,) = differences("zen", tmp_path, tmp_path, (found, other))
+    assert parted.what == f"{place}: regime"
+
+
+@pytest.mark.drill
+def test_what_a_ladder_of_models_decides_is_recorded(tmp_path: Path) -> None:
+    """Models that reach their end, and terms that are needed, which hang on no clock."""
+    found = decided_by("ladder:double_pendulum", Runner(Store(tmp_path), jobs=1))
+    ends = {said["ends"] for said in found["decisions"].values() if "ends" in said}
+    verdicts = {said["verdict"] for said in found["decisions"].values() if "verdict" in said}
+    assert Status.DONE in ends
+    assert "not needed" in verdicts
+    assert not verdicts & {"free", "paid for, not needed"}
+
+
+@pytest.mark.drill
+def test_what_a_map_of_stability_decides_is_recorded(tmp_path: Path) -> None:
+    """Largest steps and failures beyond, at each place; the claims that they contradict."""
+    axis = '[[axes]]\nname = "speed"\nunit = "1/s"\nmeaning = "of the hinge"\nvalues = [0, 1]\nparameters.speed = {}\n'
+    head = 'study = "stability"\ntitle = "One"\nquestion = "Up to which step?"\nscene = "pendulum"\n'
+    (tmp_path / "one.toml").write_text(head + axis, encoding="utf-8")
+    found = decided_by(str(tmp_path / "one.toml"), Runner(Store(tmp_path / "out"), jobs=1))
+    places = [said for place, said in found["decisions"].items() if place != "claims"]
+    assert len(places) >= 8
+    assert any(said["accurate"][1] for said in places)
+    assert found["decisions"]["claims"]["contradicted"] == 0
+
+
+def test_a_study_that_nothing_compares_is_told_in_a_line() -> None:
+    """A study of another kind is refused before any process starts."""
+    with pytest.raises(InputError, match="compared are"):
+        CliRunner().invoke(app, ["drill", "arithmetic", "robots"], catch_exceptions=False)
 
 
 def test_a_run_that_is_lacking_is_told(tmp_path: Path) -> None:
@@ -310,6 +366,7 @@ def test_every_comparison_is_in_the_matrix() -> None:
     """Every comparison of this repository, of the folders below, and of articles is in the matrix."""
     found = {Path(name).stem for name in comparison_files()}
     assert {"paper", "stick_slip", "accuracy", "turntable", "andrews_squeezer"} <= found
+    assert {"stability", "stability_plane", "tradeoff", "regimes", "ladder:double_pendulum"} <= found
     assert {path.stem for path in REPOSITORY.glob("comparisons/*/*.toml")} <= found
 
 

@@ -91,7 +91,9 @@ def robots(
 
 @drill.command()
 def arithmetic(
-    comparison: Annotated[list[str] | None, typer.Argument(help="Comparison files or names; by default all.")] = None,
+    comparison: Annotated[
+        list[str] | None, typer.Argument(help="Comparisons, studies or ladder:SCENE; by default all.")
+    ] = None,
     kind: Annotated[list[str] | None, typer.Option(help="Kind of arithmetic, may be repeated; by default all.")] = None,
     tests: Annotated[str, typer.Option(help="Run tests too: sensitive, or all.")] = "",
     comparisons: Annotated[bool, typer.Option(help="Run comparisons.")] = True,
@@ -104,6 +106,7 @@ def arithmetic(
     from proofroll.files.comparison_file import load_comparison
     from proofroll_drill.arithmetic.kinds import kinds
     from proofroll_drill.arithmetic.matrix import TESTS, comparison_files, matrix
+    from proofroll_drill.arithmetic.studies import is_study
     from proofroll_drill.table import arithmetic_lines, arithmetic_table
 
     known = {item.name: item for item in kinds()}
@@ -114,7 +117,8 @@ def arithmetic(
     asked = [item for item in known.values() if not kind or item.name in kind]
     files = (comparison or comparison_files()) if comparisons else []
     for name in comparison or ():
-        load_comparison(name)
+        if not is_study(name):
+            load_comparison(name)
     if files and asked[0].name != "reference":  # decisions are held against those of this machine
         asked.insert(0, known["reference"])
     with progress_bar("arithmetic", total=len(asked)) as advance:

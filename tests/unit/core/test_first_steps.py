@@ -62,7 +62,11 @@ class SoftParrot(Parrot):
 @pytest.mark.parametrize("liar", [Parrot, SoftParrot])
 def test_who_repeats_the_scenes_numbers_is_seen_by_its_motion(liar: type[Tiny]) -> None:
     """The first steps of an engine are looked at although it says the right acceleration."""
-    assert first_difference(certify(build(liar, SLOW, TinySettings()), SLOW)) is None
+    engine = build(liar, SLOW, TinySettings())
+    assert first_difference(certify(engine, SLOW)) is None
+    seen = {line.quantity: line.holds for line in certificate(liar, engine, SLOW, TinySettings())}
+    assert seen["acceleration"]
+    assert not seen["acceleration of the first steps"]
     with pytest.raises(Refused, match="acceleration of the first steps"):
         simulate(SLOW, liar, until=0.1)
 

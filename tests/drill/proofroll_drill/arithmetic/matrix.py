@@ -52,10 +52,11 @@ class Tried:
 
 
 def comparison_files() -> list[str]:
-    """All comparisons of this repository: its own, those of the folders below, and those of articles."""
+    """All comparisons of this repository, its own, those of the folders below and of articles; and its studies."""
     from proofroll.files.comparison_file import comparison_names
+    from proofroll_drill.arithmetic.studies import study_names
 
-    return [*comparison_names(), *map(str, sorted(data_folder("comparisons").glob("*/*.toml")))]
+    return [*comparison_names(), *map(str, sorted(data_folder("comparisons").glob("*/*.toml"))), *study_names()]
 
 
 def matrix(

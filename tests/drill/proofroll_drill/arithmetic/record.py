@@ -1,4 +1,4 @@
-"""Record of all decisions of comparisons, with the truths' numbers, of one kind of arithmetic, in a fresh store.
+"""Record of all decisions of comparisons and studies, with the truths' numbers, of one arithmetic, in a fresh store.
 
 ``python -m proofroll_drill.arithmetic.record FOLDER THREADS JOBS COMPARISON …`` writes ``FOLDER/record.json``.
 """
@@ -26,6 +26,7 @@ from proofroll.running.store import Store
 from proofroll.studies.comparison.compare import compare
 from proofroll.studies.comparison.outcome import Outcome, Run
 from proofroll.studies.comparison.planning import point_name
+from proofroll_drill.arithmetic.studies import decided_by, is_study
 
 TRUTH = "truth at"
 # Truths of closed chains take five times as long without heyoka, and more with plain instructions.
@@ -34,7 +35,7 @@ WRONG = "one that the truth does not have"
 
 
 def main(folder: str, threads: str, jobs: str, *comparisons: str) -> None:
-    """Runs the comparisons and writes what they decide."""
+    """Runs the comparisons and studies and writes what they decide."""
     process.THREADS.update(dict.fromkeys(process.THREADS, threads))
     place = Path(folder)
     if any(place.glob("store/*")):
@@ -42,8 +43,11 @@ def main(folder: str, threads: str, jobs: str, *comparisons: str) -> None:
     runner = Runner(Store(place / "store"), jobs=int(jobs))
     found: dict[str, Any] = {}
     for path in comparisons:
-        comparison = unhurried(load_comparison(path))
-        found[comparison.name] = decided(compare(comparison, runner), runner.store)
+        if is_study(path):
+            found[Path(path).stem] = decided_by(path, runner)
+        else:
+            comparison = unhurried(load_comparison(path))
+            found[comparison.name] = decided(compare(comparison, runner), runner.store)
         # Written after each, so that what was found is there if a later one is ended.
         (place / "record.json").write_text(json.dumps(found, indent=1), encoding="utf-8")
 

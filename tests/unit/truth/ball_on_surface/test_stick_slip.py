@@ -295,6 +295,16 @@ def test_a_slip_whose_direction_still_turns_ends_in_time(ratio: float) -> None:
 EPS = float(np.finfo(float).eps)
 
 
+@pytest.mark.arithmetic
+@pytest.mark.parametrize("part", [0.0, 1e-12])
+def test_friction_that_just_suffices_on_an_incline_is_ill_posed(part: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    """At μ = (2/7) tan(tilt) rolling and slipping are a relative 1e-9 of μ apart, whatever round-off makes of it."""
+    monkeypatch.setattr(taylor, "supports", lambda _: False)  # to compile takes as long as ten truths
+    edge = 2 / 7 * float(np.tan(load_scene("inclined_plane").parameters["tilt"]))
+    scene = load_scene("inclined_plane", mu_static=edge * (1 + part))
+    assert "a relative 1e-09 of friction" in truth(scene, np.linspace(0, 0.5, 3)).attrs["ill_posed"]
+
+
 @pytest.mark.drill
 @pytest.mark.arithmetic
 @pytest.mark.parametrize(("factor", "known"), [(1.0, ["slip"]), (12 / 7, [])])
