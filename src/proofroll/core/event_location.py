@@ -1,6 +1,7 @@
 """First rise of a function or guard through zero within a step, even if it falls again in the same step."""
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -81,7 +82,36 @@ def first_rise(function: Callable[[FloatArray], FloatArray], start: float, end: 
     return float(middle + half * x)
 
 
-def locate_rise(solver: Any, guards: Guards, noise: FloatArray | float = 0.0, leaving: bool = False) -> Rise | None:
+def graze(function: Callable[[FloatArray], FloatArray], start: float, end: float, near: float) -> float | None:
+    """Time of a crest in [start, end] whose height is zero within ``near``, or None; the crest may lie just beyond.
+
+    A function that was never lower than -10 ``near`` before has not come near zero: it leaves it.
+    """
+    half, middle = (end - start) / 2, (end + start) / 2
+    values = function(middle + half * _X)
+    slope = chebyshev.chebder(_TO_CHEBYSHEV @ values)
+    turns = chebyshev.chebroots(np.trim_zeros(slope, "b")) if np.any(slope) else np.empty(0)
+    for x in np.sort(np.real(turns[np.abs(np.imag(turns)) < 1e-6])):
+        t = middle + half * min(max(x, -1.0), 1.0)
+        crest = chebyshev.chebval(x, chebyshev.chebder(slope)) < 0 and abs(x) < 1 + 1e-3
+        if crest and values[x >= _X].min(initial=np.inf) < -10 * near and abs(float(function(np.array([t]))[0])) < near:
+            return float(t)
+    return None
+
+
+def _one(values: Callable[[float], FloatArray], number: int, times: FloatArray) -> FloatArray:
+    """Values of one function at some times."""
+    return np.array([values(float(t))[number] for t in times])
+
+
+def locate_rise(
+    solver: Any,
+    guards: Guards,
+    noise: FloatArray | float = 0.0,
+    leaving: bool = False,
+    near: FloatArray | float = 0.0,
+    grazes: list[float] | None = None,
+) -> Rise | None:
     """First rise of a guard through zero in the last step, even if it falls again in that step; None: there is none.
 
     The dense output is less accurate than a step: it gives a first guess, which Newton's method refines with states
@@ -92,6 +122,8 @@ def locate_rise(solver: Any, guards: Guards, noise: FloatArray | float = 0.0, le
         guards: state -> values, shape (guards,).
         noise: a guard counts as risen when it exceeds this.
         leaving: True if guards that are positive at the start of the step count as zero there.
+        near: height of a crest of each guard below which it is uncertain whether it reaches zero; 0: no matter.
+        grazes: list to which the times of these crests are appended [s].
     """
     dense, start, end = solver.dense_output(), float(solver.t_old), float(solver.t)
     known: dict[float, FloatArray] = {}
@@ -103,11 +135,15 @@ def locate_rise(solver: Any, guards: Guards, noise: FloatArray | float = 0.0, le
         return known[time]
 
     rises = []
-    below = stays_negative(lambda times: np.array([at(float(t)) for t in times]), start, end)
+    below = stays_negative(lambda times: np.array([at(float(t)) + near for t in times]), start, end)
+    nearly = np.broadcast_to(near, np.shape(below))
     for number in np.flatnonzero(np.logical_not(below)).tolist():
-        rise = first_rise(lambda times, k=number: np.array([at(float(t))[k] for t in times]), start, end)  # type: ignore[misc]  # mypy cannot type a default
+        own = partial(_one, at, number)
+        rise = first_rise(own, start, end)
         if rise is not None:
             rises.append((rise, number))
+        if grazes is not None and nearly[number] and (crest := graze(own, start, end, nearly[number])) is not None:
+            grazes.append(crest if rise is None else min(rise, crest))
     if not rises:
         return None
     (time, number), width = min(rises), 1e-4 * (end - start)

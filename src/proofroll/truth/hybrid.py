@@ -76,6 +76,7 @@ class Stretch(Generic[ModeT]):
         last: state at the end, before any transition.
         guard: index of the guard that ended it; None: it reached its time limit.
         visited: time [s] and state at the start of each step, if they were kept.
+        grazes: times [s] of crests of guards at zero: a small change decides whether they rise above it.
     """
 
     start: float
@@ -85,6 +86,7 @@ class Stretch(Generic[ModeT]):
     last: State
     guard: int | None
     visited: Sequence[tuple[float, State]] = ()
+    grazes: Sequence[float] = ()
 
 
 @dataclass(frozen=True)
@@ -236,6 +238,8 @@ def integrate_to_guard(
     first_step: float | None = None,
     noise: FloatArray | None = None,
     visited: list[tuple[float, State]] | None = None,
+    near: FloatArray | float = 0.0,
+    grazes: list[float] | None = None,
 ) -> tuple[float, State, int | None]:
     """Integrates by DOP853 to the first rise of a guard through zero, or to ``until`` [s].
 
@@ -251,6 +255,8 @@ def integrate_to_guard(
             None: chosen from the rates.
         noise: round-off of the guards, shape (guards,); a guard counts as risen only above it. None: zero.
         visited: list to which time and state at the start of each step are appended, for :func:`states_at`.
+        near: height of a crest of each guard below which it is uncertain whether it reaches zero; 0: no matter.
+        grazes: list to which the times of these crests are appended [s].
 
     Returns:
         Time [s] and state at the end, and index of the guard that rose; None: the time limit.
@@ -269,7 +275,8 @@ def integrate_to_guard(
             visited.append((solver.t, solver.y.copy()))
         controlled_step(solver, None, until)
         count.took(solver.t)
-        if rise := locate_rise(solver, guards, 0.0 if noise is None else noise, leaving=solver.t_old == time):
+        at_start = solver.t_old == time
+        if rise := locate_rise(solver, guards, 0.0 if noise is None else noise, at_start, near, grazes):
             return rise.time, corrected(rise.state), rise.guard
         go_on_from(solver, back(solver.t, solver.y))
     return until, np.asarray(solver.y), None
@@ -305,5 +312,7 @@ def states_of(
 
 
 def first_close(paths: Sequence[HybridPath[Any]], close: float) -> float:
-    """Time [s] of the first decision whose margin is below ``close``; inf: there is none."""
-    return min((time for path in paths for time, margin in path.margins if margin < close), default=np.inf)
+    """Time [s] of the first graze, or decision whose margin is below ``close``; inf: there is none."""
+    decisions = (time for path in paths for time, margin in path.margins if margin < close)
+    grazes = (time for path in paths for leg in path.legs for time in getattr(leg, "grazes", ()))
+    return min([*decisions, *grazes], default=np.inf)

@@ -365,3 +365,39 @@ def test_routes_that_agree_by_chance_are_known_to_the_tolerance_of_a_step() -> N
     units, bars = natural_units(scene.elements[0].mechanism), motion("stop", [0.0, 0.3], height=0.3).bars  # type: ignore[attr-defined]  # it is one
     assert bars["q"][-1] >= TOLERANCES[0] * units.length
     assert bars["v"][-1] >= TOLERANCES[0] * units.length / units.time
+
+
+def swing_to_a_stop(inside: float, restitution: float) -> Mechanism:
+    """A mass on a spring that reaches 1 m at pi/2, and a stop that lies nearer by some metres."""
+    joint = Joint("slide", "prismatic", "world", "mass", axis=(1, 0, 0), v0=(1.0,), stiffness=1.0,
+                  limits=(-3.0, 1.0 - inside), restitution=restitution)  # fmt: skip
+    return Mechanism((Body("mass", 1.0, inertia=(1.0, 1.0, 1.0)),), (joint,), gravity=(0.0, 0.0, 0.0))
+
+
+@pytest.mark.arithmetic
+@pytest.mark.parametrize("restitution", [0.0, 0.5])
+@pytest.mark.parametrize("inside", [1e-10, 1e-15, 0.0, -1e-15, -1e-12])
+def test_a_joint_that_grazes_its_stop_is_ill_posed(inside: float, restitution: float) -> None:
+    """Whether it touches is not known, and an impact from a depth d takes sqrt(2 d) of its speed: 1e-6 for 1e-12."""
+    found = truth_of(swing_to_a_stop(inside, restitution), np.array([0.0, 2.0]))
+    assert found.horizon == pytest.approx(np.pi / 2, abs=1e-4)
+    assert found.events == ()
+
+
+@pytest.mark.parametrize(("inside", "impacts"), [(1e-6, 1), (-1e-6, 0)])
+def test_a_joint_that_passes_or_misses_its_stop_for_certain_is_well_posed(inside: float, impacts: int) -> None:
+    """A thousandth of a millimetre decides; the impact takes all speed, and the mass swings back from there."""
+    found = truth_of(swing_to_a_stop(inside, 0.0), np.array([0.0, 2.0]))
+    assert np.isinf(found.horizon)
+    assert len(found.events) == impacts
+    hit, reach = (np.arcsin(1 - inside), 1 - inside) if impacts else (np.pi / 2, 1.0)
+    assert found.record.q[-1, 0] == pytest.approx(reach * np.cos(2.0 - hit), abs=TIGHT)
+
+
+@pytest.mark.arithmetic
+@pytest.mark.parametrize("apart", [1e-12, 0.0, -1e-12])
+def test_spheres_that_graze_each_other_are_ill_posed(apart: float) -> None:
+    """Spheres that pass at the sum of their radii, within what lengths are known to, touch or do not."""
+    found = motion("two_spheres", [0.0, 0.2], passing=0.08 + apart)
+    assert found.horizon == pytest.approx(0.12533, abs=1e-4)
+    assert found.events == ()

@@ -11,7 +11,7 @@ from proofroll.elements.mechanism.drives import MODES
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.elements.mechanism.switches import HOLDING, REDUNDANT, STOPPED, Mode, SwitchedJoint
 from proofroll.truth.hybrid import Stretch, Transition
-from proofroll.truth.mechanism.joint_stretches import JointStretches, guard_values, noise_of, reversed_mode
+from proofroll.truth.mechanism.joint_stretches import JointStretches, guard_values, near_stops, noise_of, reversed_mode
 from proofroll.truth.mechanism.maximal_coordinates import NumericEquations
 from proofroll.truth.mechanism.maximal_equations import Switched
 from proofroll.truth.mechanism.stretches import StretchLaw
@@ -48,6 +48,7 @@ class SwitchedBodies(JointStretches):
             lambda y: self._guards(equations, y, mode),
             lambda y: np.append(equations.eliminated(y[:-1]), y[-1]),
             noise_of(self.joints, self.motors, mode, self._along(state)[0], self._wanted(state)),
+            near_stops(self.joints, mode),
         )
 
     def _at_rest(self, leg: Stretch[Mode], state: Array, stopped: Sequence[int]) -> tuple[Array, Mode, float]:

@@ -30,6 +30,7 @@ from proofroll.truth.mechanism.contact_guards import (
     refuse_turning_onset,
 )
 from proofroll.truth.mechanism.stretches import Stretches, StretchLaw
+from proofroll.truth.mechanism.two_paths import CLOSE
 
 _AHEAD = 1e-9  # time step, relative to the natural time, after which an effort is compared with its limit
 _CLAMPED = 1e-9  # difference of an effort from its limit, relative to the limit, up to which it starts at the limit
@@ -113,6 +114,7 @@ class ContactStretches(Stretches[ContactMode]):
             lambda y: np.append(self._guards(y, mode, guards), -side * equations.excess(y)),
             lambda y: equations.eliminated(y, mode),
             np.append(noise_of(guards, self._size), noise),
+            np.append([CLOSE * (guard.kind == "close") for guard in guards], np.zeros_like(noise)),
         )
 
     def _guards(self, state: Array, mode: ContactMode, guards: Sequence[ContactGuard]) -> FloatArray:

@@ -180,3 +180,11 @@ def noise_of(
         leaves = at is not None and abs(q[number] - at) <= _NEAR * max(1.0, abs(at))
         noise.append(_DIGITS * float(np.spacing(max(1.0, abs(at)))) if leaves and at is not None else 0.0)
     return np.array(noise)
+
+
+def near_stops(joints: tuple[SwitchedJoint, ...], mode: Mode) -> FloatArray:
+    """Height of a crest of each guard at which it is uncertain whether a joint reaches its stop; 0 of other guards.
+
+    Whether an effort reaches its limit for a moment changes nothing, for it has no impact.
+    """
+    return np.array([CLOSE * (kind in {"low", "high"}) for _, kind in guards_of(joints, mode)])

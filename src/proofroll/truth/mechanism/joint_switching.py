@@ -9,7 +9,7 @@ from proofroll.elements.mechanism.joint_coordinates import JointCoordinates
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.elements.mechanism.switches import HOLDING, STOPPED, Mode, held_joints
 from proofroll.truth.hybrid import Stretch, Transition
-from proofroll.truth.mechanism.joint_stretches import JointStretches, guard_values, noise_of, reversed_mode
+from proofroll.truth.mechanism.joint_stretches import JointStretches, guard_values, near_stops, noise_of, reversed_mode
 from proofroll.truth.mechanism.stretches import StretchLaw
 
 
@@ -40,6 +40,7 @@ class SwitchedTree(JointStretches):
             lambda y: self._guards(y, mode),
             lambda y: np.append(corrected(y[:-1]), y[-1]),
             noise_of(self.joints, self.motors, mode, q[at_q], self._wanted(float(state[-1]), q, v)),
+            near_stops(self.joints, mode),
         )
 
     def _at_rest(self, leg: Stretch[Mode], state: Array, stopped: Sequence[int]) -> tuple[Array, Mode, float]:

@@ -25,12 +25,14 @@ class StretchLaw(NamedTuple):
         guards: values that are negative while the mode lasts, shape (guards,).
         corrected: projects a state onto its constraints.
         noise: round-off of the guards at the start, shape (guards,).
+        near: height of a crest of each guard below which it is uncertain whether it reaches zero; 0: no matter.
     """
 
     rates: Callable[[Array], Array]
     guards: Callable[[Array], FloatArray]
     corrected: Callable[[Array], Array]
     noise: FloatArray
+    near: FloatArray
 
 
 class Stretches(ABC, Generic[ModeT]):
@@ -62,7 +64,7 @@ class Stretches(ABC, Generic[ModeT]):
 
     def walk(self, time: float, state: Array, mode: ModeT, until: float) -> Stretch[ModeT]:
         """See the protocol."""
-        law, visited = self._law(state, mode), list[tuple[float, Array]]()
+        law, visited, grazes = self._law(state, mode), list[tuple[float, Array]](), list[float]()
         end, last, guard = integrate_to_guard(
             lambda _, y: law.rates(y),
             time,
@@ -74,9 +76,11 @@ class Stretches(ABC, Generic[ModeT]):
             first_step=self._span,
             noise=law.noise,
             visited=visited,
+            near=law.near,
+            grazes=grazes,
         )
         self._span = end - time if end > time else None
-        return Stretch(time, end, mode, state, last, guard, visited)
+        return Stretch(time, end, mode, state, last, guard, visited, grazes)
 
     def within(self, leg: Stretch[ModeT], times: FloatArray) -> FloatArray:
         """See the protocol."""

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from proofroll.core.errors import Diverged, Refused
+from proofroll.elements.mechanism.joint import Joint
 from proofroll.elements.mechanism.joint_coordinates import JointCoordinates
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.record import record_of
@@ -20,9 +21,9 @@ from proofroll.truth.mechanism.natural_units import Units, natural_units
 from proofroll.truth.mechanism.two_paths import TOLERANCES, followed, refuse_uncovered, two_route_motion
 from proofroll.truth.mechanism.two_routes import TwoRouteMotion, check_start, find_truth, on_same_turns
 
-# rad, natural lengths, or part of a limit: how far a stop or a limit must be exceeded to act; more than the error of
-# the scouting run
-_GRAZED = 1e-8
+# rad, natural lengths, or part of a limit: distance from a stop or a limit beyond which it surely does not act; more
+# than the error of the scouting run
+_APART = 1e-8
 _SCOUT = 1e-9  # tolerance of a scouting run, which finds out if any stop is reached
 
 
@@ -47,8 +48,9 @@ def _without_contacts(mechanism: Mechanism, times: Array) -> TwoRouteMotion:
         return find_truth(mechanism, times)
     units = natural_units(mechanism)
     own = units.mechanism(mechanism)
-    if not kinks and not any(joint.friction for joint in equations.switched):
-        scout = SwitchedTree(JointCoordinates(_wider(own)), _SCOUT)
+    apart = all(joint.limits is None or _inside(joint) for joint in own.joints)
+    if apart and not kinks and not any(joint.friction for joint in equations.switched):
+        scout = SwitchedTree(JointCoordinates(_narrower(own)), _SCOUT)
         begun = scout.begin()
         assert begun.mode is not None  # every start has a mode
         with units.errors_in_seconds():
@@ -60,19 +62,25 @@ def _without_contacts(mechanism: Mechanism, times: Array) -> TwoRouteMotion:
         return _switched(mechanism, units, own, times / units.time)
 
 
+def _inside(joint: Joint) -> bool:
+    """True if a joint with stops starts apart from both."""
+    low, high = joint.limits or (-np.inf, np.inf)
+    return low + _APART < (joint.q0[0] if joint.q0 else 0.0) < high - _APART
+
+
 def _unlimited(mechanism: Mechanism) -> Mechanism:
     """Mechanism without effort limits."""
     return replace(mechanism, actuators=tuple(replace(actuator, limit=None) for actuator in mechanism.actuators))
 
 
-def _wider(mechanism: Mechanism) -> Mechanism:
-    """Mechanism with its stops and limits a little wider, so that merely touching one does not pass it."""
+def _narrower(mechanism: Mechanism) -> Mechanism:
+    """Mechanism with its stops and limits a little narrower: a motion within them surely touches none."""
     joints = (
-        replace(joint, limits=(joint.limits[0] - _GRAZED, joint.limits[1] + _GRAZED)) if joint.limits else joint
+        replace(joint, limits=(joint.limits[0] + _APART, joint.limits[1] - _APART)) if joint.limits else joint
         for joint in mechanism.joints
     )
     actuators = (
-        actuator if actuator.limit is None else replace(actuator, limit=actuator.limit * (1 + _GRAZED))
+        actuator if actuator.limit is None else replace(actuator, limit=actuator.limit * (1 - _APART))
         for actuator in mechanism.actuators
     )
     return replace(mechanism, joints=tuple(joints), actuators=tuple(actuators))
