@@ -15,6 +15,7 @@ from proofroll.core.errors import InputError
 from proofroll.files.json_data import plain
 from proofroll.report.changes import Against, EarlierReport, against
 from proofroll.report.long_table import LongTable, TableLine
+from proofroll.report.terminal.tables import change_lines
 
 LINE = TableLine(
     study="arm", group="trees", scene="arm", place="", row=0, engine="alpha", version="1", formulation="joints",
@@ -135,3 +136,16 @@ def test_a_report_is_read_from_its_file(tmp_path: Path) -> None:
     file.write_text("[" * 100_000)
     with pytest.raises(InputError, match="with a long table"):
         EarlierReport.read(file)
+
+
+def test_runs_that_changed_alike_share_a_line() -> None:
+    """A terminal tells a change once, with all runs that have it, and another change beside it."""
+    new = [replace(line, verdict="another-scene") for line in LINES[:2]] + changed(2, error=2e-3)[2:]
+    old = [*LINES, *(replace(line, study="chain") for line in LINES[:2])]
+    found = held([*new, *(replace(line, study="chain") for line in new[:2])], old=old)
+    head, versions, both, other = change_lines(found)
+    assert head.startswith("Against old.json of 2026-01-01. Of 3 runs in both reports, changed: 2 verdicts, 1 errors")
+    assert versions == "Other versions: alpha 1 → 2."
+    runs = "arm: alpha joints default dt 1e-3; chain: alpha joints default dt 1e-3"
+    assert both == f"!! {runs}: x agrees → another-scene; z agrees → another-scene (2 runs)"
+    assert other == "!! arm: beta joints default dt 1e-3: error of x 2e-9 → 2e-3 m"

@@ -179,15 +179,19 @@ def part_lines(content: ReportContent) -> list[str]:
 
 
 def change_lines(changes: Against | None) -> list[str]:
-    """Changes since an earlier report, a line for each run; empty without an earlier one."""
+    """Changes since an earlier report, a line for all runs with the same change; empty without an earlier report."""
     if changes is None:
         return []
     head = f"Against {changes.old} of {changes.date[:10]}. {changes.sentence}"
     versions = [f"{name} {old} → {new}" for name, (old, new) in changes.versions.items()]
     lines = [f"Other versions: {', '.join(versions)}."] if versions else []
+    runs: dict[str, list[str]] = {}
     for item in changes.changes:
         where = f" at {item.place}" if item.place else ""
-        lines.append(f"!! {item.study}: {item.run}{where}: {'; '.join(item.says) or item.kind}")
+        runs.setdefault("; ".join(item.says) or item.kind, []).append(f"{item.study}: {item.run}{where}")
+    for change, where_seen in runs.items():
+        several = f" ({len(where_seen)} runs)" if len(where_seen) > 1 else ""
+        lines.append(f"!! {'; '.join(where_seen)}: {change}{several}")
     return [head, *lines]
 
 
