@@ -18,7 +18,7 @@ _watched: dict[str, tuple[Any, ...]] = {}
 
 
 def watch() -> None:
-    """Records the functions that judge engines in this process, before any engine is loaded."""
+    """Stores references to the functions that judge engines; to be called before any engine is loaded."""
     for name in _EARLY:
         importlib.import_module(f"proofroll.{name}")
     _watched.update(_judging_members())

@@ -100,7 +100,7 @@ def add(
 
 
 def package_of(engine: str) -> str:
-    """Package that brings an engine: the requirement of the adapter's extra of the engine's name; empty if unknown."""
+    """Requirement that installs an engine: of the extra with its name in the adapter's package; empty if unknown."""
     for point in announced(GROUP):
         if point.name != engine or point.dist is None:
             continue

@@ -78,7 +78,7 @@ def change_by(factor: float) -> float:
 
 
 def possible(factor: float, signed: bool) -> bool:
-    """True if a number can have this factor; a negative one only a ``signed`` number, by a known mistake."""
+    """True if a known mistake multiplies a number by this factor; only a ``signed`` number gets a negative one."""
     return factor >= 0 or (signed and known_factor(factor) is not None)
 
 

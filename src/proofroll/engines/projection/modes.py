@@ -184,7 +184,7 @@ class Stick(_Held):
         return Survey((*cone, speed - self._pace.still), trend, longest=longest)
 
     def glance(self, y: FloatArray, before: Survey, elapsed: float) -> Survey:
-        """Margins of a ball that only standstill can end, from those a step of ``elapsed`` [s] before.
+        """Margins after a step of ``elapsed`` [s], from those before it, of a rolling that ends at standstill alone.
 
         The deceleration of the centre is estimated from that step, which saves an evaluation of the equations.
         """
