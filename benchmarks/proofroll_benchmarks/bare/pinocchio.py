@@ -187,15 +187,14 @@ class _FreeFlyer:
     def rows(self, q: FloatArray, v: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Rows, their drift, and the moment of rolling resistance on the joint per newton of normal force."""
         model, data, D, a = self.model, self.data, self.directions, self.a
-        pin.forwardKinematics(model, data, q, v, self.rest)
         pin.crba(model, data, q)
         pin.nonLinearEffects(model, data, q, v)
         ex, ey = self.aim(q)
-        vx, vy, vz, wx, wy, _ = v.tolist()
+        vx, vy, vz, wx, wy, wz = v.tolist()
         turning = (vy * ex - vx * ey) / self.c
-        drift = D.dot(pin.getClassicalAcceleration(model, data, self.ball, pin.LOCAL).vector)
-        drift[0] += turning * turning * self.c
-        drift[2] += a * turning * (wx * ex + wy * ey)
+        bx, by, bz = wy * vz - wz * vy, wz * vx - wx * vz, wx * vy - wy * vx  # ω × v
+        lateral = a * turning * (wx * ex + wy * ey)
+        drift = np.array((ex * bx + ey * by + turning * turning * self.c, ex * by - ey * bx, bz + lateral))
         if not self.f:
             return D, drift, self.rest
         scale = self.f / math.sqrt(vx * vx + vy * vy + vz * vz)

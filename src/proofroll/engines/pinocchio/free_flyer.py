@@ -1,6 +1,7 @@
 """Formulation ``free_flyer``: a free ball, held on the surface without slip by three constraint rows."""
 
 import math
+import struct
 from collections.abc import Sequence
 from typing import Any
 
@@ -10,6 +11,9 @@ import pinocchio as pin
 from proofroll.core.arrays import FloatArray, cross
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.engines.pinocchio.ball_with_rows import BallWithRows, ContactRows, SlidingContact
+
+# Writes 18 numbers into an array at once, which is quicker than an assignment for each.
+_PACK: Any = struct.Struct("18d").pack_into
 
 
 class FreeFlyer(BallWithRows):
@@ -26,8 +30,6 @@ class FreeFlyer(BallWithRows):
         self._orientation = orientation
         self._matrix = np.zeros((9, 9))
         self._directions = np.zeros((3, 6))
-        self._entries = self._directions.reshape(-1)
-        self._sources = _sources(self._radius)
         self._add_ball(body, 0, pin.JointModelFreeFlyer(), pin.SE3.Identity())
         self.q0 = np.concatenate([body.p0, [0.0, 0.0, 0.0, 1.0]])
         self.v0 = np.concatenate([body.v0, body.w0])
@@ -47,23 +49,28 @@ class FreeFlyer(BallWithRows):
         return q, rest + carried
 
     def _aimed(self, moving: Sequence[float]) -> FloatArray:
-        """Matrix from (v, ω) to normal velocity and slip along e2, e3, world axes, shape (3, 6); overwritten."""
-        entries = self._entries
-        for index, source, factor in self._sources:
-            entries[index] = factor * moving[source]
+        """Matrix from (v, ω) to normal velocity and slip along e2, e3, world axes, shape (3, 6); overwritten.
+
+        The row along e1 is e1·v, along e2 the slip e2·v + a e3·ω, along e3 the slip e3·v - a e2·ω.
+        """
+        _, x1, y1, z1, x2, y2, z2, x3, y3, z3, *_ = moving
+        a = self._radius
+        rolling2, rolling3 = (a * x3, a * y3, a * z3), (-a * x2, -a * y2, -a * z2)
+        _PACK(self._directions, 0, x1, y1, z1, 0.0, 0.0, 0.0, x2, y2, z2, *rolling2, x3, y3, z3, *rolling3)
         return self._directions
 
     def _at(
         self, data: Any, q: FloatArray, v: FloatArray
-    ) -> tuple[Sequence[float], FloatArray, FloatArray, FloatArray]:
-        """Distance, triad and ė1 as 13 numbers; rows, drift and resistance of :class:`ContactRows`.
+    ) -> tuple[Sequence[float], FloatArray, FloatArray, FloatArray, tuple[float, float, float]]:
+        """Distance, triad and ė1 as 13 numbers; rows, drift and resistance of :class:`ContactRows`; ω × v, world axes.
 
         The surface's row comes first, then the two of rolling. Components are plain floats: adding to array elements
-        takes three times as long.
+        takes three times as long. Leaves the mass matrix and the bias forces in ``data``.
         """
-        bias = self._own_bias(data, q, v)
+        pin.crba(self.model, data, q)
+        pin.nonLinearEffects(self.model, data, q, v)
         # without orientation the joint's axes are the world's
-        turned = data.oMi[self.ball].rotation if self._orientation else None
+        turned = pin.Quaternion(q[3:]).toRotationMatrix() if self._orientation else None
         px, py, pz = q[:3].tolist()
         if turned is None:
             vx, vy, vz, wx, wy, wz = v.tolist()
@@ -74,13 +81,12 @@ class FreeFlyer(BallWithRows):
         rows = self._aimed(moving)
         if turned is not None:
             rows = rows.reshape(6, 3).dot(turned).reshape(3, 6)  # both halves of each row
-        drift = rows.dot(bias)
-        along1, along2, along3 = drift.tolist()
         a = self._radius
-        tx, ty, tz = a * (wy * z - wz * y), a * (wz * x - wx * z), a * (wx * y - wy * x)  # a ω × ė1
-        drift[0] = along1 + (x * vx + y * vy + z * vz)
-        drift[1] = along2 + (x2 * tx + y2 * ty + z2 * tz)
-        drift[2] = along3 + (x3 * tx + y3 * ty + z3 * tz)
+        # ω × v, the centre's acceleration at zero joint acceleration, and with a ω × ė1
+        bx, by, bz = wy * vz - wz * vy, wz * vx - wx * vz, wx * vy - wy * vx
+        tx, ty, tz = bx + a * (wy * z - wz * y), by + a * (wz * x - wx * z), bz + a * (wx * y - wy * x)
+        normal_drift = x1 * bx + y1 * by + z1 * bz + x * vx + y * vy + z * vz
+        drift = np.array((normal_drift, x2 * tx + y2 * ty + z2 * tz, x3 * tx + y3 * ty + z3 * tz))
         if (
             self._wall_rate is not None
         ):  # acceleration of the wall at the contact, W × velocity of the contact position p + a e1
@@ -94,11 +100,12 @@ class FreeFlyer(BallWithRows):
             moment = np.array((f * (y1 * vz - z1 * vy), f * (z1 * vx - x1 * vz), f * (x1 * vy - y1 * vx)))
             resistance = np.zeros(6)
             resistance[3:] = moment if turned is None else moment.dot(turned)
-        return moving, rows, drift, resistance
+        return moving, rows, drift, resistance, (bx, by, bz)
 
     def rows(self, data: Any, q: FloatArray, v: FloatArray) -> ContactRows:
         """See :class:`~proofroll.engines.pinocchio.ball_with_rows.BallWithRows`; surface row, then rolling rows."""
-        moving, *rest = self._at(data, q, v)
+        pin.forwardKinematics(self.model, data, q, v)
+        moving, *rest, _ = self._at(data, q, v)
         return ContactRows(np.array(moving[1:10]).reshape(3, 3).T, *rest)
 
     def _only_rows(self, data: Any, q: FloatArray, v: FloatArray) -> FloatArray:
@@ -129,15 +136,12 @@ class FreeFlyer(BallWithRows):
         Without orientation the acceleration has world components: the joint's acceleration refers to the ball's axes,
         which turn with ω, while the axes held fixed do not.
         """
-        _, *rows = self._at(data, q, v)
-        acceleration = self._solve(data, *rows)
+        _, rows, drift, resistance, (bx, by, bz) = self._at(data, q, v)
+        acceleration = self._solve(data, rows, drift, resistance)
         if self._orientation:
             return acceleration
-        vx, vy, vz, wx, wy, wz = v.tolist()
         ax, ay, az, *_ = acceleration.tolist()
-        acceleration[0] = ax + (wy * vz - wz * vy)
-        acceleration[1] = ay + (wz * vx - wx * vz)
-        acceleration[2] = az + (wx * vy - wy * vx)
+        acceleration[0], acceleration[1], acceleration[2] = ax + bx, ay + by, az + bz
         return acceleration
 
     def normal_force(self, data: Any) -> float:
@@ -152,10 +156,9 @@ class FreeFlyer(BallWithRows):
     def on_surface(self, q: FloatArray) -> FloatArray:
         """Configuration with the centre moved onto the surface along its normal."""
         q = q.copy()
-        gap, x, y, z = self._surface.nearby(*q[:3].tolist())
-        q[0] += gap * x
-        q[1] += gap * y
-        q[2] += gap * z
+        px, py, pz = q[:3].tolist()
+        gap, x, y, z = self._surface.nearby(px, py, pz)
+        q[0], q[1], q[2] = px + gap * x, py + gap * y, pz + gap * z
         return q
 
     def gap(self, q: FloatArray) -> float:
@@ -195,12 +198,3 @@ class FreeFlyer(BallWithRows):
         """See :class:`~proofroll.engines.pinocchio.ball_with_rows.BallWithRows`."""
         q = self.on_surface(q)
         return q, np.array(pin.impulseDynamics(self.model, data, v, self.rows(data, q, v).rows[:1]))
-
-
-def _sources(radius: float) -> list[tuple[int, int, float]]:
-    """Entries of the directions: index in their 18 numbers, index in a moving triad, and factor.
-
-    The row along e1 is e1·v, along e2 the slip e2·v + a e3·ω, along e3 the slip e3·v - a e2·ω.
-    """
-    blocks = ((0, 1, 1.0), (6, 4, 1.0), (9, 7, radius), (12, 7, 1.0), (15, 4, -radius))
-    return [(index + k, source + k, factor) for index, source, factor in blocks for k in range(3)]
