@@ -118,6 +118,7 @@ class EarlierReport:
             table, made = content["table"], content["environment"]
             rows = [zip(table["columns"], row, strict=True) for row in table["data"]]
             lines = [TableLine(**{name: value for name, value in row if name in COLUMNS}) for row in rows]
+            lines = [line for line in lines if not line.record]
             return cls(path, content["date"], made["machine"], made["versions"], lines)
         except OSError as problem:
             why = f"cannot be read: {problem.strerror or problem}; proofroll report writes one"

@@ -1,4 +1,4 @@
-"""Long table of a report: one line for each quantity of each run, with flat values, in JSON and CSV."""
+"""Long table of a report: a line for each quantity of each run and for each recorded number, in JSON and CSV."""
 
 import csv
 import io
@@ -12,7 +12,7 @@ from proofroll.files.json_data import plain
 
 @dataclass(frozen=True, kw_only=True)
 class TableLine:
-    """One quantity of one run, or a run without quantities.
+    """One quantity of one run, a run without quantities, or a number of a study's record.
 
     Attributes:
         study: name of the file that asked for the run.
@@ -28,6 +28,7 @@ class TableLine:
         verdict: of the quantity, or of a run without quantities; empty: none was given.
         limit: result of a ladder of steps for the quantity.
         limit_error: distance of the limit of small steps from the truth; None: there is none.
+        limit_error_bar: of that distance, from the scatter of the ladder.
         limit_doubt: uncertainty of that distance, of round-off and of steps beside events included.
         floor: clause about the error floor of single precision that ends the refinement; empty: there is none.
         quantity, unit, role: the measured quantity and its role (:class:`proofroll.core.observable.Role`).
@@ -39,6 +40,9 @@ class TableLine:
         order: observed order of the time step.
         cost: wall seconds per simulated second.
         cost_low, cost_high: its interval; None: it was measured once.
+        record: address of a number in its study's record (:mod:`proofroll.report.recorded`); empty: a line of a run.
+        value: that number; None: it stands in the sentence ``message``.
+        expected: number that the scene asks for where ``value`` is what an engine built.
         clean: True if clean runs of their own measured the cost; else it is that of the sampled run, during which other
             processes ran, by processor time where that is less.
     """
@@ -62,6 +66,7 @@ class TableLine:
     verdict: str
     limit: str = ""
     limit_error: float | None = None
+    limit_error_bar: float | None = None
     limit_doubt: float | None = None
     floor: str = ""
     quantity: str = ""
@@ -77,6 +82,9 @@ class TableLine:
     cost_low: float | None
     cost_high: float | None
     clean: bool
+    record: str = ""
+    value: float | None = None
+    expected: float | None = None
 
     @property
     def relative(self) -> float:

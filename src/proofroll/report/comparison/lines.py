@@ -14,7 +14,8 @@ from proofroll.studies.comparison.outcome import LadderRun, Outcome, Run
 from proofroll.studies.comparison.planning import point_name
 
 # Fields of a line about a ladder of steps, which only the step at which a comparison judges has.
-_NO_LIMIT: dict[str, Any] = {"order": None, "limit": "", "limit_error": None, "limit_doubt": None, "floor": ""}
+_NO_LIMIT: dict[str, Any] = dict.fromkeys(("order", "limit_error", "limit_error_bar", "limit_doubt"))
+_NO_LIMIT |= {"limit": "", "floor": ""}
 
 
 def lines_of(outcome: Outcome) -> list[TableLine]:
@@ -73,6 +74,7 @@ def _judged(outcome: Outcome, run: Run, plain: TableLine, item: Judgement) -> Ta
         verdict=item.verdict,
         limit=item.limit,
         limit_error=item.limit_error,
+        limit_error_bar=item.limit_error_bar,
         limit_doubt=item.limit_doubt,
         floor=item.floor,
         quantity=item.observable,

@@ -15,6 +15,7 @@ from proofroll.report.long_table import LongTable, TableLine
 from proofroll.report.page.html import page
 from proofroll.report.page.records import ReportContent, report_content
 from proofroll.report.parts import Part, PartEntry, absent, attempt
+from proofroll.report.recorded import recorded_lines
 from proofroll.report.replay.records import Replay
 from proofroll.report.replay.replay import joined, replay_content
 from proofroll.running.store import write_text
@@ -90,10 +91,12 @@ class Report:
         """
         content = self.content
         content_json = plain(content)
-        table = json.dumps(content_json.pop("table"), allow_nan=False).replace("], [", "],\n  [")
+        del content_json["table"]
+        whole = LongTable([*content.table.lines, *recorded_lines(content_json)])
+        table = json.dumps(plain(whole), allow_nan=False).replace("], [", "],\n  [")
         text = json.dumps(content_json, indent=1, allow_nan=False).removesuffix("\n}")
         write_text(out / "report.json", f'{text},\n "table": {table}\n}}\n')
-        write_text(out / "report.csv", content.table.csv)
+        write_text(out / "report.csv", whole.csv)
         write_text(out / "report.html", page(content, self.curves, self.pictures, self.replay))
 
     def _put(self, part: Part, said: PartEntry) -> None:
