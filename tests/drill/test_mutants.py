@@ -60,15 +60,16 @@ def test_an_engine_without_a_fault_is_not_detected(kind: type[Mutant]) -> None:
     assert [item for item in judged_without_fault(kind) if item.error > 2e-3 * item.scale] == []
 
 
-def test_a_fault_of_contacts_is_detected_and_named() -> None:
-    """A law of friction that is not the scene's is found, and its cause."""
-    found = tried(contact_models.PyramidForCone)
+@pytest.mark.parametrize("fault", ["PyramidForCone", "FrictionOfOneFoot"])
+def test_a_fault_of_contacts_is_detected_and_named(fault: str) -> None:
+    """A law of friction that is not the scene's, or the coefficient of one of three feet, is found, and its cause."""
+    found = tried(getattr(contact_models, fault))
     assert found.detected
     assert found.named, found.said
 
 
 @pytest.mark.parametrize(
-    "fault", ["RoughJoint", "PushingJoint", "TightClamp", "SwappedGains", "Undamped", "InverseGear"]
+    "fault", ["RoughJoint", "PushingJoint", "TightClamp", "SwappedGains", "Undamped", "InverseGear", "CoarseGear"]
 )
 def test_a_law_of_joints_that_is_another_is_named(fault: str) -> None:
     """Friction, stops, armature, limits, gains and gears of joints that are not the scene's are named as such."""

@@ -153,12 +153,15 @@ def _processor() -> str:
 
 
 def write_benchmarks(timings: Mapping[str, Timing], path: Path) -> None:
-    """Writes all timings as a pyperf suite, for ``python -m pyperf stats`` and ``compare_to``.
+    """Writes all timings as a pyperf suite, for ``python -m pyperf stats`` and ``compare_to``; none are no file.
 
     Raises:
         ProofrollError: the place cannot be written.
     """
     import pyperf
+
+    if not timings:  # pyperf has no empty suite
+        return
 
     facts = machine()
     metadata = {

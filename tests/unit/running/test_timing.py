@@ -93,6 +93,12 @@ def test_only_an_interval_of_95_percent_is_called_one() -> None:
     ]
 
 
+def test_timings_of_nothing_are_no_file(tmp_path: Path) -> None:
+    """A study whose budget sufficed for no timing writes no suite, and does not fail."""
+    write_benchmarks({}, tmp_path / "timings.json")
+    assert not list(tmp_path.iterdir())
+
+
 def test_pyperf_reads_what_is_written(tmp_path: Path) -> None:
     """The file is a pyperf suite with the same values, and says on which machine they were taken."""
     write_benchmarks({"one": Timing((1.0, 2.0, 3.0), (9.0,))}, tmp_path / "timings.json")

@@ -196,9 +196,9 @@ class Joint:
         if self.limits is not None:
             low, high = checks.numbers(f"{place}.limits", self.limits, 2)
             if self.nq != 1 or low >= high:
-                raise InputError(
-                    f"{place}.limits", self.limits, "give [least, greatest] of a joint with one coordinate"
-                )
+                advice = "a joint with several has no stops" if self.nq > 1 else "the first must be below the second"
+                advice = f"give [least, greatest] of the joint's coordinate; {advice}"
+                raise InputError(f"{place}.limits", self.limits, advice)
             checks.assign(self, limits=(low, high))
             if not low - self.stop_digits <= self.q0[0] <= high + self.stop_digits:
                 advice = f"the joint starts beyond a stop; its limits are {low:g} and {high:g}"

@@ -120,6 +120,62 @@ class FrictionTwoPercent(ContactMutant):
         return of_pairs(mechanism, lambda pair: dataclasses.replace(pair, friction=1.02 * pair.friction))
 
 
+class FrictionOfOneFoot(ContactMutant):
+    """One of three feet grips a tenth more."""
+
+    fault = "friction of one contact 1.1 times"
+    named = ("friction of left is 1.1",)
+
+    def other(self, mechanism: Mechanism) -> Mechanism:
+        """The first pair alone."""
+        first, *others = mechanism.pairs
+        return dataclasses.replace(
+            mechanism, pairs=(dataclasses.replace(first, friction=1.1 * first.friction), *others)
+        )
+
+
+class FrictionOfAnImpact(ContactMutant):
+    """One impact rubs a tenth more."""
+
+    fault = "friction of an impact 1.1 times"
+    scene: ClassVar[Any] = ("two_spheres", {})
+    until, every = 0.2, 0.01
+    named = ("friction of impacts is 1.1",)
+
+    def other(self, mechanism: Mechanism) -> Mechanism:
+        """A tenth more."""
+        return of_pairs(mechanism, lambda pair: dataclasses.replace(pair, friction=1.1 * pair.friction))
+
+
+class FrictionOfBounces(FrictionOfAnImpact):
+    """Each bounce rubs a tenth more."""
+
+    fault = "friction of bounces 1.1 times"
+    scene: ClassVar[Any] = ("spinning_bounce", {})
+    until, every = 1.0, 0.02
+
+
+class RestitutionOfAnImpact(ContactMutant):
+    """One impact returns nine tenths of its speed."""
+
+    fault = "restitution of an impact 0.9 times"
+    scene: ClassVar[Any] = ("two_spheres", {})
+    until, every = 0.2, 0.01
+    named = ("restitution of impacts is 0.9", "restitution of all pairs is 0.9")
+
+    def other(self, mechanism: Mechanism) -> Mechanism:
+        """A tenth less."""
+        return of_pairs(mechanism, lambda pair: dataclasses.replace(pair, restitution=0.9 * pair.restitution))
+
+
+class RestitutionOfBounces(RestitutionOfAnImpact):
+    """Each bounce returns nine tenths of its speed."""
+
+    fault = "restitution of bounces 0.9 times"
+    scene: ClassVar[Any] = ("spinning_bounce", {})
+    until, every = 1.0, 0.02
+
+
 class Pyramid(ContactDynamics):
     """Friction of most work among the corners of a square, whose axes are x and y."""
 

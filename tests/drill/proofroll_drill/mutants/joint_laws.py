@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from pathlib import Path
 from typing import Any, ClassVar
 
 from proofroll.core.events import Event
@@ -54,6 +55,22 @@ class RoughAgain(RoughJoint):
     until = 1.0
 
 
+class RoughElbow(OfJoint):
+    """A tenth too much in one of two joints."""
+
+    fault = "dry friction of one joint 1.1 times"
+    scene: ClassVar[Any] = (str(Path(__file__).parent / "rough_arm"), {})
+    until = 0.3
+    every = 0.01
+    named = ("dry friction of the joint elbow 1.1 times",)
+
+    def other(self, mechanism: Mechanism) -> Mechanism:
+        """The elbow alone."""
+        return of_joints(
+            mechanism, lambda j: dataclasses.replace(j, friction=(1.1 if j.name == "elbow" else 1.0) * j.friction)
+        )
+
+
 class PushingJoint(OfJoint):
     """Friction along the motion, as a drive of the same size: the pendulum swings one way in this time."""
 
@@ -88,6 +105,13 @@ class MovedStopWithRebounds(MovedStop):
     scene: ClassVar[Any] = ("stop", {"restitution": 0.5})
     until = 1.0
     named = ("turns back at -0.01,",)
+
+
+class MovedStopWithOneRebound(MovedStopWithRebounds):
+    """Rebounds from there once."""
+
+    fault = "stop at another place, with one rebound"
+    until = 0.8
 
 
 class Driven(MechanismMutant):
@@ -193,4 +217,17 @@ class InverseGear(Driven):
     def other(self, mechanism: Mechanism) -> Mechanism:
         """One over each ratio."""
         turned = tuple(dataclasses.replace(item, ratio=1 / item.ratio) for item in mechanism.couplings)
+        return dataclasses.replace(mechanism, couplings=turned)
+
+
+class CoarseGear(Driven):
+    """A ratio that is rounded."""
+
+    fault = "ratio of a gear 1 % off"
+    scene: ClassVar[Any] = ("arm_rotor", {})
+    named = ("the coupling gear has the ratio 50.5",)
+
+    def other(self, mechanism: Mechanism) -> Mechanism:
+        """A hundredth more."""
+        turned = tuple(dataclasses.replace(item, ratio=1.01 * item.ratio) for item in mechanism.couplings)
         return dataclasses.replace(mechanism, couplings=turned)

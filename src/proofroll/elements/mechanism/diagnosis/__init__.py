@@ -8,9 +8,14 @@ from proofroll.core.diagnosis.fitting import any_gravity
 from proofroll.core.diagnosis.lines import built_otherwise
 from proofroll.elements.mechanism.diagnosis import contacts
 from proofroll.elements.mechanism.diagnosis.equations import Change
-from proofroll.elements.mechanism.diagnosis.impacts import impacts
+from proofroll.elements.mechanism.diagnosis.impacts import impacts, laws_of_impacts
 from proofroll.elements.mechanism.diagnosis.joint_laws import of_actuators, of_couplings, of_stops
-from proofroll.elements.mechanism.diagnosis.numbers import FACTORS_OF_ALL, of_each_body, of_each_joint
+from proofroll.elements.mechanism.diagnosis.numbers import (
+    FACTORS_OF_ALL,
+    friction_of_each_joint,
+    of_each_body,
+    of_each_joint,
+)
 from proofroll.elements.mechanism.diagnosis.reactions import reactions, reactions_at_start
 from proofroll.elements.mechanism.diagnosis.reporting_errors import REPORTING_ERRORS
 from proofroll.elements.mechanism.diagnosis.residuals import COVERED, GIVEN, residuals_of
@@ -34,6 +39,7 @@ HYPOTHESES: tuple[Any, ...] = (
     BUILT,
     *contacts.HYPOTHESES,
     impacts,
+    laws_of_impacts,
     other_axis,
     axis_of_first_steps,
     *FACTORS_OF_ALL,
@@ -42,6 +48,7 @@ HYPOTHESES: tuple[Any, ...] = (
     of_stops,
     of_each_body,
     of_each_joint,
+    friction_of_each_joint,
     lost_coupling,
     loop_lacks_row,
     GRAVITY,

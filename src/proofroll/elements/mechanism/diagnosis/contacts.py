@@ -11,7 +11,13 @@ from numpy.typing import NDArray
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.diagnosis import Cause, Evidence, hypothesis
-from proofroll.core.diagnosis.fitting import cached_on_evidence, change_by, factor_text
+from proofroll.core.diagnosis.fitting import (
+    cached_on_evidence,
+    change_by,
+    factor_text,
+    least_squares_parameter,
+    possible,
+)
 from proofroll.core.diagnosis.samples import run_and_truth
 from proofroll.core.diagnosis.vectors import ReportedVector
 from proofroll.core.errors import Refused
@@ -27,9 +33,8 @@ _FEW = 3  # samples of friction from which a square does not fit by chance
 _ANGLES = np.linspace(0.0, np.pi / 2, 181)[:-1]
 _HELD = 1e-6  # slip speed of the truth that counts as sticking, relative to the mechanism's speed
 # A wrong contact changes all of the motion, so that no further cause of the motion is looked for.
-contact_cause = functools.partial(
-    Cause, covers=("motion", "contacts", "contact_forces", "normal_forces", "acceleration")
-)
+COVERS = ("motion", "contacts", "contact_forces", "normal_forces", "acceleration")
+contact_cause = functools.partial(Cause, covers=COVERS)
 
 
 @dataclass(frozen=True)
@@ -285,50 +290,55 @@ def at_start(evidence: Evidence) -> Iterator[Cause]:
     mechanism, size = element.mechanism, element.length
     found = start.each[0].acceleration * np.array([1, 1, 1, size, size, size])
 
-    def off(pairs: Sequence[Any]) -> float:
+    def apart(pairs: Sequence[Any]) -> FloatArray:
         try:
             first = type(element)(replace(mechanism, pairs=tuple(pairs))).first_motion
         except Refused:
-            return float("inf")
-        return float(
-            np.abs(np.concatenate([first.acceleration, size * first.angular_acceleration], axis=-1) - found).max()
-        )
+            return np.full(1, np.inf)
+        return np.ravel(np.concatenate([first.acceleration, size * first.angular_acceleration], axis=-1) - found)
+
+    def off(pairs: Sequence[Any]) -> float:
+        return float(np.abs(apart(pairs)).max())
 
     pairs = mechanism.pairs
     before = off(pairs)
 
-    def cause(says: str, after: float, remedy: str, fitted: int = 0, change: float = np.inf) -> Cause:
+    def cause(says: str, after: float, remedy: str, number: int = 0, change: float = np.inf) -> Cause:
         name = "acceleration at time 0"
         proof = name, "m/s^2", before, after
-        return contact_cause("contacts at time 0", says, *proof, remedy, fitted, explains=found.size, change=change)
+        return contact_cause("contacts at time 0", says, *proof, remedy, number, explains=found.size, change=change)
 
-    def scaled(factor: float) -> tuple[Any, ...]:
-        return tuple(replace(pair, friction=factor * pair.friction) for pair in pairs)
+    def scaled(factor: float, which: Sequence[Any] = pairs) -> list[Any]:
+        return [replace(pair, friction=max(factor, 0.0) * pair.friction) if pair in which else pair for pair in pairs]
 
     if not before > _FORCE * element.first_motion.scale:
         return
+    own = "give each pair its own coefficient"
     for pair in pairs:
         if len(pairs) > 1:
             left = off([other for other in pairs if other is not pair])
             yield cause(f"the contact {pair.name} is left out", left, "let the pair touch")
-    yield cause("friction of all contacts is off", off(scaled(0.0)), "give each pair its coefficient")
+    yield cause("friction of all contacts is off", off(scaled(0.0)), own)
     for a, b in itertools.combinations(pairs, 2):
         if a.friction != b.friction:
             swap = {a.name: b.friction, b.name: a.friction}
             after = off([replace(pair, friction=swap.get(pair.name, pair.friction)) for pair in pairs])
-            yield cause(f"friction of {a.name} and {b.name} is swapped", after, "give each pair its own coefficient")
+            yield cause(f"friction of {a.name} and {b.name} is swapped", after, own)
     from scipy.optimize import minimize_scalar  # half a second, which few runs need
 
     fit = minimize_scalar(
         lambda factor: off(scaled(factor)), bounds=(0.0, 3.0), method="bounded", options={"xatol": 1e-6}
     )
-    yield cause(
-        f"friction of all contacts is {factor_text(float(fit.x))}",
-        float(fit.fun),
-        "give each pair its own coefficient",
-        1,
-        change_by(float(fit.x)),
-    )
+    groups: list[tuple[str, Sequence[Any], float]] = [("all contacts", pairs, float(fit.x))]
+    for pair in pairs if len(pairs) > 1 else ():
+
+        def changed(factor: float, pair: Any = pair) -> FloatArray:
+            return apart(scaled(factor, (pair,)))
+
+        groups.append((pair.name, (pair,), least_squares_parameter(changed, 1.0, 1.0)))
+    for name, which, factor in groups:
+        after = off(scaled(factor, which)) if possible(factor, signed=False) else np.inf
+        yield cause(f"friction of {name} is {factor_text(factor)}", after, own, 1, change_by(factor))
 
 
 HYPOTHESES = (

@@ -162,7 +162,7 @@ class Change:
         springs, spring_damping: factors on stiffness and damping of the springs.
         weight_at_origin: True if weights act at the origins of the bodies' frames.
         added_damping, added_armature: additional damping and armature along each velocity of the tree, (nv).
-        friction: factor on the dry friction of moving joints.
+        friction: factor on the dry friction of moving joints, of all or along each velocity, (nv).
         effort: effort of an actuator as a function of itself, time, coordinate and rate.
         gyroscopic: factor on ω × I ω.
         coupling: mask of entries of the mass matrix that are lost, (nv, nv).
@@ -182,7 +182,7 @@ class Change:
     weight_at_origin: bool = False
     added_damping: FloatArray | float = 0.0
     added_armature: FloatArray | float = 0.0
-    friction: float = 1.0
+    friction: FloatArray | float = 1.0
     effort: Callable[[Actuator, float, float, float], float] = Actuator.effort
     gyroscopic: float = 1.0
     coupling: FloatArray | None = None

@@ -1,16 +1,31 @@
-"""Hypotheses of impacts: they come late, or have the restitution of another pair."""
+"""Hypotheses of impacts: they come late, or have another restitution or friction."""
 
+import functools
 import itertools
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
+from proofroll.core.arrays import FloatArray
 from proofroll.core.diagnosis import CLOSES, Cause, Evidence, hypothesis
 from proofroll.core.diagnosis.clocks import delay_text
-from proofroll.core.diagnosis.fitting import change_by, factor_text
-from proofroll.elements.mechanism.diagnosis.contacts import SeenContact, contact_cause, touch_of
+from proofroll.core.diagnosis.fitting import ABOVE, Residuals, change_by, factor_text, possible
+from proofroll.core.errors import InputError
+from proofroll.elements.mechanism.contacts.dynamics import ContactDynamics
+from proofroll.elements.mechanism.contacts.observables import PRESSES, Followed, normal_forces
+from proofroll.elements.mechanism.diagnosis.contacts import COVERS, contact_cause, touch_of
+from proofroll.elements.mechanism.diagnosis.equations import placed_of
+from proofroll.elements.mechanism.model import Mechanism
+from proofroll.elements.mechanism.placed import Placed
 
 _DELAY, _RATIO = 0.05, 1e-3  # largest delay, in steps, and error of restitution that count as none
+_JUMP = 1e-4  # least velocity that counts as missed, relative to the mechanism's speed
+_ROUNDS = 4
+_CONTRACTIONS = 20  # until slip and speed along the normal fit each other
+_REMEDY = "look at what the engine makes of it"
 _REAL = 1e-9  # imaginary part of a real root, in intervals of samples
 # If a gap has a cubic term, and its parabola misses by m one interval T back, it misses by 5 m one interval ahead, and
 # its rate there by 12 m / T.
@@ -25,10 +40,14 @@ def impacts(evidence: Evidence) -> Iterator[Cause]:
     for touch in touch_of(evidence):
         law = [contact.restitution for contact in touch.mechanism.contacts]
         names = [contact.name for contact in touch.mechanism.contacts]
-        met = [(k, one) for k in range(len(law)) for one in _met(touch, k)]
+        met = [
+            (k, one)
+            for k in range(len(law))
+            for one in _met(touch.time, touch.found.gap[:, k], touch.u_n[:, k], ~touch.presses[:, k])
+        ]
         if not met:
             continue
-        delays, delay_bars, seen, seen_bars = np.array([one for _, one in met]).T
+        delays, delay_bars, seen, seen_bars = np.array([one[2:] for _, one in met]).T
         size = float(np.abs(delays).max())
         if evidence.step and size > _DELAY * evidence.step:
             steps = np.round(2 * np.mean(delays) / evidence.step) / 2
@@ -53,16 +72,33 @@ def impacts(evidence: Evidence) -> Iterator[Cause]:
         says = f"restitution of all pairs is {factor_text(factor)}"
         after = float(np.max(np.abs(seen - factor * own) + seen_bars))
         proof = "restitution", "1", before, after
-        remedy, change = "look at what the engine makes of it", change_by(factor)
+        remedy, change = _REMEDY, change_by(factor)
         yield contact_cause("restitution", says, *proof, remedy, 1, explains=len(met), change=change)
 
 
-def _met(touch: SeenContact, c: int) -> Iterator[tuple[float, float, float, float]]:
-    """Delay [s] and its error bar, restitution and its error bar, of each impact of a contact between two flights.
+class _Impact(NamedTuple):
+    """An impact of one contact between two flights.
+
+    Attributes:
+        k: last sample before it.
+        time: where the flights meet [s].
+        delay, delay_bar: of that after the gap closes [s].
+        restitution, restitution_bar: of the gap's rate.
+    """
+
+    k: int
+    time: float
+    delay: float
+    delay_bar: float
+    restitution: float
+    restitution_bar: float
+
+
+def _met(t: FloatArray, gap: FloatArray, rate: FloatArray, free: Any) -> Iterator[_Impact]:
+    """Impacts of a contact between two flights, ``free`` of forces.
 
     A flight is a parabola through two samples; its misfit at a third sample gives the error bars.
     """
-    t, gap, rate, free = touch.time, touch.found.gap[:, c], touch.u_n[:, c], ~touch.presses[:, c]
     for k in range(1, len(t) - 2):
         if not (free[k - 1 : k + 3].all() and rate[k] < 0 < rate[k + 1]):
             continue
@@ -79,4 +115,128 @@ def _met(touch: SeenContact, c: int) -> Iterator[tuple[float, float, float, floa
         if closes and meets:
             when = min(meets, key=lambda at: abs(at - min(closes)))
             fell, rose = before.deriv()(when), after.deriv()(when)
-            yield when - min(closes), off / abs(fell), float(-rose / fell), off_rate / abs(fell)
+            bars = off / abs(fell), off_rate / abs(fell)
+            yield _Impact(k, when, when - min(closes), bars[0], float(-rose / fell), bars[1])
+
+
+@dataclass(frozen=True)
+class _Struck:
+    """A mechanism at an impact of one contact.
+
+    Attributes:
+        contact: its number.
+        q: coordinates.
+        before, after: velocities, (nv).
+        root: of the inertia over the whole mass, (nv, nv): makes of velocities those of the whole mass.
+    """
+
+    contact: int
+    q: FloatArray
+    before: FloatArray
+    after: FloatArray
+    root: FloatArray
+
+
+@hypothesis(
+    "laws of impacts",
+    "with a convex cone, or a factor on one law of all pairs, velocities before the impacts give all those after them",
+)
+def laws_of_impacts(evidence: Evidence) -> Iterator[Cause]:
+    """Hypotheses: impacts have friction or restitution with a factor, or a convex cone."""
+    for touch in touch_of(evidence) if not evidence.by_step else ():
+        mechanism, least = touch.mechanism, evidence.element.force
+        true_presses = np.asarray(PRESSES * least < normal_forces(touch.true, touch.true_force))
+        seen = list(_struck(mechanism, evidence.run, touch.found, touch.presses))
+        true = list(_struck(mechanism, evidence.truth, touch.true, true_presses))
+        own = float(np.max(np.abs(_missed(mechanism, true)), initial=0.0))
+        before = float(np.max(np.abs(_missed(mechanism, seen)), initial=0.0))
+        if before <= max(_JUMP * evidence.element.speed, ABOVE * own):
+            continue
+        held = Residuals(
+            functools.partial(_missed, struck=seen),
+            *("velocities after impacts", "m/s", before, CLOSES, COVERS, mechanism),
+            functools.partial(_others, mechanism),
+        )
+        says, remedy = "convex cone: contacts part after an impact by μ|u_t| too fast", "take Coulomb's own law"
+        after = float(np.max(np.abs(_missed(mechanism, seen, convex=True))))
+        yield contact_cause("convex cone", says, held.quantity, held.unit, before, after, remedy)
+        for law in ("friction", "restitution"):
+            factor = held.fit(functools.partial(_scaled, mechanism, law), 1.0)
+            if possible(factor, signed=False):
+                model, says = _scaled(mechanism, law, factor), f"{law} of impacts is {factor_text(factor)}"
+                yield held.cause(f"{law} of impacts", says, model, _REMEDY, 1, change_by(factor))
+
+
+def _struck(mechanism: Mechanism, dataset: Any, found: Followed, presses: Any) -> Iterator[_Struck]:
+    """Impacts of a run, or of the truth, while no other contact presses."""
+    placed, dynamics = placed_of(mechanism, dataset), ContactDynamics(mechanism)
+    mass = sum(body.mass for body in mechanism.bodies)
+    t, w, u_n = placed.time, placed.w_WB, np.sum(found.normal * found.slide, axis=-1)
+    for contact in range(found.gap.shape[1]):
+        for each in _met(t, found.gap[:, contact], u_n[:, contact], ~presses[:, contact]):
+            k = each.k
+            others = np.delete(u_n[k : k + 2], contact, axis=1)
+            if presses[k - 1 : k + 3].any() or ((others[0] < 0) & (others[1] > 0)).any():
+                continue
+            time = each.time
+            for _ in range(_ROUNDS):  # Gauss-Newton: bodies are in one place, and their velocities jump
+                (p, v), (p_after, v_after) = (
+                    _extrapolated(t, placed.p_WB, placed.v_WB, i, j, time) for i, j in ((k, k - 1), (k + 1, k + 2))
+                )
+                time -= float(np.sum((p - p_after) * (v - v_after)) / np.sum((v - v_after) ** 2))
+            spins = [w[i] + (w[i] - w[j]) / (t[i] - t[j]) * (time - t[i]) for i, j in ((k, k - 1), (k + 1, k + 2))]
+            R = Rotation.from_rotvec((time - t[k]) * (w[k] + spins[0]) / 2) * Rotation.from_matrix(placed.R_WB[k, :-1])
+            turns = np.roll(R.as_quat(), 1, axis=-1)
+            (q, before), (_, after) = (
+                Placed(mechanism, np.array([time]), p[None], velocity[None], spin[None], turns[None]).of_tree()
+                for velocity, spin in zip((v, v_after), spins, strict=True)
+            )
+            root = np.linalg.cholesky(np.linalg.inv(dynamics.at(q[0], before[0]).W)).T / np.sqrt(mass)
+            yield _Struck(contact, q[0], before[0], after[0], root)
+
+
+def _extrapolated(
+    t: FloatArray, p: FloatArray, v: FloatArray, i: int, j: int, time: float
+) -> tuple[FloatArray, FloatArray]:
+    """Places and velocities at a time, by parabolas from sample i whose curvature is that between samples i and j."""
+    a, since = (v[i] - v[j]) / (t[i] - t[j]), time - t[i]
+    return p[i] + v[i] * since + a * since**2 / 2, v[i] + a * since
+
+
+def _missed(model: Mechanism | None, struck: Sequence[_Struck], convex: bool = False) -> FloatArray:
+    """Velocities after impacts less those of a model, as of the whole mass with that kinetic energy [m/s].
+
+    ``convex``: with a convex cone of friction, contacts part faster than by their restitution, by μ times their slip.
+    """
+    if model is None:
+        return np.full(1, np.inf)
+    dynamics, found = ContactDynamics(model), [np.zeros(0)]
+    for each in struck:
+        contact, state = dynamics.contacts[each.contact], dynamics.at(each.q, each.before)
+        n, J = state.touching[each.contact].normal, state.J[each.contact]
+        comes, slip = abs(float(n @ J @ each.before)), 0.0
+        for _ in range(_CONTRACTIONS if convex else 1):
+            e = np.array([contact.restitution + contact.friction * slip / comes])
+            after, _, _ = dynamics.struck(each.q, each.before, [each.contact], e)
+            slip = float(np.linalg.norm(np.cross(n, J @ after)))
+        found.append(each.root @ (each.after - after))
+    return np.concatenate(found)
+
+
+def _scaled(mechanism: Mechanism, law: str, factor: float) -> Mechanism | None:
+    """A mechanism with a factor on the friction or restitution of all pairs; None: no pair can have that."""
+    try:
+        return replace(mechanism, pairs=tuple(replace(p, **{law: factor * getattr(p, law)}) for p in mechanism.pairs))
+    except InputError:
+        return None
+
+
+def _others(mechanism: Mechanism) -> list[Mechanism]:
+    """Mechanisms with one number of all pairs, or of one body, halved."""
+    halved = [replace(mechanism, pairs=tuple(replace(p, **{law: getattr(p, law) / 2}) for p in mechanism.pairs))
+              for law in ("friction", "restitution")]  # fmt: skip
+    for k, body in enumerate(mechanism.bodies):
+        inertia: Any = np.asarray(body.inertia) / 2
+        for other in (replace(body, mass=body.mass / 2), replace(body, inertia=inertia)):
+            halved.append(replace(mechanism, bodies=(*mechanism.bodies[:k], other, *mechanism.bodies[k + 1 :])))
+    return halved

@@ -1,16 +1,19 @@
 """Hypotheses of wrong gains, gears and limits of actuators, wrong couplings, and misplaced stops."""
 
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
-from proofroll.core.diagnosis import Cause, Evidence, above_round_off, hypothesis
+from proofroll.core.diagnosis import CLOSES_EXACTLY, Cause, Evidence, above_round_off, hypothesis
 from proofroll.core.diagnosis.fitting import change_by, factor_text, possible
 from proofroll.core.diagnosis.samples import run_and_truth
 from proofroll.elements.mechanism.diagnosis.equations import Change, is_motion, of_start, placed_of
 from proofroll.elements.mechanism.diagnosis.residuals import COVERED, best, residuals_of
 from proofroll.elements.mechanism.drives import Actuator
+from proofroll.elements.mechanism.joint_coordinates import JointCoordinates
+from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.signal import value_at
 
 Effort = Callable[[Actuator, float, float, float], float]
@@ -98,11 +101,15 @@ def _geared(actuators: tuple[Actuator, ...]) -> bool:
     return any(item.gear != 1 for item in actuators)
 
 
-@hypothesis("couplings", "the rates of both joints have one ratio at every sample, which is not the scene's")
+@hypothesis(
+    "couplings",
+    "the rates of both joints have one ratio at every sample, which is not the scene's; at time 0, all accelerations "
+    "are those of the mechanism with that ratio",
+)
 def of_couplings(evidence: Evidence) -> Iterator[Cause]:
     """Hypothesis: a coupling has a wrong ratio.
 
-    The ratio is fitted to a run; from the start alone it is chosen among the ratios that known mistakes give.
+    A ratio that closes the difference but for round-off is no error of a step, however near to the scene's.
     """
     mechanism, found = evidence.element.mechanism, run_and_truth(evidence)
     if not mechanism.couplings:
@@ -114,24 +121,38 @@ def of_couplings(evidence: Evidence) -> Iterator[Cause]:
         moving = start.v_rates[0][None]
     if moving is None:
         return
-    for coupling in mechanism.couplings:
+    for k, coupling in enumerate(mechanism.couplings):
         a, b = (moving[:, mechanism.place_of(joint)[1]] for joint in (coupling.joint_a, coupling.joint_b))
         own, alone = coupling.ratio, len(a) < 2
         square = float(a @ a)
-        known = min((1 / own, -own, -1 / own), key=lambda x: float(np.max(np.abs(b - x * a))))
-        ratio = known if alone else float(a @ b) / square if square else own
+        ratio = float(a @ b) / square if square else own
         before, after = (float(np.max(np.abs(b - x * a))) for x in (own, ratio))
         if not above_round_off(before, float(np.max(np.abs(b), initial=0.0))):
             continue
+        if alone:
+            before, after = (_off_at_start(mechanism, k, x, moving[0]) for x in (own, ratio))
         says = f"the coupling {coupling.name} has the ratio {ratio:.6g}, not {own:.6g}"
         remedy = "the scene's ratio is that of joint_b's rate to joint_a's"
-        what = f"rate of {coupling.joint_b} by its coupling", "1/s^2" if alone else "1/s", before, after
-        change = change_by(ratio / own)
-        yield Cause(f"ratio of {coupling.name}", says, *what, remedy, int(not alone), _COVERS, change=change)
+        name = "accelerations at time 0" if alone else f"rate of {coupling.joint_b} by its coupling"
+        what = name, "1/s^2" if alone else "1/s", before, after
+        change = np.inf if after <= CLOSES_EXACTLY * before else change_by(ratio / own)
+        count = len(moving[0]) if alone else None
+        yield Cause(f"ratio of {coupling.name}", says, *what, remedy, 1, _COVERS, explains=count, change=change)
+
+
+def _off_at_start(mechanism: Mechanism, number: int, ratio: float, rates: FloatArray) -> float:
+    """Largest distance of accelerations (nv) from those of the mechanism with another ratio of a coupling."""
+    couplings = list(mechanism.couplings)
+    couplings[number] = replace(couplings[number], ratio=ratio)
+    changed = replace(mechanism, couplings=tuple(couplings))
+    q, v = mechanism.start()
+    return float(np.max(np.abs(JointCoordinates(changed).solve(q, v).acceleration - rates)))
 
 
 @hypothesis(
-    "stops", "the engine's joint rests at one other place than at the true stop, or turns back at one each time"
+    "stops",
+    "the engine's joint rests at one other place than at the true stop, or turns back at one each time; if it turns "
+    "back once, place and rate after that are those of the stop's restitution there",
 )
 def of_stops(evidence: Evidence) -> Iterator[Cause]:
     """Hypothesis: a stop is misplaced.
@@ -152,27 +173,57 @@ def of_stops(evidence: Evidence) -> Iterator[Cause]:
         for limit, side in zip(joint.limits, (1.0, -1.0), strict=True):
             size = max(abs(limit), float(np.ptp(true[:, at]))) or joint.limits[1] - joint.limits[0]
             rests = (np.abs(true[:, at] - limit) <= _STILL * size) & (np.abs(rates[:, rated]) <= _STILL * size)
-            does, off = "rests", seen[rests, at] - limit
+            does, off, own = "rests", seen[rests, at] - limit, list[_Rebound]()
             if len(off) < 2:
-                does, off = "turns back", turns[turns[:, 1] == side, 0] - limit
-                theirs = expected[expected[:, 1] == side, 0] - limit
-                if not len(theirs) or np.max(np.abs(theirs)) > _AT_STOP * size:
+                own = [each for each in turns if each.side == side]
+                does, off = "turns back", np.array([each.place - limit for each in own])
+                theirs = [abs(each.place - limit) for each in expected if each.side == side]
+                if not theirs or max(theirs) > _AT_STOP * size:
                     continue
-            if len(off) < 2 or not above_round_off(float(np.max(np.abs(off))), size):
+            if not len(off) or not above_round_off(float(np.max(np.abs(off))), size):
                 continue
             shift = float(np.median(off))
+            before, after, count = float(np.max(np.abs(off))), float(np.max(np.abs(off - shift))), len(off)
+            if count == 1:
+                before, after = (own[0].missed(x, joint.restitution) for x in (limit, limit + shift))
+                count = 2  # place and rate
             says = f"the joint {joint.name} {does} at {limit + shift:.6g}, not at its stop at {limit:.6g}"
             remedy = "look at the place of the stop, at the joint's zero, and at how far the stop gives way"
-            what = f"{joint.name} at its stop", "rad, m", float(np.max(np.abs(off)))
-            after, change = float(np.max(np.abs(off - shift))), abs(shift) / size
-            yield Cause(f"stop of {joint.name}", says, *what, after, remedy, 1, _COVERS, change=change)
+            what, change = (f"{joint.name} at its stop", "rad, m", before, after), abs(shift) / size
+            yield Cause(f"stop of {joint.name}", says, *what, remedy, 1, _COVERS, explains=count, change=change)
 
 
-def _rebounds(t: FloatArray, q: FloatArray, v: FloatArray) -> FloatArray:
-    """Places where a coordinate rebounds between two samples, and the sign of its velocity after that, (n, 2).
+@dataclass(frozen=True)
+class _Rebound:
+    """A rebound of a coordinate between two samples.
 
-    The parabolas through the samples before and after the rebound meet at the place.
+    Attributes:
+        before, after: coefficients of the parabolas through the samples before and after it, from the first sample on.
+        place: where they meet.
+        side: sign of the velocity after it.
+        h: time between the samples [s].
     """
+
+    before: FloatArray
+    after: FloatArray
+    place: float
+    side: float
+    h: float
+
+    def missed(self, place: float, restitution: float) -> float:
+        """Distance of the second sample, and of its rate times ``h``, from a rebound at another place; the larger."""
+        c, b, a = self.before - (place, 0.0, 0.0)
+        if (root := b * b - 4 * a * c) < 0:
+            return abs(place - self.place)
+        x = 2 * c / (-b + self.side * np.sqrt(root))  # where it moves against the side to which it rebounds
+        rate = -restitution * (b + 2 * a * x)
+        (q, v, half), left = self.after, self.h - x
+        there = np.array([place + rate * left + half * left**2, self.h * (rate + 2 * half * left)])
+        return float(np.max(np.abs(there - (q + v * self.h + half * self.h**2, self.h * (v + 2 * half * self.h)))))
+
+
+def _rebounds(t: FloatArray, q: FloatArray, v: FloatArray) -> list[_Rebound]:
+    """Rebounds of a coordinate, each where the parabolas through the samples before and after it meet."""
     from scipy.optimize import brentq
 
     found = []
@@ -188,5 +239,6 @@ def _rebounds(t: FloatArray, q: FloatArray, v: FloatArray) -> FloatArray:
             return float(difference @ (1.0, x, x * x))
 
         if apart(0.0) * apart(h) < 0:
-            found.append((float(first @ (1.0, x := brentq(apart, 0.0, h), x * x)), float(np.sign(v[k + 1]))))
-    return np.array(found).reshape(-1, 2)
+            place = float(first @ (1.0, x := brentq(apart, 0.0, h), x * x))
+            found.append(_Rebound(first, second, place, float(np.sign(v[k + 1])), h))
+    return found

@@ -182,6 +182,28 @@ def _about_origin(
     yield held.cause("centre of mass", says, Change(mechanism, com=np.zeros_like(com)), "give the centres of mass", 0)
 
 
+@hypothesis(
+    "friction of one joint", "the equations are linear in it: one factor balances them at every state of the run"
+)
+def friction_of_each_joint(evidence: Evidence) -> Iterator[Cause]:
+    """Hypothesis: one of several joints has dry friction with a factor."""
+    mechanism = evidence.element.mechanism
+    rough = [(joint, at) for joint, at in zip(mechanism.joints, mechanism.v_slices, strict=True) if joint.friction]
+    for held in residuals_of(evidence) if len(rough) > 1 else ():
+        for joint, at in rough:
+            one = np.eye(mechanism.nv)[at].sum(axis=0)
+
+            def change(x: float, one: FloatArray = one) -> Change:
+                return Change(mechanism, friction=1 + (x - 1) * one)
+
+            factor, number = best(held, change)
+            if possible(factor, signed=True):
+                says = f"the engine moves it with the dry friction of the joint {joint.name} {factor_text(factor)}"
+                remedy = f"give {joint.name} its dry friction, against the motion"
+                name = f"friction of {joint.name}"
+                yield held.cause(name, says, change(factor), remedy, number, change_by(factor))
+
+
 @hypothesis("joint", "the equations are linear in it: one coefficient balances them at every state of the run")
 def of_each_joint(evidence: Evidence) -> Iterator[Cause]:
     """Hypothesis: one joint, or every joint, has additional damping or armature.

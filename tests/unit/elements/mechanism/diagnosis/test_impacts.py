@@ -10,6 +10,10 @@ import numpy as np
 import pytest
 
 from proofroll.core.arrays import FloatArray
+from proofroll.core.diagnosis import Evidence, diagnose, hypotheses_of
+from proofroll.core.truth import truth
+from proofroll.files.scene_file import load_scene
+from proofroll.running.simulation import simulate
 
 impacts: Any = importlib.import_module("proofroll.elements.mechanism.diagnosis.impacts")
 STEP, EVERY, G = 1e-3, 0.02, 9.81
@@ -85,3 +89,27 @@ def test_one_impact_proves_no_delay(monkeypatch: pytest.MonkeyPatch) -> None:
     t, gap, rate = bounces(STEP)
     first = t < 0.5
     assert said(monkeypatch, t[first], gap[first], rate[first]) == []
+
+
+@pytest.mark.drill
+@pytest.mark.parametrize("law", ["friction", "restitution"])
+def test_one_impact_tells_a_law_by_all_velocities_after_it(law: str) -> None:
+    """Nine tenths of friction or restitution give both spheres' twelve velocities, and no other cause is told."""
+    scene, times = load_scene("two_spheres"), np.arange(0.0, 0.2, 0.01)
+    value = {"friction": 0.1, "restitution": 0.8}[law]
+    run, true = truth(load_scene("two_spheres", **{law: 0.9 * value}), times), truth(scene, times)
+    (element,) = scene.elements
+    told = [cause.says for cause in diagnose(Evidence(element, [], run, true, STEP), hypotheses_of(element))]
+    assert told == [f"{law} of impacts is 0.9 times"]
+    assert diagnose(Evidence(element, [], true, true, STEP), hypotheses_of(element)) == []
+
+
+@pytest.mark.drill
+def test_a_convex_cone_at_an_impact_is_not_called_restitution() -> None:
+    """MuJoCo's spheres part faster by μ times their slip, which fits all velocities without a fitted number."""
+    scene = load_scene("two_spheres")
+    run = simulate(scene, "mujoco", until=0.2, every=0.008, formulation="geoms", preset="matched")
+    evidence = Evidence(scene.elements[0], [], run, truth(scene, run["time"].to_numpy()), STEP)
+    (only,) = diagnose(evidence, hypotheses_of(scene.elements[0]))
+    assert only.says.startswith("convex cone: contacts part after an impact by μ|u_t| too fast")
+    assert only.fitted == 0
