@@ -11,10 +11,10 @@ from proofroll.files.scene_file import load_scene
 from proofroll.running.case import Case, EngineFacts, Status
 from proofroll.running.engine_questions import resolve_with_truth
 from proofroll.running.runner import Runner
+from proofroll.studies.cases import case_of
 from proofroll.studies.failure import Yardstick
 from proofroll.studies.stability.axes import Axis, Effort
 from proofroll.studies.stability.records import MappedPlace
-from proofroll.studies.tradeoff.curve import Question
 
 # Sampling intervals per natural time; the coarsest step is one of them, the finer ones divide it.
 PER_PERIOD = 8
@@ -98,5 +98,4 @@ def measure(name: str, places: Sequence[Place], runner: Runner, tell: Callable[[
 
 def case_at(name: str, place: Place, facts: EngineFacts, limit: float) -> Case:
     """Case at a place with a time limit [s]."""
-    question = Question(name, place.parameters, place.until, place.scene.deciding)
-    return question.case(place.scene, facts, place.every, limit)
+    return case_of(name, place.scene, place.parameters, facts, place.until, place.every, time_limit=limit)

@@ -73,27 +73,28 @@ class Question:
         """The scene with these parameters, read at the first access."""
         return load_scene(self.scene, **self.parameters)
 
-    def case(self, scene: Scene, facts: EngineFacts, every: float, time_limit: float = STUDY_TIME_LIMIT) -> Case:
-        """Case of one run on the loaded scene."""
-        return case_of(self.scene, scene, self.parameters, facts, self.until, every, time_limit=time_limit)
+    def case(self, facts: EngineFacts, every: float) -> Case:
+        """Case of one run."""
+        limit = STUDY_TIME_LIMIT
+        return case_of(self.scene, self.loaded, self.parameters, facts, self.until, every, time_limit=limit)
 
-    def cases(self, scene: Scene, facts: EngineFacts, every: float) -> tuple[Case, ...]:
+    def cases(self, facts: EngineFacts, every: float) -> tuple[Case, ...]:
         """Cases of a point: its run and, with an adaptive step, a second run with few samples."""
         adaptive = facts.resolution not in {None, "dt"}
-        return tuple(self.case(scene, facts, each) for each in ((every, self.sparse) if adaptive else (every,)))
+        return tuple(self.case(facts, each) for each in ((every, self.sparse) if adaptive else (every,)))
 
-    def truth(self, scene: Scene, facts: EngineFacts, runs: Collection[Case]) -> Case:
+    def truth(self, facts: EngineFacts, runs: Collection[Case]) -> Case:
         """Case of the truth, with samples off the grid wherever the runs have them."""
         steps = [run.engine.step for run in runs if run.every == self.every]
-        return replace(self.case(scene, facts, self.every), between=off_grids(time_grid(self.until, self.every), steps))
+        return replace(self.case(facts, self.every), between=off_grids(time_grid(self.until, self.every), steps))
 
-    def reference(self, scene: Scene, truth: xr.Dataset, every: float) -> Reference:
+    def reference(self, truth: xr.Dataset, every: float) -> Reference:
         """Reference with this sampling interval [s], taken from the samples of the truth with the shortest one."""
         if every != self.every:
             known, times = truth["time"].to_numpy(), time_grid(self.until, every)
             places = np.abs(known[:, None] - times).argmin(axis=0)
             truth = truth.drop_dims(BETWEEN, errors="ignore").isel(time=places)
-        return Reference.of(scene, truth)
+        return Reference.of(self.loaded, truth)
 
 
 @dataclass

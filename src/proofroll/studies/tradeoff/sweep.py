@@ -204,7 +204,6 @@ def _run(
     budget: TimeBudget | None,
 ) -> None:
     """Runs curves with these steps or tolerances, and the truths that are still missing."""
-    scene = question.loaded
     options: list[tuple[str, dict[str, Any]]] = []
     for curve, value in wanted:
         facts = curve.facts
@@ -217,13 +216,11 @@ def _run(
                 raise resolved_facts
             if resolved_facts.step is not None:
                 whole_steps(0.0, question.until, resolved_facts.step)
-            cases.append(
-                (curve, question.cases(scene, resolved_facts, max(question.every, resolved_facts.step or 0.0)))
-            )
+            cases.append((curve, question.cases(resolved_facts, max(question.every, resolved_facts.step or 0.0))))
         except ProofrollError as error:
             curve.dropped[value] = str(error)
     runs = [case for _, both in cases for case in both]
-    pending = [] if references else [question.truth(scene, truth_facts, runs)]
+    pending = [] if references else [question.truth(truth_facts, runs)]
     for stage in _stages(cases) if budget else [cases]:
         kept = [(curve, both) for curve, both in stage if not budget or _affordable(curve, both[0], budget, len(stage))]
         cases_now = [*pending, *(case for _, both in kept for case in both)]
@@ -231,10 +228,10 @@ def _run(
         for case in pending:
             if results[case.key].status != Status.DONE:
                 raise ProofrollError(f"there is no truth here: {results[case.key].message}")
-            references[question.every] = question.reference(scene, runner.store.stored(case).dataset, question.every)
+            references[question.every] = question.reference(runner.store.stored(case).dataset, question.every)
         pending = []
         for every in {case.every for _, both in kept for case in both} - references.keys():
-            references[every] = question.reference(scene, references[question.every].dataset, every)
+            references[every] = question.reference(references[question.every].dataset, every)
         for curve, both in kept:
             points = [CurvePoint(case, results[case.key]) for case in both]
             lost = next((point for point in points if point.result.status is Status.LEFT_OUT), None)

@@ -128,7 +128,7 @@ def tradeoff(
     ranges = {name: [float(value) for value in values] for name, values in (over or {}).items()}
     study = Tradeoff(question, curves, absent, references, over=ranges, brief=brief, budget=budget)
     _, truth = resolve_with_truth([], runner.workers)
-    _time(study, question.case(study.reference.scene, truth, question.every), runner.workers, rounds, tell, limit)
+    _time(study, question.case(truth, question.every), runner.workers, rounds, tell, limit)
     if ranges:
         _check(study, truth, runner, arrived)
     return study
@@ -179,9 +179,8 @@ def _check(tradeoff: Tradeoff, truth: EngineFacts, runner: Runner, arrived: Call
     for values in itertools.product(*tradeoff.over.values()):
         place = dict(zip(tradeoff.over, values, strict=True))
         question = dataclasses.replace(tradeoff.question, parameters={**tradeoff.question.parameters, **place})
-        scene = question.loaded
-        runs = {key: question.cases(scene, point.case.engine, point.case.every) for key, point in chosen.items()}
-        true = question.truth(scene, truth, [case for both in runs.values() for case in both])
+        runs = {key: question.cases(point.case.engine, point.case.every) for key, point in chosen.items()}
+        true = question.truth(truth, [case for both in runs.values() for case in both])
         asked.append((place, question, true, runs))
     cases = [case for _, _, true, runs in asked for case in (true, *itertools.chain(*runs.values()))]
     results = runner.run(cases, arrived)
@@ -192,9 +191,9 @@ def _check(tradeoff: Tradeoff, truth: EngineFacts, runner: Runner, arrived: Call
             for found in corners.values():
                 found.append(lost)
             continue
-        scene, dataset = question.loaded, runner.store.stored(true).dataset
+        dataset = runner.store.stored(true).dataset
         intervals = {case.every for both in runs.values() for case in both}
-        references = {every: question.reference(scene, dataset, every) for every in intervals}
+        references = {every: question.reference(dataset, every) for every in intervals}
         for key, both in runs.items():
             point = judge_point([CurvePoint(case, results[case.key]) for case in both], references, runner)
             corners[key].append(_corner(place, point, references[both[0].every]))

@@ -149,7 +149,7 @@ def test_a_curve_ends_where_the_truth_or_round_off_shows_no_more(bar: float, err
 def test_the_truth_is_known_wherever_a_run_is_sampled(swept: tuple[dict[str, Curve], float]) -> None:
     """Samples that engines have off the grid have their true values, and no other sampling interval has any."""
     cases = [point.case for curve in swept[0].values() for point in curve.points]
-    truth = QUESTION.truth(QUESTION.loaded, cases[0].engine, cases)
+    truth = QUESTION.truth(cases[0].engine, cases)
     assert truth.between
     for case in cases:
         off = off_grid(time_grid(case.until, case.every), case.engine.step)
@@ -217,6 +217,6 @@ def test_a_coarser_truth_is_that_of_fewer_samples() -> None:
     times = time_grid(question.until, question.every)
     fine = truth(question.loaded, times, between=times[:1] + 0.3 * question.every)
     assert BETWEEN in fine.dims
-    coarse = question.reference(question.loaded, fine, 0.1)
+    coarse = question.reference(fine, 0.1)
     assert np.array_equal(coarse.dataset["p_WB"], fine["p_WB"][::10])
     assert BETWEEN not in coarse.dataset.dims
