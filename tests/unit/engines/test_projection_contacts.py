@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
 from proofroll.core.errors import Refused
 from proofroll.core.plugins import load_engine
 from proofroll.elements.mechanism.contacts.geometry import Geometry, Pair
-from proofroll.elements.mechanism.drives import Actuator
+from proofroll.elements.mechanism.drives import Actuator, Coupling
 from proofroll.elements.mechanism.element import MechanismElement
 from proofroll.elements.mechanism.joint import Joint
 from proofroll.elements.mechanism.model import Mechanism
@@ -18,6 +20,7 @@ from proofroll.elements.mechanism.parts import Body
 from proofroll.elements.mechanism.sampling import mechanism_of
 from proofroll.elements.mechanism.signal import Formula
 from proofroll.files.scene_file import load_scene
+from proofroll.truth.mechanism.switched_truth import truth_of
 from proofroll_drill.published import true_values
 
 PROJECTION = load_engine("projection")
@@ -91,14 +94,121 @@ def test_a_wrong_first_force_is_not_certified(factor: float) -> None:
     assert [line.quantity for line in element.certify(run.built(), wrong) if not line.holds] == ["forces of contact"]
 
 
-def test_contacts_beside_other_switches_are_refused() -> None:
-    """A stop beside contacts is refused in a line that says what is followed."""
-    mechanism = mechanism_of(load_scene("free_turntable"))
-    joints = tuple(
-        replace(joint, limits=(-1.0, 1.0)) if joint.kind == "revolute" else joint for joint in mechanism.joints
-    )
+def test_contacts_beside_couplings_are_refused() -> None:
+    """A coupling beside contacts is refused in a line that says what is followed."""
+    coupled = replace(on_rail(), couplings=(Coupling("belt", "rail", "shaft", 1.0, 0.1),))
     with pytest.raises(Refused, match="contacts are followed in trees"):
-        PROJECTION.build(replace(mechanism, joints=joints), DEFAULT)
+        PROJECTION.build(coupled, DEFAULT)
+
+
+def on_rail(*, sole: float = 0.2, pull: float = 0.0, **rail: Any) -> Mechanism:
+    """A cart of 0.5 kg on a rail, at 1 m/s, with a foot of 1.5 kg on a floor; ``pull`` along the rail [m/s²]."""
+    return Mechanism(
+        bodies=tuple(Body(name, mass, inertia=(1.0, 1.0, 1.0)) for name, mass in (("cart", 0.5), ("foot", 1.5))),
+        joints=(
+            Joint("rail", "prismatic", "world", "cart", axis=(1, 0, 0), v0=(1.0,), **rail),
+            Joint("shaft", "prismatic", "cart", "foot", axis=(0, 0, 1), q0=(0.1,)),
+        ),
+        geometries=(Geometry("ball", "foot", "sphere", radius=0.1), Geometry("floor", "world", "plane")),
+        pairs=(Pair("sole", ("ball", "floor"), friction=sole),),
+        gravity=(pull, 0.0, -9.81),
+    )
+
+
+def test_friction_of_a_joint_and_of_a_contact_stop_a_foot() -> None:
+    """A rail and a floor that rub together slow a foot by the sum of their frictions, and hold it where it stops."""
+    run, slowed = PROJECTION.build(on_rail(friction=2.0), replace(DEFAULT, dt=1e-2)), (2.0 + 0.2 * 1.5 * 9.81) / 2.0
+    run.advance(0.1)
+    sample = run.sample()
+    assert sample.p_WB[0, 0] == pytest.approx(0.1 - slowed * 0.1**2 / 2, abs=1e-12)
+    assert (sample.friction[0], sample.stop[0]) == pytest.approx((-2.0, 0.0), abs=1e-10)
+    assert sample.contact_force[0] == pytest.approx([-0.2 * 1.5 * 9.81, 0.0, 1.5 * 9.81], abs=1e-9)
+    run.advance(0.5)
+    assert run.sample().p_WB[0, 0] == pytest.approx(1 / slowed / 2, abs=1e-12)
+    assert [(event.kind, event.name) for event in run.events()] == [("rest", "sole"), ("stick", "rail")]
+    assert [event.time for event in run.events()] == pytest.approx([1 / slowed] * 2, abs=1e-12)
+
+
+def test_a_foot_that_slides_rebounds_from_a_stop() -> None:
+    """A stop returns half of the speed, and friction at the foot turns with it."""
+    run = PROJECTION.build(on_rail(limits=(-1.0, 0.1), restitution=0.5), replace(DEFAULT, dt=1e-2))
+    slowed = 0.2 * 9.81 * 1.5 / 2.0
+    hit = (1 - np.sqrt(1 - 2 * slowed * 0.1)) / slowed
+    back, left = 0.5 * (1 - slowed * hit), 0.3 - hit
+    run.advance(0.3)
+    assert run.sample().p_WB[0, 0] == pytest.approx(0.1 - back * left + slowed * left**2 / 2, abs=1e-12)
+    assert [(event.kind, event.name) for event in run.events()] == [("impact", "rail"), ("turn", "sole")]
+    assert [event.time for event in run.events()] == pytest.approx([hit] * 2, abs=1e-12)
+
+
+@pytest.mark.parametrize(("sole", "press"), [(0.0, -6.0), (0.2, None)])
+def test_a_foot_is_pressed_against_a_stop(sole: float, press: float | None) -> None:
+    """A stop without rebound holds a foot that is pulled on, alone or with the floor, whose shares are not unique."""
+    run = PROJECTION.build(on_rail(limits=(-1.0, 0.1), sole=sole, pull=3.0), replace(DEFAULT, dt=1e-2))
+    run.advance(0.3)
+    sample = run.sample()
+    assert sample.p_WB[0, 0] == pytest.approx(0.1, abs=1e-12)
+    assert sample.stop[0] + sample.contact_force[0, 0] == pytest.approx(-6.0, abs=1e-9)
+    assert press is None or sample.stop[0] == pytest.approx(press, abs=1e-9)
+
+
+LENGTH, HEIGHT, MASS, INERTIA, RUBS, RETURNS, RADIUS = 0.5, 0.2, 0.7, 0.02, 0.3, 0.6, 0.03
+
+
+def hinged_rod() -> Mechanism:
+    """A rod on a rubbing hinge, whose round tip falls on a rough floor and rebounds."""
+    return Mechanism(
+        bodies=(Body("rod", MASS, com=(LENGTH / 2, 0, 0), inertia=(INERTIA, INERTIA, INERTIA)),),
+        joints=(
+            Joint(
+                "hinge", "revolute", "world", "rod", axis=(0, 1, 0), position=(0, 0, HEIGHT), q0=(-0.2,), friction=RUBS
+            ),
+        ),
+        geometries=(
+            Geometry("tip", "rod", "sphere", position=(LENGTH, 0, 0), radius=RADIUS),
+            Geometry("floor", "world", "plane"),
+        ),
+        pairs=(Pair("tip", ("tip", "floor"), friction=0.3, restitution=RETURNS),),
+        gravity=(0, 0, -9.81),
+    )
+
+
+def bounces(until: float) -> tuple[float, list[float]]:
+    """Angle of :func:`hinged_rod` at ``until`` [s], and times of its changes, by an own equation of one coordinate."""
+    inertia, moment = INERTIA + MASS * LENGTH**2 / 4, MASS * 9.81 * LENGTH / 2
+    t, y, changes, ends = 0.0, [-0.2, 0.0], list[float](), list[Any]()
+    ends += [lambda _, y: LENGTH * np.sin(y[0]) - (HEIGHT - RADIUS), lambda _, y: y[1]]  # touches; turns
+    for end in ends:
+        end.terminal, end.direction = True, 1
+    while t < until:
+        falls = len(changes) % 2 == 0
+        friction = -RUBS if falls else RUBS
+
+        def rate(_: float, y: Any, friction: float = friction) -> list[float]:
+            return [y[1], (moment * np.cos(y[0]) + friction) / inertia]
+
+        found = solve_ivp(rate, (t, until), y, "DOP853", rtol=3e-14, atol=1e-15, events=ends[0] if falls else ends[1])
+        t, y = float(found.t[-1]), [float(found.y[0, -1]), -RETURNS * float(found.y[1, -1]) if falls else 0.0]
+        changes += [t] if found.status == 1 else []
+    return y[0], changes
+
+
+@pytest.mark.drill
+def test_a_rod_on_a_rubbing_hinge_bounces_as_an_own_solver_says() -> None:
+    """Both routes of the truth, and projection at steps of 2e-3 s, have the angle and events of one own equation."""
+    angle, changes = bounces(0.45)
+    kinds = [("impact", "tip"), ("turn", "hinge"), ("turn", "hinge"), ("impact", "tip"), ("turn", "hinge")]
+    times = [changes[k] for k in (0, 0, 1, 2, 2)]
+    true = truth_of(hinged_rod(), np.array([0.0, 0.45]))
+    assert np.isinf(true.horizon)
+    assert true.record.q[1, 0] == pytest.approx(angle, abs=1e-12)
+    run = PROJECTION.build(hinged_rod(), replace(DEFAULT, dt=2e-3))
+    run.advance(0.45)
+    q = run.sample().q_WB[0]
+    assert 2 * np.arctan2(q[2], q[0]) == pytest.approx(angle, abs=1e-9)  # 1e-11 is seen
+    for events, bound in ((true.events, 1e-12), (run.events(), 1e-9)):
+        assert [(event.kind, event.name) for event in events] == kinds
+        assert [event.time for event in events] == pytest.approx(times, abs=bound)
 
 
 @pytest.mark.parametrize(

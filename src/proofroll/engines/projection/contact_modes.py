@@ -1,4 +1,4 @@
-"""Contacts of bodies: open, slipping or sticking, ends of these modes, and transitions.
+"""Contacts of bodies, and laws of joints beside them: open, slipping or sticking, ends of these modes, transitions.
 
 Contact forces act along the velocities ν of the tree, whose mass matrix the projection provides. Between two
 transitions the equations are smooth; a transition is located within a step by shorter steps of the same method. The
@@ -17,12 +17,23 @@ from proofroll.core.dop853 import Accept
 from proofroll.core.errors import Diverged, Refused
 from proofroll.core.integrators import Integrator
 from proofroll.elements.mechanism import Mechanism
-from proofroll.elements.mechanism.contacts.acting import OPEN, Acting, ContactMode, changes, first_mode, slip_velocity
+from proofroll.elements.mechanism.contacts.acting import (
+    OPEN,
+    Acting,
+    ContactMode,
+    changes,
+    first_mode,
+    held_directions,
+    slip_velocity,
+)
 from proofroll.elements.mechanism.contacts.coulomb import PAINLEVE, contact_forces
+from proofroll.elements.mechanism.contacts.geometry import BodyContact
+from proofroll.elements.mechanism.contacts.joint_laws import JointContact, joint_contacts
 from proofroll.elements.mechanism.contacts.start import closed_and_still, natural_scale
 from proofroll.elements.mechanism.contacts.touching import Moving, Touching, touch
 from proofroll.elements.mechanism.rotations import Array, frame_of_axis
 from proofroll.elements.mechanism.signal import breaks, varies
+from proofroll.elements.mechanism.switches import switched_joints
 from proofroll.engines.projection.alternating import AlternatingMotion, Excess, ends_of_efforts
 from proofroll.engines.projection.dependent import DependentCoordinates, SolvedState
 from proofroll.engines.projection.elimination import Space
@@ -64,18 +75,25 @@ class ContactMotion(AlternatingMotion[ContactMode]):
     ) -> None:
         """Takes the size of a fixed ``step`` [s]; 0: the step adapts."""
         super().__init__(equations, stepper, accept, breaks(mechanism.signals))
-        self.contacts, self._index = mechanism.contacts, mechanism.body_index
+        self._bodies, self._joints = mechanism.contacts, joint_contacts(switched_joints(mechanism))
+        self.contacts: tuple[BodyContact | JointContact, ...] = (*self._bodies, *self._joints)
+        self._index = mechanism.body_index
         self.friction = np.array([contact.friction for contact in self.contacts])
+        self._bounds = np.array([contact.bound for contact in self.contacts])
+        self._rubs = self.friction + self._bounds > 0
         scale = natural_scale(mechanism)
         self._unit = math.prod(scale)  # natural speed
         self._still, self._rate = scale.speed, scale.rate
+        turns = [mechanism.joints[each.joint.number].kind != "prismatic" for each in self._joints]
+        # length of each contact's motion by 1 m, or by 1 rad
+        self._arms = np.array([1.0] * len(self._bodies) + [scale.length if turn else 1.0 for turn in turns])
         self._timed = any(map(varies, mechanism.signals))
         self._faint = max(self._still, _REST * step * float(np.linalg.norm(mechanism.gravity)))
         self._motors = {k: item for k, item in enumerate(mechanism.actuators) if item.limit is not None}
         start = np.append(equations.start, 0.0)
         self._limit_efforts(start)
         now = self.at(start)
-        closed, still = closed_and_still(now.touching, np.full(len(self.contacts), scale.length), scale.rate)
+        closed, still = closed_and_still(now.touching, scale.length / self._arms, scale.rate)
         self._enter(0.0, start, self._decided(now, closed, still))
 
     def _limit_efforts(self, y: Array) -> None:
@@ -92,19 +110,27 @@ class ContactMotion(AlternatingMotion[ContactMode]):
             return divided(space.H, push[:, None])[:, 0], np.zeros(0)
 
         free = equations.solve(x, 0.0, closing)
-        moving = self._moving(x)
-        touching = tuple(touch(each, moving[each.body_a], moving[each.body_b]) for each in self.contacts)
+        moving, touching = self._moving(x), self._touching(x)
         S, origin = spaces[0].S.reshape(-1, 4, 4), free.bodies.origin
         J, rate = np.zeros((len(touching), 3, len(S))), np.zeros((len(touching), 3))
-        for k, (contact, there) in enumerate(zip(self.contacts, touching, strict=True)):
+        for k, (contact, there) in enumerate(zip(self._bodies, touching, strict=False)):
             along = S[:, :3, :3] @ (there.place - origin) + S[:, :3, 3]
             for body, sign in ((contact.body_a, 1.0), (contact.body_b, -1.0)):
                 i = self._index[body]
                 if i >= 0:
                     J[k] += sign * (equations.tree.moves[i][:, None] * along).T
                     rate[k] += sign * self._material(x, free, i, moving[body], there)
+        for k, each in enumerate(self._joints, len(self._bodies)):
+            J[k, :, each.joint.velocity] = each.direction
+            rate[k] = each.direction * free.rates[each.joint.velocity]
         flat = J.reshape(-1, J.shape[2]).T
         return ContactsThere(touching, J, divided(spaces[0].H, flat).reshape(-1, *J.shape[:2]), rate)
+
+    def _touching(self, x: Array) -> tuple[Touching, ...]:
+        """Gap, normal and sliding velocity of each contact."""
+        moving, along = self._moving(x), self._equations.watched(x) if self._joints else {}
+        bodies = (touch(each, moving[each.body_a], moving[each.body_b]) for each in self._bodies)
+        return (*bodies, *(each.touching(*along[each.joint.number]) for each in self._joints))
 
     def _moving(self, x: Array) -> dict[str, Moving]:
         """Motion of the frames of all bodies, and of the world."""
@@ -125,23 +151,34 @@ class ContactMotion(AlternatingMotion[ContactMode]):
         turning = cross(body.R @ free.angular[i], arm) + cross(body.w, cross(body.w, arm))
         return np.asarray(free.linear[i] + turning + cross(body.w, there.place_rate - body.velocity(there.place)))
 
+    def _rows(self, now: ContactsThere, mode: ContactMode) -> list[tuple[int, Array]]:
+        """Directions in which closed contacts are constrained, with their contact."""
+        return [
+            (k, direction)
+            for k, (own, each) in enumerate(zip(mode, now.touching, strict=True))
+            for direction in held_directions(own, each, presses=not self._bounds[k])
+        ]
+
     def forces(self, now: ContactsThere, mode: ContactMode) -> Array:
         """Forces on body a of each contact in a mode [N], (contacts, 3).
 
         Raises:
             Diverged: friction makes a normal force negative (Painlevé).
         """
-        rows = _rows(now, mode)
+        rows, force = self._rows(now, mode), np.zeros((len(mode), 3))
+        for k in np.flatnonzero(self._bounds).tolist():
+            if mode[k].kind == "slip":
+                force[k] = -self._bounds[k] * self._heading(k, now.touching[k])
+        if not rows:
+            return force
         along = [
             row - self.friction[k] * self._heading(k, now.touching[k]) if mode[k].kind == "slip" else row
             for k, row in rows
         ]
-        force = np.zeros((len(mode), 3))
-        if not rows:
-            return force
+        rate = now.rate + now.J @ np.einsum("nki,ki->n", now.response, force)
         K = np.array([row @ now.J[k] for k, row in rows])
         D = np.array([now.response[:, k] @ direction for (k, _), direction in zip(rows, along, strict=True)])
-        wanted = [-row @ now.rate[k] for k, row in rows]
+        wanted = [-row @ rate[k] for k, row in rows]
         for i, (k, row) in enumerate(rows):
             if mode[k].kind == "slip":
                 wanted[i] -= now.touching[k].normal_rate @ now.touching[k].slide
@@ -155,7 +192,7 @@ class ContactMotion(AlternatingMotion[ContactMode]):
     def _settled(self, y: Array, mode: ContactMode) -> Array:
         """State without velocities that violate closed contacts."""
         now = self.at(y)
-        rows = _rows(now, mode)
+        rows = self._rows(now, mode)
         if not rows:
             return y
         K = np.array([row @ now.J[k] for k, row in rows])
@@ -181,17 +218,27 @@ class ContactMotion(AlternatingMotion[ContactMode]):
         force = self.forces(now, self.mode)
         return self._equations.solve(self.x, np.einsum("kin,ki->n", now.J, force)), force, now.touching
 
+    def sampled(self, joints: int) -> dict[str, Array]:
+        """Contact forces [N], (contacts, 3); forces of dry friction and stops along the coordinates of all joints."""
+        force, along = self.solve()[1], np.full((2, joints), np.nan)
+        for each in self._joints:
+            along[:, each.joint.number] = 0.0
+        for each, push in zip(self._joints, force[len(self._bodies) :], strict=True):
+            along[int(each.side != 0), each.joint.number] += each.direction @ push
+        return {"contact_force": force[: len(self._bodies)], "friction": along[0], "stop": along[1]}
+
     def read(self) -> dict[str, Any]:
         """Geometry and laws of the contacts now, for :class:`proofroll.elements.mechanism.sampling.MechanismBuilt`."""
         now = self.at(self._stepper.x)
-        touching = now.touching
+        count = len(self._bodies)
+        touching = now.touching[:count]
         return {
             "contact_gap": np.array([each.gap for each in touching]),
             "contact_normal": np.array([each.normal for each in touching]),
             "contact_place": np.array([each.place for each in touching]),
-            "contact_friction": self.friction.copy(),
-            "contact_restitution": np.array([contact.restitution for contact in self.contacts]),
-            "contact_response": np.einsum("kin,nlj->kilj", now.J, now.response),
+            "contact_friction": self.friction[:count],
+            "contact_restitution": np.array([contact.restitution for contact in self._bodies]),
+            "contact_response": np.einsum("kin,nlj->kilj", now.J[:count], now.response[:, :count]),
         }
 
     def _rates(self, y: Array) -> Array:
@@ -201,10 +248,9 @@ class ContactMotion(AlternatingMotion[ContactMode]):
 
     def _look(self, y: Array) -> None:
         """Stores the directions of slips, to detect reversals."""
-        moving = self._moving(y[:-1])
-        for k, (own, each) in enumerate(zip(self.mode, self.contacts, strict=True)):
+        for k, (own, there) in enumerate(zip(self.mode, self._touching(y[:-1]), strict=True)):
             if own.kind == "slip":
-                self._toward[k] = self._heading(k, touch(each, moving[each.body_a], moving[each.body_b]))
+                self._toward[k] = self._heading(k, there)
 
     def _enter(self, t: float, x: Array, mode: ContactMode) -> None:
         x, self.mode = self._settled(x, mode), mode
@@ -216,18 +262,21 @@ class ContactMotion(AlternatingMotion[ContactMode]):
         now = self.at(x)
         force, ends = self.forces(now, self.mode), list[Excess]()
         held: ContactMode = ()
+        stops = [isinstance(each, JointContact) and not each.bound for each in self.contacts]
+        shared = sum(own.kind == "stick" or (own.kind == "slip" and s) for own, s in zip(self.mode, stops, strict=True))
         for k, (own, each) in enumerate(zip(self.mode, now.touching, strict=True)):
             if own.kind == "open":
                 ends.append(Excess(k, "impact", -each.gap, -float(each.normal @ each.slide)))
                 continue
             N = float(each.normal @ force[k])
-            ends.append(Excess(k, "lift_off", -N))
-            if own.kind == "slip" and self.friction[k]:
+            if not self._bounds[k]:
+                ends.append(Excess(k, "lift_off", -N))
+            if own.kind == "slip" and self._rubs[k]:
                 ends.append(Excess(k, "still", -float(slip_velocity(each) @ self._toward[k])))
             elif own.kind == "stick":
-                beyond = float(np.linalg.norm(force[k] - N * each.normal)) - self.friction[k] * N
-                if beyond > 0 and sum(one.kind == "stick" for one in self.mode) > 1:
-                    # forces shared by several sticking contacts are not unique: others may hold what this one cannot
+                beyond = float(np.linalg.norm(force[k] - N * each.normal)) - (self._bounds[k] or self.friction[k] * N)
+                if beyond > 0 and shared > 1:
+                    # forces shared by several contacts are not unique: others may hold what this one cannot
                     held = held or self._decided(
                         now, [one.kind != "open" for one in self.mode], [one.kind == "stick" for one in self.mode]
                     )
@@ -249,9 +298,9 @@ class ContactMotion(AlternatingMotion[ContactMode]):
             self._limit_efforts(x)  # the effort that a servo requires jumps with the velocity
             happened = [("settle" if settles else "impact", self.contacts[k].name)]
             now = self.at(x)
-            still = [bool(np.linalg.norm(slip_velocity(each)) <= self._still) for each in now.touching]
+            still = [slip <= self._still for slip in self._slips(now)]
         elif kind == "still":
-            slips = [float(np.linalg.norm(slip_velocity(each))) for each in now.touching]
+            slips = self._slips(now)
             still = [stuck or own == k or slips[own] <= self._faint for own, stuck in enumerate(still)]
         mode = self._leaving(now, k) if kind == "slip" else self._decided(now, closed, still)
         if kind == "still" and slips[k] > self._still and mode[k].kind == "slip":  # it has turned, not stopped
@@ -259,6 +308,11 @@ class ContactMotion(AlternatingMotion[ContactMode]):
         struck = {name for _, name in happened}
         happened += [one for one in changes(self.contacts, was, mode, self._stands(x, mode)) if one[1] not in struck]
         return x, mode, happened
+
+    def _slips(self, now: ContactsThere) -> list[float]:
+        """Slip speed of each contact [m/s]; of turning joints at the natural length."""
+        pairs = zip(self._arms, now.touching, strict=True)
+        return [float(arm * np.linalg.norm(slip_velocity(each))) for arm, each in pairs]
 
     def _stands(self, y: Array, mode: ContactMode) -> bool:
         """True if nothing moves in a mode, or is about to move."""
@@ -281,18 +335,21 @@ class ContactMotion(AlternatingMotion[ContactMode]):
 
     def _struck(self, x: Array, now: ContactsThere, hit: int) -> tuple[Array, list[bool], bool]:
         """State after an impact by Newton's and Coulomb's laws; which contacts stay closed; True if it is the last."""
-        which = [k for k, own in enumerate(self.mode) if own.kind != "open" or k == hit]
+        which = [k for k, own in enumerate(self.mode) if (own.kind != "open" or k == hit) and not self._bounds[k]]
         frames, J, response = self._framed(now, which)
         c = np.concatenate([frame.T @ now.touching[k].slide for frame, k in zip(frames, which, strict=True)])
         speed, e = -c[3 * which.index(hit)], self.contacts[hit].restitution
-        settles = self._settles(hit, speed / self._unit, e)
+        settles = self._settles(hit, speed * self._arms[hit] / self._unit, e)
         e = 0.0 if settles else e
         c[3 * which.index(hit)] *= 1 + e
         impulse, _ = self._law(J @ response, c, which, [None] * len(which))
         x = self._pushed(x, response @ impulse.ravel())
         # by the speed, not the impulse: of a contact that the impact leaves alone that is round-off, of either sign
-        leaves = [float(each.normal @ each.slide) > self._still for each in self.at(x).touching]
-        closed = [k in which and not leaves[k] and not (k == hit and e) for k in range(len(self.mode))]
+        parts = [float(each.normal @ each.slide) for each in self.at(x).touching] * self._arms
+        closed = [
+            bool(self._bounds[k]) or (k in which and parts[k] <= self._still and not (k == hit and e))
+            for k in range(len(self.mode))
+        ]
         return x, closed, settles
 
     def _framed(self, now: ContactsThere, which: Sequence[int]) -> tuple[list[Array], Array, Array]:
@@ -304,7 +361,8 @@ class ContactMotion(AlternatingMotion[ContactMode]):
 
     def _law(self, G: Array, c: Array, which: Sequence[int], sliding: Sequence[Array | None]) -> tuple[Array, Any]:
         try:
-            return contact_forces(G, c, self.friction[list(which)], sliding, [self.contacts[k].name for k in which])
+            at, names = list(which), [self.contacts[k].name for k in which]
+            return contact_forces(G, c, self.friction[at], sliding, names, self._bounds[at])
         except Refused as error:
             raise Diverged(f"at t = {self.t if hasattr(self._stepper, 't') else 0.0:.6g} s: {error}") from None
 
@@ -320,21 +378,10 @@ class ContactMotion(AlternatingMotion[ContactMode]):
             c[3 * place : 3 * place + 3] = frame.T @ now.rate[k]
             c[3 * place] += there.normal_rate @ there.slide
             slip = frame[:, 1:].T @ there.slide
-            sliding.append(None if still[k] else slip / np.linalg.norm(slip))
+            sliding.append(slip / np.linalg.norm(slip) if self._rubs[k] and not still[k] else None)
         G = J @ response
         force, done = self._law(G, c, which, sliding)
         for place, (frame, k) in enumerate(zip(frames, which, strict=True)):
             own, slides = slice(3 * place, 3 * place + 3), sliding[place]
             mode[k] = first_mode(done[place], frame, -force[place, 1:] if slides is None else slides, G[own, own])
         return tuple(mode)
-
-
-def _rows(now: ContactsThere, mode: ContactMode) -> list[tuple[int, Array]]:
-    """Directions in which closed contacts are constrained, with their contact: normal if slipping, all if sticking."""
-    directions: list[tuple[int, Array]] = []
-    for k, (own, each) in enumerate(zip(mode, now.touching, strict=True)):
-        if own.kind == "slip":
-            directions.append((k, each.normal))
-        elif own.kind == "stick":
-            directions += [(k, direction) for direction in np.eye(3)]
-    return directions

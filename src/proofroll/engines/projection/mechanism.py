@@ -61,11 +61,10 @@ class ProjectionMechanism:
         mechanism = mechanism_of(scene)
         require(mechanism, PROVIDES, {})
         self._timed = any(map(varies, mechanism.signals))
-        rubbing = bool(switched_joints(mechanism))
         limited = any(actuator.limit is not None for actuator in mechanism.actuators)
-        switched = rubbing or limited or bool(breaks(mechanism.signals))
-        if mechanism.contacts and (rubbing or mechanism.loops or mechanism.couplings):
-            raise Refused("contacts are followed in trees whose joints have no loops, couplings, dry friction or stops")
+        switched = bool(switched_joints(mechanism)) or limited or bool(breaks(mechanism.signals))
+        if mechanism.contacts and (mechanism.loops or mechanism.couplings):
+            raise Refused("contacts are followed in trees, without loops and couplings")
         if (switched or self._timed or mechanism.contacts) and settings.equations == "compiled":
             raise Refused("equations that switch or change in time are not compiled; choose preset=matched")
         for body in mechanism.bodies:
@@ -161,8 +160,8 @@ class ProjectionMechanism:
             joint_torque=torque,
             effort=equations.efforts(solved.bodies) if self._mechanism.actuators else None,
             coupling=solved.multipliers[equations.loop_rows : equations.coupled] if self._mechanism.couplings else None,
-            contact_force=self._touching.solve()[1] if self._touching else None,
             **(self._switched.along_joints(len(self._mechanism.joints)) if self._switched else {}),
+            **(self._touching.sampled(len(self._mechanism.joints)) if self._touching else {}),
         )
 
     def built(self) -> MechanismBuilt:
