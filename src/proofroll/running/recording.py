@@ -14,7 +14,7 @@ from proofroll.core.arrays import FloatArray
 from proofroll.core.columns import Columns
 from proofroll.core.dataset import add_events, columns_of, off_grid_apart
 from proofroll.core.element import Element
-from proofroll.core.element_abilities import WatchesRuns
+from proofroll.core.element_abilities import RunWatch, WatchesRuns
 from proofroll.core.engine import Sample
 from proofroll.core.engine_abilities import TellsRemarks
 from proofroll.core.errors import Diverged, lack_behind
@@ -110,21 +110,12 @@ def record(
             break  # the run has left the scene's model
     processor += time.process_time()
     sampling = time.perf_counter() - began - wall, processor - inside
-    ended: str | None = None
-    events: list[tuple[Element, Sequence[Event]]] = []
-    for element, watch in watches:
-        own = [sample_of(scene, element, sample) for sample in samples]
-        seen = watch.conclude(times, own, events_of_engine(engine, element))
-        del samples[seen.samples :]
-        if seen.events is not None:
-            events.append((element, seen.events))
-        if seen.ended:
-            ended, failure = seen.ended, None
+    events, ended = _conclusions(scene, engine, watches, times, samples)
     lacking = (
         element.lacks([sample_of(scene, element, sample) for sample in samples], scene.asks)
         for element in scene.elements
     )
-    failure = failure or next(filter(None, lacking), None)
+    failure = (None if ended else failure) or next(filter(None, lacking), None)
     reached = times[: len(samples)]
     last = reached[np.isin(reached, asked)][-1]
     taken = dict(zip(reached.tolist(), samples, strict=True)) | {at: one for at, one in between.items() if at < last}
@@ -134,6 +125,26 @@ def record(
         columns = add_events(scene, owner, columns, own_events)
     remarks = tuple(engine.remarks()) if isinstance(engine, TellsRemarks) else ()
     return Recording(columns, failure, wall, (wall, inside), sampling, remarks, ended, passed)
+
+
+def _conclusions(
+    scene: Scene,
+    engine: Any,
+    watches: Sequence[tuple[Any, RunWatch]],
+    times: FloatArray,
+    samples: list[AnySample],
+) -> tuple[list[tuple[Element, Sequence[Event]]], str | None]:
+    """Events that watches found, by element, and why a watch ended the run; its samples after that are deleted."""
+    events: list[tuple[Element, Sequence[Event]]] = []
+    ended: str | None = None
+    for element, watch in watches:
+        own = [sample_of(scene, element, sample) for sample in samples]
+        seen = watch.conclude(times, own, events_of_engine(engine, element))
+        del samples[seen.samples :]
+        if seen.events is not None:
+            events.append((element, seen.events))
+        ended = seen.ended or ended
+    return events, ended
 
 
 _NOT_FINITE = "is not finite (NaN or overflow)"
