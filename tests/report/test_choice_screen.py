@@ -183,3 +183,25 @@ def test_small_groups_are_unfolded_and_large_ones_name_their_scenes(everything: 
     assert shown == ["engine and formulation", "pair s0, s1", "s0", "s1", "many s2, s3, s4, s5 and 1 more"]
     assert 'data-group="pair" title="s0, s1" aria-expanded="true"' in html
     assert 'title="s2, s3, s4, s5, s6" aria-expanded="false"' in html
+
+
+@pytest.mark.parametrize("width", [400, 900, 1400])
+def test_nothing_moves_while_the_page_loads(report_page: Path, visit: Visiting, width: int) -> None:
+    """The form has its place before the first script runs, so that the matrix below it stays where it is."""
+    place = "Math.round(document.querySelector('.scroll.choice').getBoundingClientRect().top)"
+    # The first node after the matrix is parsed before any script at the end of the page runs.
+    before = f"""new MutationObserver((_, watch) => {{
+      if (!document.querySelector('#choices')) return;
+      watch.disconnect(); window.atFirst = {place};
+    }}).observe(document, {{ childList: true, subtree: true }});"""
+    with visit(report_page, before=before, viewport={"width": width, "height": 800}) as seen:
+        seen.wait("document.querySelector('#choose .tools')")
+        first, last = seen.page.evaluate(f"[window.atFirst, {place}]")
+    assert abs(last - first) <= 0.02 * 800
+
+
+def test_without_scripts_there_is_no_form(report_page: Path, visit: Visiting) -> None:
+    """What only a script can answer is not shown where there are none; the matrix is."""
+    with visit(report_page, java_script_enabled=False) as seen:
+        assert not seen.page.locator("#choose").is_visible()
+        assert seen.page.locator("#choice").is_visible()

@@ -10,7 +10,6 @@
   const rows = [...table.tBodies[0].rows];
   const symbols = {{ symbols|tojson }};
   const first = {{ decades.start }}, count = {{ decades|length }};
-  form.hidden = false;
 
   // Texts are inserted as text nodes, for an engine's message must not become markup.
   function fill(cell, [state, text, title, href], best, step) {
