@@ -83,17 +83,22 @@ class PushingJoint(OfJoint):
 
 
 class MovedStop(MechanismMutant):
-    """The stop lies a centimetre below."""
+    """The stop lies below.
+
+    Attributes:
+        by: how far [m].
+    """
 
     fault = "stop at another place"
     scene: ClassVar[Any] = ("stop", {})
     until: ClassVar[float] = 0.6
     every: ClassVar[float] = 0.02
     named = ("rests at",)
+    by: ClassVar[float] = 0.01
 
     def other(self, mechanism: Mechanism) -> Mechanism:
-        """Both limits by a centimetre lower."""
-        moved = [None if j.limits is None else (j.limits[0] - 0.01, j.limits[1] - 0.01) for j in mechanism.joints]
+        """Both limits lower."""
+        moved = [None if j.limits is None else (j.limits[0] - self.by, j.limits[1] - self.by) for j in mechanism.joints]
         joints = zip(mechanism.joints, moved, strict=True)
         return dataclasses.replace(mechanism, joints=tuple(dataclasses.replace(j, limits=at) for j, at in joints))
 
@@ -108,10 +113,12 @@ class MovedStopWithRebounds(MovedStop):
 
 
 class MovedStopWithOneRebound(MovedStopWithRebounds):
-    """Rebounds from there once."""
+    """Rebounds from there once, farther below than two steps reach."""
 
     fault = "stop at another place, with one rebound"
     until = 0.8
+    by = 0.03
+    named = ("turns back at -0.03,",)
 
 
 class Driven(MechanismMutant):

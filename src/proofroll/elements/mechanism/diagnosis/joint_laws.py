@@ -22,6 +22,7 @@ _STILL = 1e-9
 _AT_STOP = 1e-3  # largest distance from a stop of rebounds found by parabolas, relative to the joint's range
 # Least change of velocity between two samples, relative to the changes before and after, that counts as a jump.
 _JUMPS = 5.0
+_REACHES = 2.0  # steps of way beyond a stop in which a method may turn back
 
 
 def _effort(kp: float = 1.0, kd: float = 1.0, gear: float = 1.0, limit: float = 1.0, clamps: str = "sum") -> Effort:
@@ -185,6 +186,8 @@ def of_stops(evidence: Evidence) -> Iterator[Cause]:
             shift = float(np.median(off))
             before, after, count = float(np.max(np.abs(off))), float(np.max(np.abs(off - shift))), len(off)
             if count == 1:
+                if abs(shift) <= _REACHES * (evidence.step or 0.0) * own[0].speed:
+                    continue  # it turned back at the end of a step
                 before, after = (own[0].missed(x, joint.restitution) for x in (limit, limit + shift))
                 count = 2  # place and rate
             says = f"the joint {joint.name} {does} at {limit + shift:.6g}, not at its stop at {limit:.6g}"
@@ -209,6 +212,11 @@ class _Rebound:
     place: float
     side: float
     h: float
+
+    @property
+    def speed(self) -> float:
+        """Largest speed before it."""
+        return float(abs(self.before[1]) + 2 * self.h * abs(self.before[2]))
 
     def missed(self, place: float, restitution: float) -> float:
         """Distance of the second sample, and of its rate times ``h``, from a rebound at another place; the larger."""
