@@ -17,7 +17,7 @@ from proofroll.elements.ball_on_surface.motion import BallMotion
 from proofroll.truth.ball_on_surface import unreduced_taylor
 from proofroll.truth.ball_on_surface.contact import ContactRates
 from proofroll.truth.ball_on_surface.impact import by_equations
-from proofroll.truth.ball_on_surface.route import End, Leg, Route, World, join_motions
+from proofroll.truth.ball_on_surface.route import End, Leg, Route, World, about_to_stop, join_motions
 from proofroll.truth.collocation import Step, System, next_length, nodes, take
 
 _TOLERANCE = 1e-13  # of a step, relative to the scale of each variable
@@ -25,7 +25,6 @@ _APPROACH = 0.5  # fraction of the time left until standstill that one step may 
 _CLOSE = 0.99  # and near it, where that time is known accurately
 _FURTHER = 1.2  # how far a polynomial is extrapolated, relative to its own step
 _MANY = 300  # steps of a rolling leg; the rest of a longer one is left to a compiled Taylor series
-_STILL = 1e-11  # time left until standstill, relative to the pace, below which the state is extrapolated
 
 
 class Implicit(Route):
@@ -86,7 +85,7 @@ class Implicit(Route):
             if compiled and len(walk.steps) == _MANY:
                 return self._rolls_on(walk, until)
             left = self._until_still(walk.state, True) if resisted else np.inf
-            if left < _STILL * self._pace:
+            if about_to_stop(left, self._pace, walk.time):
                 halted = walk.state + left * self.rates(walk.state)
                 return walk.leg(self, True, walk.time + left, self.nudged(halted, np.zeros(3)), End.HALT)
             step, length = walk.step(min(length, self._approach(left)))
@@ -122,7 +121,7 @@ class Implicit(Route):
         while walk.time < until:
             started = bool(walk.steps) or slip is not None
             left = self._until_still(walk.state, False) if started else np.inf
-            if left < _STILL * self._pace:
+            if about_to_stop(left, self._pace, walk.time):
                 still = walk.state + left * self._contact.rates(walk.state[None, :], False)[0]
                 still[6:] = 0.0
                 if walk.time + left > until:

@@ -18,12 +18,11 @@ from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.motion import BallMotion, world_motion
 from proofroll.elements.ball_on_surface.rolling_equations import reduced_rates, start
 from proofroll.truth.ball_on_surface.explicit import ExplicitRun, Rates
-from proofroll.truth.ball_on_surface.route import End
+from proofroll.truth.ball_on_surface.route import End, about_to_stop
 from proofroll.truth.ball_on_surface.sliding import Sliding
 
 _Stop = tuple[End, Callable[[FloatArray], float]]
 _APPROACH = 0.6  # fraction of the time left until the centre stops that one step may take
-_STILL = 1e-11  # time left until standstill, relative to the pace, below which the state is extrapolated
 
 
 class Polar(Sliding):
@@ -83,7 +82,7 @@ class Polar(Sliding):
             if stopped := self._ended(solver):
                 return stopped
             left = self._until_halt(solver.y) if resisted else np.inf
-            if not (left < _STILL * self._pace and solver.t < until):
+            if not (about_to_stop(left, self._pace, solver.t) and solver.t < until):
                 return None
             halted = solver.y + left * self.rates(solver.y)
             return solver.t + left, self.nudged(halted, np.zeros(3)), End.HALT

@@ -20,6 +20,15 @@ World = tuple[FloatArray, FloatArray, FloatArray]
 Motion = Callable[[FloatArray], BallMotion]
 
 
+# Time left until standstill, relative to the pace, below which the state is extrapolated; and in spacings of the time.
+_STILL, _SPACINGS = 1e-11, 1000.0
+
+
+def about_to_stop(left: float, pace: float, time: float) -> bool:
+    """True if the ``left`` time until standstill is so short that the state there is extrapolated; all in s."""
+    return bool(left < max(_STILL * pace, _SPACINGS * np.spacing(time)))
+
+
 class End(Enum):
     """Reason that a leg ended."""
 
