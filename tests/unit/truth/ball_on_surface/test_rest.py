@@ -10,6 +10,7 @@ import xarray as xr
 
 from proofroll.core.errors import Refused
 from proofroll.core.events import events_of
+from proofroll.core.truth import truth
 from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.elements.ball_on_surface.mechanics import can_rest, setting_off
 from proofroll.elements.ball_on_surface.model import RollingBall
@@ -20,6 +21,15 @@ from proofroll.running.simulation import simulate
 G, A = 9.81, 0.025
 EULER, FRAME = "projection[formulation=euler]", "projection[formulation=rotating_frame]"
 RK4 = "projection[formulation=rotating_frame,preset=default]"
+
+
+def test_a_ball_that_rolls_for_minutes_comes_to_rest() -> None:
+    """After 195 s no step is asked for that the round-off of the time hides; the ball stops at (1 + k) a V0/(f g)."""
+    speed, f, k = 0.6970627537995008, 1e-5, 0.1
+    scene = load_scene("rolling_stop", speed=speed, rolling_resistance=f, inertia_ratio=k)
+    stops = (1 + k) * A * speed / (f * G)
+    found = truth(scene, np.array([0.0, stops / 2, 1.1 * stops]))
+    assert float(found["down"][-1]) == pytest.approx(stops * speed / 2, abs=float(found["down"].attrs["error_bar"]))
 
 
 @pytest.mark.parametrize("f", [5e-4, 3 * A])
