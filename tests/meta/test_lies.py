@@ -14,7 +14,7 @@ import pytest
 from flat_judging import judged_curve
 from honest import FORMULATIONS, ORDERS, Jointed, Rolling, Switching
 from liars import ALL, BALLS, EVERY, MECHANISMS, UNTIL, Lie, liar, scene_of
-from lies import table
+from lies import ORDER, table
 from tiny import Tiny, TinySettings
 
 from proofroll.core.convergence import richardson, tightest
@@ -140,7 +140,7 @@ def test_a_lie(about: str, lie: Lie) -> None:
         assert not heard.causes
         assert max(heard.errors.values()) < 1e-3
         return
-    assert not heard.errors or max(heard.errors.values()) > 1e-3, heard
+    assert not heard.errors or lie.said == ORDER or max(heard.errors.values()) > 1e-3, heard
     assert not heard.agrees
     assert any(word in heard.words for word in lie.said), heard
     assert not [cause for cause in heard.causes[:1] if cause.startswith("or, ")]  # than nothing

@@ -48,6 +48,9 @@ _SCENES: Mapping[str, tuple[Callable[[], Scene], float]] = {
     "driven": (_driven, 0.12),
     "servo": (lambda: truth_scenes()["double_pendulum-limit"], 0.12),
     "sled": (lambda: load_scene("sled"), 0.12),
+    "bounces": (lambda: load_scene("spinning_bounce", height=0.0545), 0.12),
+    "stops": (lambda: load_scene("stop", height=0.01, restitution=0.5), 0.1),
+    "rubs": (lambda: load_scene("spring_friction"), 0.12),
 }
 UNTIL = {name: until for name, (_, until) in _SCENES.items()}
 BALLS, MECHANISMS = ("rolls", "slips"), ("tree", "loop", "driven", "servo")

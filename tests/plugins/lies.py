@@ -59,6 +59,7 @@ _PLACES, _FIRST, _MODEL = (
 )
 _V, _W, _Q = ("v_WB",), ("w_WB",), ("q_WB", "attitude is", "attitudes is")
 _FORCES, _EVENTS = ("N is", "F3 is", "forces is"), ("event_times is", "first_slip is", "event_order is", "creep is")
+ORDER = ("event_order is",)  # no error in a quantity
 _TURNED = ("rolls", *MECHANISMS, "sled")
 _STATE, _WRENCH = ("p_WB", "v_WB", "w_WB", "q_WB"), ("joint_force", "joint_torque")
 _LATE, _FACTOR, _AXES, _SIGN, _OMITTED = ("0.003 s late",), ("times",), ("other axes",), ("wrong sign",), ("left out",)
@@ -226,16 +227,18 @@ def _forces_of_contacts() -> Iterator[Lie]:
     yield lie("contacts not finite", lambda m: np.nan * m.right.contact_force)
 
 
+def _each(**change: Callable[[Event, float], Any]) -> Callable[[list[Event], float], list[Event]]:
+    return lambda right, until: [
+        dataclasses.replace(event, **{name: how(event, until) for name, how in change.items()}) for event in right
+    ]
+
+
+def _later(by: float) -> Any:
+    names = "time", "time_low", "time_high"
+    return _each(**{name: lambda event, _, name=name: getattr(event, name) + by for name in names})
+
+
 def _slips() -> Iterator[Lie]:
-    def each(**change: Callable[[Event, float], Any]) -> Callable[[list[Event], float], list[Event]]:
-        return lambda right, until: [
-            dataclasses.replace(event, **{name: how(event, until) for name, how in change.items()}) for event in right
-        ]
-
-    def later(by: float) -> Any:
-        names = "time", "time_low", "time_high"
-        return each(**{name: lambda event, _, name=name: getattr(event, name) + by for name in names})
-
     def lie(name: str, events: Any, sample: Any = None, said: tuple[str, ...] = _EVENTS) -> Lie:
         return Lie(name, ("slips",), said, sample, events=events)
 
@@ -246,14 +249,88 @@ def _slips() -> Iterator[Lie]:
     yield lie("always sticking, without events", lambda *_: [], lambda _: {"sticking": True})
     yield lie("no events", lambda *_: [])
     yield lie("an event too many", lambda right, _: [*right, Event("stick", 0.35, 0.35, 0.35)])
-    yield lie("events of the wrong kind", each(kind=lambda *_: "stick"))
-    yield lie("events 30 ms late", later(0.03))
-    yield lie("events 5 ms late", later(0.005))
-    yield lie("events before they are", later(-0.03))
-    yield lie("event times not finite", each(time=lambda *_: np.nan))
+    yield lie("events of the wrong kind", _each(kind=lambda *_: "stick"))
+    yield lie("events 30 ms late", _later(0.03))
+    yield lie("events 5 ms late", _later(0.005))
+    yield lie("events before they are", _later(-0.03))
+    yield lie("event times not finite", _each(time=lambda *_: np.nan))
     wide: dict[str, Any] = {"time_low": lambda *_: 0.0, "time_high": lambda _, until: until}
-    yield lie("brackets as wide as the run", each(**wide), said=("by luck",))
-    yield lie("events 30 ms late in brackets as wide as the run", each(time=lambda event, _: event.time + 0.03, **wide))
+    yield lie("brackets as wide as the run", _each(**wide), said=("by luck",))
+    yield lie(
+        "events 30 ms late in brackets as wide as the run", _each(time=lambda event, _: event.time + 0.03, **wide)
+    )
+
+
+def _impacts() -> Iterator[Lie]:
+    both = ("bounces", "stops")
+
+    def deeper(m: Moment) -> dict[str, Any]:
+        return {"p_WB": m.right.p_WB - [0, 0, 1e-3]}
+
+    def returning(scene: Scene) -> Scene:
+        """The scene with more restitution, of its pair or its joint."""
+        mechanism = scene.elements[0].mechanism  # type: ignore[attr-defined]  # both have one
+        part = "pairs" if mechanism.pairs else "joints"
+        (one,) = getattr(mechanism, part)
+        return of_mechanism(scene, **{part: (dataclasses.replace(one, restitution=one.restitution + 0.02),)})
+
+    def rougher(scene: Scene) -> Scene:
+        (pair,) = scene.elements[0].mechanism.pairs  # type: ignore[attr-defined]  # it has one
+        return of_mechanism(scene, pairs=(dataclasses.replace(pair, friction=1.05 * pair.friction),))
+
+    yield Lie("no impacts", both, _EVENTS, events=lambda *_: [])
+    yield Lie("an impact too many", both, _EVENTS, events=lambda right, _: [right[0], *right])
+    yield Lie("impacts 5 ms late", both, _EVENTS, events=_later(0.005))
+    yield Lie("impacts elsewhere", both, _EVENTS, events=_each(name=lambda *_: "ceiling"))
+    yield Lie("impacts that are ends of slip", both, ORDER, events=_each(kind=lambda *_: "stick"))
+    yield Lie("a step late from the first impact on", both, _PLACES, lambda m: m.at(m.t - 1e-3), ("late",), begins=0.05)
+    yield Lie("1 mm deep from the first impact on", both, _PLACES, deeper, begins=0.05)
+    yield Lie(
+        "restitution + 0.02, the scene repeated",
+        both,
+        (*_PLACES, *_EVENTS),
+        None,
+        ("restitution",),
+        model=returning,
+        built=echo,
+    )
+    yield Lie("friction of impacts x 1.05, the scene repeated", ("bounces",), _W, model=rougher, built=echo)
+    yield Lie("friction of impacts x 1.05, told", ("bounces",), ("friction",), model=rougher)
+
+
+def _friction_of_joints() -> Iterator[Lie]:
+    def lie(name: str, change: Callable[[Moment], Any], *causes: str) -> Lie:
+        return Lie(name, ("rubs",), ("friction.slide is",), lambda m: {"friction": change(m)}, causes)
+
+    def rubbing(factor: float) -> Callable[[Scene], Scene]:
+        def model(scene: Scene) -> Scene:
+            (joint,) = scene.elements[0].mechanism.joints  # type: ignore[attr-defined]  # it has one
+            return of_mechanism(scene, joints=(dataclasses.replace(joint, friction=factor * joint.friction),))
+
+        return model
+
+    yield lie("friction x 1.02", lambda m: 1.02 * m.right.friction)
+    yield lie("friction of nothing", lambda m: 0 * m.right.friction)
+    yield lie("friction along the motion", lambda m: -m.right.friction)
+    yield lie("friction not finite", lambda m: np.nan * m.right.friction)
+    yield Lie(
+        "friction of a joint x 1.02, the scene repeated",
+        ("rubs",),
+        ("friction.slide is",),
+        None,
+        ("dry friction",),
+        model=rubbing(1.02),
+        built=echo,
+    )
+    yield Lie(
+        "no friction of a joint, the scene repeated",
+        ("rubs",),
+        ("friction.slide is",),
+        None,
+        ("dry friction",),
+        model=rubbing(0.0),
+        built=echo,
+    )
 
 
 def _models() -> Iterator[Lie]:
@@ -294,8 +371,8 @@ def _small() -> Iterator[Lie]:
 def table() -> list[Lie]:
     """All lies of the table."""
     states = _times, _places, _frames, _velocities, _spins, _orientations
-    forces = _forces_of_balls, _reactions_of_joints, _efforts, _forces_of_contacts
-    return [lie for part in (*states, *forces, _slips, _models, _small) for lie in part()]
+    forces = _forces_of_balls, _reactions_of_joints, _efforts, _forces_of_contacts, _friction_of_joints
+    return [lie for part in (*states, *forces, _slips, _impacts, _models, _small) for lie in part()]
 
 
 def _off_grid(change: Callable[[Moment], Any]) -> Callable[[Moment], Any]:

@@ -55,9 +55,14 @@ class ContactWatch:
         samples: Sequence[MechanismSample],
         located: Sequence[Event] | None,
     ) -> SeenInRun:
-        """Events of the contacts; None for the events if forces of contact are not known at all times."""
+        """Events of the contacts; None for the events if forces of contact are not known at all times.
+
+        Without contacts they are those of joints and efforts that the engine itself locates.
+        """
         count, mechanism = len(samples), self._element.mechanism
-        if not mechanism.contacts or any(sample.q_WB is None for sample in samples):
+        if not mechanism.contacts:
+            return SeenInRun(count, located if self._element.has_events else None, None)
+        if any(sample.q_WB is None for sample in samples):
             return SeenInRun(count, None, None)
         pressed = given_forces(mechanism, samples)
         if count < 3 or np.isnan(pressed[1:]).any():

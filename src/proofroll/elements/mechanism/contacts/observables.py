@@ -9,7 +9,6 @@ import numpy as np
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Diverged
-from proofroll.core.events import EVENT_ORDER
 from proofroll.core.observable import Observable, Role
 from proofroll.elements.mechanism.contacts.touching import Moving, touch
 from proofroll.elements.mechanism.signal import varies
@@ -111,9 +110,6 @@ def contact_observables(mechanism: Mechanism, sizes: Mapping[str, float], least:
     yield Observable("contact_forces", "N", meaning, Role.REACTION, floor=force, asked_for=False)
     meaning = "share of the samples so far in which what may touch does not press"
     yield Observable("unpressed", "1", meaning, Role.REACTION, floor=1.0, asked_for=False)
-    yield Observable("event_times", "s", "times of all events of contacts", Role.EVENT, asked_for=False)
-    meaning = "events of another kind than the truth's"
-    yield Observable(EVENT_ORDER, "events", meaning, Role.EVENT, asked_for=False)
     laws = [law for law in LAWS if law[0] in kept_laws(mechanism)]
     for name, unit, meaning in (*RESIDUALS, *laws):
         difference = "energy" if unit == "J" else ""
