@@ -294,7 +294,15 @@ def _impacts() -> Iterator[Lie]:
         model=returning,
         built=echo,
     )
-    yield Lie("friction of impacts x 1.05, the scene repeated", ("bounces",), _W, model=rougher, built=echo)
+    yield Lie(
+        "friction of impacts x 1.05, the scene repeated",
+        ("bounces",),
+        _W,
+        None,
+        ("friction of impacts",),
+        model=rougher,
+        built=echo,
+    )
     yield Lie("friction of impacts x 1.05, told", ("bounces",), ("friction",), model=rougher)
 
 

@@ -15,7 +15,7 @@ from proofroll.core.columns import Columns
 from proofroll.core.element import FirstMotion, OptionalTerm, Sign, StepNumber
 from proofroll.core.element_abilities import RunWatch
 from proofroll.core.errors import Refused
-from proofroll.core.events import EVENT_ORDER, events_of
+from proofroll.core.events import events_of
 from proofroll.core.observable import Observable, Role
 from proofroll.core.program_text import FailedRun
 from proofroll.core.time_grid import EVERY
@@ -23,7 +23,7 @@ from proofroll.core.turns import PART
 from proofroll.elements.mechanism.analysis import Analysis, analyse
 from proofroll.elements.mechanism.capabilities import MechanismCapability, required
 from proofroll.elements.mechanism.certificate import CAPS, certify
-from proofroll.elements.mechanism.contacts.observables import LAWS, RESIDUALS, contact_observables
+from proofroll.elements.mechanism.contacts.observables import LAWS, RESIDUALS, contact_observables, event_observables
 from proofroll.elements.mechanism.contacts.start import extent, natural_length
 from proofroll.elements.mechanism.dataset import from_samples
 from proofroll.elements.mechanism.failure_program import program
@@ -246,11 +246,7 @@ class MechanismElement:
             meaning = "determinate components of the moments on children at their joints"
             found.append(Observable("torques", "N m", meaning, Role.REACTION, floor=least["N m"]))
         found += contact_observables(self.mechanism, self._sizes, _LEAST)
-        if self.has_events:
-            meaning = "times of all events of contacts, joints and efforts"
-            found.append(Observable("event_times", "s", meaning, Role.EVENT, asked_for=False))
-            meaning = "events of another kind than the truth's"
-            found.append(Observable(EVENT_ORDER, "events", meaning, Role.EVENT, asked_for=False))
+        found += event_observables(self.mechanism)
         for item in named_forces(self.mechanism):
             floor, column = least[str(item.unit)], item.field == "coupling"
             found.append(Observable(item.name, str(item.unit), item.meaning, Role.REACTION, floor=floor, column=column))
@@ -320,13 +316,6 @@ class MechanismElement:
         found = self._equations.sample(*start)
         return found | {"wrench": np.full_like(found["wrench"], np.nan)} if self.mechanism.contacts else found
 
-    @property
-    def has_events(self) -> bool:
-        """True if contacts, stops, dry friction or limits of efforts may change the mode of motion."""
-        mechanism = self.mechanism
-        of_joints = any(joint.friction or joint.limits for joint in mechanism.joints)
-        return bool(mechanism.contacts) or of_joints or any(item.limit is not None for item in mechanism.actuators)
-
     def variables(self, times: FloatArray, samples: Sequence[MechanismSample]) -> Columns:
         """See the protocol; the variables are those of :mod:`proofroll.elements.mechanism.dataset`."""
         return from_samples(self, times, samples)
@@ -339,7 +328,7 @@ class MechanismElement:
     def observe(self, dataset: xr.Dataset) -> dict[str, FloatArray]:
         """See the protocol; reactions that an engine gives in part only are left out."""
         found = {}
-        if self.has_events and "event_kind" in dataset:
+        if self.mechanism.has_events and "event_kind" in dataset:
             found["event_times"] = np.array([event.time for event in events_of(dataset)])
         for item in self.observables:
             if item.name not in dataset:

@@ -111,6 +111,12 @@ class Mechanism:
         )
 
     @property
+    def has_events(self) -> bool:
+        """True if contacts, stops, dry friction or limits of efforts may change the mode of motion."""
+        of_joints = any(joint.friction or joint.limits for joint in self.joints)
+        return bool(self.contacts) or of_joints or any(item.limit is not None for item in self.actuators)
+
+    @property
     def fastened(self) -> dict[str, list[Vector]]:
         """Points of each body, and of the world, to which joints, loops, springs or tracked points are attached [m].
 

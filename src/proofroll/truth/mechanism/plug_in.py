@@ -92,7 +92,7 @@ class MechanismTruth:
             notes.append(f"from {motion.horizon:.4g} s on {motion.reason}")
         if any(notes):
             dataset.attrs["ill_posed"] = "; ".join(filter(None, notes))
-        return with_events(dataset, motion.events) if element.has_events else dataset
+        return with_events(dataset, motion.events) if element.mechanism.has_events else dataset
 
 
 def _laws_alone(element: MechanismElement, times: FloatArray, reason: str) -> xr.Dataset:

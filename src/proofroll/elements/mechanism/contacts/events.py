@@ -61,7 +61,7 @@ class ContactWatch:
         """
         count, mechanism = len(samples), self._element.mechanism
         if not mechanism.contacts:
-            return SeenInRun(count, located if self._element.has_events else None, None)
+            return SeenInRun(count, located if mechanism.has_events else None, None)
         if any(sample.q_WB is None for sample in samples):
             return SeenInRun(count, None, None)
         pressed = given_forces(mechanism, samples)

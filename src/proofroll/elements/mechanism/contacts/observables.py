@@ -9,6 +9,7 @@ import numpy as np
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Diverged
+from proofroll.core.events import EVENT_ORDER
 from proofroll.core.observable import Observable, Role
 from proofroll.elements.mechanism.contacts.touching import Moving, touch
 from proofroll.elements.mechanism.signal import varies
@@ -89,6 +90,15 @@ def kept_laws(mechanism: Mechanism) -> frozenset[str]:
     held = any(joint.kind != "free" and "world" in {joint.parent, joint.child} for joint in mechanism.joints)
     held = held or "world" in ends or bool(np.any(mechanism.gravity))
     return frozenset(name for name, _, _ in (LAWS[:1] if held else LAWS))
+
+
+def event_observables(mechanism: Mechanism) -> Iterator[Observable]:
+    """Observables of the events of contacts, joints and efforts."""
+    if mechanism.has_events:
+        meaning = "times of all events of contacts, joints and efforts"
+        yield Observable("event_times", "s", meaning, Role.EVENT, asked_for=False)
+        meaning = "events of another kind than the truth's"
+        yield Observable(EVENT_ORDER, "events", meaning, Role.EVENT, asked_for=False)
 
 
 def contact_observables(mechanism: Mechanism, sizes: Mapping[str, float], least: float) -> Iterator[Observable]:
