@@ -14,7 +14,7 @@ KNOWN = 1e-9
 ENDS = {
     "two_spheres": (0.15, 1), "falling_rod": (0.27, 2), "rocking_block": (0.6, 4), "sled": (0.4, 3),
     "ladder": (1.06, 1), "eccentric_sphere": (0.08, 1), "free_turntable": (0.2, 0), "tilted_disc": (0.15, 0),
-    "sled_on_slope": (0.12, 1), "rattleback": (0.1, 0),
+    "sled_on_slope": (0.12, 1), "rattleback": (0.1, 0), "flick": (0.4, 3),
 }  # fmt: skip
 # Starts and sizes in which the events come soon; so slow, most level sleds come to rest with all feet at once.
 SOON = {

@@ -10,6 +10,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from proofroll.core.errors import Refused
+from proofroll.core.first_steps import first_steps
 from proofroll.core.plugins import load_engine
 from proofroll.elements.mechanism.contacts.geometry import Geometry, Pair
 from proofroll.elements.mechanism.drives import Actuator, Coupling
@@ -250,6 +251,32 @@ def test_a_limit_of_an_effort_is_not_stepped_across() -> None:
     slowed, left = 0.2 * 1.5 * 9.81 / 2, 0.04
     moved = 0.24 - slowed * 0.24**2 / 2 + 10 * (0.2**3 / 6 + 0.2**2 / 2 * left) + 2.0 * left**2 / 2
     assert run.sample().p_WB[0, 0] == pytest.approx(moved, abs=1e-13)
+
+
+def test_first_steps_into_an_impact_are_no_evidence() -> None:
+    """A ball a tenth of a millimetre above the floor lands within steps of 9 ms, which say nothing of its start."""
+    for height, judged in ((0.0501, False), (0.55, True)):
+        scene = load_scene("spinning_bounce", height=height, restitution=0.0)
+        assert bool(first_steps(PROJECTION, scene, replace(DEFAULT, dt=9e-3))) == judged
+        assert all(line.holds for line in first_steps(PROJECTION, scene, replace(DEFAULT, dt=1e-4)))
+
+
+@pytest.mark.parametrize("part", [-1e-6, 0.0, 1e-6])
+def test_a_graze_of_a_stop_passes_no_stop(part: float) -> None:
+    """A throw that ends at its stop comes down again, hit or not, with no more than its impact can change."""
+    throw = float(np.sqrt(2 * 9.81 * 0.2)) * (1 + part)
+    rail = {"axis": (0.0, 0.0, 1.0), "limits": (-5.0, 0.2), "restitution": 0.5}
+    box = Body("box", 1.0, inertia=(1.0, 1.0, 1.0))
+    run = PROJECTION.build(
+        Mechanism((box,), (Joint("rail", "prismatic", "world", "box", v0=(throw,), **rail),)), replace(DEFAULT, dt=0.01)
+    )
+    heights = []
+    for step in range(1, 31):
+        run.advance(0.01 * step)
+        heights.append(float(run.sample().p_WB[0, 2]))
+    assert max(heights) <= 0.2 + 1e-12
+    hit = np.sqrt(max(0.0, throw**2 - 2 * 9.81 * 0.2))  # speed of the impact, of which one and a half is lost
+    assert heights[-1] == pytest.approx(0.3 * throw - 9.81 * 0.3**2 / 2, abs=2 * hit * 0.3 + 1e-9)
 
 
 def test_a_graze_within_a_step_is_an_impact() -> None:

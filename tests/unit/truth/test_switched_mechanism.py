@@ -154,6 +154,38 @@ def test_what_lies_on_a_stop_or_nearly_so_comes_to_rest(height: float, restituti
     assert ends == [pytest.approx(3 * np.sqrt(2 * height / 9.81), rel=1e-12)] * bool(height)
 
 
+@pytest.mark.arithmetic
+@pytest.mark.parametrize(
+    ("part", "known"), [(-1e-6, True), (-1e-11, False), (0.0, False), (1e-11, False), (1e-6, True)]
+)
+def test_a_throw_that_rubs_and_ends_at_its_stop_is_ill_posed(part: float, known: bool) -> None:
+    """A throw that ends at its stop hits it or turns by the last digits: known until then, by both routes alike."""
+    slows = 9.81 + 2.0
+    throw = float(np.sqrt(2 * slows * 0.2)) * (1 + part)
+    rail = {"axis": (0.0, 0.0, 1.0), "limits": (-5.0, 0.2), "restitution": 0.5, "friction": 2.0}
+    box = Body("box", 1.0, inertia=(1.0, 1.0, 1.0))
+    found = truth_of(
+        Mechanism((box,), (Joint("rail", "prismatic", "world", "box", v0=(throw,), **rail),)), np.array([0.0, 0.1, 0.3])
+    )
+    assert found.record.q[1, 0] == pytest.approx(0.1 * throw - slows * 0.1**2 / 2, abs=1e-13)
+    if known:
+        assert np.isinf(found.horizon)
+        assert ("impact" in [event.kind for event in found.events]) == (part > 0)
+    else:  # speed after time in which it is lost, less that of the excess over the stop
+        assert found.horizon == pytest.approx(throw / slows, abs=1e-5)
+        assert "impact" not in [event.kind for event in found.events]
+        assert "hold or hit a stop" in found.reason
+
+
+@pytest.mark.drill
+def test_a_joint_that_comes_back_to_the_stop_of_its_start_has_a_truth() -> None:
+    """A pendulum released at its stop returns to it at rest, whatever its parameters are: nothing is ill-posed."""
+    free = load_scene("pendulum", angle=0.5).elements[0].mechanism  # type: ignore[attr-defined]
+    stopped = replace(free, joints=(replace(free.joints[0], limits=(-0.6, 0.5)),))
+    found = truth_of(stopped, np.array([0.0, 2.5]))
+    assert (found.horizon, found.events) == (np.inf, ())
+
+
 def test_friction_that_holds_does_not_creep() -> None:
     """A mass that its friction can hold stays, and friction carries the load."""
     held = Mechanism(

@@ -131,10 +131,7 @@ class MechanismElement:
 
     @cached_property
     def _touching(self) -> tuple[ContactDynamics, ContactMode] | None:
-        """Equations of contacts with laws of joints, and the mode of all of them at the start.
-
-        None: there are no contacts, or the mode is not unique.
-        """
+        """Equations of contacts with laws of joints, and modes at the start; None: no contacts, or no unique modes."""
         from proofroll.elements.mechanism.contacts.dynamics import ContactDynamics
 
         if self.mechanism.contacts:
@@ -286,7 +283,9 @@ class MechanismElement:
         acceleration = (motion.J @ rates + motion.bias)[:-1]
         scale = max(float(np.max(np.abs(acceleration[:, :3]))), self.speed**2 / self.length)
         lasts = first_change(self._equations.switched, *self.mechanism.start(), rates)
-        if self.mechanism.contacts and self._pressed is None:
+        if self._pressed is not None and self._touching is not None:
+            lasts = min(lasts, self._pressed.lasts(self._touching[1]))
+        elif self.mechanism.contacts:
             acceleration, lasts = np.full_like(acceleration, np.nan), 0.0
         moment = _PART * min(self.natural_time, lasts or np.inf)
         return FirstMotion(acceleration[:, :3], acceleration[:, 3:], scale, moment, lasts=lasts)

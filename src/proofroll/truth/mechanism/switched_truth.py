@@ -109,6 +109,6 @@ def _switched(mechanism: Mechanism, units: Units, own: Mechanism, times: Array) 
     modes = [bodies.switched(paths[1].legs[number].mode) for number in legs]
     two = on_same_turns(own, one, second.recorded(times, states_of(bodies, paths[1], times, legs)[:, :-1], modes))
     routes = ("joint coordinates, DOP853, modes by complementarity", "maximal coordinates, DOP853, modes by trial")
-    reason = "a change of the parameters within their accuracy changes which joints hold"
+    reason = "a change of the parameters within their accuracy changes which joints hold or hit a stop"
     one, two = units.record(mechanism, one), units.record(mechanism, two)
     return two_route_motion(mechanism, paths, one, two, routes, reason, units)

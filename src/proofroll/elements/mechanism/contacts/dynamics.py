@@ -75,6 +75,16 @@ class ContactSolution:
     slide_rate: Array
     response: float
 
+    def lasts(self, mode: ContactMode) -> float:
+        """Time until an open contact closes at constant acceleration [s]; infinite: never."""
+        times = [np.inf]
+        for own, touch, rate in zip(mode, self.state.touching, self.slide_rate, strict=True):
+            if own.kind == "open":
+                opening = touch.normal @ rate + touch.normal_rate @ touch.slide
+                roots = np.roots([opening / 2, touch.normal @ touch.slide, touch.gap])
+                times += [root.real for root in roots if root.imag == 0 < root.real]
+        return min(times)
+
 
 class ContactDynamics:
     """A mechanism in the coordinates of its tree with its contacts: those between bodies, then laws of joints."""
