@@ -198,10 +198,11 @@ class ReportedVector:
             yield self.cause("clamped", says, explained, remedy, 1, _EXACT, _distinct(above, most), change)
 
     def _late(self, step: float | None) -> Iterator[Cause]:
-        off = np.nan_to_num(np.abs(self.reported - self.true))
-        differs = np.max(off.reshape(len(self.time), -1), axis=-1) > _FEW * self.before
-        shift = best_delay(self.time, self.reported, self.true) if np.count_nonzero(differs) >= _SEEN else None
-        if shift is None:
+        off = np.max(np.nan_to_num(np.abs(self.reported - self.true)).reshape(len(self.time), -1), axis=-1)
+        differs = np.count_nonzero(off > _FEW * self.before) >= _SEEN
+        shift = best_delay(self.time, self.reported, self.true) if differs else None
+        # a sample on the other side of a jump differs alone, which any curve through the jump explains by a delay
+        if shift is None or np.sort(off)[-2] <= 2 * shift[2]:
             return
         delay, before, after = shift
         # a method of first order, x + h v, is late by half a step without any mistake
