@@ -25,8 +25,8 @@ def test_a_sample_on_the_other_side_of_an_impact_is_no_delay() -> None:
     time = np.linspace(0.0, 0.3, 31)
 
     def velocity(impact: float, after: float) -> np.ndarray:
-        fall = np.where(time < impact, -2.0 - 9.81 * time, after - 9.81 * (time - impact))
-        return np.stack([0 * time, 0 * time, fall], axis=-1)
+        return np.outer(np.where(time < impact, 1.0, -after), [2.0, 0.3, -0.2])
 
-    told = ReportedVector("v_WB", "the velocity", "m/s", velocity(0.1 - 1e-9, 2.04), velocity(0.1 + 1e-9, 2.0), time)
+    reported, true = velocity(0.1 - 1e-9, 0.98), velocity(0.1 + 1e-9, 1.0)
+    told = ReportedVector("v_WB", "the velocity", "m/s", reported, true, time)
     assert not [cause.says for cause in told.causes(1e-3) if cause.id == "late.v_WB"]
