@@ -30,6 +30,8 @@ _SHORT, _MANY, _SHRUNK = 1e-6, 400, 0.9
 # After every _LOOK stretches the number still to come is estimated, unless they or their states shrink. _MOST:
 # stretches of a path at most, a minute of work.
 _LOOK, _MOST = 100, 1000
+# Stretches of a path at most after a close decision, for nothing is known there.
+_BEYOND = 50
 
 
 @dataclass(frozen=True)
@@ -165,7 +167,7 @@ def follow(
         Refused: by the route.
     """
     time, over, change, still = 0.0, 0.0, route.begin(), 0
-    short, longest = 0, 0.0
+    short, longest, since = 0, 0.0, 0
     legs: list[LegT] = []
     happenings: list[Happening] = []
     margins = []
@@ -173,7 +175,8 @@ def follow(
         over = max(over, time + change.delay)  # no change is reported before the delay of an earlier one is over
         happenings += [Happening(*what, over, change.blur) for what in change.happenings]
         margins.append((time, change.margin))
-        if change.mode is None:
+        since = since + 1 if since or change.margin < close else 0
+        if change.mode is None or since > _BEYOND:
             return HybridPath(tuple(legs), tuple(happenings), tuple(margins), known=False)
         end = next((at for at in breaks if time < at < until), until)
         leg = route.walk(time, change.state, change.mode, end)

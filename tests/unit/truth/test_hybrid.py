@@ -199,3 +199,24 @@ def test_a_path_that_ends_is_not_followed_further() -> None:
     path = follow(Stopping(), 1.0, (), 1e-9, 0.0)
     times = np.array([0.25, 0.5, 1.0])
     assert states_of(Stopping(), path, times, path.leg_at(times))[:, 0].tolist() == [0.25, 0.5, 0.5]
+
+
+def test_a_path_beyond_a_close_decision_is_short() -> None:
+    """After round-off has decided nothing is known: rebounds there are not followed for minutes."""
+
+    class Rebounding:
+        count = 0
+
+        def begin(self) -> Transition[str]:
+            return Transition(np.zeros(1), "flight", (), 0.0)
+
+        def walk(self, time: float, state: FloatArray, mode: str, until: float) -> Stretch[str]:
+            self.count += 1
+            return Stretch(time, min(time + 1e-2, until), mode, state, state, 0)
+
+        def change(self, leg: Stretch[str]) -> Transition[str]:
+            return Transition(leg.last, "flight", (), np.inf)
+
+    route = Rebounding()
+    assert not follow(route, 10.0, (), 1e-9).known
+    assert route.count <= 50

@@ -85,7 +85,9 @@ def two_route_motion(
     reach = np.maximum(units.length, np.maximum(largest(placed.p_WB), largest(placed.points)))
     bars["drift"] = np.maximum.accumulate(placed.drift() + ROUND_OFF * reach)
     horizon = min(parted, first_close(paths, CLOSE) * units.time)
-    happened = tuple(event for event in _events(*paths, units.time) if event.time < horizon)
+    # a change at the horizon is what the question hangs on, and may lie before it by the accuracy of times
+    certain = horizon - units.time * time_accuracy(horizon / units.time) if np.isfinite(horizon) else horizon
+    happened = tuple(event for event in _events(*paths, units.time) if event.time < certain)
     force = None if pressed is None else pressed[0]
     return TwoRouteMotion(masked, bars, differences, horizon, [], determinate, routes, None, happened, reason, force)
 
