@@ -40,6 +40,7 @@ from proofroll.engines.projection.elimination import Space
 from proofroll.engines.projection.elimination import solved as divided
 
 _RANK = 1e-10  # smallest singular value of independent contact rows, relative to the largest
+_OVERLAP = 1e-14  # overlap that is round-off, relative to the natural length
 _STANDS = 1e-6  # acceleration, relative to the natural one, too small to start a motion
 _REST = 1e-2  # slip speed, relative to gravity times a fixed step, below which slips end together with another one
 
@@ -83,7 +84,9 @@ class ContactMotion(AlternatingMotion[ContactMode]):
         self._rubs = self.friction + self._bounds > 0
         scale = natural_scale(mechanism)
         self._unit = math.prod(scale)  # natural speed
-        self._still, self._rate = scale.speed, scale.rate
+        self._still, self._rate, self._length = scale.speed, scale.rate, scale.length
+        # overlap of each contact when it opened, an error of the method: it is no impact
+        self._overlap = np.zeros(len(self.contacts))
         turns = [mechanism.joints[each.joint.number].kind != "prismatic" for each in self._joints]
         # length of each contact's motion by 1 m, or by 1 rad
         self._arms = np.array([1.0] * len(self._bodies) + [scale.length if turn else 1.0 for turn in turns])
@@ -94,6 +97,7 @@ class ContactMotion(AlternatingMotion[ContactMode]):
         self._limit_efforts(start)
         now = self.at(start)
         closed, still = closed_and_still(now.touching, scale.length / self._arms, scale.rate)
+        self.mode = tuple(OPEN for _ in self.contacts)
         self._enter(0.0, start, self._decided(now, closed, still))
 
     def _limit_efforts(self, y: Array) -> None:
@@ -253,6 +257,10 @@ class ContactMotion(AlternatingMotion[ContactMode]):
                 self._toward[k] = self._heading(k, there)
 
     def _enter(self, t: float, x: Array, mode: ContactMode) -> None:
+        opened = [k for k, own in enumerate(mode) if own.kind == "open" and self.mode[k].kind != "open"]
+        if opened:
+            gaps = np.array([each.gap for each in self.at(x).touching])
+            self._overlap[opened] = np.maximum(-gaps[opened], 0.0) + _OVERLAP * self._length
         x, self.mode = self._settled(x, mode), mode
         self._toward = [np.array(own.heading or (0.0, 0.0, 0.0)) for own in mode]
         self._look(x)
@@ -266,7 +274,7 @@ class ContactMotion(AlternatingMotion[ContactMode]):
         shared = sum(own.kind == "stick" or (own.kind == "slip" and s) for own, s in zip(self.mode, stops, strict=True))
         for k, (own, each) in enumerate(zip(self.mode, now.touching, strict=True)):
             if own.kind == "open":
-                ends.append(Excess(k, "impact", -each.gap, -float(each.normal @ each.slide)))
+                ends.append(Excess(k, "impact", -each.gap - self._overlap[k], -float(each.normal @ each.slide)))
                 continue
             N = float(each.normal @ force[k])
             if not self._bounds[k]:
@@ -291,6 +299,8 @@ class ContactMotion(AlternatingMotion[ContactMode]):
             motor = list(self._motors)[k - len(was)]
             self._equations.applied.modes = {**self._equations.applied.modes, motor: kind}
             return x, was, happened
+        if kind == "lift_off":
+            x = self._settled(x, was)  # a closing speed that the method left would hit at once
         now, closed = self.at(x), [own.kind != "open" for own in was]
         still = [own.kind == "stick" for own in was]
         if kind == "impact":
