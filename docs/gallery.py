@@ -12,6 +12,7 @@ import re
 import sys
 from pathlib import Path
 
+import numpy as np
 from made_from import facts, stamp
 from markdown_tables import caveat_list, choice_table, remark_list, verdict_table
 
@@ -110,7 +111,8 @@ def truth(outcome: Outcome) -> str:
         return f"There is none: {result.message}."
     dataset, name = point.reference.dataset, point.scene.deciding
     said = f"{result.message}."
-    if name in dataset and "error_bar" in dataset[name].attrs:
+    unique = name in dataset and not np.isnan(dataset[name].to_numpy()).all()  # else laws alone are true
+    if unique and "error_bar" in dataset[name].attrs:
         bar, unit = dataset[name].attrs["error_bar"], dataset[name].attrs["units"]
         said += f" Error bar of {name}: {number(float(bar))} {unit}."
     return said

@@ -271,3 +271,9 @@ def test_scales_have_floors() -> None:
     assert sizes["z"] == pytest.approx(turn) == pytest.approx(0.01 * rolling_ball(curved).ball.radius)
     assert 0 < sizes["energy_balance"] < 0.01
     assert 0 < sizes["slip"] < 0.01
+
+
+@pytest.mark.parametrize(("friction", "judged"), [({"mu_static": 0.2, "mu_kinetic": 0.15}, True), ({}, False)])
+def test_a_way_slipped_while_sticking_needs_no_tolerance_to_be_judged(friction: dict[str, float], judged: bool) -> None:
+    """A run that says it sticks while it slips differs whatever the file asks; one that cannot slip says nothing."""
+    assert load_scene("sphere_in_cylinder", **friction).observables["creep"].always is judged
