@@ -15,7 +15,7 @@ from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.sampling import BallBuilt, BallSample
 from proofroll.elements.ball_on_surface.surfaces import Generator
 from proofroll.engines.exudyn.ball import add_ball, add_body
-from proofroll.engines.exudyn.integration import ExudynModel, Integration
+from proofroll.engines.exudyn.integration import BallRun, Integration
 from proofroll.engines.exudyn.local_frame import LocalGeometry, local_geometry
 from proofroll.engines.exudyn.native import Output, exu, items
 from proofroll.engines.exudyn.settings import ExudynSettings
@@ -37,7 +37,7 @@ class RollingRow(NamedTuple):
     axis: FloatArray
 
 
-class Carrier(ExudynModel):
+class Carrier(BallRun):
     """Ball, carrier, two ``GenericJoint`` and two ``CoordinateConstraint`` at velocity level."""
 
     def __init__(self, body: RollingBall, settings: ExudynSettings) -> None:

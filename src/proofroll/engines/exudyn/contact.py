@@ -26,7 +26,7 @@ from proofroll.elements.ball_on_surface.mechanics import initial_response, natur
 from proofroll.elements.ball_on_surface.model import BallCapability, RollingBall
 from proofroll.elements.ball_on_surface.sampling import BallBuilt, BallSample
 from proofroll.engines.exudyn.ball import add_ball
-from proofroll.engines.exudyn.integration import ExudynModel, Integration
+from proofroll.engines.exudyn.integration import BallRun, Integration
 from proofroll.engines.exudyn.local_frame import curvature
 from proofroll.engines.exudyn.native import Output, items
 from proofroll.engines.exudyn.settings import ExudynSettings
@@ -48,7 +48,7 @@ DEAD = 1e-6
 ROUND_OFF = 1e-12
 
 
-class PenaltyContact(ExudynModel):
+class PenaltyContact(BallRun):
     """A rigid ball and one ``ObjectContactSphereSphere`` with a hollow sphere; needs no generators of the surface."""
 
     def __init__(self, body: RollingBall, settings: ExudynSettings) -> None:

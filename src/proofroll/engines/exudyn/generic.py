@@ -15,14 +15,14 @@ from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.sampling import BallBuilt, BallSample, terms_held
 from proofroll.engines.exudyn.friction import KineticFriction, Touch, needed_function
 from proofroll.engines.exudyn.generic_forces import SIZE, base, force_function, weight_function, weight_turns
-from proofroll.engines.exudyn.integration import ExudynModel, Integration, initial_matrices
+from proofroll.engines.exudyn.integration import BallRun, Integration, initial_matrices
 from proofroll.engines.exudyn.local_frame import local_geometry
 from proofroll.engines.exudyn.native import exu, items
 from proofroll.engines.exudyn.settings import ExudynSettings
 from proofroll.engines.exudyn.stick_slip import SwitchedIntegration
 
 
-class Generic(ExudynModel):
+class Generic(BallRun):
     """An ``ObjectGenericODE2`` with velocity-level constraints."""
 
     def __init__(self, body: RollingBall, settings: ExudynSettings) -> None:

@@ -37,6 +37,10 @@ class ExudynModel:
         """See :class:`proofroll.core.engine.Engine`."""
         self.integration.advance(t)
 
+
+class BallRun(ExudynModel):
+    """Run of a ball, whose integration locates stick, slip and lift-off."""
+
     def events(self) -> Sequence[Event]:
         """See :class:`proofroll.core.engine_abilities.LocatesEvents`."""
         return list(self.integration.events)

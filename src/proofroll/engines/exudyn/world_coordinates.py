@@ -17,12 +17,12 @@ from proofroll.core.errors import Refused
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.sampling import BallBuilt, BallSample, terms_held
 from proofroll.engines.exudyn.ball import resisting
-from proofroll.engines.exudyn.integration import ExudynModel, Integration, initial_matrices
+from proofroll.engines.exudyn.integration import BallRun, Integration, initial_matrices
 from proofroll.engines.exudyn.native import Output, items
 from proofroll.engines.exudyn.settings import ExudynSettings
 
 
-class WorldCoordinates(ExudynModel):
+class WorldCoordinates(BallRun):
     """Two ``MassPoint`` and a ``CoordinateVectorConstraint`` with user functions; needs no generators of the wall."""
 
     def __init__(self, body: RollingBall, settings: ExudynSettings) -> None:

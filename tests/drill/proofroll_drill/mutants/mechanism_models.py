@@ -40,10 +40,6 @@ class MechanismMutant(Mutant):
         """Mechanism that it builds."""
         return mechanism
 
-    def events(self) -> list[Any]:
-        """None."""
-        return []
-
 
 def of_bodies(mechanism: Mechanism, change: Any) -> Mechanism:
     """Each body changed."""
