@@ -134,7 +134,7 @@ def locate_rise(
             known[time] = np.minimum(values, 0.0) if leaving and time <= start else values
         return known[time]
 
-    rises = []
+    rises, crests = list[tuple[float, int]](), list[float]()
     below = stays_negative(lambda times: np.array([at(float(t)) + near for t in times]), start, end)
     nearly = np.broadcast_to(near, np.shape(below))
     for number in np.flatnonzero(np.logical_not(below)).tolist():
@@ -143,11 +143,13 @@ def locate_rise(
         if rise is not None:
             rises.append((rise, number))
         if grazes is not None and nearly[number] and (crest := graze(own, start, end, nearly[number])) is not None:
-            grazes.append(crest if rise is None else min(rise, crest))
+            crests.append(crest if rise is None else min(rise, crest))
+    span = width = 1e-4 * (end - start)
+    if grazes is not None:  # after a rise the motion is another; a joint that rubs turns at its crest
+        grazes += [crest for crest in crests if not rises or crest <= min(rises)[0] + span]
     if not rises:
         return None
-    (time, number), width = min(rises), 1e-4 * (end - start)
-    span = width
+    time, number = min(rises)
     state = inside_last_step(solver, time)
     for _ in range(4):
         rates = solver.fun(time, state)

@@ -39,3 +39,20 @@ def test_a_rise_is_known_to_a_bracket_that_is_not_empty(level: float, rises: flo
     assert rise is not None
     assert rise.width > 0
     assert abs(rise.time - rises) <= 4 * max(rise.width, float(np.spacing(0.5)))
+
+
+def test_a_crest_after_a_rise_in_the_same_step_is_no_graze() -> None:
+    """What another guard would have reached after the first one rose does not happen; before it, it does."""
+    start = np.array([0.0, 1.0])
+    solver = solver_from(lambda _, y: np.array([1.0, 0.0 * y[1]]), 0.0, start, 1e-13, 1e-13)
+    solver.h_abs = 1.0
+    controlled_step(solver, None, 1.0)
+    assert (solver.t_old, solver.t) == (0.0, 1.0)
+    for hit, seen in ((0.4, 0), (0.8, 1)):
+        grazes: list[float] = []
+        rise = locate_rise(
+            solver, lambda y, hit=hit: np.array([y[0] - hit, -((y[0] - 0.6) ** 2)]), near=1e-9, grazes=grazes
+        )
+        assert rise is not None
+        assert rise.time == pytest.approx(hit, abs=1e-12)
+        assert len(grazes) == seen
