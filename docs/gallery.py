@@ -12,7 +12,6 @@ import re
 import sys
 from pathlib import Path
 
-import numpy as np
 from made_from import facts, stamp
 from markdown_tables import caveat_list, choice_table, remark_list, verdict_table
 
@@ -25,6 +24,7 @@ from proofroll.files.scene_file import read_scene_file, scene_names
 from proofroll.files.toml import study_of
 from proofroll.report.comparison.lines import lines_of
 from proofroll.report.comparison.records import ReportedComparison
+from proofroll.report.comparison.spread import ALONE
 from proofroll.report.comparison.summary import outcome_content
 from proofroll.report.page.choice_matrix import ChoiceStudy, choice_matrix
 from proofroll.report.page.html import templates
@@ -103,16 +103,17 @@ def drawn_scene(scene: str, name: str) -> tuple[str, str]:
     return text + "\n", drawings[0].label
 
 
-def truth(outcome: Outcome) -> str:
-    """By which routes the truth was found, and how well it is known at the first point."""
+def truth(outcome: Outcome, laws_alone: bool) -> str:
+    """By which routes the truth was found, and how well it is known at the first point, if the motion is unique."""
     point = next(iter(outcome.points.values()))
     result = point.result
     if point.reference is None:
         return f"There is none: {result.message}."
     dataset, name = point.reference.dataset, point.scene.deciding
+    if laws_alone:
+        return f"{result.message}. So engines are {ALONE}."
     said = f"{result.message}."
-    unique = name in dataset and not np.isnan(dataset[name].to_numpy()).all()  # else laws alone are true
-    if unique and "error_bar" in dataset[name].attrs:
+    if name in dataset and "error_bar" in dataset[name].attrs:
         bar, unit = dataset[name].attrs["error_bar"], dataset[name].attrs["units"]
         said += f" Error bar of {name}: {number(float(bar))} {unit}."
     return said
@@ -149,7 +150,8 @@ def section(scene: str, comparison: Comparison | None, runner: Runner) -> str:
     content = outcome_content(outcome)
     path = f"comparisons: {comparison.name}"
     parts.append(standings(outcome))
-    parts += [f"**Asked** ({path}): {comparison.question}\n", f"**True**: {truth(outcome)}\n"]
+    said = truth(outcome, content.laws_alone)
+    parts += [f"**Asked** ({path}): {comparison.question}\n", f"**True**: {said}\n"]
     # Without costs, which are measured in turns where that is asked.
     table = "".join(line.rstrip("\n").rsplit("|", 2)[0] + "|\n" for line in verdict_table(content).splitlines())
     parts += [table, failures(content) + caveat_list(content) + remark_list(content)]

@@ -31,8 +31,8 @@ CHOICE_MEANINGS = {
 def choice_table(groups: Mapping[str, Mapping[str, Sequence[str]]]) -> str:
     """One line per formulation, one column per group of scenes, from the standing in each of its scenes.
 
-    All scenes held: the sign alone; some: how many of how many; none: the sign of the best standing. The style sheet
-    knows the table by its container, and makes it as narrow as a phone.
+    All scenes held: the sign alone; some: how many of how many that are judged; none: the sign of the best standing.
+    The style sheet knows the table by its container, and makes it as narrow as a phone.
     """
     order = [str(item) for item in Verdict]
     rows = dict.fromkeys(name for rows in groups.values() for name in rows)
@@ -41,10 +41,11 @@ def choice_table(groups: Mapping[str, Mapping[str, Sequence[str]]]) -> str:
         cells = []
         for group in groups.values():
             states = group.get(name, [])
+            states = [state for state in states if state != Verdict.NOT_JUDGED] or states
             held = sum(state == Verdict.AGREES for state in states)
             sign = SYMBOLS[min(states, key=order.index)] if states else ""
             cells.append(f"{sign} {held}/{len(states)}" if 0 < held < len(states) else sign)
-        lines.append(f"| {name} | " + " | ".join(cells) + " |")
+        lines.append(f"| {name.replace('_', '_<wbr>')} | " + " | ".join(cells) + " |")
     scenes = max((len(states) for rows in groups.values() for states in rows.values()), default=0)
     held_in = " (4/7: in 4 of 7 scenes)" if scenes > 1 else ""
     shown = [word for word in CHOICE_MEANINGS if any(SYMBOLS[word] in line for line in lines)]

@@ -163,11 +163,21 @@ def test_the_first_page_shows_the_matrix_of_the_gallery(monkeypatch: pytest.Monk
     assert (tmp_path / "matrix.inc").read_text(encoding="utf-8") == written
     for page in ("index", "gallery"):
         assert "{include} gallery/matrix.inc" in (ROOT / "docs" / f"{page}.md").read_text(encoding="utf-8")
-    two = {"trees": {"alpha": ["agrees", "differs"], "beta": ["converges"]}, "loops": {"alpha": ["agrees"]}}
-    lines = gallery.choice_table(two).splitlines()
-    assert lines[3:5] == ["| alpha | ✓ 1/2 | ✓ |", "| beta | ≈ |  |"]
-    for sign in set(re.findall(r"[^\w\s|/:-]", written.partition("```\n\n")[0].partition("|---")[2])):
+    trees = {"alpha": ["agrees", "not-judged", "differs"], "be_ta": ["converges"], "gamma": ["not-judged"]}
+    lines = gallery.choice_table({"trees": trees, "loops": {"alpha": ["agrees"]}}).splitlines()
+    assert lines[3:6] == ["| alpha | ✓ 1/2 | ✓ |", "| be_<wbr>ta | ≈ |  |", "| gamma | □ |  |"]
+    for sign in set(
+        re.findall(r"[^\w\s|/:-]", written.replace("<wbr>", "").partition("```\n\n")[0].partition("|---")[2])
+    ):
         assert f"{sign} " in written.partition("```\n\n")[2], sign
+
+
+def test_the_gallery_gives_no_error_bar_where_no_motion_is_unique() -> None:
+    """A section whose engines are held to laws alone has no error bar and no errors, and there are such sections."""
+    sections = (ROOT / "docs" / "gallery.md").read_text(encoding="utf-8").split("\n## ")[1:]
+    laws_alone = [section for section in sections if "laws of mechanics alone" in section]
+    assert {section.partition("\n")[0] for section in laws_alone} >= {"cradle", "dominoes", "painleve_rod"}
+    assert not [section for section in laws_alone if "Error bar" in section or "positions [m]" in section]
 
 
 def test_the_nightly_workflow_parses_and_runs_what_there_is() -> None:

@@ -63,7 +63,9 @@ def test_forces_that_are_not_judged_are_no_failure(proofroll: Proofroll, report:
     assert code == 0
     ball = json.loads(out)["advice"][1]
     assert ball["choice"] == "beta joints default at dt 1e-3 s"
-    assert ball["sentence"].startswith("For ball rolling forces are not judged; for motion alone to 1e-3 take beta")
+    assert ball["sentence"].startswith(
+        "For ball rolling (ball) forces are not judged; for motion alone to 1e-3 take beta"
+    )
 
 
 def test_without_a_tolerance_a_report_answers_for_that_of_its_first_screen(proofroll: Proofroll, report: Path) -> None:
@@ -74,6 +76,14 @@ def test_without_a_tolerance_a_report_answers_for_that_of_its_first_screen(proof
     assert (code, out, err.count("\n")) == (2, "", 1)
     assert "--tolerance = ''" not in err
     assert "--tolerance is missing" in err
+
+
+def test_without_a_report_no_option_is_blamed_that_was_not_given(proofroll: Proofroll, tmp_path: Path) -> None:
+    """The line names the file that is looked for, and what writes it."""
+    code, out, err = proofroll("recommend", "arm", "ball", "--out", str(tmp_path))
+    assert (code, out, err.count("\n")) == (2, "", 1)
+    assert f"stored report = '{tmp_path}/report.json': cannot be read" in err
+    assert "proofroll report writes one" in err
 
 
 @pytest.mark.parametrize(
@@ -94,3 +104,10 @@ def test_what_a_report_cannot_answer_is_one_line(
     assert (code, out) == (2, "")
     assert words in err
     assert len(err.splitlines()) <= 2
+
+
+def test_one_group_is_advised_from_the_report_of_the_folder(proofroll: Proofroll, report: Path) -> None:
+    """A group is no scene, but a report has its runs; its advice is that of the report's first screen."""
+    code, out, err = proofroll("recommend", "rolling", "--out", str(report.parent), "--json")
+    assert (code, err) == (0, "")
+    assert json.loads(out)["advice"][0]["of"] == "ball rolling"

@@ -33,6 +33,20 @@ window.reading = (() => {
     return [...document.querySelectorAll("section[id]")].filter(silent).map((section) => section.id);
   }
 
+  // Texts in which a number like 1e-4 stands in two lines.
+  function broken() {
+    const found = [], texts = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT), range = document.createRange();
+    for (let text; (text = texts.nextNode());) {
+      if (!/\de-\d/.test(text.data) || text.parentElement.closest("script, style, svg")) continue;
+      for (const number of text.data.matchAll(/\d[\d.]*e-\d+/g)) {
+        range.setStart(text, number.index);
+        range.setEnd(text, number.index + number[0].length);
+        if (new Set([...range.getClientRects()].map((box) => Math.round(box.top))).size > 1) found.push(`${number[0]} in ${text.data.trim()}`);
+      }
+    }
+    return found;
+  }
+
   // Where links lead to and a reader who follows them sees nothing, everything being folded before.
   async function lost() {
     const links = new Map([...document.querySelectorAll("a[href^='#']")].map((link) => [link.hash, link]));
@@ -131,5 +145,5 @@ window.reading = (() => {
     return parseFloat(transitionDuration) > 0.01 || parseFloat(animationDuration) > 0.01 || scrollBehavior === "smooth";
   }).map(named);
 
-  return { undrawn, empty, lost, faint, wide, cut, reachable, visits, moving };
+  return { undrawn, broken, empty, lost, faint, wide, cut, reachable, visits, moving };
 })();

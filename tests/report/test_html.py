@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import json
 import math
+import re
 from pathlib import Path
 from typing import Any
 
@@ -40,6 +41,30 @@ def test_page_needs_no_other_file_and_no_network(html: str, parse: Any) -> None:
         assert tag not in {"link", "iframe", "object", "base"}
 
 
+@pytest.mark.drill
+def test_an_address_is_the_same_in_a_report_of_more(everything: Any, tmp_path: Path, parse: Any) -> None:
+    """With another comparison before it, and without its first row, the ids of a comparison, its rows and runs stay."""
+    first = everything.content.comparisons[0]
+    other = dataclasses.replace(first, name="other", title="Other")
+
+    def ids(*comparisons: Any) -> set[str]:
+        content = dataclasses.replace(everything.content, comparisons=list(comparisons))
+        whole = dataclasses.replace(everything, content=content, curves=len(comparisons) * everything.curves)
+        text = whole.write(tmp_path / "report.html").read_text(encoding="utf-8")
+        found = {attributes.get("id", "") for _, attributes in parse(text).tags}
+        return {name for name in found if "invented" in name or "-rows-" in name}
+
+    alone = ids(first)
+    assert len(alone) > 50
+    assert alone <= ids(other, first)
+    runs = [dataclasses.replace(run, row=run.row - 1) for run in first.runs if run.row]
+    fewer = dataclasses.replace(first, rows=first.rows[1:], runs=runs)
+    assert {name for name in ids(fewer) if "second" in name or "default" in name} <= alone
+    assert {run.run_id(row, point) for run, row, point in ((fewer, 0, ""), (fewer, 2, "x"))} == {
+        first.run_id(1, ""), first.run_id(3, "x")
+    }  # fmt: skip
+
+
 def test_plotly_is_there_once_and_comes_back_as_it_was(html: str, unpack: Any) -> None:
     """The bundle is in the page once, compressed, and unpacked it is what its makers ship."""
     bundle = plotly.offline.get_plotlyjs()
@@ -68,9 +93,11 @@ def test_every_row_and_every_run_appears(written: tuple[dict[str, Any], Path], h
     elements = parse(html)
     ids = [attributes["id"] for _, attributes in elements.tags if "id" in attributes]
     assert len(ids) == len(set(ids))
-    for row in range(4):
-        for point in range(2):
-            assert f"c0-r{row}-p{point}" in ids
+    (comparison,) = content["comparisons"]
+    assert len(comparison["runs"]) == 8
+    for run in comparison["runs"]:
+        named = comparison["rows"][run["row"]]["engine"], run["point"]
+        assert ".".join(["evidence-invented", *("-".join(re.findall(r"\w+", text)) for text in named)]) in ids
     titles = {attributes.get("title") for tag, attributes in elements.tags if tag == "th"}
     assert {row["engine"] for row in content["comparisons"][0]["rows"]} <= titles
     assert "gamma is not installed here" in elements.text

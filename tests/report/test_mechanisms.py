@@ -14,7 +14,14 @@ from browsing import Visit
 from scipy.spatial.transform import Rotation
 
 from proofroll.core.errors import Refused
+from proofroll.core.scene import Scene
 from proofroll.core.truth import truth
+from proofroll.elements.mechanism.contacts.geometry import Geometry, Pair
+from proofroll.elements.mechanism.element import MechanismElement
+from proofroll.elements.mechanism.joint import Joint
+from proofroll.elements.mechanism.model import Mechanism
+from proofroll.elements.mechanism.parts import Body
+from proofroll.elements.mechanism.report.drawing import mechanism_drawing
 from proofroll.elements.mechanism.report.replay import _turned, draw_mechanism
 from proofroll.files.comparison_file import load_comparison
 from proofroll.files.scene_file import load_scene
@@ -124,6 +131,28 @@ def test_forces_of_contact_are_replayed_at_the_shapes() -> None:
         (0, -0.75, [0.02] * 3),
         (0, 0.75, [0.02] * 3),
     ]
+
+
+def test_a_bore_is_replayed_as_a_tube_along_the_way() -> None:
+    """A tube around the bore's axis, as long as the way of the balls in it and its diameter."""
+    body = Body("b", 1.0, inertia=(4e-4, 4e-4, 4e-4))
+    joint = Joint("j", "free", "world", "b", q0=(0.0, 0.1, 0.0, 1, 0, 0, 0), v0=(1.0, 0, 0, 0, 0, 0))
+    shapes = (
+        Geometry("ball", "b", "sphere", radius=0.1),
+        Geometry("tube", "world", "bore", (0.0, 0.0, -0.3), radius=0.5, axis=(1, 0, 0)),
+    )
+    mechanism = Mechanism(
+        (body,), (joint,), gravity=(0, 0, 0), geometries=shapes, pairs=(Pair("hit", ("ball", "tube"), 0.1),)
+    )
+    scene = Scene("flying", "", (MechanismElement(mechanism),))
+    case, _, _ = draw_mechanism(Replayed(scene, truth(scene, np.linspace(0.0, 0.2, 3)), "", [], "ball", "as it is"))
+    tube = case["shapes"][1]
+    assert (tube["kind"], tube["body"]) == ("bore", 1)  # on the world, which comes after the bodies
+    assert tube["at"] == pytest.approx([0.1, 0.0, -0.3])
+    assert tube["half"] == pytest.approx([0.5, 0.5, 0.6])
+    assert Rotation.from_quat(tube["turn"]).apply([0, 0, 1]) == pytest.approx([1, 0, 0])
+    (ring,) = [mark for mark in mechanism_drawing(scene.elements[0]).marks if getattr(mark, "look", "") == "hidden"]
+    assert len(ring.points) > 50
 
 
 def test_bodies_of_vertices_are_replayed_as_rods_around_them() -> None:

@@ -13,7 +13,8 @@ import pytest
 from browsing import Visit
 
 Visiting = Callable[..., AbstractContextManager[Visit]]
-PICTURE = "document.querySelector('[data-precision=c0] .canvas')"
+PART = "[data-precision=evidence-invented]"
+PICTURE = f"document.querySelector('{PART} .canvas')"
 TRACES = f"{PICTURE}.data.filter((trace) => trace.name && trace.name !== 'choice')"
 
 
@@ -21,7 +22,7 @@ TRACES = f"{PICTURE}.data.filter((trace) => trace.name && trace.name !== 'choice
 def seen(report_page: Path, visit: Visiting) -> Iterator[Visit]:
     """The page with the pictures of its comparison drawn."""
     with visit(report_page, viewport={"width": 1280, "height": 900}) as opened:
-        opened.page.locator("[data-precision=c0]").scroll_into_view_if_needed()
+        opened.page.locator(PART).scroll_into_view_if_needed()
         opened.wait(f"({PICTURE}.data ?? []).length > 0")
         yield opened
 
@@ -43,26 +44,43 @@ def test_each_engine_has_a_panel_with_the_others_in_grey(seen: Visit) -> None:
 @pytest.mark.drill
 def test_a_mouse_points_and_zooms(seen: Visit) -> None:
     """No legend lies on a panel; a point says what it is; a drag zooms all panels, and a double click returns."""
-    part = seen.page.locator("[data-precision=c0]")
-    panels = [item.bounding_box() for item in part.locator(".nsewdrag").all()]
+    part = seen.page.locator(PART)
     legends = [item.bounding_box() for item in part.locator(".infolayer > [class^=legend]").all()]
+    panels = [item.bounding_box() for item in part.locator(".nsewdrag").all()]
     assert len(legends) == len(panels) == 2
     below = [legend["y"] >= panel["y"] + panel["height"] for legend in legends for panel in panels]
     assert all(below), (legends, panels)
-    point = part.locator(".points path.point").last.bounding_box()
-    seen.page.mouse.move(point["x"] + point["width"] / 2, point["y"] + point["height"] / 2)
-    seen.wait("document.querySelector('[data-precision=c0] .hoverlayer').textContent.includes('of the size')")
+    mouse = seen.page.mouse
+
+    def box_of(what: str) -> dict[str, float]:
+        """Box of a drawn part in the middle of the screen."""
+        part.locator(".canvas").evaluate("(canvas) => canvas.scrollIntoView({ block: 'center' })")
+        return part.locator(what).first.bounding_box()
+
+    # Each is repeated where it is waited for: what is drawn above may move the panels between a look and a click.
+    def point() -> None:
+        mouse.move(0, 0)
+        box = box_of(".points path.point >> nth=-1")
+        mouse.move(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
+
+    def drag() -> None:
+        box = box_of(".nsewdrag")
+        mouse.move(box["x"] + 40, box["y"] + 40)
+        mouse.down()
+        mouse.move(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2, steps=4)
+        mouse.up()
+
+    def reset() -> None:
+        box = box_of(".nsewdrag")
+        mouse.dblclick(box["x"] + 60, box["y"] + 60)
+
+    seen.wait(f"document.querySelector('{PART} .hoverlayer').textContent.includes('of the size')", again=point)
     spans = f"JSON.stringify([{PICTURE}.layout.xaxis.range, {PICTURE}.layout.xaxis2.range])"
-    whole, left = seen.page.evaluate(spans), panels[0]
-    seen.page.mouse.move(left["x"] + 40, left["y"] + 40)
-    seen.page.mouse.down()
-    seen.page.mouse.move(left["x"] + left["width"] / 2, left["y"] + left["height"] / 2, steps=4)
-    seen.page.mouse.up()
-    seen.wait(f"{spans} !== {whole!r}")
+    whole = seen.page.evaluate(spans)
+    seen.wait(f"{spans} !== {whole!r}", again=drag)
     first, second = json.loads(seen.page.evaluate(spans))
     assert first == second
-    seen.page.mouse.dblclick(left["x"] + 60, left["y"] + 60)
-    seen.wait(f"{spans} === {whole!r}")
+    seen.wait(f"{spans} === {whole!r}", again=reset)
 
 
 @pytest.mark.drill
@@ -74,9 +92,9 @@ def test_quantity_tolerance_and_engines_are_chosen(seen: Visit) -> None:
     slider.press("Home")
     seen.wait(f"{ring} !== {before}")
     assert seen.page.evaluate(ring) < before
-    seen.page.locator("[data-precision=c0] select").select_option(label="forces (largest of all reactions)")
+    seen.page.locator(f"{PART} select").select_option(label="forces (largest of all reactions)")
     seen.wait(f"{PICTURE}.layout.annotations.length === 1")
-    seen.page.locator("[data-precision=c0] select").select_option(index=0)
+    seen.page.locator(f"{PART} select").select_option(index=0)
     seen.page.get_by_role("checkbox", name="alpha").uncheck()
     seen.wait(f"{TRACES}.length === 1")
     seen.page.get_by_role("checkbox", name="alpha").check()
@@ -94,7 +112,7 @@ def test_an_error_beyond_all_size_is_cut_and_marked(everything: Any, tmp_path: P
     content = replace(everything.content, table=replace(table, lines=wild))
     page = replace(everything, content=content).write(tmp_path / "report.html")
     with visit(page, viewport={"width": 1280, "height": 900}) as opened:
-        opened.page.locator("[data-precision=c0]").scroll_into_view_if_needed()
+        opened.page.locator(PART).scroll_into_view_if_needed()
         opened.wait(f"({PICTURE}.data ?? []).length > 0")
         trace = opened.page.evaluate(f"{TRACES}.find(({{ name }}) => name === 'fine default')")
         assert trace["y"] == [1]

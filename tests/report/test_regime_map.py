@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -61,7 +62,8 @@ def test_file_is_a_picture_of_its_own(maps: list[xr.Dataset], tmp_path: Path) ->
 def test_report_shows_the_maps(made: tuple[Outcome, Store], maps: Any, tmp_path: Path, parse: Any) -> None:
     """Twice on one page, no id is used twice."""
     whole = begun([made[0]], "proofroll report")
-    parts = [RegimesPart(load_regimes("regimes"), maps=maps) for _ in range(2)]
+    asked = load_regimes("regimes")
+    parts = [RegimesPart(replace(asked, name=name), maps=maps) for name in ("regimes", "more")]
     whole.expect(parts, tmp_path)
     for part in parts:
         whole.make(part, lambda: None)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import json
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager
 from pathlib import Path
@@ -84,6 +85,33 @@ def test_a_table_downloads_as_csv(live: Visit, tmp_path: Path) -> None:
     assert all(len(row) == len(head) for row in rows)
     assert rows[1][3].startswith("differs ")
     assert [address for address in live.requested if not address.startswith(("file:", "blob:"))] == []
+
+
+@pytest.mark.drill
+def test_every_list_sorts_and_downloads(report_page: Path, visit: Visiting) -> None:
+    """Each table but a map, also with one row or joined cells; from four rows on it filters; nothing below moves."""
+    with visit(report_page, viewport={"width": 1280, "height": 900}) as opened:
+        opened.unfold()
+        lists = """[...document.querySelectorAll('.scroll > table:not(.heat)')].filter(
+          (table) => table.querySelectorAll('tbody tr:not(.group)').length > 0)"""
+        opened.page.evaluate(
+            f"window.lists = {lists}.map((table) => [table, table.tBodies[0].rows.length, table.closest('.scroll')])"
+        )
+        many = opened.page.evaluate("lists.length")
+        assert many > 20
+        room = """JSON.stringify(lists.map(([table, , region]) => [table.tHead.getBoundingClientRect().height,
+          table.id === 'choice' ? 0 : region.previousElementSibling.getBoundingClientRect().height]))"""
+        before = json.loads(opened.page.evaluate(room))
+        for number in range(many):
+            opened.page.evaluate(f"lists[{number}][2].scrollIntoView()")
+            opened.wait(f"lists[{number}][2].dataset.sorts === ''")
+        assert json.loads(opened.page.evaluate(room)) == [pytest.approx(sizes, abs=1) for sizes in before]
+        tools = "item[2].previousElementSibling.querySelector"
+        assert opened.page.evaluate(f"lists.every((item) => {tools}('button'))")
+        filters = f"{tools}('input') !== null"
+        rows = "item[0].querySelectorAll('tbody tr').length >= 4"
+        assert opened.page.evaluate(f"lists.every((item) => ({filters}) === ({rows}))")
+        assert opened.messages == []
 
 
 def test_hidden_engines_stay_hidden_in_a_table_that_sorts(live: Visit) -> None:

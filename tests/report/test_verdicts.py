@@ -16,6 +16,7 @@ from folded import whole
 from rich.console import Console
 
 from proofroll.core.convergence import Limit, richardson
+from proofroll.core.engine_abilities import Level
 from proofroll.core.verdict import Verdict
 from proofroll.report.comparison import tables
 from proofroll.report.comparison.conclusions import conclusions
@@ -101,7 +102,7 @@ def test_one_refused_case_of_eleven_shows_the_ten(made: tuple[Outcome, Store]) -
     assert verdict_text(row) == "refused 1/11 ✓10"
     assert row.reason == "at speed=6: one coefficient only"
     assert "⊘ refused 1/11 ✓10" in printed(content, 100)
-    first = next(iter(overview(content, 0).groups.values()))[0]
+    first = next(iter(overview(content).groups.values()))[0]
     assert (first.verdict_text, first.cells["z"].judgement.verdict) == ("refused 1/11 ✓10", "agrees")
 
 
@@ -117,7 +118,7 @@ def test_the_price_of_compiling_has_a_column(made: tuple[Outcome, Store]) -> Non
     assert "s before" in slow
     assert re.search(r" 24 ", slow)
     assert "s before" not in quick
-    pages = [str(templates().get_template("parts.html").module.matrix(overview(one, 0), "", "")) for one in contents]
+    pages = [str(templates().get_template("parts.html").module.matrix(overview(one), "", "")) for one in contents]
     assert ["before <small>s</small>" in page for page in pages] == [False, True]
     assert re.search(r'<td class="n">24</td>', pages[1])
 
@@ -175,7 +176,7 @@ def test_a_wrong_limit_within_tolerance_is_marked(outcome: Outcome) -> None:
     row = content.rows[2]
     assert row.verdict == "agrees"
     assert "✓ agrees*" in printed(content, 100)
-    assert "agrees*" in [line.verdict_text for lines in overview(content, 0).groups.values() for line in lines]
+    assert "agrees*" in [line.verdict_text for lines in overview(content).groups.values() for line in lines]
     (remark,) = row.remarks
     assert "shown not to be the truth: off by 4e-4 ± 1e-7 m, order 2" in remark
     assert f"* beta only: {remark}" in [line.replace(" (dt 1e-3 s)", "") for line in closing_lines(content)]
@@ -293,7 +294,32 @@ def test_the_cheapest_is_the_same_in_each_sentence_and_in_the_matrix(
     assert "4e-3 s" in cell.name if coarse < 0.2 else cell.cost == 0.2
     assert f"{cell.name} for {column.group} ({cell.text})" in content.findings.sentences[2]
     assert content.comparisons[0].evidence
-    assert f"the cheapest is {cell.name}: {cell.text} s" in content.comparisons[0].evidence.findings.answer
+    held = "To hold motion to 1e-4 of the path and forces to 1e-4 of the largest"
+    answer = content.comparisons[0].evidence.findings.answer
+    assert f"{held}, the cheapest is {cell.name}: {cell.text} s" in answer
+
+
+def test_equations_derived_for_a_scene_are_in_no_contest(made: tuple[Outcome, Store]) -> None:
+    """They are the cheapest, and neither the comparison's sentence nor that of the first page names them."""
+    runs: dict[int, list[Run]] = {0: [], 1: []}
+    for run in made[0].runs:
+        number = made[0].comparison.rows.index(run.row)
+        if number < 2:
+            assert run.facts is not None
+            facts = dataclasses.replace(run.facts, level=Level.PROJECTION if number == 0 else Level.CONSTRAINT)
+            engine = "derived" if number == 0 else facts.name
+            seconds = 0.01 if number == 0 else 0.2
+            result = dataclasses.replace(run.result, timings=[seconds], seconds_per_second=seconds)
+            judged = [dataclasses.replace(item, error=1e-9) for item in run.judgements]
+            facts = dataclasses.replace(facts, name=engine)
+            runs[number].append(dataclasses.replace(run, result=result, judgements=judged, facts=facts))
+    content = report_content([with_runs(made[0], runs)], "proofroll report invented")
+    assert {row.engine for row in content.choice.rows if row.own_equations} == {"derived"}
+    assert content.comparisons[0].evidence
+    answer = content.comparisons[0].evidence.findings.answer
+    assert "the cheapest is alpha" in answer
+    (drawn,) = content.precision.values()
+    assert {curve.engine for curve in drawn.curves if curve.own} == {"derived"}
 
 
 def test_every_verdict_is_documented() -> None:

@@ -66,7 +66,7 @@ def test_sections_answer_in_order(written_page: str, parse: Any) -> None:
     """What agrees, what to use, why; each section is there, has a heading and says something."""
     elements = parse(written_page)
     ids = [attributes["id"] for tag, attributes in elements.tags if tag == "section" and "id" in attributes]
-    assert ids == ["verdicts", "use", "findings", "speed0", "stability0", "c0", "made"]
+    assert ids == ["verdicts", "use", "findings", "study-tradeoff", "study-stability", "evidence-invented", "made"]
     assert "1 of 2 boundaries are passed in silence" in elements.text
     assert "good depends on mass" in elements.text
     assert "with at most 3 values for each axis" in elements.text
@@ -74,14 +74,14 @@ def test_sections_answer_in_order(written_page: str, parse: Any) -> None:
     assert "stability/sphere_in_cylinder/good-V0-8.py" in elements.text
     links = {attributes["href"][1:] for tag, attributes in elements.tags if tag == "a"}
     assert links <= {attributes.get("id") for _, attributes in elements.tags}
-    assert {"stability0-0", "stability0-1"} <= links, "each cell of the map leads to its boundary"
+    assert {"study-stability-0", "study-stability-1"} <= links, "each cell of the map leads to its boundary"
 
 
 def test_error_against_cost_is_drawn_where_runs_allow_it(report: Report, written_page: str) -> None:
     """The trade-off and the comparison have pictures, of all their engines, and a choice of their quantities."""
     found = report.content.precision
-    assert set(found) == {"speed0", "c0"}
-    assert {curve.engine for curve in found["c0"].curves} == {"alpha", "beta"}
+    assert set(found) == {"study-tradeoff", "evidence-invented"}
+    assert {curve.engine for curve in found["evidence-invented"].curves} == {"alpha", "beta"}
     for section, picture in found.items():
         part = written_page[written_page.index(f'data-precision="{section}"') :]
         assert part[: part.index("</select>")].count("<option") == len(picture.quantities)

@@ -291,8 +291,8 @@ class _Comparing:
         many, ran = len(self.plans), max(0, len(self.results) - (self.runner.reused - self._reused))
         left = (time.monotonic() - self._start) / ran * (len(self._keys) - len(self.results)) if ran else 0.0
         if self.limit and (used := self._budget - self.limit.left) > 0:
-            # On a machine that does other things, too, processor time passes slower.
-            left = min(left, self.limit.left * (time.monotonic() - self._start) / used)
+            # On a machine that does other things, too, processor time passes slower. The rest is judged in the end.
+            left = min(left, (self.limit.left + self.limit.after) * (time.monotonic() - self._start) / used)
         ended = sum(self._known(at) == len(item.cases) for at, item in enumerate(self.plans))
         of = f"{ended} of {many} comparisons ended, " if many > 1 else ""
         self.tell(f"{of}{f'about {float(written(left, 1)):g} s left, ' if ran else ''}{case.engine.name}")

@@ -15,6 +15,7 @@ from proofroll.cli.tradeoff import Over, measure, question_of, ranges_of, requir
 from proofroll.core.errors import InputError, ProofrollError, require_known
 
 if TYPE_CHECKING:
+    from proofroll.report.changes import EarlierReport
     from proofroll.studies.tradeoff.claims import TradeoffClaims
     from proofroll.studies.tradeoff.curve import Question
     from proofroll.studies.tradeoff.records import TradeoffStudy
@@ -53,11 +54,16 @@ def recommend(
     It chooses among models of engines; solutions of the scene's own equations (closed form, reduced, projection) are
     listed apart, unless --engine asks for them. Of the cheaper ones, which all fail, the most accurate is shown.
 
-    Of several scenes, studies or groups (as loops) the runs of a report answer, OUT/report.json unless --report names
-    another: a choice for each, and over all. The tolerance is then a part of the path, or '0.1 %' of it; by default
-    1e-4, as on the first screen. Where --forces asks for forces that are not judged, the choice is for motion alone.
+    For a group (as loops) and for several scenes or studies the runs of a report answer, OUT/report.json unless
+    --report names another: a choice for each, and over all. The tolerance is then a part of the path, or '0.1 %' of it;
+    by default 1e-4, as on the first screen. Where --forces asks for forces that are not judged, the choice is for
+    motion alone.
     """
-    if len(scenes) > 1 or forces or report is not None:
+    from proofroll.files.scene_file import is_scene
+
+    found = out / "report.json"
+    grouped = found.is_file() and not is_scene(scenes[0]) and not scenes[0].endswith(".toml")
+    if len(scenes) > 1 or forces or grouped or report is not None:
         given = {
             "--quantity": quantity,
             "--budget": budget,
@@ -69,7 +75,10 @@ def recommend(
         for name, value in given.items():
             if value:
                 raise InputError(name, value if value is not True else "given", "it is for one scene, without a report")
-        _from_report(scenes, tolerance, engine or [], report or out / "report.json", forces=forces, as_json=as_json)
+        from proofroll.report.changes import EarlierReport
+
+        stored = EarlierReport.read(report or found, "--report" if report else "stored report")
+        _from_report(scenes, tolerance, engine or [], stored, forces=forces, as_json=as_json)
     (scene,) = scenes
     from proofroll.core.plugins import engine_names, parse_engine, require_engine
     from proofroll.report.tradeoff.tables import answer_lines
@@ -92,14 +101,13 @@ def recommend(
 
 
 def _from_report(
-    names: list[str], tolerance: str, engines: list[str], path: Path, *, forces: bool, as_json: bool
+    names: list[str], tolerance: str, engines: list[str], report: EarlierReport, *, forces: bool, as_json: bool
 ) -> None:
     """Prints advice for several scenes from the runs of a report; exit code 1 if in one nothing holds the tolerance."""
-    from proofroll.report.changes import EarlierReport
     from proofroll.report.page.advice import advice
     from proofroll.report.page.choice_matrix import FIRST_TOLERANCE, ChoiceStudy, choice_matrix
 
-    lines = EarlierReport.read(path, "--report").lines
+    path, lines = report.path, report.lines
     for name in engines:
         require_known("--engine", name, sorted({line.engine for line in lines}), f"{path} has")
     lines = [line for line in lines if not engines or line.engine in engines]

@@ -23,6 +23,8 @@ def read_only(item: T) -> T:
     inside: Iterable[Any] = ()
     if isinstance(item, np.ndarray):
         item.flags.writeable = False
+    elif item is None or isinstance(item, str | int | float):
+        pass  # most of what is inside, and the tests below are slow
     elif isinstance(item, Mapping):
         inside = item.values()
     elif isinstance(item, (tuple, list)):

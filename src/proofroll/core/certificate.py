@@ -47,7 +47,7 @@ class Line:
         difference: relative to the quantity's scale; None if the engine does not report it.
         tolerance: largest difference that is accepted.
         because: reason for a tolerance above round-off; empty: the tolerance is round-off.
-        roundings: roundings of the scale, in the engine's precision, that an honest engine may lose.
+        roundings: allowed round-off, in the engine's machine epsilons times the scale.
     """
 
     quantity: str

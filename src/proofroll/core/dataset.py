@@ -24,6 +24,8 @@ Key = TypeVar("Key", bound=Hashable)
 _SHARED = frozenset({"time", "xyz", "wxyz", "between"})
 # Dimension of the samples off the grid of times, and prefix of the names of their variables.
 BETWEEN = "between"
+# A sample that is nearer to an impact than this part of the sampling interval lies on it.
+_ON_IMPACT = 1e-6
 
 
 def from_samples(scene: Scene, times: FloatArray, samples: Sequence[AnySample]) -> xr.Dataset:
@@ -140,14 +142,58 @@ def scales(scene: Scene, truth: xr.Dataset) -> dict[str, float]:
     return {name: max(size, floors[name]) if np.isfinite(size) else floors[name] for name, size in sizes.items()}
 
 
+def off_impacts(
+    scene: Scene, truth: xr.Dataset, runs: Mapping[Key, xr.Dataset]
+) -> tuple[xr.Dataset, dict[Key, xr.Dataset]]:
+    """Truth and runs without the samples that lie on an impact of the truth, where velocities have two values.
+
+    Which of them a run has there hangs on its last digits. The first sample stays; all stay where most lie on impacts,
+    as of a ball that bounces in time with the samples: else nothing would be judged.
+    """
+    times = truth.variables["time"].values
+    happened = [event for element in scene.elements for event in events_of(part(scene, element, truth))]
+    hits = np.array([event.time for event in happened if event.kind == "impact"])
+    near = _ON_IMPACT * float(np.max(np.diff(times), initial=0.0))
+    keep = ~np.any(np.abs(times[:, None] - hits) <= near, axis=1)
+    keep[:1] = True
+    if keep.all() or np.mean(keep) <= 0.5:
+        return truth, dict(runs)
+    return truth.isel(time=keep), {key: run.isel(time=keep[: run.sizes["time"]]) for key, run in runs.items()}
+
+
+def shared_events(
+    scene: Scene, truth: xr.Dataset, runs: Mapping[Key, xr.Dataset]
+) -> tuple[xr.Dataset, dict[Key, xr.Dataset]]:
+    """Truth and runs without events at their end that some of them have, and others would have a moment later.
+
+    Such an event lies no farther from the end than the widest bracket of an event and one sampling interval.
+    """
+    everything, times = [truth, *runs.values()], truth.variables["time"].values
+    for element in scene.elements:
+        parts = [part(scene, element, item) for item in everything]
+        events = [events_of(own) for own in parts]
+        fewest = min(map(len, events))
+        late = [event.time for one in events for event in one[fewest:]]
+        if not late:
+            continue
+        widest = max(event.time_high - event.time_low for one in events for event in one)
+        if min(late) >= times[-1] - min(widest, float(np.max(np.diff(times), initial=0.0))):
+            for number, own in enumerate(parts):
+                if len(events[number]) > fewest:
+                    everything[number] = with_part(scene, element, everything[number], own.isel(event=slice(fewest)))
+    return everything[0], dict(zip(runs, everything[1:], strict=True))
+
+
 def common_span(
     scene: Scene, truth: xr.Dataset, runs: Mapping[Key, xr.Dataset]
 ) -> tuple[xr.Dataset, dict[Key, xr.Dataset]]:
     """Truth and runs cut to the time in which they are comparable for every element (:class:`WatchesRuns`).
 
-    The element whose comparable time ends first ends it for all. Only that element keeps its events after the last
-    sample; later events of the other elements are dropped.
+    Samples on an impact are left out (:func:`off_impacts`), and events at the end that only some have
+    (:func:`shared_events`). The element whose comparable time ends first ends it for
+    all. Only that element keeps its events after the last sample; later events of the other elements are dropped.
     """
+    truth, runs = shared_events(scene, *off_impacts(scene, truth, runs))
     spans = {}
     for element in scene.elements:
         if isinstance(element, WatchesRuns):

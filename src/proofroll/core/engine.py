@@ -116,7 +116,7 @@ class Engine(Protocol):
         """State and reactions now, as a sample of the kind of element. Untimed; changes nothing."""
 
     def built(self) -> Any:
-        """Model read back from the engine at time 0, as a record of the kind of element; changes nothing."""
+        """Read-back of the built model at time 0, in the element's record type; without side effects."""
 
 
 class Scheme(StrEnum):

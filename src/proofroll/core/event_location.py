@@ -55,7 +55,7 @@ def stays_negative(function: Callable[[FloatArray], FloatArray], start: float, e
 
 
 def first_rise(function: Callable[[FloatArray], FloatArray], start: float, end: float) -> float | None:
-    """First time in (start, end] at which a function of times passes from negative to positive, or None.
+    """First time in [start, end] at which a function of times passes from negative to positive, or None.
 
     A polynomial through 20 Chebyshev points finds every root, also the pair under a crest that lies between the ends
     of a step; two secant steps on the function itself then polish the first.
@@ -71,10 +71,11 @@ def first_rise(function: Callable[[FloatArray], FloatArray], start: float, end: 
         return start if chebyshev.chebval(-1.0, slope) > 0 else None
     roots = chebyshev.chebroots(np.trim_zeros(coefficients, "b")) if np.any(coefficients) else np.empty(0)
     real = np.sort(np.real(roots[np.abs(np.imag(roots)) < 1e-9]))
-    rising = [x for x in real if -1 <= x <= 1 + 1e-12 and chebyshev.chebval(x, slope) > 0]
+    # a root at an end of the step is in the step, whatever its last digits
+    rising = [x for x in real if abs(x) <= 1 + 1e-12 and chebyshev.chebval(x, slope) > 0]
     if not rising:
         return None
-    x = rising[0]
+    x = max(rising[0], -1.0)
     for _ in range(2):
         steepness = float(chebyshev.chebval(x, slope))
         value = float(function(np.array([middle + half * x]))[0])

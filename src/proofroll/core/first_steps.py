@@ -34,7 +34,7 @@ _STIFF = 5e-3
 OF_FIRST_STEPS = " of the first steps"  # end of the quantity of such lines
 
 
-def first_steps(kind: Any, scene: Scene, settings: Any) -> list[Line]:
+def first_steps(kind: Any, scene: Scene, settings: Any, engine: Any = None) -> list[Line]:
     """Certificate lines of the acceleration and angular acceleration at time 0, derived from the first steps.
 
     A parabola and a cubic through the velocities after zero to three steps give the derivative at time 0; runs with
@@ -44,16 +44,15 @@ def first_steps(kind: Any, scene: Scene, settings: Any) -> list[Line]:
 
     An engine without a step is sampled after short times. There are no lines for an element whose motion has no
     direction yet (a ball at rest under rolling resistance), one that may come to rest within these steps, and a contact
-    so soft that its springs move first.
+    so soft that its springs move first. ``engine`` is at time 0 and says how soft it is; without it one is built.
 
     Raises:
         Diverged, Refused: by the engine.
     """
-    built = build(kind, scene, settings)
+    soft = softness(engine or build(kind, scene, settings), scene)
     lines = []
     for index, element in enumerate(scene.elements):
         start = element.first_motion
-        soft = softness(built, scene)
         if start is None or soft > _SPRINGS or _STEPS * (fixed_step(settings) or 0.0) >= start.lasts:
             continue
         lines += _lines(kind, scene, settings, index, start, soft)
@@ -117,7 +116,7 @@ def certificate(kind: Any, engine: Any, scene: Scene, settings: Any) -> list[Lin
     lines = certify(engine, scene, settings)
     granted = {line.quantity: line.tolerance for line in lines if line.standing is not Standing.NOT_REPORTED}
     derived = []
-    for line in derivable(kind, scene, settings):
+    for line in derivable(kind, scene, settings, engine):
         more = granted.get(line.quantity.replace(OF_FIRST_STEPS, ""))
         derived.append(line if more is None else replace(line, tolerance=max(line.tolerance, _STIFF) + more))
     contact_laws = [
@@ -129,13 +128,13 @@ def certificate(kind: Any, engine: Any, scene: Scene, settings: Any) -> list[Lin
     return [*lines, *contact_laws, *derived]
 
 
-def derivable(kind: Any, scene: Scene, settings: Any) -> list[Line]:
+def derivable(kind: Any, scene: Scene, settings: Any, engine: Any = None) -> list[Line]:
     """Lines of :func:`first_steps` that are precise enough: with a tolerance of at most :data:`MOST`.
 
     Empty if the engine fails (as its run will) or takes no finer step.
     """
     with contextlib.suppress(Diverged, Refused, InputError):
-        return [line for line in first_steps(kind, scene, settings) if line.tolerance <= MOST]
+        return [line for line in first_steps(kind, scene, settings, engine) if line.tolerance <= MOST]
     return []
 
 

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from enum import StrEnum
+from typing import Self
 
 
 class Role(StrEnum):
@@ -55,6 +56,10 @@ class Observable:
     hangs_on_events: bool = True
     absent: str = ""
     difference_of: str = ""
+
+    def __deepcopy__(self, _: object) -> Self:
+        """The observable itself, which is immutable: a scene has hundreds, and every engine gets a copy of it."""
+        return self
 
     @property
     def shown(self) -> str:

@@ -66,9 +66,9 @@ class Scene:
 
     @property
     def fully_asked(self) -> Self:
-        """The scene with all results asked for that its elements offer, as a truth needs it."""
-        asks = dict.fromkeys(ask for element in self.elements for ask in element.askable)
-        return replace(self, asks=tuple(asks))
+        """Copy of the scene that asks for every optional result of its elements, as a truth needs it."""
+        asks = tuple(dict.fromkeys(ask for element in self.elements for ask in element.askable))
+        return self if asks == self.asks else replace(self, asks=asks)
 
     @property
     def for_an_engine(self) -> Self:

@@ -107,7 +107,8 @@ def on_turns_of(
         None if the observable depends on turns without being periodic, so that no comparison is possible (the energy of
             a spring that turns wind up).
     """
-    marked = [run[name].attrs for run in datasets if name in run and UNCERTAIN in run[name].attrs]
+    own = [run.variables[name].attrs for run in datasets if name in run.variables]
+    marked = [attrs for attrs in own if UNCERTAIN in attrs]
     if not marked or other is None or values.shape != other.shape:
         return values
     if PERIOD not in marked[0]:

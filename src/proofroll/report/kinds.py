@@ -30,7 +30,7 @@ class ReportKind(Protocol):
 
     Attributes:
         template: in the folder ``templates`` beside the class's module, with the macro
-            ``truth(comparison, number, index, truth)``: facts of a truth besides its route; empty: none.
+            ``truth(comparison, truth)``: facts of a truth besides its route; empty: none.
         names: additional names for the template; they must differ from those of other kinds.
         caption: text below the drawings.
         replay_script: script in the folder ``templates`` that draws the kind's replays in a browser; empty: none. Its

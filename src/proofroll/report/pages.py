@@ -24,6 +24,12 @@ _PLACES = re.compile(
     re.DOTALL,
 )
 
+# What is no running text, and what is: between two tags. A browser breaks a line at the hyphen of ``1e-3``.
+_NO_TEXT = re.compile(r"(<(script|style|svg|option|title)\b.*?</\2>)", re.DOTALL)
+_TEXT = re.compile(r"(?:^|>)([^<]*\de-\d[^<]*)(?=<)")
+_EXPONENT = re.compile(r"\d[\d.]*e-\d+")
+_WORDS = 12  # of a label or a name in an address
+
 
 def environment(*folders: Path) -> jinja2.Environment:
     """Templates of the report and of further folders, read now, so that changes during a long run have no effect.
@@ -44,8 +50,22 @@ def environment(*folders: Path) -> jinja2.Environment:
 
 
 def rendered(templates: jinja2.Environment, name: str, **said: Any) -> str:
-    """Rendered page with addressed rows; a lone surrogate from an engine's message becomes a question mark."""
-    return addressed(templates.get_template(name).render(**said).encode("utf-8", "replace").decode("utf-8"))
+    """Rendered page with addressed rows and unbroken numbers; a lone surrogate of a message becomes a question mark."""
+    text = templates.get_template(name).render(**said).encode("utf-8", "replace").decode("utf-8")
+    return unbroken(addressed(text))
+
+
+def unbroken(html: str) -> str:
+    """Page without line breaks inside numbers as ``1e-3`` that are part of a longer text."""
+    pieces = _NO_TEXT.split(html)
+    del pieces[2::3]  # names of elements
+    pieces[::2] = (_TEXT.sub(_kept_whole, piece) for piece in pieces[::2])
+    return "".join(pieces)
+
+
+def _kept_whole(found: re.Match[str]) -> str:
+    alone = " " not in found[1].strip()
+    return found[0] if alone else _EXPONENT.sub(r'<span class="whole">\g<0></span>', found[0])
 
 
 def addressed(html: str) -> str:
@@ -67,7 +87,7 @@ def addressed(html: str) -> str:
         own = re.search(r' id="([^"]*)"', parts["row"])
         of = re.search(r' data-of="([^"]*)"', parts["row"])
         name = f"{at['engine']} {of[1] if of else ''} {re.sub('<[^>]*>', '', parts['cell'])}"
-        place = ".".join(filter(None, (at["section"], _slug(at["label"]), _slug(name) or "row")))
+        place = ".".join(filter(None, (at["section"], slug(at["label"], _WORDS), slug(name, _WORDS) or "row")))
         taken[place] += 1
         place += f"-{taken[place]}" if taken[place] > 1 else ""
         start = found[0] if own else f'<tr id="{place}"{parts["row"]}>{parts["cell"]}'
@@ -76,9 +96,14 @@ def addressed(html: str) -> str:
     return _PLACES.sub(address, html)
 
 
-def _slug(text: str) -> str:
-    """Text as a part of an address: its first twelve words in lower case, joined by hyphens."""
-    return "-".join(re.findall(r"\w+", markup.unescape(text).lower())[:12])
+def section_id(kind: str, name: str) -> str:
+    """HTML id of the section of a study: it has the same in a report of other studies."""
+    return f"{kind}-{slug(name)}"
+
+
+def slug(text: str, most: int | None = None) -> str:
+    """Text as a part of an address: its words, or the first of them, in lower case, joined by hyphens."""
+    return "-".join(re.findall(r"\w+", markup.unescape(text).lower())[:most])
 
 
 def packed(content: bytes) -> str:

@@ -17,6 +17,7 @@ from proofroll.core.errors import ProofrollError, require_known
 from proofroll.files.scene_sources import source_of
 from proofroll.files.toml import named_file, read_toml, study_files
 from proofroll.report.long_table import TableLine
+from proofroll.report.pages import section_id
 from proofroll.running.runner import Runner
 
 GROUP = "proofroll.report_parts"
@@ -44,6 +45,11 @@ class PartEntry:
     study: Any = None
     contradictions: Sequence[str] = ()
     lost: Sequence[str] = ()
+
+    @property
+    def section(self) -> str:
+        """HTML id of its section of a page."""
+        return section_id("study", self.name)
 
 
 class Part(Protocol):

@@ -151,6 +151,16 @@ class Drawing:
         if np.any(gravity):
             self.vector(np.asarray(place) + np.outer([0.0, _GRAVITY], unit(at(gravity))), "force", "g")
 
+    def covers(self, place: npt.ArrayLike, symbol: str) -> bool:
+        """True if letters centred at a place of the picture [px], shape (2,), would cover letters written before."""
+        x, y = np.asarray(place, dtype=np.float64)
+        return any(
+            abs(mark.y - y) < 1.5 * _LETTER
+            and abs(mark.x - x) < 0.5 * _LETTER * (len(symbol) + sum(len(part.text) for part in mark.parts))
+            for mark in self.marks
+            if isinstance(mark, Lettering)
+        )
+
     def text(
         self, place: npt.ArrayLike, symbol: str, look: str = "letter", beside: tuple[float, float] = (0.0, 0.0)
     ) -> None:

@@ -1,4 +1,4 @@
-"""Meaning of a file in a format that an engine defines (MJCF), asked of that engine in a separate process."""
+"""MJCF files compiled by MuJoCo in a separate process."""
 
 import contextlib
 import tempfile

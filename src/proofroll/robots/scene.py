@@ -187,7 +187,7 @@ def _follows(robot: Robot, mimic: Mimic) -> bool:
 
 
 def _couplings(file: RobotFile, robot: Robot) -> Iterator[str]:
-    """Clause for each coupling of a robot that a scene cannot represent: mimics, constraints, tendons, a medium."""
+    """Clauses on what a scene leaves out: mimics, equality constraints, tendons, a viscous medium."""
     for mimic in (mimic for mimic in robot.mimics if not _follows(robot, mimic)):
         yield f"joint {mimic.joint} following {mimic.other} (mimic)"
     if file.kind != "mjcf":

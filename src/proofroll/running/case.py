@@ -92,6 +92,7 @@ class EngineFacts:
         family: those laws that the scene requires, in one text; empty: none.
         precision: of its arithmetic, see :func:`proofroll.core.engine.precision_of`.
         scheme: integration rule, see :class:`proofroll.core.engine.Scheme`; empty: it declares none.
+        level: rung of the ladder of models, see :class:`proofroll.core.engine_abilities.Level`; empty: not declared.
         libraries: versions of Python, numpy and scipy, which decide the last digits; in another interpreter also a hash
             of all its packages.
     """
@@ -110,6 +111,7 @@ class EngineFacts:
     family: str = ""
     precision: str = "double"
     scheme: str = ""
+    level: str = ""
     libraries: dict[str, str] = field(default_factory=dict)
 
     @property
@@ -163,6 +165,7 @@ class Case:
         left_out = {"time_limit", *(name for name in ("asks", "turns", "between") if not getattr(self, name))}
         content = {name: value for name, value in asdict(self).items() if name not in left_out}
         content["engine"]["name"] = plain_name(self.engine.name)
+        del content["engine"]["level"]  # a word for people
         return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()[:24]
 
     @classmethod

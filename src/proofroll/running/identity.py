@@ -63,7 +63,7 @@ def resolve(engine: str, options: dict[str, Any], requires: Sequence[str] = ()) 
             raise InputError("truth", ", ".join(options), "the truth has no settings; leave them out")
         return dataclasses.asdict(EngineFacts("truth", truth_version(), _code_of(*load_truths()), {}))
     from proofroll.core.engine import precision_of, scheme_of
-    from proofroll.core.engine_abilities import LowersOrder, SharesEquations, TellsCaveats, laws
+    from proofroll.core.engine_abilities import LowersOrder, SharesEquations, TellsCaveats, TellsLevels, laws
     from proofroll.core.plugins import resolve_settings
     from proofroll.running.loading import load
 
@@ -82,6 +82,7 @@ def resolve(engine: str, options: dict[str, Any], requires: Sequence[str] = ()) 
         families=laws(kind, settings),
         precision=precision_of(settings),
         scheme=scheme_of(settings),
+        level=kind.levels.get(settings.formulation, "") if isinstance(kind, TellsLevels) else "",
         libraries=libraries(engine),
     )
     return dataclasses.asdict(facts)

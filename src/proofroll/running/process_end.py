@@ -20,9 +20,9 @@ _TICK = 0.25
 def interrupt_held() -> Iterator[None]:
     """Context manager that defers Ctrl-C to its end; processes started inside never receive it.
 
-    The signal mask is inherited by these processes, whose parent ends them. It does not stop another thread of this
-    process from taking the signal, for which Python would interrupt the main thread; so handlers that only take note
-    are installed for all handled signals. A second signal ends the process at once.
+    These processes inherit the signal mask; their parent ends them. The mask is not enough here, as another thread may
+    receive the signal: so handlers record each handled signal, which is raised at the end, also after an error. A
+    second signal ends the process at once.
     """
     waiting: list[int] = []
 
@@ -41,8 +41,8 @@ def interrupt_held() -> Iterator[None]:
         signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
         for number, handler in before.items():
             signal.signal(number, handler)
-    for held in waiting:
-        signal.raise_signal(held)
+        for held in waiting:  # also after an error, or it would be lost
+            signal.raise_signal(held)
 
 
 def end_at_once(*_: object) -> None:

@@ -12,7 +12,8 @@ from proofroll.running.time_budget import TimeBudget
 class WaitingCases:
     """Queue of cases that wait for a worker.
 
-    A worker gets cases of the same engine while there are any, as a new worker costs more than many cases.
+    A worker gets cases of the same engine while there are any among those with the smallest number: a new worker costs
+    more than many cases.
 
     Args:
         budget: processor time of the cases, or None.

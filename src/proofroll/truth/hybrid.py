@@ -129,7 +129,7 @@ class HybridRoute(Legs[ModeT, Stretch[ModeT]], Protocol):
     """Protocol of a route whose legs are stretches: states within are found from the state at the start."""
 
     def within(self, leg: Stretch[ModeT], times: FloatArray) -> FloatArray:
-        """States at rising times [s] within a leg, shape (times, state)."""
+        """States at increasing times [s] within a stretch, shape (times, state)."""
 
 
 @dataclass(frozen=True)

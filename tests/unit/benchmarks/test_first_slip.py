@@ -50,7 +50,7 @@ def random_balls(count: int) -> dict[str, FloatArray]:
 def test_the_papers_case(model: Any) -> None:
     """Every model finds the paper's first slip, and the place where it happens."""
     run = FirstSlip(rolling_ball(PAPER), model)
-    assert run.run(UNTIL) == pytest.approx(1.720183172, abs=1e-9)
+    assert run.run(UNTIL) == pytest.approx(1.720183172, abs=1e-9)  # by their last digits, here and below
     assert run.p_WB[2] == pytest.approx(-0.15342234, abs=1e-8)
     assert run.run(1.72) is None
     assert run.run(UNTIL) == pytest.approx(true_time(PAPER), abs=1e-12)

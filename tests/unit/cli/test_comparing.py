@@ -120,6 +120,17 @@ def test_the_time_that_is_left_is_never_less_than_none() -> None:
     assert said[2].startswith("about 50 s left"), "for a person, without a power of ten"
 
 
+def test_a_spent_budget_leaves_the_time_to_judge() -> None:
+    """Of 100 s the runs have used 90: the 10 s that are kept for judging are told, and not 0 s."""
+    said: list[str] = []
+    runner: Any = SimpleNamespace(reused=0, jobs=1)
+    running = _Comparing([], runner, TimeBudget(100.0, spent=90.0), None, said.append)
+    running._keys, running.results, running._budget = list("abcdefgh"), {"a": None}, 90.0  # type: ignore[assignment]
+    running._start -= 90.0
+    running._tell(SimpleNamespace(engine=SimpleNamespace(name="mujoco")))  # type: ignore[arg-type]
+    assert said[0].startswith("about 10 s left")
+
+
 def test_what_judging_took_is_kept_of_a_budget_for_the_end() -> None:
     """Four of twelve cases took 6 s to judge and to write, so all that have ended by now are given 12 s."""
     budget = TimeBudget(100.0)

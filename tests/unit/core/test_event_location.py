@@ -30,6 +30,7 @@ def test_an_oscillation_is_left_to_more_points(frequency):
         assert not (rises and stays)
 
 
+@pytest.mark.arithmetic
 @pytest.mark.parametrize(("level", "rises"), [(0.0, 0.0), (0.16, 0.2)])
 def test_a_rise_is_known_to_a_bracket_that_is_not_empty(level: float, rises: float) -> None:
     """Where a parabola of time passes a level lies in a bracket of some width."""
@@ -39,6 +40,13 @@ def test_a_rise_is_known_to_a_bracket_that_is_not_empty(level: float, rises: flo
     assert rise is not None
     assert rise.width > 0
     assert abs(rise.time - rises) <= 4 * max(rise.width, float(np.spacing(0.5)))
+
+
+@pytest.mark.parametrize("shift", [-1e-17, 0.0, 1e-17])
+def test_a_rise_at_the_start_of_a_step_is_in_it(shift: float) -> None:
+    """A function that is zero at the start but for round-off, and rises, has its rise there, whatever its sign."""
+    for slope in (1.0, 0.3, 7.0):
+        assert first_rise(lambda t, a=slope: a * t * (1 - t) + shift, 0.0, 0.7) == pytest.approx(0.0, abs=1e-15)
 
 
 def test_a_crest_after_a_rise_in_the_same_step_is_no_graze() -> None:

@@ -4,7 +4,7 @@ import dataclasses
 import sys
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from importlib.metadata import distributions
+from importlib.metadata import distribution, distributions
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -37,6 +37,17 @@ class Toy:
         "free": {"default": ToySettings("free", "default", 2e-3), "matched": ToySettings("free", "matched", 1e-3)},
         "chart": {"default": ToySettings("chart", "default", 4e-3)},
     }
+
+
+def test_everything_announced_is_there() -> None:
+    """Each entry point of the package loads: commands, studies, subjects of versions, and all others."""
+    announced = distribution("proofroll").entry_points
+    assert len(announced) > 25
+    for item in announced:
+        try:
+            item.load()
+        except Missing:  # an engine that is not installed says so
+            continue
 
 
 @pytest.mark.parametrize(

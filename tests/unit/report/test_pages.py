@@ -12,7 +12,7 @@ from proofroll.cli import options
 from proofroll.cli.report import report
 from proofroll.core.errors import InputError
 from proofroll.report.page import html
-from proofroll.report.pages import environment, rendered
+from proofroll.report.pages import environment, rendered, unbroken
 
 
 def test_templates_are_those_of_the_start(tmp_path: Path) -> None:
@@ -61,3 +61,20 @@ def test_words_are_escaped(tmp_path: Path) -> None:
     assert rendered(environment(tmp_path), "said.html", word="<One") == "&lt;One"
     with pytest.raises(jinja2.UndefinedError):
         rendered(environment(tmp_path), "said.html")
+
+
+def test_numbers_in_running_text_are_kept_whole() -> None:
+    """In sentences, lists of numbers and labels; one alone in a cell, attributes, scripts and pictures stay."""
+    whole = '<span class="whole">1e-4</span>'
+    assert unbroken("<td>0, 1e-4, 0</td>") == f"<td>0, {whole}, 0</td>"
+    assert unbroken("<b>to 1e-4</b> and 1e-4.<i></i>") == f"<b>to {whole}</b> and {whole}.<i></i>"
+    assert unbroken("<i><svg></svg>dt 1e-4 s</i>") == f"<i><svg></svg>dt {whole} s</i>"
+    for same in (
+        "<td>1e-4</td>",
+        '<td title="to 1e-4 m">to</td>',
+        "<script>a > 1e-4 && b < 1</script>",
+        "<svg><text>dt 1e-4 s</text></svg>",
+        "<option>dt 1e-4 s</option>",
+        "<p>the e-4 of 1e4</p>",
+    ):
+        assert unbroken(same) == same

@@ -107,6 +107,12 @@ def test_key_follows_all_that_decides_the_result(make_case: MakeCase) -> None:
     assert make_case("oracle", time_limit=1.0).key == case.key
 
 
+def test_the_rung_of_an_engine_decides_no_result(make_case: MakeCase) -> None:
+    """A formulation that is moved to another rung of the ladder keeps its stored results."""
+    case = make_case("oracle")
+    assert dataclasses.replace(case, engine=dataclasses.replace(case.engine, level="engine contact")).key == case.key
+
+
 def test_case_and_result_survive_json(make_case: MakeCase) -> None:
     """A case and a result are the same after a trip through JSON."""
     case = make_case("oracle", settings={"dt": 1e-3, "formulation": "free"}, parameters={"speed": 5.0})
@@ -295,6 +301,7 @@ def test_a_case_that_asks_nothing_keeps_its_key(make_case: MakeCase) -> None:
     case = make_case("oracle")
     later = {"time_limit", "asks", "turns", "between"}
     content = {key: value for key, value in dataclasses.asdict(case).items() if key not in later}
+    del content["engine"]["level"]
     assert case.key == hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()[:24]
     assert dataclasses.replace(case, turns=True).key != case.key
     asking = dataclasses.replace(case, asks=("orientation",))

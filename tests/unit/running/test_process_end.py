@@ -72,6 +72,18 @@ def test_a_time_limit_waits_until_processes_have_begun() -> None:
         assert (ended.returncode, ended.stdout, ended.stderr) == expected
 
 
+def test_an_interrupt_during_an_error_is_not_lost() -> None:
+    """Ctrl-C while processes are started, whose start then fails, interrupts as any other."""
+
+    def begin() -> None:
+        with interrupt_held():
+            signal.getsignal(signal.SIGINT)(signal.SIGINT, None)  # type: ignore[operator, misc, arg-type]
+            raise OSError("no process")
+
+    with pytest.raises(KeyboardInterrupt):
+        begin()
+
+
 def test_an_interrupt_waits_until_processes_have_begun() -> None:
     """Ctrl-C that another thread takes does not break the start of a process in two; it comes right after."""
     begins, began = threading.Event(), []

@@ -188,6 +188,15 @@ def test_a_joint_that_comes_back_to_the_stop_of_its_start_grazes_it() -> None:
     assert found.record.q[1] == pytest.approx(back.record.q[1], abs=TIGHT)
 
 
+def test_a_joint_that_starts_beyond_its_stop_by_rounding_leaves_it_without_an_impact() -> None:
+    """A pendulum released a billionth of its range beyond a stop falls as one without stops."""
+    free = load_scene("pendulum", angle=2.8).elements[0].mechanism  # type: ignore[attr-defined]
+    beyond = replace(free, joints=(replace(free.joints[0], limits=(-1.2, 2.8 - 3.9e-9)),))
+    found, fell = (truth_of(each, np.array([0.0, 0.5])) for each in (beyond, free))
+    assert (found.events, found.horizon) == ((), np.inf)
+    assert found.record.q[1] == pytest.approx(fell.record.q[1], abs=TIGHT)
+
+
 def test_friction_that_holds_does_not_creep() -> None:
     """A mass that its friction can hold stays, and friction carries the load."""
     held = Mechanism(

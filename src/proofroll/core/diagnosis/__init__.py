@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
 
@@ -16,6 +17,7 @@ import numpy as np
 
 from proofroll.core.arrays import FloatArray, largest_difference
 from proofroll.core.element import Element
+from proofroll.core.errors import NotUnique
 from proofroll.core.number_format import number
 
 if TYPE_CHECKING:
@@ -157,9 +159,13 @@ def diagnose(evidence: Evidence, hypotheses: Sequence[Hypothesis]) -> list[Cause
 
     A cause of a quantity that an earlier one explains already is kept only if it is as good, as an alternative, and
     only a few are. A cause with a fitted parameter is dropped if another fitted one is as good: neither proves
-    anything.
+    anything. A hypothesis ends where mechanics leaves open how its model would move; those before count.
     """
-    proven = [cause for item in hypotheses for cause in item.test(evidence) if cause.proven]
+    proven: list[Cause] = []
+    for item in hypotheses:
+        with suppress(NotUnique):
+            for cause in item.test(evidence):
+                proven += [cause] if cause.proven else []
     proven.sort(key=lambda cause: (cause.fitted, cause.left))
     causes: list[Cause] = []
     for cause in proven:

@@ -86,7 +86,10 @@ def singular_values(C: Array) -> Array:
 
 
 def least_norm_solution(matrix: Array, right: Array) -> Array:
-    """Vector x of least norm that minimises abs(matrix·x − right); singular values below RANK count as zero."""
+    """Vector x of least norm that minimises abs(matrix·x − right).
+
+    Singular values below RANK times the largest count as zero.
+    """
     return np.asarray(np.linalg.lstsq(matrix, right, rcond=RANK)[0], dtype=np.float64)
 
 

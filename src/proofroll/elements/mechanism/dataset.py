@@ -43,24 +43,28 @@ def from_samples(element: MechanismElement, times: FloatArray, samples: Sequence
         raise Diverged(lacking)
     wrench = np.array([[reactions(element, s, name) for name in ("joint_force", "joint_torque")] for s in samples])
     placed = placed_from(element, times, samples)
-    named = np.array([_named(element, sample) for sample in samples])
+    fields = {name: _over_time(samples, name, count) for name, count in lengths(element.mechanism).items()}
+    named = pick_named(element.mechanism, fields).T
     return columns(element, placed, wrench, given_forces(element.mechanism, samples), named)
 
 
 def placed_from(element: MechanismElement, times: FloatArray, samples: Sequence[MechanismSample]) -> Placed:
     """Motion of the bodies in samples at these times [s]."""
+    count = len(element.bodies)
 
     def stacked(name: str, width: int) -> FloatArray:
-        return np.array([np.reshape(getattr(sample, name), (len(element.bodies), width)) for sample in samples])
+        return np.array([np.asarray(getattr(sample, name)).reshape(count, width) for sample in samples])
 
     return Placed(
         element.mechanism, times, stacked("p_WB", 3), stacked("v_WB", 3), stacked("w_WB", 3), stacked("q_WB", 4)
     )
 
 
-def _named(element: MechanismElement, sample: MechanismSample) -> FloatArray:
-    counts = lengths(element.mechanism)
-    return pick_named(element.mechanism, {name: along(sample, name, count) for name, count in counts.items()})
+def _over_time(samples: Sequence[MechanismSample], name: str, count: int) -> FloatArray:
+    """The field :func:`along` coordinates of all samples, (time, count)."""
+    if all(getattr(sample, name) is None for sample in samples):
+        return np.full((len(samples), count), np.nan)
+    return np.array([along(sample, name, count) for sample in samples])
 
 
 def along(sample: MechanismSample, name: str, count: int) -> FloatArray:

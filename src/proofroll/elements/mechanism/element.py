@@ -329,10 +329,9 @@ class MechanismElement:
         found = {}
         if self.mechanism.has_events and "event_kind" in dataset:
             found["event_times"] = np.array([event.time for event in events_of(dataset)])
-        for item in self.observables:
-            if item.name not in dataset:
-                continue
-            values = dataset[item.name].to_numpy()
+        known = dataset.variables  # indexing a dataset would make coordinates, too
+        for item in (one for one in self.observables if one.name in known):
+            values = known[item.name].values
             values = values[1:] if item.role == Role.REACTION else values
             if not np.any(np.isnan(values)):
                 found[item.name] = values
@@ -340,7 +339,8 @@ class MechanismElement:
 
     def scales(self, truth: xr.Dataset) -> dict[str, float]:
         """See the protocol: ranges, largest reactions, and natural sizes of what should be zero."""
-        reach, speed = (float(np.max(np.ptp(truth[name].to_numpy(), axis=0))) for name in ("positions", "v_WB"))
+        known = truth.variables
+        reach, speed = (float(np.max(np.ptp(known[name].values, axis=0))) for name in ("positions", "v_WB"))
         by_motion = not self._own_length and reach and speed
         own = natural_sizes(self.mechanism, reach, speed) if by_motion else self._sizes
         natural = {"attitudes": 1.0, "energy_error": own["J"], "drift": own["m"]}
@@ -349,7 +349,7 @@ class MechanismElement:
         for item in self.observables:
             if item.role == Role.EVENT:
                 continue
-            values = truth[item.name].to_numpy() if item.name in truth else np.zeros(1)
+            values = known[item.name].values if item.name in known else np.zeros(1)
             if item.role == Role.REACTION and item.name not in natural:
                 sizes[item.name] = float(np.nanmax(np.abs(values), initial=0.0))
             else:

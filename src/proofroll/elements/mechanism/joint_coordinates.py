@@ -259,7 +259,7 @@ class JointCoordinates:
     def run_rk4(self, times: Array) -> Record:
         """Record of the motion at the given times [s], by Runge-Kutta 4 in equal steps of at most 2 ms.
 
-        Equal steps pass singular poses; error control would shrink its steps there for ever.
+        Fixed steps pass singular poses, where adaptive steps would shrink to zero.
         """
         nq = self.mechanism.nq
         states = zip(times, self.rk4_states(times, _EQUAL_STEP), strict=True)

@@ -62,8 +62,8 @@ def lengths(mechanism: Mechanism) -> Mapping[str, int]:
 
 
 def pick_named(mechanism: Mechanism, fields: Mapping[str, Array]) -> Array:
-    """Named forces [N, N m] picked from the fields of a sample, in the order of :func:`named_forces`, (forces,)."""
-    return np.array([fields[item.field][item.place] for item in named_forces(mechanism)], dtype=float)
+    """Named forces [N, N m] picked from fields, (…, places), in the order of :func:`named_forces`, (forces, …)."""
+    return np.array([fields[item.field][..., item.place] for item in named_forces(mechanism)], dtype=float)
 
 
 def joint_force_shares(at_stop: bool, friction: float, force: float) -> tuple[float, float]:

@@ -36,7 +36,7 @@ class Placed:
     known_q: FloatArray | None = None
 
     def __post_init__(self) -> None:
-        read_only(self)
+        read_only((self.time, self.p_WB, self.v_WB, self.w_WB, self.q_WB, self.known_q))
 
     @cached_property
     def R_WB(self) -> FloatArray:

@@ -12,6 +12,7 @@ from proofroll.core.errors import Refused
 from proofroll.elements.mechanism import Joint, Mechanism
 from proofroll.elements.mechanism.capabilities import ALL_JOINTS, FORCES, MechanismCapability, require
 from proofroll.elements.mechanism.joint import child_in_parent
+from proofroll.elements.mechanism.named_forces import named_forces
 from proofroll.elements.mechanism.rotations import Array, to_quaternion
 from proofroll.elements.mechanism.sampling import (
     DEPENDENT,
@@ -67,6 +68,20 @@ class MujocoMechanism(SteppedModel):
         self._mechanism = mechanism
         self._bodies = [self._model.body(body.name).id for body in mechanism.bodies]
         self._sites = [self._model.site(f"{number}").id for number in range(len(mechanism.joints))]
+        # Names are looked up once: in each sample they would cost more than the rest of it.
+        self._sensors = [
+            [int(self._model.sensor(f"{kind}{number}").adr[0]) for kind in ("FORCE", "TORQUE")]
+            for number in range(len(mechanism.joints))
+        ]
+        self._named = bool(named_forces(mechanism))
+        self._gears = [actuator.gear for actuator in mechanism.actuators]
+        couplings = map(mechanism_model.coupling_name, mechanism.couplings)
+        equalities = {self._model.equality(name).id: k for k, name in enumerate(couplings)}
+        places = {self._model.joint(joint.name).id: k for k, joint in enumerate(mechanism.joints) if joint.nq == 1}
+        dofs = {int(self._model.jnt_dofadr[own]): k for own, k in places.items()}
+        self._numbers = places, dofs, equalities
+        self._at_rest = np.full((2, len(mechanism.joints)), np.nan)
+        self._at_rest[:, list(places.values())] = 0.0
         # Sensors give the reactions, and only samples need them: in every step they would cost 5 to 20 % of it.
         self._model.opt.disableflags |= _NO_SENSORS
         for joint in mechanism.joints:
@@ -142,12 +157,12 @@ class MujocoMechanism(SteppedModel):
         for row, body in zip(twists, self._bodies, strict=True):
             mujoco.mj_objectVelocity(self._model, data, mujoco.mjtObj.mjOBJ_XBODY, body, row, 0)
         force, torque = self._reactions(data)
-        along = self._along(data)
+        along = self._along(data) if self._named else {}
         return MechanismSample(
-            p_WB=data.xpos[self._bodies].copy(),
-            v_WB=twists[:, 3:].copy(),
-            w_WB=twists[:, :3].copy(),
-            q_WB=data.xquat[self._bodies].copy(),
+            p_WB=data.xpos[self._bodies],
+            v_WB=twists[:, 3:],
+            w_WB=twists[:, :3],
+            q_WB=data.xquat[self._bodies],
             joint_force=force,
             joint_torque=torque,
             **along,
@@ -155,27 +170,21 @@ class MujocoMechanism(SteppedModel):
 
     def _along(self, data: Any) -> dict[str, Array]:
         """Efforts of actuators, and forces of couplings, dry friction and stops, along coordinates [N or N m]."""
-        model, mechanism = self._model, self._mechanism
-        gears = [actuator.gear for actuator in mechanism.actuators]
-        friction, stop = np.full((2, len(mechanism.joints)), np.nan)
-        coupling = np.zeros(len(mechanism.couplings))
-        equalities = {
-            model.equality(mechanism_model.coupling_name(item)).id: k for k, item in enumerate(mechanism.couplings)
-        }
-        places = {int(model.joint(joint.name).id): k for k, joint in enumerate(mechanism.joints) if joint.nq == 1}
-        dofs = {int(model.jnt_dofadr[own]): k for own, k in places.items()}
-        friction[list(dofs.values())] = stop[list(dofs.values())] = 0.0
-        kinds, rows = data.efc_type[: data.nefc].tolist(), self._rows(data, data.nefc)
+        model, (places, dofs, equalities) = self._model, self._numbers
+        friction, stop = self._at_rest.copy()
+        coupling = np.zeros(len(equalities))
+        kinds = data.efc_type[: data.nefc].tolist()
+        rows = self._rows(data, data.nefc) if kinds else None
         for row, (kind, own) in enumerate(zip(kinds, data.efc_id[: data.nefc].tolist(), strict=True)):
             force = float(data.efc_force[row])
             if kind == _ROW.mjCNSTR_EQUALITY and own in equalities:
                 coupling[equalities[own]] = force
             elif kind == _ROW.mjCNSTR_FRICTION_DOF and own in dofs:
                 friction[dofs[own]] = force
-            elif kind == _ROW.mjCNSTR_LIMIT_JOINT and own in places:
+            elif kind == _ROW.mjCNSTR_LIMIT_JOINT and own in places and rows is not None:
                 # a stop pushes up where the coordinate has a positive sign in its row
                 stop[places[own]] += force * float(np.sign(rows[row, int(model.jnt_dofadr[own])]))
-        return {"effort": data.actuator_force * gears, "coupling": coupling, "friction": friction, "stop": stop}
+        return {"effort": data.actuator_force * self._gears, "coupling": coupling, "friction": friction, "stop": stop}
 
     def _reactions(self, data: Any) -> tuple[Array, Array]:
         """Forces [N] and moments about the joint [N m] of joints and loops on the child, world axes.
@@ -187,8 +196,7 @@ class MujocoMechanism(SteppedModel):
         count = len(self._mechanism.joints)
         for number, site in enumerate(self._sites):
             R = data.site_xmat[site].reshape(3, 3)
-            force[number] = R @ data.sensor(f"FORCE{number}").data
-            torque[number] = R @ data.sensor(f"TORQUE{number}").data
+            force[number], torque[number] = (R @ data.sensordata[at : at + 3] for at in self._sensors[number])
         rows = {int(data.efc_id[row]): row for row in reversed(range(data.ne))}  # first row of each constraint
         for number, loop in enumerate(self._mechanism.loops):
             if loop.kind == "fixed":

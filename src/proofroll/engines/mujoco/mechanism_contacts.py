@@ -14,10 +14,11 @@ from proofroll.core.errors import Refused
 from proofroll.elements.mechanism import WORLD, Mechanism
 from proofroll.elements.mechanism.contacts.geometry import BodyContact
 from proofroll.elements.mechanism.contacts.shapes import (
+    Bore,
     CircleShape,
-    ConvexShape,
     EllipsoidShape,
     HalfSpace,
+    Shape,
     SphereShape,
 )
 from proofroll.elements.mechanism.contacts.start import touches
@@ -50,6 +51,10 @@ def check_contacts(mechanism: Mechanism, settings: MujocoSettings) -> None:
         check_coefficients([contact.friction], settings, "a contact")
         sides = ((contact.body_a, contact.shape_a), (contact.body_b, contact.shape_b))
         for (body, shape), (_, other) in (sides, sides[::-1]):
+            if isinstance(shape, Bore):
+                raise Refused(
+                    f"{contact.name} is in a bore; MuJoCo's shapes are convex, and facets are another surface"
+                )
             if isinstance(shape, HalfSpace) and body in moving and not isinstance(other, SphereShape):
                 raise Refused(
                     f"the plane of {contact.name} moves with {body}; MuJoCo's planes stand, and a box in its place "
@@ -88,7 +93,7 @@ def _set_pair_law(pair: Any, contact: BodyContact, settings: MujocoSettings) -> 
         pair.solreffriction = (-1e-9, -1 / settings.dt)
 
 
-def _set_shape(geom: Any, shape: ConvexShape | HalfSpace, moves: bool) -> None:
+def _set_shape(geom: Any, shape: Shape, moves: bool) -> None:
     if isinstance(shape, HalfSpace):
         frame = frame_of_axis(shape.normal)
         geom.quat = to_quaternion(frame)
@@ -98,6 +103,7 @@ def _set_shape(geom: Any, shape: ConvexShape | HalfSpace, moves: bool) -> None:
         else:
             geom.type, geom.size, geom.pos = mujoco.mjtGeom.mjGEOM_PLANE, (0.0, 0.0, 1.0), shape.point
         return
+    assert not isinstance(shape, Bore)  # refused
     geom.pos = shape.centre
     if isinstance(shape, SphereShape):
         geom.type, geom.size = mujoco.mjtGeom.mjGEOM_SPHERE, (max(shape.radius, _VERTEX), 0.0, 0.0)

@@ -56,7 +56,7 @@ class Pinocchio:
         "composite": Level.CONSTRAINT,
         "free_flyer": Level.CONSTRAINT,
         "contact": Level.CONTACT,
-        "null_space": Level.PROJECTION,
+        "null_space": Level.CONSTRAINT,
         "constraint_dynamics": Level.CONSTRAINT,
         "impulses": Level.CONTACT,
     }

@@ -80,7 +80,7 @@ class Composite(BallWithRows):
         self.v_scale = np.concatenate([self._speed / metres, np.full(3, self._speed / self._radius)])
 
     def rows(self, data: Any, q: FloatArray, v: FloatArray) -> ContactRows:
-        """See :class:`~proofroll.engines.pinocchio.ball_with_rows.BallWithRows`; the two rolling rows."""
+        """Rows of no slip; see :class:`~proofroll.engines.pinocchio.ball_with_rows.BallWithRows`."""
         model, ball, a, axes = self.model, self.ball, self._radius, pin.LOCAL_WORLD_ALIGNED
         # computeAllTerms does not touch data.a, so the bias needs forwardKinematics with a joint acceleration of zero
         pin.forwardKinematics(model, data, q, v, self._rest)
@@ -104,7 +104,7 @@ class Composite(BallWithRows):
         return ContactRows(frame, directions.dot(jacobian), drift, resistance)
 
     def _along_axes(self) -> _AlongAxes | None:
-        """Constant terms along the ball's axes; None if they depend on the position."""
+        """Slip Jacobian in the ball's axes if it is the same everywhere; else None."""
         here, elsewhere = (self._own_jacobian(self.q0 + shift) for shift in _SHIFTS)
         if not np.allclose(here, elsewhere, rtol=1e-12, atol=1e-12):
             return None

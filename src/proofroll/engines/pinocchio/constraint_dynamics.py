@@ -38,7 +38,7 @@ class ConstraintDynamics:
     """
 
     def __init__(self, tree: JointTree, proximal: float) -> None:
-        """Takes the term μ of the proximal method."""
+        """Builds the constraints; ``proximal`` is the regularisation μ of Pinocchio's proximal solver."""
         self._tree, self._model, self.on_couplings = tree, tree.model, np.zeros(0)
         self.proximal = _ACCURACY, proximal, _ITERATIONS
         self._proximal = pin.ProximalSettings(*self.proximal)

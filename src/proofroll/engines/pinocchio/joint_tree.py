@@ -48,10 +48,9 @@ class JointTree:
     """
 
     def __init__(self, mechanism: Mechanism, *, apart: bool = False) -> None:
-        """Builds the model; ``apart`` separates positions of free bodies from their orientations.
+        """Builds the model; with ``apart`` a free body is a translation in world axes and a rotation.
 
-        Velocities of a free-flyer joint turn with the body, and a step of semi-implicit Euler multiplies them by the
-        square root of 1 + (ω dt)²; with ``apart`` they have world axes.
+        In a free-flyer joint a step of semi-implicit Euler multiplies velocities by the square root of 1 + (ω dt)².
         """
         self.mechanism, self._apart = mechanism, apart
         self.model: Any = pin.Model()

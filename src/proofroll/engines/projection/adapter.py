@@ -46,7 +46,10 @@ class Projection:
     }
     settings: ClassVar[type[ProjectionSettings]] = ProjectionSettings
     presets: ClassVar[Mapping[str, Mapping[str, ProjectionSettings]]] = PRESETS
-    levels: ClassVar[Mapping[str, Level]] = dict.fromkeys(PRESETS, Level.PROJECTION)
+    levels: ClassVar[Mapping[str, Level]] = {
+        **dict.fromkeys(_OF_BALLS, Level.PROJECTION),
+        "dependent": Level.CONSTRAINT,
+    }
     terms: ClassVar[Sequence[Term]] = (
         Term(
             "elimination of violations",

@@ -325,7 +325,7 @@ class ContactMotion(AlternatingMotion[ContactMode]):
         return [float(arm * np.linalg.norm(slip_velocity(each))) for arm, each in pairs]
 
     def _stands(self, y: Array, mode: ContactMode) -> bool:
-        """True if nothing moves in a mode, or is about to move."""
+        """True if velocities and accelerations in a mode are zero within round-off."""
         if self._timed or any(own.kind == "slip" for own in mode):
             return False
         now = self.at(y := self._settled(y, mode))

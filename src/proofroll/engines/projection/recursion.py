@@ -116,7 +116,7 @@ def _four(twists: Array) -> Array:
 
 
 def _moments(forces: Array) -> Array:
-    """Components (moment about the origin, force) of matrices f pᵀ."""
+    """Spatial forces (moment about the origin, force), shape (..., 6), from their 4×4 matrices f pᵀ."""
     flat = forces[..., :3, :3].reshape(*forces.shape[:-2], 9)
     return np.concatenate([flat @ SKEW.T, forces[..., :3, 3]], axis=-1)
 

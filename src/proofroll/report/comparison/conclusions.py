@@ -52,8 +52,8 @@ def _answer(content: ReportedComparison, choice: ChoiceMatrix) -> str:
     for column in choice.columns:
         forces = not choice.unjudged[True].issuperset(column.studies)
         for _, cell in choice.ranked(column, FIRST_TOLERANCE, forces)[:1]:
-            text += f" For {NEEDS[forces]} to {number(FIRST_TOLERANCE)}, the cheapest is {cell.name}: {cell.text} s of "
-            text += "computing per simulated second."
+            needs = NEEDS[forces].format(number(FIRST_TOLERANCE))
+            text += f" To hold {needs}, the cheapest is {cell.name}: {cell.text} s of computing per simulated second."
     return text
 
 

@@ -12,6 +12,7 @@ from proofroll.report.long_table import TableLine
 from proofroll.running.case import Result, Status
 from proofroll.studies.comparison.outcome import LadderRun, Outcome, Run
 from proofroll.studies.comparison.planning import point_name
+from proofroll.studies.tradeoff.recommend import by_hand
 
 # Fields of a line about a ladder of steps, which only the step at which a comparison judges has.
 _NO_LIMIT: dict[str, Any] = dict.fromkeys(("order", "limit_error", "limit_error_bar", "limit_doubt"))
@@ -45,7 +46,7 @@ def _plain(outcome: Outcome, run: Run, row: int) -> TableLine:
         preset=words["preset"] or "",
         setting=words["setting"],
         precision=words["precision"],
-        own_equations=bool(run.shared),
+        own_equations=bool(run.shared) or (run.facts is not None and by_hand(run.facts.level)),
         resolution=words["resolution"] or "",
         step=words["resolution_value"],
         verdict=run.verdict,

@@ -14,6 +14,7 @@ from proofroll.core.verdict import Judgement, Verdict
 from proofroll.files.json_data import MERGED
 from proofroll.report.comparison.spread import Spread
 from proofroll.report.labels import names, unit
+from proofroll.report.pages import section_id, slug
 from proofroll.running.case import Result, Status
 from proofroll.running.timing import Timing
 
@@ -218,6 +219,22 @@ class ReportedComparison:
     beyond_budget: list[str] = field(default_factory=list)
     spread: list[Spread] = field(default_factory=list)
     evidence: ComparisonEvidence | None = field(default=None, metadata=MERGED)
+
+    @property
+    def section(self) -> str:
+        """HTML id of its evidence in a page."""
+        return section_id("evidence", self.name)
+
+    def point_id(self, point: str) -> str:
+        """HTML id of the evidence at a point."""
+        return f"{self.section}.at-{slug(point)}"
+
+    def run_id(self, row: int, point: str) -> str:
+        """HTML id of the evidence of a row at a point: it stays where other rows and points are left out."""
+        engine = self.rows[row].engine
+        again = [item.engine for item in self.rows[:row]].count(engine)
+        words = slug(engine) + (f"-{again + 1}" if again else "")
+        return ".".join(filter(None, (self.section, words, slug(point))))
 
     @property
     def unreached(self) -> str:

@@ -64,12 +64,7 @@ class Matrix:
     compiles: bool
 
 
-def anchor(comparison: int, row: int, point: int) -> str:
-    """HTML id of the evidence of one row at one point."""
-    return f"c{comparison}-r{row}-p{point}"
-
-
-def overview(content: ReportedComparison, comparison: int) -> Matrix:
+def overview(content: ReportedComparison) -> Matrix:
     """Verdict matrix of a comparison: the worst verdict of each row over all points."""
     points = list(dict.fromkeys(run.point for run in content.runs))
     lines, before = [], seconds_before(content)
@@ -77,7 +72,7 @@ def overview(content: ReportedComparison, comparison: int) -> Matrix:
         runs = content.runs_of(index)
         worst = next((run for run in runs if run.verdict == row.verdict), runs[0])
         slowest = (run.cost for run in runs if run.cost and run.seconds_per_second == row.seconds_per_second)
-        hrefs = {point: anchor(comparison, index, number) for number, point in enumerate(points)}
+        hrefs = {point: content.run_id(index, point) for point in points}
         cells = {name: Cell(item, hrefs[item.point], item.point) for name, item in row.observables.items()}
         shown = (verdict_text(row), hrefs[worst.point], row.message, row.as_expected, next(slowest, None))
         lines.append(MatrixLine(row, cells, *shown, before=before.get(index)))
@@ -92,12 +87,12 @@ def counted(content: ReportedComparison) -> str:
     return f"{plural(len(verdicts), 'settings')}: {counts}; {surprise if content.as_expected else 'not as expected'}"
 
 
-def at_point(content: ReportedComparison, comparison: int, point: int, name: str) -> Matrix:
+def at_point(content: ReportedComparison, name: str) -> Matrix:
     """Verdict matrix of one point of the parameters."""
     lines = []
     for run in content.runs:
         if run.point == name:
-            href = anchor(comparison, run.row, point)
+            href = content.run_id(run.row, name)
             cells = {judgement.observable: Cell(judgement, href) for judgement in run.judgements}
             message = run.message if run.status != "done" else ""
             shown = (run.verdict, href, message, not run.contradictions, run.cost, run.build_seconds)

@@ -5,9 +5,11 @@ import math
 from dataclasses import dataclass
 
 from proofroll.core.number_format import counted, number
-from proofroll.report.page.choice_matrix import ASKED, SEVERITY, ChoiceCell, ChoiceColumn, ChoiceMatrix
+from proofroll.core.verdict import Verdict
+from proofroll.report.page.choice_matrix import ASKED, NOT_RUN, SEVERITY, ChoiceCell, ChoiceColumn, ChoiceMatrix
 
 NOTHING = "nothing that was run and timed holds it"
+NOT_REACHED = "no run could be judged, for lack of time or of a truth"
 
 
 @dataclass(frozen=True)
@@ -76,6 +78,8 @@ def of_column(matrix: ChoiceMatrix, column: ChoiceColumn, tolerance: float, forc
     first, *others = engines.values()
     if judged is None:
         return Advised(column.title, f"{asked}: motion is not judged there.", judged=False)
+    if not _was_judged(matrix, column, tolerance, judged):
+        return Advised(column.title, f"{asked}: {NOT_REACHED}.")
     clauses = [_other(name, cell, first[1]) for name, cell in others]
     held = math.isfinite(first[1].cost)
     if held:
@@ -90,7 +94,10 @@ def of_column(matrix: ChoiceMatrix, column: ChoiceColumn, tolerance: float, forc
 def over_all(matrix: ChoiceMatrix, tolerance: float, forces: bool) -> Advised:
     """Advice over all studies: fewest formulations that hold the tolerance in most of them, the most useful first."""
     alone = {column.studies[0]: column for column in matrix.columns if len(column.studies) == 1}
-    columns = {name: column for name, column in alone.items() if name not in matrix.unjudged[forces]}
+    judged = {name: column for name, column in alone.items() if name not in matrix.unjudged[forces]}
+    columns = {name: column for name, column in judged.items() if _was_judged(matrix, column, tolerance, forces)}
+    if judged and not columns:
+        return Advised("all", f"Over all: {NOT_REACHED}.")
     if alone and not columns:
         return Advised("all", f"Over all: {'forces are' if forces else 'motion is'} judged in no study.")
     costs = {
@@ -126,6 +133,8 @@ def _use(costs: dict[str, float], missing: set[str]) -> tuple[int, float]:
 def _asked(matrix: ChoiceMatrix, column: ChoiceColumn, tolerance: float, forces: bool) -> tuple[str, bool | None]:
     """Head of a sentence, and whether the answer is about forces, too; None: motion is not judged."""
     title = column.title if column.whole else f"“{column.title}”"
+    if column.whole and len(column.studies) == 1:
+        title += f" ({column.studies[0]})"
     size = number(tolerance)
     if _unjudged(matrix, column, False):
         return f"For {title} to {size}", None
@@ -136,6 +145,12 @@ def _asked(matrix: ChoiceMatrix, column: ChoiceColumn, tolerance: float, forces:
 
 def _unjudged(matrix: ChoiceMatrix, column: ChoiceColumn, forces: bool) -> bool:
     return matrix.unjudged[forces].issuperset(column.studies)
+
+
+def _was_judged(matrix: ChoiceMatrix, column: ChoiceColumn, tolerance: float, forces: bool) -> bool:
+    """False if every formulation was left out there, say for lack of time."""
+    cells = (matrix.cell(row, column, tolerance, forces) for row in matrix.models)
+    return any(cell.state not in {NOT_RUN, Verdict.NOT_JUDGED} for cell in cells)
 
 
 def _engines(
@@ -164,6 +179,8 @@ def _other(name: str, cell: ChoiceCell, first: ChoiceCell) -> str:
     """Clause on another engine: its cost relative to the cheapest, or the reason why it does not hold the tolerance."""
     if math.isfinite(cell.cost):
         return f"{_named(name, cell)} costs {_times(cell.cost, first.cost)}"
+    if cell.state == Verdict.NOT_JUDGED:
+        return f"{name} was not judged"
     return f"{name} does not get there ({cell.why})" if cell.why else f"{_named(name, cell)} holds it, not timed"
 
 

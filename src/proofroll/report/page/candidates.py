@@ -1,6 +1,6 @@
 """Candidates for a choice: each setting with each of its steps in each study, over all places of the study."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import groupby
 
@@ -81,15 +81,15 @@ class Candidate:
         return max((item.at(tolerance) for item in both), key=_LIMITS.index)
 
 
-def candidates(lines: Sequence[TableLine], href: str, places: Sequence[str]) -> list[Candidate]:
+def candidates(lines: Sequence[TableLine], href: str, runs: Mapping[tuple[int, str], str]) -> list[Candidate]:
     """Candidates of one row of a study, its own step first.
 
-    ``href``: HTML id of the study's evidence; ``places``: places with evidence of their own, in the order of their ids.
+    ``href``: HTML id of the study's evidence; ``runs``: those of its runs, by row and place.
     """
     needed = list(dict.fromkeys(line.place for line in lines))
     own = lines[0].step
-    ladders, bounds = [_ladder(lines, role) for role in _ROLES], held_joints(lines)
-    anchors = {"": href} | {place: f"{href}-r{lines[0].row}-p{number}" for number, place in enumerate(places)}
+    ladders, bounds = [_ladder(lines, role) for role in _ROLES], held_tolerances(lines)
+    anchors = {"": href} | {place: run for (row, place), run in runs.items() if row == lines[0].row}
     steps = []
     for value in dict.fromkeys(line.step for line in lines):
         at = {place: [line for line in lines if line.step == value and line.place == place] for place in needed}
@@ -142,7 +142,7 @@ def _blame(judged: dict[str, list[TableLine]]) -> tuple[Verdict | None, str]:
     return None, ""
 
 
-def held_joints(lines: Sequence[TableLine]) -> dict[TableLine, float]:
+def held_tolerances(lines: Sequence[TableLine]) -> dict[TableLine, float]:
     """Smallest tolerance that each line's run holds without luck, relative to the quantity's size.
 
     The rule is that of the trade-off (:func:`proofroll.studies.tradeoff.pareto.envelope`) and that of a verdict: a

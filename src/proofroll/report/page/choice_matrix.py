@@ -6,6 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import groupby, product
+from types import MappingProxyType
 from typing import NamedTuple
 
 from proofroll.core.number_format import error, number
@@ -29,6 +30,8 @@ NOTHING = "nothing that was run and timed holds it for"
 UNJUDGED = "no scene that was run is judged by that"
 NOT_RUN = "none"
 SEVERITY = list(map(str, Verdict))
+# Number of groups beside which scenes find room on a screen of 1400 px.
+FEW = 5
 _WHY = {
     LimitResult.WITHIN: "finer steps come closer",
     LimitResult.NO_LADDER: "the closest of what was run",
@@ -60,11 +63,11 @@ class ChoiceCell(NamedTuple):
 
 
 class ChoiceStudy(NamedTuple):
-    """A study in the matrix: title, HTML id of its evidence, and places that have evidence of their own."""
+    """A study in the matrix: title, HTML id of its evidence, and those of its runs by row and place."""
 
     title: str
     href: str
-    places: Sequence[str] = ()
+    runs: Mapping[tuple[int, str], str] = MappingProxyType({})
 
 
 @dataclass(frozen=True)
@@ -109,8 +112,9 @@ class ChoiceMatrix:
 
     @property
     def unfolded(self) -> list[str]:
-        """Groups whose scenes are columns from the start: those of at most two."""
-        return [column.group for column in self.columns if column.whole and len(column.studies) <= 2]
+        """Groups whose scenes are columns from the start: those of at most two, unless there are many groups."""
+        groups = [column for column in self.columns if column.whole]
+        return [column.group for column in groups if len(column.studies) <= 2] if len(groups) <= FEW else []
 
     @property
     def engines(self) -> list[str]:
@@ -241,8 +245,8 @@ def choice_matrix(lines: Iterable[TableLine], studies: Mapping[str, ChoiceStudy]
     groups: dict[str, dict[str, None]] = {}
     derived = {(line.engine, line.formulation) for line in chosen if line.own_equations}
     for (name, _, _), own in groupby(chosen, key=lambda x: (x.study, x.row, x.engine)):
-        of_row, (_, href, places) = list(own), studies[name]
-        first, found = of_row[0], candidates(of_row, href, places)
+        of_row, (_, href, runs) = list(own), studies[name]
+        first, found = of_row[0], candidates(of_row, href, runs)
         groups.setdefault(first.group, {})[name] = None
         for setting in ("", first.setting or "as it is"):
             key = (first.engine, first.formulation, setting)
@@ -269,8 +273,8 @@ def _cell(steps: Sequence[Candidate], tolerance: float, forces: bool) -> ChoiceC
     held = [(item.cost if item.cost is not None else math.inf, size, item) for size, item in known if size <= tolerance]
     if held:
         cost, size, item = min(held, key=lambda entry: entry[:2])
-        text = "✓" if math.isinf(cost) else f"{'' if item.clean else '~'}{number(cost)}"
-        spent = "not timed" if math.isinf(cost) else f"{text} s of computing per simulated second"
+        text = "not timed" if math.isinf(cost) else f"{'' if item.clean else '~'}{number(cost)}"
+        spent = text if math.isinf(cost) else f"{text} s of computing per simulated second"
         title = f"{item.name}: within {number(size)}, {spent}"
         return ChoiceCell(Verdict.AGREES, text, title, item.href, cost, item.name)
     if known:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import functools
 import inspect
 import json
-import re
 import shlex
 from collections.abc import Mapping, Sequence
 from importlib import resources
@@ -30,14 +29,11 @@ from proofroll.running.case import host_sentences
 
 if TYPE_CHECKING:
     import jinja2
-    import markupsafe
 
     from proofroll.report.comparison.plots import PointCurves
     from proofroll.report.comparison.records import ReportedComparison, ReportedRun
     from proofroll.report.page.records import ReportContent
     from proofroll.report.replay.records import Replay
-
-_EXPONENT = re.compile(r"\d[\d.]*e-\d+")
 
 
 def page(
@@ -113,7 +109,6 @@ def _templates(kinds: tuple[type[Part] | type[ReportKind], ...]) -> jinja2.Envir
         "settings": labels.settings_text,
         "name_of": labels.name_of,
         "family_and_caveat": labels.family_and_caveat,
-        "unbroken": _unbroken,
         "plain": plain,
     }
     made.globals |= {
@@ -149,13 +144,6 @@ def _templates(kinds: tuple[type[Part] | type[ReportKind], ...]) -> jinja2.Envir
     for kind in kinds:
         made.globals |= kind.names
     return made
-
-
-def _unbroken(text: str) -> markupsafe.Markup:
-    """Sentence as markup without line breaks inside numbers like ``1e-3``, where browsers break at the hyphen."""
-    import markupsafe
-
-    return markupsafe.Markup(_EXPONENT.sub(r'<span class="whole">\g<0></span>', str(markupsafe.escape(text))))
 
 
 def _again(comparison: ReportedComparison, run: ReportedRun) -> str:

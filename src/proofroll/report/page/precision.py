@@ -8,7 +8,7 @@ from typing import NamedTuple
 from proofroll.core.verdict import Verdict
 from proofroll.report.labels import step, symbol
 from proofroll.report.long_table import TableLine
-from proofroll.report.page.candidates import held_joints, largest
+from proofroll.report.page.candidates import held_tolerances, largest
 
 # Least number of points of a picture; fewer are no more than a table.
 _FEWEST = 2
@@ -27,7 +27,7 @@ class PrecisionPoint(NamedTuple):
         errors: largest error of each quantity of the picture, relative to its size; None: not reported; 1e300: not
             finite.
         held: the smallest tolerance that the run holds without luck
-            (:func:`proofroll.report.page.candidates.held_joints`), in place of each error.
+            (:func:`proofroll.report.page.candidates.held_tolerances`), in place of each error.
     """
 
     step: str
@@ -62,7 +62,7 @@ def work_precision(lines: Iterable[TableLine]) -> WorkPrecision | None:
     judged = [line for line in lines if line.verdict not in _UNJUDGED]
     named = list(dict.fromkeys(line.quantity for line in judged if line.scale))
     groups = [role for role in ("motion", "reaction") if any(line.role == role and line.scale for line in judged)]
-    bounds = held_joints(judged)
+    bounds = held_tolerances(judged)
     curves: dict[tuple[str, str, str, str], list[TableLine]] = {}
     for line in judged:
         curves.setdefault((line.engine, line.formulation, line.setting, line.resolution), []).append(line)

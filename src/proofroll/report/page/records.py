@@ -139,11 +139,13 @@ class ReportContent:
     def choice(self) -> ChoiceMatrix:
         """Choice matrix of the comparisons and of the trade-offs that have results."""
         studies = {
-            item.name: ChoiceStudy(item.title, f"c{number}", list(dict.fromkeys(run.point for run in item.runs)))
-            for number, item in enumerate(self.comparisons)
+            item.name: ChoiceStudy(
+                item.title, item.section, {(run.row, run.point): item.run_id(run.row, run.point) for run in item.runs}
+            )
+            for item in self.comparisons
         }
-        swept = enumerate(self.entries.get("tradeoffs", ()))
-        studies |= {item.name: ChoiceStudy(item.title, f"speed{number}") for number, item in swept if item.study}
+        swept = [item for item in self.entries.get("tradeoffs", ()) if item.study]
+        studies |= {item.name: ChoiceStudy(item.title, item.section) for item in swept}
         return choice_matrix(self.table.lines, studies)
 
     @property
@@ -165,8 +167,8 @@ class ReportContent:
     @cached_property
     def precision(self) -> dict[str, WorkPrecision]:
         """Work–precision pictures by the id of their section, for studies with enough timed runs."""
-        sections = {item.name: f"c{number}" for number, item in enumerate(self.comparisons)}
-        sections |= {item.name: f"speed{number}" for number, item in enumerate(self.entries.get("tradeoffs", ()))}
+        sections = {item.name: item.section for item in self.comparisons}
+        sections |= {item.name: item.section for item in self.entries.get("tradeoffs", ())}
         lines: dict[str, list[TableLine]] = {name: [] for name in sections}
         for line in self.table.lines:
             lines.get(line.study, []).append(line)

@@ -57,6 +57,9 @@
       return `${head} ${[least === null ? unheld : `take ${name} (${text} s/s)`, ...others].join("; ")}.`;
     }), `This is of ${chosen(true).join(", ") || "no engine"} alone. What serves all scenes, and what forces change, is said of all engines together.`];
   }
+  // A text whose numbers as 1e-3 are not broken, as `unbroken`.
+  const put = (place, text) => place.replaceChildren(...text.split(/(\d[\d.]*e-\d+)/).map(
+    (part, at) => at % 2 ? Object.assign(document.createElement("span"), { className: "whole", textContent: part }) : part));
   async function show() {
     const place = (forces.checked ? count : 0) + Number(slider.value) - first;
     told.textContent = `1e-${slider.value}`;
@@ -65,10 +68,10 @@
     const cheapest = (asked) => data.ranks[asked].map((ranked) => ranked.find(([at]) => !rows[at].classList.contains("off")));
     const best = cheapest(place);
     rows.forEach((row, i) => data.grid[i].forEach((numbers, j) => fill(row.cells[j + 1], data.cells[numbers[place]], best[j]?.[0] === i, best[j]?.[2])));
-    answer.textContent = sentence(best, data);
-    document.getElementById("also").textContent = forces.checked ? "" : also(best, cheapest(place + count), data);
+    put(answer, sentence(best, data));
+    put(document.getElementById("also"), forces.checked ? "" : also(best, cheapest(place + count), data));
     const words = advised(JSON.parse(await unpack("all-words"))[place]);
-    document.querySelectorAll("#words li").forEach((line, i) => { line.textContent = words[i]; });
+    document.querySelectorAll("#words li").forEach((line, i) => put(line, words[i]));
     table.dataset.at = place;
     table.dispatchEvent(new Event("filled"));
   }

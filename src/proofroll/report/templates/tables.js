@@ -9,9 +9,9 @@
     });
     return library;
   }
-  const regular = (table) => table.tHead?.rows.length === 1 && !table.matches(".heat")
-    && ![...table.querySelectorAll("[rowspan], thead [colspan], tbody:not([data-engine]) [colspan]")].length;
-  const few = (table) => table.querySelectorAll("tbody tr:not(.group)").length < 4;
+  // A map is no list: its numbers are rows of the table of its boundaries.
+  const sorts = (table) => !table.matches(".heat") && rowsOf(table) > 0;
+  const rowsOf = (table) => table.querySelectorAll("tbody tr:not(.group)").length;
 
   // Rows of engines one after the other, each with its engine: a table that sorts has neither groups nor joined cells.
   function flatten(table) {
@@ -25,7 +25,7 @@
           if (row.cells[0].textContent.trim() !== part.dataset.engine) row.cells[0].prepend(`${part.dataset.engine} `);
         }
         for (const joined of row.querySelectorAll("[colspan]")) {
-          row.querySelector(".word").append(Object.assign(document.createElement("small"), { className: "why", textContent: joined.textContent, title: joined.textContent }));
+          (row.querySelector(".word") ?? row.cells[0]).append(Object.assign(document.createElement("small"), { className: "why", textContent: joined.textContent, title: joined.textContent }));
           for (let more = joined.colSpan; more > 0; --more) joined.before(Object.assign(document.createElement("td"), { className: "cell none", textContent: "–" }));
           joined.remove();
         }
@@ -84,7 +84,7 @@
       paging: false, info: false, autoWidth: false, order: [], orderDescReverse: false,
       language: { search: "Filter", zeroRecords: "no row has this" },
       layout: {
-        topStart: "search",
+        topStart: rows.length < 4 ? null : "search",
         topEnd: { buttons: [{ extend: "csv", text: "CSV", filename: () => `${label}${asked()}`, title: null,
           exportOptions: { format: { body: (_, __, ___, cell) => said(cell), header: (_, __, cell) => said(cell ?? heads[__]) } } }] },
         bottomStart: null, bottomEnd: null,
@@ -92,9 +92,10 @@
     });
     const tools = made.table().container().querySelector(".dt-layout-row:not(.dt-layout-table)");
     tools.classList.add("tools");
-    tools.querySelector("input").setAttribute("aria-label", `Filter: ${label}`);
+    tools.querySelector("input")?.setAttribute("aria-label", `Filter: ${label}`);
     tools.querySelector("button").setAttribute("aria-label", `CSV: ${label}`);
-    if (form) form.append(tools); else region.before(tools);
+    if (form) form.append(tools); else region.previousElementSibling.replaceWith(tools);
+    table.classList.remove("later");
     table.addEventListener("filled", () => { key(rows, heads); made.rows().invalidate("dom").draw(false); });
     region.dataset.sorts = "";
   }
@@ -103,5 +104,11 @@
     near.unobserve(entry.target);
     (window.requestIdleCallback ?? setTimeout)(() => enliven(entry.target));
   }), { rootMargin: "400px" });
-  everywhere((part) => part.querySelectorAll(".scroll > table").forEach((table) => { if (regular(table) && !few(table)) near.observe(table); }));
+  everywhere((part) => part.querySelectorAll(".scroll > table").forEach((table) => {
+    if (!sorts(table)) return;
+    // Room for the signs and the tools of a table that sorts, so that nothing moves when they come.
+    table.classList.add("later");
+    if (table.id !== "choice") table.closest(".scroll").before(Object.assign(document.createElement("div"), { className: "tools" }));
+    near.observe(table);
+  }));
 })();

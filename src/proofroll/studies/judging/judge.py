@@ -32,6 +32,7 @@ if TYPE_CHECKING:
 _USUAL = Tolerance(0.01, True)
 _LEAST = 0.01
 _NO_TOLERANCE = "no tolerance is given for it"
+_UNDETERMINED = "the truth does not determine it at all times"
 _MOST_TRUTHS = 64
 _truths: dict[tuple[str, bytes, bytes], xr.Dataset] = {}
 
@@ -158,8 +159,12 @@ def judge(
     observed: dict[str, FloatArray] = {}
     if "scene_digest" in dataset.attrs:  # all variables of a run
         reference, cut = reference.common_span({0: dataset})
-        dataset, observed = cut[0], run_values.observables_of(reference, cut[0])
-    sure = [str(name) for name, variable in dataset.data_vars.items() if UNCERTAIN not in variable.attrs]
+        observed = run_values.observables_of(reference, cut[0])
+    else:
+        reference, cut = reference.off_impacts({0: dataset})
+    dataset = cut[0]
+    given_variables = dataset.variables  # indexing a dataset would make coordinates, too
+    sure = [str(name) for name in dataset.data_vars if UNCERTAIN not in given_variables[name].attrs]
     bounds = _bounds(tolerance, reference, observed, sure)
     compared = [_compared(name, bound, reference, observed, dataset) for name, bound in bounds.items()]
     further = {
@@ -173,6 +178,7 @@ def judge(
         unjudged |= _events_left(scene, observed, bounds)
         if any(scene.observables[name].role is Role.REACTION for name in bounds if name in scene.observables):
             unjudged = {name: why for name, why in unjudged.items() if name not in given.reactions}
+        unjudged |= dict.fromkeys((name for name in observed if _unknown(reference, name)), _UNDETERMINED)
     for item in compared:  # judged observables, though perhaps derived from other given variables
         unjudged.pop(item.judgement.observable, None)
     return Judged(scene.name, tuple(compared), because, unjudged)
@@ -196,11 +202,11 @@ def _events_left(scene: Scene, observed: Mapping[str, FloatArray], judged: Mappi
 
 
 def _unsure(dataset: xr.Dataset, reference: Reference, judged: Mapping[str, Tolerance]) -> dict[str, str]:
-    """Variable that is sampled too coarsely to judge -> reason."""
-    reasons = {}
+    """Reasons for variables that are sampled too coarsely; a judged one appears as ``turns of NAME``."""
+    reasons, given = {}, dataset.variables
     for name in judged.keys() | {name for name, item in reference.scene.observables.items() if item.headline}:
-        if name in dataset and UNCERTAIN in dataset[name].attrs:
-            reasons[f"turns of {name}" if name in judged else name] = str(dataset[name].attrs[UNCERTAIN])
+        if name in given and UNCERTAIN in given[name].attrs:
+            reasons[f"turns of {name}" if name in judged else name] = str(given[name].attrs[UNCERTAIN])
     return dict(sorted(reasons.items()))
 
 
@@ -230,7 +236,7 @@ def _bounds(
         known = ", ".join(str(name) for name in reference.dataset.data_vars if _comparable(reference, str(name)))
         raise InputError("run", ", ".join(variables), f"the truth has none of these; it has {known}")
     if given is None:
-        main = [name for name in observed if _is_main(scene.observables[name])]
+        main = [name for name in observed if _is_main(scene.observables[name]) and not _unknown(reference, name)]
         events = [name for name in observed if (item := scene.observables[name]).watched and item.role is Role.EVENT]
         every = Tolerance(2 * reference.sampled_bar, False, "s")
         tolerances = dict.fromkeys([*main, *_states(reference, variables)] if main else able, _USUAL)
@@ -249,6 +255,11 @@ def _bounds(
 def _is_main(item: Observable) -> bool:
     """True if an observable is judged by default: headlines, and every force and moment."""
     return item.headline or (item.role is Role.REACTION and item.unit != "1")
+
+
+def _unknown(reference: Reference, name: str) -> bool:
+    """True if it is a force that the truth does not know at some time, as across a line to which joints confine it."""
+    return reference.scene.observables[name].role is Role.REACTION and name not in reference.curves
 
 
 def _states(reference: Reference, variables: Sequence[str]) -> list[str]:
@@ -281,32 +292,34 @@ def _tolerance(name: str, given: object, unit: str) -> Tolerance:
 
 
 def _comparable(reference: Reference, name: str) -> bool:
-    return name in reference.dataset.data_vars and "error_bar" in reference.dataset[name].attrs
+    known = reference.dataset.variables  # indexing a dataset would make coordinates, too
+    return name in known and "error_bar" in known[name].attrs
 
 
 def _unit(reference: Reference, name: str) -> str:
     item = reference.scene.observables.get(name)
-    return item.unit if item else str(reference.dataset[name].attrs["units"])
+    return item.unit if item else str(reference.dataset.variables[name].attrs["units"])
 
 
 def _compared(
     name: str, bound: Tolerance, reference: Reference, observed: Mapping[str, FloatArray], dataset: xr.Dataset
 ) -> Compared:
-    item, unit = reference.scene.observables.get(name), _unit(reference, name)
+    item, unit, given = reference.scene.observables.get(name), _unit(reference, name), dataset.variables
+    times = given["time"].values
     if name in observed:
         run = run_values.run_curve(reference, name, observed[name], dataset)
         true, scale = reference.true(name, run.values), reference.sizes.get(name, 1.0)
     else:
-        values, truth_of = dataset[name].to_numpy(), reference.dataset[name]
-        known = truth_of.to_numpy()
-        if item and item.role is Role.REACTION and dataset["time"].to_numpy()[0] == 0:
+        values, truth_of = given[name].values, reference.dataset.variables[name]
+        known = truth_of.values
+        if item and item.role is Role.REACTION and times[0] == 0:
             known, values = known[1:], values[1:]  # several engines define reactions only after a first step
         if truth_of.dims[-1:] == ("wxyz",):
             values = turned_alike(values, known)
         run = RunCurve(values, between=run_values.values_off_grid(reference, name, dataset))
         true, scale = TrueCurve(known, float(truth_of.attrs["error_bar"])), _size(reference, name, known, unit)
     judgement = judge_curve(Allowance(name, unit, bound.absolute(scale), scale), run, true)
-    return Compared(judgement, _farthest(run.values, true.values, dataset["time"].to_numpy()))
+    return Compared(judgement, _farthest(run.values, true.values, times))
 
 
 def _farthest(values: FloatArray, true: FloatArray, times: FloatArray) -> float | None:

@@ -5,13 +5,14 @@ from __future__ import annotations
 import re
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.beside_events import beside_events
-from proofroll.core.dataset import Key, common_span, observe, part, scales
+from proofroll.core.dataset import Key, common_span, observe, off_impacts, part, scales
 from proofroll.core.element_abilities import KnowsAnotherScene
 from proofroll.core.events import EVENT_ORDER, Event, events_of
 from proofroll.core.observable import Role
@@ -45,7 +46,13 @@ class Reference:
 
     def common_span(self, trajectories: Mapping[Key, xr.Dataset]) -> tuple[Reference, dict[Key, xr.Dataset]]:
         """Truth and runs cut to the time in which they are comparable (:class:`WatchesRuns`)."""
-        truth, runs = common_span(self.scene, self.dataset, trajectories)
+        return self._cut(*common_span(self.scene, self.dataset, trajectories))
+
+    def off_impacts(self, trajectories: Mapping[Key, xr.Dataset]) -> tuple[Reference, dict[Key, xr.Dataset]]:
+        """Truth and runs without the samples on true impacts (:func:`proofroll.core.dataset.off_impacts`)."""
+        return self._cut(*off_impacts(self.scene, self.dataset, trajectories))
+
+    def _cut(self, truth: xr.Dataset, runs: dict[Key, xr.Dataset]) -> tuple[Reference, dict[Key, xr.Dataset]]:
         if truth is self.dataset:
             return self, runs
         return replace(self, dataset=truth, curves=observe(self.scene, truth)), runs
@@ -102,7 +109,7 @@ class Reference:
         if known is None:  # for example a force that the equations do not determine all the time
             return np.full_like(values, np.nan), np.inf
         if item.role != Role.RESIDUAL:
-            return known, float(self.dataset[name].attrs["error_bar"])
+            return known, float(self.dataset.variables[name].attrs["error_bar"])
         # Zero for a perfect run; the residual of the truth is the resolution of the measurement.
         return np.zeros_like(values), float(np.max(np.abs(known), initial=0.0))
 
@@ -150,10 +157,10 @@ class Reference:
         late = min(widest if reported else 2 * self.sampled_bar, step or np.inf)
         return beside_events(times, values, [event.time for event in events], late)
 
-    @property
+    @cached_property
     def sampled_bar(self) -> float:
         """Error bar of an event that is located by samples only [s]: half the longest sampling interval."""
-        return float(np.max(np.diff(self.dataset["time"].to_numpy()), initial=0.0)) / 2
+        return float(np.max(np.diff(self.dataset.variables["time"].values), initial=0.0)) / 2
 
     @property
     def events(self) -> list[Event]:

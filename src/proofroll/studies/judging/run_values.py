@@ -24,19 +24,19 @@ if TYPE_CHECKING:
 def always_judged(reference: Reference, names: Iterable[str]) -> dict[str, Tolerance]:
     """Tolerances of the observables that are judged even without one in the file; only differences are shown."""
     items = {name: reference.scene.observables[name] for name in names if reference.scene.observables[name].always}
-    end = Tolerance(float(reference.dataset["time"][-1]), False, "s")
+    end = Tolerance(float(reference.dataset.variables["time"].values[-1]), False, "s")
     return {name: end if item.role is Role.EVENT else Tolerance(0.5, True) for name, item in items.items()}
 
 
 def observables_of(reference: Reference, dataset: xr.Dataset) -> dict[str, FloatArray]:
     """Observables of an engine's trajectory, by name."""
-    curves = observe(reference.scene, dataset)
+    curves, given = observe(reference.scene, dataset), dataset.variables
     for element in reference.scene.elements:
         own, true = part(reference.scene, element, dataset), part(reference.scene, element, reference.dataset)
         if "event_kind" in own:  # the run reports events
             curves[reference.scene.label(element, EVENT_ORDER)] = event_order(own, true)
     curves = {name: values for name, values in curves.items() if name in reference.scene.observables}
-    for name in [name for name in curves if name in dataset and dataset[name].dims[-1:] == ("wxyz",)]:
+    for name in [name for name in curves if name in given and given[name].dims[-1:] == ("wxyz",)]:
         values = curves.pop(name)
         if name in reference.curves:  # the scene asks for orientations
             curves[name] = turned_alike(values, reference.curves[name])

@@ -59,13 +59,14 @@ class GivenRun:
             InputError: one has not.
         """
         for dim, given in self.labels.items():
-            wanted = truth[dim].to_numpy().tolist() if dim in truth.coords else given
+            wanted = truth.variables[dim].values.tolist() if dim in truth.coords else given
             if given != wanted:
                 advice = f"name them as the scene does, in its order: {', '.join(wanted)}"
                 raise InputError("run", f"{dim} {', '.join(given)}", advice)
+        known = truth.variables
         for name, unit in self.units.items():
-            if name in truth.data_vars:
-                _require_unit(name, unit, str(truth[name].attrs["units"]))
+            if name in known and "units" in known[name].attrs:
+                _require_unit(name, unit, str(known[name].attrs["units"]))
 
 
 def _require_unit(name: str, unit: str, wanted: str) -> None:
@@ -85,11 +86,13 @@ def read_run(run: RunInput, scene: Scene) -> GivenRun:
         raise InputError("scene", scene.name, advice)
     units = {str(k): str(v.attrs["units"]).strip() for k, v in dataset.variables.items() if "units" in v.attrs}
     labels = {
-        str(k): list(map(str, v.to_numpy())) for k, v in dataset.coords.items() if v.dtype.kind in "UO" and v.ndim
+        str(k): list(map(str, v.values))
+        for k, v in dataset.variables.items()
+        if k in dataset.coords and v.dtype.kind in "UO" and v.ndim
     }
     if "time" in units:
         _require_unit("time", units["time"], "s")
-    times = dataset["time"].to_numpy()
+    times = dataset.variables["time"].values
     number = np.issubdtype(times.dtype, np.number)
     if not (times.size and number and np.all(np.isfinite(times)) and times[0] >= 0 and np.all(np.diff(times) > 0)):
         raise InputError("run", "time", "give times in s that rise from 0 or later")
@@ -134,9 +137,10 @@ def _require_finite_state(run: xr.Dataset, scene: Scene) -> None:
     for element in scene.elements:
         for own in element.sample_type.widths:
             name = scene.label(element, own)
-            if name not in run or not np.issubdtype(run[name].dtype, np.number) or run[name].dims[:1] != ("time",):
+            item = run.variables.get(name)
+            if item is None or not np.issubdtype(item.dtype, np.number) or item.dims[:1] != ("time",):
                 continue
-            values = run[name].to_numpy().reshape(run.sizes["time"], -1)
+            values = item.values.reshape(len(item), -1)
             bad = ~np.all(np.isfinite(values), axis=1)
             if np.any(bad):
                 at = float(run["time"][int(np.argmax(bad))])

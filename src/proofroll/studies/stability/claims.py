@@ -155,7 +155,7 @@ class StabilityFile:
 
 
 def file_for(scene: str) -> StabilityFile:
-    """File about a scene, or at a path that ends in ``.toml``; without one, a default map along the scene's parameters.
+    """Stability file at a path that ends in ``.toml``, or about a named scene, or a default map of its parameters.
 
     Raises:
         InputError: there is no such scene, or the file is broken.

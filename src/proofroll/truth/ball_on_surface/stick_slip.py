@@ -76,7 +76,9 @@ def stick_slip(scene: Scene, times: FloatArray) -> tuple[xr.Dataset, list[Event]
         number, known = min(number, posed), False
         why = f"a relative {MOVE:g} of friction, resistance, restitution or gravity changes it"
     events = []
-    for (kind, time), (_, other) in zip(first[:number], second, strict=False):
+    certain = until - MOVE * max(until, pace)  # the last digits would say whether an event at the end is in
+    shared = [both for both in zip(first[:number], second, strict=False) if both[0][1] < certain]
+    for (kind, time), (_, other) in shared:
         wide = SAFETY * (abs(time - other) + _FLOOR * time + paths[0].blurs.get(time, 0.0))
         events.append(Event(kind, time, max(time - wide, 0.0), time + wide))
     result, check = (

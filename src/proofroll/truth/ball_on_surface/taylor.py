@@ -67,7 +67,7 @@ class SlidingTaylor(Sliding):
         return np.concatenate([u * self._scales, frame[:, 1:].T @ v_WB, [w_WB @ frame[:, 0]]])
 
     def friction(self, state: FloatArray) -> tuple[float, float]:
-        """See :class:`Route`; both multiplied by (1 + κ)/κ and divided by the mass [m/s²]."""
+        """Needed and available friction, times (1 + κ)/κ over the mass [m/s²]; see :class:`Route`."""
         b2, b3, _, N = self._model.drive(state, self._pars)
         return float(np.hypot(b2, b3)), self._A * self._body.contact.mu_static * float(N)
 

@@ -34,7 +34,7 @@ def truth_of(mechanism: Mechanism, times: Array) -> TwoRouteMotion:
         Refused: fewer than two routes cover the mechanism; the text says why.
         NotUnique: the laws of contact leave more than one motion, or none.
     """
-    times = np.asarray(times, dtype=float)
+    times, mechanism = np.asarray(times, dtype=float), _with_stops_at_start(mechanism)
     try:
         return contact_truth(mechanism, times) if mechanism.contacts else _without_contacts(mechanism, times)
     except Diverged as stopped:
@@ -60,6 +60,17 @@ def _without_contacts(mechanism: Mechanism, times: Array) -> TwoRouteMotion:
     refuse_uncovered(mechanism)
     with units.errors_in_seconds():
         return _switched(mechanism, units, own, times / units.time)
+
+
+def _with_stops_at_start(mechanism: Mechanism) -> Mechanism:
+    """Mechanism whose stops lie where its joints start, if these start beyond them by rounding, at most ``AT_STOP``."""
+    joints = (
+        replace(joint, limits=(min(joint.limits[0], *joint.q0), max(joint.limits[1], *joint.q0)))
+        if joint.limits and joint.q0
+        else joint
+        for joint in mechanism.joints
+    )
+    return replace(mechanism, joints=tuple(joints))
 
 
 def _inside(joint: Joint) -> bool:

@@ -85,8 +85,10 @@ def two_route_motion(
     reach = np.maximum(units.length, np.maximum(largest(placed.p_WB), largest(placed.points)))
     bars["drift"] = np.maximum.accumulate(placed.drift() + ROUND_OFF * reach)
     horizon = min(parted, first_close(paths, CLOSE) * units.time)
-    # a change at the horizon is what the question hangs on, and may lie before it by the accuracy of times
-    certain = horizon - units.time * time_accuracy(horizon / units.time) if np.isfinite(horizon) else horizon
+    # A change at the horizon is what the question hangs on, and may lie before it by the accuracy of times; of one at
+    # the end the last digits would say whether it is in.
+    last = min(horizon, float(one.time[-1]))
+    certain = last - units.time * time_accuracy(last / units.time)
     happened = tuple(event for event in _events(*paths, units.time) if event.time < certain)
     force = None if pressed is None else pressed[0]
     return TwoRouteMotion(masked, bars, differences, horizon, [], determinate, routes, None, happened, reason, force)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,7 @@ import pytest
 from proofroll.core.diagnosis import Cause, Evidence, Hypothesis, diagnose
 from proofroll.core.diagnosis.fitting import possible
 from proofroll.core.diagnosis.vectors import ReportedVector, product
+from proofroll.core.errors import NotUnique
 
 FITTED = Cause("x", "it does x", "motion", "m", 1.0, 1e-9, "do y", fitted=1)
 
@@ -32,6 +34,18 @@ def test_of_two_fitted_numbers_that_explain_the_same_neither_is_told() -> None:
     assert _told(FITTED) == ["x"]
     assert _told(FITTED, other) == []
     assert _told(dataclasses.replace(FITTED, fitted=0), dataclasses.replace(other, fitted=0)) == ["x", "z"]
+
+
+def test_a_hypothesis_without_a_unique_motion_costs_no_other_cause() -> None:
+    """Causes before the model that moves in no unique way are told, its own and those of other hypotheses."""
+
+    def open_in_the_end(_: Evidence) -> Iterator[Cause]:
+        yield dataclasses.replace(FITTED, fitted=0)
+        raise NotUnique("friction tears")
+
+    later = dataclasses.replace(FITTED, id="z", fitted=0)
+    hypotheses = [Hypothesis("x", "", open_in_the_end), Hypothesis("z", "", lambda _: [later])]
+    assert [cause.id for cause in diagnose(Evidence(None, []), hypotheses)] == ["x", "z"]
 
 
 def test_what_a_method_does_by_itself_takes_the_proof_from_others() -> None:

@@ -2,6 +2,7 @@
 
 import dataclasses
 import json
+from itertools import combinations
 
 import numpy as np
 import pytest
@@ -309,17 +310,31 @@ def test_drives_and_stops_are_drawn(scene: str, marks: list[str]) -> None:
 
 
 @pytest.mark.parametrize(
-    ("scene", "shapes", "names"),
-    [("sled", 4, ["left", "right", "back"]), ("rattleback", 2, ["contact"]), ("tilted_disc", 2, ["contact"])],
+    ("scene", "outlines", "names"),
+    [
+        ("sled", 5, ["left", "right", "back"]),
+        ("falling_rod", 3, ["contact"]),
+        ("rattleback", 2, ["contact"]),
+        ("tilted_disc", 2, ["contact"]),
+    ],
 )
-def test_shapes_that_may_touch_are_drawn(scene: str, shapes: int, names: list[str]) -> None:
-    """Each shape has an outline and each plane one patch, also where contacts share it; what touches has its name."""
+def test_shapes_that_may_touch_are_drawn(scene: str, outlines: int, names: list[str]) -> None:
+    """An outline for each shape, each plane, also shared, and each body of several places; names of closed contacts."""
     element = load_scene(scene).elements[0]
     smooth = dataclasses.replace(element.mechanism, geometries=(), pairs=())
     full, bare = mechanism_drawing(element), mechanism_drawing(dataclasses.replace(element, mechanism=smooth))
     letters = ["".join(part.text for part in mark.parts) for mark in full.marks if isinstance(mark, Lettering)]
     assert set(names) <= set(letters)
-    assert len(full.marks) - len(bare.marks) == shapes + len(names)
+    assert len(full.marks) - len(bare.marks) == outlines + len(names)
+
+
+def test_names_of_a_drawing_stand_apart() -> None:
+    """Six contacts and three joints close to each other: no name covers another."""
+    words = [mark for mark in mechanism_drawing(element_of("dominoes")).marks if isinstance(mark, Lettering)]
+    assert len(words) >= 9
+    for one, other in combinations(words, 2):
+        letters = sum(len(part.text) for mark in (one, other) for part in mark.parts)
+        assert abs(one.y - other.y) >= 10 or abs(one.x - other.x) >= 3.5 * letters, (one, other)
 
 
 def test_the_natural_time_knows_servos_and_what_they_move() -> None:

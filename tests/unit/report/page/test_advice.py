@@ -10,7 +10,7 @@ from proofroll.report.long_table import TableLine
 from proofroll.report.page.advice import advice
 from proofroll.report.page.choice_matrix import ChoiceStudy, choice_matrix
 
-STUDIES = {name: ChoiceStudy(f"A {name}", f"c{number}", [""]) for number, name in enumerate(("arm", "chain"))}
+STUDIES = {name: ChoiceStudy(f"A {name}", f"c{number}") for number, name in enumerate(("arm", "chain"))}
 BETA = line(engine="beta", row=3, error=1e-9, cost=0.5)
 WRONG = line(engine="gamma", row=4, error=2e-2, cost=0.3, limit="another limit", verdict="differs")
 MUTE = line(engine="delta", row=5, error=None, cost=None, status="refused", message="no loops", verdict="refused")
@@ -25,7 +25,7 @@ def test_each_engine_is_told_beside_the_cheapest() -> None:
     """The choice with its step, another with how many times its cost, and those that never get there with why."""
     one = said([*ARM, BETA, WRONG, MUTE], 1e-3)[0]
     assert one == (
-        "For trees to 1e-3 take alpha joints default at dt 1e-3 s (0.01 s/s); "
+        "For trees (arm) to 1e-3 take alpha joints default at dt 1e-3 s (0.01 s/s); "
         "beta joints default at dt 1e-3 s costs 50 times that; "
         "delta joints does not get there (refused); "
         "gamma joints does not get there (off by 0.02, its limit of small steps is another). "
@@ -43,7 +43,9 @@ def test_the_choice_is_told_apart_from_its_sentence() -> None:
 def test_where_nothing_holds_it_the_closest_is_named() -> None:
     """Nothing is advised; what comes closest says by how much it misses."""
     one = said([LINE, FORCE], 1e-5)[0]
-    assert one.startswith("For trees to 1e-5 nothing that was run and timed holds it; alpha joints does not get there")
+    assert one.startswith(
+        "For trees (arm) to 1e-5 nothing that was run and timed holds it; alpha joints does not get there"
+    )
     assert "off by 5e-4, finer steps come closer" in one
     assert one.endswith("If forces count, too, nothing that was run and timed holds it.")
 
@@ -53,10 +55,8 @@ def test_forces_are_told_where_they_change_nothing_or_are_never_given() -> None:
     exact = replace(FORCE, error=1e-9)
     assert said([LINE, exact], 1e-3)[0].endswith("It holds the forces, too.")
     assert said([LINE], 1e-3)[0].endswith("Forces are not judged there.")
-    alone = (
-        "For trees forces are not judged; for motion alone to 1e-3 take alpha joints default at dt 1e-3 s (0.01 s/s)."
-    )
-    assert said([LINE], 1e-3, forces=True)[0] == alone
+    alone = "For trees (arm) forces are not judged; for motion alone to 1e-3 take alpha joints default at dt 1e-3 s"
+    assert said([LINE], 1e-3, forces=True)[0] == f"{alone} (0.01 s/s)."
     assert "with forces" in said([LINE, exact], 1e-3, forces=True)[0]
 
 
@@ -86,3 +86,16 @@ def test_a_study_without_judged_motion_is_no_part_of_all() -> None:
     laws = replace(LINE, role="residual", study="chain", scene="chain")
     assert said([*ARM, laws], 1e-3)[-1] == said(ARM, 1e-3)[-1]
     assert said([laws], 1e-3)[-1] == "Over all: motion is judged in no study."
+
+
+def test_what_was_left_out_is_not_told_to_fail() -> None:
+    """An engine without time was not judged; a scene where none had any is told so and no part of all."""
+    late = replace(LINE, study="chain", scene="chain", status="left out", verdict="not-judged", error=None, cost=None)
+    beta = replace(late, engine="beta", row=3)
+    reason = "no run could be judged, for lack of time or of a truth."
+    _, arm, chain, whole = said([*ARM, late, beta], 1e-3)
+    assert arm.startswith("For “A arm” to 1e-3 take alpha")
+    assert chain == f"For “A chain” to 1e-3: {reason}"
+    assert whole == said(ARM, 1e-3)[-1]
+    assert said([late], 1e-3) == [f"For trees (chain) to 1e-3: {reason}", f"Over all: {reason}"]
+    assert "beta joints was not judged" in said([*ARM, replace(beta, study="arm", scene="arm")], 1e-3)[0]

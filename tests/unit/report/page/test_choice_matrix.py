@@ -15,9 +15,9 @@ from proofroll.report.long_table import TableLine
 from proofroll.report.page.choice_matrix import DECADES, NOT_RUN, ChoiceCell, ChoiceMatrix, ChoiceStudy, choice_matrix
 
 STUDIES = {
-    "arm": ChoiceStudy("An arm", "c0", ["", "mass=2"]),
-    "chain": ChoiceStudy("A chain", "c1", [""]),
-    "ball": ChoiceStudy("A ball", "c2", [""]),
+    "arm": ChoiceStudy("An arm", "c0", {(0, ""): "c0.joints", (0, "mass=2"): "c0.joints.mass-2"}),
+    "chain": ChoiceStudy("A chain", "c1"),
+    "ball": ChoiceStudy("A ball", "c2"),
 }
 
 
@@ -37,7 +37,7 @@ def test_a_cell_has_the_cheapest_run_that_holds_the_tolerance() -> None:
     assert at(ARM, 4)[:2] == (Verdict.AGREES, "~0.04")
     assert at(ARM, 6)[:2] == (Verdict.AGREES, "0.2")
     assert "alpha joints tuned at dt 1e-3 s: within 2e-7" in at(ARM, 6).title
-    assert at(ARM, 3).href == "c0-r0-p0"
+    assert at(ARM, 3).href == "c0.joints"
     assert at(ARM, 6, setting="default").state == Verdict.CONVERGES, "what unfolds is that setting alone"
 
 
@@ -147,7 +147,7 @@ def test_a_run_holds_only_at_all_places() -> None:
     """One place beyond the tolerance, or without a result, is enough; what is ill-posed is left out."""
     heavy = line(place="mass=2", error=5e-2, cost=0.03)
     assert at([LINE, heavy], 3)[:2] == (Verdict.CONVERGES, "0.05")
-    assert at([LINE, heavy], 3).href == "c0-r0-p1"
+    assert at([LINE, heavy], 3).href == "c0.joints.mass-2"
     assert at([LINE, replace(heavy, verdict="ill-posed")], 3).state == Verdict.AGREES
     assert at([LINE, replace(heavy, error=1e-4)], 3)[:2] == (Verdict.AGREES, "0.03"), "the slowest place"
     assert at([LINE, FORCE, *FINER, heavy], 4).state != Verdict.AGREES, "the finer step was not run there"
@@ -244,3 +244,17 @@ def test_a_scene_that_was_left_out_says_nothing_against_those_that_ran() -> None
     said = choice_matrix([*ARM, gone, other], STUDIES).answer(1e-4, False)
     assert "alpha joints default at dt 2.5e-4 s for trees" in said
     assert at([gone], 4).state == Verdict.NOT_JUDGED
+
+
+def test_scenes_of_small_groups_are_unfolded_beside_few_groups_alone() -> None:
+    """A group of one or two scenes is unfolded beside four others, and beside eight folded as they are."""
+    for many, unfolded in ((5, 5), (9, 0)):
+        lines = [line(study=f"s{at}", scene=f"s{at}", group=f"group {at}") for at in range(many)]
+        matrix = choice_matrix(lines, {item.study: ChoiceStudy(item.study, "") for item in lines})
+        assert len(matrix.unfolded) == unfolded
+
+
+def test_a_cell_without_a_cost_says_so() -> None:
+    """What holds the tolerance and was not timed is told in words beside its sign, which stands once."""
+    found = at([line(error=1e-9, cost=None)], 4)
+    assert (found.state, found.text) == (Verdict.AGREES, "not timed")

@@ -35,6 +35,15 @@ def test_infinitely_many_bounces(e: float, height: float) -> None:
     assert settles.time_low <= rests <= settles.time_high
 
 
+@pytest.mark.arithmetic
+def test_an_impact_at_the_end_is_not_among_the_events() -> None:
+    """An impact at the last sample, to the last digit, is left out by any arithmetic; one clearly before is told."""
+    scene, falls = load_scene("bouncing_ball", height=0.1, restitution=0.5), math.sqrt(2 * 0.1 / G)
+    told = [len(events_of(truth(scene, np.array([0.0, 2.5 * falls * part])))) for part in (1 - 1e-15, 1, 1 + 1e-15)]
+    assert told == [2, 2, 2]
+    assert len(events_of(truth(scene, np.array([0.0, 2.5 * falls * (1 + 1e-6)])))) == 3
+
+
 @pytest.mark.drill
 @settings(max_examples=10, deadline=None)
 @given(

@@ -16,6 +16,7 @@ from proofroll.core.events import events_of
 from proofroll.core.observable import Role
 from proofroll.core.plugins import load_engine
 from proofroll.core.truth import truth
+from proofroll.elements.ball_on_surface.element import scene_with
 from proofroll.elements.mechanism.contacts import coulomb
 from proofroll.elements.mechanism.contacts.geometry import Geometry, Pair
 from proofroll.elements.mechanism.drives import Actuator
@@ -232,6 +233,38 @@ def test_a_ball_moves_as_its_own_truth_says(
     for (_, theirs), event in zip(expected, found.events, strict=True):
         assert event.time_low - 1e-12 <= theirs.time_high
         assert theirs.time_low <= event.time_high + 1e-12
+
+
+@pytest.mark.drill
+@pytest.mark.parametrize("flies", [False, True])
+def test_a_ball_in_a_bore_moves_as_in_its_cylinder(flies: bool) -> None:
+    """Body, sphere and bore have the motion of the ball's own routes: rolling upright, and hit and slid in a tilt."""
+    scene = load_scene("sphere_in_cylinder", mu_static=0.35)
+    if flies:
+        scene = load_scene("tilted_cylinder", radius=0.05, cylinder_radius=0.5, tilt=1.0, mu_static=0.5)
+        element = scene.elements[0]
+        start = {"coordinates": (3.1, 0.0), "velocity": (3.0, 0.0), "tangential_spin": (0.0, 0.0), "gap": 0.02}
+        contact = replace(element.contact, restitution=0.5)  # type: ignore[attr-defined]
+        scene = scene_with(scene, contact=contact, start=replace(element.start, **start))  # type: ignore[attr-defined]
+    wall, ball = scene.elements[0].surface, scene.elements[0].rolling  # type: ignore[attr-defined]
+    moment, tilt = float(ball.ball.inertia), float(wall.tilt)
+    body = Body("ball", float(ball.ball.mass), inertia=(moment, moment, moment))
+    q0, v0 = (*ball.p0, 1.0, 0.0, 0.0, 0.0), (*ball.v0, *ball.w0)
+    joint = Joint("free", "free", "world", "ball", q0=tuple(map(float, q0)), v0=tuple(map(float, v0)))
+    axis = (float(np.sin(tilt)), 0.0, float(np.cos(tilt)))
+    shapes = (
+        Geometry("sphere", "ball", "sphere", radius=float(ball.ball.radius)),
+        Geometry("wall", "world", "bore", radius=float(wall.radius), axis=axis),
+    )
+    pair = Pair("contact", ("sphere", "wall"), float(ball.contact.mu_static), float(ball.contact.restitution or 0.0))
+    times = np.linspace(0, 0.15, 4)
+    own, found = truth(scene, times), truth_of(Mechanism((body,), (joint,), geometries=shapes, pairs=(pair,)), times)
+    for field in ("p_WB", "v_WB", "w_WB"):
+        apart = np.abs(getattr(found.record, field)[:, 0] - own[field].to_numpy()).max()
+        assert apart <= found.bars[field][-1] + own[field].attrs["error_bar"], field
+    told = [{"bounce": "impact"}.get(event.kind, event.kind) for event in events_of(own)]
+    assert told == [event.kind for event in found.events]
+    assert ("impact" in told) == flies
 
 
 @pytest.mark.drill

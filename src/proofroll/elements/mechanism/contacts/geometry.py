@@ -15,15 +15,16 @@ from proofroll.core.errors import InputError, require_known
 from proofroll.elements.mechanism import checks, rotations
 from proofroll.elements.mechanism.checks import METRES, RADIANS, RATIO, WORLD, ZERO, Vector, Z
 from proofroll.elements.mechanism.contacts.shapes import (
+    Bore,
     CircleShape,
-    ConvexShape,
     EllipsoidShape,
     HalfSpace,
+    Shape,
     SphereShape,
 )
 from proofroll.elements.mechanism.rotations import Array
 
-GeometryKind = Literal["sphere", "ellipsoid", "circle", "plane", "box"]
+GeometryKind = Literal["sphere", "ellipsoid", "circle", "plane", "box", "bore"]
 # Fields that describe each kind of geometry, besides its position.
 _KEYS: Mapping[str, tuple[str, ...]] = {
     "sphere": ("radius",),
@@ -31,11 +32,15 @@ _KEYS: Mapping[str, tuple[str, ...]] = {
     "circle": ("radius", "normal"),
     "plane": ("normal",),
     "box": ("size", "orientation"),
+    "bore": ("radius", "axis"),
 }
 # Largest semi-axis of an ellipsoid over its smallest. The support function squares the ratio, which costs 1e-10 of the
 # height at 1e3; and a contact on a flat side is as stiff as that ratio.
 _FLATTEST = 1e3
-_RULES = "only a plane with a sphere, ellipsoid, circle or box, and two spheres, have a rule; choose one of these pairs"
+_RULES = (
+    "only a plane with a sphere, ellipsoid, circle or box, a bore with a sphere, and two spheres have a rule; "
+    "choose one of these pairs"
+)
 
 
 @dataclass(frozen=True)
@@ -45,12 +50,14 @@ class Geometry:
     Attributes:
         name: unique among geometries.
         body: that it is fixed to, or ``world``.
-        kind: a box touches with its eight vertices; a plane pairs with any other kind, a sphere also with a sphere.
-        position: of its centre, or of any point of a plane, in the body's frame [m].
+        kind: a box touches with its eight vertices; a plane pairs with any other kind but a bore, a sphere also with
+            a sphere or a bore, an endless cylindrical hole that it moves in.
+        position: of its centre, or of any point of a plane or of a bore's axis, in the body's frame [m].
         orientation: roll, pitch, yaw of an ellipsoid's or a box's axes in the body's frame [rad].
-        radius: of a sphere or circle; a sphere of radius 0 is a vertex [m].
+        radius: of a sphere, circle or bore; a sphere of radius 0 is a vertex [m].
         axes: semi-axes of an ellipsoid, the largest at most 1000 times the smallest [m].
         normal: of a plane, out of the material, or of a circle's disc, in the body's frame; default: z.
+        axis: of a bore, in the body's frame; default: z.
         size: edges of a box [m].
     """
 
@@ -62,6 +69,7 @@ class Geometry:
     radius: float | None = field(default=None, metadata=METRES)
     axes: Vector | None = field(default=None, metadata=METRES)
     normal: Vector = field(default=Z, metadata=RATIO)
+    axis: Vector = field(default=Z, metadata=RATIO)
     size: Vector | None = field(default=None, metadata=METRES)
 
     def __post_init__(self) -> None:
@@ -69,9 +77,10 @@ class Geometry:
         require_known(f"{place}.kind", self.kind, _KEYS)
         checks.assign(self, position=checks.vector(f"{place}.position", self.position))
         checks.assign(self, orientation=checks.vector(f"{place}.orientation", self.orientation))
-        checks.assign(self, normal=checks.axis(f"{place}.normal", self.normal))
-        usual = {"orientation": ZERO, "normal": Z}
-        for key in ("radius", "axes", "size", "orientation", "normal"):
+        for key in ("normal", "axis"):
+            checks.assign(self, **{key: checks.axis(f"{place}.{key}", getattr(self, key))})
+        usual = {"orientation": ZERO, "normal": Z, "axis": Z}
+        for key in ("radius", "axes", "size", *usual):
             value, asked = getattr(self, key), key in _KEYS[self.kind]
             if not asked and value != usual.get(key):
                 raise InputError(f"{place}.{key}", value, f"{_a(self.kind)} has none; it has {_key_list(self.kind)}")
@@ -79,8 +88,8 @@ class Geometry:
                 raise InputError(f"{place}.{key}", "nothing", f"{_a(self.kind)} needs it; add it")
         if self.radius is not None:
             radius = checks.number(f"{place}.radius", self.radius, at_least=0)
-            if self.kind == "circle" and not radius:
-                raise InputError(f"{place}.radius", radius, "a circle has a radius above 0; a vertex is a sphere")
+            if self.kind != "sphere" and not radius:
+                raise InputError(f"{place}.radius", radius, f"a {self.kind} has a radius above 0; a vertex is a sphere")
             checks.assign(self, radius=radius)
         for key in ("axes", "size"):
             if getattr(self, key) is not None:
@@ -94,17 +103,21 @@ class Geometry:
 
     @cached_property
     def frame(self) -> Array:
-        """Axes in the body's frame, as columns; for a plane or a circle z is the normal."""
+        """Axes in the body's frame, as columns; z is the normal of a plane or a circle, and the axis of a bore."""
+        if self.kind == "bore":
+            return read_only(rotations.frame_of_axis(self.axis))
         if self.kind in {"plane", "circle"}:
             return read_only(rotations.frame_of_axis(self.normal))
         return read_only(rotations.from_rpy(self.orientation))
 
     @cached_property
-    def shapes(self) -> tuple[ConvexShape | HalfSpace, ...]:
-        """Convex shapes that touch, in the body's frame: one, or the eight vertices of a box."""
+    def shapes(self) -> tuple[Shape, ...]:
+        """Shapes that touch, in the body's frame: one, or the eight vertices of a box."""
         centre = np.array(self.position)
         if self.kind == "plane":
             return (HalfSpace(centre, np.array(self.normal)),)
+        if self.kind == "bore":
+            return (Bore(centre, np.array(self.axis), self.radius or 0.0),)
         if self.kind == "box":
             corners = itertools.product((-0.5, 0.5), repeat=3)
             return tuple(SphereShape(centre + self.frame @ (np.array(self.size) * corner), 0.0) for corner in corners)
@@ -150,7 +163,7 @@ class BodyContact:
     Attributes:
         name: of the pair; a box adds ``.1`` to ``.8``.
         body_a, body_b: of the first and the second geometry.
-        shape_a, shape_b: in the frames of these; one of them may be a plane.
+        shape_a, shape_b: in the frames of these; one of them may be a wall.
         friction, restitution: of the pair.
         bound: largest friction without a normal force; always 0 between bodies [N].
     """
@@ -159,8 +172,8 @@ class BodyContact:
     name: str
     body_a: str
     body_b: str
-    shape_a: ConvexShape | HalfSpace
-    shape_b: ConvexShape | HalfSpace
+    shape_a: Shape
+    shape_b: Shape
     friction: float
     restitution: float
 
@@ -183,8 +196,17 @@ def contacts_of(geometries: Sequence[Geometry], pairs: Sequence[Pair]) -> tuple[
             raise InputError(place, pair.geometries, advice)
         listed[frozenset(pair.geometries)] = pair.name
         kinds = {a.kind, b.kind}
-        if kinds == {"plane"} or not ("plane" in kinds or kinds == {"sphere"}):
+        if kinds in ({"plane"}, {"plane", "bore"}) or not (
+            "plane" in kinds or kinds in ({"sphere"}, {"sphere", "bore"})
+        ):
             raise InputError(place, pair.geometries, _RULES)
+        if "bore" in kinds:
+            bore, ball = (a, b) if a.kind == "bore" else (b, a)
+            if (ball.radius or 0.0) >= (bore.radius or 0.0):
+                advice = (
+                    f"a sphere of radius {ball.radius:g} m has no room in a bore of {bore.radius:g} m; make it smaller"
+                )
+                raise InputError(place, pair.geometries, advice)
         if kinds == {"sphere"} and not (a.radius or b.radius):
             raise InputError(place, pair.geometries, "two points have no direction between them; give one a radius")
         touching = list(itertools.product(a.shapes, b.shapes))

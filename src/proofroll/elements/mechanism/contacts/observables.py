@@ -58,7 +58,7 @@ class Followed(NamedTuple):
 
 
 def follow_contacts(placed: Placed) -> Followed:
-    """Gaps, speeds of slip and normals of all contacts at all times."""
+    """Gaps, slip speeds, normals and sliding velocities of all contacts at all times."""
     mechanism = placed.mechanism
     shape = (len(placed.time), len(mechanism.contacts))
     gap, slip, normal, slide = np.zeros(shape), np.zeros(shape), np.zeros((*shape, 3)), np.zeros((*shape, 3))
@@ -132,7 +132,9 @@ def contact_observables(mechanism: Mechanism, sizes: Mapping[str, float], least:
 def residuals(
     found: Followed, pressed: FloatArray, friction: FloatArray, weight: float, speed: float
 ) -> dict[str, FloatArray]:
-    """Values of ``RESIDUALS`` and of ``unpressed``, shape (time, contacts); NaN for contacts without known forces.
+    """Residuals of the contact laws and ``unpressed``, by name, shape (time, contacts).
+
+    ``penetration`` always has values; the others are NaN where no component of the force is known.
 
     Args:
         found: the contacts along the motion.

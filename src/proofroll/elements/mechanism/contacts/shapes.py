@@ -1,4 +1,6 @@
-"""Convex shapes by their support function: the farthest point in a direction, and its derivative by the direction.
+"""Shapes that touch: convex ones by their support function, and the walls that these lie on.
+
+A support function gives the farthest point in a direction, and its derivative by the direction.
 
 All coordinates are in the frame of the body that a shape is fixed to.
 """
@@ -73,3 +75,16 @@ class HalfSpace:
 
     point: Array
     normal: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Bore:
+    """Endless cylindrical hole in a body, around an axis of unit length through a point [m]."""
+
+    point: Array
+    axis: Array
+    radius: float
+
+
+Wall = HalfSpace | Bore
+Shape = ConvexShape | Wall

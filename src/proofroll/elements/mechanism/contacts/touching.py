@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from proofroll.elements.mechanism.contacts.geometry import BodyContact
-from proofroll.elements.mechanism.contacts.shapes import ConvexShape, HalfSpace, SphereShape
+from proofroll.elements.mechanism.contacts.shapes import Bore, ConvexShape, HalfSpace, SphereShape, Wall
 from proofroll.elements.mechanism.rotations import Array, cross
 
 
@@ -32,8 +32,8 @@ class Touching(NamedTuple):
         gap: distance of the shapes, negative where they overlap [m].
         normal: unit vector from b to a; a force along it pushes a away.
         normal_rate: its time derivative [1/s].
-        place: point of contact, or of an open contact the point that would touch: on the shape that is not a plane, for
-            two spheres on a [m].
+        place: point of contact, or of an open contact the point that would touch: on the shape that is no wall, for two
+            spheres on a [m].
         place_rate: velocity of that point in the world, as it moves over both bodies [m/s].
         slide: velocity of a's material relative to b's at that point [m/s]; along the normal it is the gap's rate.
     """
@@ -48,11 +48,11 @@ class Touching(NamedTuple):
 
 def touch(contact: BodyContact, a: Moving, b: Moving) -> Touching:
     """Gap, normal, point of contact and rates of a contact at given motions of its bodies."""
-    if isinstance(contact.shape_b, HalfSpace):
-        assert not isinstance(contact.shape_a, HalfSpace)  # two planes are no contact
-        gap, n, n_rate, place, rate = _on_plane(contact.shape_a, a, contact.shape_b, b)
-    elif isinstance(contact.shape_a, HalfSpace):
-        gap, n, n_rate, place, rate = _on_plane(contact.shape_b, b, contact.shape_a, a)
+    if isinstance(contact.shape_b, Wall):
+        assert not isinstance(contact.shape_a, Wall)  # two walls are no contact
+        gap, n, n_rate, place, rate = _on_wall(contact.shape_a, a, contact.shape_b, b)
+    elif isinstance(contact.shape_a, Wall):
+        gap, n, n_rate, place, rate = _on_wall(contact.shape_b, b, contact.shape_a, a)
         n, n_rate = -n, -n_rate
     else:
         assert isinstance(contact.shape_a, SphereShape)
@@ -64,8 +64,32 @@ def touch(contact: BodyContact, a: Moving, b: Moving) -> Touching:
 _Lying = tuple[float, Array, Array, Array, Array]
 
 
+def _on_wall(shape: ConvexShape, own: Moving, wall: Wall, other: Moving) -> _Lying:
+    """Gap, normal, its rate, point of contact and its rate of a convex shape on a wall, with the wall's normal."""
+    if isinstance(wall, HalfSpace):
+        return _on_plane(shape, own, wall, other)
+    assert isinstance(shape, SphereShape)  # alone has a rule
+    return _in_bore(shape, own, wall, other)
+
+
+def _in_bore(sphere: SphereShape, own: Moving, bore: Bore, other: Moving) -> _Lying:
+    """Numbers of :func:`_on_wall` in a bore, whose normal points to the axis."""
+    centre, foot = own.p + own.R @ sphere.centre, other.p + other.R @ bore.point
+    axis = other.R @ bore.axis
+    axis_rate = cross(other.w, axis)
+    d, d_rate = centre - foot, own.velocity(centre) - other.velocity(foot)
+    out = d - axis * (axis @ d)
+    out_rate = d_rate - axis_rate * (axis @ d) - axis * (axis_rate @ d + axis @ d_rate)
+    distance = float(np.linalg.norm(out))
+    length = distance or 1.0  # a trial step may lay the centre on the axis, where the normal is zero
+    n = -out / length
+    n_rate = -(out_rate - n * (n @ out_rate)) / length
+    place, rate = centre - sphere.radius * n, own.velocity(centre) - sphere.radius * n_rate
+    return bore.radius - sphere.radius - distance, n, n_rate, place, rate
+
+
 def _on_plane(shape: ConvexShape, own: Moving, plane: HalfSpace, other: Moving) -> _Lying:
-    """Gap, normal, its rate, point of contact and its rate of a convex shape on a plane, with the plane's normal."""
+    """Numbers of :func:`_on_wall` on a plane, of any convex shape."""
     n = other.R @ plane.normal
     n_rate = cross(other.w, n)
     point, by_direction = shape.support(-(own.R.T @ n))

@@ -13,7 +13,7 @@ from proofroll.core.arrays import FloatArray
 from proofroll.core.diagnosis import CLOSES, Cause, Evidence, hypothesis
 from proofroll.core.diagnosis.clocks import delay_text
 from proofroll.core.diagnosis.fitting import ABOVE, Residuals, change_by, factor_text, possible
-from proofroll.core.errors import InputError
+from proofroll.core.errors import InputError, NotUnique
 from proofroll.elements.mechanism.contacts.dynamics import ContactDynamics
 from proofroll.elements.mechanism.contacts.observables import PRESSES, Followed, normal_forces
 from proofroll.elements.mechanism.diagnosis.contacts import COVERS, contact_cause, touch_of
@@ -150,7 +150,7 @@ def laws_of_impacts(evidence: Evidence) -> Iterator[Cause]:
         true = list(_struck(mechanism, evidence.truth, touch.true, true_presses))
         own = float(np.max(np.abs(_missed(mechanism, true)), initial=0.0))
         before = float(np.max(np.abs(_missed(mechanism, seen)), initial=0.0))
-        if before <= max(_JUMP * evidence.element.speed, ABOVE * own):
+        if not max(_JUMP * evidence.element.speed, ABOVE * own) < before < np.inf:
             continue
         held = Residuals(
             functools.partial(_missed, struck=seen),
@@ -207,6 +207,7 @@ def _missed(model: Mechanism | None, struck: Sequence[_Struck], convex: bool = F
     """Velocities after impacts less those of a model, as of the whole mass with that kinetic energy [m/s].
 
     ``convex``: with a convex cone of friction, contacts part faster than by their restitution, by μ times their slip.
+    Infinite without a model, and where it leaves the outcome of an impact open.
     """
     if model is None:
         return np.full(1, np.inf)
@@ -217,7 +218,10 @@ def _missed(model: Mechanism | None, struck: Sequence[_Struck], convex: bool = F
         comes, slip = abs(float(n @ J @ each.before)), 0.0
         for _ in range(_CONTRACTIONS if convex else 1):
             e = np.array([contact.restitution + contact.friction * slip / comes])
-            after, _, _ = dynamics.struck(each.q, each.before, [each.contact], e)
+            try:
+                after, _, _ = dynamics.struck(each.q, each.before, [each.contact], e)
+            except NotUnique:
+                return np.full(1, np.inf)
             slip = float(np.linalg.norm(np.cross(n, J @ after)))
         found.append(each.root @ (each.after - after))
     return np.concatenate(found)

@@ -192,7 +192,8 @@ def of_stops(evidence: Evidence) -> Iterator[Cause]:
                 count = 2  # place and rate
             says = f"the joint {joint.name} {does} at {limit + shift:.6g}, not at its stop at {limit:.6g}"
             remedy = "look at the place of the stop, at the joint's zero, and at how far the stop gives way"
-            what, change = (f"{joint.name} at its stop", "rad, m", before, after), abs(shift) / size
+            unit = "rad" if joint.kind == "revolute" else "m"
+            what, change = (f"{joint.name} at its stop", unit, before, after), abs(shift) / size
             yield Cause(f"stop of {joint.name}", says, *what, remedy, 1, _COVERS, explains=count, change=change)
 
 

@@ -1,10 +1,11 @@
 """Drawing of a mechanism at its start: bodies, joints with their laws, loops, springs, tracked points."""
 
 import numpy as np
+from scipy.spatial import ConvexHull
 from scipy.spatial.transform import Rotation
 
 from proofroll.core.arrays import FloatArray
-from proofroll.elements.mechanism.contacts.shapes import HalfSpace
+from proofroll.elements.mechanism.contacts.shapes import Bore, HalfSpace, Wall
 from proofroll.elements.mechanism.contacts.start import TOUCHING, touches
 from proofroll.elements.mechanism.element import MechanismElement
 from proofroll.elements.mechanism.kinematics import Tree
@@ -14,6 +15,7 @@ from proofroll.report.pen import Drawing, View, across, circle, unit
 _SIZE = 240.0  # size of the mechanism in the picture [px]
 _JOINT, _MASS, _POINT = 4.0, 2.5, 3.0  # radii of the marks [px]
 _NEAR = 44.0  # distance of two names that would cover each other [px]
+_LINE = 15.0  # height of a line of names [px]
 _MOST_NAMES = 12  # of joints and loops: more would cover the drawing
 _OBLIQUE = (0.45, -0.85, 0.35)  # direction towards the viewer for spatial mechanisms, world axes with z up
 _STROKE = 10.0  # half of the stroke that marks a stop [px]
@@ -68,20 +70,21 @@ def _reach(element: MechanismElement) -> float:
     sizes = [
         float(np.linalg.norm(shape.support(axis)[0] - shape.support(-axis)[0]))
         for shape in shapes
-        if not isinstance(shape, HalfSpace)
+        if not isinstance(shape, Wall)
         for axis in np.eye(3)
     ]
     return max([element.length, *sizes])
 
 
 def _shapes(picture: Drawing, at: View, element: MechanismElement) -> None:
-    """Draws the outline of each shape that may touch, a patch of each plane, and names of closed contacts."""
+    """Draws outlines of shapes that may touch and of their bodies, a patch of each plane, names of closed contacts."""
     mechanism = element.mechanism
     motion = Tree(mechanism).at(*mechanism.start())
     touching, index = touches(mechanism, motion), mechanism.body_index
     upright = np.cross(direction(element)[0], at.right)
     rim = circle(np.zeros(3), at.right, upright, np.linspace(0.0, 2 * np.pi, _OUTLINE))
     drawn_already: set[bytes] = set()
+    outlines: dict[str, list[FloatArray]] = {}
     for contact, each in zip(mechanism.contacts, touching, strict=True):
         for body, shape in ((contact.body_a, contact.shape_a), (contact.body_b, contact.shape_b)):
             p, R = motion.p_WB[index[body]], motion.R_WB[index[body]]
@@ -91,14 +94,36 @@ def _shapes(picture: Drawing, at: View, element: MechanismElement) -> None:
                 middle = np.mean([one.place for one in touching], axis=0)
                 middle = middle - n * (n @ (middle - p - R @ shape.point))
                 outline = middle + _PATCH * _reach(element) * np.array([x + y, y - x, -x - y, x - y, x + y])
+            elif isinstance(shape, Bore):  # the circle at the height of the contact
+                axis, foot = R @ shape.axis, p + R @ shape.point
+                x, y = frame_of_axis(axis)[:, :2].T * shape.radius
+                middle = foot + axis * (axis @ (each.place - foot))
+                outline = circle(middle, x, y, np.linspace(0.0, 2 * np.pi, _OUTLINE))
             else:
                 outline = np.array([p + R @ shape.support(R.T @ d)[0] for d in rim])
             path = np.asarray(at(outline))
             if path.round(3).tobytes() not in drawn_already:
-                picture.path(path, "hidden" if isinstance(shape, HalfSpace) else "thin")
+                picture.path(path, "hidden" if isinstance(shape, Wall) else "thin")
                 drawn_already.add(path.round(3).tobytes())
+                if not isinstance(shape, Wall):
+                    outlines.setdefault(body, []).append(path)
         if each.gap <= TOUCHING * element.length and len(touching) <= _MOST_NAMES:
             _name(picture, np.asarray(at(each.place)), contact.name, "letter", (0.0, 14.0))
+    for body, paths in outlines.items():
+        com = at(motion.p_WB[index[body]] + motion.R_WB[index[body]] @ mechanism.bodies[index[body]].com)
+        hull = _hull(np.array([com, *np.concatenate(paths)]))
+        if len(paths) > 1 or np.any(np.all(hull == com, axis=1)):  # else the body is drawn by its only shape
+            picture.path(hull, "line")
+
+
+def _hull(places: FloatArray) -> FloatArray:
+    """Closed outline around places of the picture, or the line through them; shapes (n, 2)."""
+    _, sizes, axes = np.linalg.svd(places - places.mean(axis=0), full_matrices=False)
+    if sizes[-1] < 1.0:
+        along = places @ axes[0]
+        return places[[along.argmin(), along.argmax()]]
+    corners = ConvexHull(places).vertices
+    return places[[*corners, corners[0]]]
 
 
 def _laws(picture: Drawing, at: View, element: MechanismElement) -> None:
@@ -176,5 +201,8 @@ def _zigzag(ends: FloatArray) -> FloatArray:
 
 
 def _name(picture: Drawing, place: FloatArray, name: str, look: str, beside: tuple[float, float]) -> None:
-    """Writes a name with spaces for underscores, which the pen would turn into indices."""
-    picture.text(place, name.replace("_", " "), look, beside)
+    """Writes a name with spaces for underscores, which the pen would turn into indices; clear of other names."""
+    step = np.array([0.0, _LINE if beside[1] > 0 else -_LINE])
+    shifts = (beside + k * step for k in range(_MOST_NAMES))
+    clear = next((shift for shift in shifts if not picture.covers(place + shift, name)), np.array(beside))
+    picture.text(place, name.replace("_", " "), look, (float(clear[0]), float(clear[1])))

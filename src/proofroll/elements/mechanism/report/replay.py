@@ -16,7 +16,7 @@ from proofroll.core.scene import Scene
 from proofroll.elements.mechanism.checks import WORLD, ZERO, Vector
 from proofroll.elements.mechanism.contacts.geometry import BodyContact, Geometry
 from proofroll.elements.mechanism.contacts.observables import SLIDES
-from proofroll.elements.mechanism.contacts.shapes import HalfSpace
+from proofroll.elements.mechanism.contacts.shapes import Wall
 from proofroll.elements.mechanism.element import MechanismElement, the_mechanism
 from proofroll.elements.mechanism.placed import Placed
 from proofroll.elements.mechanism.report.drawing import direction
@@ -55,7 +55,7 @@ def draw_mechanism(replayed: Replayed) -> tuple[dict[str, Any], list[int], Packe
     mechanism, length = element.mechanism, element.length
     bodies, rods = [*element.bodies, WORLD], _rods(element)
     joints = [(each.name, each.b, each.position_b) for each in mechanism.connections if each.kind != "free"]
-    # The force of a contact is drawn at the middle of the shape that is not a plane; undetermined forces are not drawn.
+    # The force of a contact is drawn at the middle of the shape that is no wall; undetermined forces are not drawn.
     touching = [_touching(contact) for contact in mechanism.contacts]
     joints += [
         (contact.name, body, middle) for contact, (body, middle, _) in zip(mechanism.contacts, touching, strict=True)
@@ -134,19 +134,19 @@ def _rods(element: MechanismElement) -> dict[str, list[list[Vector]]]:
 
 
 def _outline(contact: BodyContact, placed: Placed) -> FloatArray:
-    """Outermost points along the world's axes of a contact's shape that is not a plane, at all frames, shape (n, 3)."""
+    """Outermost points along the world's axes of a contact's shape that is no wall, at all frames, shape (n, 3)."""
     body, _, sign = _touching(contact)
     shape = contact.shape_a if sign > 0 else contact.shape_b
-    assert not isinstance(shape, HalfSpace)
+    assert not isinstance(shape, Wall)
     origin, turned = placed.point(body, ZERO), placed.R_WB[:, placed.mechanism.body_index[body]]
     ways = np.concatenate([np.eye(3), -np.eye(3)])
     return np.array([p + R @ shape.support(way @ R)[0] for p, R in zip(origin, turned, strict=True) for way in ways])
 
 
 def _touching(contact: BodyContact) -> tuple[str, Vector, float]:
-    """Body of the shape that is not a plane, its centre in that body's frame [m], and the sign of the force on it."""
-    if isinstance(contact.shape_a, HalfSpace):
-        assert not isinstance(contact.shape_b, HalfSpace)  # two planes are no contact
+    """Body of the shape that is no wall, its centre in that body's frame [m], and the sign of the force on it."""
+    if isinstance(contact.shape_a, Wall):
+        assert not isinstance(contact.shape_b, Wall)  # two walls are no contact
         body, shape, sign = contact.body_b, contact.shape_b, -1.0
     else:
         body, shape, sign = contact.body_a, contact.shape_a, 1.0
@@ -165,6 +165,10 @@ def _shape(geometry: Geometry, body: int, element: MechanismElement, com: FloatA
         half = np.array(geometry.size) / 2
     if geometry.kind == "circle":
         half[2] = _FLAT * half[0]
+    if geometry.kind == "bore":
+        foot, axis = at, frame[:, 2]
+        along = (com - foot) @ axis if geometry.body == WORLD else np.zeros(1)
+        at, half[2] = foot + along.mean() * axis, np.ptp(along) / 2 + half[0]
     if geometry.kind == "plane":
         if geometry.body == WORLD:  # centred below the moving bodies
             middle, n = com.mean(axis=(0, 1)), frame[:, 2]

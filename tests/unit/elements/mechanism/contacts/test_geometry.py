@@ -14,6 +14,7 @@ from proofroll.files.scene_file import load_scene
 PLANE = {"name": "floor", "body": "world", "kind": "plane"}
 BALL = {"name": "ball", "body": "b", "kind": "sphere", "radius": 0.1}
 STONE = {"name": "stone", "body": "b", "kind": "ellipsoid", "axes": [0.3, 0.2, 0.1], "position": [0, 0, 1]}
+BORE = {"name": "tube", "body": "world", "kind": "bore", "radius": 0.1}
 PAIR = {"name": "foot", "geometries": ["ball", "floor"], "friction": 0.3}
 
 
@@ -47,6 +48,9 @@ def made(
         ({**PLANE, "normal": [0, 0, 0]}, "geometries.floor.normal"),
         ({**STONE, "radius": 1}, "geometries.stone.radius = 1.0: an ellipsoid has none; it has axes and orientation"),
         ({**PLANE}, "geometries.floor.name = 'floor': this name is used twice"),
+        ({**BORE, "radius": 0}, "geometries.tube.radius = 0.0: a bore has a radius above 0"),
+        ({**BORE, "normal": [1, 0, 0]}, "geometries.tube.normal = (1.0, 0.0, 0.0): a bore has none; it has"),
+        ({**BORE, "axis": [0, 0, 0]}, "geometries.tube.axis"),
     ],
 )  # fmt: skip
 def test_bad_geometries_are_one_line(geometry: dict[str, Any], said: str) -> None:
@@ -66,6 +70,9 @@ def test_bad_geometries_are_one_line(geometry: dict[str, Any], said: str) -> Non
         ({"geometries": ["floor", "floor"]}, "pairs.foot.geometries = ('floor', 'floor'): both belong to the world"),
         ({"geometries": ["stone", "egg"]}, "pairs.foot.geometries = ('stone', 'egg'): only a plane with"),
         ({"geometries": ["stone"]}, "pairs.0.geometries"),
+        ({"geometries": ["stone", "tube"]}, "pairs.foot.geometries = ('stone', 'tube'): only a plane with"),
+        ({"geometries": ["lid", "tube"]}, "pairs.foot.geometries = ('lid', 'tube'): only a plane with"),
+        ({"geometries": ["tube", "ball"]}, "pairs.foot.geometries = ('tube', 'ball'): a sphere of radius 0.1 m has"),
         ({"friction": -0.1}, "pairs.foot.friction = -0.1: must be at least 0"),
         ({"restitution": 1.5}, "pairs.foot.restitution = 1.5: no impact returns more than it takes"),
         ({"restitution": -0.5}, "pairs.foot.restitution = -0.5: must be at least 0"),
@@ -75,7 +82,7 @@ def test_bad_pairs_are_one_line(pair: dict[str, Any], said: str) -> None:
     """Each impossible pair names its field, its value and what to do."""
     egg = {**STONE, "name": "egg", "body": "c"}
     with pytest.raises(InputError) as error:
-        made(PLANE, BALL, STONE, egg, pairs=({**PAIR, **pair},))
+        made(PLANE, BALL, STONE, egg, BORE, {**PLANE, "name": "lid", "body": "c"}, pairs=({**PAIR, **pair},))
     assert str(error.value).startswith(said)
     assert "\n" not in str(error.value)
 

@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from proofroll.elements.mechanism.contacts.geometry import BodyContact
-from proofroll.elements.mechanism.contacts.shapes import CircleShape, EllipsoidShape, HalfSpace, SphereShape
+from proofroll.elements.mechanism.contacts.shapes import Bore, CircleShape, EllipsoidShape, HalfSpace, SphereShape
 from proofroll.elements.mechanism.contacts.touching import Moving, Touching, touch
 
 STEP = 1e-5  # s; central differences leave 1e-10 of it, round-off 1e-11
@@ -35,6 +35,7 @@ def some_shape(kind: str, rng: np.random.Generator) -> Any:
         "vertex": lambda: SphereShape(centre, 0.0),
         "ellipsoid": lambda: EllipsoidShape(centre, axes, frame),
         "disc": lambda: CircleShape(centre, 0.3, frame[:, 2].copy()),
+        "bore": lambda: Bore(centre, frame[:, 1].copy(), 9.0),
         "plane": lambda: HalfSpace(centre, frame[:, 1].copy()),
     }[kind]()
 
@@ -48,8 +49,27 @@ def test_balls_with_one_centre_have_numbers() -> None:
     assert all(np.isfinite(part).all() for part in found)
 
 
+def test_a_ball_on_the_axis_of_its_bore_has_numbers() -> None:
+    """A trial step may lay it there: the gap is known, and nothing is NaN."""
+    ball, still = SphereShape(np.zeros(3), 0.2), Moving(np.zeros(3), np.eye(3), np.zeros(3), np.zeros(3))
+    found = touch(BodyContact("c", "a", "b", ball, Bore(np.zeros(3), np.eye(3)[2], 0.5), 0.0, 0.0), still, still)
+    assert found.gap == pytest.approx(0.3)
+    assert all(np.isfinite(part).all() for part in found)
+
+
 @pytest.mark.parametrize(
-    "pair", ["ball plane", "plane ball", "vertex plane", "ellipsoid plane", "disc plane", "plane disc", "ball ball"]
+    "pair",
+    [
+        "ball plane",
+        "plane ball",
+        "vertex plane",
+        "ellipsoid plane",
+        "disc plane",
+        "plane disc",
+        "ball ball",
+        "ball bore",
+        "bore vertex",
+    ],
 )
 @pytest.mark.parametrize("seed", [0, 1, 2])
 def test_rates_are_derivatives(pair: str, seed: int) -> None:
@@ -82,3 +102,23 @@ def test_an_ellipsoid_is_as_far_from_a_plane_as_its_nearest_point() -> None:
     assert found.gap <= heights.min()
     assert found.gap == pytest.approx(heights.min(), abs=1e-2)
     assert float(n @ (found.place - through)) == pytest.approx(found.gap, abs=1e-14)
+
+
+@pytest.mark.parametrize("seed", [0, 1, 2])
+def test_a_ball_is_as_far_from_a_bore_as_its_farthest_point_from_the_axis(seed: int) -> None:
+    """Gap and place of contact from the distances of a sphere's points from the axis; the normal points to it."""
+    rng = np.random.default_rng(seed)
+    ball, bore = some_shape("ball", rng), some_shape("bore", rng)
+    a, b = some_body(rng), some_body(rng)
+    found = touch(BodyContact("c", "a", "b", ball, bore, 0.0, 0.0), a, b)
+    way = rng.normal(size=(20000, 3))
+    surface = a.p + a.R @ ball.centre + ball.radius * way / np.linalg.norm(way, axis=1, keepdims=True)
+    axis, foot = b.R @ bore.axis, b.p + b.R @ bore.point
+
+    def distance(places: np.ndarray[Any, Any]) -> Any:
+        return np.linalg.norm(np.cross(places - foot, axis), axis=-1)
+
+    assert found.gap == pytest.approx(bore.radius - distance(surface).max(), abs=1e-3)
+    assert distance(found.place) == pytest.approx(bore.radius - found.gap, abs=1e-13)
+    assert distance(found.place + 1e-3 * found.normal) < distance(found.place)
+    assert abs(float(found.normal @ axis)) < 1e-14

@@ -113,3 +113,12 @@ def test_a_convex_cone_at_an_impact_is_not_called_restitution() -> None:
     (only,) = diagnose(evidence, hypotheses_of(scene.elements[0]))
     assert only.says.startswith("convex cone: contacts part after an impact by μ|u_t| too fast")
     assert only.fitted == 0
+
+
+def test_a_model_that_leaves_an_impact_open_fits_none() -> None:
+    """A rod whose friction is ten times the scene's tears at the floor; the scene's own law has a finite residual."""
+    mechanism = load_scene("painleve_rod", friction=0.2).elements[0].mechanism
+    (joint,) = mechanism.joints
+    struck = [impacts._Struck(0, np.array(joint.q0), np.array([-10.0, 1.0, 0.0]), np.zeros(3), np.eye(3))]
+    assert np.all(np.isfinite(impacts._missed(mechanism, struck)))
+    assert np.all(np.isinf(impacts._missed(impacts._scaled(mechanism, "friction", 10.0), struck)))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -12,7 +13,7 @@ import xarray as xr
 from scipy.spatial.transform import Rotation
 
 from proofroll.core.certificate import Line
-from proofroll.core.diagnosis import Evidence, diagnose, hypotheses_of
+from proofroll.core.diagnosis import Cause, Evidence, diagnose, hypotheses_of
 from proofroll.core.diagnosis.scene_diagnosis import diagnose_scene
 from proofroll.core.scene import Scene
 from proofroll.core.truth import truth
@@ -26,9 +27,13 @@ ROUGH_ARM = Path(__file__).parents[4] / "drill/proofroll_drill/mutants/rough_arm
 
 
 def _told(scene: Scene, run: object, true: object, settled: frozenset[str] = frozenset()) -> list[str]:
+    return [cause.says for cause in _causes(scene, run, true, settled)]
+
+
+def _causes(scene: Scene, run: object, true: object, settled: frozenset[str] = frozenset()) -> Sequence[Cause]:
     (element,) = scene.elements
     evidence = Evidence(element, [], run, true, 2e-3, settled)  # type: ignore[arg-type]  # datasets
-    return [cause.says for cause in diagnose(evidence, hypotheses_of(element))]
+    return diagnose(evidence, hypotheses_of(element))
 
 
 @pytest.mark.drill
@@ -52,8 +57,8 @@ def test_a_stop_at_zero_that_is_never_left_can_be_misplaced() -> None:
     """A joint that rests on its stop at 0 from the start, where nothing has a size, is told to rest below it."""
     scene = _resting_on(0.0)
     times = np.arange(0.0, 0.2, 0.02)
-    (said,) = _told(scene, truth(_resting_on(-0.5), times), truth(scene, times))
-    assert said == "the joint guide rests at -0.5, not at its stop at 0"
+    (cause,) = _causes(scene, truth(_resting_on(-0.5), times), truth(scene, times))
+    assert (cause.says, cause.unit) == ("the joint guide rests at -0.5, not at its stop at 0", "m")
 
 
 def _resting_on(at: float) -> Scene:

@@ -67,10 +67,12 @@ replayed.mechanism = (replay) => {
       return mesh;
     });
     for (const { body, kind, at, turn, half } of shown.shapes) {
-      if (!Math.max(...half) || (ghost && kind === "plane")) continue;
+      const wall = ["plane", "bore"].includes(kind);
+      if (!Math.max(...half) || (ghost && wall)) continue;
       const unit = { plane: () => new T.PlaneGeometry(2, 2), box: () => new T.BoxGeometry(2, 2, 2),
-        circle: () => new T.CylinderGeometry(1, 1, 2, 48).rotateX(Math.PI / 2) }[kind] || (() => new T.SphereGeometry(1, 32, 20));
-      const paint = { color: kind === "plane" ? colour("--wall") : tone, transparent: true, opacity: ghost ? 0.15 : kind === "plane" ? 0.5 : 0.25 };
+        circle: () => new T.CylinderGeometry(1, 1, 2, 48).rotateX(Math.PI / 2),
+        bore: () => new T.CylinderGeometry(1, 1, 2, 48, 1, true).rotateX(Math.PI / 2) }[kind] || (() => new T.SphereGeometry(1, 32, 20));
+      const paint = { color: wall ? colour("--wall") : tone, transparent: true, opacity: ghost ? 0.15 : wall ? 0.5 : 0.25 };
       const mesh = new T.Mesh(unit(), new T.MeshPhongMaterial({ ...paint, depthWrite: false, side: T.DoubleSide }));
       mesh.position.set(...at);
       mesh.quaternion.set(...turn);

@@ -1,0 +1,67 @@
+"""Judging a trajectory: samples on an impact, and how often its dataset is indexed."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import proofroll
+
+
+@pytest.mark.drill
+def test_the_cost_of_judging_does_not_grow_with_the_number_of_variables(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Judging a run indexes its dataset a few times, not once or more for each of its variables.
+
+    An index makes coordinates anew, which takes longer than all comparisons of a curve of a hundred samples.
+    """
+    run = proofroll.simulate("pendulum", until=0.1, every=0.01)
+    assert len(run.data_vars) > 20
+    proofroll.judge(run, "pendulum")
+    indexed = 0
+    get = xr.Dataset.__getitem__
+
+    def counted(self: Any, key: Any) -> Any:
+        nonlocal indexed
+        indexed += 1
+        return get(self, key)
+
+    monkeypatch.setattr(xr.Dataset, "__getitem__", counted)
+    assert proofroll.judge(run, "pendulum").compared
+    assert indexed < 10
+
+
+@pytest.mark.drill
+@pytest.mark.parametrize("of_a_run", [True, False])
+def test_a_sample_on_an_impact_may_be_of_either_side(*, of_a_run: bool) -> None:
+    """Velocities have two values there, so that none is wrong; at the next sample one is."""
+    run = proofroll.simulate("two_spheres", until=0.2, every=0.02).copy(deep=True)
+    if not of_a_run:
+        run = run[["v_WB"]].drop_attrs(deep=False)
+    allowed = {"v_WB": "1e-6 m/s"}
+    (hit,) = np.flatnonzero(np.isclose(run["time"], 0.1))
+    for side in (hit - 1, hit + 1):
+        run["v_WB"][hit] = run["v_WB"][side].to_numpy()
+        assert proofroll.judge(run, "two_spheres", allowed, because="round-off").agrees
+    run["v_WB"][hit + 1] = run["v_WB"][hit - 1].to_numpy()
+    assert not proofroll.judge(run, "two_spheres", allowed, because="round-off").agrees
+
+
+@pytest.mark.drill
+def test_samples_that_nearly_all_lie_on_impacts_are_judged() -> None:
+    """With no other samples a wrong run would agree."""
+    run = proofroll.simulate("two_spheres", until=0.1, every=0.1).copy(deep=True)
+    run["p_WB"][1] += 1.0
+    assert not proofroll.judge(run, "two_spheres", {"p_WB": "1e-3 m"}, because="no way").agrees
+
+
+@pytest.mark.drill
+def test_a_force_that_the_truth_does_not_determine_accuses_nobody() -> None:
+    """Across the plane to which a joint confines a rod, joint and foot share the force: whatever is said of it."""
+    run = proofroll.simulate("falling_rod", "projection", until=0.1, every=0.01).copy(deep=True)
+    found = proofroll.judge(run, "falling_rod")
+    assert found.agrees, found
+    assert found.unjudged["contact_forces"] == "the truth does not determine it at all times"
+    run["normal_forces"][5:] *= 1.1
+    run["contact_forces"][5:] *= 1.1
+    assert not proofroll.judge(run, "falling_rod").agrees
