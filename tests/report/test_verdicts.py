@@ -197,6 +197,23 @@ def test_what_could_not_be_judged_is_not_said_to_be_as_expected(made: tuple[Outc
     assert "Nothing contradicts the comparison file; 1 of its runs could not be judged." in closing_lines(content)
     assert "Nothing of it was unexpected." in conclusions(content, NOTHING, [], None).answer
     assert counted(content).endswith("; nothing is contradicted")
+    away = Result(Status.MISSING, "beta is not installed here")
+    runs[0] = [dataclasses.replace(run, result=away) for run in runs[0]]
+    assert any("1 of its runs could not" in line for line in closing_lines(outcome_content(with_runs(made[0], runs))))
+
+
+def test_where_nothing_is_claimed_nothing_is_said_to_be_expected(made: tuple[Outcome, Store]) -> None:
+    """A scene without a file of claims expects nothing: neither its findings nor its heading say that it did."""
+    comparison = made[0].comparison
+    rows = [dataclasses.replace(row, expect=list(Verdict)) for row in comparison.rows]
+    own = [rows[comparison.rows.index(run.row)] for run in made[0].runs]
+    runs = [dataclasses.replace(run, row=row, contradictions=[]) for run, row in zip(made[0].runs, own, strict=True)]
+    open_to_all = dataclasses.replace(comparison, rows=rows)
+    content = outcome_content(dataclasses.replace(made[0], comparison=open_to_all, runs=runs))
+    found = conclusions(content, NOTHING, [], None)
+    assert "expected" not in found.answer
+    assert found.sentences[-1] == "No file says what to expect here, so that nothing can contradict it."
+    assert not re.search("expected|contradicted", counted(content))
 
 
 def test_who_is_silent_or_shares_equations_is_marked(outcome: Outcome) -> None:

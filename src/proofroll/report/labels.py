@@ -46,10 +46,12 @@ def precision_words(precision: str) -> tuple[str, ...]:
 
 
 def unjudged(content: ReportedComparison) -> int:
-    """Count of runs that could not be judged, though their rows expect a verdict."""
+    """Count of runs that could not be judged, though their rows expect a verdict: without a truth or their engine."""
+    from proofroll.running.case import Status
     from proofroll.studies.comparison.expectations import NOBODY
 
-    return sum(run.verdict in NOBODY and run.verdict not in content.rows[run.row].expected for run in content.runs)
+    open_runs = [run for run in content.runs if run.verdict in NOBODY or run.status == Status.MISSING]
+    return sum(run.verdict not in content.rows[run.row].expected for run in open_runs)
 
 
 def verdict_text(row: ReportedRow) -> str:

@@ -94,7 +94,7 @@ class Exudyn:
         "contact": Level.CONTACT,
         "redundant": Level.CONSTRAINT,
         "spheres": Level.CONTACT,
-        "tree": Level.REDUCED,
+        "tree": Level.CONSTRAINT,
     }
     terms: ClassVar[Sequence[Term]] = (
         Term(

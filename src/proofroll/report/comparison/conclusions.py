@@ -44,10 +44,10 @@ def _answer(content: ReportedComparison, choice: ChoiceMatrix) -> str:
     """Sentence: counts of verdicts, whether they were expected, and the cheapest engine at ``FIRST_TOLERANCE``."""
     rows, alone = content.rows, content.laws_alone
     unexpected = len(content.contradictions)
-    expected = f"Not expected: {counted(unexpected, 'results')}."
+    expected = f" Not expected: {counted(unexpected, 'results')}."
     if content.as_expected:
-        expected = "Nothing of it was unexpected." if unjudged(content) else "All of this was expected."
-    text = f"Of {counted(len(rows), 'engine settings')}, {standings(rows, alone)}. {expected}"
+        expected = " Nothing of it was unexpected." if unjudged(content) else " All of this was expected."
+    text = f"Of {counted(len(rows), 'engine settings')}, {standings(rows, alone)}.{expected if content.claims else ''}"
     text = f"{ALONE[0].upper()}{ALONE[1:]}. {text}" if alone else text
     for column in choice.columns:
         forces = not choice.unjudged[True].issuperset(column.studies)
@@ -161,6 +161,8 @@ def _surprises(content: ReportedComparison) -> str:
         more = f" (and {len(contradictions) - 1} more, listed below)" if len(contradictions) > 1 else ""
         return f"Not expected: {contradictions[0]}{more}."
     known = [row for row in content.rows if row.verdict != "agrees"]
+    if not content.claims:
+        return "No file says what to expect here, so that nothing can contradict it."
     if not known:
         nothing = "no law is broken" if content.laws_alone else "nothing disagrees with the truth"
         return f"Nothing contradicts what the comparison expects, and {nothing}."

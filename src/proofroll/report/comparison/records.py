@@ -221,6 +221,11 @@ class ReportedComparison:
     evidence: ComparisonEvidence | None = field(default=None, metadata=MERGED)
 
     @property
+    def claims(self) -> bool:
+        """False if every verdict is expected of every row, as in the default comparison of a scene."""
+        return any(len(row.expected) < len(Verdict) for row in self.rows)
+
+    @property
     def section(self) -> str:
         """HTML id of its evidence in a page."""
         return section_id("evidence", self.name)

@@ -84,7 +84,8 @@ def counted(content: ReportedComparison) -> str:
     verdicts = [row.verdict.value for row in content.rows]
     counts = ", ".join(f"{sign} {verdicts.count(word)} {word}" for word, sign in SYMBOLS.items() if word in verdicts)
     surprise = "nothing is contradicted" if unjudged(content) else "as expected"
-    return f"{plural(len(verdicts), 'settings')}: {counts}; {surprise if content.as_expected else 'not as expected'}"
+    end = f"; {surprise if content.as_expected else 'not as expected'}" if content.claims else ""
+    return f"{plural(len(verdicts), 'settings')}: {counts}{end}"
 
 
 def at_point(content: ReportedComparison, name: str) -> Matrix:

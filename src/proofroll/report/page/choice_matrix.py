@@ -27,7 +27,7 @@ UNIT = "in seconds of computing per second of motion"
 WITH_FORCES = "With forces to {0} of the largest, too"
 SAME = "the same for"
 NOTHING = "nothing that was run and timed holds it for"
-UNJUDGED = "no scene that was run is judged by that"
+UNJUDGED = "that is judged in no scene that was run"
 NOT_RUN = "none"
 SEVERITY = list(map(str, Verdict))
 # Number of groups beside which scenes find room on a screen of 1400 px.

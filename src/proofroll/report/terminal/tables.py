@@ -147,7 +147,7 @@ def closing_lines(content: ReportedComparison) -> list[str]:
         said = "1 result contradicts" if count == 1 else f"{count} results contradict"
         lines.append(f"{said} what {content.name} expects (!! above){'; first' if count > 5 else ''}:")
         lines += [f"  {sentence}" for sentence in content.contradictions[:5]]
-    elif any(len(row.expected) < len(Verdict) for row in rows):  # else nothing is claimed
+    elif content.claims:
         left = unjudged(content)
         lines.append(
             f"Nothing contradicts the comparison file; {left} of its runs could not be judged."

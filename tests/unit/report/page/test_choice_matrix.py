@@ -117,7 +117,7 @@ def test_a_scene_without_judged_motion_takes_no_part() -> None:
     laws = replace(LINE, role="residual", study="chain", scene="chain")
     assert at([laws], 2)[:2] == (Verdict.NOT_JUDGED, "no motion")
     assert at([*ARM, laws], 2)[:2] == at(ARM, 2)[:2]
-    assert choice_matrix([laws], STUDIES).answer(1e-2, False).endswith(": no scene that was run is judged by that.")
+    assert choice_matrix([laws], STUDIES).answer(1e-2, False).endswith(": that is judged in no scene that was run.")
 
 
 def test_the_limit_of_forces_says_nothing_of_motion() -> None:

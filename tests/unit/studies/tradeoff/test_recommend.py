@@ -10,17 +10,13 @@ from invented import invented_budget, invented_study, measured_point, timed
 
 from proofroll.core.comparison import Tolerance
 from proofroll.core.errors import InputError
+from proofroll.core.plugins import load_engine
 from proofroll.files.json_data import plain
 from proofroll.report.tradeoff.tables import answer_lines, corner_table, default_quantities, front_tables
-from proofroll.running.identity import resolve
 from proofroll.studies.tradeoff.recommend import by_hand, covers
 from proofroll.studies.tradeoff.recommend import recommend as recommended
 from proofroll.studies.tradeoff.records import Corner, MeasuredPoint, MeasuredQuantity, SparseRun, TradeoffStudy
 from proofroll.studies.tradeoff.requirements import Requirements
-
-PROJECTION = ("euler", "rotating_frame", "dependent")
-PINOCCHIO = ("composite", "contact", "null_space", "constraint_dynamics", "impulses")
-REDUCED = ("equations", "closed_form")
 
 
 def point(  # noqa: D103 -- one measured point
@@ -221,9 +217,9 @@ def test_solvers_of_any_mechanism_are_no_equations_by_hand() -> None:
     """Of our engines only those with a ball's equations are left out of the contest, in studies and comparisons."""
     found = {
         (engine, formulation)
-        for engine, formulations in {"projection": PROJECTION, "pinocchio": PINOCCHIO, "reduced": REDUCED}.items()
-        for formulation in formulations
-        if by_hand(str(resolve(engine, {"formulation": formulation})["level"]))
+        for engine in ("exudyn", "mujoco", "pinocchio", "projection", "reduced")
+        for formulation, level in load_engine(engine).levels.items()
+        if by_hand(level)
     }
     assert found == {
         ("projection", "euler"), ("projection", "rotating_frame"), ("reduced", "equations"), ("reduced", "closed_form"),
