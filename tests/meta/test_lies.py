@@ -157,6 +157,7 @@ UNASKED = [
     ("slips", "always sticking", "first_slip is"),
     ("slips", "always sticking, without events", "first_slip is"),
     ("slips", "never sticking", "first_slip is"),
+    ("bounces", "right on the grid alone, an impact in each interval", "positions is"),
     ("slips", "nothing", "not judged: event_times, event_order; no tolerance is given for it"),
 ]
 

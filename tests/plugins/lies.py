@@ -238,6 +238,18 @@ def _later(by: float) -> Any:
     return _each(**{name: lambda event, _, name=name: getattr(event, name) + by for name in names})
 
 
+def _more(times: Callable[[float], list[tuple[float, float, float]]]) -> Callable[[list[Event], float], list[Event]]:
+    """Further impacts on the part of the last one, at these times and brackets of a run until its end."""
+    return lambda right, until: (
+        right
+        + [
+            dataclasses.replace(last, time=time, time_low=low, time_high=high)
+            for last in right[-1:]
+            for time, low, high in times(until)
+        ]
+    )
+
+
 def _slips() -> Iterator[Lie]:
     def lie(name: str, events: Any, sample: Any = None, said: tuple[str, ...] = _EVENTS) -> Lie:
         return Lie(name, ("slips",), said, sample, events=events)
@@ -376,11 +388,25 @@ def _small() -> Iterator[Lie]:
     yield Lie("1 ns late", ALL, (), lambda m: m.at(m.t - 1e-9))
 
 
+def _further_impacts() -> Iterator[Lie]:
+    both = ("bounces", "stops")
+    yield Lie("an impact after the end", both, _EVENTS, events=_more(lambda _: [(1e9, 1e9, 1e9)]))
+    crowd = _more(lambda until: [(until - EVERY / 2, until - EVERY, until)] * 100)
+    yield Lie("a hundred impacts somewhere in the last interval", both, (*_EVENTS, "by luck"), events=crowd)
+    yield Lie(
+        "right on the grid alone, an impact in each interval",
+        both,
+        (*_PLACES, *_EVENTS),
+        _off_grid(lambda m: m.at(m.t - 0.002)),
+        events=_more(lambda until: [(t, t, t) for t in np.arange(EVERY / 2, until, EVERY)]),
+    )
+
+
 def table() -> list[Lie]:
     """All lies of the table."""
     states = _times, _places, _frames, _velocities, _spins, _orientations
     forces = _forces_of_balls, _reactions_of_joints, _efforts, _forces_of_contacts, _friction_of_joints
-    return [lie for part in (*states, *forces, _slips, _impacts, _models, _small) for lie in part()]
+    return [lie for part in (*states, *forces, _slips, _impacts, _models, _small, _further_impacts) for lie in part()]
 
 
 def _off_grid(change: Callable[[Moment], Any]) -> Callable[[Moment], Any]:

@@ -6,13 +6,15 @@ from collections.abc import Hashable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
+import numpy.typing as npt
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.columns import Columns, Variable
 from proofroll.core.element import Element
 from proofroll.core.element_abilities import WatchesRuns
-from proofroll.core.events import Event, event_columns, events_of
+from proofroll.core.events import JUMPS, Event, event_columns, events_of
 from proofroll.core.multi_element import AnySample, sample_of
+from proofroll.core.observable import Role
 from proofroll.core.scene import Scene
 
 if TYPE_CHECKING:
@@ -24,8 +26,12 @@ Key = TypeVar("Key", bound=Hashable)
 _SHARED = frozenset({"time", "xyz", "wxyz", "between"})
 # Dimension of the samples off the grid of times, and prefix of the names of their variables.
 BETWEEN = "between"
+# Attribute: widest bracket [s] of the events at the end that are left out of a comparison.
+LEFT_OUT = "widest_bracket_left_out"
 # A sample that is nearer to an impact than this part of the sampling interval lies on it.
 _ON_IMPACT = 1e-6
+# Units of what an impact leaves as it is, reactions apart: places, angles and orientations.
+_CONTINUOUS = frozenset({"m", "rad", "1"})
 
 
 def from_samples(scene: Scene, times: FloatArray, samples: Sequence[AnySample]) -> xr.Dataset:
@@ -142,23 +148,46 @@ def scales(scene: Scene, truth: xr.Dataset) -> dict[str, float]:
     return {name: max(size, floors[name]) if np.isfinite(size) else floors[name] for name, size in sizes.items()}
 
 
-def off_impacts(
-    scene: Scene, truth: xr.Dataset, runs: Mapping[Key, xr.Dataset]
-) -> tuple[xr.Dataset, dict[Key, xr.Dataset]]:
-    """Truth and runs without the samples that lie on an impact of the truth, where velocities have two values.
+def off_impacts(scene: Scene, truth: xr.Dataset, runs: Mapping[Key, xr.Dataset]) -> dict[Key, xr.Dataset]:
+    """Runs with the truth's values where a sample lies on a true impact, of all that has two values there.
 
-    Which of them a run has there hangs on its last digits. The first sample stays; all stay where most lie on impacts,
-    as of a ball that bounces in time with the samples: else nothing would be judged.
+    Which of them a run has hangs on its last digits. Places and orientations have one, and are the run's own, as is a
+    velocity or energy far from what the truth has at that sample and beside it. The first sample stays, and all
+    do where most lie on impacts, as of a ball that bounces in time with the samples: else nothing would be judged.
     """
     times = truth.variables["time"].values
     happened = [event for element in scene.elements for event in events_of(part(scene, element, truth))]
-    hits = np.array([event.time for event in happened if event.kind == "impact"])
+    hits = np.array([event.time for event in happened if event.kind in JUMPS])
     near = _ON_IMPACT * float(np.max(np.diff(times), initial=0.0))
-    keep = ~np.any(np.abs(times[:, None] - hits) <= near, axis=1)
-    keep[:1] = True
-    if keep.all() or np.mean(keep) <= 0.5:
-        return truth, dict(runs)
-    return truth.isel(time=keep), {key: run.isel(time=keep[: run.sizes["time"]]) for key, run in runs.items()}
+    on = np.any(np.abs(times[:, None] - hits) <= near, axis=1)
+    on[:1] = False
+    if not on.any() or np.mean(on) >= 0.5:
+        return dict(runs)
+    return {key: _of_either_side(scene, truth, run, np.flatnonzero(on)) for key, run in runs.items()}
+
+
+def _of_either_side(scene: Scene, truth: xr.Dataset, run: xr.Dataset, on: npt.NDArray[np.intp]) -> xr.Dataset:
+    """The run with the truth's values at the samples ``on`` impacts, where its own may be those of either side."""
+    at, given, known = on[on < run.sizes["time"]], run.variables, truth.variables
+    last = truth.sizes["time"] - 1
+    changed = {}
+    for name in map(str, run.data_vars):
+        own, item = given[name], scene.observables.get(name)
+        reaction = item is not None and item.role is Role.REACTION
+        if name not in known or own.dims[:1] != ("time",) or own.dtype.kind != "f":
+            continue
+        if own.shape[1:] != known[name].shape[1:]:  # a user's file
+            continue
+        if known[name].attrs.get("units") in _CONTINUOUS and not reaction:
+            continue
+        true = known[name].values
+        around = np.stack([true[at - 1], true[at], true[np.minimum(at + 1, last)]])
+        low, high = around.min(axis=0), around.max(axis=0)
+        inside = (own.values[at] >= 2 * low - high) & (own.values[at] <= 2 * high - low)
+        values = own.values.copy()
+        values[at] = np.where((reaction | inside) & np.isfinite(true[at]), true[at], own.values[at])
+        changed[name] = (own.dims, values, own.attrs)
+    return run.assign(changed)
 
 
 def shared_events(
@@ -166,21 +195,26 @@ def shared_events(
 ) -> tuple[xr.Dataset, dict[Key, xr.Dataset]]:
     """Truth and runs without events at their end that some of them have, and others would have a moment later.
 
-    Such an event lies no farther from the end than the widest bracket of an event and one sampling interval.
+    Such an event lies no farther from the end than the widest bracket of an event and one sampling interval. The widest
+    bracket that is left out of a run remains in its attributes.
     """
     everything, times = [truth, *runs.values()], truth.variables["time"].values
     for element in scene.elements:
         parts = [part(scene, element, item) for item in everything]
         events = [events_of(own) for own in parts]
         fewest = min(map(len, events))
-        late = [event.time for one in events for event in one[fewest:]]
-        if not late:
+        late = np.array([event.time for one in events for event in one[fewest:]])
+        if not late.size:
             continue
         widest = max(event.time_high - event.time_low for one in events for event in one)
-        if min(late) >= times[-1] - min(widest, float(np.max(np.diff(times), initial=0.0))):
-            for number, own in enumerate(parts):
-                if len(events[number]) > fewest:
-                    everything[number] = with_part(scene, element, everything[number], own.isel(event=slice(fewest)))
+        room = min(widest, float(np.max(np.diff(times), initial=0.0)))
+        if not np.all(np.abs(late - times[-1]) <= room):
+            continue
+        for number, own in enumerate(parts):
+            if left_out := events[number][fewest:]:
+                open_ = max(event.time_high - event.time_low for event in left_out)
+                cut = with_part(scene, element, everything[number], own.isel(event=slice(fewest)))
+                everything[number] = cut.assign_attrs({LEFT_OUT: max(open_, cut.attrs.get(LEFT_OUT, 0.0))})
     return everything[0], dict(zip(runs, everything[1:], strict=True))
 
 
@@ -189,11 +223,11 @@ def common_span(
 ) -> tuple[xr.Dataset, dict[Key, xr.Dataset]]:
     """Truth and runs cut to the time in which they are comparable for every element (:class:`WatchesRuns`).
 
-    Samples on an impact are left out (:func:`off_impacts`), and events at the end that only some have
-    (:func:`shared_events`). The element whose comparable time ends first ends it for
-    all. Only that element keeps its events after the last sample; later events of the other elements are dropped.
+    Samples on an impact may be of either side (:func:`off_impacts`), and events at the end that only some have are
+    left out (:func:`shared_events`). The element whose comparable time ends first ends it for all. Only that element
+    keeps its events after the last sample; later events of the other elements are dropped.
     """
-    truth, runs = shared_events(scene, *off_impacts(scene, truth, runs))
+    truth, runs = shared_events(scene, truth, off_impacts(scene, truth, runs))
     spans = {}
     for element in scene.elements:
         if isinstance(element, WatchesRuns):

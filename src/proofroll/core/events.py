@@ -16,6 +16,8 @@ if TYPE_CHECKING:
 # Name of an observable for kinds of elements with events: how many events differ in kind from the truth's, are missing
 # or are too many.
 EVENT_ORDER = "event_order"
+# Kinds of events at which velocities jump, of all kinds of elements.
+JUMPS = frozenset({"impact", "bounce", "settle"})
 
 
 @dataclass(frozen=True)

@@ -50,7 +50,7 @@ def test_the_numeric_model_holds_its_bound() -> None:
     """The numeric projection method is taken at a tolerance that holds the bound, and none where none does."""
     found = numeric(FREE, "rotating_frame", TIMES, TRUE_P, 1e-9)
     assert found is not None
-    assert found.error <= 1e-9
+    assert found.error <= 1e-9  # near it by construction: the loosest tolerance that holds it is taken
     assert numeric(FREE, "rotating_frame", TIMES, TRUE_P, 1e-20) is None
 
 

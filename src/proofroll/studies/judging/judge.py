@@ -11,7 +11,7 @@ import numpy as np
 from proofroll.core.arrays import FloatArray
 from proofroll.core.columns import UNCERTAIN
 from proofroll.core.comparison import Tolerance
-from proofroll.core.dataset import BETWEEN
+from proofroll.core.dataset import BETWEEN, off_impacts
 from proofroll.core.errors import InputError, require_known
 from proofroll.core.number_format import number
 from proofroll.core.observable import Observable, Role
@@ -160,9 +160,9 @@ def judge(
     if "scene_digest" in dataset.attrs:  # all variables of a run
         reference, cut = reference.common_span({0: dataset})
         observed = run_values.observables_of(reference, cut[0])
+        dataset = cut[0]
     else:
-        reference, cut = reference.off_impacts({0: dataset})
-    dataset = cut[0]
+        dataset = off_impacts(scene, reference.dataset, {0: dataset})[0]
     given_variables = dataset.variables  # indexing a dataset would make coordinates, too
     sure = [str(name) for name in dataset.data_vars if UNCERTAIN not in given_variables[name].attrs]
     bounds = _bounds(tolerance, reference, observed, sure)

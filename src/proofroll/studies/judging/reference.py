@@ -12,7 +12,7 @@ import numpy as np
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.beside_events import beside_events
-from proofroll.core.dataset import Key, common_span, observe, off_impacts, part, scales
+from proofroll.core.dataset import LEFT_OUT, Key, common_span, observe, part, scales
 from proofroll.core.element_abilities import KnowsAnotherScene
 from proofroll.core.events import EVENT_ORDER, Event, events_of
 from proofroll.core.observable import Role
@@ -46,13 +46,7 @@ class Reference:
 
     def common_span(self, trajectories: Mapping[Key, xr.Dataset]) -> tuple[Reference, dict[Key, xr.Dataset]]:
         """Truth and runs cut to the time in which they are comparable (:class:`WatchesRuns`)."""
-        return self._cut(*common_span(self.scene, self.dataset, trajectories))
-
-    def off_impacts(self, trajectories: Mapping[Key, xr.Dataset]) -> tuple[Reference, dict[Key, xr.Dataset]]:
-        """Truth and runs without the samples on true impacts (:func:`proofroll.core.dataset.off_impacts`)."""
-        return self._cut(*off_impacts(self.scene, self.dataset, trajectories))
-
-    def _cut(self, truth: xr.Dataset, runs: dict[Key, xr.Dataset]) -> tuple[Reference, dict[Key, xr.Dataset]]:
+        truth, runs = common_span(self.scene, self.dataset, trajectories)
         if truth is self.dataset:
             return self, runs
         return replace(self, dataset=truth, curves=observe(self.scene, truth)), runs
@@ -130,7 +124,8 @@ class Reference:
         item = self.scene.observables[name]
         if item.role != Role.EVENT or item.name == EVENT_ORDER:
             return 0.0
-        return max((event.time_high - event.time_low for event in self.events_of(dataset)), default=0.0) / 2
+        widths = [event.time_high - event.time_low for event in self.events_of(dataset)]
+        return max([*widths, float(dataset.attrs.get(LEFT_OUT, 0.0))]) / 2
 
     def beside(self, name: str, values: FloatArray, dataset: xr.Dataset, step: float | None) -> float:
         """Error of an observable of a run whose events are a step late or early (:mod:`proofroll.core.beside_events`).

@@ -65,16 +65,23 @@ def values_off_grid(reference: Reference, name: str, dataset: xr.Dataset) -> tup
 def off_grid(reference: Reference, name: str, dataset: xr.Dataset) -> tuple[FloatArray, FloatArray, FloatArray] | None:
     """Times [s] of samples off the grid, an observable or state there, and its true values; None: nothing to compare.
 
-    Intervals with an event of the run or of the truth are left out: for up to a step of the engine its forces may be
-    those from before the event.
+    Intervals with an event of the truth are left out, and a neighbour if the run has it there: for up to a step of the
+    engine its forces may be those from before the event.
     """
     own, item = f"{BETWEEN}.{name}", reference.scene.observables.get(name)
     if own not in dataset or own not in reference.dataset:
         return None
     run, truth = dataset.variables, reference.dataset.variables  # indexing a dataset would copy arrays
     times, known, grid = run[BETWEEN].values, truth[BETWEEN].values, truth["time"].values
-    happened = [event.time for one in (dataset, reference.dataset) for event in reference.events_of(one)]
-    alone = ~np.isin(np.searchsorted(grid, times), np.searchsorted(grid, happened))
+    happened, own_events = (
+        np.array([event.time for event in reference.events_of(one)]) for one in (reference.dataset, dataset)
+    )
+    left_out = np.searchsorted(grid, happened)
+    if own_events.size:
+        nearest = own_events[np.argmin(np.abs(own_events - happened[:, None]), axis=1)]
+        beside = np.clip(np.searchsorted(grid, nearest), left_out - 1, left_out + 1)
+        left_out = np.concatenate([left_out, beside])
+    alone = ~np.isin(np.searchsorted(grid, times), left_out)
     both = np.isin(times, known) & alone & (times < grid[-1])
     times, values, true = times[both], run[own].values[both], truth[own].values[np.isin(known, times[both])]
     if item is not None and item.role is Role.RESIDUAL:

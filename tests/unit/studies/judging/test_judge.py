@@ -34,7 +34,7 @@ def test_the_cost_of_judging_does_not_grow_with_the_number_of_variables(monkeypa
 @pytest.mark.drill
 @pytest.mark.parametrize("of_a_run", [True, False])
 def test_a_sample_on_an_impact_may_be_of_either_side(*, of_a_run: bool) -> None:
-    """Velocities have two values there, so that none is wrong; at the next sample one is."""
+    """Velocities have two values there, so that none is wrong; at the next sample one is, and so is 100 times one."""
     run = proofroll.simulate("two_spheres", until=0.2, every=0.02).copy(deep=True)
     if not of_a_run:
         run = run[["v_WB"]].drop_attrs(deep=False)
@@ -43,8 +43,22 @@ def test_a_sample_on_an_impact_may_be_of_either_side(*, of_a_run: bool) -> None:
     for side in (hit - 1, hit + 1):
         run["v_WB"][hit] = run["v_WB"][side].to_numpy()
         assert proofroll.judge(run, "two_spheres", allowed, because="round-off").agrees
+    run["v_WB"][hit] = 100 * run["v_WB"][hit - 1].to_numpy()
+    assert not proofroll.judge(run, "two_spheres", allowed, because="round-off").agrees
+    run["v_WB"][hit] = run["v_WB"][hit + 1].to_numpy()
     run["v_WB"][hit + 1] = run["v_WB"][hit - 1].to_numpy()
     assert not proofroll.judge(run, "two_spheres", allowed, because="round-off").agrees
+
+
+@pytest.mark.drill
+def test_a_place_at_an_impact_has_one_value() -> None:
+    """A run that is at another place at a sample on an impact alone differs there."""
+    run = proofroll.simulate("two_spheres", until=0.2, every=0.02).copy(deep=True)
+    allowed = {"p_WB": "1e-3 m"}
+    assert proofroll.judge(run, "two_spheres", allowed, because="a round number").agrees
+    (hit,) = np.flatnonzero(np.isclose(run["time"], 0.1))
+    run["p_WB"][hit] += 0.01
+    assert not proofroll.judge(run, "two_spheres", allowed, because="a round number").agrees
 
 
 @pytest.mark.drill
@@ -65,3 +79,16 @@ def test_a_force_that_the_truth_does_not_determine_accuses_nobody() -> None:
     run["normal_forces"][5:] *= 1.1
     run["contact_forces"][5:] *= 1.1
     assert not proofroll.judge(run, "falling_rod").agrees
+
+
+def test_a_sample_on_a_bounce_may_be_of_either_side() -> None:
+    """Velocities of a ball on a wall have two values there, too; one far from both is wrong."""
+    scene = proofroll.load_scene("bouncing_ball", height=0.1, restitution=0.5)
+    falls = np.sqrt(2 * 0.1 / 9.81)
+    times = falls / 3 * np.arange(6)
+    velocities = np.zeros((6, 3))
+    velocities[:, 2] = [*(-9.81 * times[:3]), 0.0, *(0.5 * 9.81 * falls - 9.81 * (times[4:] - falls))]
+    for down, agrees in ((-9.81 * falls, True), (0.5 * 9.81 * falls, True), (5 * 9.81 * falls, False)):
+        velocities[3, 2] = down
+        run = {"time": times, "v_WB": velocities}
+        assert proofroll.judge(run, scene, {"v_WB": "1e-6 m/s"}, because="round-off").agrees is agrees
