@@ -318,7 +318,7 @@ def test_onset_to_one_percent(proofroll: Proofroll, tmp_path: Path) -> None:
         (["--over", "speed=6:2"], "the lower end first"),
         (["--over", "colour=2:6"], "colour = 2.0"),
         (["--over", "speed=fast:faster"], "parameter=low:high"),
-        (["--until", "0"], "positive time"),
+        (["--until", "0"], "positive, finite time"),
         (["--set", "speed=0"], "speed = '0'"),
     ],
 )

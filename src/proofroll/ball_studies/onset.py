@@ -20,7 +20,7 @@ from proofroll.files.trajectory_file import read_columns
 from proofroll.running.case import Case, EngineFacts, Result, Status
 from proofroll.running.engine_questions import describe_each, resolve
 from proofroll.running.idle_workers import Workers
-from proofroll.running.process import WorkerDied
+from proofroll.running.process import status_of
 from proofroll.running.runner import Runner
 from proofroll.studies.cases import case_of
 
@@ -140,7 +140,7 @@ def onset_study(
     rows, answered = [], iter(answers)
     for name, spec, facts_of_engine in zip(names, specs, facts, strict=True):
         if not isinstance(facts_of_engine, EngineFacts):
-            status = facts_of_engine.status if isinstance(facts_of_engine, WorkerDied) else Status.MISSING
+            status = status_of(facts_of_engine)
             rows.append(EngineOnset(name, spec.name, {}, status, str(facts_of_engine), None, None, "failed"))
             continue
         result, first = next(answered)

@@ -71,9 +71,8 @@ def question_of(
     scene: str, settings: list[str] | None, quantities: list[str] | None, until: float | None
 ) -> tuple[TradeoffClaims | None, Question]:
     """Claims and question of a file about a trade-off; with other parameters or times there are no claims (None)."""
-    from proofroll.core.time_grid import time_grid
     from proofroll.files.scene_file import is_scene, load_scene
-    from proofroll.studies.cases import usual_length
+    from proofroll.studies.cases import length_of, require_length
     from proofroll.studies.tradeoff.claims import claims_for, load_claims
     from proofroll.studies.tradeoff.curve import Question
 
@@ -85,10 +84,8 @@ def question_of(
         quantity = quantities[0] if quantities else claims.quantity
         return claims, Question(name, claims.parameters, claims.until, quantity)
     loaded = load_scene(name, **given)  # type: ignore[arg-type]  # text is checked and converted there
-    length = usual_length(name) if until is None else until
-    time_grid(length, length or 1.0)
-    if length <= 0:
-        raise InputError("until", length, "give a positive time in s")
+    length = length_of(name, until)
+    require_length(length)
     quantity = quantities[0] if quantities else loaded.deciding
     return None, Question(name, {key: loaded.parameters[key] for key in given}, length, quantity)
 

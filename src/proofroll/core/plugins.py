@@ -148,6 +148,18 @@ class EngineSpec:
         inner = ",".join(f"{key}={value}" for key, value in self.options.items())
         return f"{self.name}[{inner}]" if inner else self.name
 
+    def means(self, engine: str, settings: Mapping[str, Any]) -> bool:
+        """True if an engine with these settings is of this name and has all of the given settings."""
+        return engine == self.name and all(_same(settings.get(key), value) for key, value in self.options.items())
+
+
+def _same(value: object, text: object) -> bool:
+    """True if a setting has a value that the user wrote as text, as a number or as a word."""
+    try:
+        return float(value) == float(text)  # type: ignore[arg-type]
+    except (TypeError, ValueError):
+        return str(value).lower() == str(text).lower()
+
 
 def parse_engine(text: str) -> EngineSpec:
     """Reads ``name`` or ``name[key=value,…]``; ``name@place`` runs in another interpreter.

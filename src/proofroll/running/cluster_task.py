@@ -20,7 +20,7 @@ from proofroll.core.errors import InputError, ProofrollError
 from proofroll.core.plugins import GROUP
 from proofroll.files.scene_file import load_scene
 from proofroll.files.trajectory_file import STORED
-from proofroll.running.case import Case, EngineFacts, Status
+from proofroll.running.case import Case, EngineFacts
 from proofroll.running.engine_questions import resolve
 from proofroll.running.identity import digest
 from proofroll.running.idle_workers import Workers
@@ -105,7 +105,7 @@ def run_case(asked: Asked, content: dict[str, Any], files: Mapping[str, bytes]) 
         try:
             result = run_one(case, out, workers)
         except InputError as error:
-            result = result_without_answer(case, Status.REFUSED, error)
+            result = result_without_answer(case, error)
         content = dataclasses.asdict(dataclasses.replace(result, host=socket.gethostname()))
         return content, out.read_bytes() if result.trajectory is not None else None
 

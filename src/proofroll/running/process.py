@@ -58,6 +58,14 @@ class WorkerDied(ProofrollError):  # noqa: N818 -- a fact about the worker, turn
         super().__init__(message)
 
 
+def status_of(error: ProofrollError) -> Status:
+    """Status of a case whose engine gave this error in place of a result."""
+    if isinstance(error, WorkerDied):
+        return error.status
+    known = {InputError: Status.REFUSED, Missing: Status.MISSING}
+    return next((status for kind, status in known.items() if isinstance(error, kind)), Status.CRASHED)
+
+
 def end_all() -> None:
     """Kills every worker of this process with all that it started, without waiting; safe in a signal handler."""
     for worker in list(_living):

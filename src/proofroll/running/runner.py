@@ -19,7 +19,7 @@ from proofroll.core.plugins import plain_name
 from proofroll.running.case import Case, Result, Status
 from proofroll.running.engine_questions import lent_workers
 from proofroll.running.idle_workers import Workers
-from proofroll.running.process import Worker, WorkerDied
+from proofroll.running.process import Worker, WorkerDied, status_of
 from proofroll.running.store import Store
 from proofroll.running.time_budget import TimeBudget
 from proofroll.running.waiting_cases import WaitingCases
@@ -201,10 +201,10 @@ class Runner:
                     try:
                         worker = self.workers.take(engine)
                     except (InputError, Missing, WorkerDied) as error:  # the engine's interpreter is gone meanwhile
-                        status = error.status if isinstance(error, WorkerDied) else Status.MISSING
+                        gone = Missing(str(error)) if isinstance(error, InputError) else error
                         if waiting.budget:
                             waiting.budget.end(case.key)
-                        arrived.put((case, result_without_answer(case, status, error)))
+                        arrived.put((case, result_without_answer(case, gone)))
                         continue
                     self._busy.add(worker)
                     if self._stopping.is_set():  # _stop may have run before this worker was in _busy
@@ -234,9 +234,9 @@ class Runner:
         except WorkerDied as error:
             if self._stopping.is_set():
                 return False
-            result, lives = result_without_answer(case, error.status, error), False
+            result, lives = result_without_answer(case, error), False
         except ProofrollError as error:  # affects this case only, for example a full disk
-            result, lives = result_without_answer(case, Status.CRASHED, error), True
+            result, lives = result_without_answer(case, error), True
         arrived.put((case, result))
         return lives
 
@@ -246,7 +246,7 @@ class Runner:
             try:
                 result = make(written)
             except InputError as error:  # affects this case only, for example a step that does not divide the grid
-                result = result_without_answer(case, Status.REFUSED, error)
+                result = result_without_answer(case, error)
             except WorkerDied as error:  # show the final name of the file, not the temporary one
                 shown = str(error).replace(str(written.absolute()), str(self.store.trajectory(case)))
                 raise WorkerDied(error.status, shown) from None
@@ -286,9 +286,9 @@ def _counted(budget: TimeBudget | None, worker: Worker, case: Case, limit: float
         budget.end(case.key, worker.used - before, lost=worker.used == before)
 
 
-def result_without_answer(case: Case, status: Status, error: ProofrollError) -> Result:
+def result_without_answer(case: Case, error: ProofrollError) -> Result:
     """Result of a case without an answer of its worker; the error is its message."""
-    return Result(status, str(error), versions={plain_name(case.engine.name): case.engine.version})
+    return Result(status_of(error), str(error), versions={plain_name(case.engine.name): case.engine.version})
 
 
 def run_one(case: Case, out: Path, workers: Workers | None = None) -> Result:
@@ -297,4 +297,4 @@ def run_one(case: Case, out: Path, workers: Workers | None = None) -> Result:
         with lent_workers(workers) as lent, lent.lend(case.engine.name) as worker:
             return _ask(worker, case, case.time_limit, out)
     except WorkerDied as error:
-        return result_without_answer(case, error.status, error)
+        return result_without_answer(case, error)

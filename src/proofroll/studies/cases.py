@@ -1,5 +1,6 @@
 """Makes all cases: those of studies, and that of a single run on the command line."""
 
+import math
 import threading
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
@@ -16,9 +17,15 @@ from proofroll.running.idle_workers import Workers
 _USUAL = 2.0  # s
 
 
-def usual_length(scene: str) -> float:
-    """Default length of a run [s]: 2 s, or the ``duration`` of the scene's file if it is shorter."""
-    return min(_USUAL, read_scene_file(scene).duration or _USUAL)
+def length_of(scene: str, until: float | None) -> float:
+    """Length of a run [s]; by default 2 s, or the ``duration`` of the scene's file if it is shorter."""
+    return min(_USUAL, read_scene_file(scene).duration or _USUAL) if until is None else until
+
+
+def require_length(until: float) -> None:
+    """Raises InputError unless the length of a study's runs [s] is positive and finite."""
+    if not 0 < until < math.inf:
+        raise InputError("until", until, "give a positive, finite time in s")
 
 
 def case_of(
@@ -56,7 +63,7 @@ def single_case(
         scene: name or path.
         parameters: values of parameters, as text or numbers.
         engine: ``name`` or ``name[key=value,…]``.
-        until: last time [s]; None: :func:`usual_length`.
+        until: last time [s]; None: :func:`length_of`.
         every: sampling interval [s]; None: :func:`proofroll.core.time_grid.sampling_interval`.
         time_limit: wall time of the run [s].
         asks: results wanted besides the motion.
@@ -77,8 +84,5 @@ def single_case(
     facts = resolve([(spec.name, spec.options)], workers, loaded.requires)[0]
     if isinstance(facts, ProofrollError):
         raise facts
-    if until is None:
-        until = usual_length(scene)
-    if every is None:
-        every = sampling_interval(facts.step)
+    until, every = length_of(scene, until), sampling_interval(facts.step) if every is None else every
     return case_of(scene, loaded, parameters, facts, until, every, time_limit=time_limit, turns=True)

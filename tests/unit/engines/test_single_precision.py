@@ -237,7 +237,7 @@ def test_growing_round_off_takes_nothing_from_the_best_step() -> None:
     steps = [2.0**-n for n in range(7)]
     points = [point(step, error, error * np.ones(5)) for step, error in zip(steps, errors, strict=True)]
     facts: Any = SimpleNamespace(precision="single", resolution="dt")
-    found = Curve("single", facts, None, points)
+    found = Curve("single", facts, points)
     floor = found.floor("x")
     assert floor is not None
     assert floor.best.step == steps[4]

@@ -9,8 +9,9 @@ from proofroll.core.errors import ProofrollError
 from proofroll.core.number_format import number
 from proofroll.files.json_data import MERGED
 from proofroll.running.case import EngineDescription, Status
+from proofroll.running.process import status_of
 from proofroll.running.timing import Interval, machine, ratio
-from proofroll.studies.ladder.ladder import Ladder, absence, key_of
+from proofroll.studies.ladder.ladder import Ladder, key_of
 from proofroll.studies.ladder.models import LadderModel, Need, Ran, Rung, Switch, need_of_term
 from proofroll.studies.tradeoff.pareto import front
 
@@ -117,7 +118,7 @@ def ladder_content(study: Ladder) -> LadderContent:
         rungs=[_rung(study, rung) for rung in study.ladder],
         terms=[_term(study, switch) for switch in study.switches],
         absent={
-            name: Absence(absence(engine).status.value, str(engine))
+            name: Absence(status_of(engine).value, str(engine))
             for name, engine in study.engines.items()
             if isinstance(engine, ProofrollError)
         },

@@ -12,11 +12,11 @@ from proofroll.core.arrays import FloatArray, largest_difference
 from proofroll.core.comparison import Band, Comparison
 from proofroll.core.convergence import Limit, floor_of, richardson, scatter_of, tightest
 from proofroll.core.diagnosis.scene_diagnosis import diagnose_scene
-from proofroll.core.errors import Missing, ProofrollError
+from proofroll.core.errors import ProofrollError
 from proofroll.core.verdict import Allowance, Judgement, Refinement, Verdict, judge_curve
 from proofroll.files.trajectory_file import StoredTrajectory
 from proofroll.running.case import LASTING, Case, EngineFacts, Result, Status
-from proofroll.running.process import WorkerDied
+from proofroll.running.process import status_of
 from proofroll.running.runner import Runner
 from proofroll.running.time_budget import TimeBudget
 from proofroll.studies.comparison.expectations import contradictions_of
@@ -42,7 +42,7 @@ def evaluate(planned: Plan, results: dict[str, Result], runner: Runner) -> Outco
     for run in planned.runs:
         point = points[point_name(run.parameters)]
         if isinstance(run.facts, ProofrollError):
-            judged.append(_absent(run))
+            judged.append(_run(run, Result(status_of(run.facts), str(run.facts))))
             continue
         result = results[run.ladder[1.0].key]
         if result.trajectory is None or result.status != Status.DONE:
@@ -138,16 +138,6 @@ def _with_trajectory(run: Run, held: Mapping[str, StoredTrajectory]) -> Run:
     """The run with its trajectory, if its file exists."""
     trajectory = held[run.case.key] if run.case else None
     return replace(run, trajectory=trajectory if trajectory and trajectory.file.is_file() else None)
-
-
-def _absent(run: Planned) -> Run:
-    """Row whose engine could not be asked: missing, crashed or hung."""
-    status = Status.CRASHED
-    if isinstance(run.facts, Missing):
-        status = Status.MISSING
-    elif isinstance(run.facts, WorkerDied):
-        status = run.facts.status
-    return _run(run, Result(status, str(run.facts)))
 
 
 def _without_result(run: Planned, point: ComparedPoint, result: Result) -> Run:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.dataset import observe
-from proofroll.core.errors import InputError, ProofrollError, Refused, require_known
+from proofroll.core.errors import InputError, Refused, require_known
 from proofroll.core.limits import STUDY_TIME_LIMIT
 from proofroll.core.observable import Role
 from proofroll.core.plugins import engine_names
@@ -20,11 +20,11 @@ from proofroll.core.time_grid import off_grids, time_grid
 from proofroll.files.scene_file import load_scene
 from proofroll.running.case import Case, EngineFacts, Result, Status
 from proofroll.running.engine_questions import describe_each, resolve, resolve_with_truth
-from proofroll.running.process import WorkerDied
+from proofroll.running.process import status_of
 from proofroll.running.runner import Runner
 from proofroll.running.stopwatch import Stopwatch
 from proofroll.running.timing import ROUNDS, Timing, time_in_rounds
-from proofroll.studies.cases import case_of, usual_length
+from proofroll.studies.cases import case_of, length_of, require_length
 from proofroll.studies.judging import run_values
 from proofroll.studies.judging.reference import Reference
 from proofroll.studies.ladder.models import LadderModel, Rung, Switch, rungs, switches
@@ -91,10 +91,8 @@ class Ladder:
         engines: Sequence[str] = (),
         rounds: int | None = None,
     ) -> None:
-        until = usual_length(scene) if until is None else until
-        time_grid(until, _EVERY)  # checks the time
-        if until <= 0:
-            raise InputError("until", until, "give a time in s that is positive")
+        until = length_of(scene, until)
+        require_length(until)
         if tolerance is not None and not (math.isfinite(tolerance) and tolerance > 0):
             raise InputError("tolerance", tolerance, "give a positive number in the unit of the quantity")
         self._name, self._runner, self.until = scene, runner, until
@@ -128,7 +126,7 @@ class Ladder:
             if isinstance(engine_facts, EngineFacts):
                 cases[key] = self._case(engine_facts, model)
             else:
-                self.answers[key] = ModelAnswer(None, absence(engine_facts))
+                self.answers[key] = ModelAnswer(None, Result(status_of(engine_facts), str(engine_facts)))
         results = self._runner.run(cases.values(), lambda case, _: progress(case.engine.name))
         for key, case in cases.items():
             self.answers[key] = self._answer(models[key], case, results[case.key])
@@ -197,10 +195,3 @@ class Ladder:
 def key_of(model: LadderModel) -> str:
     """Text that identifies a model."""
     return repr((model.engine, sorted(model.options.items()), sorted(model.parameters.items()), model.asks))
-
-
-def absence(error: ProofrollError) -> Result:
-    """Result for an engine or settings that could not be asked."""
-    if isinstance(error, WorkerDied):
-        return Result(error.status, str(error))
-    return Result(Status.REFUSED if isinstance(error, InputError) else Status.MISSING, str(error))

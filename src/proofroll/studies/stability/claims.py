@@ -98,9 +98,7 @@ class Claim:
         return sentences
 
     def _about(self, point: BoundaryPoint) -> bool:
-        spec = parse_engine(self.engine)
-        settings = point.settings
-        if point.engine != spec.name or any(str(settings.get(k)) != str(v) for k, v in spec.options.items()):
+        if not parse_engine(self.engine).means(point.engine, point.settings):
             return False
         if self.axes and point.axis not in self.axes:
             return False

@@ -97,7 +97,7 @@ def _point(point: MapPoint) -> BoundaryPoint:
         engine=facts.name,
         settings={key: value for key, value in facts.settings.items() if key != facts.resolution},
         curve=point.curve.engine,
-        level=point.curve.level,
+        level=facts.level or None,
         caveat=facts.caveat,
         family=facts.family,
         precision=facts.precision,

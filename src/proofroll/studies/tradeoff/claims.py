@@ -24,7 +24,7 @@ from proofroll.files.toml import study_content, study_files
 from proofroll.running.timing import FACTOR, Timing, interval_text, ratio
 from proofroll.studies.claim_judgement import ClaimJudgement
 from proofroll.studies.tradeoff.curve import Question
-from proofroll.studies.tradeoff.recommend import fits, holding
+from proofroll.studies.tradeoff.recommend import holding
 from proofroll.studies.tradeoff.records import MeasuredPoint, TradeoffStudy
 from proofroll.studies.tradeoff.requirements import Requirements
 
@@ -78,7 +78,7 @@ class Converges:
         claim = f"{self.engine} converges in {quantity} with order {lowest:g} to {highest:g}"
         if unknown := _unknown(study, [self.engine]):
             return ClaimJudgement(claim, self.because, None, unknown)
-        curves = {point.curve for point in study.points if fits(point, self.engine)}
+        curves = {point.curve for point in _of(study.points, [self.engine])}
         budgets = [b for b in study.budgets if b.curve in curves and b.quantity == quantity]
         orders = [(b.order_low or b.order, b.order_high or b.order) for b in budgets if b.order]
         if not orders:
@@ -120,7 +120,7 @@ class Cheapest:
         if unknown := _unknown(study, self.engine):
             return None, unknown
         held = holding(study, required)
-        mine = [point for point in held if any(fits(point, text) for text in self.engine)]
+        mine = _of(held, self.engine)
         others = [point for point in held if point not in mine]
         if not mine:
             return False, "no step of it holds that"
@@ -149,9 +149,15 @@ def _name(point: MeasuredPoint) -> str:
     return f"{point.engine} {point.settings.get('formulation', '')}{step}"
 
 
+def _of(points: Sequence[MeasuredPoint], engines: Sequence[str]) -> list[MeasuredPoint]:
+    """Points of engines with settings, each ``name[key=value,…]``."""
+    specs = [parse_engine(text) for text in engines]
+    return [point for point in points if any(spec.means(point.engine, point.settings) for spec in specs)]
+
+
 def _unknown(study: TradeoffStudy, engines: Sequence[str]) -> str:
     """Reason why the study cannot judge some engines; empty if it can."""
-    about = [point for point in study.points if any(fits(point, text) for text in engines)]
+    about = _of(study.points, engines)
     if not about:
         return "it was not measured"
     late = next((point for point in about if point.status == "timeout"), None)

@@ -152,14 +152,12 @@ class Curve:
     Attributes:
         engine: ``name[formulation=…,preset=…]``.
         facts: with the preset's own step or tolerance.
-        level: its rung on the ladder of models, or None if the engine does not declare it.
         points: coarse first.
         dropped: step -> why there is no run with it.
     """
 
     engine: str
     facts: EngineFacts
-    level: str | None
     points: list[CurvePoint] = field(default_factory=list)
     dropped: dict[float, str] = field(default_factory=dict)
 

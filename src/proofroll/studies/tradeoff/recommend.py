@@ -196,18 +196,7 @@ def _asked(point: MeasuredPoint, required: Requirements) -> bool:
         return False
     if not required.engines:
         return not by_hand(point.level) or bool(required.levels)
-    return any(fits(point, text) for text in required.engines)
-
-
-def fits(point: MeasuredPoint, text: str) -> bool:
-    """True if a point has the engine and the settings of ``name[key=value,…]``."""
-    return chosen_by(text, point.engine, point.settings)
-
-
-def chosen_by(text: str, engine: str, settings: Mapping[str, Any]) -> bool:
-    """True if ``name[key=value,…]`` means this engine, and the settings contain its values."""
-    spec = parse_engine(text)
-    return engine == spec.name and all(_same(settings.get(key), value) for key, value in spec.options.items())
+    return any(parse_engine(text).means(point.engine, point.settings) for text in required.engines)
 
 
 def covers(measured: Sequence[str], asked: Sequence[str]) -> bool:
@@ -216,13 +205,6 @@ def covers(measured: Sequence[str], asked: Sequence[str]) -> bool:
         return not measured
     whole = {spec.name for spec in map(parse_engine, measured) if not spec.options}
     return all(text in measured or parse_engine(text).name in whole for text in asked)
-
-
-def _same(value: object, text: str) -> bool:
-    try:
-        return float(value) == float(text)  # type: ignore[arg-type]
-    except (TypeError, ValueError):
-        return str(value).lower() == text.lower()
 
 
 def _holds(study: TradeoffStudy, point: MeasuredPoint, required: Requirements, absolute: float) -> str:

@@ -53,7 +53,7 @@ def curves_of(
     Raises:
         InputError: an unknown engine, formulation or setting.
     """
-    wanted: list[tuple[str, str | None]] = []
+    wanted: list[str] = []
     absent: dict[str, str] = {}
     asked = [(text, parse_engine(text)) for text in list(engines) or engine_names()]
     descriptions = describe_each((spec.name for _, spec in asked), workers)
@@ -68,31 +68,29 @@ def curves_of(
         if foreign:
             absent.setdefault(spec.name, "none of its formulations is for scenes of this kind")
         wanted += chosen
-        if any(parse_engine(name).name == spec.name for name, _ in wanted):
+        if any(parse_engine(name).name == spec.name for name in wanted):
             absent.pop(spec.name, None)
         elif spec.name not in absent:
             raise InputError("engine", text, f"{spec.name} has {', '.join(answer.presets)}")
-    specs = [parse_engine(name) for name, _ in wanted]
+    specs = [parse_engine(name) for name in wanted]
     curves = []
     resolved = resolve([(spec.name, spec.options) for spec in specs], workers)
-    for (name, level), facts in zip(wanted, resolved, strict=True):
+    for name, facts in zip(wanted, resolved, strict=True):
         if isinstance(facts, InputError):
             raise facts
         if isinstance(facts, EngineFacts):
-            curves.append(Curve(name, facts.on(requires), level))
+            curves.append(Curve(name, facts.on(requires)))
         else:
             absent[name] = str(facts)
     return curves, absent
 
 
-def _chosen(
-    spec: EngineSpec, described: EngineDescription, requires: frozenset[str]
-) -> tuple[list[tuple[str, str | None]], bool]:
-    """Formulations and presets that a specification selects, each with its level.
+def _chosen(spec: EngineSpec, described: EngineDescription, requires: frozenset[str]) -> tuple[list[str], bool]:
+    """Formulations and presets that a specification selects, as ``name[key=value,…]``.
 
     The second value is True if some were left out because they are for other kinds of scenes.
     """
-    chosen: list[tuple[str, str | None]] = []
+    chosen: list[str] = []
     foreign = False
     for formulation, presets in described.presets.items():
         if spec.options.get("formulation", formulation) != formulation:
@@ -105,8 +103,7 @@ def _chosen(
         for preset in presets:
             if spec.options.get("preset", preset) == preset:
                 options = {"formulation": formulation, "preset": preset, **spec.options}
-                inner = ",".join(f"{key}={value}" for key, value in options.items())
-                chosen.append((f"{spec.name}[{inner}]", described.levels.get(formulation)))
+                chosen.append(str(EngineSpec(spec.name, options)))
     return chosen, foreign
 
 

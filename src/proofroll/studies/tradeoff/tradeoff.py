@@ -16,6 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from proofroll.core.errors import Missing
+from proofroll.core.plugins import parse_engine
 from proofroll.running.case import Case, EngineFacts, Result, Status
 from proofroll.running.engine_questions import resolve_with_truth
 from proofroll.running.idle_workers import Workers
@@ -26,7 +27,6 @@ from proofroll.running.timing import ROUNDS, Timing, time_in_rounds
 from proofroll.studies.judging.reference import Reference
 from proofroll.studies.tradeoff.curve import Curve, CurvePoint, Question, judge_point
 from proofroll.studies.tradeoff.pareto import front
-from proofroll.studies.tradeoff.recommend import chosen_by
 from proofroll.studies.tradeoff.records import Corner
 from proofroll.studies.tradeoff.sweep import FINER, GAIN, curves_of, sweep
 
@@ -136,7 +136,7 @@ def tradeoff(
 
 def _briefly(claimed: Sequence[str], curve: Curve) -> list[float]:
     """Finer steps of a curve in a brief study, in sampling intervals."""
-    named = any(chosen_by(text, curve.facts.name, curve.facts.settings) for text in claimed)
+    named = any(parse_engine(text).means(curve.facts.name, curve.facts.settings) for text in claimed)
     return [part for part in FINER if part >= (BRIEF_CLAIMED if named else BRIEF_FINER)]
 
 

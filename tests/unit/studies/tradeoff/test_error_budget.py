@@ -36,7 +36,7 @@ def made(
         "made", "1", "0", {"dt": 0.1, "rtol": 0.1}, resolution, declared if resolution == "dt" else None, highest
     )
     scatter = np.random.default_rng(1)
-    curve = Curve("made", facts, None)
+    curve = Curve("made", facts)
     for step in STEPS:
         own = EngineFacts(facts.name, "1", "0", {resolution: step}, resolution, facts.order)
         values = TRUE + factor * step**order * np.cos(T) + model * T + floor * scatter.uniform(-1, 1, T.size)
@@ -98,7 +98,7 @@ def test_the_coarse_end_is_that_of_the_whole_curve(start: int) -> None:
 
     The time step dominates there, although the model does from the sampling interval on.
     """
-    curve = Curve("made", EngineFacts("made", "1", "0", {"dt": 0.1}, "dt", 2), None)
+    curve = Curve("made", EngineFacts("made", "1", "0", {"dt": 0.1}, "dt", 2))
     for step in (0.4, *STEPS):
         every = max(step, 0.05)
         stride = round(every / 0.05)
@@ -155,7 +155,7 @@ def test_an_adaptive_curve_has_no_order() -> None:
 def test_too_few_runs() -> None:
     """From fewer than three runs nothing is concluded."""
     facts = EngineFacts("made", "1", "0", {"dt": 0.1}, "dt", 2)
-    found = budget(Curve("made", facts, None), "z", 0.05, TRUE, observed(), 1.0)
+    found = budget(Curve("made", facts), "z", 0.05, TRUE, observed(), 1.0)
     assert found.model_form is None
     assert "oo few runs" in found.sentence
 
