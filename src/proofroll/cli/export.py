@@ -7,6 +7,7 @@ from typing import Annotated
 import typer
 
 from proofroll.cli import options
+from proofroll.core.limits import TIME_LIMIT
 
 
 def export(
@@ -21,7 +22,7 @@ def export(
     from proofroll.studies.cases import single_case
 
     options.require_writable(file, "file")
-    case = single_case(scene, options.assignments(settings), engine, until=1.0, every=1.0, time_limit=60.0)
+    case = single_case(scene, options.assignments(settings), engine, until=1.0, every=1.0, time_limit=TIME_LIMIT)
     with options.spinner(f"{scene} in {case.engine.name}"):
         text = model_file(case)
     write_text(file, text)

@@ -5,6 +5,7 @@ from typing import Annotated, Any
 import typer
 
 from proofroll.cli import options
+from proofroll.core.limits import PROGRAM_TIME_LIMIT
 from proofroll.core.number_format import counted
 
 
@@ -12,7 +13,9 @@ def findings(
     engine: Annotated[list[str] | None, typer.Option(help="Only findings about this engine; may be repeated.")] = None,
     python: Annotated[str, typer.Option(help="Interpreter that has the engines, instead of this one.")] = "",
     listed: Annotated[bool, typer.Option("--list", help="Tell them, with remedies, without running anything.")] = False,
-    time_limit: Annotated[float, typer.Option(help="Wall seconds after which a program is ended.")] = 300.0,
+    time_limit: Annotated[
+        float, typer.Option(help="Wall seconds after which a program is ended.")
+    ] = PROGRAM_TIME_LIMIT,
     as_json: options.Json = False,
 ) -> None:
     """Run what was found out about engines against what is installed: what still shows, and what is gone."""

@@ -6,5 +6,8 @@ TIME_LIMIT = 120.0
 RUN_TIME_LIMIT = 600.0
 # One of the many runs of a study.
 STUDY_TIME_LIMIT = 60.0
-# The first answer of a worker, which may have to read packages from a cold disk.
+# The program of a finding, or the writing of an engine's model file.
+PROGRAM_TIME_LIMIT = 300.0
+
+# The first answer of a worker, or of an engine about itself, which may have to read packages from a cold disk.
 HELLO_TIME_LIMIT = 60.0

@@ -11,8 +11,7 @@ from proofroll.core.number_format import number
 if TYPE_CHECKING:
     from proofroll.core.verdict import Judgement
     from proofroll.report.comparison.records import ReportedComparison, ReportedRow, ReportedRun, Setting
-    from proofroll.studies.stability.records import BoundaryPoint
-    from proofroll.studies.tradeoff.records import MeasuredPoint
+    from proofroll.studies.tradeoff.records import SweptSetting
 
 SYMBOLS = {
     "agrees": "✓",
@@ -122,7 +121,7 @@ def names(rows: Sequence[Setting]) -> list[str]:
     return [name if short.count(name) == 1 else str(row.engine) for name, row in zip(short, rows, strict=True)]
 
 
-def name_of(point: BoundaryPoint | MeasuredPoint) -> str:
+def name_of(point: SweptSetting) -> str:
     """Engine, formulation and preset of a point of a study, and ``f32`` if single precision."""
     settings = point.settings
     words = point.engine, settings.get("formulation"), settings.get("preset"), *precision_words(point.precision)
@@ -139,7 +138,7 @@ def with_caveat(name: str, caveat: str) -> str:
     return f"{name} ({caveat})" if caveat else name
 
 
-def family_and_caveat(point: Any) -> str:
+def family_and_caveat(point: SweptSetting) -> str:
     """Family and caveat of a measured point, in one clause; empty without either."""
     return "; ".join(filter(None, (point.family, point.caveat)))
 

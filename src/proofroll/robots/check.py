@@ -21,7 +21,7 @@ from proofroll.robots.hypotheses import hypotheses
 from proofroll.robots.importer_row import importer_row, row_with_copy
 from proofroll.robots.layers import LAYERS, RobotTruth
 from proofroll.robots.lint import lint
-from proofroll.robots.meaning import meaning, opened
+from proofroll.robots.meaning import moving_robot, source_of
 from proofroll.robots.mjcf_compiler import Compiler
 from proofroll.robots.protocol import Request
 from proofroll.robots.records import DrawnBody, DrawnJoint, DrawnRobot, ImporterRow, RobotCheck, UsedTruth
@@ -72,11 +72,7 @@ def check(
         asked.append((spec, reading.options_of(spec.options, spec.name)))
     with lent_workers(workers) as lent, tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        file = opened(path, base, root, time_limit, lent)
-        written = reading.write(file, folder)
-        robot, compiler = meaning(file, written, time_limit, lent)
-        if not robot.moving:
-            raise InputError("file", path, "nothing in it moves" + _fixed_hint(file))
+        file, written, robot, compiler = moving_robot(path, base, root, time_limit, lent, folder)
         truth = RobotTruth.of(robot, random_states(robot, states, seed))
         checked = _Checked(path, file, written, base, truth, bar_of(truth), compiler, folder, time_limit, lent)
 
@@ -98,7 +94,7 @@ def check(
         kind=file.kind,
         base=base if file.kind == "urdf" else "as in the file",
         lint=[*file.remarks, *lint(file, robot)],
-        truth=UsedTruth(checked.source, checked.bar, states, seed, robot.dofs),
+        truth=UsedTruth(source_of(compiler), checked.bar, states, seed, robot.dofs),
         layers=LAYERS,
         engines=rows,
         robot=robot_drawing(truth),
@@ -132,11 +128,6 @@ class _Checked:
     time_limit: float
     workers: Workers
 
-    @property
-    def source(self) -> str:
-        """Source of the meaning, as a clause."""
-        return f"the model that {' '.join(self.compiler)} compiles" if self.compiler else "our own reading of the file"
-
     def row(self, spec: EngineSpec, options: dict[str, bool]) -> ImporterRow:
         """Row of an engine, also of one that refuses, crashes or runs out of time.
 
@@ -161,7 +152,7 @@ class _Checked:
         # The engine that defines the format, in another version than the one that gave the meaning.
         compiler = self.compiler
         if compiler and plain_name(spec.name) == compiler.engine and answer.version != compiler.version:
-            says = f"{importer.says}; held against {self.source}".removeprefix("; ")
+            says = f"{importer.says}; held against {source_of(compiler)}".removeprefix("; ")
             importer = dataclasses.replace(importer, says=says)
         return dataclasses.replace(importer, as_written=self._as_written(spec, options, importer))
 
@@ -202,10 +193,6 @@ def _accepted(path: Path, given: Sequence[str]) -> set[str]:
         for name in names:
             require_known(place, str(name), known, "there is no such cause; choose from")
     return {*given, *written}
-
-
-def _fixed_hint(file: RobotFile) -> str:
-    return "; try --base free" if file.kind == "urdf" and file.base == "fixed" else ""
 
 
 def bar_of(truth: RobotTruth) -> float:

@@ -24,6 +24,28 @@ _Answer = TypeVar("_Answer")
 _defines: dict[str, str] = {}
 
 
+def moving_robot(
+    path: Path, base: str, root: Path | None, time_limit: float, workers: Workers, folder: Path
+) -> tuple[RobotFile, Path, Robot, mjcf_compiler.Compiler | None]:
+    """A file, its copy for engines in a folder, and what :func:`meaning` says of it.
+
+    Raises:
+        InputError: the file is broken, or nothing in it moves.
+    """
+    file = opened(path, base, root, time_limit, workers)
+    written = reading.write(file, folder)
+    robot, compiler = meaning(file, written, time_limit, workers)
+    if not robot.moving:
+        hint = "; try --base free" if file.kind == "urdf" and file.base == "fixed" else ""
+        raise InputError("file", path, f"nothing in it moves{hint}")
+    return file, written, robot, compiler
+
+
+def source_of(compiler: mjcf_compiler.Compiler | None) -> str:
+    """Clause on whose reading is the meaning of a file."""
+    return f"the model that {' '.join(compiler)} compiles" if compiler else "our own reading of the file"
+
+
 def meaning(
     file: RobotFile, written: Path, time_limit: float, workers: Workers | None = None
 ) -> tuple[Robot, mjcf_compiler.Compiler | None]:

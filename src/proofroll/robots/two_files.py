@@ -19,7 +19,7 @@ from proofroll.robots.check import bar_of, robot_drawing
 from proofroll.robots.importer_row import importer_row
 from proofroll.robots.layers import LAYERS, RobotTruth
 from proofroll.robots.lint import lint
-from proofroll.robots.meaning import meaning, opened
+from proofroll.robots.meaning import moving_robot, source_of
 from proofroll.robots.model import Array, Mimic, Robot
 from proofroll.robots.protocol import Reading
 from proofroll.robots.records import AgainstCheck, ImporterRow, UnlikeValue, UsedTruth
@@ -96,12 +96,9 @@ def _meant(
     path: Path, base: str, root: Path | None, time_limit: float, workers: Workers
 ) -> tuple[RobotFile, Robot, str]:
     """A file, its robot, and a clause that says whose reading gave the robot."""
-    file = opened(path, base, root, time_limit, workers)
     with tempfile.TemporaryDirectory() as folder:
-        robot, compiler = meaning(file, reading.write(file, Path(folder)), time_limit, workers)
-    if not robot.moving:
-        raise InputError("file", path, "nothing in it moves")
-    return file, robot, f"the model that {' '.join(compiler)} compiles" if compiler else "our own reading of the file"
+        file, _, robot, compiler = moving_robot(path, base, root, time_limit, workers, Path(folder))
+    return file, robot, source_of(compiler)
 
 
 def _lint(file: RobotFile, robot: Robot) -> list[LintRemark]:

@@ -9,12 +9,11 @@ from typing import Any
 
 from proofroll.core.engine_abilities import Term
 from proofroll.core.errors import ProofrollError, Refused
+from proofroll.core.limits import HELLO_TIME_LIMIT, PROGRAM_TIME_LIMIT
 from proofroll.core.plugins import parse_engine
 from proofroll.running.case import Case, EngineDescription, EngineFacts
 from proofroll.running.idle_workers import Workers
 
-_START_UP_SECONDS = 60.0
-_WRITING_SECONDS = 300.0
 # Engines that have not answered yet, for displays of progress.
 waited_for: list[str] = []
 
@@ -29,7 +28,7 @@ def _waiting_for(engine: str) -> Iterator[None]:
 
 
 def _answers(
-    requests: Sequence[tuple[str, Mapping[str, Any]]], workers: Workers | None, seconds: float = _START_UP_SECONDS
+    requests: Sequence[tuple[str, Mapping[str, Any]]], workers: Workers | None, seconds: float = HELLO_TIME_LIMIT
 ) -> list[dict[str, Any] | ProofrollError]:
     """Answers of engines to requests, or errors, in the order of the requests; engines start and answer in parallel."""
     answers: dict[int, dict[str, Any] | ProofrollError] = {}
@@ -113,10 +112,10 @@ def prepare(engine: str, workers: Workers) -> None:
     with contextlib.suppress(ProofrollError):
         name = parse_engine(engine).name
         with _waiting_for(name), workers.lend(name) as worker:
-            worker.request({"do": "resolve", "engine": name, "options": {}}, _START_UP_SECONDS)
+            worker.request({"do": "resolve", "engine": name, "options": {}}, HELLO_TIME_LIMIT)
             if name == "truth":
                 importing = {"function": "proofroll.files.trajectory_file:import_xarray", "arguments": {}}
-                worker.request({"do": "call", **importing}, _START_UP_SECONDS)
+                worker.request({"do": "call", **importing}, HELLO_TIME_LIMIT)
 
 
 def programs(cases: Sequence[Case], workers: Workers | None = None) -> list[tuple[str | None, str]]:
@@ -135,7 +134,7 @@ def model_file(case: Case) -> str:
     Raises:
         Refused: the engine writes no model files, or none of this scene.
     """
-    (answer,) = _answers([_to_write(case, "model_file")], None, _WRITING_SECONDS)
+    (answer,) = _answers([_to_write(case, "model_file")], None, PROGRAM_TIME_LIMIT)
     if isinstance(answer, ProofrollError):
         raise answer
     if "text" not in answer:

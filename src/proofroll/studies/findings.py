@@ -12,6 +12,7 @@ from enum import StrEnum
 from pathlib import Path
 
 from proofroll.core.errors import InputError, Missing, require_known
+from proofroll.core.limits import PROGRAM_TIME_LIMIT
 from proofroll.files.data_folders import data_folder
 from proofroll.running.process import safe_environment
 
@@ -118,7 +119,9 @@ def read_finding(path: Path) -> EngineFinding:
     return EngineFinding(name=path.stem, **texts, text=_PROGRAM.sub("", parts[2]).strip(), program=programs[0])
 
 
-def run_findings(findings: Sequence[EngineFinding], python: str = "", time_limit: float = 300.0) -> Iterator[Shown]:
+def run_findings(
+    findings: Sequence[EngineFinding], python: str = "", time_limit: float = PROGRAM_TIME_LIMIT
+) -> Iterator[Shown]:
     """Runs the program of each finding in a process of its own.
 
     Args:

@@ -14,6 +14,7 @@ from proofroll.core.verdict import Judgement, Verdict
 from proofroll.files.scene_file import SceneFile
 from proofroll.files.trajectory_file import StoredTrajectory
 from proofroll.running.case import Case, EngineFacts, Result, Status
+from proofroll.studies.comparison.planning import point_name
 from proofroll.studies.html_table import gauge, html_table
 from proofroll.studies.judging.reference import Reference
 
@@ -148,8 +149,6 @@ class Outcome:
     @cached_property
     def laws_alone(self) -> list[str]:
         """Names of points without a unique motion, where only residuals (laws of mechanics) are judged."""
-        from proofroll.studies.comparison.planning import point_name
-
         names = []
         for name, point in self.points.items():
             runs = [run for run in self.runs if point_name(run.parameters) == name]

@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any
 
 from proofroll.core.number_format import number
 from proofroll.core.validation import FloatOrInf
@@ -10,6 +9,7 @@ from proofroll.studies.claim_judgement import JudgedFile
 from proofroll.studies.stability.axes import Axis, Effort
 from proofroll.studies.stability.step_numbers import Explanation
 from proofroll.studies.study_store import Measured
+from proofroll.studies.tradeoff.records import SweptSetting
 
 BOUNDARIES = ("stable", "accurate")
 # Boundaries within this factor count as equal: two rungs of a ladder of steps (True), one of tolerances (False).
@@ -43,12 +43,11 @@ class Boundary:
     message: str | None
 
 
-@dataclass(frozen=True)
-class BoundaryPoint:
-    """One engine with its settings at one value of an axis.
+@dataclass(frozen=True, kw_only=True)
+class BoundaryPoint(SweptSetting):
+    """One engine with its settings, without step or tolerance, at one value of an axis.
 
     Attributes:
-        engine, settings, curve, level, caveat, family, precision, resolution: which.
         axis, value, parameters: where.
         until: length of every run [s].
         period: natural time of the scene there [s].
@@ -66,13 +65,6 @@ class BoundaryPoint:
         reproducer_note: reason why it needs proofroll, or why there is none.
     """
 
-    engine: str
-    settings: dict[str, Any]
-    curve: str
-    level: str | None
-    caveat: str
-    family: str
-    resolution: str | None
     axis: str
     value: FloatOrInf
     parameters: dict[str, FloatOrInf]
@@ -94,7 +86,6 @@ class BoundaryPoint:
     reproducer: str | None = None
     reproducer_needs: list[str] = field(default_factory=list)
     reproducer_note: str | None = None
-    precision: str = "double"
 
     @property
     def shown(self) -> Boundary:

@@ -86,6 +86,7 @@ def stability_study(stability_map: StabilityMap) -> StabilityStudy:
 
 def _point(point: MapPoint) -> BoundaryPoint:
     place, facts = point.place, point.curve.facts
+    settings = {key: value for key, value in facts.settings.items() if key != facts.resolution}
     sides = {name: _side(point, name) for name in BOUNDARIES}
     if place.yardstick.true is None:
         sides["accurate"] = replace(sides["accurate"], largest=None, numbers={})  # unknown without a truth
@@ -94,14 +95,7 @@ def _point(point: MapPoint) -> BoundaryPoint:
     first = sides[boundary]
     errors = [item.error for item in point.found.seen.values() if item.stable and item.error is not None]
     return BoundaryPoint(
-        engine=facts.name,
-        settings={key: value for key, value in facts.settings.items() if key != facts.resolution},
-        curve=point.curve.engine,
-        level=facts.level or None,
-        caveat=facts.caveat,
-        family=facts.family,
-        precision=facts.precision,
-        resolution=facts.resolution,
+        **point.curve.setting(replace(facts, settings=settings)),
         axis=place.axis,
         value=place.value,
         parameters=place.parameters,

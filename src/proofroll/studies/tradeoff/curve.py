@@ -6,7 +6,7 @@ import itertools
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -165,6 +165,11 @@ class Curve:
     def fixed_step(self) -> bool:
         """True if it is swept over steps, False for tolerances."""
         return self.facts.resolution == "dt"
+
+    def setting(self, facts: EngineFacts) -> dict[str, Any]:
+        """Values of the fields of :class:`SweptSetting` with the facts of one of its runs."""
+        known = {name: getattr(facts, name) for name in ("settings", "resolution", "caveat", "family", "precision")}
+        return {"engine": facts.name, "curve": self.engine, "level": facts.level or None} | known
 
     @property
     def tried(self) -> set[float | None]:

@@ -35,6 +35,27 @@ class MeasuredCost:
         return math.inf if self.seconds_per_second is None else self.seconds_per_second
 
 
+@dataclass(frozen=True, kw_only=True)
+class SweptSetting:
+    """Engine with settings along a curve.
+
+    Attributes:
+        engine: name of the engine.
+        curve: ``name[formulation=…,preset=…]``.
+        level: rung on the ladder of models; None: not declared.
+        settings, resolution, caveat, family, precision: the engine's facts.
+    """
+
+    engine: str
+    curve: str
+    level: str | None
+    settings: dict[str, Any]
+    resolution: str | None
+    caveat: str = ""
+    family: str = ""
+    precision: str = "double"
+
+
 @dataclass(frozen=True)
 class SparseRun:
     """Run of an engine with an adaptive step over few samples.
@@ -74,12 +95,12 @@ class Corner:
 
 
 @dataclass(frozen=True, kw_only=True)
-class MeasuredPoint(MeasuredCost):
+class MeasuredPoint(SweptSetting, MeasuredCost):
     """One engine with complete settings.
 
     Attributes:
         id: number of the point in its study.
-        engine, curve, level, settings, resolution, step, order, caveat, family, precision: the engine's facts.
+        step, order: step or tolerance, and declared order of convergence.
         status, message, host: end of the run, and the machine of a cluster that made it.
         error: observable -> largest distance from the truth; None: not finite.
         envelope: observable -> largest error of this run and of the next finer ones.
@@ -88,16 +109,8 @@ class MeasuredPoint(MeasuredCost):
     """
 
     id: int
-    engine: str
-    curve: str
-    level: str | None
-    settings: dict[str, Any]
-    resolution: str | None
     step: float | None
     order: int | None
-    caveat: str = ""
-    family: str = ""
-    precision: str = "double"
     status: Status
     message: str
     host: str = ""

@@ -168,17 +168,10 @@ def _point(curve: Curve, point: CurvePoint, number: int, envelope: dict[str, flo
     facts, few = point.case.engine, point.sparse
     return MeasuredPoint(
         **_cost(point.timing),
+        **curve.setting(facts),
         id=number,
-        engine=facts.name,
-        curve=curve.engine,
-        level=facts.level or None,
-        settings=facts.settings,
-        resolution=facts.resolution,
         step=point.step,
         order=facts.order,
-        caveat=facts.caveat,
-        family=facts.family,
-        precision=facts.precision,
         status=point.result.status,
         message=point.result.message,
         host=point.result.host,

@@ -19,8 +19,8 @@ from proofroll.running.engine_questions import describe
 from proofroll.running.runner import Runner
 from proofroll.running.stopwatch import Stopwatch
 from proofroll.running.timing import Interval, ratio, time_in_rounds
-from proofroll.studies.comparison import default_comparison as first_look
 from proofroll.studies.comparison.compare import evaluate
+from proofroll.studies.comparison.default_comparison import default_comparison
 from proofroll.studies.comparison.outcome import Outcome, Run
 from proofroll.studies.comparison.planning import plan
 from proofroll.studies.versions.difference import (
@@ -67,12 +67,12 @@ def _rows_of(comparison: Comparison, engine: str) -> list[Row]:
 
 def _of_scene(name: str, engine: str) -> Comparison:
     """Rows of one engine in the default comparison of a scene."""
-    looked = first_look.default_comparison(name, {})
-    rows = _rows_of(looked, engine)
+    comparison = default_comparison(name, {})
+    rows = _rows_of(comparison, engine)
     if not rows:
         why = f"no comparison about {name} has rows of it, and no formulation of it that is installed here can"
         raise InputError("engine", engine, why)
-    return dataclasses.replace(looked, rows=rows, timed=False)
+    return dataclasses.replace(comparison, rows=rows, timed=False)
 
 
 Progress = Callable[[str], None]
