@@ -41,10 +41,10 @@ def robot_versions(file: str, old: str, new: str) -> VersionsStudy:
     layers, changed = [], []
     for layer in dict.fromkeys(name for row in rows for name in row.layers):
         both_layers = [row.layers.get(layer) for row in rows]
-        held = [None if item is None else item.holds for item in both_layers]
+        holds = [None if item is None else item.holds for item in both_layers]
         shown = [None if item is None else "holds" if item.holds else amount(item.difference) for item in both_layers]
-        layers.append(LayerVersions(layer, shown[0], shown[1], held[0] != held[1]))
-        if held[0] != held[1]:
+        layers.append(LayerVersions(layer, shown[0], shown[1], holds[0] != holds[1]))
+        if holds[0] != holds[1]:
             changed.append(f"{layer}: {shown[0] or 'not offered'} → {shown[1] or 'not offered'}")
     if rows[0].status != rows[1].status:
         changed.insert(0, f"the robot: {_does(rows[0])} → {_does(rows[1])}")

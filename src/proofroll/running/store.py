@@ -75,13 +75,13 @@ class Store:
         Raises:
             ProofrollError: the place cannot be written.
         """
-        with contextlib.ExitStack() as held:
+        with contextlib.ExitStack() as stack:
             try:
                 with self._locked(fcntl.LOCK_SH):  # or _sweep of another process would remove it before it is locked
                     place = tempfile.mkdtemp(prefix=_INCOMING, dir=self.folder)
-                    held.callback(shutil.rmtree, place, ignore_errors=True)  # with an unfinished file, if any
+                    stack.callback(shutil.rmtree, place, ignore_errors=True)  # with an unfinished file, if any
                     with contextlib.suppress(OSError):  # the file system cannot lock
-                        held.enter_context(_holding(Path(place), fcntl.LOCK_SH))
+                        stack.enter_context(_holding(Path(place), fcntl.LOCK_SH))
             except OSError as error:
                 raise ProofrollError(f"{self.folder} cannot be written ({error.strerror or error})") from None
             yield Path(place) / self.trajectory(case).name

@@ -125,13 +125,13 @@ def _orientation(surface: Surface, sampled: Sampled, times: FloatArray) -> Float
     # differ by a constant rotation in the ball's frame; its change between samples, which the spin does not explain, is
     # interpolated.
     everywhere = np.union1d(grid, times)
-    carried = _turned(surface, sampled, everywhere)
+    carried = _orientations(surface, sampled, everywhere)
     apart = carried[np.searchsorted(everywhere, grid)].inv() * Rotation.from_quat(stored, scalar_first=True)
     between = Slerp(grid, apart)(np.clip(times, grid[0], grid[-1]))
     return np.asarray((carried[np.searchsorted(everywhere, times)] * between).as_quat(scalar_first=True))
 
 
-def _turned(surface: Surface, sampled: Sampled, times: FloatArray) -> Rotation:
+def _orientations(surface: Surface, sampled: Sampled, times: FloatArray) -> Rotation:
     """Orientations at rising times from 0 [s] by quadrature of the spin; identity at the first time.
 
     The components of the spin in the local frame, which vary slowly, are interpolated; those in the world vary as fast

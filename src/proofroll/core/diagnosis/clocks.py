@@ -25,9 +25,9 @@ def _comparable(time: FloatArray, reported: FloatArray, true: FloatArray) -> tup
     """
     if len(time) < _FEWEST:
         return None
-    flat, held = reported.reshape(len(time), -1), true.reshape(len(time), -1)
-    known = np.isfinite(flat).all(0) & np.isfinite(held).all(0)
-    return (flat[:, known], held[:, known]) if known.any() else None
+    flat, exact = reported.reshape(len(time), -1), true.reshape(len(time), -1)
+    known = np.isfinite(flat).all(0) & np.isfinite(exact).all(0)
+    return (flat[:, known], exact[:, known]) if known.any() else None
 
 
 def best_delay(time: FloatArray, reported: FloatArray, true: FloatArray) -> tuple[float, float, float] | None:
@@ -40,10 +40,10 @@ def best_delay(time: FloatArray, reported: FloatArray, true: FloatArray) -> tupl
     comparable = _comparable(time, reported, true)
     if comparable is None:
         return None
-    flat, held = comparable
+    flat, exact = comparable
     end = _SPLINE if len(time) >= _MANY else _END
     inner = slice(end, -end)
-    flat, curve = flat[inner], make_interp_spline(time, held, k=_SPLINE)
+    flat, curve = flat[inner], make_interp_spline(time, exact, k=_SPLINE)
     rate, delay, reach = curve.derivative(), 0.0, time[end] - time[0]
     for _ in range(_SHIFTS):
         slope = rate(time[inner] - delay)
@@ -52,7 +52,7 @@ def best_delay(time: FloatArray, reported: FloatArray, true: FloatArray) -> tupl
             return None
         delay -= float(np.sum((flat - curve(time[inner] - delay)) * slope)) / square
         delay = float(np.clip(delay, -reach, reach))
-    return delay, largest_gap(flat, held[inner]), largest_gap(flat, curve(time[inner] - delay))
+    return delay, largest_gap(flat, exact[inner]), largest_gap(flat, curve(time[inner] - delay))
 
 
 def best_clock_factor(time: FloatArray, reported: FloatArray, true: FloatArray) -> tuple[float, float, float] | None:

@@ -174,7 +174,7 @@ def _departure(evidence: Evidence, name: str) -> float:
     if run is None or truth is None or name not in run or name not in truth or run[name].shape != truth[name].shape:
         return 0.0
     reported, true = run[name].to_numpy(), truth[name].to_numpy()
-    off = _turned(reported, true) if name == "q_WB" else largest_gap(reported, true)
+    off = _largest_turn(reported, true) if name == "q_WB" else largest_gap(reported, true)
     length, time = element.length, element.natural_time
     natural = {"p_WB": length, "v_WB": length / time, "w_WB": 1 / time, "q_WB": 1.0}[name]
     return off / max(largest_gap(true, np.broadcast_to(true[:1], true.shape)), float(_STILL * natural))
@@ -196,14 +196,14 @@ def reported_quaternions(true_ones: Callable[[Evidence], FloatArray]) -> Hypothe
             return
         if len(reported) > 1 and largest_gap(np.abs(reported[0]), np.abs(true[0])) < _START:
             reported, true = reported[1:], true[1:]  # an engine may give at time 0 what it was given
-        before = _turned(reported, true)
+        before = _largest_turn(reported, true)
         if not above_round_off(before, 1.0):
             return
         for says, after in (
-            ("q_WB has its scalar last", _turned(reported, true[..., [1, 2, 3, 0]])),
+            ("q_WB has its scalar last", _largest_turn(reported, true[..., [1, 2, 3, 0]])),
             (
                 "q_WB is that of the inverse rotation, of the world in the body",
-                _turned(reported, true * [1, -1, -1, -1]),
+                _largest_turn(reported, true * [1, -1, -1, -1]),
             ),
         ):
             remedy = "give a unit quaternion of the body, scalar first"
@@ -212,7 +212,7 @@ def reported_quaternions(true_ones: Callable[[Evidence], FloatArray]) -> Hypothe
     return test
 
 
-def _turned(reported: FloatArray, other: FloatArray) -> float:
+def _largest_turn(reported: FloatArray, other: FloatArray) -> float:
     """Largest difference of quaternions, up to their signs."""
     signs = np.where(np.sum(reported * other, axis=-1, keepdims=True) < 0, -1.0, 1.0)
     return largest_gap(reported * signs, other)

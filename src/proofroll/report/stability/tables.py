@@ -112,11 +112,11 @@ def _range(points: Sequence[BoundaryPoint], side: str) -> str:
     if not known:
         return "no truth"
     values = [size(point, side) for point in known]
-    held = [value for value in values if value is not None]
-    if not held:
+    sizes = [value for value in values if value is not None]
+    if not sizes:
         return "none"
-    low = "none" if len(held) < len(values) else number(min(held))
-    high = number(max(held)) + ("" if any(p.sides[side].reached for p in known) else "+")
+    low = "none" if len(sizes) < len(values) else number(min(sizes))
+    high = number(max(sizes)) + ("" if any(p.sides[side].reached for p in known) else "+")
     return low if low == high else f"{low}…{high}"
 
 

@@ -32,9 +32,9 @@ if TYPE_CHECKING:
 def evaluate(planned: Plan, results: dict[str, Result], runner: Runner) -> Outcome:
     """Judges the results of a plan's cases."""
     comparison = planned.comparison
-    held = {case.key: runner.store.stored(case) for case in planned.cases}
+    stored = {case.key: runner.store.stored(case) for case in planned.cases}
     points = {
-        name: ComparedPoint(planned.scenes[name], case, results[case.key], held[case.key])
+        name: ComparedPoint(planned.scenes[name], case, results[case.key], stored[case.key])
         for name, case in planned.truths.items()
     }
     judged: list[Run] = []
@@ -57,7 +57,7 @@ def evaluate(planned: Plan, results: dict[str, Result], runner: Runner) -> Outco
             judged.append(_of_another_scene(run, result, other))
             continue
         trajectories = {
-            factor: held[case.key].dataset
+            factor: stored[case.key].dataset
             for factor, case in run.ladder.items()
             if results[case.key].status == Status.DONE
         }
@@ -84,7 +84,7 @@ def evaluate(planned: Plan, results: dict[str, Result], runner: Runner) -> Outco
             causes = diagnose_scene(reference.scene, result.certificate, main, true, run.facts.step, judgements)
             judged_run = replace(judged_run, diagnosis=causes)
         judged.append(judged_run)
-    judged = [run if run.result.trajectory is None else _with_trajectory(run, held) for run in judged]
+    judged = [run if run.result.trajectory is None else _with_trajectory(run, stored) for run in judged]
     return Outcome(comparison, planned.scene, planned.file, judged, points, _beyond_budget(planned, results))
 
 
@@ -134,9 +134,9 @@ def _run(planned: Planned, result: Result, **judged: Any) -> Run:
     return Run(planned.row, planned.parameters, facts, result, case=planned.ladder.get(1.0), **judged)
 
 
-def _with_trajectory(run: Run, held: Mapping[str, StoredTrajectory]) -> Run:
+def _with_trajectory(run: Run, stored: Mapping[str, StoredTrajectory]) -> Run:
     """The run with its trajectory, if its file exists."""
-    trajectory = held[run.case.key] if run.case else None
+    trajectory = stored[run.case.key] if run.case else None
     return replace(run, trajectory=trajectory if trajectory and trajectory.file.is_file() else None)
 
 

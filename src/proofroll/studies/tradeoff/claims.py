@@ -50,8 +50,8 @@ class Holds:
         claim = f"{self.engine} holds {_to(quantity, self.tolerance)} up to a step of {self.step:g}"
         if unknown := _unknown(study, [self.engine]):
             return ClaimJudgement(claim, self.because, None, unknown)
-        held = holding(study, Requirements(quantity, self.tolerance, engines=(self.engine,)), here=True)
-        steps = [point.step for point in held if point.step is not None]
+        points = holding(study, Requirements(quantity, self.tolerance, engines=(self.engine,)), here=True)
+        steps = [point.step for point in points if point.step is not None]
         if not steps:
             return ClaimJudgement(claim, self.because, False, "no step of the sweep does")
         shown = f"the coarsest that does is {max(steps):g}"
@@ -119,9 +119,9 @@ class Cheapest:
     def _compared(self, study: TradeoffStudy, required: Requirements) -> tuple[bool | None, str]:
         if unknown := _unknown(study, self.engine):
             return None, unknown
-        held = holding(study, required)
-        mine = _of(held, self.engine)
-        others = [point for point in held if point not in mine]
+        within = holding(study, required)
+        mine = _of(within, self.engine)
+        others = [point for point in within if point not in mine]
         if not mine:
             return False, "no step of it holds that"
         if not others:

@@ -20,11 +20,11 @@ def envelope(errors: Sequence[float], floor: int | None = None) -> list[float]:
         floor: number of the run at the error floor of single precision; finer runs do not count. None: no floor.
     """
     last = len(errors) if floor is None else floor + 1
-    held = []
+    largest = []
     for index, error in enumerate(errors[:last]):
         finer = [other for other in errors[index + 1 : last] if other != float("inf")][:_NEIGHBOURS]
-        held.append(max([error, *finer]))
-    return [*held, *errors[last:]]
+        largest.append(max([error, *finer]))
+    return [*largest, *errors[last:]]
 
 
 def costs_overlap(one: Sequence[float] | None, other: Sequence[float] | None) -> bool:

@@ -209,11 +209,11 @@ def covers(measured: Sequence[str], asked: Sequence[str]) -> bool:
 
 def _holds(study: TradeoffStudy, point: MeasuredPoint, required: Requirements, absolute: float) -> str:
     """Text on the margin with which a point holds the tolerance."""
-    held, bar = point.envelope_of(required.quantity), study.quantities[required.quantity].truth_error_bar or 0.0
-    if not max(held, bar):
+    envelope, bar = point.envelope_of(required.quantity), study.quantities[required.quantity].truth_error_bar or 0.0
+    if not max(envelope, bar):
         return "no error is seen"
     # An error below the truth's error bar is known only to be below it.
-    text = f"{_times(absolute / max(held, bar), at_least=held < bar)} better than asked"
+    text = f"{_times(absolute / max(envelope, bar), at_least=envelope < bar)} better than asked"
     if point.corners:
         worst = max(corner.off(required.tolerance.relative)[required.quantity] for corner in point.corners)
         there = required.tolerance.value if required.tolerance.relative else absolute

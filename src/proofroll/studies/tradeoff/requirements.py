@@ -63,16 +63,16 @@ def failure_reason(study: TradeoffStudy, point: MeasuredPoint, required: Require
 def _reason_here(study: TradeoffStudy, point: MeasuredPoint, name: str, absolute: float) -> str | None:
     """Reason why it does not hold the tolerance with margin at the scene's own parameters, or None."""
     unit = study.quantities[name].unit
-    error, held = point.error.get(name), point.envelope.get(name)
-    if error is None or held is None:
+    error, off = point.error.get(name), point.envelope.get(name)
+    if error is None or off is None:
         return f"{name} has no finite error: {point.message}"
     if error > absolute:
         blame = _COARSE if _finer_holds(study, point, name, absolute) else _blame(study, point, name, absolute)
         return f"{name} is off by {number(error)} {unit}; {blame}"
     if luck := _luck(study, point, name, absolute):
         return f"its error of {number(error)} {unit} is luck: {luck}"
-    if held * MARGIN > absolute:
-        return f"{name} is off by {number(held)} {unit}, which leaves less than a factor of {MARGIN:g} to the tolerance"
+    if off * MARGIN > absolute:
+        return f"{name} is off by {number(off)} {unit}, which leaves less than a factor of {MARGIN:g} to the tolerance"
     bar = study.quantities[name].truth_error_bar or 0.0
     if bar * MARGIN > absolute:
         return f"the truth itself is known only to {number(bar)} {unit}, so nothing can be seen to hold it"

@@ -159,8 +159,8 @@ def _points(curve: Curve, quantities: Sequence[str], numbers: Mapping[str, int])
     envelopes = {name: curve.envelope(name) for name in quantities}
     points = []
     for index, point in enumerate(curve.points):
-        held = {name: errors[index] for name, errors in envelopes.items() if name in point.errors}
-        points.append(_point(curve, point, numbers[point.case.key], held))
+        own = {name: errors[index] for name, errors in envelopes.items() if name in point.errors}
+        points.append(_point(curve, point, numbers[point.case.key], own))
     return points
 
 
