@@ -11,6 +11,7 @@ from collections.abc import Callable, Generator, Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from proofroll.core.scene import Scene
 from proofroll.files.scene_file import load_scene
 from proofroll.running.case import Case, EngineFacts, Result, Status
 from proofroll.running.runner import Runner
@@ -73,6 +74,7 @@ class StabilityMap:
 
     Attributes:
         scene: name of the scene.
+        default: the scene with its default parameters.
         axes, effort: question of the map.
         places: the values of the axes.
         points: every engine at every place.
@@ -80,6 +82,7 @@ class StabilityMap:
     """
 
     scene: str
+    default: Scene
     axes: list[Axis]
     effort: Effort
     places: list[MappedPlace]
@@ -120,7 +123,8 @@ def stability(
     """
     effort = effort or Effort()
     tell: Progress = progress or (lambda _text, _count: None)
-    curves, absent = curves_of(engines, runner.workers, load_scene(scene).requires)
+    default = load_scene(scene)
+    curves, absent = curves_of(engines, runner.workers, default.requires)
     for curve in (curve for curve in curves if curve.facts.resolution is None):
         absent[curve.engine] = "has neither step nor tolerance: exact at any time, it has no boundary to look for"
     curves = [curve for curve in curves if curve.facts.resolution is not None]
@@ -135,7 +139,7 @@ def stability(
     refused = _refused(points)
     points = [point for point in points if point.curve.engine not in refused]
     mapped = [MappedPlace(place.axis, place.value, place.parameters, place.problem) for place in asked]
-    return StabilityMap(scene, list(axes), effort, mapped, points, absent | refused)
+    return StabilityMap(scene, default, list(axes), effort, mapped, points, absent | refused)
 
 
 def _refused(points: Sequence[MapPoint]) -> dict[str, str]:

@@ -6,7 +6,6 @@ from dataclasses import asdict, replace
 from operator import attrgetter
 from pathlib import Path
 
-from proofroll.files.scene_file import load_scene
 from proofroll.running.case import hosts
 from proofroll.running.runner import Runner
 from proofroll.studies.claim_judgement import JudgedFile
@@ -56,8 +55,7 @@ def make_stability(
 
 def stability_study(stability_map: StabilityMap) -> StabilityStudy:
     """Record of a stability map with its counts and conclusions."""
-    points = [_point(point) for point in stability_map.points]
-    scene = load_scene(stability_map.scene)
+    points, scene = [_point(point) for point in stability_map.points], stability_map.default
     failing = [point for point in points if point.failure and point.failure not in NOT_RUN]
     return StabilityStudy(
         scene=stability_map.scene,

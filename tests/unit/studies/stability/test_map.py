@@ -17,6 +17,7 @@ from invented import boundary_point
 from invented import stability_study as invented_map
 
 from proofroll.core.errors import InputError
+from proofroll.files import scene_file
 from proofroll.files.json_data import plain, record
 from proofroll.files.scene_file import load_scene
 from proofroll.report.stability.map import legend, letters, svg
@@ -74,6 +75,16 @@ def test_a_map(small: Any) -> None:
     assert all(point.largest_accurate <= point.largest_stable for point in study.points)
     assert study.boundaries == sum(study.failures.values())
     assert record(StabilityStudy, json.loads(json.dumps(plain(study), allow_nan=False))) == study
+
+
+def test_no_scene_is_loaded_after_the_runs(small: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The record of a map is made from the scenes that were run."""
+
+    def refused(*_: object) -> None:
+        raise AssertionError("a scene is loaded again")
+
+    monkeypatch.setattr(scene_file, "_read", refused)
+    assert stability_study(small).meanings
 
 
 def test_a_search_hangs_on_no_clock(small: Any) -> None:
