@@ -29,6 +29,11 @@ def error(value: float | None, digits: int = 2) -> str:
     return number(value, digits, none="∞")
 
 
+def spaced(unit: str) -> str:
+    """Unit to stand behind a number, with a space in front; empty for a ratio."""
+    return "" if unit == "1" else f" {unit}"
+
+
 def vector(values: Sequence[float] | FloatArray) -> str:
     """Text of a vector; components that are round-off of the largest one become zero."""
     given = [float(value) for value in values]

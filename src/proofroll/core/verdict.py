@@ -8,7 +8,7 @@ import numpy as np
 from proofroll.core.arrays import FloatArray, largest_difference
 from proofroll.core.convergence import Limit
 from proofroll.core.engine import EPSILON
-from proofroll.core.number_format import number
+from proofroll.core.number_format import number, spaced
 
 # A ladder whose rungs differ by less than this part of the tolerance needs no order: even if the differences never
 # shrank, twenty further halvings (a step a million times smaller) would move the curve by the tolerance at most.
@@ -114,7 +114,7 @@ class Allowance:
     @property
     def shown_unit(self) -> str:
         """Unit for a text, with a space in front; empty for a ratio."""
-        return "" if self.unit == "1" else f" {self.unit}"
+        return spaced(self.unit)
 
 
 @dataclass(frozen=True)

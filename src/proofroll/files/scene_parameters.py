@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from proofroll.core.errors import InputError, choices, require_known
+from proofroll.core.number_format import spaced
 
 
 @dataclass(frozen=True)
@@ -135,5 +136,4 @@ def _check_bounds(name: str, parameter: Parameter, values: Mapping[str, float], 
         limit = values[bound] if isinstance(bound, str) else bound
         if not holds(value, limit):
             shown = f"{bound} = {limit:g}" if isinstance(bound, str) else f"{limit:g}"
-            unit = "" if parameter.unit == "1" else f" {parameter.unit}"
-            raise InputError(name, value, f"{parameter.meaning} must be {words} {shown}{unit}")
+            raise InputError(name, value, f"{parameter.meaning} must be {words} {shown}{spaced(parameter.unit)}")

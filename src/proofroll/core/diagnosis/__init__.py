@@ -18,7 +18,7 @@ import numpy as np
 from proofroll.core.arrays import FloatArray, largest_difference
 from proofroll.core.element import Element
 from proofroll.core.errors import NotUnique
-from proofroll.core.number_format import number
+from proofroll.core.number_format import number, spaced
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -116,7 +116,7 @@ class Cause:
     @property
     def sentence(self) -> str:
         """Clause about the engine, with the proof."""
-        unit = "" if self.unit == "1" else f" {self.unit}"
+        unit = spaced(self.unit)
         before, after = number(self.before), number(self.after, 1)
         return f"{self.says} ({self.quantity} off by {before}{unit}, by {after}{unit} with that)"
 

@@ -7,7 +7,7 @@ from itertools import groupby
 
 from proofroll.core.comparison import Comparison, Row
 from proofroll.core.diagnosis.scene_diagnosis import Diagnosis
-from proofroll.core.number_format import number
+from proofroll.core.number_format import number, spaced
 from proofroll.core.observable import Role
 from proofroll.core.scene import Scene
 from proofroll.core.verdict import Judgement, Verdict
@@ -172,8 +172,7 @@ class Outcome:
             worst_of = max(run.judgements, key=lambda item: item.error / item.tolerance, default=None)
             cells = ["", "", "", run.result.message]
             if worst_of is not None:
-                unit = "" if worst_of.unit == "1" else f" {worst_of.unit}"
-                off = [number(value) + unit for value in (worst_of.error, worst_of.tolerance)]
+                off = [number(value) + spaced(worst_of.unit) for value in (worst_of.error, worst_of.tolerance)]
                 cells = [worst_of.observable, *off, worst_of.reason]
             gauges.append("" if worst_of is None else gauge(worst_of.error, worst_of.tolerance))
             name = " ".join([run.row.engine, *(f"{key}={value:g}" for key, value in run.parameters.items())])

@@ -13,7 +13,7 @@ from proofroll.core.columns import UNCERTAIN
 from proofroll.core.comparison import Tolerance
 from proofroll.core.dataset import BETWEEN, off_impacts
 from proofroll.core.errors import InputError, require_known
-from proofroll.core.number_format import number
+from proofroll.core.number_format import number, spaced
 from proofroll.core.observable import Observable, Role
 from proofroll.core.scene import Scene
 from proofroll.core.truth import truth
@@ -57,7 +57,7 @@ class Compared:
     def __str__(self) -> str:
         """Largest difference with its time, the tolerance, and the error bar of the truth."""
         judgement = self.judgement
-        unit = "" if judgement.unit == "1" else f" {judgement.unit}"
+        unit = spaced(judgement.unit)
         when = "" if self.at is None else f" at {self.at:.4g} s"
         error, allowed = number(judgement.error, 3), number(judgement.tolerance, 3)
         difference = f"{judgement.observable} is off by {error}{unit}{when}, allowed {allowed}{unit}"
@@ -106,7 +106,7 @@ class Judged:
         rows = []
         for item in self.compared:
             judgement, sign = item.judgement, "✓" if item.agrees else "✗"
-            unit = "" if judgement.unit == "1" else f" {judgement.unit}"
+            unit = spaced(judgement.unit)
             numbers = (
                 number(value) + unit for value in (judgement.error, judgement.tolerance, judgement.truth_error_bar)
             )
