@@ -116,7 +116,7 @@ def require_supported(body: RollingBall) -> None:
     Raises:
         Refused: heyoka is missing, or the scene is another.
     """
-    if not (rolling.supports(body) and isinstance(body.surface, Cylinder) and rolling.is_uniform(body)):
+    if not (rolling.supports(body) and isinstance(body.surface, Cylinder)) or np.any(rolling.local_gravity(body)[:2]):
         raise Refused("compiled first slips need a cylinder along whose axis gravity points")
     require_heyoka("a compiled first slip")
 
@@ -146,7 +146,7 @@ def margins(excess: Any, available: Any, system: list[tuple[Any, Any]]) -> rolli
 def _reduced(tolerance: float) -> tuple[Any, rolling.Function]:
     import heyoka as hy
 
-    symbols = rolling.expressions(resistance=True, uniform=True)
+    symbols = rolling.expressions(resistance=True)
     mu = hy.par[len(rolling.PARAMETERS)]
     available = (symbols.A * mu * symbols.N) ** 2
     return _stopping(symbols.rolling(), symbols.excess(mu), available, tolerance)

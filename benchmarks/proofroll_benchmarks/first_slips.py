@@ -152,10 +152,12 @@ def _compiled() -> tuple[Any, rolling.Function]:
     """
     import heyoka as hy
 
-    symbols = rolling.expressions(resistance=True, uniform=True)
+    symbols = rolling.expressions(resistance=True)
+    anywhere = {symbols.state[0]: hy.expression(0.0)}  # gravity along the axis is the same at every q
     clock, mu, limit = hy.make_vars("clock"), hy.par[len(_PARAMETERS) - 1], hy.par[len(_PARAMETERS)]
-    system = [*symbols.rolling()[2:], (clock, hy.expression(1.0))]
-    excess = symbols.excess(mu)
+    rates = [(variable, hy.subs(rate, anywhere)) for variable, rate in symbols.rolling()[2:]]
+    system = [*rates, (clock, hy.expression(1.0))]
+    excess = hy.subs(symbols.excess(mu), anywhere)
     lanes = hy.recommended_simd_size()
     up = hy.event_direction.positive
     # A lane's next ball has nothing to do with the last one, so no event needs to be kept from coming twice.
@@ -170,4 +172,4 @@ def _compiled() -> tuple[Any, rolling.Function]:
         tol=_TOLERANCE,
         t_events=events,
     )
-    return integrator, margins(excess, (symbols.A * mu * symbols.N) ** 2, system)
+    return integrator, margins(excess, hy.subs((symbols.A * mu * symbols.N) ** 2, anywhere), system)

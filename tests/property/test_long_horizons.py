@@ -116,7 +116,7 @@ def test_a_hundred_thousand_oscillations() -> None:
     4 of that is the closed form's own round-off, the rest that of some three hundred thousand steps of the series.
     """
     body = rolling_ball(load_scene("sphere_in_cylinder"))
-    model = rolling.reduced(resistance=False, uniform=True, tolerance=EPS)
+    model = rolling.reduced(resistance=False, tolerance=EPS)
     series = copy.copy(model.integrator)
     series.time, series.state[:] = 0.0, rolling.start(body)
     series.pars[:] = np.array(rolling.parameters(body)[: len(series.pars)])

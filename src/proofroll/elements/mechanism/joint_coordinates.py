@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from proofroll.core.arrays import cross
+from proofroll.core.dop853 import integrate
 from proofroll.core.errors import Diverged, Refused
 from proofroll.elements.mechanism.analysis import BRANCHES, RANK, RowSign, analyse, reactions
 from proofroll.elements.mechanism.complementarity import (
@@ -25,7 +26,7 @@ from proofroll.elements.mechanism.complementarity import (
 from proofroll.elements.mechanism.kinematics import BodyMotion, Rows, Tree
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.named_forces import joint_force_shares, lengths, pick_named
-from proofroll.elements.mechanism.record import Record, integrate, record_of
+from proofroll.elements.mechanism.record import Record, record_of
 from proofroll.elements.mechanism.rotations import Array, skews, to_quaternion
 from proofroll.elements.mechanism.signal import value_at, varies
 from proofroll.elements.mechanism.switches import REDUNDANT, STOPPED, Mode, held_joints, switched_joints

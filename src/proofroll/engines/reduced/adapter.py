@@ -15,7 +15,7 @@ from proofroll.core.errors import Diverged, Refused, refuse_first
 from proofroll.core.integrators import DormandPrince853
 from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.compiled.library import TIGHTEST, require_heyoka, with_heyoka
-from proofroll.elements.ball_on_surface.compiled.rolling import is_uniform, parameters, reduced, supports
+from proofroll.elements.ball_on_surface.compiled.rolling import parameters, reduced, supports
 from proofroll.elements.ball_on_surface.compiled.rolling import start as start_along_arc
 from proofroll.elements.ball_on_surface.compiled.series import Series, still_moving
 from proofroll.elements.ball_on_surface.element import rolling_ball
@@ -168,7 +168,7 @@ class Compiled(ReducedModel):
         super().__init__(body)
         self._pars = parameters(body)
         self._resistance = body.contact.rolling_resistance > 0
-        model = reduced(self._resistance, is_uniform(body), rtol)
+        model = reduced(self._resistance, rtol)
         pars = np.array(self._pars[: len(model.integrator.pars)])
         self._evaluate = model.evaluate
         self._series = Series(model.integrator, pars, start_along_arc(body), self._check)

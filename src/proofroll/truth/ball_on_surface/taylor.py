@@ -9,7 +9,7 @@ import numpy as np
 from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Diverged
 from proofroll.elements.ball_on_surface.compiled import library
-from proofroll.elements.ball_on_surface.compiled.rolling import is_uniform, parameters, start
+from proofroll.elements.ball_on_surface.compiled.rolling import parameters, start
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.motion import BallMotion, world_motion
 from proofroll.elements.ball_on_surface.surfaces import Cylinder, Plane
@@ -54,7 +54,7 @@ class SlidingTaylor(Sliding):
         self._A = (1 + body.ball.inertia_ratio) / body.ball.inertia_ratio
         self._pars = [*parameters(body), *(min(mu, _LARGEST) for mu in (contact.mu_kinetic, contact.mu_static))]
         bounded = bool(np.isfinite(contact.mu_static))
-        self._model: TaylorModel = model(contact.rolling_resistance > 0, is_uniform(body), bounded)
+        self._model: TaylorModel = model(contact.rolling_resistance > 0, bounded)
 
     def start(self) -> FloatArray:
         """See :class:`Route`."""

@@ -42,23 +42,20 @@ class TaylorModel:
 _local = threading.local()
 
 
-def model(resistance: bool, uniform: bool, bounded: bool) -> TaylorModel:
-    """Integrators, compiled once per thread: with rolling resistance, on a uniform surface, with bounded friction.
-
-    ``resistance`` and ``uniform`` as in :func:`expressions`.
-    """
+def model(resistance: bool, bounded: bool) -> TaylorModel:
+    """Integrators, compiled once per thread: with rolling resistance, with bounded friction."""
     if not hasattr(_local, "models"):
         _local.models = cache(_compiled)
-    compiled: TaylorModel = _local.models(resistance, uniform, bounded)
+    compiled: TaylorModel = _local.models(resistance, bounded)
     return compiled
 
 
-def _compiled(resistance: bool, uniform: bool, bounded: bool) -> TaylorModel:
+def _compiled(resistance: bool, bounded: bool) -> TaylorModel:
     import heyoka as hy
 
     size, y, phi, t = hy.make_vars("size", "y", "phi", "t")
     mu_k, mu_s, limit, t_end = (hy.par[i] for i in range(len(SHARED), len(PARAMETERS)))
-    equations = expressions(resistance, uniform)
+    equations = expressions(resistance)
     q, h, v2, v3, w1 = equations.state
     A, N, b2, b3 = equations.A, equations.N, equations.b2, equations.b3
     rates, along = equations.rates, equations.along

@@ -5,15 +5,15 @@ from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
-from proofroll.core.errors import NotUnique, Refused
+from proofroll.core.errors import Refused
 from proofroll.elements.mechanism.contacts.acting import OPEN, Acting, ContactMode, Direction, first_mode, slip_velocity
 from proofroll.elements.mechanism.contacts.start import closed_and_still
 from proofroll.elements.mechanism.contacts.touching import Touching
 from proofroll.elements.mechanism.rotations import Array, cross, frame_of_axis
-from proofroll.truth.hybrid import Stretch, Transition
+from proofroll.truth.hybrid import Transition
 from proofroll.truth.mechanism.body_switching import SLACK
 from proofroll.truth.mechanism.contact_equations import BodiesSolution, BodiesState, ContactEquations
-from proofroll.truth.mechanism.contact_guards import AT_REST, STOPPED, striking
+from proofroll.truth.mechanism.contact_guards import AT_REST, STOPPED
 from proofroll.truth.mechanism.contact_stretches import ContactStretches, SolvedContacts, modes_of
 from proofroll.truth.mechanism.maximal_coordinates import RANK
 
@@ -40,39 +40,6 @@ class ContactBodies(ContactStretches):
         state = self.equations.eliminated(state, modes_of(closed, still))
         mode, margin = self._decided(state, closed, still)
         return Transition(state, mode, (), margin)
-
-    def _torn(self, leg: Stretch[ContactMode]) -> NotUnique:
-        return NotUnique(f"friction leaves no unique motion from t = {leg.end:.6g} s on (Painlevé)")
-
-    def _leaving(self, state: Array, mode: ContactMode, k: int) -> Acting:
-        line = mode[k].along
-        assert line is not None  # other contacts are refused before
-        pulls = self.equations.accelerated(self.equations.at(state), mode).force[k]
-        x, y, z = (float(component) * (-1.0 if np.dot(line, pulls) > 0 else 1.0) for component in line)
-        return Acting("slip", (x, y, z), (x, y, z))
-
-    def _impact(self, leg: Stretch[ContactMode], hit: int) -> Transition[ContactMode]:
-        state, law = leg.last, self.contacts[hit].restitution
-        bodies = self.equations.at(state)
-        speed = -float(bodies.touching[hit].normal @ bodies.touching[hit].slide)
-        hits = striking(leg.mode, bodies.touching, hit, leg.end)
-        rubs = self.equations.bounds > 0  # dry friction of joints gives no impulse
-        closed = [(own.kind != "open" or k in hits) and not rubs[k] for k, own in enumerate(leg.mode)]
-        laws = [self.contacts[k].restitution if k in hits else 0.0 for k in range(len(closed))]
-        delay = 0.0
-        after, solution, margin = self._struck(state, bodies, closed, laws)
-        if self._settles(hit, speed, law):
-            free = self.equations.at(after)
-            pull = -float(free.touching[hit].normal @ self.equations.accelerated(free, leg.mode).slide[hit])
-            delay = self._bouncing(speed * law, pull, law)
-            after, solution, margin = self._struck(state, bodies, closed, [0.0] * len(closed))
-        stays = []
-        for k, (shut, each) in enumerate(zip(closed, bodies.touching, strict=True)):
-            parts = float(each.normal @ solution.slide[k]) > STOPPED
-            stays.append(shut and not parts)
-        stays = [stay or bool(rub) for stay, rub in zip(stays, rubs, strict=True)]
-        first = ("settle" if delay else "impact", self.contacts[hit].name)
-        return self._after(leg, after, stays, (first,), margin, delay)
 
     def _decided(self, state: Array, closed: Sequence[bool], still: Sequence[bool]) -> tuple[ContactMode, float]:
         bodies = self.equations.at(state)
@@ -116,12 +83,13 @@ class ContactBodies(ContactStretches):
         return bool(nnls(matrix, aims, maxiter=100 * matrix.shape[1])[1] <= SLACK * size)
 
     def _struck(
-        self, state: Array, bodies: BodiesState, closed: Sequence[bool], laws: Sequence[float]
-    ) -> tuple[Array, BodiesSolution, float]:
-        """State, velocities and margin after an impact, by the restitution law of each contact.
-
-        Closed contacts press, slide or open. Margin 0: several outcomes satisfy all inequalities.
-        """
+        self,
+        state: Array,
+        mode: ContactMode,  # noqa: ARG002 -- for the other route
+        closed: Sequence[bool],
+        laws: Sequence[float],
+    ) -> tuple[Array, list[bool], float]:
+        bodies = self.equations.at(state)
         speeds = [float(each.normal @ each.slide) for each in bodies.touching]
         after = np.array([-law * min(speed, 0.0) for law, speed in zip(laws, speeds, strict=True)])
 
@@ -132,8 +100,10 @@ class ContactBodies(ContactStretches):
         e = self.equations.equations.equations
         state = state.copy()
         state[e.nx : e.nx + e.nu] = solution.moved
+        parting = (float(each.normal @ slide) for each, slide in zip(bodies.touching, solution.slide, strict=True))
+        stays = [shut and away <= STOPPED for shut, away in zip(closed, parting, strict=True)]
         apart = max((float(np.abs(other.moved - solution.moved).max()) for _, other, _ in others), default=0.0)
-        return state, solution, 0.0 if apart > _SAME * float(np.abs(bodies.u).max()) else np.inf
+        return state, stays, 0.0 if apart > _SAME * float(np.abs(bodies.u).max()) else np.inf
 
     def _own(self, bodies: BodiesState, closed: Sequence[bool]) -> list[Acting]:
         """Provisional mode of each contact: open, or stick, with its line if it can slide along a line only."""

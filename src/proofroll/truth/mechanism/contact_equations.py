@@ -203,7 +203,7 @@ class ContactEquations:
         solution = self.accelerated(self.at(unit), mode)
         x, u = state[: e.nx], unit[e.nx : e.nx + e.nu]
         angles = self.equations.loaded(unit[:-1])[0].angle_rate if e.angles else []
-        return np.array([*self._moving(x, u), *solution.moved, *angles, 1.0], dtype=float)
+        return np.array([*self.equations.moving(x, u), *solution.moved, *angles, 1.0], dtype=float)
 
     def _wanted(self, state: Array) -> Array:
         """Efforts that the actuators with a limit would apply without it [N m, N]."""
@@ -231,12 +231,6 @@ class ContactEquations:
             push={joint.number: joint.push(now) for joint, now in pairs if joint.push(now)},
         )
 
-    def _moving(self, x: Array, u: Array) -> list[float]:
-        """Rates of the coordinates x at velocities u."""
-        e = self.equations.equations
-        bodies = zip(e.bodies, e.x_slices, e.u_slices, strict=True)
-        return [rate for body, at_x, at_u in bodies for rate in body.rate(x[at_x].tolist(), u[at_u].tolist())]
-
     def eliminated(self, state: Array, mode: ContactMode) -> Array:
         """State without violations of joint rows, closed contacts and unit quaternions."""
         e = self.equations.equations
@@ -248,7 +242,7 @@ class ContactEquations:
         normals = np.array([bodies.touching[k].normal @ bodies.J[k] for k in closed])
         gaps = np.array([bodies.touching[k].gap for k in closed])
         back = _least_motion(bodies, normals, gaps)
-        state[: e.nx] -= np.array(self._moving(state[: e.nx], back), dtype=float)
+        state[: e.nx] -= self.equations.moving(state[: e.nx], back)
         state = self.equations.normalised(state)
         bodies = self.at(state)
         sticking = [bodies.J[k] for k in closed if mode[k].kind == "stick"]

@@ -11,12 +11,14 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
+from proofroll.core.errors import NotUnique
 from proofroll.elements.mechanism.contacts.acting import FAINT, OPEN, Acting, ContactMode, changes, slip_velocity
+from proofroll.elements.mechanism.contacts.coulomb import PAINLEVE
 from proofroll.elements.mechanism.contacts.touching import Touching
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.elements.mechanism.signal import varies
-from proofroll.truth.hybrid import Stretch, Transition, states_at
+from proofroll.truth.hybrid import Stretch, Transition
 from proofroll.truth.mechanism.contact_guards import (
     AT_REST,
     STANDS,
@@ -28,6 +30,7 @@ from proofroll.truth.mechanism.contact_guards import (
     guards_of,
     noise_of,
     refuse_turning_onset,
+    striking,
 )
 from proofroll.truth.mechanism.stretches import Stretches, StretchLaw
 from proofroll.truth.mechanism.two_paths import CLOSE
@@ -93,16 +96,17 @@ class ContactStretches(Stretches[ContactMode]):
         """Mode that follows from the forces, and its relative margin from another mode."""
 
     @abstractmethod
-    def _torn(self, leg: Stretch[ContactMode]) -> Exception:
-        """Refusal of a motion that is not unique after the end of a stretch."""
+    def _struck(
+        self, state: Array, mode: ContactMode, closed: Sequence[bool], laws: Sequence[float]
+    ) -> tuple[Array, list[bool], float]:
+        """State after an impact, contacts that stay closed, and the relative margin from another outcome.
 
-    @abstractmethod
-    def _leaving(self, state: Array, mode: ContactMode, k: int) -> Acting:
-        """Slip that starts at the bound of friction, opposite to the friction that held."""
-
-    @abstractmethod
-    def _impact(self, leg: Stretch[ContactMode], hit: int) -> Transition[ContactMode]:
-        """Transition at an impact."""
+        Args:
+            state: before the impact.
+            mode: before the impact.
+            closed: contacts that may take impulses.
+            laws: restitution of each contact in this impact.
+        """
 
     def _law(self, state: Array, mode: ContactMode) -> StretchLaw:
         guards, equations = guards_of(self.contacts, mode), self._equations
@@ -170,13 +174,6 @@ class ContactStretches(Stretches[ContactMode]):
                 wait = max(wait, 2 * FAINT / float(np.linalg.norm(solved.slide_rate[k])))
         return (state, time) if not wait else (state + wait * self._equations.rate(state, mode), time + wait)
 
-    def within(self, leg: Stretch[ContactMode], times: FloatArray) -> FloatArray:
-        """See the protocol."""
-        if not leg.visited:
-            return np.array([leg.first for _ in times])
-        law = self._law(leg.first, leg.mode)
-        return states_at(lambda _, y: law.rates(y), leg.visited, times, self._tolerance, law.corrected)
-
     def change(self, leg: Stretch[ContactMode]) -> Transition[ContactMode]:
         """See the protocol."""
         guards = guards_of(self.contacts, leg.mode)
@@ -194,6 +191,39 @@ class ContactStretches(Stretches[ContactMode]):
             mode[k] = self._leaving(leg.last, leg.mode, k)
             return Transition(leg.last, tuple(mode), (("slip", name),))
         return self._stopped(leg) if kind == "still" else self._impact(leg, k)
+
+    def _torn(self, leg: Stretch[ContactMode]) -> NotUnique:
+        """Error of a motion that is not unique after the end of a stretch."""
+        slipping = next(c.name for c, own in zip(self.contacts, leg.mode, strict=True) if own.kind == "slip")
+        return NotUnique(f"from t = {leg.end:.6g} s on " + PAINLEVE.format(name=slipping))
+
+    def _leaving(self, state: Array, mode: ContactMode, k: int) -> Acting:
+        """Slip that starts at the bound of friction, opposite to the friction that held."""
+        line = mode[k].along
+        assert line is not None  # other contacts are refused before
+        sign = -1.0 if np.dot(line, self._solved(state, mode).force[k]) > 0 else 1.0
+        x, y, z = (sign * component for component in line)
+        return Acting("slip", (x, y, z), (x, y, z))
+
+    def _impact(self, leg: Stretch[ContactMode], hit: int) -> Transition[ContactMode]:
+        """Transition at an impact."""
+        contacts, touching, law = self.contacts, self._touching(leg.last), self.contacts[hit].restitution
+        hits = striking(leg.mode, touching, hit, leg.end)
+        # dry friction of joints gives no impulse
+        closed = [
+            (own.kind != "open" or k in hits) and not contact.bound
+            for k, (own, contact) in enumerate(zip(leg.mode, contacts, strict=True))
+        ]
+        laws = [contact.restitution if k in hits else 0.0 for k, contact in enumerate(contacts)]
+        speed, delay = -float(touching[hit].normal @ touching[hit].slide), 0.0
+        state, stays, margin = self._struck(leg.last, leg.mode, closed, laws)
+        if self._settles(hit, speed, law):
+            pull = -float(touching[hit].normal @ self._solved(state, leg.mode).slide_rate[hit])
+            delay = self._bouncing(speed * law, pull, law)
+            state, stays, margin = self._struck(leg.last, leg.mode, closed, [0.0] * len(closed))
+        stays = [stay or bool(contact.bound) for stay, contact in zip(stays, contacts, strict=True)]
+        first = ("settle" if delay else "impact", contacts[hit].name)
+        return self._after(leg, state, stays, (first,), margin, delay)
 
     def _stopped(self, leg: Stretch[ContactMode]) -> Transition[ContactMode]:
         """Transition where a slip stops: alone, or with all others.

@@ -4,14 +4,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from proofroll.core.errors import NotUnique
-from proofroll.elements.mechanism.contacts.acting import Acting, ContactMode
-from proofroll.elements.mechanism.contacts.coulomb import PAINLEVE
+from proofroll.elements.mechanism.contacts.acting import ContactMode
 from proofroll.elements.mechanism.contacts.dynamics import ContactDynamics, ContactSolution
 from proofroll.elements.mechanism.contacts.touching import Touching
 from proofroll.elements.mechanism.rotations import Array
-from proofroll.truth.hybrid import Stretch, Transition
-from proofroll.truth.mechanism.contact_guards import STOPPED, striking
+from proofroll.truth.hybrid import Transition
+from proofroll.truth.mechanism.contact_guards import STOPPED
 from proofroll.truth.mechanism.contact_stretches import ContactStretches, SolvedContacts
 
 
@@ -31,43 +29,16 @@ class ContactTree(ContactStretches):
         state = self.dynamics.eliminated(np.concatenate([*self.dynamics.mechanism.start(), [0.0]]), mode)
         return Transition(state, mode, (), margin)
 
-    def _torn(self, leg: Stretch[ContactMode]) -> NotUnique:
-        slipping = next(c.name for c, own in zip(self.contacts, leg.mode, strict=True) if own.kind == "slip")
-        return NotUnique(f"from t = {leg.end:.6g} s on " + PAINLEVE.format(name=slipping))
-
-    def _leaving(self, state: Array, mode: ContactMode, k: int) -> Acting:
-        solution = self._forces(state, mode)
-        own = mode[k]
-        assert own.along is not None  # other contacts are refused before
-        sign = -float(np.sign(np.dot(own.along, solution.force[k])))
-        x, y, z = (sign * np.array(own.along)).tolist()
-        return Acting("slip", (x, y, z), (x, y, z))
-
-    def _impact(self, leg: Stretch[ContactMode], hit: int) -> Transition[ContactMode]:
-        contacts, dynamics = self.contacts, self.dynamics
-        q, v, time = dynamics.parts(leg.last)
-        touching = dynamics.at(q, v).touching
-        hits = striking(leg.mode, touching, hit, leg.end)
-        # dry friction of joints gives no impulse
-        closed = [k for k, own in enumerate(leg.mode) if (own.kind != "open" or k in hits) and not contacts[k].bound]
-        speed = -float(touching[hit].normal @ touching[hit].slide)
-        law = np.array([contacts[k].restitution if k in hits else 0.0 for k in closed])
-        after, impulse, margin = dynamics.struck(q, v, closed, law)
-        delay = 0.0
-        if self._settles(hit, speed, contacts[hit].restitution):
-            free = dynamics.solve(q, after, leg.mode, time)
-            pull = -float(touching[hit].normal @ free.slide_rate[hit])
-            delay = self._bouncing(speed * contacts[hit].restitution, pull, contacts[hit].restitution)
-            after, impulse, margin = dynamics.struck(q, v, closed, np.zeros(len(closed)))
-        state = np.concatenate([q, after, [time]])
-        stays = [bool(contact.bound) for contact in contacts]
-        for place, k in enumerate(closed):
-            e = contacts[k].restitution if k in hits and not delay else 0.0
-            stays[k] = impulse[place, 0] > 0 and not e
-            if k not in hits and not impulse[place, 0] > 0:
-                stays[k] = float(touching[k].normal @ dynamics.at(q, after).touching[k].slide) <= STOPPED
-        first = ("settle" if delay else "impact", contacts[hit].name)
-        return self._after(leg, state, stays, (first,), margin, delay)
+    def _struck(
+        self, state: Array, mode: ContactMode, closed: Sequence[bool], laws: Sequence[float]
+    ) -> tuple[Array, list[bool], float]:
+        (q, v, time), which = self.dynamics.parts(state), np.flatnonzero(closed).tolist()
+        after, impulse, margin = self.dynamics.struck(q, v, which, np.array([laws[k] for k in which]))
+        stays, touching = list(closed), self.dynamics.at(q, after).touching
+        for pressed, k in zip(impulse[:, 0] > 0, which, strict=True):
+            leaves = mode[k].kind == "open" or float(touching[k].normal @ touching[k].slide) > STOPPED
+            stays[k] = not laws[k] if pressed else not leaves
+        return np.concatenate([q, after, [time]]), stays, margin
 
     def _forces(self, state: Array, mode: ContactMode) -> ContactSolution:
         q, v, time = self.dynamics.parts(state)

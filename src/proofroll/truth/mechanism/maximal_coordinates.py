@@ -15,11 +15,12 @@ import numpy as np
 from scipy.linalg import qr
 from scipy.spatial.transform import Rotation
 
+from proofroll.core.dop853 import integrate
 from proofroll.core.errors import Missing
 from proofroll.elements.mechanism.complementarity import refuse_switching
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.named_forces import joint_force_shares, lengths, pick_named
-from proofroll.elements.mechanism.record import Record, integrate, record_of
+from proofroll.elements.mechanism.record import Record, record_of
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.truth.mechanism.constraint_rows import ConstraintRow
 from proofroll.truth.mechanism.maximal_bodies import BodyInScalars
@@ -166,12 +167,14 @@ class NumericEquations:
         e, unit = self.equations, self.normalised(state)
         solved = self.solve(unit, time)
         x, u = state[: e.nx], unit[e.nx : e.nx + e.nu]
-        moving = [
-            value
-            for body, at_x, at_u in zip(e.bodies, e.x_slices, e.u_slices, strict=True)
-            for value in body.rate(x[at_x].tolist(), u[at_u].tolist())
-        ]
-        return np.array([*moving, *solved.acceleration, *solved.equations.angle_rate], dtype=float)
+        return np.array([*self.moving(x, u), *solved.acceleration, *solved.equations.angle_rate], dtype=float)
+
+    def moving(self, x: Array, u: Array) -> Array:
+        """Rates of the coordinates x at velocities u."""
+        e = self.equations
+        bodies = zip(e.bodies, e.x_slices, e.u_slices, strict=True)
+        rates = [rate for body, at_x, at_u in bodies for rate in body.rate(x[at_x].tolist(), u[at_u].tolist())]
+        return np.array(rates, dtype=float)
 
     def eliminated(self, state: Array) -> Array:
         """State without violations of rows and of unit quaternions."""
@@ -179,8 +182,7 @@ class NumericEquations:
         solved = self.solve(state)
         u = state[e.nx : e.nx + e.nu]
         back = -solved.into @ (solved.back @ solved.residual)
-        for body, at_x, at_u in zip(e.bodies, e.x_slices, e.u_slices, strict=True):
-            state[at_x] += np.array(body.rate(state[at_x].tolist(), back[at_u].tolist()), dtype=float)
+        state[: e.nx] += self.moving(state[: e.nx], back)
         u -= solved.into @ (solved.back @ (solved.C @ u))
         return self.normalised(state)
 
@@ -189,8 +191,7 @@ class NumericEquations:
         e, state = self.equations, state.copy()
         # all different, by the golden ratio
         ways = by * (1.0 + np.modf(np.arange(1, e.nu + 1) * 0.6180339887498949)[0])
-        for body, at_x, at_u in zip(e.bodies, e.x_slices, e.u_slices, strict=True):
-            state[at_x] += np.array(body.rate(state[at_x].tolist(), ways[at_u].tolist()), dtype=float)
+        state[: e.nx] += self.moving(state[: e.nx], ways)
         state[e.nx : e.nx + e.nu] *= 1.0 + ways
         for _ in range(3):  # Newton's method doubles the number of digits
             state = self.eliminated(state)

@@ -9,10 +9,9 @@ import numpy as np
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Refused
-from proofroll.elements.mechanism.record import integrate
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.elements.mechanism.switches import Settling
-from proofroll.truth.hybrid import Stretch, integrate_to_guard
+from proofroll.truth.hybrid import Stretch, integrate_to_guard, states_at
 
 ModeT = TypeVar("ModeT")
 
@@ -84,6 +83,7 @@ class Stretches(ABC, Generic[ModeT]):
 
     def within(self, leg: Stretch[ModeT], times: FloatArray) -> FloatArray:
         """See the protocol."""
-        law, spans = self._law(leg.first, leg.mode), np.maximum(times - leg.start, 0.0)
-        tolerance = float(self._tolerance[0])
-        return np.array(list(integrate(lambda _, y: law.rates(y), leg.first, spans, tolerance, law.corrected)))
+        if not leg.visited:
+            return np.array([leg.first for _ in times])
+        law = self._law(leg.first, leg.mode)
+        return states_at(lambda _, y: law.rates(y), leg.visited, times, self._tolerance, law.corrected)

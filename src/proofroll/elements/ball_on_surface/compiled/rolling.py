@@ -73,19 +73,14 @@ class Expressions:
         return hy.sum([hy.diff(expression, x) * rate for x, rate in flow])
 
 
-def expressions(resistance: bool, uniform: bool) -> Expressions:
-    """The equations in symbols.
-
-    Args:
-        resistance: with rolling resistance; without it the speed may pass through zero.
-        uniform: True if gravity's local components are constant along the surface.
-    """
+def expressions(resistance: bool) -> Expressions:
+    """The equations in symbols; without rolling ``resistance`` the speed may pass through zero."""
     import heyoka as hy
 
     q, h, v2, v3, w1 = hy.make_vars(*STATES)
     k, gx, gy, gz, swing, back, A, per_A, lever = (hy.par[i] for i in range(len(PARAMETERS)))
     angle = k * q
-    g1, g2 = (gx, gy) if uniform else (gx * hy.cos(angle) + gy * hy.sin(angle), gy * hy.cos(angle) - gx * hy.sin(angle))
+    g1, g2 = gx * hy.cos(angle) + gy * hy.sin(angle), gy * hy.cos(angle) - gx * hy.sin(angle)
     N = g1 + k * v2**2
     per_speed = lever * N / hy.sqrt(v2**2 + v3**2) if resistance else hy.expression(0.0)
     return Expressions(
@@ -133,14 +128,14 @@ class CompiledEquations:
 
 
 @lru_cache(maxsize=16)
-def reduced(resistance: bool, uniform: bool, tolerance: float) -> CompiledEquations:
+def reduced(resistance: bool, tolerance: float) -> CompiledEquations:
     """Equations compiled for a relative tolerance of each step [1], which also decides the order of the series.
 
     Its forces over mass are b2/A, b3/A (the friction needed) and N.
     """
     import heyoka as hy
 
-    symbols = expressions(resistance, uniform)
+    symbols = expressions(resistance)
     system = symbols.rolling()
     outputs = [*(rate for _, rate in system), symbols.per_A * symbols.b2, symbols.per_A * symbols.b3, symbols.N]
     return CompiledEquations(
@@ -152,11 +147,6 @@ def reduced(resistance: bool, uniform: bool, tolerance: float) -> CompiledEquati
 def supports(body: RollingBall) -> bool:
     """True if the expressions hold on the scene's surface and the wall does not move."""
     return isinstance(body.surface, (Cylinder, Plane)) and body.wall_rate is None
-
-
-def is_uniform(body: RollingBall) -> bool:
-    """True if gravity's local components are constant along the surface."""
-    return not isinstance(body.surface, Cylinder) or not np.any(local_gravity(body)[:2])
 
 
 def parameters(body: RollingBall) -> list[float]:
