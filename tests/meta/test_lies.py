@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import pytest
@@ -28,6 +28,7 @@ from proofroll.core.plugins import resolve_settings
 from proofroll.core.scene import Scene
 from proofroll.core.verdict import Allowance, Judgement, LimitResult, Refinement, RunCurve, Verdict, judge_curve
 from proofroll.files.scene_file import load_scene
+from proofroll.running import time_case
 from proofroll.running.case import Result, Status
 from proofroll.running.recording import record
 from proofroll.running.simulation import simulate
@@ -358,6 +359,31 @@ def test_a_cost_that_is_faked(kind: type[Tiny], cost: float, said: str) -> None:
     found = clean_runs(kind, scene, settings, record(build(kind, scene, settings), scene, np.linspace(0, 0.1, 11)))
     assert min(found.rates, default=np.inf) >= cost
     assert any(said in remark for remark in found.remarks) is bool(said)
+
+
+class Remembers(Tiny):
+    """Runs once, and looks up the same run from then on."""
+
+    kept: ClassVar[dict[float, Any]] = {}
+
+    def advance(self, t: float) -> None:
+        """Slow steps, or what is known."""
+        if t not in self.kept:
+            while self.t < t:
+                super().advance(min(t, self.t + 1e-4))
+            self.kept[t] = self.x
+        self.x, self.t = self.kept[t], t
+
+
+@pytest.mark.parametrize(("kind", "remarks"), [(Tiny, 0), (Remembers, 1)])
+def test_a_run_that_is_remembered(kind: type[Tiny], remarks: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """An engine whose first run, the judged one, costs ten times as much as later ones has a speed with a remark."""
+    monkeypatch.setattr(time_case, "_LONG_SECONDS", 1e-4)
+    monkeypatch.setattr(Remembers, "kept", {})
+    scene, settings = load_scene("inclined_plane"), TinySettings(dt=1e-4)
+    clean_runs(Tiny, scene, settings, record(build(Tiny, scene, settings), scene, np.linspace(0, 0.1, 11)))  # warm
+    found = clean_runs(kind, scene, settings, record(build(kind, scene, settings), scene, np.linspace(0, 0.5, 51)))
+    assert sum("times as long as those that are timed" in remark for remark in found.remarks) == remarks
 
 
 @pytest.mark.parametrize("about", ALL)

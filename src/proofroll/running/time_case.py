@@ -30,6 +30,8 @@ _SAME = 1e-6
 # The last sample does work that ``advance`` put off if it costs as much as _PUT_OFF usual samples, _PART of the run
 # before it, and at least _LEAST_SECONDS [s].
 _PUT_OFF, _PART, _LEAST_SECONDS = 10.0, 0.5, 0.05
+# The judged run took long if its processor time is this many times that of the clean runs, and at least this much [s].
+_TIMES_AS_LONG, _LONG_SECONDS = 10.0, 1.0
 
 
 def time_once(case: dict[str, Any], seconds: float) -> dict[str, Any]:
@@ -99,6 +101,12 @@ def clean_runs(kind: Any, scene: Scene, settings: Any, recording: Recording) -> 
             )
             return timed
     timed.rates = [run.wall / run.t for run in runs]
+    longer = recording.advancing[1] / last / max(timed.processor / sum(run.t for run in runs), 1e-12)
+    if recording.advancing[1] > _LONG_SECONDS and longer > _TIMES_AS_LONG:
+        timed.remarks.append(
+            f"the judged run took {longer:.0f} times as long as those that are timed: what the engine prepares or "
+            "keeps of an earlier run is not in its speed"
+        )
     usual = recording.sampling[0] / len(recording.passed)
     put_off = min(runs, key=lambda run: run.sampling)
     if is_put_off(put_off.wall - put_off.sampling, put_off.sampling, usual):
