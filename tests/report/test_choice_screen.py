@@ -132,7 +132,7 @@ def test_the_answer_and_the_frames_are_of_the_chosen_engines(seen: Visit, matrix
     assert framed.count() == len(wanted)
     assert framed.locator("xpath=..").evaluate_all("rows => rows.every((row) => row.dataset.engine !== 'alpha')")
     words = seen.page.locator("#words li").all_text_contents()
-    vars(others)["unjudged"] = matrix.unjudged  # what is judged in a scene hangs on no choice
+    vars(others).update(judged=matrix.judged, unjudged=matrix.unjudged)  # what is judged in a scene hangs on no choice
     sentences = [item.sentence for item in advice(others, 10.0**-decade, forces)]
     assert words[:-1] == sentences[:-1]
     assert not any("alpha" in word for word in words)

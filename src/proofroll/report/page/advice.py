@@ -55,7 +55,7 @@ def words(matrix: ChoiceMatrix) -> str:
             heads.append(head)
             engines.append(
                 [
-                    (engine, cell.cost, _named(name, cell), cell.text)
+                    (engine, cell.cost, _told(name, cell), cell.text)
                     if math.isfinite(cell.cost)
                     else (engine, None, _other(name, cell, cell), "")
                     for engine, (name, cell) in found.items()
@@ -83,7 +83,7 @@ def of_column(matrix: ChoiceMatrix, column: ChoiceColumn, tolerance: float, forc
     clauses = [_other(name, cell, first[1]) for name, cell in others]
     held = math.isfinite(first[1].cost)
     if held:
-        clauses.insert(0, f"take {_named(*first)} ({first[1].text} s/s)")
+        clauses.insert(0, f"take {_told(*first)} ({first[1].text} s/s)")
     else:
         clauses = [NOTHING, _other(*first, first[1]), *clauses]
     changed = "" if forces else _with_forces(matrix, column, tolerance, first[1])
@@ -167,18 +167,23 @@ def _engines(
     return dict(sorted(best_of.items(), key=lambda item: _standing(item[1][1])))
 
 
-def _standing(cell: ChoiceCell) -> tuple[float, int]:
-    return cell.cost, SEVERITY.index(cell.state)
+def _standing(cell: ChoiceCell) -> tuple[float, float, int]:
+    held = math.isfinite(cell.cost)
+    return cell.lacking if held else math.inf, cell.cost, SEVERITY.index(cell.state)
 
 
 def _named(name: str, cell: ChoiceCell) -> str:
     return cell.name or name
 
 
+def _told(name: str, cell: ChoiceCell) -> str:
+    return f"{_named(name, cell)}{cell.share}"
+
+
 def _other(name: str, cell: ChoiceCell, first: ChoiceCell) -> str:
     """Clause on another engine: its cost relative to the cheapest, or the reason why it does not hold the tolerance."""
     if math.isfinite(cell.cost):
-        return f"{_named(name, cell)} costs {_times(cell.cost, first.cost)}"
+        return f"{_told(name, cell)} costs {_times(cell.cost, first.cost)}"
     if cell.state == Verdict.NOT_JUDGED:
         return f"{name} was not judged"
     return f"{name} does not get there ({cell.why})" if cell.why else f"{_named(name, cell)} holds it, not timed"

@@ -51,6 +51,7 @@ class ChoiceCell(NamedTuple):
         cost: of the slowest scene; infinite unless the tolerance is held in all and costs were measured.
         name: setting and step; for several scenes the ones that they share, or empty.
         why: short reason why the tolerance is not held; empty: it is.
+        scenes, lacking: numbers of the column's scenes in which it was judged, and of those in which only others were.
     """
 
     state: str
@@ -60,6 +61,13 @@ class ChoiceCell(NamedTuple):
     cost: float = math.inf
     name: str = ""
     why: str = ""
+    scenes: int = 1
+    lacking: int = 0
+
+    @property
+    def share(self) -> str:
+        """Words for the part of the column's scenes in which it was judged; empty: in all."""
+        return f" in {self.scenes} of {self.scenes + self.lacking} scenes" if self.lacking else ""
 
 
 class ChoiceStudy(NamedTuple):
@@ -131,16 +139,24 @@ class ChoiceMatrix:
         # A study without any judgement, say for lack of time, does not count against the studies that ran.
         known = [name for name in judged if any(item.blame != Verdict.NOT_JUDGED for item in row.found[name])]
         cells = [(self.titles[name], _cell(row.found[name], tolerance, forces)) for name in known or judged]
-        return _joined(cells) if cells else ChoiceCell(NOT_RUN, "", "not run")
+        if not cells:
+            return ChoiceCell(NOT_RUN, "", "not run")
+        lacking = self.judged[forces].intersection(column.studies).difference(known)
+        return _joined(cells)._replace(scenes=len(cells), lacking=len(lacking))
+
+    @cached_property
+    def judged(self) -> tuple[set[str], set[str]]:
+        """Studies in which motion is judged, and those in which forces are judged, too."""
+        items = [(name, item) for row in self.rows for name, own in row.found.items() for item in own]
+        motion = {name for name, item in items if item.motion is not None}
+        return motion, motion & {name for name, item in items if item.forces is not None}
 
     @cached_property
     def unjudged(self) -> tuple[set[str], set[str]]:
         """Studies that ran without judged motion, and those that lack judged motion or forces."""
-        items = [(name, item) for row in self.rows for name, own in row.found.items() for item in own]
-        ran = {name for name, item in items if item.blame is None}
-        motion = ran - {name for name, item in items if item.motion is not None}
-        both = motion | (ran - {name for name, item in items if item.forces is not None})
-        return motion, both
+        found = [(name, own) for row in self.rows for name, own in row.found.items()]
+        ran = {name for name, own in found if any(item.blame is None for item in own)}
+        return ran - self.judged[False], ran - self.judged[True]
 
     @property
     def models(self) -> list[ChoiceRow]:
@@ -148,10 +164,14 @@ class ChoiceMatrix:
         return [row for row in self.rows if row.is_model]
 
     def ranked(self, column: ChoiceColumn, tolerance: float, forces: bool) -> list[tuple[int, ChoiceCell]]:
-        """Formulations that hold a tolerance, the cheapest first: number of the row, and its cell."""
+        """Formulations that hold a tolerance: number of the row, and its cell.
+
+        Those that were judged in the most scenes come first, for scenes differ in cost, and of these the cheapest.
+        """
         rows = [(place, row) for place, row in enumerate(self.rows) if row.is_model]
         cells = [(place, self.cell(row, column, tolerance, forces)) for place, row in rows]
-        return sorted((item for item in cells if math.isfinite(item[1].cost)), key=lambda item: item[1].cost)
+        held = [item for item in cells if math.isfinite(item[1].cost)]
+        return sorted(held, key=lambda item: (item[1].lacking, item[1].cost))
 
     def best(self, tolerance: float, forces: bool) -> list[int | None]:
         """Number of the row of each column's cheapest formulation; None where none holds the tolerance."""
@@ -197,7 +217,7 @@ class ChoiceMatrix:
         return cell.name.removeprefix(row.name).strip()
 
     def _phrase(self, column: ChoiceColumn, place: int, cell: ChoiceCell) -> str:
-        return f"{cell.name or self.rows[place].name} for {column.group} ({cell.text})"
+        return f"{cell.name or self.rows[place].name} for {column.group} ({cell.text}{cell.share})"
 
     @cached_property
     def judged_groups(self) -> tuple[list[str], list[str]]:

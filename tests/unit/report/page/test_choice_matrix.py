@@ -12,6 +12,7 @@ from table_lines import ARM, FINER, FORCE, LINE, line
 
 from proofroll.core.verdict import Verdict
 from proofroll.report.long_table import TableLine
+from proofroll.report.page.advice import of_column
 from proofroll.report.page.choice_matrix import DECADES, NOT_RUN, ChoiceCell, ChoiceMatrix, ChoiceStudy, choice_matrix
 
 STUDIES = {
@@ -206,6 +207,20 @@ def test_the_cheapest_of_each_column_is_framed() -> None:
     names = [[None if at is None else found.rows[at].name for at in found.best(at, False)] for at in (1e-3, 1e-8)]
     assert names == [["alpha joints", None], ["beta joints", None]]
     assert not any(found.rows[at].setting for at in found.best(1e-3, False) if at is not None)
+
+
+def test_a_formulation_of_all_scenes_comes_before_a_cheaper_one_of_some() -> None:
+    """Scenes differ in cost: what ran only in a group's cheap scene does not answer for the group, and says so."""
+    both = [line(error=1e-9, cost=0.5), line(error=1e-9, cost=2.0, study="chain")]
+    found = choice_matrix([*both, line(engine="beta", row=3, error=1e-9, cost=0.1)], STUDIES)
+    whole = found.columns[0]
+    assert [found.rows[place].engine for place, _ in found.ranked(whole, 1e-4, False)] == ["alpha", "beta"]
+    assert "alpha joints default at dt 1e-3 s for trees (2)" in found.answer(1e-4, False)
+    told = of_column(found, whole, 1e-4, False).sentence
+    assert "; beta joints default at dt 1e-3 s in 1 of 2 scenes costs 0.05 times that." in told
+    alone = replace(found, rows=[row for row in found.rows if row.engine == "beta"])
+    vars(alone)["judged"] = found.judged
+    assert "(0.1 in 1 of 2 scenes)" in alone.answer(1e-4, False), "the only one of the chosen engines"
 
 
 def test_the_data_hold_every_cell(whole: ChoiceMatrix) -> None:
