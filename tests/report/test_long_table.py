@@ -112,6 +112,15 @@ def test_the_documented_line_reads_the_table(
     assert len(content["table"]["data"]) == len(frame)
 
 
+def test_brackets_in_a_sentence_leave_the_json_readable(made: tuple[Outcome, Store], tmp_path: Path) -> None:
+    """A matrix in a text, as in the source of a scene, is not taken for two lines of the table."""
+    asked = "Is it [[1, n], [n, n^2]]?"
+    comparison = dataclasses.replace(made[0].comparison, question=asked)
+    begun([dataclasses.replace(made[0], comparison=comparison)], "proofroll report").write(tmp_path)
+    table = json.loads((tmp_path / "report.json").read_text(encoding="utf-8"))["table"]
+    assert any(asked in line for line in table["data"])
+
+
 def _section(text: str) -> str:
     found = re.search(r"^## The long table\n(.*?)(?=^## |\Z)", text, flags=re.DOTALL | re.MULTILINE)
     assert found is not None

@@ -93,9 +93,11 @@ class Report:
         content_json = plain(content)
         del content_json["table"]
         whole = LongTable([*content.table.lines, *recorded_lines(content_json)])
-        table = json.dumps(plain(whole), allow_nan=False).replace("], [", "],\n  [")
+        table = plain(whole)
+        rows = ",\n  ".join(json.dumps(row, allow_nan=False) for row in table.pop("data"))
+        head = json.dumps(table).removesuffix("}")
         text = json.dumps(content_json, indent=1, allow_nan=False).removesuffix("\n}")
-        write_text(out / "report.json", f'{text},\n "table": {table}\n}}\n')
+        write_text(out / "report.json", f'{text},\n "table": {head}, "data": [{rows}]}}\n}}\n')
         write_text(out / "report.csv", whole.csv)
         write_text(out / "report.html", page(content, self.curves, self.pictures, self.replay))
 
