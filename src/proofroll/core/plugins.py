@@ -100,12 +100,15 @@ def _not_found(point: EntryPoint, error: ModuleNotFoundError) -> ProofrollError:
     )
 
 
+def distribution_of(requirement: str) -> str:
+    """Name of the distribution in a requirement, ``mujoco`` of ``mujoco>=3.2; extra == 'mujoco'``."""
+    return re.split(r"[\s;<>=!~\[(]", requirement, maxsplit=1)[0]
+
+
 def _installed(requirement: str) -> bool:
     """True if a required distribution is installed; requirements of extras count as installed."""
-    name, _, condition = requirement.partition(";")
-    match = re.match(r"[\w.-]+", name)
     with suppress(PackageNotFoundError):
-        return "extra" in condition or match is None or bool(version(match[0]))
+        return "extra" in requirement.partition(";")[2] or bool(version(distribution_of(requirement)))
     return False
 
 

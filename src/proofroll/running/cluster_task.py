@@ -10,20 +10,21 @@ import socket
 import tempfile
 import threading
 from collections.abc import Callable, Mapping
-from importlib.metadata import PackageNotFoundError, requires, version
+from importlib.metadata import requires
 from pathlib import Path
 from typing import Any
 
 import proofroll
 from proofroll.core.announced import announced
 from proofroll.core.errors import InputError, ProofrollError
-from proofroll.core.plugins import GROUP
+from proofroll.core.plugins import GROUP, distribution_of
 from proofroll.files.scene_file import load_scene
 from proofroll.files.trajectory_file import STORED
 from proofroll.running.case import Case, EngineFacts
 from proofroll.running.engine_questions import resolve
 from proofroll.running.identity import digest
 from proofroll.running.idle_workers import Workers
+from proofroll.running.manifest import versions_of
 from proofroll.running.process import WorkerDied
 from proofroll.running.runner import result_without_answer, run_one
 
@@ -67,15 +68,10 @@ def installed() -> dict[str, str]:
     for text in [text for name in sorted(names) for text in requires(name) or []]:
         extra = re.search(r"extra == ['\"](\w+)['\"]", text)
         if extra is None or extra[1] in extras:
-            names.add(re.split(r"[\s;<>=!~\[(]", text, maxsplit=1)[0])
+            names.add(distribution_of(text))
     root = Path(proofroll.__file__).parent
-    versions_of = {"python": platform.python_version(), "proofroll's code": digest([root / "engines", root / "truth"])}
-    for name in sorted(names, key=str.lower):
-        try:
-            versions_of[name] = version(name)
-        except PackageNotFoundError:
-            versions_of[name] = "absent"
-    return versions_of
+    own = {"python": platform.python_version(), "proofroll's code": digest([root / "engines", root / "truth"])}
+    return own | dict.fromkeys(sorted(names, key=str.lower), "absent") | versions_of(names)
 
 
 def run_case(asked: Asked, content: dict[str, Any], files: Mapping[str, bytes]) -> tuple[dict[str, Any], bytes | None]:

@@ -1,6 +1,5 @@
 """Identity of an engine: its settings, its versions and the code that decides its results."""
 
-import contextlib
 import dataclasses
 import hashlib
 import inspect
@@ -19,7 +18,7 @@ from proofroll.core.source_code import OWN, hash_of, package_of, with_imports
 from proofroll.core.truth import load_truths
 from proofroll.files.json_data import plain
 from proofroll.running.case import EngineDescription, EngineFacts
-from proofroll.running.manifest import version_of
+from proofroll.running.manifest import version_of, versions_of
 from proofroll.running.program import path_of
 
 # Folders whose code decides every result; reports and the command line do not.
@@ -96,11 +95,8 @@ def used(settings: Any) -> dict[str, Any]:
 
 def truth_version() -> str:
     """Versions of proofroll and of the libraries that integrate the truth."""
-    versions_of = [f"proofroll {proofroll.__version__}"]
-    for name in ("numpy", "scipy", "heyoka"):
-        with contextlib.suppress(metadata.PackageNotFoundError):
-            versions_of.append(f"{name} {version_of(name)}")
-    return ", ".join(versions_of)
+    known = {"proofroll": proofroll.__version__} | versions_of(("numpy", "scipy", "heyoka"), version_of)
+    return ", ".join(f"{name} {version}" for name, version in known.items())
 
 
 def libraries(engine: str) -> dict[str, str]:
@@ -112,9 +108,7 @@ def libraries(engine: str) -> dict[str, str]:
     program = path_of(engine)
     if program is not None:
         return {"program": hashlib.sha256(program.read_bytes()).hexdigest()[:12]}
-    versions = {"python": platform.python_version()}
-    for name in ("numpy", "scipy"):
-        versions[name] = version_of(name)
+    versions = {"python": platform.python_version()} | versions_of(("numpy", "scipy"), version_of)
     if place_of(engine):
         packages = sorted({f"{item.name}=={item.version}" for item in metadata.distributions()})
         versions["packages"] = hashlib.sha256("\n".join(packages).encode()).hexdigest()[:12]

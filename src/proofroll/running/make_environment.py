@@ -19,7 +19,7 @@ from pathlib import Path
 
 from proofroll.core.announced import announced
 from proofroll.core.errors import InputError, ProofrollError
-from proofroll.core.plugins import GROUP, release
+from proofroll.core.plugins import GROUP, distribution_of, release
 from proofroll.running import environments
 from proofroll.running.engine_questions import describe
 from proofroll.running.environments import Environment
@@ -106,7 +106,7 @@ def package_of(engine: str) -> str:
             continue
         for text in point.dist.requires or []:
             if re.search(rf"extra\s*==\s*['\"]{re.escape(engine)}['\"]", text):
-                return re.split(r"[\s;<>=!~\[(]", text, maxsplit=1)[0]
+                return distribution_of(text)
     return ""
 
 

@@ -1,9 +1,10 @@
 """Manifest of a trajectory: the engine, settings, versions and machine that made it."""
 
+import contextlib
 import json
 import platform
 import sys
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from functools import cache
 from importlib import metadata
 from typing import Any
@@ -21,6 +22,15 @@ def versions(engine: str, version: str) -> dict[str, str]:
 
 # Version of an installed package; cached, as reading it takes a millisecond and every run needs it.
 version_of = cache(metadata.version)
+
+
+def versions_of(names: Iterable[str], read: Callable[[str], str] = metadata.version) -> dict[str, str]:
+    """Versions of those of the named packages that are installed, each by ``read``."""
+    known = {}
+    for name in names:
+        with contextlib.suppress(metadata.PackageNotFoundError):
+            known[name] = read(name)
+    return known
 
 
 def manifest(

@@ -6,22 +6,22 @@ Inputs other than the question are found without importing any engine.
 import datetime
 import hashlib
 import json
-import re
 from dataclasses import dataclass
-from importlib.metadata import PackageNotFoundError, requires, version
+from importlib.metadata import requires
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, TypeVar
 
 import proofroll
 from proofroll.core.announced import announced
-from proofroll.core.plugins import ELEMENTS, GROUP
+from proofroll.core.plugins import ELEMENTS, GROUP, distribution_of
 from proofroll.core.source_code import hash_of
 from proofroll.core.truth import TRUTHS
 from proofroll.files.atomic import ordinary_content
 from proofroll.files.json_data import plain, record
 from proofroll.running.environments import remembered
 from proofroll.running.identity import ASIDE
+from proofroll.running.manifest import versions_of
 from proofroll.running.store import seal, write_text
 from proofroll.running.timing import machine
 
@@ -38,18 +38,13 @@ def versions() -> dict[str, str]:
     """
     plug_ins = [point for group in (GROUP, ELEMENTS, TRUTHS) for point in announced(group) if point.dist is not None]
     names = _required() | {point.dist.name for point in plug_ins if point.dist is not None}
-    versions_of = {}
-    for name in sorted(names, key=str.lower):
-        try:
-            versions_of[name] = version(name)
-        except PackageNotFoundError:
-            continue
+    known = versions_of(sorted(names, key=str.lower))
     for top in sorted({point.module.partition(".")[0] for point in plug_ins} - {"proofroll"}):
-        versions_of[f"code of {top}"] = _code_of(top)
+        known[f"code of {top}"] = _code_of(top)
     for item in remembered():
         content = "\n".join([item.version, item.interpreter, *item.packages])
-        versions_of[f"{item.name}@{item.label}"] = hashlib.sha256(content.encode()).hexdigest()[:12]
-    return versions_of
+        known[f"{item.name}@{item.label}"] = hashlib.sha256(content.encode()).hexdigest()[:12]
+    return known
 
 
 def _code_of(top: str) -> str:
@@ -63,7 +58,7 @@ def _code_of(top: str) -> str:
 
 def _required() -> set[str]:
     """Names of proofroll and of its requirements, those of all extras included."""
-    return {"proofroll"} | {re.split(r"[\s;<>=!~\[(]", text, maxsplit=1)[0] for text in requires("proofroll") or []}
+    return {"proofroll", *map(distribution_of, requires("proofroll") or [])}
 
 
 def code() -> str:
