@@ -51,6 +51,7 @@ _SCENES: Mapping[str, tuple[Callable[[], Scene], float]] = {
     "bounces": (lambda: load_scene("spinning_bounce", height=0.0545), 0.12),
     "stops": (lambda: load_scene("stop", height=0.01, restitution=0.5), 0.1),
     "rubs": (lambda: load_scene("spring_friction"), 0.12),
+    "gears": (lambda: load_scene("gear_pair"), 0.12),
 }
 UNTIL = {name: until for name, (_, until) in _SCENES.items()}
 BALLS, MECHANISMS = ("rolls", "slips"), ("tree", "loop", "driven", "servo")

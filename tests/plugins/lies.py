@@ -46,6 +46,18 @@ def heavier(part: str, factor: float) -> Callable[[Scene], Scene]:
     return model
 
 
+def _of(by: float, **part: str) -> Callable[[Scene], Scene]:
+    """Change of a scene: a number of the first joint, coupling … of its mechanism times a factor."""
+    ((kind, number),) = part.items()
+
+    def model(scene: Scene) -> Scene:
+        first, *others = getattr(scene.elements[0].mechanism, kind)  # type: ignore[attr-defined]  # it has one
+        changed = dataclasses.replace(first, **{number: by * getattr(first, number)})
+        return of_mechanism(scene, **{kind: (changed, *others)})
+
+    return model
+
+
 def echo(_: Any, true: Any) -> Any:
     """Certificate data of the honest model instead of those of the changed one; see ``Lie.built``."""
     return true
@@ -286,10 +298,7 @@ def _impacts() -> Iterator[Lie]:
         (one,) = getattr(mechanism, part)
         return of_mechanism(scene, **{part: (dataclasses.replace(one, restitution=one.restitution + 0.02),)})
 
-    def rougher(scene: Scene) -> Scene:
-        (pair,) = scene.elements[0].mechanism.pairs  # type: ignore[attr-defined]  # it has one
-        return of_mechanism(scene, pairs=(dataclasses.replace(pair, friction=1.05 * pair.friction),))
-
+    rougher = _of(pairs="friction", by=1.05)
     yield Lie("no impacts", both, _EVENTS, events=lambda *_: [])
     yield Lie("an impact too many", both, _EVENTS, events=lambda right, _: [right[0], *right])
     yield Lie("impacts 5 ms late", both, _EVENTS, events=_later(0.005))
@@ -322,13 +331,6 @@ def _friction_of_joints() -> Iterator[Lie]:
     def lie(name: str, change: Callable[[Moment], Any], *causes: str) -> Lie:
         return Lie(name, ("rubs",), ("friction.slide is",), lambda m: {"friction": change(m)}, causes)
 
-    def rubbing(factor: float) -> Callable[[Scene], Scene]:
-        def model(scene: Scene) -> Scene:
-            (joint,) = scene.elements[0].mechanism.joints  # type: ignore[attr-defined]  # it has one
-            return of_mechanism(scene, joints=(dataclasses.replace(joint, friction=factor * joint.friction),))
-
-        return model
-
     yield lie("friction x 1.02", lambda m: 1.02 * m.right.friction)
     yield lie("friction of nothing", lambda m: 0 * m.right.friction)
     yield lie("friction along the motion", lambda m: -m.right.friction)
@@ -339,7 +341,7 @@ def _friction_of_joints() -> Iterator[Lie]:
         ("friction.slide is",),
         None,
         ("dry friction",),
-        model=rubbing(1.02),
+        model=_of(joints="friction", by=1.02),
         built=echo,
     )
     yield Lie(
@@ -348,7 +350,7 @@ def _friction_of_joints() -> Iterator[Lie]:
         ("friction.slide is",),
         None,
         ("dry friction",),
-        model=rubbing(0.0),
+        model=_of(joints="friction", by=0.0),
         built=echo,
     )
 
@@ -402,11 +404,30 @@ def _further_impacts() -> Iterator[Lie]:
     )
 
 
+def _forces_of_couplings_and_stops() -> Iterator[Lie]:
+    def lie(name: str, change: Callable[[Moment], Any]) -> Lie:
+        return Lie(name, ("gears",), ("coupling.gear is",), lambda m: {"coupling": change(m)})
+
+    yield lie("couplings x 1.02", lambda m: 1.02 * m.right.coupling)
+    yield lie("couplings of nothing", lambda m: 0 * m.right.coupling)
+    yield lie("couplings backwards", lambda m: -m.right.coupling)
+    yield Lie(
+        "couplings x 100 between samples",
+        ("gears",),
+        ("coupling.gear is",),
+        _off_grid(lambda m: {"coupling": 100 * m.right.coupling}),
+    )
+    yield Lie("ratio x 1.01, the scene repeated", ("gears",), _MODEL, model=_of(couplings="ratio", by=1.01), built=echo)
+    yield Lie("a stop that presses in flight", ("stops",), ("stop.guide is",), lambda m: {"stop": m.right.stop + 1})
+
+
 def table() -> list[Lie]:
     """All lies of the table."""
     states = _times, _places, _frames, _velocities, _spins, _orientations
     forces = _forces_of_balls, _reactions_of_joints, _efforts, _forces_of_contacts, _friction_of_joints
-    return [lie for part in (*states, *forces, _slips, _impacts, _models, _small, _further_impacts) for lie in part()]
+    # New ones come last: the place of a lie decides of which scenes it is told.
+    last = _models, _small, _further_impacts, _forces_of_couplings_and_stops
+    return [lie for part in (*states, *forces, _slips, _impacts, *last) for lie in part()]
 
 
 def _off_grid(change: Callable[[Moment], Any]) -> Callable[[Moment], Any]:
