@@ -130,6 +130,8 @@ def _settings_for(kind: Any, alone: Scene, settings: Any) -> Any:
 
 def sample_of(scene: Scene, element: Element, sample: AnySample) -> Sample:
     """Part of a sample that belongs to one element. Raises Diverged if it is missing or of the wrong type."""
+    if len(scene.elements) == 1 and isinstance(sample, element.sample_type):
+        return sample  # the usual case, without the slow test for a mapping
     own = sample.get(element.name, sample) if isinstance(sample, Mapping) else sample
     if not isinstance(own, element.sample_type) or (own is sample and len(scene.elements) > 1):
         each = " for each element, by its name" if len(scene.elements) > 1 else ""

@@ -191,7 +191,10 @@ def follow(
             short += 1
         try:
             if still > _STUCK or short > _MANY:
-                raise Diverged(f"the truth makes no progress at t = {leg.end:g} s, where its modes alternate at once")
+                raise Diverged(
+                    f"the truth makes no progress at t = {leg.end:g} s, where {_latest(happenings)} follow each other "
+                    "without end; ask for an earlier end of the run"
+                )
             if short == 1:
                 _refuse_many(legs, until)
             time, change = leg.end, route.change(leg)
@@ -199,6 +202,14 @@ def follow(
             if leg.end >= edge or min(margin for _, margin in margins) < close:
                 return HybridPath(tuple(legs), tuple(happenings), tuple(margins), known=False)
             raise
+
+
+def _latest(happenings: Sequence[Happening]) -> str:
+    """Kinds of the last changes and what they happened to, for a sentence."""
+    kinds: dict[str, dict[str, None]] = {}
+    for change in happenings[-_STUCK:]:
+        kinds.setdefault(change.name, {})[change.kind] = None
+    return " and ".join(f"{', '.join(of)} of {name}" for name, of in sorted(kinds.items())) or "changes of mode"
 
 
 def _refuse_many(legs: Sequence[Span], until: float) -> None:
@@ -216,7 +227,7 @@ def _refuse_many(legs: Sequence[Span], until: float) -> None:
     if len(legs) + (0.0 if calm else ahead) > _MOST and min(spans) > _SHRUNK * max(spans) and not _narrows(last):
         raise Diverged(
             f"by t = {end:g} s there have been {len(legs)} changes; at this pace {number(ahead, 1)} more follow until "
-            f"{until:g} s, and the truth follows {_MOST}; ask for a shorter time"
+            f"t = {until:g} s, and the truth follows {_MOST}; ask for a shorter time"
         )
 
 

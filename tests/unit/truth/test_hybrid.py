@@ -54,7 +54,7 @@ def test_states_within_a_stretch_follow_from_its_steps() -> None:
 
 @pytest.mark.parametrize("length", [0.0, 1e-9])
 def test_a_route_that_alternates_without_progress_is_told(length: float) -> None:
-    """Stretches without end that are nothing beside the time that has passed end in words."""
+    """Stretches without end that are nothing beside the time that has passed end in words, with what alternates."""
 
     class Alternating:
         def begin(self) -> Transition[str]:
@@ -64,9 +64,10 @@ def test_a_route_that_alternates_without_progress_is_told(length: float) -> None
             return Stretch(time, min(until, time + (length if time else 0.1)), mode, state, state, 0)
 
         def change(self, leg: Stretch[str]) -> Transition[str]:
-            return Transition(leg.last, "right" if leg.mode == "left" else "left", (), np.inf)
+            other, kind = ("right", "impact") if leg.mode == "left" else ("left", "release")
+            return Transition(leg.last, other, ((kind, leg.mode),), np.inf)
 
-    with pytest.raises(Diverged, match=r"no progress at t = 0\.1 s"):
+    with pytest.raises(Diverged, match=r"no progress at t = 0\.1 s, where impact of left and release of right follow"):
         follow(Alternating(), 1.0)
 
 
@@ -87,7 +88,7 @@ def test_thousands_of_rebounds_are_refused_as_soon_as_they_are_seen() -> None:
             return Transition(leg.last, "flight", (), np.inf)
 
     route = Lossless()
-    said = r"100 changes; at this pace 1e4 more follow until 1 s, and the truth follows 1000; ask for a shorter time$"
+    said = r"100 changes; at this pace 1e4 more follow until t = 1 s, and the truth follows 1000; ask for a shorter"
     with pytest.raises(Diverged, match=said):
         follow(route, 1.0)
     assert route.count == 100
@@ -136,7 +137,7 @@ def test_a_burst_at_the_start_is_followed_as_far_as_its_pace_allows() -> None:
     """Quick changes from the start on have a truth where at their pace there are fewer than 1000, else a reason."""
     burst = [1e-3] * 250
     assert follow(Swinging(burst, [1.0]), 0.9).known
-    with pytest.raises(Diverged, match=r"at this pace 1e5 more follow until 100 s.*; ask for a shorter time$"):
+    with pytest.raises(Diverged, match=r"at this pace 1e5 more follow until t = 100 s.*; ask for a shorter time$"):
         follow(Swinging(burst, [1.0]), 100.0)
 
 

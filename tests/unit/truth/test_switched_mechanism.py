@@ -84,6 +84,17 @@ def test_an_impact_that_presses_two_stops_has_no_unique_outcome() -> None:
         truth_of(Mechanism(bodies, joints, gravity=(0.0, 0.0, 0.0)), np.array([0.0, 0.3]))
 
 
+def test_rebounds_that_nothing_pulls_back_are_refused_by_name() -> None:
+    """Two masses that fall on a stop and on each other hit without end, and the refusal says which rebounds shrink."""
+    joints = (
+        Joint("lower", "prismatic", "world", "a", q0=(0.3,), limits=(0.0, 10.0), restitution=0.2),
+        Joint("upper", "prismatic", "a", "b", q0=(0.3,), limits=(0.0, 10.0), restitution=0.2),
+    )
+    bodies = tuple(Body(name, 1.0, inertia=(0.1, 0.1, 0.1)) for name in ("a", "b"))
+    with pytest.raises(Refused, match=r"rebounds of (lower|upper) shrink to nothing, and no force pulls it back"):
+        truth_of(Mechanism(bodies, joints), np.array([0.0, 3.0]))
+
+
 def test_rebounds_are_summed_by_the_fastest_impact() -> None:
     """An impact settles against the fastest one at its stop, which need not be the first."""
     mechanism = load_scene("stop").elements[0].mechanism  # type: ignore[attr-defined]

@@ -5,6 +5,8 @@ import pytest
 from proofroll_dart import Dart
 
 import proofroll
+from proofroll.core.engine_abilities import require_provided
+from proofroll.core.errors import Refused
 
 
 @pytest.mark.parametrize(
@@ -17,6 +19,14 @@ def test_laws_are_those_of_the_scene(name: str, error: float) -> None:
     engine.advance(0.5)
     truth = proofroll.simulate(scene, until=0.5, every=0.5)
     assert np.max(np.abs(engine.sample().p_WB - truth["p_WB"].to_numpy()[1])) < error
+
+
+@pytest.mark.parametrize(("name", "reason"), [("arm_pd", "no inertia of their own"), ("gear_pair", "no mimic joints")])
+@pytest.mark.parametrize("formulation", ["world", "forward_dynamics"])
+def test_what_it_has_not_is_refused_with_the_reason(formulation: str, name: str, reason: str) -> None:
+    """Armature and couplings are refused before anything is built."""
+    with pytest.raises(Refused, match=reason):
+        require_provided(Dart, formulation, proofroll.load_scene(name))
 
 
 def test_equations_without_steps_have_no_stops() -> None:

@@ -65,7 +65,7 @@ class SwitchedBodies(JointStretches):
                 for m in (reversed_mode(leg.mode, which), leg.mode)
             )
             pull, falling = (abs(float(self._accelerations(law, state)[which])) for law in laws)
-            delay = self._bouncing(speed * joint.restitution, pull, joint.restitution, falling)
+            delay = self._bouncing(joint.name, speed * joint.restitution, pull, joint.restitution, falling)
             state, margin = self._struck(last, leg.mode, which, 0.0)
         rates = self._along(state)[1]
         still = [

@@ -219,7 +219,7 @@ class ContactStretches(Stretches[ContactMode]):
         state, stays, margin = self._struck(leg.last, leg.mode, closed, laws)
         if self._settles(hit, speed, law):
             pull = -float(touching[hit].normal @ self._solved(state, leg.mode).slide_rate[hit])
-            delay = self._bouncing(speed * law, pull, law)
+            delay = self._bouncing(self.contacts[hit].name, speed * law, pull, law)
             state, stays, margin = self._struck(leg.last, leg.mode, closed, [0.0] * len(closed))
         stays = [stay or bool(contact.bound) for stay, contact in zip(stays, contacts, strict=True)]
         first = ("settle" if delay else "impact", contacts[hit].name)

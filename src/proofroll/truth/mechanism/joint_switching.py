@@ -65,7 +65,7 @@ class SwitchedTree(JointStretches):
                 for mode in (reversed_mode(leg.mode, which), leg.mode)
             )
             v[joint.velocity] = 0.0
-            delay = self._bouncing(rebound, pull, joint.restitution, falling)
+            delay = self._bouncing(joint.name, rebound, pull, joint.restitution, falling)
         decided, after = self.equations.decided(q, v, leg.end)
         return state, decided, min(margin, after), delay
 

@@ -14,6 +14,8 @@ from proofroll.elements.mechanism.switches import Settling
 from proofroll.truth.hybrid import Stretch, integrate_to_guard, states_at
 
 ModeT = TypeVar("ModeT")
+# Least deceleration of rebounds whose time is summed, in natural units; below it is round-off.
+_PULL = 1e-9
 
 
 class StretchLaw(NamedTuple):
@@ -48,16 +50,19 @@ class Stretches(ABC, Generic[ModeT]):
         """Equations of a stretch that starts at a state."""
 
     @staticmethod
-    def _bouncing(rebound: float, pull: float, restitution: float, falling: float | None = None) -> float:
-        """Time until the rebounds are over [s], from the speed ``rebound`` of the first and the decelerations.
+    def _bouncing(name: str, rebound: float, pull: float, restitution: float, falling: float | None = None) -> float:
+        """Time until the rebounds of a joint or contact are over, from the speed of the first and its decelerations.
 
         ``pull``: on the way out; ``falling``: on the way back, less by friction (None: the same).
 
         Raises:
-            Refused: nothing pulls the body back.
+            Refused: nothing pulls it back, in natural units, as where impacts on another joint end its rebounds.
         """
-        if not pull > 0:
-            raise Refused("a rebound is slower than routes follow, and nothing pulls it back")
+        if not pull > _PULL:
+            raise Refused(
+                f"rebounds of {name} shrink to nothing, and no force pulls it back between them, as where joints or "
+                "contacts hit each other without end: no route sums these; ask for an earlier end of the run"
+            )
         slower = 1.0 if falling is None else math.sqrt(falling / pull)  # impact speed over rebound speed
         return (1 + (1 / slower if slower else 0.0)) * rebound / (pull * (1 - restitution * slower))
 
