@@ -5,8 +5,9 @@ Units are powers of two, so conversions do not round.
 
 from __future__ import annotations
 
+import math
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
@@ -14,15 +15,16 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from proofroll.core.errors import Diverged, Refused
+from proofroll.core.parameters import Unit
+from proofroll.core.quantity import OR, powers_of
+from proofroll.core.validation import units_of_kind
 from proofroll.elements.mechanism.contacts.start import natural_scale
 from proofroll.elements.mechanism.joint import Joint
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.named_forces import named_forces
 from proofroll.elements.mechanism.record import Record
-from proofroll.elements.mechanism.signal import FUNCTIONS, Formula, Signal, Table
+from proofroll.elements.mechanism.signal import FUNCTIONS, Formula, Table
 
-_COORDINATES = {"planar": (1, 1, 0), "free": (1, 1, 1, 0, 0, 0, 0), "prismatic": (1,)}  # powers of the length
-_VELOCITIES = _COORDINATES | {"free": (1, 1, 1, 0, 0, 0)}
 _TIME = re.compile(r"(?<=\bt = )[\d.e+-]+(?= s\b)")  # times in messages of routes
 
 
@@ -47,78 +49,74 @@ class Units(NamedTuple):
     @property
     def force(self) -> float:
         """Unit of force [N]."""
-        return self.mass * self.length / self.time**2
+        return self.size("N")
+
+    def size(self, unit: str) -> float:
+        """Unit of a quantity, in the SI unit that scene files give it."""
+        base = {"m": self.length, "kg": self.mass, "s": self.time}
+        return math.prod((base[name] ** power for name, power in powers_of(unit).items()), start=1.0)
 
     def mechanism(self, si: Mechanism) -> Mechanism:
         """Mechanism in these units, from one in SI units."""
-        to, joints = Units(1 / self.length, 1 / self.mass, 1 / self.time), {j.name: j for j in si.joints}
-        length, stiffness = to.length, to.force / to.length
+        slides = {joint.name: joint.kind == "prismatic" for joint in si.joints}
 
-        def placed(item: Any, *names: str) -> Any:
-            return replace(item, **{name: _times(getattr(item, name), length) for name in names})
+        def each(parts: Iterable[Any]) -> tuple[Any, ...]:
+            return tuple(self._own(part) for part in parts)
 
-        bodies = [
-            replace(
-                placed(body, "com"),
-                mass=body.mass * to.mass,
-                inertia=tuple(_times(row, to.mass * length**2) for row in body.inertia),
-            )
-            for body in si.bodies
-        ]
-        springs = [
-            replace(
-                placed(spring, "position_a", "position_b", "length"),
-                stiffness=spring.stiffness * stiffness,
-                damping=spring.damping * stiffness * to.time,
-            )
-            for spring in si.springs
-        ]
-        actuators = []
-        for item in si.actuators:
-            way, effort = to._along(joints[item.joint])
-            target = {"torque": effort, "velocity": way / to.time, "position": way}[item.kind]
-            actuators.append(
-                replace(
-                    item,
-                    target=self._signal(item.target, target),
-                    kp=item.kp * effort / way,
-                    kd=item.kd * effort / way * to.time,
-                    limit=None if item.limit is None else item.limit * effort,
-                )
-            )
         couplings = []
         for coupling in si.couplings:
-            (a, _), (b, _) = (to._along(joints[name]) for name in (coupling.joint_a, coupling.joint_b))
-            couplings.append(replace(coupling, ratio=coupling.ratio * b / a, offset=coupling.offset * b))
+            a, b = slides[coupling.joint_a], slides[coupling.joint_b]
+            ratio = coupling.ratio * self.length ** (a - b)
+            couplings.append(replace(self._own(coupling, b), ratio=ratio))
         return replace(
             si,
-            bodies=tuple(bodies),
-            joints=tuple(self._joint(to, placed(joint, "position", "child_position")) for joint in si.joints),
-            loops=tuple(placed(loop, "position_a", "position_b") for loop in si.loops),
-            springs=tuple(springs),
-            points=tuple(placed(point, "position") for point in si.points),
-            geometries=tuple(placed(item, "position", "radius", "axes", "size") for item in si.geometries),
-            actuators=tuple(actuators),
+            bodies=each(si.bodies),
+            joints=each(si.joints),
+            loops=each(si.loops),
+            springs=each(si.springs),
+            points=each(si.points),
+            geometries=each(si.geometries),
+            actuators=tuple(self._own(motor, slides[motor.joint]) for motor in si.actuators),
             couplings=tuple(couplings),
-            gravity=_times(si.gravity, length / to.time**2),
+            gravity=self._valued(si.gravity, "m/s^2"),
         )
+
+    def _own(self, part: Any, slides: bool = False) -> Any:
+        """Part of a mechanism in these units; a unit with a choice is that of a joint that turns, or ``slides``."""
+        units = units_of_kind(type(part), getattr(part, "kind", None))
+        one = {
+            name: unit.split(OR)[slides] if isinstance(unit, str) and OR in unit else unit
+            for name, unit in units.items()
+        }
+        return replace(part, **{name: self._valued(getattr(part, name), unit) for name, unit in one.items() if unit})
+
+    def _valued(self, value: Any, unit: Unit) -> Any:
+        """SI value in these units: a number, a tuple of numbers with one unit or one each, a signal; None stays."""
+        if isinstance(unit, tuple):
+            return tuple(self._valued(each, own) for each, own in zip(value, unit, strict=True))
+        if isinstance(value, tuple):
+            return tuple(self._valued(each, unit) for each in value)
+        if isinstance(value, _InUnits):
+            return replace(value, second=value.second * self.time, factor=value.factor / self.size(unit))
+        if isinstance(value, Formula):
+            return _InUnits(value.text, value.numbers, self.time, 1 / self.size(unit))
+        if isinstance(value, Table):
+            return Table(self._valued(value.times, "s"), self._valued(value.values, unit))
+        return None if value is None else value / self.size(unit)
 
     def record(self, mechanism: Mechanism, own: Record) -> Record:
         """Record in SI units, from one in these units; ``mechanism`` is in SI units."""
-        speed, moment = self.length / self.time, self.force * self.length
-        q = [
-            self.length**power for joint in mechanism.joints for power in _COORDINATES.get(joint.kind, (0,) * joint.nq)
-        ]
-        v = [self.length**power for joint in mechanism.joints for power in _VELOCITIES.get(joint.kind, (0,) * joint.nv)]
+        moment = self.force * self.length
+        q, v = (np.array(self._along(mechanism, name)) for name in ("q0", "v0"))
         named = [self.force if item.unit == "N" else moment for item in named_forces(mechanism)]
         return Record(
             time=own.time * self.time,
             p_WB=own.p_WB * self.length,
-            v_WB=own.v_WB * speed,
+            v_WB=own.v_WB * (self.length / self.time),
             q_WB=own.q_WB,
             w_WB=own.w_WB / self.time,
-            q=own.q * np.array(q[: own.q.shape[1]]),
-            v=own.v * (np.array(v[: own.v.shape[1]]) / self.time),
+            q=own.q * q[: own.q.shape[1]],
+            v=own.v * v[: own.v.shape[1]],
             wrench=own.wrench * np.repeat([self.force, moment], 3),
             named=own.named * np.array(named[: own.named.shape[1]]),
             residual=own.residual,
@@ -133,34 +131,13 @@ class Units(NamedTuple):
             message = _TIME.sub(lambda match: f"{float(match[0]) * self.time:.6g}", str(error))
             raise type(error)(message) from None
 
-    def _along(self, joint: Joint) -> tuple[float, float]:
-        """Units of a joint's coordinate and of an effort along it."""
-        return (self.length, self.force) if joint.kind == "prismatic" else (1.0, self.force * self.length)
-
-    def _joint(self, to: Units, joint: Joint) -> Joint:
-        way, effort = to._along(joint)
-        q, v = _COORDINATES.get(joint.kind, (0,) * joint.nq), _VELOCITIES.get(joint.kind, (0,) * joint.nv)
-        return replace(
-            joint,
-            q0=tuple(value * to.length**power for value, power in zip(joint.q0, q, strict=True)),
-            v0=tuple(value * to.length**power / to.time for value, power in zip(joint.v0, v, strict=True)),
-            stiffness=joint.stiffness * effort / way,
-            rest=joint.rest * way,
-            damping=joint.damping * effort / way * to.time,
-            friction=joint.friction * effort,
-            torque=self._signal(joint.torque, effort),
-            armature=joint.armature * effort / way * to.time**2,
-            limits=_times(joint.limits, way),
-        )
-
-    def _signal(self, signal: Signal, factor: float) -> Signal:
-        if isinstance(signal, _InUnits):
-            return replace(signal, second=signal.second * self.time, factor=signal.factor * factor)
-        if isinstance(signal, Formula):
-            return _InUnits(signal.text, signal.numbers, self.time, factor)
-        if isinstance(signal, Table):
-            return Table(_times(signal.times, 1 / self.time), _times(signal.values, factor))
-        return signal * factor
+    def _along(self, mechanism: Mechanism, name: str) -> list[float]:
+        """Units of all coordinates (``q0``) or velocities (``v0``) of a mechanism's tree."""
+        found: list[float] = []
+        for joint in mechanism.joints:
+            unit, count = units_of_kind(Joint, joint.kind)[name], len(getattr(joint, name))
+            found += map(self.size, (unit,) * count if isinstance(unit, str) else unit)
+        return found
 
 
 def natural_units(mechanism: Mechanism) -> Units:
@@ -168,10 +145,3 @@ def natural_units(mechanism: Mechanism) -> Units:
     length, rate = natural_scale(mechanism)
     mass = mechanism.mass
     return Units(length, 2.0 ** round(np.log2(mass)), 1 / rate)
-
-
-def _times(value: Any, factor: float) -> Any:
-    """Product of a number, or of each number of a tuple, with a factor; None stays None."""
-    if value is None or isinstance(value, float | int):
-        return value if value is None else value * factor
-    return tuple(item * factor for item in value)
