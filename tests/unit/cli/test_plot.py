@@ -91,10 +91,11 @@ def test_no_other_file_is_written_over(proofroll: Proofroll, tmp_path: Path) -> 
 @pytest.mark.parametrize(
     ("words", "shown"),
     [(["sphere_in_cylinder", "--set", "speed=3", "--engine", "oracle"], ["truth", "oracle"]),
-     (["pendulum", "--engine", "truth"], ["truth"])],
+     (["pendulum", "--engine", "truth"], ["truth"]),
+     (["painleve_rod", "--engine", "mujoco"], ["mujoco"])],
 )  # fmt: skip
 def test_a_run_in_motion(proofroll: Proofroll, tmp_path: Path, words: list[str], shown: list[str]) -> None:
-    """The page holds the truth and beside it the run, of whatever kind of element, named by what is not default."""
+    """The page holds the truth and beside it the run, of whatever kind, named by what is not default; or it alone."""
     run = tmp_path / "run.nc"
     assert proofroll("run", *words, *RUN, "--out", str(run))[0] == 0
     code, out, err = proofroll("replay", str(run))

@@ -36,15 +36,16 @@ FACTORS: Mapping[float, str] = {
 }
 
 
-def least_squares_parameter(residual: Callable[[float], FloatArray], start: float, size: float) -> float:
-    """Parameter that minimises the sum of squared residuals, by Gauss-Newton with halved steps."""
+def least_squares_parameters(
+    residual: Callable[[FloatArray], FloatArray], start: FloatArray, size: float
+) -> FloatArray:
+    """Parameters that minimise the sum of squared residuals, by Gauss-Newton with halved steps."""
     x, at = start, residual(start)
     for _ in range(_ROUNDS):
-        slope = (residual(x + _STEP * size) - at) / (_STEP * size)
-        denominator = float(slope @ slope)
-        if not np.isfinite(denominator) or denominator == 0:
+        slopes = np.stack([residual(x + h) - at for h in _STEP * size * np.eye(len(x))], axis=-1) / (_STEP * size)
+        if not np.all(np.isfinite(slopes)) or not np.any(slopes):
             return x
-        step = -float(slope @ at) / denominator
+        step = -np.linalg.lstsq(slopes, at, rcond=None)[0]
         for _ in range(6):
             tried = residual(x + step)
             if np.all(np.isfinite(tried)) and tried @ tried <= at @ at:
@@ -53,9 +54,14 @@ def least_squares_parameter(residual: Callable[[float], FloatArray], start: floa
         else:
             return x
         x, at = x + step, tried
-        if abs(step) < 1e-9 * size:
+        if np.max(np.abs(step)) < 1e-9 * size:
             break
     return x
+
+
+def least_squares_parameter(residual: Callable[[float], FloatArray], start: float, size: float) -> float:
+    """The same for a single parameter."""
+    return float(least_squares_parameters(lambda x: residual(float(x[0])), np.array([start]), size)[0])
 
 
 def known_factor(factor: float) -> tuple[float, str] | None:

@@ -66,6 +66,7 @@ class Replayed:
         ghosts: runs drawn beside it.
         group: name of the group of cases that it belongs to.
         label: name in its group.
+        solid: name of what is drawn solid: the truth, or where there is none the run alone.
     """
 
     scene: Scene
@@ -74,6 +75,7 @@ class Replayed:
     ghosts: list[Ghost]
     group: str
     label: str
+    solid: str = "truth"
 
 
 def some(motion: xr.Dataset, names: Collection[str]) -> dict[str, npt.NDArray[Any]]:

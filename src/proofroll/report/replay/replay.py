@@ -81,7 +81,7 @@ def case_content(replayed: Replayed, kind: ReplayKind) -> tuple[ReplayCase, str]
     first = {ghost.engine: ghost for ghost in reversed(replayed.ghosts)}  # the one furthest off comes first
     until, whole = own["until"], own["frames"]
     runs = [
-        ReplayedRun("truth", -1, True, whole, "", replayed.file),
+        ReplayedRun(replayed.solid, -1, True, whole, "", replayed.file),
         *(
             ReplayedRun(
                 name=ghost.name,

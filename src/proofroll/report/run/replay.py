@@ -29,7 +29,7 @@ _WRITES = "proofroll run … --out writes one"
 
 
 def replay_page(path: Path, run: xr.Dataset, scene_of_run: str | None = None) -> str:
-    """HTML page that replays a run: the truth of its scene, solid, and the run, translucent.
+    """HTML page that replays a run: the truth of its scene, solid, and the run, translucent; without a truth alone.
 
     In a scene of several elements, each is a case of its own, for no force couples them.
 
@@ -54,20 +54,26 @@ def replay_page(path: Path, run: xr.Dataset, scene_of_run: str | None = None) ->
     true = truth(scene, run["time"].to_numpy())
     cases: list[ReplayCase] = []
     packed: list[str] = []
+    said: list[str] = []
     group = scene.title if len(parts) == 1 or not label else f"{scene.title}, {label}"
     for (element, alone), drawer in zip(parts, drawers, strict=True):
         true_part, run_part = (part(scene, element, whole) for whole in (true, run))
         shown = element.name if len(parts) > 1 else label or scene.title
-        replayed = Replayed(alone, true_part, "", _ghosts(run_part, true_part), group, shown)
+        known = bool(np.isfinite(true_part["p_WB"]).all())  # else laws alone judge a run
+        if known:
+            replayed = Replayed(alone, true_part, "", _ghosts(run_part, true_part), group, shown)
+        else:
+            replayed = Replayed(alone, run_part, "", [], group, shown, str(run.attrs["engine"]))
         case, numbers = case_content(replayed, drawer)
         cases.append(case)
         packed.append(numbers)
+        said.append(_caption(run, known))
     return rendered(
         templates(),
         "run_replay.html",
         scene=scene,
         replay=Replay(three(), 0, cases, packed),
-        said=_caption(run),
+        said=" ".join(dict.fromkeys(said)),
         replay_scripts=[other.replay_script for other in report_kinds().values() if other.replay_script],
     )
 
@@ -87,12 +93,14 @@ def _drawer(path: Path, scene: Scene, element: Element, alone: Scene, run: xr.Da
     return kind.replay()
 
 
-def _caption(run: xr.Dataset) -> str:
+def _caption(run: xr.Dataset, known: bool) -> str:
     engine = str(run.attrs["engine"])
     if engine == "truth":
         return "The truth."
-    settings = settings_text(json.loads(run.attrs["settings"]))
-    return f"The truth, solid, and {engine} ({settings}), translucent; where it agrees it is hidden in the truth."
+    with_settings = f"{engine} ({settings_text(json.loads(run.attrs['settings']))})"
+    if not known:
+        return f"{with_settings} alone: no truth tells the whole motion."
+    return f"The truth, solid, and {with_settings}, translucent; where it agrees it is hidden in the truth."
 
 
 def _scene(path: Path, run: xr.Dataset, name: str) -> Scene:

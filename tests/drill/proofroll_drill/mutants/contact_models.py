@@ -109,15 +109,15 @@ class FrictionOff(ContactMutant):
         return of_pairs(mechanism, lambda pair: dataclasses.replace(pair, friction=0.0))
 
 
-class FrictionTwoPercent(ContactMutant):
-    """Two hundredths more friction."""
+class FrictionOnePercent(ContactMutant):
+    """A hundredth less friction."""
 
-    fault = "friction of contacts 2 % off"
-    named = ("friction of all contacts is 1.02",)
+    fault = "friction of contacts 1 % off"
+    named = ("friction of all contacts is 0.99 ",)
 
     def other(self, mechanism: Mechanism) -> Mechanism:
-        """Two hundredths more of each pair."""
-        return of_pairs(mechanism, lambda pair: dataclasses.replace(pair, friction=1.02 * pair.friction))
+        """A hundredth less of each pair."""
+        return of_pairs(mechanism, lambda pair: dataclasses.replace(pair, friction=0.99 * pair.friction))
 
 
 class FrictionOfOneFoot(ContactMutant):
@@ -224,6 +224,14 @@ class FootMoved(ContactMutant):
         return of_geometry(mechanism, "left_foot", position=(x + 1e-3, y, z))
 
 
+class FootMovedSilently(FootMoved):
+    """The same, and its certificate has the scene's place."""
+
+    fault = "a foot moved 1 mm, and not told"
+    honest = False
+    named = ("left_foot is at (0.151, 0.1, -0.08)",)
+
+
 class NormalTurned(ContactMutant):
     """The floor leans by a thousandth, and its certificate says so."""
 
@@ -235,6 +243,15 @@ class NormalTurned(ContactMutant):
     def other(self, mechanism: Mechanism) -> Mechanism:
         """Another floor."""
         return of_geometry(mechanism, "floor", normal=(1e-3, 0.0, 1.0))
+
+
+class NormalTurnedSilently(NormalTurned):
+    """The same, and its certificate has the scene's normal."""
+
+    fault = "normal of a contact turned, and not told"
+    until, every = 0.4, 0.02
+    honest = False
+    named = ("normal of floor is turned by 0.001 rad",)
 
 
 class OtherBody(ContactMutant):

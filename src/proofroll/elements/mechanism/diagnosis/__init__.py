@@ -7,6 +7,7 @@ import numpy as np
 from proofroll.core.diagnosis.fitting import any_gravity
 from proofroll.core.diagnosis.lines import built_otherwise
 from proofroll.elements.mechanism.diagnosis import contacts
+from proofroll.elements.mechanism.diagnosis.contacts_at_start import at_start
 from proofroll.elements.mechanism.diagnosis.equations import Change
 from proofroll.elements.mechanism.diagnosis.impacts import impacts, laws_of_impacts
 from proofroll.elements.mechanism.diagnosis.joint_laws import of_actuators, of_couplings, of_stops
@@ -38,6 +39,7 @@ HYPOTHESES: tuple[Any, ...] = (
     reactions_at_start,
     BUILT,
     *contacts.HYPOTHESES,
+    at_start,
     impacts,
     laws_of_impacts,
     other_axis,

@@ -1,10 +1,8 @@
 """Hypotheses of contacts: a wrong coefficient, a missing contact, another law of friction."""
 
 import functools
-import itertools
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
-from typing import Any
+from collections.abc import Iterator
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,18 +13,15 @@ from proofroll.core.diagnosis.fitting import (
     cached_on_evidence,
     change_by,
     factor_text,
-    least_squares_parameter,
-    possible,
 )
 from proofroll.core.diagnosis.samples import run_and_truth
 from proofroll.core.diagnosis.vectors import ReportedVector
-from proofroll.core.errors import Refused
 from proofroll.elements.mechanism.contacts.observables import PRESSES, SLIDES, Followed, follow_contacts, normal_forces
-from proofroll.elements.mechanism.diagnosis.equations import is_motion, of_start, placed_of
+from proofroll.elements.mechanism.diagnosis.equations import is_motion, placed_of
 from proofroll.elements.mechanism.model import Mechanism
 
 # Least difference of forces and least overlap that point to another law, relative to the mechanism's force and size.
-_FORCE, _SUNK = 1e-4, 1e-3
+FORCE, _SUNK = 1e-4, 1e-3
 _OFF = 1e-3  # largest factor of friction that counts as zero
 _TURNS = 0.3  # rad: least turn of slip and friction that shows the shape of a cone
 _FEW = 3  # samples of friction from which a square does not fit by chance
@@ -147,7 +142,7 @@ def friction_factor(evidence: Evidence) -> Iterator[Cause]:
         for which, name in groups[: 1 if len(names) == 1 else None]:
             at = touch.slides[:, which] & (touch.friction[which] > 0)
             T, full = touch.T[:, which][at], touch.against[:, which][at]
-            if len(T) < 2 or np.abs(T - full).max() <= _FORCE * evidence.element.force:
+            if len(T) < 2 or np.abs(T - full).max() <= FORCE * evidence.element.force:
                 continue
             factor = float(np.sum(T * full) / np.sum(full * full))
             off = abs(factor) <= _OFF
@@ -211,14 +206,14 @@ def _of_a_square(
     Arrays over samples: normals, slips [m/s], friction T and Coulomb's friction ``full`` [N], (samples, 3); its size
     [N], (samples,). Differences below a small part of ``least``, a natural force [N], count as none.
     """
-    if np.abs(n - n[0]).max() > _FORCE:
+    if np.abs(n - n[0]).max() > FORCE:
         return
     e1 = np.eye(3)[np.argmin(np.abs(n[0]))]
     e1 = np.cross(n[0], e1) / np.linalg.norm(np.cross(n[0], e1))
     plane = np.array([e1, np.cross(n[0], e1)])
     turned_by = max(np.ptp(np.unwrap(np.arctan2(*(each @ plane.T).T[::-1]))) for each in (u, T))
     against = float(np.abs(T - full).max())
-    if turned_by < _TURNS or against <= _FORCE * least:
+    if turned_by < _TURNS or against <= FORCE * least:
         return
     turned = np.array([[[np.cos(a), np.sin(a)], [-np.sin(a), np.cos(a)]] for a in _ANGLES])
     sides = np.abs(np.einsum("aij,kj->aki", turned, T @ plane.T)).sum(axis=-1)
@@ -260,7 +255,7 @@ def forces_at_start(evidence: Evidence) -> Iterator[Cause]:
 )
 def creep(evidence: Evidence) -> Iterator[Cause]:
     """Hypothesis: sticking contacts creep, as by a regularised law of friction."""
-    for touch in touch_of(evidence):
+    for touch in touch_of(evidence) if "positions" not in evidence.settled else ():  # it explains no wrong force
         held = touch.presses & (touch.true.slip <= _HELD * evidence.element.speed) & (touch.friction > 0)
         slip = touch.found.slip[held]
         run, truth = evidence.run, evidence.truth
@@ -277,70 +272,6 @@ def creep(evidence: Evidence) -> Iterator[Cause]:
         yield contact_cause("creep", says, *proof, "make that speed smaller", 1)
 
 
-@hypothesis(
-    "contacts at time 0", "the accelerations at time 0 are those of a mechanism whose contacts differ in one thing"
-)
-def at_start(evidence: Evidence) -> Iterator[Cause]:
-    """Hypotheses tried on the first accelerations: a pair missing, friction scaled, off or swapped between pairs."""
-    element, start = evidence.element, None
-    if element.mechanism.contacts:
-        start = of_start(evidence, derived=True)
-    if start is None:
-        return
-    mechanism, size = element.mechanism, element.length
-    found = start.each[0].acceleration * np.array([1, 1, 1, size, size, size])
-
-    def apart(pairs: Sequence[Any]) -> FloatArray:
-        try:
-            first = type(element)(replace(mechanism, pairs=tuple(pairs))).first_motion
-        except Refused:
-            return np.full(1, np.inf)
-        return np.ravel(np.concatenate([first.acceleration, size * first.angular_acceleration], axis=-1) - found)
-
-    def off(pairs: Sequence[Any]) -> float:
-        return float(np.abs(apart(pairs)).max())
-
-    pairs = mechanism.pairs
-    before = off(pairs)
-
-    def cause(says: str, after: float, remedy: str, number: int = 0, change: float = np.inf) -> Cause:
-        name = "acceleration at time 0"
-        proof = name, "m/s^2", before, after
-        return contact_cause("contacts at time 0", says, *proof, remedy, number, explains=found.size, change=change)
-
-    def scaled(factor: float, which: Sequence[Any] = pairs) -> list[Any]:
-        return [replace(pair, friction=max(factor, 0.0) * pair.friction) if pair in which else pair for pair in pairs]
-
-    if not before > _FORCE * element.first_motion.scale:
-        return
-    own = "give each pair its own coefficient"
-    for pair in pairs:
-        if len(pairs) > 1:
-            left = off([other for other in pairs if other is not pair])
-            yield cause(f"the contact {pair.name} is left out", left, "let the pair touch")
-    yield cause("friction of all contacts is off", off(scaled(0.0)), own)
-    for a, b in itertools.combinations(pairs, 2):
-        if a.friction != b.friction:
-            swap = {a.name: b.friction, b.name: a.friction}
-            after = off([replace(pair, friction=swap.get(pair.name, pair.friction)) for pair in pairs])
-            yield cause(f"friction of {a.name} and {b.name} is swapped", after, own)
-    from scipy.optimize import minimize_scalar  # half a second, which few runs need
-
-    fit = minimize_scalar(
-        lambda factor: off(scaled(factor)), bounds=(0.0, 3.0), method="bounded", options={"xatol": 1e-6}
-    )
-    groups: list[tuple[str, Sequence[Any], float]] = [("all contacts", pairs, float(fit.x))]
-    for pair in pairs if len(pairs) > 1 else ():
-
-        def changed(factor: float, pair: Any = pair) -> FloatArray:
-            return apart(scaled(factor, (pair,)))
-
-        groups.append((pair.name, (pair,), least_squares_parameter(changed, 1.0, 1.0)))
-    for name, which, factor in groups:
-        after = off(scaled(factor, which)) if possible(factor, signed=False) else np.inf
-        yield cause(f"friction of {name} is {factor_text(factor)}", after, own, 1, change_by(factor))
-
-
 HYPOTHESES = (
     contact_forces,
     forces_at_start,
@@ -349,5 +280,4 @@ HYPOTHESES = (
     friction_factor,
     left_out,
     creep,
-    at_start,
 )

@@ -12,9 +12,17 @@ from scipy.spatial.transform import Rotation
 from proofroll.core.arrays import FloatArray
 from proofroll.core.diagnosis import CLOSES, Cause, Evidence, hypothesis
 from proofroll.core.diagnosis.clocks import delay_text
-from proofroll.core.diagnosis.fitting import ABOVE, Residuals, change_by, factor_text, possible
+from proofroll.core.diagnosis.fitting import (
+    ABOVE,
+    Residuals,
+    change_by,
+    factor_text,
+    least_squares_parameters,
+    possible,
+)
 from proofroll.core.errors import InputError, NotUnique
 from proofroll.elements.mechanism.contacts.dynamics import ContactDynamics
+from proofroll.elements.mechanism.contacts.geometry import Geometry
 from proofroll.elements.mechanism.contacts.observables import PRESSES, Followed, normal_forces
 from proofroll.elements.mechanism.diagnosis.contacts import COVERS, contact_cause, touch_of
 from proofroll.elements.mechanism.diagnosis.equations import placed_of
@@ -26,6 +34,7 @@ _JUMP = 1e-4  # least velocity that counts as missed, relative to the mechanism'
 _ROUNDS = 4
 _CONTRACTIONS = 20  # until slip and speed along the normal fit each other
 _REMEDY = "look at what the engine makes of it"
+_EXACT = 1e-3  # part of the difference at impacts that no error of a step leaves by chance
 _REAL = 1e-9  # imaginary part of a real root, in intervals of samples
 # If a gap has a cubic term, and its parabola misses by m one interval T back, it misses by 5 m one interval ahead, and
 # its rate there by 12 m / T.
@@ -139,10 +148,10 @@ class _Struck:
 
 @hypothesis(
     "laws of impacts",
-    "with a convex cone, or a factor on one law of all pairs, velocities before the impacts give all those after them",
+    "with a convex cone, a factor on one law of all pairs or a turned plane, velocities before impacts give all after",
 )
 def laws_of_impacts(evidence: Evidence) -> Iterator[Cause]:
-    """Hypotheses: impacts have friction or restitution with a factor, or a convex cone."""
+    """Hypotheses: impacts have friction or restitution with a factor, a convex cone, or a plane with another normal."""
     for touch in touch_of(evidence) if not evidence.by_step else ():
         mechanism, least = touch.mechanism, evidence.element.force
         true_presses = np.asarray(PRESSES * least < normal_forces(touch.true, touch.true_force))
@@ -165,6 +174,17 @@ def laws_of_impacts(evidence: Evidence) -> Iterator[Cause]:
             if possible(factor, signed=False):
                 model, says = _scaled(mechanism, law, factor), f"{law} of impacts is {factor_text(factor)}"
                 yield held.cause(f"{law} of impacts", says, model, _REMEDY, 1, change_by(factor))
+        for plane in (geometry for geometry in mechanism.geometries if geometry.kind == "plane"):
+
+            def missed(by: FloatArray, plane: Geometry = plane, held: Residuals[Mechanism] = held) -> FloatArray:
+                return held.left(_turned(held.plain, plane, by))
+
+            by = least_squares_parameters(missed, np.zeros(2), 1.0)
+            after, off = float(np.max(np.abs(missed(by)))), float(np.linalg.norm(by))
+            says, remedy = f"the normal of {plane.name} is turned by {off:.4g} rad", "look at the axes of geometries"
+            explains = int(np.sum(np.abs(missed(np.zeros(2))) > CLOSES * before))
+            proof = "normal of a plane", says, held.quantity, held.unit, before, after, remedy, 2
+            yield contact_cause(*proof, explains=explains, change=np.inf if after <= _EXACT * before else off)
 
 
 def _struck(mechanism: Mechanism, dataset: Any, found: Followed, presses: Any) -> Iterator[_Struck]:
@@ -233,6 +253,13 @@ def _scaled(mechanism: Mechanism, law: str, factor: float) -> Mechanism | None:
         return replace(mechanism, pairs=tuple(replace(p, **{law: factor * getattr(p, law)}) for p in mechanism.pairs))
     except InputError:
         return None
+
+
+def _turned(mechanism: Mechanism, plane: Geometry, by: FloatArray) -> Mechanism:
+    """A mechanism with the normal of a plane turned towards its two axes [rad]."""
+    normal = tuple((plane.frame[:, 2] + plane.frame[:, :2] @ by).tolist())
+    others = (replace(g, normal=normal) if g is plane else g for g in mechanism.geometries)
+    return replace(mechanism, geometries=tuple(others))
 
 
 def _others(mechanism: Mechanism) -> list[Mechanism]:
