@@ -107,7 +107,7 @@ def test_pgs_is_refused_where_it_returns_wrong_impulses() -> None:
 def test_a_solver_that_gives_up_ends_the_run() -> None:
     """A solver that does not find the impulses ends the run, and its time is said."""
     run = PINOCCHIO.build(load_scene("free_turntable"), replace(PRESETS["matched"], solver="pgs"))
-    with pytest.raises(Diverged, match=r"pgs solver did not reach .* at 1"):
+    with pytest.raises(Diverged, match=r"pgs solver did not reach .* at 1.*; a larger one may do"):
         run.advance(3.0)
 
 

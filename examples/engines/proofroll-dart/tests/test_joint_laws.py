@@ -1,4 +1,4 @@
-"""Servos, limits of efforts, dry friction and stops of DART's joints."""
+"""Servos, limits of efforts, dry friction and stops of DART's joints; bodies that touch are refused."""
 
 import numpy as np
 import pytest
@@ -32,3 +32,10 @@ def test_what_it_has_not_is_refused_with_the_reason(formulation: str, name: str,
 def test_equations_without_steps_have_no_stops() -> None:
     """Laws that switch are not among the capabilities of the formulation that scipy integrates."""
     assert not proofroll.load_scene("stop").requires <= Dart.provides["forward_dynamics"]
+
+
+@pytest.mark.parametrize("formulation", ["world", "forward_dynamics"])
+def test_bodies_that_touch_are_refused(formulation: str) -> None:
+    """Contact between bodies is refused with what DART lacks."""
+    with pytest.raises(proofroll.Refused, match=r"contact between bodies.*pyramid"):
+        proofroll.simulate("falling_rod", f"dart[formulation={formulation}]", until=0.1, every=0.1)

@@ -311,7 +311,7 @@ class ImpulseSteps:
             ):
                 raise Diverged(
                     f"Pinocchio's {self._settings.solver} solver did not reach "
-                    f"solver_tolerance={self._settings.solver_tolerance:g} at {self.t:g} s"
+                    f"solver_tolerance={self._settings.solver_tolerance:g} at {self.t:g} s; a larger one may do"
                 )
             got = np.array(solver.result.retrieveConstraintImpulses())
             v = free + to_joints @ got

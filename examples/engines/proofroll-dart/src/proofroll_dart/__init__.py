@@ -29,6 +29,7 @@ _LACKING = {
     MechanismCapability.SPRINGS: "DART has no springs between points",
     MechanismCapability.ARMATURE: "DART's joints have no inertia of their own",
     MechanismCapability.COUPLINGS: "this version of dartpy has no mimic joints",
+    MechanismCapability.CONTACT: "DART's friction is a pyramid, and it has no setter for the cone",
     MechanismCapability.FREE: "this adapter integrates coordinates whose rates are the velocities",
     MechanismCapability.SPHERICAL: "this adapter integrates coordinates whose rates are the velocities",
 }
