@@ -200,6 +200,7 @@ def test_a_scene_outside_models(edited: Callable[[str, str], str]) -> None:
         ),
         ('mass = "$mass"', 'mass = "$radius"', ["balls.0.mass = '$radius'", "in kg, that parameter in m"]),
         ('velocity = ["$speed"', 'velocity = ["$gravity"', ["initial.0.velocity.0", "in m/s, that parameter in m/s^2"]),
+        ("coordinates = [0", 'coordinates = ["$radius"', ["initial.0.coordinates.0", "in rad, that parameter in m"]),
         ('below = "cylinder_radius"', 'below = "mass"', ["parameters.radius.below = 'mass'", "its unit is kg"]),
         ("value = inf", 'value = "mu_kinetic"', ["mu_static.value", "mu_static -> mu_kinetic -> mu_static", "circle"]),
         ('title = "', f'a = {"[" * 5000}\ntitle = "', ["nested more than 16 deep"]),

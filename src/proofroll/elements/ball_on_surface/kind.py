@@ -58,7 +58,7 @@ class BallOnSurfaceKind:
         for surface in contents.surfaces:
             if isinstance(surface, Declared):
                 surface.checked()
-        starts = {start.body: start for start in contents.initial}
+        starts = {start.body: (index, start) for index, start in enumerate(contents.initial)}
         elements = []
         for index, contact in enumerate(contents.contacts):
             if contact.body not in starts:
@@ -67,9 +67,12 @@ class BallOnSurfaceKind:
                 )
             if any(contact.body == other.body for other in contents.contacts[:index]):
                 raise InputError(f"{where}: contacts.{index}.body", contact.body, "a ball touches one surface")
-            ball = balls[contact.body]
+            ball, surface, (at, start) = balls[contact.body], surfaces[contact.surface], starts[contact.body]
+            # Only with the surface are the units of its coordinates known.
+            coordinates = tables["initial"][at].get("coordinates", [])
+            numbers.filled(coordinates, f"{where}: initial.{at}.coordinates", {}, surface.units)
             try:
-                elements.append(BallOnSurface(ball, surfaces[contact.surface], contact, starts[ball.name], gravity))
+                elements.append(BallOnSurface(ball, surface, contact, start, gravity))
             except InputError as error:
                 raise error.within(f"{where}: initial", ball.name) from None
         for name in balls.keys() - {contact.body for contact in contents.contacts}:
