@@ -138,6 +138,8 @@ def test_infinite_numbers_are_empty(content: ReportContent) -> None:
 def test_a_trade_off_says_what_its_curves_tend_to() -> None:
     """A limit that is off by far more than its bars is another; one within them is the truth's; none is none."""
     budget = CurveBudget(engine="a", curve="a", quantity="z", model_form=1e-3, model_form_bar=1e-6, truth=1e-9)
-    assert _limit(budget)["limit"] == LimitResult.ANOTHER
-    assert _limit(dataclasses.replace(budget, model_form_bar=1e-3))["limit"] == LimitResult.WITHIN
-    assert _limit(dataclasses.replace(budget, model_form=None))["limit"] == LimitResult.NOT_SHOWN
+    assert _limit(budget, "m")["limit"] == LimitResult.ANOTHER
+    assert _limit(dataclasses.replace(budget, model_form_bar=1e-3), "m")["limit"] == LimitResult.WITHIN
+    assert _limit(dataclasses.replace(budget, model_form=None), "m")["limit"] == LimitResult.NOT_SHOWN
+    single = dataclasses.replace(budget, best_step=5e-4, floor=2e-5)
+    assert _limit(single, "m")["floor"] == "best step 5e-4 s, floor 2e-5 m: single precision"

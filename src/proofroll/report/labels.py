@@ -7,10 +7,12 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from proofroll.core.number_format import number
+from proofroll.core.plugins import parse_engine
 
 if TYPE_CHECKING:
     from proofroll.core.verdict import Judgement
     from proofroll.report.comparison.records import ReportedComparison, ReportedRow, ReportedRun, Setting
+    from proofroll.running.case import EngineFacts
     from proofroll.studies.tradeoff.records import SweptSetting
 
 SYMBOLS = {
@@ -121,10 +123,22 @@ def names(rows: Sequence[Setting]) -> list[str]:
     return [name if short.count(name) == 1 else str(row.engine) for name, row in zip(short, rows, strict=True)]
 
 
+def setting_words(engine: str, facts: EngineFacts | SweptSetting) -> str:
+    """Preset, further options that a file or user set (``cone=pyramidal``), and ``f32`` for single precision.
+
+    Args:
+        engine: ``name[key=value,…]`` with these options.
+        facts: complete settings, their resolution and precision.
+    """
+    usual, preset = {"formulation", "preset", facts.resolution}, facts.settings.get("preset")
+    chosen = [f"{key}={value}" for key, value in parse_engine(engine).options.items() if key not in usual]
+    shown = [] if preset is None or (chosen and preset == "matched") else [preset]
+    return " ".join([*shown, *chosen, *precision_words(facts.precision)])
+
+
 def name_of(point: SweptSetting) -> str:
-    """Engine, formulation and preset of a point of a study, and ``f32`` if single precision."""
-    settings = point.settings
-    words = point.engine, settings.get("formulation"), settings.get("preset"), *precision_words(point.precision)
+    """Engine, formulation and setting of a point of a study."""
+    words = point.engine, point.settings.get("formulation"), setting_words(point.curve, point)
     return " ".join(filter(None, words))
 
 

@@ -1,13 +1,21 @@
 """Long table of a report: a line for each quantity of each run and for each recorded number, in JSON and CSV."""
 
+from __future__ import annotations
+
 import csv
 import io
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from proofroll.files.json_data import plain
+from proofroll.report.labels import setting_words
+from proofroll.running.environments import shown_name
+
+if TYPE_CHECKING:
+    from proofroll.running.case import EngineFacts
+    from proofroll.studies.tradeoff.records import SweptSetting
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -19,7 +27,7 @@ class TableLine:
         group: group of the scene.
         scene: name of the scene.
         place: parameters of the run in words; empty: the scene's own.
-        row: number of the run's row in its study.
+        row: number of the run's row in its study; of a trade-off, of its curve.
         engine, version, formulation, preset, setting, precision: of the run; ``setting`` has preset and further
         options.
         own_equations: the run solves equations derived for the scene, as its truth does.
@@ -33,7 +41,7 @@ class TableLine:
         floor: clause about the error floor of single precision that ends the refinement; empty: there is none.
         quantity, unit, role: the measured quantity and its role (:class:`proofroll.core.observable.Role`).
         headline: summaries show it.
-        error: largest distance from the truth; None: not finite, or there is none.
+        error: largest distance of this run from the truth; None: not finite, or there is none.
         truth_error_bar: of the truth, in the same unit.
         tolerance: largest error that counts as agreement; None: not given.
         scale: size of the quantity.
@@ -99,6 +107,26 @@ class TableLine:
         if self.limit_error is None or not self.scale:
             return None
         return max(0.0, self.limit_error - (self.limit_doubt or 0.0)) / self.scale
+
+
+def setting_columns(name: str, engine: str, facts: EngineFacts | SweptSetting) -> dict[str, Any]:
+    """Columns of a line about an engine's setting.
+
+    Args:
+        name: of the engine.
+        engine: the same as ``name[key=value,…]``, with the options that a file or user set.
+        facts: complete settings, their resolution and precision.
+    """
+    settings = facts.settings
+    return {
+        "engine": shown_name(name),
+        "formulation": settings.get("formulation") or "",
+        "preset": settings.get("preset") or "",
+        "setting": setting_words(engine, facts),
+        "precision": facts.precision,
+        "resolution": facts.resolution or "",
+        "step": settings.get(facts.resolution or ""),
+    }
 
 
 COLUMNS = tuple(item.name for item in fields(TableLine))

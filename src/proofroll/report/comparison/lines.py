@@ -6,9 +6,9 @@ from typing import Any
 
 from proofroll.core.verdict import Judgement, Verdict
 from proofroll.report.comparison.records import Cost, rough_cost
-from proofroll.report.comparison.summary import settings_of
+from proofroll.report.comparison.summary import facts_of
 from proofroll.report.kinds import group_of
-from proofroll.report.long_table import TableLine
+from proofroll.report.long_table import TableLine, setting_columns
 from proofroll.running.case import Result, Status
 from proofroll.studies.comparison.outcome import LadderRun, Outcome, Run
 from proofroll.studies.comparison.planning import point_name
@@ -32,7 +32,7 @@ def lines_of(outcome: Outcome) -> list[TableLine]:
 
 def _plain(outcome: Outcome, run: Run, row: int) -> TableLine:
     """Fields shared by all lines of a run."""
-    comparison, words = outcome.comparison, settings_of(run)
+    comparison, facts = outcome.comparison, facts_of(run)
     point = outcome.points.get(point_name(run.parameters))
     return TableLine(
         study=comparison.name,
@@ -40,16 +40,10 @@ def _plain(outcome: Outcome, run: Run, row: int) -> TableLine:
         scene=comparison.scene,
         place=point_name(run.parameters),
         row=row,
-        engine=words["name"],
-        version=run.facts.version if run.facts else "",
-        formulation=words["formulation"] or "",
-        preset=words["preset"] or "",
-        setting=words["setting"],
-        precision=words["precision"],
-        own_equations=bool(run.shared) or (run.facts is not None and by_hand(run.facts.level)),
-        resolution=words["resolution"] or "",
-        step=words["resolution_value"],
+        version=facts.version,
+        own_equations=bool(run.shared) or by_hand(facts.level),
         verdict=run.verdict,
+        **setting_columns(facts.name, run.row.engine, facts),
         **_ended(outcome, run.result),
     )
 

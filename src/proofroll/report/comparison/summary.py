@@ -3,7 +3,6 @@
 import dataclasses
 from typing import Any
 
-from proofroll.core.plugins import parse_engine
 from proofroll.core.verdict import Judgement, Verdict
 from proofroll.files.trajectory_file import StoredTrajectory
 from proofroll.report.comparison.records import (
@@ -21,7 +20,7 @@ from proofroll.report.comparison.records import (
 )
 from proofroll.report.comparison.spread import spread_of
 from proofroll.report.kinds import group_of, kind_name
-from proofroll.report.labels import precision_words
+from proofroll.report.labels import setting_words
 from proofroll.running.case import EngineFacts, Status, hosts
 from proofroll.running.environments import shown_name
 from proofroll.studies.comparison.outcome import SEVERITY, Outcome, Run
@@ -183,23 +182,20 @@ def _worst(runs: list[Run], name: str) -> WorstJudgement:
     return WorstJudgement(**known, point=point_name(where.parameters), largest=largest)
 
 
-def _setting(engine: str, facts: EngineFacts) -> str:
-    """Preset, further options in the comparison file (``cone=pyramidal``), and ``f32`` for single precision."""
-    usual, preset = {"formulation", "preset", facts.resolution}, facts.settings.get("preset")
-    chosen = [f"{key}={value}" for key, value in parse_engine(engine).options.items() if key not in usual]
-    shown = [] if preset is None or (chosen and preset == "matched") else [preset]
-    return " ".join([*shown, *chosen, *precision_words(facts.precision)])
+def facts_of(run: Run) -> EngineFacts:
+    """Facts of a run's engine; of one that is missing, its name alone."""
+    return run.facts or EngineFacts(run.row.engine.partition("[")[0], version="", code="", settings={})
 
 
 def settings_of(run: Run) -> dict[str, Any]:
     """Values of the fields of :class:`Setting`."""
-    facts = run.facts or EngineFacts(run.row.engine.partition("[")[0], version="", code="", settings={})
+    facts = facts_of(run)
     return {
         "engine": run.row.engine,
         "name": shown_name(facts.name),
         "formulation": facts.settings.get("formulation"),
         "preset": facts.settings.get("preset"),
-        "setting": _setting(run.row.engine, facts),
+        "setting": setting_words(run.row.engine, facts),
         "resolution": facts.resolution,
         "resolution_value": facts.settings.get(facts.resolution or ""),
         "declared_order": facts.order,

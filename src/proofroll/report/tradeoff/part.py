@@ -8,11 +8,12 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 from proofroll.core.comparison import Tolerance
+from proofroll.core.convergence import floor_text
 from proofroll.core.number_format import counted
 from proofroll.core.verdict import LimitResult
 from proofroll.files.json_data import MERGED
 from proofroll.report.kinds import group_of
-from proofroll.report.long_table import TableLine
+from proofroll.report.long_table import TableLine, setting_columns
 from proofroll.report.parts import Part, PartEntry, Tell, claims_sentence
 from proofroll.report.tradeoff import tables as tradeoff_tables
 from proofroll.report.tradeoff.tables import default_quantities
@@ -112,19 +113,19 @@ class TradeoffPart(Part):
         assert study is not None  # it was made
         scene = self.asked.swept.loaded
         group, place = group_of(scene), point_name(study.parameters)
-        limits = {(item.curve, item.quantity): _limit(item) for item in study.budgets}
+        units = {name: item.unit for name, item in scene.observables.items()}
+        limits = {(item.curve, item.quantity): _limit(item, units[item.quantity]) for item in study.budgets}
         lines = []
+        rows = {curve: row for row, curve in enumerate(dict.fromkeys(point.curve for point in study.points))}
         for point in study.points:
             low, high = point.interval or (None, None)
             run: dict[str, Any] = {
-                "study": self.asked.name, "group": group, "scene": study.scene, "place": place, "row": point.id,
-                "engine": point.engine, "version": study.measured.versions.get(point.engine, ""),
-                "formulation": point.settings.get("formulation") or "", "preset": point.settings.get("preset") or "",
-                "setting": point.settings.get("preset") or "", "precision": point.precision,
-                "own_equations": by_hand(point.level), "resolution": point.resolution or "", "step": point.step,
-                "status": point.status, "message": "" if point.status == Status.DONE else point.message, "verdict": "",
+                "study": self.asked.name, "group": group, "scene": study.scene, "place": place,
+                "row": rows[point.curve], "version": study.measured.versions.get(point.engine, ""),
+                "own_equations": by_hand(point.level), "status": point.status,
+                "message": "" if point.status == Status.DONE else point.message, "verdict": "",
                 "cost": point.seconds_per_second, "cost_low": low, "cost_high": high, "clean": True,
-            }  # fmt: skip
+            } | setting_columns(point.engine, point.curve, point)  # fmt: skip
             lines += [
                 TableLine(
                     **run,
@@ -137,18 +138,21 @@ class TradeoffPart(Part):
                     truth_error_bar=study.quantities[name].truth_error_bar,
                     scale=study.quantities[name].scale,
                 )
-                for name, error in point.envelope.items()
+                for name, error in point.error.items()
                 if name in study.quantities
             ] or [TableLine(**run)]
         return lines
 
 
-def _limit(budget: CurveBudget) -> dict[str, Any]:
+def _limit(budget: CurveBudget, unit: str) -> dict[str, Any]:
     """Fields about a curve's limit of small steps: not shown, beyond both error bars of the truth, or within."""
+    columns: dict[str, Any] = {"limit": LimitResult.NOT_SHOWN}
+    if budget.best_step is not None and budget.floor is not None:
+        columns["floor"] = floor_text(budget.best_step, budget.floor, unit)
     if budget.model_form is None:
-        return {"limit": LimitResult.NOT_SHOWN}
+        return columns
     limit = LimitResult.ANOTHER if budget.model_form > _SHOWN * budget.doubt else LimitResult.WITHIN
-    return {"limit": limit, "limit_error": budget.model_form, "limit_doubt": budget.doubt}
+    return columns | {"limit": limit, "limit_error": budget.model_form, "limit_doubt": budget.doubt}
 
 
 def advice(study: TradeoffStudy, claims: TradeoffClaims) -> list[Advice]:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from proofroll.report.figure import panels, svg_text
-from proofroll.report.labels import listed, symbol
+from proofroll.report.labels import listed, name_of, symbol
 from proofroll.report.labels import unit as shown_unit
 
 if TYPE_CHECKING:
@@ -50,7 +50,7 @@ def _panel(panel: Any, study: TradeoffStudy, quantity: str) -> None:
             curves.setdefault(point.curve, []).append(point)
     engines = list(dict.fromkeys(point.engine for point in study.points))
     seen: dict[str, list[str]] = {}
-    for name, points in curves.items():
+    for points in curves.values():
         engine, formulation = points[0].engine, str(points[0].settings.get("formulation", ""))
         preset = str(points[0].settings.get("preset", ""))
         styles = seen.setdefault(engine, [])
@@ -67,7 +67,7 @@ def _panel(panel: Any, study: TradeoffStudy, quantity: str) -> None:
             markerfacecolor="none" if preset == "default" else None,
             linewidth=1.6 if preset == "tuned" else 1.0,
             alpha=0.9,
-            label=" ".join(filter(None, (engine, formulation, preset))) or name,
+            label=name_of(points[0]),
         )
     panel.set(xscale="log", yscale="log")
     _front(panel, study, quantity)
