@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from itertools import chain
 from pathlib import Path
@@ -17,7 +17,6 @@ from proofroll.core.number_format import number as written
 if TYPE_CHECKING:
     from proofroll.core.comparison import Comparison
     from proofroll.running.case import Case, Result
-    from proofroll.running.idle_workers import Workers
     from proofroll.running.runner import Runner
     from proofroll.running.time_budget import TimeBudget
     from proofroll.studies.comparison.outcome import Outcome
@@ -55,6 +54,7 @@ def compare(
     from proofroll.report.comparison.summary import outcome_content
     from proofroll.report.terminal.tables import verdict_parts
     from proofroll.running.idle_workers import Workers
+    from proofroll.studies.comparison.by_name import comparison_named
 
     workers = Workers()
     with options.spinner(comparison):
@@ -65,38 +65,6 @@ def compare(
     content = outcome_content(outcomes[0])
     options.show(content, as_json, lambda: verdict_parts(content))
     raise typer.Exit(exit_code(outcomes))
-
-
-def comparison_named(
-    name: str, parameters: Mapping[str, str], workers: Workers, budget: float | None, scheduler: str | None
-) -> Comparison:
-    """Comparison of this name, or the default comparison of a scene, within a budget.
-
-    Args:
-        name: of a comparison or a scene.
-        parameters: of a scene, those that differ from the defaults.
-        workers: pool for the questions to engines.
-        budget: processor time of all runs of a scene [s]; None: the default, or no limit on a cluster.
-        scheduler: of the cluster, or None.
-
-    Raises:
-        InputError: there is neither, or a budget or parameters were given for a comparison, which has its own.
-    """
-    from proofroll.core.errors import InputError
-    from proofroll.files.comparison_file import load_comparison
-    from proofroll.files.scene_file import means_scene
-
-    if means_scene(name, alone=bool(budget or parameters)):
-        from proofroll.studies.comparison.default_comparison import BUDGET, default_comparison
-
-        if budget and scheduler:
-            raise InputError("--budget", budget, "what runs on a cluster has none; drop --scheduler")
-        return default_comparison(name, parameters, workers, None if scheduler else budget or BUDGET)
-    if budget:
-        raise InputError("--budget", budget, "a comparison file runs all that it asks for; name a scene, or use report")
-    if parameters:
-        raise InputError("--set", next(iter(parameters)), "a comparison file has its own points; name a scene instead")
-    return load_comparison(name)
 
 
 def mention_scene(name: str, comparison: Comparison) -> None:

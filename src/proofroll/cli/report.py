@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from proofroll.cli import options
-from proofroll.cli.comparing import comparison_named, exit_code, list_omitted_engines, outcomes_of
+from proofroll.cli.comparing import exit_code, list_omitted_engines, outcomes_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -79,6 +79,7 @@ def report(
     from proofroll.report.parts import all_parts, parts_of
     from proofroll.running.idle_workers import Workers
     from proofroll.running.store import alone_in
+    from proofroll.studies.comparison.by_name import comparison_named
 
     before = _processor_seconds()
     if history:
@@ -111,8 +112,11 @@ def report(
         growing = _Growing(loaded, parts, out, lambda ended, awaited: begun(ended, command, awaited, left_out))
         with growing.resumable():
             stage = _begin(1, total, "comparisons") if loaded else ""
-            spent = _processor_seconds() - before
-            outcomes = outcomes_of(loaded, engine or [], runner, stage, growing.add, budget, spent) if loaded else []
+            outcomes = (
+                outcomes_of(loaded, engine or [], runner, stage, growing.add, budget, _processor_seconds() - before)
+                if loaded
+                else []
+            )
         made = begun(outcomes, command, left_out=left_out)
         made.earlier = earlier
         missing = made.expect(parts, out, fresh=fresh)

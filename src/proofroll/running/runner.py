@@ -40,6 +40,9 @@ class Runner:
         fresh: run every case again, once, though its result is stored.
         cluster: runs the cases; None: this machine does. Engines are asked and speeds measured on this machine always.
         workers: processes that may have loaded an engine already; None: new ones.
+
+    Raises:
+        InputError: ``jobs`` is no whole number from 1 on.
     """
 
     def __init__(
@@ -50,6 +53,8 @@ class Runner:
         cluster: Cluster | None = None,
         workers: Workers | None = None,
     ) -> None:
+        if jobs is not None and not (isinstance(jobs, int) and jobs >= 1):
+            raise InputError("jobs", jobs, "give the number of workers at once, at least 1")
         self.store = store
         self.cluster = cluster
         self.workers = workers or Workers()

@@ -1,8 +1,11 @@
-"""Comparison from Python, of a comparison file or of a scene alone."""
+"""Comparison of a name, which is that of a comparison file or of a scene."""
 
-from collections.abc import Sequence
+import math
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
+from proofroll.core.comparison import Comparison
 from proofroll.core.errors import InputError
 from proofroll.files.comparison_file import load_comparison
 from proofroll.files.scene_file import means_scene
@@ -37,11 +40,33 @@ def compare(
         InputError: an argument names something unknown or makes no sense.
     """
     workers = Workers()
-    if means_scene(name, alone=bool(parameters or budget)):
-        comparison = default_comparison(name, parameters, workers, budget or BUDGET)
-    elif parameters or budget:
-        given = next(iter(parameters), "budget")
-        raise InputError(given, parameters.get(given, budget), "a comparison file has its own; name a scene instead")
-    else:
-        comparison = load_comparison(name)
-    return comparing.compare(comparison, Runner(Store(Path(out) / "cases"), jobs=jobs, workers=workers), engines)
+    runner = Runner(Store(Path(out) / "cases"), jobs=jobs, workers=workers)
+    return comparing.compare(comparison_named(name, parameters, workers, budget), runner, engines)
+
+
+def comparison_named(
+    name: str, parameters: Mapping[str, Any], workers: Workers, budget: float | None, scheduler: str | None = None
+) -> Comparison:
+    """Comparison of this name, or the default comparison of a scene, within a budget.
+
+    Args:
+        name: of a comparison or a scene.
+        parameters: of a scene, those that differ from the defaults.
+        workers: pool for the questions to engines.
+        budget: processor time of all runs of a scene [s]; None: the default, or no limit on a cluster.
+        scheduler: of the cluster, or None.
+
+    Raises:
+        InputError: there is neither, or a budget or parameters were given for a comparison, which has its own.
+    """
+    if budget is not None and not 1 <= budget < math.inf:
+        raise InputError("budget", budget, "give the processor time of all runs in seconds, at least 1")
+    if means_scene(name, alone=bool(budget or parameters)):
+        if budget and scheduler:
+            raise InputError("budget", budget, "what runs on a cluster has none; drop --scheduler")
+        return default_comparison(name, parameters, workers, None if scheduler else budget or BUDGET)
+    if budget:
+        raise InputError("budget", budget, "a comparison file runs all that it asks for; name a scene, or use report")
+    for key, value in parameters.items():
+        raise InputError(key, value, "a comparison file has its own points; name a scene instead")
+    return load_comparison(name)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -25,5 +27,13 @@ def test_a_notebook_shows_a_comparison(tmp_path: Path, monkeypatch: pytest.Monke
 def test_what_is_for_a_scene_is_not_for_a_file() -> None:
     """A comparison file has its own points and no budget: either is refused by its name."""
     for given, advice in (({"speed": 2.0}, "speed = 2.0"), ({"budget": 9.0}, "budget = 9.0")):
-        with pytest.raises(proofroll.InputError, match=f"{advice}: a comparison file has its own"):
+        with pytest.raises(proofroll.InputError, match=f"{advice}: a comparison file"):
             proofroll.compare("paper", **given)
+
+
+@pytest.mark.parametrize("given", [{"jobs": 0}, {"jobs": -1}, {"jobs": 1.5}, {"budget": -5.0}, {"budget": math.nan}])
+def test_numbers_that_make_no_sense_are_refused(given: dict[str, Any], tmp_path: Path) -> None:
+    """Workers and processor time below 1, or no number, give one line with their name before anything runs."""
+    ((name, value),) = given.items()
+    with pytest.raises(proofroll.InputError, match=rf"^{name} = {value}: .*, at least 1$"):
+        proofroll.compare("pendulum", out=tmp_path, **given)
