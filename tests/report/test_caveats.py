@@ -36,6 +36,8 @@ OURS = "proofroll's own integrator"
         ("exudyn[formulation=generic,preset=default]", "adaptive step"),
         ("exudyn[formulation=generic,preset=matched]", ""),
         ("exudyn[formulation=contact,preset=default]", ""),
+        ("exudyn[formulation=spheres,preset=matched]", "proofroll's own contact forces at the start"),
+        ("exudyn[formulation=spheres,preset=default]", "own contact forces at the start"),
         ("mujoco[formulation=free,preset=default]", ""),
     ],
 )

@@ -62,6 +62,17 @@ def test_every_part_of_the_default_report_is_found_in_its_order(
         assert [other.head for other in found] == [part.head]
 
 
+def test_content_is_made_once_for_each_part(made: tuple[Outcome, Store]) -> None:
+    """What is written and shown is one content; a further part makes another, which has it."""
+    whole, (part, *_) = begun([made[0]], COMMAND), further()
+    before = whole.content
+    assert whole.content is before
+    whole.parts.append(part)
+    whole._put(part, part.entry())
+    assert [entry.name for entry in whole.content.further] == [part.asked.name]
+    assert not before.further
+
+
 def test_sections_answer_in_order(written_page: str, parse: Any) -> None:
     """What agrees, what to use, why; each section is there, has a heading and says something."""
     elements = parse(written_page)

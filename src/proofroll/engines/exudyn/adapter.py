@@ -120,9 +120,12 @@ class Exudyn:
     @staticmethod
     def caveat(settings: ExudynSettings) -> str:
         """See :class:`proofroll.core.engine_abilities.TellsCaveats`; a step that halves itself has no order."""
-        if settings.preset != "default" or settings.halvings:
-            return ""
-        return "Exudyn's adaptive step, which it has on by default, is off, so that the step is the one given"
+        caveats = []
+        if settings.preset == "default" and not settings.halvings:
+            caveats = ["Exudyn's adaptive step, which it has on by default, is off, so that the step is the one given"]
+        if settings.formulation == "spheres":
+            caveats.append("radii and softness of the spheres follow proofroll's own contact forces at the start")
+        return "; ".join(caveats)
 
     family = staticmethod(spheres.family)
 

@@ -113,9 +113,8 @@ class MujocoSettings:
     def order(self) -> int | None:
         """Measured order of convergence; :func:`lowered` has the capabilities of a scene that lower it.
 
-        A contact whose time constant does not shrink with the step is a smooth spring, which RK4 follows at its own
-        order (towards the limit of that spring, not of a hard contact). Other contacts of the chart, and contacts with
-        J̇v, are of order 2.
+        Of mechanisms it is 4 with RK4. A chart with a fixed time constant is a smooth spring, and its limit no hard
+        contact: RK4 has its order for turning bodies there. Other charts, and contacts with J̇v, have 2; all else has 1.
         """
         if self.formulation in OF_MECHANISMS:
             return 4 if self.integrator == "RK4" else 1

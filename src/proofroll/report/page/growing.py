@@ -3,7 +3,7 @@
 import json
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from functools import partial
+from functools import cached_property, partial
 from pathlib import Path
 
 from proofroll.core.errors import ProofrollError
@@ -44,9 +44,9 @@ class Report:
     _said: dict[int, PartEntry] = field(default_factory=dict)
     _lines: dict[int, Sequence[TableLine]] = field(default_factory=dict)
 
-    @property
+    @cached_property
     def content(self) -> ReportContent:
-        """Content of the report, with the further studies that have an entry so far."""
+        """Content of the report, with the further studies that have an entry so far; made anew after each."""
         said = [(part.key, self._said[id(part)]) for part in self.parts if id(part) in self._said]
         entries = {key: [entry for other, entry in said if other == key] for key in self.compared.entries}
         environment = self.compared.environment
@@ -103,6 +103,7 @@ class Report:
 
     def _put(self, part: Part, said: PartEntry) -> None:
         self._said[id(part)] = said
+        self.__dict__.pop("content", None)
         if said.study is not None:
             self._lines[id(part)] = part.lines()
             alike = [id(other) for other in self.parts if other.key == part.key]
