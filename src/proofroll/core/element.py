@@ -47,8 +47,8 @@ class StepNumber:
     """A dimensionless number of a step size that may explain where steps become too long.
 
     Attributes:
-        name: as claims write it.
-        symbol, meaning: for a person.
+        name: as claims write it, ``turn``.
+        symbol, meaning: for a person, ``Ωh``.
         value: None or 0 if it is unknown or does not exist.
     """
 

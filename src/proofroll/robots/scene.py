@@ -142,7 +142,7 @@ def _names(robot: Robot) -> dict[str, str]:
 def _joint(
     robot: Robot, joint: RobotJoint, names: Mapping[str, str], start: RobotStates, values: Mapping[str, float]
 ) -> dict[str, Any]:
-    """Table of a joint between the bodies of the scene to which its parent and its child belong."""
+    """Scene table of a joint; its ends are the scene's bodies, which may hold several links."""
     home, p, R = robot.welded[joint.parent]
     carrier = next((other.child for other in robot.moving if other.name == home), WORLD)
     table: dict[str, Any] = {"name": joint.name, "kind": joint.kind}

@@ -72,7 +72,10 @@ class TimeBudget:
             self._unfinished[self._group.get(case, 0)] += 1
 
     def begin(self, case: str, abreast: int) -> float:
-        """Time that a case may take while at most ``abreast`` cases run [s]; 0: it must not begin."""
+        """Registers the start of a case; returns the time that it may take [s], 0 if it must not begin.
+
+        ``abreast``: largest number of cases that run at once.
+        """
         group = self._group.get(case, 0)
         with self._lock:
             left = self._left()

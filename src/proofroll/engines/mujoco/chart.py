@@ -35,7 +35,7 @@ class Chart(Formulation):
 
     @staticmethod
     def write(spec: Any, body: RollingBall) -> None:
-        """Lays the joints along the two rigid motions that slide the surface along itself.
+        """Writes one joint for each of the two rigid motions that map the surface onto itself.
 
         Raises:
             Refused: the surface has no such motions, or the file's joints are of another kind.

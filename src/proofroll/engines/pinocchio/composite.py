@@ -156,7 +156,7 @@ class Composite(BallWithRows):
         return pin.forwardDynamics(self.model, data, torque, rows, drift)  # type: ignore[no-any-return]  # it is an array
 
     def normal_force(self, data: Any) -> float:
-        """See :class:`~proofroll.engines.pinocchio.ball_with_rows.BallWithRows`: forwardDynamics keeps the bias."""
+        """Normal force from the bias forces, which ``pin.forwardDynamics`` leaves in ``data``."""
         if self._own is not None:
             if data is not self._read:
                 # A view of Pinocchio's memory, looked up once: the look-up takes as long as the dynamics.

@@ -191,7 +191,7 @@ class Constraints:
 
 
 def _frames(axes: list[Array], places: list[Vector], com: Array) -> Array:
-    """Poses of ends in the axes of their bodies, from the centres of mass."""
+    """Pose (4x4) of each connection's end in its body's axes, relative to the centre of mass."""
     frames = np.zeros((len(axes), 4, 4))
     frames[:, :3, :3], frames[:, :3, 3], frames[:, 3, 3] = np.array(axes), np.array(places) - com, 1.0
     return frames

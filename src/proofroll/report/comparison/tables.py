@@ -28,7 +28,7 @@ def observables(content: ReportedComparison) -> dict[str, str]:
 
 
 def seconds_before(content: ReportedComparison) -> dict[int, float]:
-    """Longest time before the first step of each row [s]; empty unless one of them exceeds 10 s."""
+    """Number of each row -> longest time before its first step [s]; empty unless one of them exceeds 10 s."""
     longest: dict[int, float] = {}
     for run in content.runs:
         longest[run.row] = max(longest.get(run.row, 0.0), run.build_seconds or 0.0)

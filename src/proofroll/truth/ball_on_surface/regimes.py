@@ -45,11 +45,11 @@ def _carries(body: RollingBall, p_WB: FloatArray, v_WB: FloatArray) -> bool:
 
 
 def analytic_boundaries(body: RollingBall, speeds: FloatArray) -> tuple[FloatArray, FloatArray] | None:
-    """Boundaries in μ, each of shape (n,): the ball falls below the first and never slips above the second [1].
+    """Bounds on μ: with less than the first the ball falls, with more than the second it never slips.
 
-    Without rolling resistance, for initial ``speeds`` [m/s], shape (n,), by the closed form on a vertical cylinder with
-    a level start and no spin about the normal; None elsewhere. The friction needed is m g (1 - cos νt / (1 + κ)) with κ
-    = J/ma²: at most 12/7 of the weight of a homogeneous ball.
+    Each has the shape (n,) of the initial ``speeds`` [m/s]. None: there is no closed form, which needs a vertical
+    cylinder, a level start and no spin about the normal; it leaves out rolling resistance. The friction needed is m g
+    (1 - cos νt / (1 + κ)) with κ = J/ma²: at most 12/7 of the weight of a homogeneous ball.
     """
     surface = body.surface
     if not isinstance(surface, Cylinder):

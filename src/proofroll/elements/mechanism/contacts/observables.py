@@ -175,7 +175,7 @@ def residuals(
 
 
 def normal_forces(found: Followed, pressed: FloatArray) -> FloatArray:
-    """Normal force of each contact [N], shape (time, contacts); components that are tangential may be unknown (NaN)."""
+    """Normal force of each contact [N], shape (time, contacts); known from the normal component alone, others NaN."""
     along = np.abs(found.normal) > _AXIS
     return np.asarray(np.sum(np.where(along, pressed, 0.0) * found.normal, axis=-1))
 

@@ -151,7 +151,7 @@ class _Struck:
     "with a convex cone, a factor on one law of all pairs or a turned plane, velocities before impacts give all after",
 )
 def laws_of_impacts(evidence: Evidence) -> Iterator[Cause]:
-    """Hypotheses: impacts have friction or restitution with a factor, a convex cone, or a plane with another normal."""
+    """Hypotheses: an engine scales the friction or restitution of impacts, uses a convex cone, or turns a plane."""
     for touch in touch_of(evidence) if not evidence.by_step else ():
         mechanism, least = touch.mechanism, evidence.element.force
         true_presses = np.asarray(PRESSES * least < normal_forces(touch.true, touch.true_force))

@@ -48,7 +48,7 @@ class MechanismReport(ReportKind):
 
     @staticmethod
     def group(scene: Scene) -> str:
-        """Group of its hardest part: contact, switching joint laws, loops, springs and drives, or none (trees)."""
+        """Group of its hardest part: contact, switching joint laws, loops, springs and drives; else trees."""
         needs = the_mechanism(scene).requires
         if needs & _CONTACTS:
             return "contact"

@@ -144,7 +144,7 @@ def _outline(contact: BodyContact, placed: Placed) -> FloatArray:
 
 
 def _touching(contact: BodyContact) -> tuple[str, Vector, float]:
-    """Body of the shape that is no wall, its centre in that body's frame [m], and the sign of the force on it."""
+    """The contact's convex shape: its body, its centre there [m], and +1 if the force is the one on body a, else -1."""
     if isinstance(contact.shape_a, Wall):
         assert not isinstance(contact.shape_b, Wall)  # two walls are no contact
         body, shape, sign = contact.body_b, contact.shape_b, -1.0
