@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 from proofroll.files.json_data import plain
 from proofroll.robots.body_recursion import body_recursion
 from proofroll.robots.layers import RobotTruth
-from proofroll.robots.model import WORLD, Robot, RobotBody, RobotJoint
+from proofroll.robots.model import NO_BODY, Robot, RobotBody, RobotJoint
 from proofroll.robots.opening import open_robot
 from proofroll.robots.reading import robot_from, states_from
 from proofroll.robots.states import random_states
@@ -32,7 +32,7 @@ def _tree(base: str, seed: int, kinds: list[str] = KINDS) -> Robot:
         A = random.normal(size=(3, 3))
         bodies[name] = RobotBody(name, random.uniform(0.5, 2), random.normal(size=3), A @ A.T + 0.1 * np.eye(3))
         axis = random.normal(size=3)
-        parent = f"b{random.integers(index)}" if index else WORLD
+        parent = f"b{random.integers(index)}" if index else NO_BODY
         place, at = (np.zeros(3), np.zeros(3)) if free else random.normal(size=(2, 3))
         turn = np.eye(3) if free else np.asarray(Rotation.random(rng=random).as_matrix())
         axis /= np.linalg.norm(axis)
@@ -57,7 +57,7 @@ def test_pendulum() -> None:
     mass, length, moment, armature, q = 1.3, 0.7, 0.05, 0.2, 0.4
     rod = RobotBody("rod", mass, np.array([0.0, 0.0, -length]), np.diag([moment, moment, 0.001]))
     axis = np.array([0.0, 1.0, 0.0])
-    hinge = RobotJoint("hinge", "revolute", WORLD, "rod", np.zeros(3), np.eye(3), axis, armature=armature)
+    hinge = RobotJoint("hinge", "revolute", NO_BODY, "rod", np.zeros(3), np.eye(3), axis, armature=armature)
     robot = Robot("pendulum", {"rod": rod}, (hinge,))
     states = random_states(robot, 1, 0)
     states = dataclasses.replace(states, angle={"hinge": np.array([q])})

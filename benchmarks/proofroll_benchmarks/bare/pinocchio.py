@@ -22,7 +22,7 @@ from proofroll.elements.ball_on_surface.model import BallCapability, RollingBall
 from proofroll.elements.mechanism.joint import FACTS
 from proofroll.elements.mechanism.sampling import mechanism_of
 from proofroll.engines.pinocchio.constraint_dynamics import ConstraintDynamics
-from proofroll.engines.pinocchio.contact import UNBOUNDED_FRICTION
+from proofroll.engines.pinocchio.contact import LARGEST_FRICTION
 from proofroll.engines.pinocchio.mechanism_run import MechanismRun
 from proofroll.engines.pinocchio.plane_contact import PlaneContact
 from proofroll_benchmarks.bare import Bare, in_vertical_cylinder, is_mechanism
@@ -272,8 +272,8 @@ def _contact(body: RollingBall, settings: Any) -> Callable[[FloatArray], FloatAr
     """Velocity-level steps, each with the plane tangent to the cylinder at the ball."""
     a, c, dt, f = body.ball.radius, body.surface.length_scales[0], settings.dt, body.contact.rolling_resistance
     leapfrog, bounded = settings.integrator == "leapfrog", math.isfinite(body.contact.mu_static)
-    mu_s = body.contact.mu_static if bounded else UNBOUNDED_FRICTION["pgs"]
-    mu_k = body.contact.mu_kinetic if bounded else UNBOUNDED_FRICTION["pgs"]
+    mu_s = body.contact.mu_static if bounded else LARGEST_FRICTION["pgs"]
+    mu_k = body.contact.mu_kinetic if bounded else LARGEST_FRICTION["pgs"]
     known = PlaneContact(body, "pgs", settings.solver_tolerance)
     model, data, ball, inverse, point, point_data = (
         known.model, known.data, known.ball, known.inverse, known.point, known.point_data

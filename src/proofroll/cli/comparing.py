@@ -203,7 +203,7 @@ class _Comparing:
         """
         from proofroll.running.case import Status
 
-        place, awaited = self._places(phase), self._awaited(phase)
+        priority, awaited = self._priorities(phase), self._awaited(phase)
         postponed: list[Case] = []
 
         def arrived(case: Case, result: Result) -> None:
@@ -221,12 +221,12 @@ class _Comparing:
 
         cases = {case.key: case for _, items in phase for case in items if case.key not in self.results}
         # Cases beyond their comparison's share are tried again with the time that the others left.
-        self.runner.run(cases.values(), arrived_first if self.limit else arrived, self.limit, place)
-        self.runner.run(postponed, arrived, self.limit, place)
+        self.runner.run(cases.values(), arrived_first if self.limit else arrived, self.limit, priority)
+        self.runner.run(postponed, arrived, self.limit, priority)
         self._judge_ended(awaited, last=last)
 
-    def _places(self, phase: _Phase) -> dict[str, int]:
-        """Key of a case -> its place in the order of running: by comparison, truths first."""
+    def _priorities(self, phase: _Phase) -> dict[str, int]:
+        """Key of a case -> its priority: by comparison, truths first."""
         parts = reversed([*enumerate(phase)])
         return {case.key: 2 * number + (case.key not in self._truths) for number, (_, items) in parts for case in items}
 

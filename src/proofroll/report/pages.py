@@ -87,11 +87,11 @@ def addressed(html: str) -> str:
         own = re.search(r' id="([^"]*)"', parts["row"])
         of = re.search(r' data-of="([^"]*)"', parts["row"])
         name = f"{at['engine']} {of[1] if of else ''} {re.sub('<[^>]*>', '', parts['cell'])}"
-        place = ".".join(filter(None, (at["section"], slug(at["label"], _WORDS), slug(name, _WORDS) or "row")))
-        taken[place] += 1
-        place += f"-{taken[place]}" if taken[place] > 1 else ""
-        start = found[0] if own else f'<tr id="{place}"{parts["row"]}>{parts["cell"]}'
-        return f'{start}<a class="row" href="#{own[1] if own else place}" aria-label="link to this row"></a>'
+        address = ".".join(filter(None, (at["section"], slug(at["label"], _WORDS), slug(name, _WORDS) or "row")))
+        taken[address] += 1
+        address += f"-{taken[address]}" if taken[address] > 1 else ""
+        start = found[0] if own else f'<tr id="{address}"{parts["row"]}>{parts["cell"]}'
+        return f'{start}<a class="row" href="#{own[1] if own else address}" aria-label="link to this row"></a>'
 
     return _PLACES.sub(address, html)
 

@@ -5,7 +5,7 @@ M comes column by column. Source: Featherstone, Rigid Body Dynamics Algorithms, 
 
 import numpy as np
 
-from proofroll.robots.model import WORLD, Array, Robot, RobotBody, RobotJoint
+from proofroll.robots.model import NO_BODY, Array, Robot, RobotBody, RobotJoint
 from proofroll.robots.states import RobotStates
 from proofroll.robots.two_formulations import Dynamics, armature, skew, turned_armature, within
 
@@ -27,7 +27,7 @@ def newton_euler(robot: Robot, states: RobotStates, v: Array, a: Array, gravity:
     start = np.zeros((*v.shape[:2], 6))
     falling = start.copy()
     falling[..., 3:] = -gravity
-    velocity, acceleration, force = {WORLD: start}, {WORLD: falling}, {}
+    velocity, acceleration, force = {NO_BODY: start}, {NO_BODY: falling}, {}
     X, S = {}, {}
     for joint in robot.joints:
         r, R = within(joint, states)
@@ -52,7 +52,7 @@ def newton_euler(robot: Robot, states: RobotStates, v: Array, a: Array, gravity:
     for joint in reversed(robot.joints):
         if joint.dofs:
             torque[..., robot.columns[joint.name]] = force[joint.child] @ S[joint.child]
-        if joint.parent != WORLD:
+        if joint.parent != NO_BODY:
             force[joint.parent] = force[joint.parent] + force[joint.child] @ X[joint.child]
     return torque
 

@@ -14,7 +14,7 @@ from proofroll.core.arrays import slices
 
 Array = npt.NDArray[np.float64]
 # Parent of joints in the world. It is no name of a body or joint: many root links are called ``world``.
-WORLD = ""
+NO_BODY = ""
 # Relative violation of inertia's inequalities that counts as round-off of the file's digits.
 _ROUNDING = 1e-9
 # Degrees of freedom of each kind of joint.
@@ -64,7 +64,7 @@ class RobotJoint:
     Attributes:
         name: unique.
         kind: a key of :data:`DOFS`.
-        parent: a body, or :data:`WORLD`.
+        parent: a body, or :data:`NO_BODY`.
         child: a body.
         position: of the joint in the parent's frame [m], shape (3,); for a free joint, an offset of its coordinates.
         rotation: of the child's frame against the parent's at coordinate 0, shape (3, 3).
@@ -154,9 +154,9 @@ class Robot:
     def welded(self) -> dict[str, tuple[str, Array, Array]]:
         """Body -> moving joint that carries it, and its position and rotation in the frame of that joint's child.
 
-        A body that is fixed to the world has :data:`WORLD` instead of a joint.
+        A body that is fixed to the world has :data:`NO_BODY` instead of a joint.
         """
-        welded = {WORLD: (WORLD, np.zeros(3), np.eye(3))}
+        welded = {NO_BODY: (NO_BODY, np.zeros(3), np.eye(3))}
         for joint in self.joints:
             if joint.dofs:
                 welded[joint.child] = (joint.name, np.zeros(3), np.eye(3))
@@ -171,7 +171,7 @@ class Robot:
         """Moving joint -> composite of the bodies that it carries rigidly, in the frame of the joint's child."""
         parts: dict[str, list[tuple[RobotBody, Array, Array]]] = {joint.name: [] for joint in self.moving}
         for name, (home, p, R) in self.welded.items():
-            if home != WORLD:
+            if home != NO_BODY:
                 parts[home].append((self.bodies[name], p, R))
         return {name: composed(name, parts_of_joint) for name, parts_of_joint in parts.items()}
 

@@ -16,7 +16,7 @@ from proofroll.core.errors import InputError
 from proofroll.elements.mechanism.joint import LAWS
 from proofroll.elements.mechanism.rotations import to_rpy
 from proofroll.robots.meaning import opened, robot_of_text
-from proofroll.robots.model import WORLD, Array, Mimic, Robot, RobotJoint
+from proofroll.robots.model import NO_BODY, Array, Mimic, Robot, RobotJoint
 from proofroll.robots.motors import motors
 from proofroll.robots.opening import BASES
 from proofroll.robots.robot_file import RobotFile
@@ -144,9 +144,9 @@ def _joint(
 ) -> dict[str, Any]:
     """Scene table of a joint; its ends are the scene's bodies, which may hold several links."""
     home, p, R = robot.welded[joint.parent]
-    carrier = next((other.child for other in robot.moving if other.name == home), WORLD)
+    carrier = next((other.child for other in robot.moving if other.name == home), NO_BODY)
     table: dict[str, Any] = {"name": joint.name, "kind": joint.kind}
-    table |= {"parent": "world" if home == WORLD else names[carrier], "child": names[joint.child]}
+    table |= {"parent": "world" if home == NO_BODY else names[carrier], "child": names[joint.child]}
     table["child_position"] = joint.child_position.tolist()
     laws = {
         law: values[law] * getattr(joint, law) for law in _FACTORS if joint.kind in LAWS[law] and getattr(joint, law)

@@ -11,7 +11,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from proofroll.core.arrays import cross
-from proofroll.robots.model import WORLD, Array, Robot, RobotJoint
+from proofroll.robots.model import NO_BODY, Array, Robot, RobotJoint
 from proofroll.robots.states import RobotStates
 
 # Smallest eigenvalue of the scaled mass matrix that counts as nonzero: some 64 velocities times round-off.
@@ -81,7 +81,7 @@ Frames = dict[str, tuple[Array, Array]]
 
 def poses(robot: Robot, states: RobotStates) -> Frames:
     """Position of the origin and rotation of every body in the world, shapes (states, 3) and (states, 3, 3)."""
-    placed = {WORLD: (np.zeros((states.count, 3)), np.broadcast_to(np.eye(3), (states.count, 3, 3)))}
+    placed = {NO_BODY: (np.zeros((states.count, 3)), np.broadcast_to(np.eye(3), (states.count, 3, 3)))}
     for joint in robot.joints:
         p, R = placed[joint.parent]
         r, Q = within(joint, states)
@@ -121,11 +121,11 @@ def world_jacobians(robot: Robot, states: RobotStates, frames: Frames | None = N
     v = states.stacked(states.velocity, robot)
     frames = poses(robot, states) if frames is None else frames
     rest = np.zeros((count, 3))
-    motions = {WORLD: _Motion(np.zeros((count, 3, n)), np.zeros((count, 3, n)), rest, rest, rest)}
+    motions = {NO_BODY: _Motion(np.zeros((count, 3, n)), np.zeros((count, 3, n)), rest, rest, rest)}
     for joint in robot.joints:
         motions[joint.child] = _carried(robot, joint, motions[joint.parent], frames, v)
     M, g, c = np.zeros((count, n, n)), np.zeros((count, n)), np.zeros((count, n))
-    if motions.keys() - {WORLD}:
+    if motions.keys() - {NO_BODY}:
         bodies = [robot.bodies[joint.child] for joint in robot.joints]
         mass = np.array([body.mass for body in bodies])[:, None]
         R = np.array([frames[joint.child][1] for joint in robot.joints])  # (bodies, states, 3, 3)

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from proofroll.core.errors import InputError, choices, error_place
-from proofroll.robots.model import DOFS, WORLD, Array, Mimic, Robot, RobotBody, RobotJoint
+from proofroll.robots.model import DOFS, NO_BODY, Array, Mimic, Robot, RobotBody, RobotJoint
 from proofroll.robots.robot_file import LintRemark, RobotFile, numbers
 
 # Name of the joint between the world and the root link.
@@ -193,7 +193,7 @@ def _ordered(joints: list[RobotJoint], links: dict[str, Element], base: str) -> 
     for joint in joints:
         below.setdefault(joint.parent, []).append(joint)
     kind = "free" if base == "free" else "fixed"
-    parents_first = [RobotJoint(BASE_JOINT, kind, WORLD, roots[0], np.zeros(3), np.eye(3), np.array([0.0, 0.0, 1.0]))]
+    parents_first = [RobotJoint(BASE_JOINT, kind, NO_BODY, roots[0], np.zeros(3), np.eye(3), np.array([0.0, 0.0, 1.0]))]
     waiting = list(reversed(below.get(roots[0], [])))
     while waiting:
         parents_first.append(waiting.pop())

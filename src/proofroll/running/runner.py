@@ -75,7 +75,7 @@ class Runner:
         cases: Iterable[Case],
         progress: Callable[[Case, Result], None] | None = None,
         budget: TimeBudget | None = None,
-        place: Mapping[str, int] = MappingProxyType({}),
+        priority: Mapping[str, int] = MappingProxyType({}),
     ) -> dict[str, Result]:
         """Results of cases, by key.
 
@@ -83,7 +83,7 @@ class Runner:
             cases: those to be run.
             progress: called in this thread with each case and result as it arrives.
             budget: processor time of all cases; cases beyond it are left out.
-            place: see :meth:`follow`.
+            priority: see :meth:`follow`.
         """
 
         def no_more(case: Case, result: Result) -> tuple[()]:
@@ -91,14 +91,14 @@ class Runner:
                 progress(case, result)
             return ()
 
-        return self.follow(cases, no_more, budget, place)
+        return self.follow(cases, no_more, budget, priority)
 
     def follow(
         self,
         cases: Iterable[Case],
         then: Callable[[Case, Result], Iterable[Case]],
         budget: TimeBudget | None = None,
-        place: Mapping[str, int] = MappingProxyType({}),
+        priority: Mapping[str, int] = MappingProxyType({}),
     ) -> dict[str, Result]:
         """Results of cases as by :meth:`run`, where each result may lead to further cases, which begin at once.
 
@@ -106,12 +106,12 @@ class Runner:
             cases: the first ones.
             then: called in this thread as each result arrives; returns cases that have not been asked for yet.
             budget: processor time of cases on this machine; a cluster has none.
-            place: key of a case -> number; cases with a smaller number are all begun before others.
+            priority: key of a case -> number; cases with a smaller number are all begun before others.
         """
         results: dict[str, Result] = {}
         asked: set[str] = set()
         arrived: _Arrived = queue.SimpleQueue()
-        shared = WaitingCases(budget, place)
+        shared = WaitingCases(budget, priority)
         running = 0
         ready: deque[tuple[Case, Result]] = deque()
 

@@ -17,12 +17,12 @@ class WaitingCases:
 
     Args:
         budget: processor time of the cases, or None.
-        place: key of a case -> number, by default 0; cases with a smaller number are all begun before others.
+        priority: key of a case -> number, by default 0; cases with a smaller number are all begun before others.
     """
 
-    def __init__(self, budget: TimeBudget | None = None, place: Mapping[str, int] = MappingProxyType({})) -> None:
+    def __init__(self, budget: TimeBudget | None = None, priority: Mapping[str, int] = MappingProxyType({})) -> None:
         self.budget = budget
-        self._place = place
+        self._priority = priority
         self._changed = threading.Condition()
         self._by_engine: dict[int, dict[str, deque[Case]]] = {}
         self._begun: set[tuple[int, str]] = set()
@@ -33,7 +33,7 @@ class WaitingCases:
         if self.budget:
             self.budget.wait(case.key)
         with self._changed:
-            groups = self._by_engine.setdefault(self._place.get(case.key, 0), {})
+            groups = self._by_engine.setdefault(self._priority.get(case.key, 0), {})
             groups.setdefault(case.engine.name, deque()).append(case)
             self._changed.notify()
 
@@ -51,7 +51,7 @@ class WaitingCases:
         """
         with self._changed:
             while not self._closed:
-                at = min((place for place, groups in self._by_engine.items() if any(groups.values())), default=None)
+                at = min((number for number, groups in self._by_engine.items() if any(groups.values())), default=None)
                 if at is not None:
                     groups = self._by_engine[at]
                     group = groups.get(engine or "")

@@ -15,7 +15,7 @@ def case(key: str, engine: str) -> Any:
 
 def test_earlier_places_come_first_and_a_worker_keeps_its_engine_within_one() -> None:
     """All cases of the first place are begun before any of the second, those of a worker's engine first."""
-    waiting = WaitingCases(place={"a1": 0, "b1": 0, "a2": 0, "a3": 1, "b2": 1})
+    waiting = WaitingCases(priority={"a1": 0, "b1": 0, "a2": 0, "a3": 1, "b2": 1})
     for key in ("a3", "b2", "a1", "b1", "a2"):
         waiting.add(case(key, key[0]))
     taken = [waiting.take("a"), waiting.take("a"), waiting.take("a"), waiting.take("b"), waiting.take("b")]

@@ -18,7 +18,7 @@ NEARBY = 0.05  # rad or m: far enough from a singular start to see the rank that
 # A pose counts as singular if the least singular value of its rows, relative to the usual one, is below this. It is
 # the root of 1e-9: a length changed by 1e-9 of itself makes such a pose singular, and no file is surer of a length.
 BRANCHES = 3e-5
-State = TypeVar("State")
+Start = TypeVar("Start")
 _FOLLOWED = 0.3  # least determinant between bases of a space at two poses; 1: unchanged, 0: a direction left it
 _ZERO = 1e-9  # relative: a component of a null vector that is zero but for round-off
 
@@ -181,8 +181,8 @@ def reactions(tree: Tree, motion: BodyMotion, rows: Rows, multipliers: Array, lo
 
 
 def general_place(
-    start: State, rows: Callable[[State], tuple[Array, Array]], moved: Callable[[State, Array], State]
-) -> State:
+    start: Start, rows: Callable[[Start], tuple[Array, Array]], moved: Callable[[Start, Array], Start]
+) -> Start:
     """State near the start that fulfils the constraints and is in no special position; a start may be a singular pose.
 
     Args:

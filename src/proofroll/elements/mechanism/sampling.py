@@ -9,7 +9,7 @@ import numpy as np
 from proofroll.core.engine import Regularised, Sample
 from proofroll.core.errors import Refused
 from proofroll.elements.mechanism import joint
-from proofroll.elements.mechanism.analysis import State, general_place
+from proofroll.elements.mechanism.analysis import Start, general_place
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.rotations import Array
 
@@ -117,7 +117,7 @@ def row_rank(rows: Array) -> int:
 
 
 def independent_anywhere(
-    start: State, rows: Callable[[State], tuple[Array, Array]], moved: Callable[[State, Array], State]
+    start: Start, rows: Callable[[Start], tuple[Array, Array]], moved: Callable[[Start, Array], Start]
 ) -> int:
     """Number of independent constraint rows at the start or, where it is larger, at a :func:`general_place` near it."""
     near = general_place(start, rows, moved)

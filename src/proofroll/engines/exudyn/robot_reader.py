@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 from proofroll.core.errors import Refused
 from proofroll.engines.exudyn.integration import new_system
 from proofroll.engines.exudyn.native import Output, add_kinematic_tree, exu, items, new_settings
-from proofroll.robots.model import WORLD, Array, RobotJoint
+from proofroll.robots.model import NO_BODY, Array, RobotJoint
 from proofroll.robots.protocol import AtState, Reading, Request, evaluate
 
 # Exudyn's joint type and axis of each link that stands for a joint.
@@ -126,7 +126,7 @@ class _Tree:
         parent = -1
         if joint.kind == "free":  # its coordinates are relative to the world, whatever its parent is
             position, rotation = np.zeros(3), np.eye(3)
-        elif home != WORLD:
+        elif home != NO_BODY:
             parent = self.link[home]
             before = next(other for other in robot.moving if other.name == home)
             B = self.turn[home]

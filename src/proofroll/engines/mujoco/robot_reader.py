@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from proofroll.core.errors import Refused
 from proofroll.engines.mujoco.running import mass_matrix, written
-from proofroll.robots.model import WORLD, Array, Mimic, Robot, RobotBody, RobotJoint, composed
+from proofroll.robots.model import NO_BODY, Array, Mimic, Robot, RobotBody, RobotJoint, composed
 from proofroll.robots.protocol import AtState, Reading, Request, Whole, evaluate
 
 # Springs and dampers; MuJoCo up to 3.3 has one flag for both.
@@ -207,7 +207,7 @@ def robot_of(model: Any) -> Robot:
         raise Refused("a tendon has armature, which the check does not cover")
     if any(np.any(getattr(model, f"{name}poly", 0)) for name in ("jnt_stiffness", "dof_damping")):
         raise Refused("a joint has a spring or damper that is not linear, which the check does not cover")
-    names = [WORLD, *(model.body(index).name for index in range(1, model.nbody))]
+    names = [NO_BODY, *(model.body(index).name for index in range(1, model.nbody))]
     bodies: dict[str, RobotBody] = {}
     joints: list[RobotJoint] = []
     driven = {int(model.actuator_trnid[index, 0]) for index in range(model.nu) if model.actuator_trntype[index] == 0}

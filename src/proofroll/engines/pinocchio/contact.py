@@ -30,7 +30,7 @@ from proofroll.engines.pinocchio.plane_contact import PlaneContact
 from proofroll.engines.pinocchio.settings import PinocchioSettings
 
 # Pinocchio's cone needs a number for unbounded friction. PGS accepts any; the iterations of ADMM grow with it.
-UNBOUNDED_FRICTION = {"pgs": 1e6, "admm": 1e2}
+LARGEST_FRICTION = {"pgs": 1e6, "admm": 1e2}
 # Ratio of friction to its bound above which an impulse lies on the cone [1].
 _ON_CONE = 1 - 1e-9
 # Normal impulse, relative to that of gravity, that is round-off of the gap: the wall does not press.
@@ -97,7 +97,7 @@ class ContactSteps:
         self._lever = 0.5 * self.dt * body.ball.radius
         self._faint = _FAINT * body.ball.mass * float(np.linalg.norm(body.gravity)) * self.dt
         self.bounded = math.isfinite(body.contact.mu_static)
-        unbounded = UNBOUNDED_FRICTION[self.solver]
+        unbounded = LARGEST_FRICTION[self.solver]
         self.mu_static = body.contact.mu_static if self.bounded else unbounded
         self.mu_kinetic = body.contact.mu_kinetic if self.bounded else unbounded
 
@@ -306,7 +306,7 @@ class ContactRun(ContactSteps):
             regularised=_softened(self._body, self),
             terms=terms_held(
                 resists=lever,
-                slips=contact.friction(self.mu_static) != UNBOUNDED_FRICTION[self.solver],
+                slips=contact.friction(self.mu_static) != LARGEST_FRICTION[self.solver],
                 turns=contact.model.joints[contact.ball].nq == QUATERNION,
             ),
         )

@@ -7,7 +7,7 @@ from scipy.optimize import linear_sum_assignment
 from scipy.spatial.transform import Rotation
 
 from proofroll.robots.hypotheses import RobotEvidence, hypothesis
-from proofroll.robots.model import WORLD, Array, Robot, RobotBody
+from proofroll.robots.model import NO_BODY, Array, Robot, RobotBody
 
 
 def _moments(inertia: Array) -> Array:
@@ -72,7 +72,7 @@ def _misplaced(evidence: RobotEvidence, *, turned: bool) -> Robot | None:
     for joint in robot.joints:
         home, p, R = robot.welded[joint.child]
         body = robot.bodies[joint.child]
-        if joint.dofs or home == WORLD or not body.mass:
+        if joint.dofs or home == NO_BODY or not body.mass:
             continue
         source = robot.sources.get(joint.child, {})
         moments, Q = _principal(np.array(source.get("written", body.inertia)))

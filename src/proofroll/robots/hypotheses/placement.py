@@ -7,7 +7,7 @@ from xml.etree.ElementTree import Element
 import numpy as np
 
 from proofroll.robots.hypotheses import RobotEvidence, hypothesis
-from proofroll.robots.model import WORLD, Robot, RobotBody, RobotJoint
+from proofroll.robots.model import NO_BODY, Robot, RobotBody, RobotJoint
 
 
 @hypothesis({"drake": "1.51.1"}, "give each further joint a body of its own without mass")
@@ -50,10 +50,10 @@ def default_gravity(evidence: RobotEvidence) -> Robot | None:
 )
 def first_tree_only(evidence: RobotEvidence) -> Robot | None:
     """Only the first tree under the world is read."""
-    robot, kept = evidence.robot, {WORLD}
+    robot, kept = evidence.robot, {NO_BODY}
     joints: list[RobotJoint] = []
     for joint in robot.joints:
-        if joint.parent in kept and not (joint.parent == WORLD and joints):
+        if joint.parent in kept and not (joint.parent == NO_BODY and joints):
             kept.add(joint.child)
             joints.append(joint)
     return _with_joints(robot, joints) if len(joints) < len(robot.joints) else None
@@ -104,7 +104,7 @@ def tree_read_again(evidence: RobotEvidence) -> Robot | None:
         for again in (f"{name} ({number})" for number in range(2, times + 1)):
             bodies[again] = RobotBody(again, 0.0, np.zeros(3), np.zeros((3, 3)))
             kept = joint.armature if _one_of_several(joint, robot) else 0.0
-            joints.append(dataclasses.replace(joint, name=again, parent=WORLD, child=again, armature=kept))
+            joints.append(dataclasses.replace(joint, name=again, parent=NO_BODY, child=again, armature=kept))
     return robot.change(bodies=bodies, joints=tuple(joints))
 
 
