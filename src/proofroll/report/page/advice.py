@@ -169,7 +169,7 @@ def _engines(
 
 def _standing(cell: ChoiceCell) -> tuple[float, float, int]:
     held = math.isfinite(cell.cost)
-    return cell.lacking if held else math.inf, cell.cost, SEVERITY.index(cell.state)
+    return cell.absent if held else math.inf, cell.cost, SEVERITY.index(cell.state)
 
 
 def _named(name: str, cell: ChoiceCell) -> str:

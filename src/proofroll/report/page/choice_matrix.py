@@ -52,6 +52,7 @@ class ChoiceCell(NamedTuple):
         name: setting and step; for several scenes the ones that they share, or empty.
         why: short reason why the tolerance is not held; empty: it is.
         scenes, lacking: numbers of the column's scenes in which it was judged, and of those in which only others were.
+        absent: number of the latter without a run of it, as it may be unable to represent them; others were left out.
     """
 
     state: str
@@ -63,6 +64,7 @@ class ChoiceCell(NamedTuple):
     why: str = ""
     scenes: int = 1
     lacking: int = 0
+    absent: int = 0
 
     @property
     def share(self) -> str:
@@ -142,7 +144,7 @@ class ChoiceMatrix:
         if not cells:
             return ChoiceCell(NOT_RUN, "", "not run")
         lacking = self.judged[forces].intersection(column.studies).difference(known)
-        return _joined(cells)._replace(scenes=len(cells), lacking=len(lacking))
+        return _joined(cells)._replace(scenes=len(cells), lacking=len(lacking), absent=len(lacking - row.found.keys()))
 
     @cached_property
     def judged(self) -> tuple[set[str], set[str]]:
@@ -166,12 +168,13 @@ class ChoiceMatrix:
     def ranked(self, column: ChoiceColumn, tolerance: float, forces: bool) -> list[tuple[int, ChoiceCell]]:
         """Formulations that hold a tolerance: number of the row, and its cell.
 
-        Those that were judged in the most scenes come first, for scenes differ in cost, and of these the cheapest.
+        Those with runs in the most scenes come first, for scenes differ in cost, and of these the cheapest. What was
+        left out, say for lack of time, does not count here.
         """
         rows = [(place, row) for place, row in enumerate(self.rows) if row.is_model]
         cells = [(place, self.cell(row, column, tolerance, forces)) for place, row in rows]
         held = [item for item in cells if math.isfinite(item[1].cost)]
-        return sorted(held, key=lambda item: (item[1].lacking, item[1].cost))
+        return sorted(held, key=lambda item: (item[1].absent, item[1].cost))
 
     def best(self, tolerance: float, forces: bool) -> list[int | None]:
         """Number of the row of each column's cheapest formulation; None where none holds the tolerance."""

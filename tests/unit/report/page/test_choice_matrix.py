@@ -218,6 +218,9 @@ def test_a_formulation_of_all_scenes_comes_before_a_cheaper_one_of_some() -> Non
     assert "alpha joints default at dt 1e-3 s for trees (2)" in found.answer(1e-4, False)
     told = of_column(found, whole, 1e-4, False).sentence
     assert "; beta joints default at dt 1e-3 s in 1 of 2 scenes costs 0.05 times that." in told
+    late = line(engine="beta", row=3, study="chain", status="left out", verdict="not-judged", error=None, cost=None)
+    unfinished = choice_matrix([*both, line(engine="beta", row=3, error=1e-9, cost=0.1), late], STUDIES)
+    assert "(0.1 in 1 of 2 scenes)" in unfinished.answer(1e-4, False), "lack of time makes no other engine cheaper"
     alone = replace(found, rows=[row for row in found.rows if row.engine == "beta"])
     vars(alone)["judged"] = found.judged
     assert "(0.1 in 1 of 2 scenes)" in alone.answer(1e-4, False), "the only one of the chosen engines"
