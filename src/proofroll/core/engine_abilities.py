@@ -37,6 +37,11 @@ class Level(StrEnum):
     FACETS = "faceted wall"
 
 
+def by_hand(level: str | None) -> bool:
+    """True if a rung of the ladder solves equations derived by hand for the scene, which are no engine's model."""
+    return level in {Level.CLOSED_FORM, Level.REDUCED, Level.PROJECTION}
+
+
 @dataclass(frozen=True)
 class Term:
     """A part of a model that a setting switches on and off.

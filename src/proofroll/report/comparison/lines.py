@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
 
+from proofroll.core.engine_abilities import by_hand
 from proofroll.core.verdict import Judgement, Verdict
 from proofroll.report.comparison.records import Cost, rough_cost
 from proofroll.report.comparison.summary import facts_of
@@ -12,7 +13,6 @@ from proofroll.report.long_table import TableLine, setting_columns
 from proofroll.running.case import Result, Status
 from proofroll.studies.comparison.outcome import LadderRun, Outcome, Run
 from proofroll.studies.comparison.planning import point_name
-from proofroll.studies.tradeoff.recommend import by_hand
 
 # Fields of a line about a ladder of steps, which only the step at which a comparison judges has.
 _NO_LIMIT: dict[str, Any] = dict.fromkeys(("order", "limit_error", "limit_error_bar", "limit_doubt"))

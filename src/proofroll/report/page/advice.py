@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from proofroll.core.number_format import counted, number
 from proofroll.core.verdict import Verdict
-from proofroll.report.page.choice_matrix import ASKED, NOT_RUN, SEVERITY, ChoiceCell, ChoiceColumn, ChoiceMatrix
+from proofroll.report.page.choice_matrix import ASKED, NO_RUN, SEVERITY, ChoiceCell, ChoiceColumn, ChoiceMatrix
 
 NOTHING = "nothing that was run and timed holds it"
 NOT_REACHED = "no run could be judged, for lack of time or of a truth"
@@ -150,7 +150,7 @@ def _unjudged(matrix: ChoiceMatrix, column: ChoiceColumn, forces: bool) -> bool:
 def _was_judged(matrix: ChoiceMatrix, column: ChoiceColumn, tolerance: float, forces: bool) -> bool:
     """False if every formulation was left out there, say for lack of time."""
     cells = (matrix.cell(row, column, tolerance, forces) for row in matrix.models)
-    return any(cell.state not in {NOT_RUN, Verdict.NOT_JUDGED} for cell in cells)
+    return any(cell.state not in {NO_RUN, Verdict.NOT_JUDGED} for cell in cells)
 
 
 def _engines(

@@ -4,10 +4,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import groupby
 
+from proofroll.core.convergence import envelope
 from proofroll.core.verdict import LimitResult, Verdict
 from proofroll.report.labels import step
 from proofroll.report.long_table import TableLine
-from proofroll.studies.tradeoff.pareto import envelope
 
 # Results of a ladder of steps, from the most to the least promising.
 _LIMITS = (LimitResult.WITHIN, LimitResult.NO_LADDER, LimitResult.NOT_SHOWN, LimitResult.ANOTHER)
@@ -145,7 +145,7 @@ def _blame(judged: dict[str, list[TableLine]]) -> tuple[Verdict | None, str]:
 def held_tolerances(lines: Sequence[TableLine]) -> dict[TableLine, float]:
     """Smallest tolerance that each line's run holds without luck, relative to the quantity's size.
 
-    The rule is that of the trade-off (:func:`proofroll.studies.tradeoff.pareto.envelope`) and that of a verdict: a
+    The rule is that of the trade-off (:func:`proofroll.core.convergence.envelope`) and that of a verdict: a
     limit of small steps that is beyond the tolerance by more than its doubts outweighs agreement at one step.
     """
 

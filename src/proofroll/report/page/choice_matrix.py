@@ -28,7 +28,7 @@ WITH_FORCES = "With forces to {0} of the largest, too"
 SAME = "the same for"
 NOTHING = "nothing that was run and timed holds it for"
 UNJUDGED = "that is judged in no scene that was run"
-NOT_RUN = "none"
+NO_RUN = "none"
 SEVERITY = list(map(str, Verdict))
 # Number of groups beside which scenes find room on a screen of 1400 px.
 FEW = 5
@@ -142,7 +142,7 @@ class ChoiceMatrix:
         known = [name for name in judged if any(item.blame != Verdict.NOT_JUDGED for item in row.found[name])]
         cells = [(self.titles[name], _cell(row.found[name], tolerance, forces)) for name in known or judged]
         if not cells:
-            return ChoiceCell(NOT_RUN, "", "not run")
+            return ChoiceCell(NO_RUN, "", "not run")
         lacking = self.judged[forces].intersection(column.studies).difference(known)
         return _joined(cells)._replace(scenes=len(cells), lacking=len(lacking), absent=len(lacking - row.found.keys()))
 

@@ -9,6 +9,7 @@ from typing import Any, ClassVar
 
 from proofroll.core.comparison import Tolerance
 from proofroll.core.convergence import floor_text
+from proofroll.core.engine_abilities import by_hand
 from proofroll.core.number_format import counted
 from proofroll.core.verdict import LimitResult
 from proofroll.files.json_data import MERGED
@@ -23,7 +24,7 @@ from proofroll.studies.claim_judgement import ClaimJudgement
 from proofroll.studies.comparison.planning import point_name
 from proofroll.studies.study_store import valid_study
 from proofroll.studies.tradeoff.claims import STUDY, TradeoffClaims, load_claims
-from proofroll.studies.tradeoff.recommend import Answer, by_hand, recommend
+from proofroll.studies.tradeoff.recommend import Answer, recommend
 from proofroll.studies.tradeoff.records import CurveBudget, TradeoffStudy
 from proofroll.studies.tradeoff.requirements import Requirements
 from proofroll.studies.tradeoff.study import make_tradeoff

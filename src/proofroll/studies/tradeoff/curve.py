@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from proofroll.core.arrays import FloatArray, largest_difference
-from proofroll.core.convergence import is_floor
+from proofroll.core.convergence import envelope, is_floor
 from proofroll.core.dataset import BETWEEN
 from proofroll.core.limits import STUDY_TIME_LIMIT
 from proofroll.core.scene import Scene
@@ -23,7 +23,6 @@ from proofroll.running.timing import Timing
 from proofroll.studies.cases import case_of
 from proofroll.studies.judging import run_values
 from proofroll.studies.judging.reference import Reference
-from proofroll.studies.tradeoff.pareto import envelope
 from proofroll.studies.tradeoff.records import Corner
 
 if TYPE_CHECKING:
@@ -177,7 +176,7 @@ class Curve:
         return {point.step for point in self.points} | self.dropped.keys()
 
     def envelope(self, quantity: str) -> list[float]:
-        """Envelope of the points' errors, see :func:`proofroll.studies.tradeoff.pareto.envelope`.
+        """Envelope of the points' errors, see :func:`proofroll.core.convergence.envelope`.
 
         Errors at steps below the best one, which grow by round-off in single precision, do not count against larger
         steps.

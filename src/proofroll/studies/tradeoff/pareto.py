@@ -5,27 +5,6 @@ from typing import TypeVar
 
 _Item = TypeVar("_Item")
 
-# Number of finer runs that must not be worse; the error of a single one may cancel by chance, too.
-_NEIGHBOURS = 2
-
-
-def envelope(errors: Sequence[float], floor: int | None = None) -> list[float]:
-    """Largest error of each run and of the next two finer ones that have a result; coarse first.
-
-    So a coarse run whose error cancels by chance does not count as accurate. Only the next runs matter: round-off that
-    grows at much smaller steps does not make a coarse run worse.
-
-    Args:
-        errors: coarse first; inf: no result.
-        floor: number of the run at the error floor of single precision; finer runs do not count. None: no floor.
-    """
-    last = len(errors) if floor is None else floor + 1
-    largest = []
-    for index, error in enumerate(errors[:last]):
-        finer = [other for other in errors[index + 1 : last] if other != float("inf")][:_NEIGHBOURS]
-        largest.append(max([error, *finer]))
-    return [*largest, *errors[last:]]
-
 
 def costs_overlap(one: Sequence[float] | None, other: Sequence[float] | None) -> bool:
     """True if the intervals (low, high) of two costs overlap; False if one is missing."""

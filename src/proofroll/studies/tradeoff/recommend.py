@@ -4,7 +4,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from proofroll.core.engine_abilities import Level
+from proofroll.core.engine_abilities import by_hand
 from proofroll.core.errors import InputError
 from proofroll.core.plugins import parse_engine
 from proofroll.files.json_data import MERGED, OPTIONAL
@@ -18,13 +18,6 @@ _OF_A_POINT = (
     "engine", "settings", "resolution", "step", "level", "seconds_per_second", "interval", "confidence", "measurements",
 )  # fmt: skip
 _CLOSEST = "the most accurate that was measured, nothing beyond is guessed"
-# Rungs of the ladder with equations derived for the scene by hand, which are not engines' models.
-_BY_HAND = frozenset({Level.CLOSED_FORM, Level.REDUCED, Level.PROJECTION})
-
-
-def by_hand(level: str | None) -> bool:
-    """True if a rung of the ladder solves equations derived by hand for the scene."""
-    return level in set(_BY_HAND)
 
 
 @dataclass(frozen=True)

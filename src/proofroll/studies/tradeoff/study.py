@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from proofroll.core.convergence import floor_text
+from proofroll.core.engine_abilities import by_hand
 from proofroll.core.number_format import counted, number
 from proofroll.core.observable import Role
 from proofroll.files.json_data import plain, record
@@ -21,7 +22,6 @@ from proofroll.studies.tradeoff.claims import TradeoffClaims
 from proofroll.studies.tradeoff.curve import Curve, CurvePoint, Question
 from proofroll.studies.tradeoff.error_budget import budget
 from proofroll.studies.tradeoff.pareto import front
-from proofroll.studies.tradeoff.recommend import by_hand
 from proofroll.studies.tradeoff.records import (
     CurveBudget,
     DroppedStep,

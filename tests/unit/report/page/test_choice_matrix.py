@@ -13,7 +13,7 @@ from table_lines import ARM, FINER, FORCE, LINE, line
 from proofroll.core.verdict import Verdict
 from proofroll.report.long_table import TableLine
 from proofroll.report.page.advice import of_column
-from proofroll.report.page.choice_matrix import DECADES, NOT_RUN, ChoiceCell, ChoiceMatrix, ChoiceStudy, choice_matrix
+from proofroll.report.page.choice_matrix import DECADES, NO_RUN, ChoiceCell, ChoiceMatrix, ChoiceStudy, choice_matrix
 
 STUDIES = {
     "arm": ChoiceStudy("An arm", "c0", {(0, ""): "c0.joints", (0, "mass=2"): "c0.joints.mass-2"}),
@@ -242,7 +242,7 @@ def test_what_was_not_run_is_empty(whole: ChoiceMatrix) -> None:
     """An engine that was not asked for a scene has a cell that says so."""
     row = next(item for item in whole.rows if item.engine == "beta")
     column = next(item for item in whole.columns if item.group == "ball rolling")
-    assert whole.cell(row, column, 1e-4, False) == ChoiceCell(NOT_RUN, "", "not run")
+    assert whole.cell(row, column, 1e-4, False) == ChoiceCell(NO_RUN, "", "not run")
 
 
 @pytest.fixture

@@ -7,7 +7,8 @@ import math
 from hypothesis import given
 from hypothesis import strategies as st
 
-from proofroll.studies.tradeoff.pareto import costs_overlap, envelope, front
+from proofroll.core.convergence import envelope
+from proofroll.studies.tradeoff.pareto import costs_overlap, front
 
 NUMBERS = st.floats(min_value=1e-12, max_value=1e6)
 

@@ -9,11 +9,12 @@ import pytest
 from invented import invented_budget, invented_study, measured_point, timed
 
 from proofroll.core.comparison import Tolerance
+from proofroll.core.engine_abilities import by_hand
 from proofroll.core.errors import InputError
 from proofroll.core.plugins import load_engine
 from proofroll.files.json_data import plain
 from proofroll.report.tradeoff.tables import answer_lines, corner_table, default_quantities, front_tables
-from proofroll.studies.tradeoff.recommend import by_hand, covers
+from proofroll.studies.tradeoff.recommend import covers
 from proofroll.studies.tradeoff.recommend import recommend as recommended
 from proofroll.studies.tradeoff.records import Corner, MeasuredPoint, MeasuredQuantity, SparseRun, TradeoffStudy
 from proofroll.studies.tradeoff.requirements import Requirements
