@@ -86,7 +86,7 @@ class Pace(NamedTuple):
         return _SETTLED * self.speed
 
 
-class ContactMode(ABC):
+class BallMode(ABC):
     """One mode of contact: its own state y and equations, and the margins that end it.
 
     Attributes:
@@ -128,7 +128,7 @@ def time_left(size: float, growth: float) -> float:
 _CLEAR = 0.25
 
 
-class _Held(ContactMode):
+class _Held(BallMode):
     """Base of the modes with active rows."""
 
     sticking = True
@@ -137,19 +137,19 @@ class _Held(ContactMode):
         self._ball, self._friction = ball, friction
 
     def rates(self, y: FloatArray) -> FloatArray:
-        """See :class:`ContactMode`."""
+        """See :class:`BallMode`."""
         return self._ball.rates(y)
 
     def x(self, y: FloatArray) -> FloatArray:
-        """See :class:`ContactMode`."""
+        """See :class:`BallMode`."""
         return y
 
     def eliminated(self, y: FloatArray) -> FloatArray:
-        """See :class:`ContactMode`."""
+        """See :class:`BallMode`."""
         return self._ball.eliminated(y)
 
     def force(self, y: FloatArray) -> FloatArray:
-        """See :class:`ContactMode`."""
+        """See :class:`BallMode`."""
         return self._ball.contact_force(self._ball.response_at(y))
 
 
@@ -164,7 +164,7 @@ class Stick(_Held):
         self.exits = (*((Exit.CONE,) if friction.bounded else ()), *((Exit.HALT,) if self.halts else ()))
 
     def survey(self, y: FloatArray) -> Survey:
-        """See :class:`ContactMode`. Rolling resistance shortens steps towards the point where the centre stops."""
+        """See :class:`BallMode`. Rolling resistance shortens steps towards the point where the centre stops."""
         kin, trend = self._ball.kinematics(y), 0.0
         response = self._ball.response(kin)
         cone: tuple[float, ...] = ()
@@ -226,7 +226,7 @@ class Rest(_Held):
         return ball.eliminated(result)
 
     def survey(self, y: FloatArray) -> Survey:  # noqa: ARG002 -- nothing changes any more
-        """See :class:`ContactMode`."""
+        """See :class:`BallMode`."""
         return Survey(())
 
 
@@ -237,7 +237,7 @@ START = 1e-3
 _DYING = 0.25
 
 
-class _Slip(ContactMode):
+class _Slip(BallMode):
     """Base of both descriptions of slip; a state is x and ``size`` components of the slip."""
 
     sticking = False
@@ -251,11 +251,11 @@ class _Slip(ContactMode):
         """Equations solved for the slip at y."""
 
     def x(self, y: FloatArray) -> FloatArray:
-        """See :class:`ContactMode`."""
+        """See :class:`BallMode`."""
         return y[: -self.size]
 
     def force(self, y: FloatArray) -> FloatArray:
-        """See :class:`ContactMode`."""
+        """See :class:`BallMode`."""
         return self._ball.contact_force(self.look(y).response)
 
 
@@ -288,17 +288,17 @@ class SlavedSlip(_Slip):
         return min(span, 0.1 * math.hypot(*kin.v[1:3]) / (math.hypot(*sliding.response.rate[1:3]) or 1.0))
 
     def rates(self, y: FloatArray) -> FloatArray:
-        """See :class:`ContactMode`."""
+        """See :class:`BallMode`."""
         sliding = self.look(y)
         return np.append(self._ball.derivative(sliding.kin, sliding.response), sliding.growth)
 
     def eliminated(self, y: FloatArray) -> FloatArray:
-        """See :class:`ContactMode`."""
+        """See :class:`BallMode`."""
         (d2, d3), rho = self.look(y).direction, float(y[-1])
         return np.append(self._friction.rolling.eliminated(y[:-1], (rho * d2, rho * d3)), rho)
 
     def survey(self, y: FloatArray) -> Survey:
-        """See :class:`ContactMode`."""
+        """See :class:`BallMode`."""
         sliding, rho = self.look(y), float(y[-1])
         slow = START * self._pace.time * sliding.strength - rho
         dying = sliding.growth + _DYING * sliding.strength
@@ -325,19 +325,19 @@ class FreeSlip(_Slip):
         return self._friction.slide(self._ball.kinematics(y[:-2]), along(float(y[-1])))
 
     def rates(self, y: FloatArray) -> FloatArray:
-        """See :class:`ContactMode`."""
+        """See :class:`BallMode`."""
         sliding = self.look(y)
         rate = self._ball.derivative(sliding.kin, sliding.response)
         return np.concatenate([rate, [sliding.growth, sliding.across / float(y[-2])]])
 
     def eliminated(self, y: FloatArray) -> FloatArray:
-        """See :class:`ContactMode`."""
+        """See :class:`BallMode`."""
         (d2, d3), rho = along(float(y[-1])), float(y[-2])
         x = self._friction.rolling.eliminated(y[:-2], (rho * d2, rho * d3))
         return np.concatenate([x, y[-2:]])
 
     def survey(self, y: FloatArray) -> Survey:
-        """See :class:`ContactMode`. The stiff direction limits steps so that the method stays stable."""
+        """See :class:`BallMode`. The stiff direction limits steps so that the method stays stable."""
         sliding, rho = self.look(y), float(y[-2])
         N, span = sliding.response.N, DIFFERENCE * self._pace.time
         ahead = self._ball.kinematics(y[:-2] + span * self._ball.derivative(sliding.kin, sliding.response))

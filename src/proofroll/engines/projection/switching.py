@@ -15,7 +15,7 @@ from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.engines.projection.alternating import WITHOUT_PROGRESS
 from proofroll.engines.projection.friction import Friction
 from proofroll.engines.projection.method import ProjectedBall
-from proofroll.engines.projection.modes import ContactMode, Exit, FreeSlip, Pace, Rest, SlavedSlip, Stick, Survey
+from proofroll.engines.projection.modes import BallMode, Exit, FreeSlip, Pace, Rest, SlavedSlip, Stick, Survey
 
 # Accuracy of located times, relative to the time scale of the motion; at least the round-off of the time.
 _LOCATED = 1e-12
@@ -66,7 +66,7 @@ class Switching:
         self._slaved, self._free = SlavedSlip(friction, pace), FreeSlip(friction, pace)
         self._idle = 0
         self._lost: str | None = None
-        self.mode: ContactMode = self._stick
+        self.mode: BallMode = self._stick
         self._survey = Survey(())
         if not np.any(body.slip0):
             self._settle(0.0, 0.0, x, was_sticking=True)
@@ -126,7 +126,7 @@ class Switching:
             return self._stick.glance(stepper.x, self._survey, stepper.t - stepper.t_before)
         return self.mode.survey(stepper.x)
 
-    def _enter(self, mode: ContactMode, t: float, y: FloatArray) -> None:
+    def _enter(self, mode: BallMode, t: float, y: FloatArray) -> None:
         def accept(at: float, state: FloatArray) -> FloatArray:
             self._check(at, mode.x(state))
             return mode.eliminated(state) if self._eliminate else state
@@ -194,7 +194,7 @@ class Switching:
         if high > 0:
             x = ball.eliminated(x)
         speed = self.friction.rolling.speed(x) if self._stick.halts else np.inf
-        mode: ContactMode
+        mode: BallMode
         if speed <= self._pace.settled and self._rest.holds(x):
             mode, x = self._rest, self._rest.eliminated(x)
         else:

@@ -13,7 +13,7 @@ from proofroll.elements.mechanism.rotations import Array, cross, frame_of_axis
 from proofroll.truth.hybrid import Transition
 from proofroll.truth.mechanism.body_switching import SLACK
 from proofroll.truth.mechanism.contact_equations import BodiesSolution, BodiesState, ContactEquations
-from proofroll.truth.mechanism.contact_guards import AT_REST, STOPPED
+from proofroll.truth.mechanism.contact_guards import AT_REST, SLIP_ENDED
 from proofroll.truth.mechanism.contact_stretches import ContactStretches, SolvedContacts, modes_of
 from proofroll.truth.mechanism.maximal_coordinates import RANK
 
@@ -101,7 +101,7 @@ class ContactBodies(ContactStretches):
         state = state.copy()
         state[e.nx : e.nx + e.nu] = solution.moved
         parting = (float(each.normal @ slide) for each, slide in zip(bodies.touching, solution.slide, strict=True))
-        stays = [shut and away <= STOPPED for shut, away in zip(closed, parting, strict=True)]
+        stays = [shut and away <= SLIP_ENDED for shut, away in zip(closed, parting, strict=True)]
         apart = max((float(np.abs(other.moved - solution.moved).max()) for _, other, _ in others), default=0.0)
         return state, stays, 0.0 if apart > _SAME * float(np.abs(bodies.u).max()) else np.inf
 

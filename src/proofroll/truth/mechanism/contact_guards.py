@@ -17,7 +17,7 @@ from proofroll.truth.mechanism.two_paths import time_accuracy
 # In natural units (natural_units.py): speeds that count as rest, and accelerations too small to start a motion. Both
 # routes stop there, so that they do not integrate the round-off of a state at rest.
 AT_REST, STANDS = 1e-13, 1e-9
-STOPPED = 1e-11  # slip speed that remains when a slip below FAINT is extrapolated to rest
+SLIP_ENDED = 1e-11  # slip speed that remains when a slip below FAINT is extrapolated to rest
 # Value of Painlevé's measure (1 without friction) that counts as zero.
 _LEAST_RESPONSE = 1e-3
 _DIGITS = 1e-14  # relative to the mechanism's size: round-off of a gap that has just opened

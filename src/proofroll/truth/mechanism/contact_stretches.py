@@ -21,8 +21,8 @@ from proofroll.elements.mechanism.signal import varies
 from proofroll.truth.hybrid import Stretch, Transition
 from proofroll.truth.mechanism.contact_guards import (
     AT_REST,
+    SLIP_ENDED,
     STANDS,
-    STOPPED,
     ContactGuard,
     Touchable,
     faint_time,
@@ -247,7 +247,7 @@ class ContactStretches(Stretches[ContactMode]):
         happened: tuple[tuple[str, str], ...],
         margin: float = np.inf,
         delay: float = 0.0,
-        stopped: float = STOPPED,
+        stopped: float = SLIP_ENDED,
     ) -> Transition[ContactMode]:
         """Transition to the mode that follows from the forces; contacts not faster than ``stopped`` are at rest."""
         slips = [float(np.linalg.norm(slip_velocity(each))) for each in self._touching(state)]

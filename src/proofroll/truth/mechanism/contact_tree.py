@@ -9,7 +9,7 @@ from proofroll.elements.mechanism.contacts.dynamics import ContactDynamics, Cont
 from proofroll.elements.mechanism.contacts.touching import Touching
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.truth.hybrid import Transition
-from proofroll.truth.mechanism.contact_guards import STOPPED
+from proofroll.truth.mechanism.contact_guards import SLIP_ENDED
 from proofroll.truth.mechanism.contact_stretches import ContactStretches, SolvedContacts
 
 
@@ -36,7 +36,7 @@ class ContactTree(ContactStretches):
         after, impulse, margin = self.dynamics.struck(q, v, which, np.array([laws[k] for k in which]))
         stays, touching = list(closed), self.dynamics.at(q, after).touching
         for pressed, k in zip(impulse[:, 0] > 0, which, strict=True):
-            leaves = mode[k].kind == "open" or float(touching[k].normal @ touching[k].slide) > STOPPED
+            leaves = mode[k].kind == "open" or float(touching[k].normal @ touching[k].slide) > SLIP_ENDED
             stays[k] = not laws[k] if pressed else not leaves
         return np.concatenate([q, after, [time]]), stays, margin
 

@@ -23,7 +23,7 @@ TOLERANCES = 1e-14, 3e-14
 # Relative margin of a decision below which uncertainties of the parameters may change it.
 CLOSE = 1e-9
 
-Path = HybridPath[Stretch[Any]]
+FollowedPath = HybridPath[Stretch[Any]]
 
 
 def refuse_uncovered(mechanism: Mechanism) -> None:
@@ -48,7 +48,7 @@ def followed(
 
 def two_route_motion(
     mechanism: Mechanism,
-    paths: tuple[Path, Path],
+    paths: tuple[FollowedPath, FollowedPath],
     one: Record,
     two: Record,
     routes: tuple[str, str],
@@ -103,7 +103,7 @@ def _of_a_step(mechanism: Mechanism, record: Record, units: Units) -> dict[str, 
     return {name: TOLERANCES[0] * size for name, size in sizes.items()}
 
 
-def _parted(one: Path, two: Path, kinds: Callable[[Any], Any]) -> float:
+def _parted(one: FollowedPath, two: FollowedPath, kinds: Callable[[Any], Any]) -> float:
     """Start of the first leg in which the two routes are in different modes [s]; inf: there is none.
 
     Changes at the same instant may come in either order; if that order matters, the margin of a decision is small.
@@ -130,7 +130,7 @@ def time_accuracy(time: float) -> float:
     return CLOSE * max(1.0, time)
 
 
-def _events(one: Path, two: Path, unit: float) -> Sequence[Event]:
+def _events(one: FollowedPath, two: FollowedPath, unit: float) -> Sequence[Event]:
     """Events of both routes, each with a bracket that contains both times, round-off and blur; ``unit`` [s]."""
     events = []
     for a, b in zip(one.happenings, two.happenings, strict=False):  # one route may have more events after they part
