@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import unicodedata
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
+from proofroll.core.errors import InputError
 from proofroll.core.number_format import number
 from proofroll.core.plugins import parse_engine
 
@@ -131,7 +133,9 @@ def setting_words(engine: str, facts: EngineFacts | SweptSetting) -> str:
         facts: complete settings, their resolution and precision.
     """
     usual, preset = {"formulation", "preset", facts.resolution}, facts.settings.get("preset")
-    chosen = [f"{key}={value}" for key, value in parse_engine(engine).options.items() if key not in usual]
+    chosen: list[str] = []
+    with suppress(InputError):  # a stored study may have any text
+        chosen = [f"{key}={value}" for key, value in parse_engine(engine).options.items() if key not in usual]
     shown = [] if preset is None or (chosen and preset == "matched") else [preset]
     return " ".join([*shown, *chosen, *precision_words(facts.precision)])
 
