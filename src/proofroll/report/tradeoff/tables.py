@@ -245,8 +245,11 @@ def answer_lines(advice: Recommendation) -> Iterator[str]:
         yield f"For {asked}, use {_line(answer.choice, answer.unit)}"
         if not advice.affordable:
             yield f"That is more than the budget of {number(advice.budget)} s per simulated second."
-    for tie in answer.ties:
-        yield f"A tie in cost, as far as the intervals tell: {_line(tie, answer.unit)}"
+    if answer.ties:
+        tie = min(answer.ties, key=lambda t: t.point.envelope_of(answer.quantity))
+        many = f"{len(answer.ties)} others tie in cost, as far as the intervals tell; the most accurate"
+        words = many if len(answer.ties) > 1 else "A tie in cost, as far as the intervals tell"
+        yield f"{words}: {_line(tie, answer.unit)}"
     for choice, words in (
         (advice.best_within_budget, "Within the budget"),
         (answer.runner_up, "Runner-up"),

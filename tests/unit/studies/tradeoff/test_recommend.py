@@ -101,6 +101,16 @@ def test_costs_that_cannot_be_told_apart_are_ties() -> None:
     assert any("tie" in line and "near only" in line for line in answer_lines(recommended(measured, required(1e-3))))
 
 
+def test_many_ties_are_one_line() -> None:
+    """Several ties in cost are counted in one line, which names the most accurate of them."""
+    errors = (2e-5, 1e-6, 3e-5)
+    near = [point(3 + k, f"near{k}", 1.01e-2, e, interval=[1e-2, 1.02e-2]) for k, e in enumerate(errors)]
+    measured = study(FAST, replace(MIDDLE, interval=[9.9e-3, 1.01e-2]), *near)
+    (line,) = [line for line in answer_lines(recommended(measured, required(1e-3))) if "tie" in line]
+    assert line.startswith("3 others tie in cost")
+    assert "the most accurate: near1 only" in line
+
+
 def test_a_factor_is_a_number_as_a_person_writes_it() -> None:
     """What holds a tolerance thousands of times over is said without powers of ten."""
     reason = recommend(study(point(1, "fine", 1e-3, 2.5e-7)), required(1e-3))["choice"]["reason"]
