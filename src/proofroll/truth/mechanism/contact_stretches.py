@@ -222,8 +222,8 @@ class ContactStretches(Stretches[ContactMode]):
             delay = self._bouncing(self.contacts[hit].name, speed * law, pull, law)
             state, stays, margin = self._struck(leg.last, leg.mode, closed, [0.0] * len(closed))
         stays = [stay or bool(contact.bound) for stay, contact in zip(stays, contacts, strict=True)]
-        first = ("settle" if delay else "impact", contacts[hit].name)
-        return self._after(leg, state, stays, (first,), margin, delay)
+        happened = tuple(("settle" if delay and k == hit else "impact", contacts[k].name) for k in hits)
+        return self._after(leg, state, stays, happened, margin, delay)
 
     def _stopped(self, leg: Stretch[ContactMode]) -> Transition[ContactMode]:
         """Transition where a slip stops: alone, or with all others.

@@ -299,6 +299,30 @@ def test_a_plank_that_falls_flat_is_refused(tilt: float) -> None:
         truth_of(replace(block, joints=(flat,)), np.array([0.0, 0.3]))
 
 
+@pytest.mark.parametrize("friction", [0.0, 0.2])
+def test_corners_hit_at_once_are_refused_where_only_one_of_them_is_pressed(friction: float) -> None:
+    """A turning block lands flat: one impact of both presses the faster corner alone, but either may come first."""
+    block = mechanism_of("rocking_block", friction=friction)
+    falls, spin = float(np.sqrt(2 * 0.05 / 9.81)), 4.95
+    lands = replace(block.joints[0], q0=(0.0, -0.3, -spin * falls), v0=(0.0, 0.0, spin))
+    with pytest.raises(Refused, match="presses left and right at once"):
+        truth_of(replace(block, joints=(lands,)), np.array([0.0, 0.15]))
+
+
+def test_a_smooth_plank_that_falls_flat_rests() -> None:
+    """Either end hit first presses the other more and more: without friction and rebound it lies still."""
+    plank = mechanism_of("rocking_block", friction=0.0, moment=0.005)
+    flat = replace(plank.joints[0], q0=(0.0, -0.3, 0.0), v0=(0.0, 0.0, 0.0))
+    found = truth_of(replace(plank, joints=(flat,)), np.array([0.0, 0.2]))
+    assert np.isinf(found.horizon)
+    times_of(found, *[float(np.sqrt(2 * 0.05 / 9.81))] * 2)
+    assert happened(found) == [("impact", "left"), ("impact", "right")]
+    assert found.record.p_WB[1, 0] == pytest.approx([0, 0, 0.25], abs=1e-12)
+    assert np.abs(found.record.v_WB[1]).max() < 1e-12
+    assert found.pressed is not None
+    assert found.pressed[1, :, 2] == pytest.approx([4.905, 4.905], abs=DIGITS)
+
+
 def test_stops_with_friction_beside_contact_are_refused() -> None:
     """One joint with both is refused: what each holds at a stop is not determinate."""
     with pytest.raises(Refused, match="rail has stops and dry friction beside contacts"):

@@ -4,6 +4,7 @@ Between two events each contact is ``open``, ``slip``s (one row, friction agains
 rows). The next mode follows from the forces, by :mod:`proofroll.elements.mechanism.contacts.coulomb`.
 """
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -23,7 +24,7 @@ from proofroll.elements.mechanism.contacts.acting import (
 from proofroll.elements.mechanism.contacts.coulomb import robust_forces
 from proofroll.elements.mechanism.contacts.geometry import BodyContact
 from proofroll.elements.mechanism.contacts.joint_laws import JointContact, joint_contacts, mode_of_joints
-from proofroll.elements.mechanism.contacts.start import closed_and_still, natural_scale, touches
+from proofroll.elements.mechanism.contacts.start import STILL, closed_and_still, natural_scale, touches
 from proofroll.elements.mechanism.contacts.touching import Touching
 from proofroll.elements.mechanism.joint_coordinates import JointCoordinates, Solution
 from proofroll.elements.mechanism.kinematics import BodyMotion
@@ -287,13 +288,12 @@ class ContactDynamics:
         G, names = J @ state.W @ J.T, [self.contacts[k].name for k in closed]
         sliding = [None] * len(closed)
         impulse, _, same = robust_forces(G, c, self.friction[list(closed)], sliding, names, least=_NO_IMPULSE)
-        pressed = [k for k in range(len(closed)) if impulse[k, 0] > 0]
-        for a in pressed:
-            for b in pressed:
-                if a < b and np.abs(G[3 * a : 3 * a + 3, 3 * b : 3 * b + 3]).max() > RANK * np.abs(G).max():
-                    raise NotUnique(
-                        f"an impact presses {names[a]} and {names[b]} at once: its outcome depends on their order"
-                    )
+        speeds, scale = (J @ v)[::3], float(np.abs(J @ v).max())
+        hit = (speeds < -STILL * scale) | (impulse[:, 0] > STILL * impulse[:, 0].max())
+        lossy = np.array([bool(self.contacts[k].friction or self.contacts[k].restitution) for k in closed])
+        if pair := _ordered(G, lossy, hit):
+            a, b = (names[k] for k in pair)
+            raise NotUnique(f"an impact presses {a} and {b} at once: its outcome depends on their order")
         return v + state.W @ J.T @ impulse.ravel(), impulse, np.inf if same else 0.0
 
     def sample(self, q: Array, v: Array, mode: ContactMode, time: float = 0.0) -> tuple[dict[str, Any], Array]:
@@ -316,6 +316,27 @@ class ContactDynamics:
         named = [item.field in {"friction", "stop"} and item.place in loose for item in named_forces(self.mechanism)]
         record["named"] = np.where(named, np.nan, record["named"])
         return record, np.where(found.determinate[:count], pressed, np.nan)
+
+
+def _ordered(G: Array, lossy: Array, hit: Array) -> tuple[int, int] | None:
+    """Two contacts whose order decides the outcome of an impact; None: it is the same in any order.
+
+    Impacts without coupling are independent. Smooth plastic contacts, if none opens another, press more and more in any
+    order, up to the least impulses after which nothing closes (least elements of Z-matrices: R. W. Cottle, J.-S. Pang
+    and R. E. Stone, The Linear Complementarity Problem, 1992). Moreau's law for all contacts at once gives the same.
+
+    Args:
+        G: changes of all slides by unit impulses, (3 contacts, 3 contacts).
+        lossy: True for contacts with friction or restitution.
+        hit: True for contacts that close, or that the outcome presses.
+    """
+    blocks, least = G.reshape(len(hit), 3, len(hit), 3), RANK * float(np.abs(G).max())
+    coupled = np.abs(blocks).max(axis=(1, 3)) > least
+    opens = (blocks[:, 0, :, 0] > least) & ~np.eye(len(hit), dtype=bool)
+    for a, b in itertools.combinations(np.flatnonzero(hit).tolist(), 2):
+        if coupled[a, b] and (opens[[a, b]].any() or lossy[coupled[a] | coupled[b]].any()):
+            return a, b
+    return None
 
 
 def _least_motion_for(W: Array, K: Array, violation: Array) -> Array:

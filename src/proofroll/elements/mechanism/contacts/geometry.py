@@ -37,6 +37,8 @@ _KEYS: Mapping[str, tuple[str, ...]] = {
 # Largest semi-axis of an ellipsoid over its smallest. The support function squares the ratio, which costs 1e-10 of the
 # height at 1e3; and a contact on a flat side is as stiff as that ratio.
 _FLATTEST = 1e3
+# Room of a sphere in a bore, relative to the bore's radius, that counts as none: digits of a file.
+_ROOM = 1e-9
 _RULES = (
     "only a plane with a sphere, ellipsoid, circle or box, a bore with a sphere, and two spheres have a rule; "
     "choose one of these pairs"
@@ -202,7 +204,7 @@ def contacts_of(geometries: Sequence[Geometry], pairs: Sequence[Pair]) -> tuple[
             raise InputError(place, pair.geometries, _RULES)
         if "bore" in kinds:
             bore, ball = (a, b) if a.kind == "bore" else (b, a)
-            if (ball.radius or 0.0) >= (bore.radius or 0.0):
+            if (ball.radius or 0.0) >= (1 - _ROOM) * (bore.radius or 0.0):
                 advice = (
                     f"a sphere of radius {ball.radius:g} m has no room in a bore of {bore.radius:g} m; make it smaller"
                 )

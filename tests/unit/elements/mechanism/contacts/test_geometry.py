@@ -87,6 +87,12 @@ def test_bad_pairs_are_one_line(pair: dict[str, Any], said: str) -> None:
     assert "\n" not in str(error.value)
 
 
+def test_room_in_a_bore_is_more_than_round_off() -> None:
+    """A sphere that is smaller than its bore by 1e-12 of it is told that it has no room, before a truth fails at it."""
+    with pytest.raises(InputError, match=r"a sphere of radius 0\.1 m has no room in a bore of 0\.1 m; make it smaller"):
+        made(PLANE, BALL, {**BORE, "radius": 0.1 * (1 + 1e-12)}, pairs=({**PAIR, "geometries": ["tube", "ball"]},))
+
+
 def test_a_pair_is_listed_once() -> None:
     """The same two geometries in another order are the same pair."""
     again = {**PAIR, "name": "again", "geometries": ["floor", "ball"]}
