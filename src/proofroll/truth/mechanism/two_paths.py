@@ -134,6 +134,9 @@ def _events(one: FollowedPath, two: FollowedPath, unit: float) -> Sequence[Event
     """Events of both routes, each with a bracket that contains both times, round-off and blur; ``unit`` [s]."""
     events = []
     for a, b in zip(one.happenings, two.happenings, strict=False):  # one route may have more events after they part
-        time, wide = unit * float(a.time), unit * (SAFETY * abs(a.time - b.time) + ROUND_OFF * a.time + a.blur)
+        time, wide = (
+            unit * float(a.time),
+            unit * (SAFETY * abs(a.time - b.time) + ROUND_OFF * max(1.0, a.time) + a.blur),
+        )
         events.append(Event(a.kind, time, float(time - wide), float(time + wide), a.name))
     return tuple(events)
