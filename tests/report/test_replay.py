@@ -433,3 +433,20 @@ def test_a_ball_in_the_air_is_off_the_wall() -> None:
     state = poses(rolling_ball(scene), data, data["time"]).state
     assert state is not None
     assert set(state.tolist()) == {AWAY}
+
+
+@pytest.mark.drill
+@pytest.mark.parametrize(("engine", "hidden"), [("truth", True), ("projection", False)])
+def test_a_run_alone_has_no_table_of_ghosts(
+    proofroll: Callable[..., tuple[int, str, str]], tmp_path: Path, visit: Visiting, engine: str, hidden: bool
+) -> None:
+    """The table says how far other runs are from the one drawn solid; where there is none, there is no table."""
+    run = tmp_path / "run.nc"
+    lengths = ["--until", "0.1", "--every", "0.05"]
+    assert proofroll("run", "pendulum", "--engine", engine, *lengths, "--out", str(run))[0] == 0
+    assert proofroll("replay", str(run))[0] == 0
+    with visit(tmp_path / "run-replay.html", viewport=SMALL) as opened:
+        ready(opened)
+        assert part(opened, "runs").locator("tr").count() == (0 if hidden else 1)
+        assert part(opened, "head").is_hidden() is hidden
+        assert not opened.messages

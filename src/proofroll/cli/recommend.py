@@ -33,14 +33,18 @@ def recommend(
     tolerance: Annotated[
         str, typer.Option(help="Largest error: 1e-3 in its unit, '1 mm', or '1 %' of its scale.")
     ] = "",
-    budget: Annotated[float | None, typer.Option(help="Wall seconds per simulated second that you can afford.")] = None,
+    budget: Annotated[
+        float | None, typer.Option(help="Wall seconds per simulated second that a run may take; not of --measure.")
+    ] = None,
     settings: options.Set = None,
     engine: Annotated[
         list[str] | None, typer.Option(help="Choose among these engines, name[key=value,…]; repeat.")
     ] = None,
     over: Over = None,
     until: options.Until = None,
-    measure_first: Annotated[bool, typer.Option("--measure", help="Measure first if no curves are stored.")] = False,
+    measure_first: Annotated[
+        bool, typer.Option("--measure", help="Measure first if no curves are stored, as tradeoff without --budget.")
+    ] = False,
     forces: Annotated[bool, typer.Option("--forces", help="Forces count as the motion does; from a report.")] = False,
     report: Annotated[
         Path | None, typer.Option(help="A report.json whose runs answer, as they do for several names.")

@@ -84,6 +84,7 @@
       if (unit) cell.append(" ", make("small", {}, unit));
       return cell;
     };
+    ui.head.closest("table").hidden = shown.runs.length === 1;
     ui.head.replaceChildren(
       head({ name: "ghost" }), head({ name: "off by", unit: "mm", number: true, title: shown.off }), ...columns.map(head),
     );
