@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import re
 import subprocess
@@ -9,6 +10,7 @@ import sys
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from html import unescape
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -294,6 +296,20 @@ def test_a_budget_is_spent_briefly_first_and_grows(
     assert "left out" not in said
     speeds, verdicts, said = made(most=3)
     assert (speeds, set(verdicts)) == ([[2.0, 4.0], [2.0, 4.0]], {"agrees"})
+
+
+@pytest.mark.drill
+def test_a_used_budget_begins_no_further_study(
+    proofroll: Proofroll, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It is named with the reason and the command that makes it, and the exit code is that of a report without it."""
+    (name,) = files(tmp_path, figures=FIGURES.replace("STATED", "-160"))
+    spent = itertools.count(0.0, 40.0)
+    monkeypatch.setattr(import_module("proofroll.cli.report"), "_processor_seconds", lambda: next(spent))
+    code, said, err = proofroll("report", name, "--out", str(tmp_path / "out"), "--budget", "30")
+    assert code == 0, err
+    assert "Missing (1): Figures: Not run: the budget is used; proofroll" in " ".join(said.split())
+    assert "the budget is used" in (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
 
 
 @pytest.mark.drill

@@ -185,6 +185,35 @@ def test_small_groups_are_unfolded_and_large_ones_name_their_scenes(everything: 
     assert 'title="s2, s3, s4, s5, s6" aria-expanded="false"' in html
 
 
+@pytest.mark.drill
+@pytest.mark.parametrize("width", [400, 1400])
+def test_names_of_rows_stay_in_their_column_and_in_sight(
+    everything: Any, tmp_path: Path, visit: Visiting, width: int
+) -> None:
+    """All unfolded, on a screen and in print, a name ends within its cell; it stays when the matrix scrolls."""
+    lines = everything.content.table.lines
+    named = [replace(x, formulation="rotating_frame_of_a_body", own_equations=x.engine == "alpha") for x in lines]
+    content = replace(everything.content, table=replace(everything.content.table, lines=named))
+    path = replace(everything, content=content).write(tmp_path / "report.html")
+    heads = "[...document.querySelectorAll('#choice tbody th')].filter((head) => head.offsetParent)"
+    ends = f"""{heads}.map((head) => {{
+      const text = document.createRange();
+      text.selectNodeContents(head);
+      return Math.max(...[...text.getClientRects()].map((part) => part.right)) - head.getBoundingClientRect().right;
+    }})"""
+    with visit(path, viewport={"width": width, "height": 800}) as seen:
+        seen.wait("document.querySelector('#choose .tools')")
+        seen.page.evaluate("document.querySelectorAll('#choice [aria-expanded=false]').forEach((fold) => fold.click())")
+        assert max(seen.page.evaluate(ends)) <= 0
+        seen.page.evaluate("document.getElementById('choice').style.width = '3000px'")
+        seen.page.evaluate("document.querySelector('.choice').scrollLeft = 500")
+        seen.page.evaluate("window.edge = document.querySelector('.choice').getBoundingClientRect().left")
+        assert seen.page.evaluate(f"{heads}.every((head) => Math.abs(head.getBoundingClientRect().left - edge) < 2)")
+        seen.page.evaluate("document.getElementById('choice').style.width = ''")
+        seen.page.emulate_media(media="print")
+        assert max(seen.page.evaluate(ends)) <= 0
+
+
 @pytest.mark.parametrize("width", [400, 900, 1400])
 def test_nothing_moves_while_the_page_loads(report_page: Path, visit: Visiting, width: int) -> None:
     """The form has its place before the first script runs, so that the matrix below it stays where it is."""

@@ -61,7 +61,7 @@ def test_a_table_sorts_by_a_column(live: Visit) -> None:
     assert column(live, 0)[1:] == ["alpha fine default", "beta only", "alpha fine matched"]
     sort(live, "verdict", "ascending")
     verdicts = [text.split()[1].removesuffix("not") for text in column(live, 2)]
-    assert verdicts == ["agrees", "incomplete", "differs", "failed"]
+    assert verdicts == ["agrees", "incomplete", "differs", "missing"]
     assert live.messages == []
 
 

@@ -106,7 +106,9 @@ def test_exactly_three_sentences_from_the_data(report: Report) -> None:
         "Of 4 settings in one comparison, 1 agrees with the truth everywhere, 1 without reporting all"
     )
     assert "closest is alpha fine matched" in found[0]
-    assert found[1].startswith("1 differs from the truth and runs to the end without a word, worst alpha fine default")
+    assert found[1].startswith(
+        "1 setting differs from the truth and runs to the end without a word, worst alpha fine default"
+    )
     assert found[1].endswith("1 of 2 boundaries of stability and accuracy are passed without a word.")
     assert found[2] == report.content.choice.answer(FIRST_TOLERANCE, forces=True)
     nothing = three_sentences([], {}, choice_matrix([], {}))

@@ -15,7 +15,7 @@ from proofroll.cli import options
 from proofroll.cli.comparing import exit_code, list_omitted_engines, outcomes_of
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Collection
 
     from rich.table import Table
 
@@ -43,7 +43,7 @@ def report(
     scheduler: options.Scheduler = None,
     budget: Annotated[
         float | None,
-        typer.Option(min=1, help="Processor-seconds of all comparisons; without names all there are, in folders too."),
+        typer.Option(min=1, help="Processor-seconds; without names all comparisons there are, in folders too."),
     ] = None,
     only: Annotated[
         str | None,
@@ -62,12 +62,13 @@ def report(
     """Run the comparisons and the further studies, and write report.html and report.json.
 
     Without names it makes those that lie in the folder of studies itself: the main comparisons, and all further studies
-    but those on request. The comparisons of folders inside, as mechanisms/pendulum, it leaves out and names.
-    The files are there after the first comparison, and are written again now and then, after all of them and after each
-    further study. A report that is stopped (Ctrl-C) keeps what has ended; the same command goes on from there. A study
-    that is kept and still holds is used as it is; otherwise it is made briefly, as is a comparison that says so, and
-    the report names the command that makes it whole. With --budget every comparison is brief first, and grows while
-    there is time; what is left out is named, and the same command goes on with it. --set is for scenes and robot files.
+    but those on request. The comparisons of folders inside, as mechanisms/pendulum, it leaves out and names. The files
+    are there after the first comparison, and are written again now and then, after all of them and after each further
+    study. A report that is stopped (Ctrl-C) keeps what has ended; the same command goes on from there. A study that is
+    kept and still holds is used as it is; otherwise it is made briefly, as is a comparison that says so, and the report
+    names the command that makes it whole. With --budget every comparison is brief first, and grows while there is time;
+    no further study begins once it is used. What is left out is named, and the same command goes on. --set is for
+    scenes and robot files.
     """
     from dataclasses import replace
 
@@ -105,8 +106,7 @@ def report(
     templates()  # read before the work, during which the files may change
     runner = options.new_runner(out, fresh, jobs, scheduler, workers)
     list_omitted_engines(loaded, engine or [])
-    keys = {part.key: part.words for part in parts}
-    total = len(keys) + bool(loaded)
+    total = len({part.key for part in parts}) + bool(loaded)
     command = _command(studies or [], engine or [], settings or [], budget, out, only)
     with alone_in(out, lambda: options.complain(f"another report is being made in {out}; this one waits for it")):
         growing = _Growing(loaded, parts, out, lambda ended, awaited: begun(ended, command, awaited, left_out))
@@ -121,14 +121,10 @@ def report(
         made.earlier = earlier
         missing = made.expect(parts, out, fresh=fresh)
         made.write(out)
-        for number, (key, words) in enumerate(keys.items(), start=1 + bool(loaded)):
-            wanted = [part for part in missing if part.key == key]
-            stage = _begin(number, total, words if wanted else f"{words}: kept from before")
-            for part in wanted:
-                _make(made, part, runner, out, stage)
-                made.write(out)
+        rest = (lambda: budget - _processor_seconds() + before) if budget else None
+        unmade = _make_all(made, parts, missing, runner, out, rest)
         options.show(made.content, as_json, lambda: _shown(made.content, out))
-    raise typer.Exit(_exit_code(made.content, exit_code(outcomes)))
+    raise typer.Exit(_exit_code(made.content, exit_code(outcomes), unmade))
 
 
 def _processor_seconds() -> float:
@@ -234,6 +230,32 @@ def _begin(number: int, total: int, words: str) -> str:
     return f"{number} of {total}: "
 
 
+def _make_all(
+    made: Report,
+    parts: list[Part],
+    missing: list[Part],
+    runner: Runner,
+    out: Path,
+    rest: Callable[[], float] | None,
+) -> set[str]:
+    """Makes the further studies that are missing; returns names of those for which a budget left no ``rest`` [s]."""
+    keys = {part.key: part.words for part in parts}
+    first, unmade = 1 + bool(made.content.comparisons), set()
+    for number, (key, words) in enumerate(keys.items(), start=first):
+        wanted = [part for part in missing if part.key == key]
+        stage = _begin(number, len(keys) + first - 1, words if wanted else f"{words}: kept from before")
+        for part in wanted:
+            if rest and rest() <= 0:
+                unmade.add(part.head["name"])
+                made.leave_out(part, "Not run: the budget is used")
+            else:
+                _make(made, part, runner, out, stage)
+                made.write(out)
+    if unmade:
+        made.write(out)
+    return unmade
+
+
 def _make(made: Report, part: Part, runner: Runner, out: Path, stage: str) -> None:
     """Makes one further study with a progress bar; prints a sentence on standard error if that failed."""
     with options.progress_bar(f"{stage}{part.words}") as advance:
@@ -242,10 +264,11 @@ def _make(made: Report, part: Part, runner: Runner, out: Path, stage: str) -> No
         options.complain(f"{part.head['title']}: {entry.missing}")
 
 
-def _exit_code(content: ReportContent, compared: int) -> int:
-    """Exit code of the report, from those of its comparisons and the results of its further studies."""
+def _exit_code(content: ReportContent, compared: int, unmade: Collection[str]) -> int:
+    """Exit code of the report, from those of its comparisons and of its further studies but those left ``unmade``."""
     entries = content.further
-    if compared == options.ENGINE or any(entry.missing or entry.lost for entry in entries):
+    lost = any((entry.missing and entry.name not in unmade) or entry.lost for entry in entries)
+    if compared == options.ENGINE or lost:
         return options.ENGINE
     changed = content.against is not None and content.against.changed
     contradicted = compared or changed or any(entry.contradictions for entry in entries)

@@ -14,6 +14,7 @@ from typing import Any, TypeGuard
 from proofroll.core.errors import InputError
 from proofroll.core.number_format import counted, error, number
 from proofroll.files.atomic import ordinary_content
+from proofroll.report.labels import step
 from proofroll.report.long_table import COLUMNS, TableLine
 
 # Changes of an error that count as round-off of another build: relative to the quantity's size, and to the error.
@@ -159,7 +160,7 @@ def runs_of(lines: Iterable[TableLine]) -> dict[tuple[str, str, str, int], dict[
     """Lines of each run, by quantity; the key is study, place, settings, and a number among runs of equal settings."""
     rows: dict[tuple[str, str, str], dict[int, dict[str, TableLine]]] = defaultdict(dict)
     for line in lines:
-        size = f"{line.resolution} {number(line.step, 6)}" if line.step is not None else ""
+        size = step(line.resolution, line.step, 6)
         run = " ".join(filter(None, (line.engine, line.formulation, line.setting, size)))
         rows[line.study, line.place, run].setdefault(line.row, {})[line.quantity] = line
     return {(*key, place): run for key, places in rows.items() for place, run in enumerate(places.values())}

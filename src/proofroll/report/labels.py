@@ -39,7 +39,7 @@ MEANINGS = {
     "not-judged": "there is no truth here, or its own error bar exceeds the tolerance: no engine is judged by it",
     "refused": "the engine says that it cannot represent the scene, or run it with these settings: it has not failed",
     "differs": "not within tolerance: another limit, no limit shown, or one step only; each says which",
-    "failed": "there is no result; the row says why",
+    "failed": "there is no result; the row says why. “missing”: the engine is not installed",
 }
 
 
@@ -57,17 +57,26 @@ def unjudged(content: ReportedComparison) -> int:
     return sum(run.verdict not in content.rows[run.row].expected for run in open_runs)
 
 
-def verdict_text(row: ReportedRow) -> str:
-    """Verdict of a row, with the counts of its cases if their verdicts differ: ``failed 1/11 ✗2 ✓8``.
+def verdict_word(entry: ReportedRow | ReportedRun, runs: Sequence[ReportedRun]) -> str:
+    """Verdict of some runs; ``missing`` where none of those that failed has its engine."""
+    from proofroll.running.case import Status
+
+    failed = [run for run in runs if run.verdict == "failed"]
+    gone = entry.verdict == "failed" and failed and all(run.status == Status.MISSING for run in failed)
+    return "missing" if gone else str(entry.verdict)
+
+
+def verdict_text(row: ReportedRow, runs: Sequence[ReportedRun] = ()) -> str:
+    """Verdict of a row with its runs, with the counts of its cases if their verdicts differ: ``failed 1/11 ✗2 ✓8``.
 
     A star refers to a remark below the table.
     """
     star = "*" if row.remarks else ""
     counts = {word: row.verdicts[word] for word in SYMBOLS if row.verdicts.get(word)}
     if counts.keys() <= {row.verdict}:
-        return f"{row.verdict}{star}"
+        return f"{verdict_word(row, runs)}{star}"
     others = [f"{SYMBOLS[word]}{count}" for word, count in reversed(counts.items()) if word != row.verdict]
-    return " ".join([row.verdict, f"{counts[row.verdict]}/{sum(counts.values())}", *others]) + star
+    return " ".join([verdict_word(row, runs), f"{counts[row.verdict]}/{sum(counts.values())}", *others]) + star
 
 
 def detail(entry: ReportedRow | ReportedRun | Judgement) -> str:
@@ -103,11 +112,11 @@ def off_by(judgement: Judgement) -> str:
     return f"off by {size} in {symbol(judgement.observable)}"
 
 
-def step(resolution: str | None, value: float | None) -> str:
+def step(resolution: str | None, value: float | None, digits: int | None = None) -> str:
     """Text of the setting that trades speed for accuracy: ``dt 2.5e-3 s``, ``rtol 2.2e-14``; empty without one."""
     if not resolution or value is None:
         return ""
-    return f"dt {number(value, 3)} s" if resolution == "dt" else f"{resolution} {number(value)}"
+    return f"dt {number(value, digits or 3)} s" if resolution == "dt" else f"{resolution} {number(value, digits or 2)}"
 
 
 def setting(row: Setting) -> str:

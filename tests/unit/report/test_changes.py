@@ -69,7 +69,7 @@ def test_the_same_numbers_have_not_changed() -> None:
 def test_one_change_is_found_and_nothing_else(values: dict[str, Any], kind: str, says: str) -> None:
     """One per cent of an error, a verdict, the end of a run, a cost beyond its interval: the run is named."""
     found = held(changed(0, **values))
-    assert [(item.run, item.kind) for item in found.changes] == [("alpha joints default dt 1e-3", kind)]
+    assert [(item.run, item.kind) for item in found.changes] == [("alpha joints default dt 1e-3 s", kind)]
     assert found.changes[0].says[0] == says
     assert found.changed
 
@@ -109,7 +109,7 @@ def test_costs_of_a_busy_machine_accuse_no_engine() -> None:
 
 def test_runs_that_are_gone_count_and_new_ones_do_not() -> None:
     """A run that is not made any more is a change; one that is new is told; other studies are left alone."""
-    assert [(item.kind, item.run) for item in held(LINES[:2]).changes] == [("gone", "beta joints default dt 1e-3")]
+    assert [(item.kind, item.run) for item in held(LINES[:2]).changes] == [("gone", "beta joints default dt 1e-3 s")]
     assert held(LINES[:2]).changed
     more = held([*LINES, replace(LINE, row=2, engine="gamma")])
     assert [item.kind for item in more.changes] == ["new"]
@@ -146,6 +146,6 @@ def test_runs_that_changed_alike_share_a_line() -> None:
     head, versions, both, other = change_lines(found)
     assert head.startswith("Against old.json of 2026-01-01. Of 3 runs in both reports, changed: 2 verdicts, 1 errors")
     assert versions == "Other versions: alpha 1 → 2."
-    runs = "arm: alpha joints default dt 1e-3; chain: alpha joints default dt 1e-3"
+    runs = "arm: alpha joints default dt 1e-3 s; chain: alpha joints default dt 1e-3 s"
     assert both == f"!! {runs}: x agrees → another-scene; z agrees → another-scene (2 runs)"
-    assert other == "!! arm: beta joints default dt 1e-3: error of x 2e-9 → 2e-3 m"
+    assert other == "!! arm: beta joints default dt 1e-3 s: error of x 2e-9 → 2e-3 m"

@@ -8,7 +8,7 @@ from proofroll.core.number_format import error, number
 from proofroll.core.verdict import Judgement
 from proofroll.report.comparison.records import Cost, ReportedComparison, ReportedRow, ReportedRun
 from proofroll.report.comparison.tables import observables, seconds_before
-from proofroll.report.labels import SYMBOLS, symbol, unit, unjudged, verdict_text
+from proofroll.report.labels import SYMBOLS, symbol, unit, unjudged, verdict_text, verdict_word
 
 
 @dataclass(frozen=True)
@@ -74,7 +74,7 @@ def overview(content: ReportedComparison) -> Matrix:
         slowest = (run.cost for run in runs if run.cost and run.seconds_per_second == row.seconds_per_second)
         hrefs = {point: content.run_id(index, point) for point in points}
         cells = {name: Cell(item, hrefs[item.point], item.point) for name, item in row.observables.items()}
-        shown = (verdict_text(row), hrefs[worst.point], row.message, row.as_expected, next(slowest, None))
+        shown = (verdict_text(row, runs), hrefs[worst.point], row.message, row.as_expected, next(slowest, None))
         lines.append(MatrixLine(row, cells, *shown, before=before.get(index)))
     return _matrix(content, lines)
 
@@ -96,7 +96,7 @@ def at_point(content: ReportedComparison, name: str) -> Matrix:
             href = content.run_id(run.row, name)
             cells = {judgement.observable: Cell(judgement, href) for judgement in run.judgements}
             message = run.message if run.status != "done" else ""
-            shown = (run.verdict, href, message, not run.contradictions, run.cost, run.build_seconds)
+            shown = (verdict_word(run, [run]), href, message, not run.contradictions, run.cost, run.build_seconds)
             lines.append(MatrixLine(run, cells, *shown))
     return _matrix(content, lines)
 

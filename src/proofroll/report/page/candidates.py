@@ -50,7 +50,8 @@ class Candidate:
         blame: verdict of a place without a result; None: every place has one.
         motion_ladder, forces_ladder: result of its ladder of steps for either.
         href: HTML id of the evidence of the place with the largest error.
-        message: reason why a place has no result.
+        status: status of that place; empty: every place has a result.
+        message: reason why that place has none.
     """
 
     row: int
@@ -65,6 +66,7 @@ class Candidate:
     motion_ladder: LadderResult
     forces_ladder: LadderResult
     href: str
+    status: str
     message: str
 
     def error(self, forces: bool) -> float | None:
@@ -118,28 +120,29 @@ def _candidate(
     clean = all(lines[0].clean for lines in at.values() if lines)
     own = {line: line.relative for line in bounds}
     errors = {place: [largest(lines, role, own) for role in _ROLES] for place, lines in judged.items()}
-    blame, message = _blame(judged)
+    blame, status, message = _blame(judged)
     if judged:
         furthest = max(errors, key=lambda place: max(errors[place][0] or 0.0, errors[place][1] or 0.0))
         href = anchors.get(furthest, href)
     motion, forces = (_worst([pair[which] for pair in errors.values()]) for which in (0, 1))
     held = [_worst([largest(lines, role, bounds) for lines in judged.values()]) for role in _ROLES]
     return Candidate(
-        first.row, name, motion, forces, held[0], held[1], cost, clean, blame, ladders[0], ladders[1], href, message
+        *(first.row, name, motion, forces, held[0], held[1], cost, clean, blame),
+        *(ladders[0], ladders[1], href, status, message),
     )
 
 
-def _blame(judged: dict[str, list[TableLine]]) -> tuple[Verdict | None, str]:
-    """Verdict and message of the first place without a result; None and empty if every place has one."""
+def _blame(judged: dict[str, list[TableLine]]) -> tuple[Verdict | None, str, str]:
+    """Verdict, status and message of the first place without a result; None and empty texts if every place has one."""
     if not judged:
-        return Verdict.NOT_JUDGED, "no engine can be judged here"
+        return Verdict.NOT_JUDGED, "", "no engine can be judged here"
     for place, lines in judged.items():
         if not lines:
-            return Verdict.FAILED, f"no run with this step at {place}"
+            return Verdict.FAILED, "", f"no run with this step at {place}"
         if lines[0].status != "done":
             verdict = {str(item): item for item in Verdict}.get(lines[0].verdict, Verdict.FAILED)
-            return verdict, lines[0].message
-    return None, ""
+            return verdict, lines[0].status, lines[0].message
+    return None, "", ""
 
 
 def held_tolerances(lines: Sequence[TableLine]) -> dict[TableLine, float]:

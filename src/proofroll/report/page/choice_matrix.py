@@ -316,7 +316,8 @@ def _cell(steps: Sequence[Candidate], tolerance: float, forces: bool) -> ChoiceC
         return ChoiceCell(Verdict.INCOMPLETE, lacking, title, whole[0].href, why=f"reports {lacking}")
     item = steps[0]
     state = item.blame or Verdict.FAILED
-    return ChoiceCell(state, str(state), f"{item.name}: {item.message}".rstrip(": "), item.href, why=str(state))
+    word = "missing" if item.status == "missing" else str(state)  # its engine is not installed
+    return ChoiceCell(state, word, f"{item.name}: {item.message}".rstrip(": "), item.href, why=word)
 
 
 def _beyond(size: float, tolerance: float, digits: int = 1) -> str:

@@ -75,6 +75,8 @@ def _silent(comparisons: Sequence[ReportedComparison], maps: Sequence[StabilityS
     passed = f"{silent} of {boundaries} boundaries of stability and accuracy are passed without a word"
     alone = [comparison.laws_alone for comparison in comparisons]
     laws, truth = "a law of mechanics" if any(alone) else "", "from the truth" if not all(alone) or not alone else ""
+    if comparisons and not any(run.status == "done" for item in comparisons for run in item.runs):
+        return f"No run has ended that could be silently wrong{f'; {passed}' if maps else ''}."
     if not wrong:
         off = " or ".join(filter(None, (truth and f"differs {truth}", laws and f"breaks {laws}")))
         nothing = f"No setting that ran to its end {off}"
@@ -84,7 +86,7 @@ def _silent(comparisons: Sequence[ReportedComparison], maps: Sequence[StabilityS
     _, name, text = max(wrong)
     differ, breaks, run = ("differ", "break", "run") if len(wrong) > 1 else ("differs", "breaks", "runs")
     off = " or ".join(filter(None, (truth and f"{differ} {truth}", laws and f"{breaks} {laws}")))
-    text = f"{len(wrong)} {off} and {run} to the end without a word, worst {name}: {text}"
+    text = f"{counted(len(wrong), 'settings')} {off} and {run} to the end without a word, worst {name}: {text}"
     return f"{text}; {passed}." if maps else f"{text}."
 
 

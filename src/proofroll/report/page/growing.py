@@ -83,6 +83,10 @@ class Report:
         self._put(part, said)
         return said
 
+    def leave_out(self, part: Part, reason: str) -> None:
+        """Gives a further study that is not made the reason as its entry."""
+        self._put(part, absent(part, reason))
+
     def write(self, out: Path) -> None:
         """Writes ``report.html``, ``report.json`` and ``report.csv``.
 

@@ -152,7 +152,9 @@ class ReportContent:
     def beyond_budget(self) -> str:
         """Sentence on the cases that a budget of processor time did not suffice for; empty if there are none."""
         left = sum(len(item.beyond_budget) for item in self.comparisons)
-        return f"Runs left out for lack of processor time: {left}. The same command goes on with them." if left else ""
+        nothing = all(item.unreached for item in self.comparisons)  # so that a repeated command might not get on
+        next_step = "Too little for any truth: give more" if nothing else "The same command goes on with them"
+        return f"Runs left out for lack of processor time: {left}. {next_step}." if left else ""
 
     @property
     def omission_sentences(self) -> str:

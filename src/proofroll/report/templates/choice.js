@@ -86,15 +86,6 @@
   }
   everywhere(hide);
   form.addEventListener("submit", (event) => event.preventDefault());
-  // Scenes of a group are unfolded at first where the screen has room, small groups first.
-  addEventListener("load", () => {
-    if (innerWidth <= 800) return;
-    const scenes = (button) => button.title.split(", ").length;
-    for (const button of [...table.querySelectorAll("button[data-group][aria-expanded=false]")].sort((one, other) => scenes(one) - scenes(other))) {
-      button.click();
-      if (table.offsetWidth > table.parentElement.clientWidth) button.click();
-    }
-  });
 
   // Before the head itself hears of it, which would sort its column.
   table.addEventListener("keypress", (event) => { if (event.target.closest("thead :is([data-group], a)")) event.stopPropagation(); }, true);
@@ -108,4 +99,11 @@
     const parts = group === undefined ? "tr" : "th, td";
     table.querySelectorAll(parts).forEach((part) => { if (part.dataset.of === (group ?? model)) part.hidden = !open; });
   }, true);
+
+  // Scenes of a group are unfolded at first where the screen has room, small groups first.
+  const scenes = (button) => button.title.split(", ").length;
+  for (const button of innerWidth > 800 ? [...table.querySelectorAll("button[data-group][aria-expanded=false]")].sort((one, other) => scenes(one) - scenes(other)) : []) {
+    button.click();
+    if (table.offsetWidth > table.parentElement.clientWidth) button.click();
+  }
 })();

@@ -85,7 +85,7 @@ def verdict_table(content: ReportedComparison) -> Table:
         table.add_row(
             Text(" ".join(filter(None, (row.name, row.formulation, row.setting)))),
             step(row.resolution, row.resolution_value),
-            Text(f"{SYMBOLS[verdict]} {verdict_text(row)}", style=STYLES[verdict]),
+            Text(f"{SYMBOLS[verdict]} {verdict_text(row, content.runs_of(place))}", style=STYLES[verdict]),
             *(number(judged[name].error if name in judged else None) for name, _ in names),
             *(number(found[place]) for found in numbers.values()),
             Text("") if row.as_expected else Text("!!", style="bold red"),
@@ -207,7 +207,7 @@ def first_lines(content: ReportContent) -> list[str]:
     if missing:
         lines.append(_one_line(f"Missing ({len(missing)}): {missing[0].title}: {missing[0].missing}"))
     if not unexpected:
-        lines.append(_one_line(f"Look first at what is silent: {content.findings.sentences[1]}"))
+        lines.append(_one_line(content.findings.sentences[1]))
     return lines
 
 

@@ -133,14 +133,15 @@ def test_the_limit_of_forces_says_nothing_of_motion() -> None:
     [
         ({"status": "refused", "verdict": "refused", "message": "needs loops"}, Verdict.REFUSED),
         ({"status": "crashed", "verdict": "failed", "message": "it ended"}, Verdict.FAILED),
+        ({"status": "missing", "verdict": "failed", "message": "not installed"}, Verdict.FAILED),
         ({"verdict": "ill-posed"}, Verdict.NOT_JUDGED),
     ],
 )
 def test_what_gave_no_result_says_so(changes: dict[str, Any], state: Verdict) -> None:
-    """Refused, failed, and what nobody is judged by, each with its word."""
+    """Refused, failed, and what nobody is judged by, each with its word; an engine that is not installed is missing."""
     missing = {} if "status" not in changes else {"quantity": "", "role": "", "error": None, "scale": None}
     found = at([line(**changes, **missing)], 4)
-    assert (found.state, found.text) == (state, str(state))
+    assert (found.state, found.text) == (state, "missing" if changes.get("status") == "missing" else str(state))
     assert changes.get("message", "") in found.title
 
 
