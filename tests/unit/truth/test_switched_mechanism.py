@@ -13,7 +13,7 @@ from proofroll.elements.mechanism.joint_coordinates import JointCoordinates
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.parts import Body
 from proofroll.files.scene_file import load_scene
-from proofroll.truth.hybrid import first_close, follow
+from proofroll.truth.hybrid import HybridPath, Stretch, first_close, follow
 from proofroll.truth.mechanism import two_paths
 from proofroll.truth.mechanism.body_switching import SwitchedBodies
 from proofroll.truth.mechanism.joint_switching import SwitchedTree
@@ -406,6 +406,22 @@ def test_stops_hit_at_once_by_bodies_apart_are_well_posed(later: float) -> None:
     assert first_close(paths, CLOSE) == np.inf
     assert two_paths._parted(*paths, lambda mode: mode) == np.inf
     assert [sorted(item.name for item in path.happenings) for path in paths] == [["left", "right"]] * 2
+
+
+@pytest.mark.parametrize("extra", [0, 1])
+def test_a_leg_of_no_length_of_one_route_shifts_no_later_leg(extra: int) -> None:
+    """States of both routes are compared in the same leg where one of them has one more that lasts an instant."""
+    modes = [("high", 0.0), ("forward", 1.0), ("high", 1.0 + 1e-12), ("free", 2.0)]
+    ends = [1.0, 1.0 + 1e-12, 2.0, 3.0]
+    long = [
+        Stretch(start, end, mode, np.zeros(1), np.zeros(1), None)
+        for (mode, start), end in zip(modes, ends, strict=True)
+    ]
+    short = [long[0], *long[2:]]
+    paths = [HybridPath(tuple(legs), (), ()) for legs in ((long, short), (short, long))[extra]]
+    legs = paths[0].leg_at(np.array([0.5, 1.5, 2.5]))
+    others = two_paths.second_legs((paths[0], paths[1]), legs)
+    assert [paths[1].legs[number].mode for number in others] == ["high", "high", "free"]
 
 
 def test_stops_hit_one_after_the_other_are_well_posed() -> None:

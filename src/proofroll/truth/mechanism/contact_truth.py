@@ -14,7 +14,7 @@ from proofroll.truth.mechanism.contact_equations import ContactEquations
 from proofroll.truth.mechanism.contact_tree import ContactTree
 from proofroll.truth.mechanism.maximal_coordinates import MaximalCoordinates
 from proofroll.truth.mechanism.natural_units import Units, natural_units
-from proofroll.truth.mechanism.two_paths import TOLERANCES, followed, refuse_uncovered, two_route_motion
+from proofroll.truth.mechanism.two_paths import TOLERANCES, followed, refuse_uncovered, second_legs, two_route_motion
 from proofroll.truth.mechanism.two_routes import TwoRouteMotion, check_start, on_same_turns
 
 
@@ -44,7 +44,7 @@ def _in_units(mechanism: Mechanism, units: Units, times: Array) -> TwoRouteMotio
     until, kinks = float(times[-1]), breaks(own.signals)
     paths = followed(tree, bodies, until, kinks)
     legs = paths[0].leg_at(times)
-    others = [min(number, len(paths[1].legs) - 1) for number in legs]
+    others = second_legs(paths, legs, kinds)
     samples = [
         dynamics.sample(*dynamics.parts(state)[:2], paths[0].legs[number].mode, float(state[-1]))
         for state, number in zip(states_of(tree, paths[0], times, legs), legs, strict=True)

@@ -1,5 +1,6 @@
 """Truth of a mechanism that switches, from the paths of two routes: horizon, events, error bars."""
 
+from bisect import bisect_right
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
@@ -103,21 +104,42 @@ def _of_a_step(mechanism: Mechanism, record: Record, units: Units) -> dict[str, 
     return {name: TOLERANCES[0] * size for name, size in sizes.items()}
 
 
-def _parted(one: FollowedPath, two: FollowedPath, kinds: Callable[[Any], Any]) -> float:
-    """Start of the first leg in which the two routes are in different modes [s]; inf: there is none.
+def second_legs(
+    paths: tuple[HybridPath[Stretch[ModeT]], HybridPath[Stretch[ModeT]]],
+    legs: Sequence[int],
+    kinds: Callable[[Any], Any] = lambda mode: mode,
+) -> list[int]:
+    """Numbers of the second route's legs in which it is while the first is in these legs."""
+    pairs, last = _alike(*paths, kinds)[0], len(paths[1].legs) - 1
+    found = []
+    for leg in legs:
+        before = pairs[max(bisect_right(pairs, (leg, last)) - 1, 0)] if pairs else (0, 0)
+        found.append(min(max(before[1] + leg - before[0], 0), last))
+    return found
+
+
+def _alike(
+    one: FollowedPath, two: FollowedPath, kinds: Callable[[Any], Any]
+) -> tuple[list[tuple[int, int]], list[Stretch[Any]]]:
+    """Numbers of legs of both routes that are in the same mode in turn, and the legs from where they part.
 
     Changes at the same instant may come in either order; if that order matters, the margin of a decision is small.
     """
-    left = [list(path.legs) for path in (one, two)]
+    pairs, left = list[tuple[int, int]](), [list(path.legs) for path in (one, two)]
     while all(left):
         if kinds(left[0][0].mode) == kinds(left[1][0].mode):
+            pairs.append((len(one.legs) - len(left[0]), len(two.legs) - len(left[1])))
             del left[0][0], left[1][0]
         elif passing := next((legs for legs in left if _instant(legs[0])), None):
             del passing[0]
         else:
-            return min(legs[0].start for legs in left)
-    rest = [leg for leg in (*left[0], *left[1]) if not _instant(leg)]
-    return rest[0].start if rest else np.inf
+            break
+    return pairs, left[0] + left[1] if all(left) else [leg for leg in left[0] + left[1] if not _instant(leg)]
+
+
+def _parted(one: FollowedPath, two: FollowedPath, kinds: Callable[[Any], Any]) -> float:
+    """Start of the first leg in which the two routes are in different modes [s]; inf: there is none."""
+    return min((leg.start for leg in _alike(one, two, kinds)[1]), default=np.inf)
 
 
 def _instant(leg: Stretch[Any]) -> bool:
