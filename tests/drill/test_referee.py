@@ -12,17 +12,21 @@ from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.analysis import analyse
 from proofroll.elements.mechanism.assembly import check_start
+from proofroll.elements.mechanism.contacts.start import check_contacts
 from proofroll.elements.mechanism.joint import FACTS
 from proofroll.elements.mechanism.joint_coordinates import JointCoordinates
 from proofroll.elements.mechanism.record import Record, record_of
 from proofroll.truth.mechanism import maximal_taylor
 from proofroll.truth.mechanism.maximal_bodies import Planar, made_bodies
 from proofroll.truth.mechanism.maximal_coordinates import MaximalCoordinates
+from proofroll.truth.mechanism.switched_truth import truth_of
 from proofroll_drill.referee import holding
 from proofroll_drill.referee.balls import BallReferee
-from proofroll_drill.referee.holding import errors, hold, hold_ball
+from proofroll_drill.referee.holding import errors, hold, hold_ball, hold_contacts
 from proofroll_drill.referee.random_balls import STYLES as STYLES_OF_BALLS
 from proofroll_drill.referee.random_balls import WALLS, random_ball
+from proofroll_drill.referee.random_contacts import STYLES as STYLES_OF_CONTACTS
+from proofroll_drill.referee.random_contacts import random_contacts
 from proofroll_drill.referee.random_mechanisms import STYLES, random_mechanism
 
 STARTS = range(40)
@@ -119,3 +123,35 @@ def test_the_referee_of_balls_notices_what_is_wrong(monkeypatch: pytest.MonkeyPa
     monkeypatch.setattr(holding, "random_ball", lambda _: ("", heavier))
     monkeypatch.setattr(holding, "truth", lambda _, times: truth(scene, times))
     assert not hold_ball(17).sound
+
+
+@pytest.mark.drill
+# An ellipsoid that lands, spheres that pass each other, a rod that lands and whose slip stops.
+@pytest.mark.parametrize("seed", [41, 52, 27])
+def test_no_error_of_the_truth_of_contacts_lies_beyond_its_bar(seed: int) -> None:
+    """States, contact forces and events of short motions; `drill referee --contacts` has any number."""
+    held = hold_contacts(seed)
+    assert held.sound, held.text
+    assert {"p_WB", "v_WB", "w_WB", "q_WB", "pressed", "event"} <= set(held.worst)
+
+
+@pytest.mark.drill
+def test_the_referee_of_contacts_notices_what_is_wrong(monkeypatch: pytest.MonkeyPatch) -> None:
+    """An ellipsoid with an axis that is a millionth too long lands at another time."""
+    style, mechanism, until = random_contacts(41)
+    shape, floor = mechanism.geometries
+    longer = replace(shape, axes=(shape.axes[0] * (1 + 1e-6), *shape.axes[1:]))
+    larger = replace(mechanism, geometries=(longer, floor))
+    monkeypatch.setattr(holding, "random_contacts", lambda _: (style, mechanism, until))
+    monkeypatch.setattr(holding, "truth_of", lambda _, times: truth_of(larger, times))
+    held = hold_contacts(41)
+    assert not held.refused
+    assert held.worst["event"] > 1
+
+
+@pytest.mark.parametrize("seed", range(8 * len(STYLES_OF_CONTACTS)))
+def test_random_bodies_touch_or_are_apart_at_the_start(seed: int) -> None:
+    """No random bodies overlap or strike at time 0, and each style has its turn."""
+    style, mechanism, _ = random_contacts(seed)
+    assert style == [*STYLES_OF_CONTACTS][seed % len(STYLES_OF_CONTACTS)]
+    check_contacts(mechanism)

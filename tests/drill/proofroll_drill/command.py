@@ -54,18 +54,23 @@ def mutants(scheduler: Scheduler = None, as_json: Json = False) -> None:
 
 @drill.command()
 def referee(
-    first: Annotated[int, typer.Option(help="Number of the first random mechanism or ball.")] = 0,
+    first: Annotated[int, typer.Option(help="Number of the first random mechanism, ball or scene of contacts.")] = 0,
     count: Annotated[int, typer.Option(help="How many.", min=1)] = 20,
-    balls: Annotated[bool, typer.Option(help="Balls instead of mechanisms.")] = False,
+    balls: Annotated[bool, typer.Option("--balls", help="Balls instead of mechanisms.")] = False,
+    contacts: Annotated[bool, typer.Option("--contacts", help="Bodies that touch instead of mechanisms.")] = False,
     as_json: Json = False,
 ) -> None:
-    """Hold truths of random mechanisms, or balls, against a solver of its own; exit 1 on an error beyond its bar."""
-    from proofroll_drill.referee.holding import hold, hold_ball
+    """Hold truths of random mechanisms, balls or contacts against other solvers; exit 1 on an error beyond its bar."""
+    from proofroll.core.errors import InputError
+    from proofroll_drill.referee.holding import hold, hold_ball, hold_contacts
 
-    rows, kind = [], "balls" if balls else "mechanisms"
+    if balls and contacts:
+        raise InputError("--contacts", "with --balls", "give one of them")
+    kind, held = ("contacts", hold_contacts) if contacts else ("balls", hold_ball) if balls else ("mechanisms", hold)
+    rows = []
     with progress_bar(kind, total=count) as advance:
         for seed in range(first, first + count):
-            rows.append((hold_ball if balls else hold)(seed))
+            rows.append(held(seed))
             advance(str(seed))
     sound = sum(row.sound for row in rows)
     content = {"tried": len(rows), "sound": sound, kind: rows}

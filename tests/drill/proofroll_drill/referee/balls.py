@@ -15,7 +15,7 @@ import numpy as np
 from proofroll.elements.ball_on_surface.element import BallOnSurface
 
 from .extrapolation import Long, one_step, tight_step
-from .solver import long, turn
+from .linear_algebra import long, turn
 
 _LONGEST = 0.02  # s
 _NEAR_STOP = 0.4  # of the time that a slip still takes, the most that a step makes of it: no friction is reversed in it

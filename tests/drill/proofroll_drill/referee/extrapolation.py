@@ -28,7 +28,9 @@ def extrapolated(rate: Callable[[Long], Long], start: Long, times: Long) -> list
     return found
 
 
-def tight_step(rate: Callable[[Long], Long], state: Long, step: Any, most: Any) -> tuple[Long, Any, Any]:
+def tight_step(
+    rate: Callable[[Long], Long], state: Long, step: Any, most: Any, tight: float = _TIGHT
+) -> tuple[Long, Any, Any]:
     """The state after one step [s] of at most ``most``; how long it was, and how long the next may be.
 
     Raises:
@@ -37,12 +39,12 @@ def tight_step(rate: Callable[[Long], Long], state: Long, step: Any, most: Any) 
     length = min(step, most)
     while True:
         moved, error = one_step(rate, state, length)
-        if error <= _TIGHT or not length > _SMALLEST:
+        if error <= tight or not length > _SMALLEST:
             break
-        step = length = length * max(0.2, min(0.7, 0.8 * (_TIGHT / error) ** (1 / (2 * _COLUMNS - 1))))
+        step = length = length * max(0.2, min(0.7, 0.8 * (tight / error) ** (1 / (2 * _COLUMNS - 1))))
     if not error < 1e-13:
         raise ArithmeticError("the referee's steps fell to nothing")
-    grows = min(2.0, 0.8 * (_TIGHT / max(error, 1e-22)) ** (1 / (2 * _COLUMNS - 1)))
+    grows = min(2.0, 0.8 * (tight / max(error, 1e-22)) ** (1 / (2 * _COLUMNS - 1)))
     return moved, length, step if length < step else length * grows  # one that was cut says nothing of the next
 
 

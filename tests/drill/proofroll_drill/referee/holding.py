@@ -1,4 +1,4 @@
-"""Truths of random mechanisms and balls held against the referee: every error in parts of its own bar."""
+"""Truths of random mechanisms, balls and contacts held against the referee: every error in parts of its own bar."""
 
 from __future__ import annotations
 
@@ -13,26 +13,32 @@ from proofroll.core.events import events_of
 from proofroll.core.truth import truth
 from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.assembly import check_start
+from proofroll.elements.mechanism.contacts.start import check_contacts
 from proofroll.elements.mechanism.record import Record
 from proofroll.elements.mechanism.rotations import Array
-from proofroll.truth.mechanism.two_routes import find_truth
+from proofroll.truth.mechanism.switched_truth import truth_of
+from proofroll.truth.mechanism.two_routes import TwoRouteMotion, find_truth
 
 from .balls import BallReferee
+from .contacts import ContactReferee, Told
+from .linear_algebra import long
 from .random_balls import random_ball
+from .random_contacts import random_contacts
 from .random_mechanisms import random_mechanism
-from .solver import Referee, long
+from .solver import Referee
 
 UNTIL, UNTIL_OF_BALLS = 0.2, 0.5  # s
+_ALIKE = {"rest": "stick", "settle": "impact"}  # the truth's words for what the referee calls otherwise
 _BEYOND = 1e-3  # s after what ends the referee's account, so that the truth has its event
 
 
 @dataclass(frozen=True)
 class Held:
-    """One mechanism or ball.
+    """One mechanism, ball or scene of contacts.
 
     Attributes:
         seed, style: which.
-        kinds: of its joints, then of its loops; of a ball what it does.
+        kinds: of its joints, then of its loops; of a ball or of contacts the events.
         refused: why there is no truth, or the truth's own word where it is ill-posed; empty if it is well-posed.
         worst: largest error of each quantity, in parts of its bar.
         determinate: how many components of reactions were compared.
@@ -111,6 +117,57 @@ def hold_ball(seed: int, until: float = UNTIL_OF_BALLS) -> Held:
     if left and not said and "event_time" in found:
         worst["event"] = np.inf
     return Held(seed, style, does, said, worst, 0)
+
+
+def hold_contacts(seed: int) -> Held:
+    """The truth of random bodies that touch against the referee's, as far as that goes; events too."""
+    style, mechanism, until = random_contacts(seed)
+    times = np.linspace(0, until, 3)
+    told = ContactReferee(mechanism).follow(list(times))
+    does = ", ".join([*(f"{kind} {name}" for kind, name, _ in told.events), *([told.why] if told.why else [])])
+    if not told.seen:
+        return Held(seed, style, does, f"the referee cannot say: {told.why}", {}, 0)
+    try:
+        check_contacts(mechanism)
+        # a truth needs a time after the start
+        found = truth_of(mechanism, times[: max(2, len(told.seen))])
+    except ProofrollError as error:
+        return Held(seed, style, does, str(error), {}, 0)
+    known = int(np.sum(times[: len(told.seen)] < found.horizon))
+    worst: dict[str, float] = {}
+    record, seen = found.record, told.seen[:known]
+    pairs: dict[str, tuple[Any, Any]] = {
+        "p_WB": (record.p_WB, [one["p_WB"] for one in seen]),
+        "v_WB": (record.v_WB, [one["v_WB"] for one in seen]),
+        "w_WB": (record.w_WB, [one["w_WB"] for one in seen]),
+        "q_WB": (record.placed(mechanism).R_WB[:, :-1] / 4, [one["R_WB"] / 4 for one in seen]),
+        "pressed": (found.pressed, [one["pressed"] for one in seen]),
+        "wrench": (record.wrench, [one["wrench"] for one in seen]),
+    }
+    for name, (given, true) in pairs.items():
+        for value, other, bar in zip(given, true, found.bars[name], strict=False):  # the truth may go on
+            apart = float(np.nanmax(np.abs(value - other), initial=0))  # not a number: undetermined
+            worst[name] = max(worst.get(name, 0.0), float(apart / bar) if bar else np.inf if apart else 0.0)
+    worst["event"] = _event_error(told, found)
+    return Held(seed, style, does, "", worst, 0)
+
+
+def _event_error(told: Told, found: TwoRouteMotion) -> float:
+    """Largest distance of an event in parts of its bracket; infinite if one has no counterpart."""
+    last = min(told.end, found.horizon)
+    left = [event for event in told.events if event[2] < last]
+    worst = 0.0
+    for event in found.events:
+        if event.time >= last:
+            continue
+        same = [each for each in left if each[0] == _ALIKE.get(event.kind, event.kind) and each[1] == event.name]
+        if not same:
+            return np.inf
+        nearest = min(same, key=lambda each: abs(each[2] - event.time))
+        left.remove(nearest)
+        wide = max(event.time_high - event.time, event.time - event.time_low, float(np.spacing(event.time)))
+        worst = max(worst, float(abs(nearest[2] - event.time)) / wide)
+    return np.inf if left else worst
 
 
 def errors(mechanism: Mechanism, record: Record, determinate: NDArray[np.bool_]) -> dict[str, Array]:

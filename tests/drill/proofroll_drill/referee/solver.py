@@ -6,7 +6,7 @@ or is carried by b. Multipliers come from a pivoted Cholesky factor, which leave
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,34 +14,9 @@ from numpy.typing import NDArray
 from proofroll.elements.mechanism import Joint, Mechanism
 
 from .extrapolation import Long, extrapolated
+from .linear_algebra import cross, inverse, long, of_quaternion, of_rpy, quaternion, semidefinite_solve, turn
 
-_DEPENDENT = 1e-12  # of a squared row: what others leave of a dependent one is round-off, 1e-30
 _ONE = np.eye(3, dtype=np.longdouble)
-
-
-def long(values: Any) -> Long:
-    """The values as an array of long doubles."""
-    return np.asarray(values, dtype=np.longdouble)
-
-
-def turn(axis: Any, angle: Any) -> Long:
-    """Rotation about a unit vector (Rodrigues)."""
-    K = long([[0, -axis[2], axis[1]], [axis[2], 0, -axis[0]], [-axis[1], axis[0], 0]])
-    return _ONE + np.sin(angle) * K + (1 - np.cos(angle)) * (K @ K)
-
-
-def of_quaternion(p: Long) -> Long:
-    """Rotations of unit quaternions wxyz, (..., 3, 3)."""
-    w, u = p[..., :1, None], p[..., 1:]
-    twice = np.einsum("...i,...j->...ij", u, u)
-    cross = np.cross(u[..., None, :], _ONE)  # rows u × e
-    return (2 * w**2 - 1) * _ONE + 2 * twice + 2 * w * np.swapaxes(cross, -1, -2)
-
-
-def of_rpy(rpy: Any) -> Long:
-    """Rotation of roll, pitch, yaw about fixed axes."""
-    r, p, y = long(rpy)
-    return turn((0, 0, 1), y) @ turn((0, 1, 0), p) @ turn((1, 0, 0), r)
 
 
 def axes_of(joint: Joint) -> tuple[Long, Long, Long]:
@@ -50,7 +25,34 @@ def axes_of(joint: Joint) -> tuple[Long, Long, Long]:
     given = long(joint.second_axis) if joint.second_axis is not None else _ONE[int(np.argmin(np.abs(z)))]
     x = given - z * (z @ given)
     x = x / np.sqrt(x @ x)
-    return x, np.cross(z, x), z
+    return x, cross(z, x), z
+
+
+class System(NamedTuple):
+    """Equations of the bodies at one state.
+
+    Attributes:
+        push, twist: force and moment on each body of a unit multiplier of each row, (rows, bodies, 3).
+        bias: second rate of each row without accelerations.
+        yields: what each row gives way per multiplier: one over an armature, 0 for others.
+        of_push, of_twist: accelerations by a unit multiplier.
+        a0, alpha0: accelerations without multipliers.
+        inverse: of the inertias, world axes.
+        given: wrenches of springs and drives of joints.
+        broken: largest violation of a row and of its rate.
+    """
+
+    push: Long
+    twist: Long
+    bias: Long
+    yields: Long
+    of_push: Long
+    of_twist: Long
+    a0: Long
+    alpha0: Long
+    inverse: Long
+    given: Long
+    broken: Any
 
 
 class Referee:
@@ -61,7 +63,9 @@ class Referee:
         self._mass = long([body.mass for body in mechanism.bodies])
         self._com = long([*(body.com for body in mechanism.bodies), (0, 0, 0)])
         self._inertia = long([body.inertia for body in mechanism.bodies])
-        self._inverse = np.array([_inverse(inertia) for inertia in self._inertia])
+        self._inverse = np.array([inverse(inertia) for inertia in self._inertia])
+        self._ways = [of_rpy(joint.orientation) @ axes_of(joint)[2] for joint in mechanism.joints]  # of a joint, on a
+        self._seconds = [axes_of(joint)[0] for joint in mechanism.joints]  # on b
         index = mechanism.body_index
         self.ends = [(index[j.parent], index[j.child]) for j in mechanism.joints]
         self.ends += [(index[k.body_a], index[k.body_b]) for k in mechanism.loops]
@@ -118,10 +122,10 @@ class Referee:
             place = R[a] @ long(joint.position) + at_zero @ shift
             arm = R[b] @ long(joint.child_position)
             p[b] = p[a] + place - arm
-            v[b] = v[a] + np.cross(w[a], place) + at_zero @ slide - np.cross(w[b], arm)
-            quaternions[b] = _quaternion(R[b])
+            v[b] = v[a] + cross(w[a], place) + at_zero @ slide - cross(w[b], arm)
+            quaternions[b] = quaternion(R[b])
         arms = np.einsum("nij,nj->ni", R, self._com)
-        r, rate = (p + arms)[:n], (v + np.cross(w, arms))[:n]
+        r, rate = (p + arms)[:n], (v + cross(w, arms))[:n]
         angles = [value for _, joint in self._turning for value in joint.q0]
         return np.concatenate([r.ravel(), quaternions.ravel(), rate.ravel(), w[:n].ravel(), long(angles)])
 
@@ -144,18 +148,31 @@ class Referee:
             energy += spring.stiffness * (np.sqrt(d @ d) - spring.length) ** 2 / 2
         for q, rate, joint in self._coordinates(r, R, v, w, angles):
             energy += (joint.stiffness * (q - long(joint.rest)) ** 2 + joint.armature * rate**2) / 2
-        found = {"p_WB": (r - arms)[:n], "v_WB": (v - np.cross(w, arms))[:n], "w_WB": w[:n], "R_WB": R[:n]}
+        found = {"p_WB": (r - arms)[:n], "v_WB": (v - cross(w, arms))[:n], "w_WB": w[:n], "R_WB": R[:n]}
         return found | {"wrench": wrench, "angles": angles, "energy": energy, "broken": broken}
 
     def solve(self, state: Long) -> tuple[Long, Long, Any]:
         """Rate of the state, wrenches of joints and loops on their second body, largest violation of a constraint."""
+        system = self.system(state)
+        n, m = self.n, len(system.bias)
+        pushes, twists = system.push.reshape(m, 3 * n), system.twist.reshape(m, 3 * n)
+        A = pushes @ system.of_push.reshape(m, 3 * n).T + twists @ system.of_twist.reshape(m, 3 * n).T
+        A[np.arange(m), np.arange(m)] += system.yields
+        right = -system.bias - pushes @ system.a0.ravel() - twists @ system.alpha0.ravel()
+        multipliers = semidefinite_solve(A, right)
+        acceleration = system.a0 + np.einsum("m,mni->ni", multipliers, system.of_push)
+        alpha = system.alpha0 + np.einsum("m,mni->ni", multipliers, system.of_twist)
+        return self.rate(state, acceleration, alpha), self.wrenches(state, system, multipliers), system.broken
+
+    def system(self, state: Long) -> System:
+        """Rows of joints and loops at a state, and accelerations without their forces."""
         n = self.n
         r, R, v, w, angles = self._parts(state)
         force, moment = np.zeros((n + 1, 3), np.longdouble), np.zeros((n + 1, 3), np.longdouble)
         given = np.zeros((len(self.ends), 6), np.longdouble)
         force[:n] += self._mass[:, None] * long(self.mechanism.gravity)
         body_w = np.einsum("nji,nj->ni", R, w)[:n]
-        moment[:n] -= np.cross(w[:n], np.einsum("nij,njk,nk->ni", R[:n], self._inertia, body_w))
+        moment[:n] -= cross(w[:n], np.einsum("nij,njk,nk->ni", R[:n], self._inertia, body_w))
         self._loads(r, R, v, w, angles, force, moment, given)
         u, at_a, at_b = (
             np.einsum("mij,mj->mi", R[carrier], part)
@@ -163,62 +180,67 @@ class Referee:
         )
         w_a, w_b, w_u = w[self._a], w[self._b], w[self._carrier]
         point = self._points[:, None]
-        turned_b = np.cross(w_b, at_b)
+        turned_b = cross(w_b, at_b)
         d = np.where(point, r[self._b] + at_b - r[self._a] - at_a, at_b)
-        d_rate = np.where(point, v[self._b] + turned_b - v[self._a] - np.cross(w_a, at_a), turned_b)
-        d_bias = np.cross(w_b, turned_b) - np.where(point, np.cross(w_a, np.cross(w_a, at_a)), 0)
-        u_rate = np.cross(w_u, u)
-        bias = _dots(np.cross(w_u, u_rate), d) + 2 * _dots(u_rate, d_rate) + _dots(u, d_bias)
+        d_rate = np.where(point, v[self._b] + turned_b - v[self._a] - cross(w_a, at_a), turned_b)
+        d_bias = cross(w_b, turned_b) - np.where(point, cross(w_a, cross(w_a, at_a)), 0)
+        u_rate = cross(w_u, u)
+        bias = _dots(cross(w_u, u_rate), d) + 2 * _dots(u_rate, d_rate) + _dots(u, d_bias)
         rates = _dots(u_rate, d) + _dots(u, d_rate)
         # force and moment of a unit multiplier on b, a and what carries u
         m = len(u)
         push, twist = np.zeros((m, n + 1, 3), np.longdouble), np.zeros((m, n + 1, 3), np.longdouble)
         rows = np.arange(m)
         push[rows, self._b] += np.where(point, u, 0)
-        twist[rows, self._b] += np.cross(at_b, u)
+        twist[rows, self._b] += cross(at_b, u)
         push[rows, self._a] -= np.where(point, u, 0)
-        twist[rows, self._a] -= np.where(point, np.cross(at_a, u), 0)
-        twist[rows, self._carrier] += np.cross(u, d)
-        residual = _dots(u, d)
+        twist[rows, self._a] -= np.where(point, cross(at_a, u), 0)
+        twist[rows, self._carrier] += cross(u, d)
+        residual, yields = _dots(u, d), np.zeros(m, np.longdouble)
         for k, (number, joint) in enumerate(self._armed, self._hard):
+            yields[k] = 1 / long(joint.armature)
             if joint.kind == "revolute":  # not a product: the rate about the axis
                 a, b = self.ends[number]
                 push[k], twist[k] = 0, 0
                 twist[k, b], twist[k, a] = u[k], -u[k]
-                bias[k] = np.cross(w[a], u[k]) @ (w[b] - w[a])
+                bias[k] = cross(w[a], u[k]) @ (w[b] - w[a])
         push, twist = push[:, :n], twist[:, :n]
         inverse = np.einsum("nij,njk,nlk->nil", R[:n], self._inverse, R[:n])
         a0, alpha0 = force[:n] / self._mass[:, None], np.einsum("nij,nj->ni", inverse, moment[:n])
         of_push, of_twist = push / self._mass[:, None], np.einsum("nij,mnj->mni", inverse, twist)
-        pushes, twists = push.reshape(m, 3 * n), twist.reshape(m, 3 * n)
-        A = pushes @ of_push.reshape(m, 3 * n).T + twists @ of_twist.reshape(m, 3 * n).T
-        for k, (_, joint) in enumerate(self._armed, self._hard):
-            A[k, k] += 1 / long(joint.armature)
-        right = -bias - pushes @ a0.ravel() - twists @ alpha0.ravel()
-        multipliers = _semidefinite_solve(A, right)
-        acceleration = a0 + np.einsum("m,mni->ni", multipliers, of_push)
-        alpha = alpha0 + np.einsum("m,mni->ni", multipliers, of_twist)
-        wrench = given
-        for k in range(m):
+        hard = slice(self._hard)
+        broken = max(np.abs(residual[hard]).max(initial=0), np.abs(rates[hard]).max(initial=0))
+        return System(push, twist, bias, yields, of_push, of_twist, a0, alpha0, inverse, given, broken)
+
+    def wrenches(self, state: Long, system: System, multipliers: Long) -> Long:
+        """Wrenches of joints and loops on their second body about its point, world axes."""
+        n = self.n
+        r, R, *_ = self._parts(state)
+        wrench = system.given.copy()
+        for k, size in enumerate(multipliers[: len(self._number)]):
             b = self._b[k]
             if b < n:
-                f, t = multipliers[k] * push[k, b], multipliers[k] * twist[k, b]
+                f, t = size * system.push[k, b], size * system.twist[k, b]
                 arm = self._arms[self._number[k]]
                 wrench[self._number[k], :3] += f
-                wrench[self._number[k], 3:] += t - np.cross(R[b] @ arm, f)
+                wrench[self._number[k], 3:] += t - cross(R[b] @ arm, f)
             else:  # the world is b: what a feels, with the other sign, about b's point
                 a = self._a[k]
-                f, t = -multipliers[k] * push[k, a], -multipliers[k] * twist[k, a]
+                f, t = -size * system.push[k, a], -size * system.twist[k, a]
                 wrench[self._number[k], :3] += f
-                wrench[self._number[k], 3:] += t + np.cross(r[a] - self._arms[self._number[k]], f)
+                wrench[self._number[k], 3:] += t + cross(r[a] - self._arms[self._number[k]], f)
+        return wrench
+
+    def rate(self, state: Long, acceleration: Long, alpha: Long) -> Long:
+        """Rate of a state whose bodies accelerate so."""
+        n = self.n
+        r, R, v, w, angles = self._parts(state)
         angle_rates = [rate for _, rate, joint in self._coordinates(r, R, v, w, angles) if joint.kind != "prismatic"]
         p = state[3 * n : 7 * n].reshape(n, 4)
         p = p / np.sqrt((p**2).sum(1))[:, None]
-        p_rate = np.concatenate([-_dots(w[:n], p[:, 1:])[:, None], p[:, :1] * w[:n] + np.cross(w[:n], p[:, 1:])], 1) / 2
+        p_rate = np.concatenate([-_dots(w[:n], p[:, 1:])[:, None], p[:, :1] * w[:n] + cross(w[:n], p[:, 1:])], 1) / 2
         parts = (v[:n], p_rate, acceleration, alpha, long(angle_rates))
-        hard = slice(self._hard)
-        broken = max(np.abs(residual[hard]).max(initial=0), np.abs(rates[hard]).max(initial=0))
-        return np.concatenate([part.ravel() for part in parts]), wrench, broken
+        return np.concatenate([part.ravel() for part in parts])
 
     def _connect(self, number: int, kind: str, at_a: Any, frame_a: Long, at_b: Any, frame_b: Long) -> None:
         a, b = self.ends[number]
@@ -257,7 +279,7 @@ class Referee:
                 R[b] @ (long(spring.position_b) - self._com[b]),
             )
             d = r[b] + arm_b - r[a] - arm_a
-            rate = v[b] + np.cross(w[b], arm_b) - v[a] - np.cross(w[a], arm_a)
+            rate = v[b] + cross(w[b], arm_b) - v[a] - cross(w[a], arm_a)
             found.append((spring, d, (a, b, arm_a, arm_b, rate)))
         return found
 
@@ -268,12 +290,11 @@ class Referee:
             if joint.kind not in {"revolute", "universal", "prismatic"}:
                 continue
             a, b = self.ends[number]
-            x, _, z = axes_of(joint)
-            axis = R[a] @ of_rpy(joint.orientation) @ z
+            axis, x = R[a] @ self._ways[number], self._seconds[number]
             if joint.kind == "prismatic":
                 arm = R[b] @ self._arms[number]
                 d = r[b] + arm - r[a] - R[a] @ (long(joint.position) - self._com[a])
-                rate = v[b] + np.cross(w[b], arm) - v[a] - np.cross(w[a], r[b] + arm - r[a])
+                rate = v[b] + cross(w[b], arm) - v[a] - cross(w[a], r[b] + arm - r[a])
                 found.append((axis @ d, axis @ rate, joint))
                 continue
             for way in [axis, R[b] @ x][: joint.nq]:
@@ -288,13 +309,12 @@ class Referee:
             pull = (spring.stiffness * (length - spring.length) + spring.damping * (d @ rate) / length) * d / length
             force[a] += pull
             force[b] -= pull
-            moment[a] += np.cross(arm_a, pull)
-            moment[b] -= np.cross(arm_b, pull)
+            moment[a] += cross(arm_a, pull)
+            moment[b] -= cross(arm_b, pull)
         coordinates = self._coordinates(r, R, v, w, angles)
         for number, joint in enumerate(self.mechanism.joints):
             a, b = self.ends[number]
-            x, _, z = axes_of(joint)
-            axis = R[a] @ of_rpy(joint.orientation) @ z
+            axis, x = R[a] @ self._ways[number], self._seconds[number]
             f, t = 0 * axis, 0 * axis
             if joint.kind == "spherical":
                 t = -joint.damping * (w[b] - w[a])
@@ -304,9 +324,9 @@ class Referee:
                 f, t = (f + along, t) if joint.kind == "prismatic" else (f, t + along)
             arm = R[b] @ self._arms[number]
             force[b] += f
-            moment[b] += t + np.cross(arm, f)
+            moment[b] += t + cross(arm, f)
             force[a] -= f
-            moment[a] -= t + np.cross(r[b] + arm - r[a], f)
+            moment[a] -= t + cross(r[b] + arm - r[a], f)
             given[number] += np.concatenate([f, t])
 
 
@@ -315,9 +335,9 @@ def _loop_frames(loop: Any) -> tuple[Long, Any, Long]:
 
     def frame(axis: Any) -> Long:
         z = long(axis) / np.sqrt((long(axis) ** 2).sum())
-        x = np.cross(z, _ONE[int(np.argmin(np.abs(z)))])
+        x = cross(z, _ONE[int(np.argmin(np.abs(z)))])
         x = x / np.sqrt(x @ x)
-        return np.array([x, np.cross(z, x), z]).T
+        return np.array([x, cross(z, x), z]).T
 
     on_a, on_b = frame(loop.axis_a), frame(loop.axis_b)
     if loop.kind in {"fixed", "prismatic"}:
@@ -329,47 +349,3 @@ def _loop_frames(loop: Any) -> tuple[Long, Any, Long]:
 
 def _dots(one: Long, other: Long) -> Long:
     return (one * other).sum(-1)
-
-
-def _inverse(matrix: Long) -> Long:
-    """Inverse of a 3×3 matrix by cross products."""
-    a, b, c = matrix
-    adjoint = np.array([np.cross(b, c), np.cross(c, a), np.cross(a, b)])
-    return adjoint.T / (a @ adjoint[0])
-
-
-def _quaternion(R: Long) -> Long:
-    """Unit quaternion wxyz of a rotation, from its largest component."""
-    squares = np.array([1 + np.trace(R), *(1 - np.trace(R) + 2 * np.diag(R))])
-    k = int(np.argmax(squares))
-    skewed = np.array([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]])
-    if k == 0:
-        found = np.array([squares[0], *skewed])
-    else:
-        found = np.array([skewed[k - 1], *(R[k - 1] + R[:, k - 1])])
-        found[k] = squares[k]
-    return found / np.sqrt(found @ found)
-
-
-def _semidefinite_solve(A: Long, right: Long) -> Long:
-    """A solution of A x = right by Cholesky factors with pivots; zero in what depends on the rest."""
-    A, b, order = A.copy(), right.copy(), []
-    size = np.diag(A).copy()
-    size[size == 0] = 1
-    left = np.ones(len(b), bool)
-    factors = []
-    for _ in range(len(b)):
-        ratio = np.where(left, np.diag(A) / size, -1)
-        pivot = int(np.argmax(ratio))
-        if ratio[pivot] < _DEPENDENT:
-            break
-        left[pivot] = False
-        column = np.where(left, A[:, pivot], 0) / A[pivot, pivot]
-        b = b - column * b[pivot]
-        factors.append((pivot, column, A[pivot, pivot]))
-        A = A - np.outer(column, A[pivot])
-        order.append(pivot)
-    x = np.zeros_like(b)
-    for pivot, column, diagonal in reversed(factors):
-        x[pivot] = b[pivot] / diagonal - column @ x
-    return x
