@@ -277,7 +277,7 @@ def test_rows_of_one_declared_scheme_are_named_whatever_their_errors(
     declared = ["", "semi-implicit Euler", third, ""]
     rows = [dataclasses.replace(row, scheme=said) for row, said in zip(content.rows, declared, strict=True)]
     said = (
-        "One scheme has one error, whoever computes it, so no evidence for one another: "
+        "Of one integration scheme, so no evidence for one another where they agree: "
         "alpha fine default (dt 1e-3 s), beta only (dt 1e-3 s) (semi-implicit Euler)."
     )
     lines = closing_lines(dataclasses.replace(content, rows=rows))

@@ -191,7 +191,7 @@ def one_scheme(content: ReportedComparison) -> list[str]:
     ]
     said = (
         (
-            "One scheme has one error, whoever computes it, so no evidence for one another",
+            "Of one integration scheme, so no evidence for one another where they agree",
             [f"{', '.join(rows)} ({scheme})" for scheme, rows in declared.items()],
         ),
         (
