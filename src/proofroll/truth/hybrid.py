@@ -19,7 +19,7 @@ from proofroll.core.stalling import StepCount
 
 State = FloatArray
 ModeT = TypeVar("ModeT")
-LegT = TypeVar("LegT", bound="Span")
+SpanT = TypeVar("SpanT", bound="Span")
 Rates = Callable[[float, State], FloatArray]
 # Successive stretches of zero length after which a route makes no progress.
 _STUCK = 50
@@ -93,13 +93,13 @@ class Stretch(Generic[ModeT]):
 
 @dataclass(frozen=True)
 class Transition(Generic[ModeT]):
-    """State and mode after a leg, with the changes that led there.
+    """State and mode after a stretch, with the changes that led there.
 
     Attributes:
-        state, mode: of the next leg; mode None: the continuation is unknown and the path ends.
+        state, mode: of the next stretch; mode None: the continuation is unknown and the path ends.
         happenings: kind and name of each change.
         margin: relative distance of the forces from another outcome; inf where nothing was decided.
-        delay: time from the end of the leg to the end of the changes [s]; infinitely many may follow each other
+        delay: time from the end of the stretch to the end of the changes [s]; infinitely many may follow each other
             meanwhile.
         blur: uncertainty of that delay that all routes share [s].
     """
@@ -112,52 +112,56 @@ class Transition(Generic[ModeT]):
     blur: float = 0.0
 
 
-class Legs(Protocol[ModeT, LegT]):
-    """Protocol of a route: integrates legs in its own state variables and decides the transitions."""
+class SwitchingRoute(Protocol[ModeT, SpanT]):
+    """Protocol of a route: integrates stretches in its own state variables and decides the transitions."""
 
     def begin(self) -> Transition[ModeT]:
         """State and mode at time 0."""
 
-    def walk(self, time: float, state: State, mode: ModeT, until: float) -> LegT:
-        """Integrates one leg from ``time`` to its first guard, or to ``until`` [s]."""
+    def walk(self, time: float, state: State, mode: ModeT, until: float) -> SpanT:
+        """Integrates one stretch from ``time`` to its first guard, or to ``until`` [s]."""
 
-    def change(self, leg: LegT) -> Transition[ModeT]:
-        """Transition after a leg that ended at a guard or at a break."""
+    def change(self, stretch: SpanT) -> Transition[ModeT]:
+        """Transition after a stretch that ended at a guard or at a break."""
 
 
-class HybridRoute(Legs[ModeT, Stretch[ModeT]], Protocol):
-    """Protocol of a route whose legs are stretches: states within are found from the state at the start."""
+class HybridRoute(SwitchingRoute[ModeT, Stretch[ModeT]], Protocol):
+    """Protocol of a route that finds states within a stretch from the state at its start."""
 
-    def within(self, leg: Stretch[ModeT], times: FloatArray) -> FloatArray:
+    def within(self, stretch: Stretch[ModeT], times: FloatArray) -> FloatArray:
         """States at increasing times [s] within a stretch, shape (times, state)."""
 
 
 @dataclass(frozen=True)
-class HybridPath(Generic[LegT]):
+class HybridPath(Generic[SpanT]):
     """A whole motion.
 
     Attributes:
-        legs: in order, from time 0.
+        stretches: in order, from time 0.
         happenings: changes of mode, in order of time.
         margins: time [s] and relative distance from another outcome, of each decision.
-        known: True if the last leg reaches the end time; otherwise its continuation is unknown.
+        known: True if the last stretch reaches the end time; otherwise its continuation is unknown.
     """
 
-    legs: tuple[LegT, ...]
+    stretches: tuple[SpanT, ...]
     happenings: tuple[Happening, ...]
     margins: tuple[tuple[float, float], ...]
     known: bool = True
 
-    def leg_at(self, times: FloatArray) -> list[int]:
-        """Index of the leg at each time [s]; the time of a change belongs to the later leg."""
-        ends = [leg.end for leg in self.legs[:-1]]
+    def stretch_at(self, times: FloatArray) -> list[int]:
+        """Index of the stretch at each time [s]; the time of a change belongs to the later stretch."""
+        ends = [stretch.end for stretch in self.stretches[:-1]]
         return [int(k) for k in np.searchsorted(ends, times, side="right")]
 
 
 def follow(
-    route: Legs[ModeT, LegT], until: float, breaks: Sequence[float] = (), close: float = 0.0, edge: float = np.inf
-) -> HybridPath[LegT]:
-    """Path from time 0 to ``until`` [s]; legs also end at the rising ``breaks`` [s], where the rates are not smooth.
+    route: SwitchingRoute[ModeT, SpanT],
+    until: float,
+    breaks: Sequence[float] = (),
+    close: float = 0.0,
+    edge: float = np.inf,
+) -> HybridPath[SpanT]:
+    """Path from time 0 to ``until`` [s]; stretches also end at ``breaks`` [s], rising, where the rates are not smooth.
 
     After a decision with a margin below ``close``, where round-off decides, or from the time ``edge`` [s] on, at which
     another route came to such a decision, a refusal ends the path instead of being raised.
@@ -168,7 +172,7 @@ def follow(
     """
     time, over, change, still = 0.0, 0.0, route.begin(), 0
     short, longest, since = 0, 0.0, 0
-    legs: list[LegT] = []
+    stretches: list[SpanT] = []
     happenings: list[Happening] = []
     margins = []
     while True:
@@ -177,30 +181,30 @@ def follow(
         margins.append((time, change.margin))
         since = since + 1 if since or change.margin < close else 0
         if change.mode is None or since > _BEYOND:
-            return HybridPath(tuple(legs), tuple(happenings), tuple(margins), known=False)
+            return HybridPath(tuple(stretches), tuple(happenings), tuple(margins), known=False)
         end = next((at for at in breaks if time < at < until), until)
-        leg = route.walk(time, change.state, change.mode, end)
-        legs.append(leg)
-        if leg.guard is None and end == until:
-            return HybridPath(tuple(legs), tuple(happenings), tuple(margins))
-        still = still + 1 if leg.end <= leg.start else 0
-        length = leg.end - leg.start
+        stretch = route.walk(time, change.state, change.mode, end)
+        stretches.append(stretch)
+        if stretch.guard is None and end == until:
+            return HybridPath(tuple(stretches), tuple(happenings), tuple(margins))
+        still = still + 1 if stretch.end <= stretch.start else 0
+        length = stretch.end - stretch.start
         if length > 0.0:
-            if length > _SHORT * leg.end or length < _SHRUNK * longest:
+            if length > _SHORT * stretch.end or length < _SHRUNK * longest:
                 short, longest = 0, length
             short += 1
         try:
             if still > _STUCK or short > _MANY:
                 raise Diverged(
-                    f"the truth makes no progress at t = {leg.end:g} s, where {_latest(happenings)} follow each other "
-                    "without end; ask for an earlier end of the run"
+                    f"the truth makes no progress at t = {stretch.end:g} s, where {_latest(happenings)} follow each "
+                    "other without end; ask for an earlier end of the run"
                 )
             if short == 1:
-                _refuse_many(legs, until)
-            time, change = leg.end, route.change(leg)
+                _refuse_many(stretches, until)
+            time, change = stretch.end, route.change(stretch)
         except (Diverged, Refused):
-            if leg.end >= edge or min(margin for _, margin in margins) < close:
-                return HybridPath(tuple(legs), tuple(happenings), tuple(margins), known=False)
+            if stretch.end >= edge or min(margin for _, margin in margins) < close:
+                return HybridPath(tuple(stretches), tuple(happenings), tuple(margins), known=False)
             raise
 
 
@@ -212,28 +216,28 @@ def _latest(happenings: Sequence[Happening]) -> str:
     return " and ".join(f"{', '.join(of)} of {name}" for name, of in sorted(kinds.items())) or "changes of mode"
 
 
-def _refuse_many(legs: Sequence[Span], until: float) -> None:
+def _refuse_many(stretches: Sequence[Span], until: float) -> None:
     """Refuses early a motion whose mode will change thousands of times.
 
     Raises:
         Diverged: the durations of the last stretches predict more than _MOST stretches until ``until`` [s].
     """
-    if len(legs) % _LOOK:
+    if len(stretches) % _LOOK:
         return
-    last, end = legs[-_LOOK:], legs[-1].end
+    last, end = stretches[-_LOOK:], stretches[-1].end
     spans = [last[_LOOK // 2].start - last[0].start, end - last[_LOOK // 2].start]
-    calm = sum(spans) < _SHRUNK * end * _LOOK / len(legs)  # changes came slower before, and may again
+    calm = sum(spans) < _SHRUNK * end * _LOOK / len(stretches)  # changes came slower before, and may again
     ahead = (until - end) * _LOOK / sum(spans) if sum(spans) > 0.0 else np.inf
-    if len(legs) + (0.0 if calm else ahead) > _MOST and min(spans) > _SHRUNK * max(spans) and not _narrows(last):
+    if len(stretches) + (0.0 if calm else ahead) > _MOST and min(spans) > _SHRUNK * max(spans) and not _narrows(last):
         raise Diverged(
-            f"by t = {end:g} s there have been {len(legs)} changes; at this pace {number(ahead, 1)} more follow until "
-            f"t = {until:g} s, and the truth follows {_MOST}; ask for a shorter time"
+            f"by t = {end:g} s there have been {len(stretches)} changes; at this pace {number(ahead, 1)} more follow "
+            f"until t = {until:g} s, and the truth follows {_MOST}; ask for a shorter time"
         )
 
 
-def _narrows(legs: Sequence[Span]) -> bool:
+def _narrows(stretches: Sequence[Span]) -> bool:
     """True if the states at the starts of stretches contract; their last component, the time, does not count."""
-    starts = np.array([leg.first[:-1] for leg in legs if isinstance(leg, Stretch)])
+    starts = np.array([stretch.first[:-1] for stretch in stretches if isinstance(stretch, Stretch)])
     if not len(starts):
         return False
     first, second = (np.linalg.norm(np.ptp(half, axis=0)) for half in np.array_split(starts, 2))
@@ -259,13 +263,13 @@ def integrate_to_guard(
 
     Args:
         rates: right-hand side.
-        time: start of the leg [s].
+        time: start of the stretch [s].
         state: state at the start.
         until: time limit [s].
         tolerance: absolute, of each component of the state.
         guards: values that are negative while the mode lasts, shape (guards,).
         corrected: projects a state onto its constraints; applied after every step.
-        first_step: length of the first step at most [s], from the leg before, as rebounds get shorter and shorter;
+        first_step: length of the first step at most [s], from the stretch before, as rebounds get shorter and shorter;
             None: chosen from the rates.
         noise: round-off of the guards, shape (guards,); a guard counts as risen only above it. None: zero.
         visited: list to which time and state at the start of each step are appended, for :func:`states_at`.
@@ -316,17 +320,17 @@ def states_at(
 
 
 def states_of(
-    route: HybridRoute[ModeT], path: HybridPath[Stretch[ModeT]], times: FloatArray, legs: Sequence[int]
+    route: HybridRoute[ModeT], path: HybridPath[Stretch[ModeT]], times: FloatArray, stretches: Sequence[int]
 ) -> FloatArray:
-    """States at rising times [s], each within the leg of the given index or at its end, shape (times, state)."""
-    at, ends = np.asarray(legs), np.array([path.legs[number].end for number in legs])
+    """States at rising times [s], each within the stretch of the given index or at its end, shape (times, state)."""
+    at, ends = np.asarray(stretches), np.array([path.stretches[number].end for number in stretches])
     within = np.minimum(times, ends)  # beyond the end of a path that is not known further, rates may be of any size
-    parts = [route.within(path.legs[number], within[at == number]) for number in sorted(set(legs))]
+    parts = [route.within(path.stretches[number], within[at == number]) for number in sorted(set(stretches))]
     return np.concatenate(parts)
 
 
 def first_close(paths: Sequence[HybridPath[Any]], close: float) -> float:
     """Time [s] of the first graze, or decision whose margin is below ``close``; inf: there is none."""
     decisions = (time for path in paths for time, margin in path.margins if margin < close)
-    grazes = (time for path in paths for leg in path.legs for time in getattr(leg, "grazes", ()))
+    grazes = (time for path in paths for stretch in path.stretches for time in getattr(stretch, "grazes", ()))
     return min([*decisions, *grazes], default=np.inf)

@@ -63,9 +63,9 @@ def test_a_route_that_alternates_without_progress_is_told(length: float) -> None
         def walk(self, time: float, state: FloatArray, mode: str, until: float) -> Stretch[str]:
             return Stretch(time, min(until, time + (length if time else 0.1)), mode, state, state, 0)
 
-        def change(self, leg: Stretch[str]) -> Transition[str]:
-            other, kind = ("right", "impact") if leg.mode == "left" else ("left", "release")
-            return Transition(leg.last, other, ((kind, leg.mode),), np.inf)
+        def change(self, stretch: Stretch[str]) -> Transition[str]:
+            other, kind = ("right", "impact") if stretch.mode == "left" else ("left", "release")
+            return Transition(stretch.last, other, ((kind, stretch.mode),), np.inf)
 
     with pytest.raises(Diverged, match=r"no progress at t = 0\.1 s, where impact of left and release of right follow"):
         follow(Alternating(), 1.0)
@@ -84,8 +84,8 @@ def test_thousands_of_rebounds_are_refused_as_soon_as_they_are_seen() -> None:
             self.count += 1
             return Stretch(time, min(time + self.length, until), mode, state, state, 0)
 
-        def change(self, leg: Stretch[str]) -> Transition[str]:
-            return Transition(leg.last, "flight", (), np.inf)
+        def change(self, stretch: Stretch[str]) -> Transition[str]:
+            return Transition(stretch.last, "flight", (), np.inf)
 
     route = Lossless()
     said = r"100 changes; at this pace 1e4 more follow until t = 1 s, and the truth follows 1000; ask for a shorter"
@@ -112,10 +112,10 @@ class Swinging:
             return Stretch(time, until, mode, state, state, None)
         return Stretch(time, min(time + self.lengths[self.count - 1], until), mode, state, state, 0)
 
-    def change(self, leg: Stretch[str] | None) -> Transition[str]:
+    def change(self, stretch: Stretch[str] | None) -> Transition[str]:
         """See the protocol."""
         size = self.sizes[min(self.count, len(self.sizes) - 1)]
-        return Transition(np.array([(-1) ** self.count * size, leg.end if leg else 0.0]), "on", (), np.inf)
+        return Transition(np.array([(-1) ** self.count * size, stretch.end if stretch else 0.0]), "on", (), np.inf)
 
 
 @pytest.mark.parametrize(
@@ -157,8 +157,8 @@ def test_rebounds_that_shrink_by_a_hundredth_make_progress() -> None:
                 time, until if length < 1e-12 else time + length, mode, state, state, None if length < 1e-12 else 0
             )
 
-        def change(self, leg: Stretch[str]) -> Transition[str]:
-            return Transition(leg.last, "flight", (), np.inf)
+        def change(self, stretch: Stretch[str]) -> Transition[str]:
+            return Transition(stretch.last, "flight", (), np.inf)
 
     route = Rebounding()
     follow(route, 1.0)
@@ -176,13 +176,13 @@ class Stopping:
         """See the protocol."""
         return Stretch(time, min(0.5, until), mode, state, state, 0)
 
-    def change(self, leg: Stretch[str]) -> Transition[str]:
+    def change(self, stretch: Stretch[str]) -> Transition[str]:
         """See the protocol."""
-        raise Refused(f"no outcome at {leg.end} s")
+        raise Refused(f"no outcome at {stretch.end} s")
 
-    def within(self, leg: Stretch[str], times: FloatArray) -> FloatArray:
+    def within(self, stretch: Stretch[str], times: FloatArray) -> FloatArray:
         """See the protocol."""
-        return np.clip(times, leg.start, None)[:, None]
+        return np.clip(times, stretch.start, None)[:, None]
 
 
 @pytest.mark.parametrize("edge", [0.5, np.inf])
@@ -199,7 +199,7 @@ def test_a_path_that_ends_is_not_followed_further() -> None:
     """States asked for after the last known one are the last known one: rates beyond it may be of any size."""
     path = follow(Stopping(), 1.0, (), 1e-9, 0.0)
     times = np.array([0.25, 0.5, 1.0])
-    assert states_of(Stopping(), path, times, path.leg_at(times))[:, 0].tolist() == [0.25, 0.5, 0.5]
+    assert states_of(Stopping(), path, times, path.stretch_at(times))[:, 0].tolist() == [0.25, 0.5, 0.5]
 
 
 def test_a_path_beyond_a_close_decision_is_short() -> None:
@@ -215,8 +215,8 @@ def test_a_path_beyond_a_close_decision_is_short() -> None:
             self.count += 1
             return Stretch(time, min(time + 1e-2, until), mode, state, state, 0)
 
-        def change(self, leg: Stretch[str]) -> Transition[str]:
-            return Transition(leg.last, "flight", (), np.inf)
+        def change(self, stretch: Stretch[str]) -> Transition[str]:
+            return Transition(stretch.last, "flight", (), np.inf)
 
     route = Rebounding()
     assert not follow(route, 10.0, (), 1e-9).known

@@ -409,8 +409,8 @@ def test_stops_hit_at_once_by_bodies_apart_are_well_posed(later: float) -> None:
 
 
 @pytest.mark.parametrize("extra", [0, 1])
-def test_a_leg_of_no_length_of_one_route_shifts_no_later_leg(extra: int) -> None:
-    """States of both routes are compared in the same leg where one of them has one more that lasts an instant."""
+def test_a_stretch_of_no_length_of_one_route_shifts_no_later_stretch(extra: int) -> None:
+    """States of both routes are compared in the same stretch where one of them has one more that lasts an instant."""
     modes = [("high", 0.0), ("forward", 1.0), ("high", 1.0 + 1e-12), ("free", 2.0)]
     ends = [1.0, 1.0 + 1e-12, 2.0, 3.0]
     long = [
@@ -418,10 +418,10 @@ def test_a_leg_of_no_length_of_one_route_shifts_no_later_leg(extra: int) -> None
         for (mode, start), end in zip(modes, ends, strict=True)
     ]
     short = [long[0], *long[2:]]
-    paths = [HybridPath(tuple(legs), (), ()) for legs in ((long, short), (short, long))[extra]]
-    legs = paths[0].leg_at(np.array([0.5, 1.5, 2.5]))
-    others = two_paths.second_legs((paths[0], paths[1]), legs)
-    assert [paths[1].legs[number].mode for number in others] == ["high", "high", "free"]
+    paths = [HybridPath(tuple(stretches), (), ()) for stretches in ((long, short), (short, long))[extra]]
+    stretches = paths[0].stretch_at(np.array([0.5, 1.5, 2.5]))
+    others = two_paths.counterparts((paths[0], paths[1]), stretches)
+    assert [paths[1].stretches[number].mode for number in others] == ["high", "high", "free"]
 
 
 def test_stops_hit_one_after_the_other_are_well_posed() -> None:

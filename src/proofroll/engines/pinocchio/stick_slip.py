@@ -89,7 +89,7 @@ class AdaptiveStickSlip(Adaptive):
 
     def _advance(self, start: float, end: float) -> None:
         while start < end:
-            start = self._leg(start, end)
+            start = self._stretch(start, end)
 
     # -- the laws ---------------------------------------------------------------------------------------------------
 
@@ -135,7 +135,7 @@ class AdaptiveStickSlip(Adaptive):
 
     # -- from event to event ----------------------------------------------------------------------------------------
 
-    def _leg(self, start: float, end: float) -> float:
+    def _stretch(self, start: float, end: float) -> float:
         """Integrates in the present mode until it changes or to ``end``; returns that time [s]."""
         if self._solver is None:
             y = self._joined(self.q, self.v)

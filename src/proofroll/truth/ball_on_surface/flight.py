@@ -9,7 +9,7 @@ from proofroll.core.errors import Diverged, Refused
 from proofroll.core.event_location import first_rise
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.motion import BallMotion
-from proofroll.truth.ball_on_surface.route import End, Leg, Route, World
+from proofroll.truth.ball_on_surface.route import BallStretch, End, Route, World
 
 # Fraction of the ball's time scale after take-off at which the search for a landing starts: at take-off itself the gap
 # is zero.
@@ -63,7 +63,7 @@ class Landed:
     slip: FloatArray | None
 
 
-def landing_outcome(body: RollingBall, route: Route, flight: Leg) -> Bounce | Landed | None:
+def landing_outcome(body: RollingBall, route: Route, flight: BallStretch) -> Bounce | Landed | None:
     """Outcome of a landing: a bounce, or lasting contact.
 
     A ball that leaves each impact with e times its speed bounces infinitely often in a finite time. Below the speed
@@ -119,11 +119,11 @@ def _slip(body: RollingBall, v: FloatArray, w: FloatArray, e1: FloatArray) -> Fl
     return slip if size > _STANDS * (np.sqrt(a * gravity) + np.linalg.norm(v) + a * np.linalg.norm(w)) else None
 
 
-def fly(body: RollingBall, world: World, time: float, until: float, state: FloatArray) -> Leg:
+def fly(body: RollingBall, world: World, time: float, until: float, state: FloatArray) -> BallStretch:
     """Free fall from ``time`` [s] with constant spin until the ball lands, or to ``until`` [s].
 
     ``world``: position, velocity and spin at take-off. ``state``: the same in the route's variables, handed on to the
-    leg.
+    stretch.
     """
     p, v, w = world
 
@@ -155,5 +155,5 @@ def fly(body: RollingBall, world: World, time: float, until: float, state: Float
         end = min(time + 2 * (start - time), until)
         lands, start = first_rise(sunk, start, end), end
     if lands is None:
-        return Leg(time, until, False, state, End.TIME, motion)
-    return Leg(time, lands, False, state, End.LANDED, motion)
+        return BallStretch(time, until, False, state, End.TIME, motion)
+    return BallStretch(time, lands, False, state, End.LANDED, motion)

@@ -17,14 +17,14 @@ from proofroll.elements.ball_on_surface.motion import BallMotion
 from proofroll.truth.ball_on_surface import unreduced_taylor
 from proofroll.truth.ball_on_surface.contact import ContactRates
 from proofroll.truth.ball_on_surface.impact import by_equations
-from proofroll.truth.ball_on_surface.route import End, Leg, Route, World, about_to_stop, join_motions
+from proofroll.truth.ball_on_surface.route import BallStretch, End, Route, World, about_to_stop, join_motions
 from proofroll.truth.collocation import Step, System, next_length, nodes, take
 
 _TOLERANCE = 1e-13  # of a step, relative to the scale of each variable
 _APPROACH = 0.5  # fraction of the time left until standstill that one step may take, far from it,
 _CLOSE = 0.99  # and near it, where that time is known accurately
 _FURTHER = 1.2  # how far a polynomial is extrapolated, relative to its own step
-_MANY = 300  # steps of a rolling leg; the rest of a longer one is left to a compiled Taylor series
+_MANY = 300  # steps of a rolling stretch; the rest of a longer one is left to a compiled Taylor series
 
 
 class Implicit(Route):
@@ -75,7 +75,7 @@ class Implicit(Route):
         w = (state[3:6] @ e1) * e1 - cross(e1, v_WB) / self._body.ball.radius
         return np.concatenate([state[:3], w, np.zeros(3)])
 
-    def stick(self, time: float, state: FloatArray, until: float) -> Leg:
+    def stick(self, time: float, state: FloatArray, until: float) -> BallStretch:
         """See :class:`Route`."""
         walk = _Walk(self._contact.system(sticking=True), time, state, until)
         resisted = self._body.contact.rolling_resistance > 0
@@ -87,32 +87,32 @@ class Implicit(Route):
             left = self._until_still(walk.state, True) if resisted else np.inf
             if about_to_stop(left, self._pace, walk.time):
                 halted = walk.state + left * self.rates(walk.state)
-                return walk.leg(self, True, walk.time + left, self.nudged(halted, np.zeros(3)), End.HALT)
+                return walk.stretch(self, True, walk.time + left, self.nudged(halted, np.zeros(3)), End.HALT)
             step, length = walk.step(min(length, self._approach(left)))
             ends = [] if self._held else [(End.LIFTOFF, partial(self._pull_along, step, True))]
             ends += [(End.CONE, partial(self._excess_along, step))] if np.isfinite(self._mu) else []
             found = [(first_rise(g, step.time, step.time + step.length), why) for why, g in ends]
             if ended := [(when, why) for when, why in found if when is not None]:
                 when, why = min(ended, key=lambda item: item[0])
-                return walk.leg(self, True, when, walk.cut(when), why)
-        return walk.leg(self, True, until, walk.state, End.TIME)
+                return walk.stretch(self, True, when, walk.cut(when), why)
+        return walk.stretch(self, True, until, walk.state, End.TIME)
 
-    def _rolls_on(self, walk: _Walk, until: float) -> Leg:
-        """Continues a long rolling leg by Taylor series of the same equations, which take a fraction of the time."""
+    def _rolls_on(self, walk: _Walk, until: float) -> BallStretch:
+        """Continues a long roll by Taylor series of the same equations, which take a fraction of the time."""
         y, begun = walk.state, walk.time
         end, slips, states = unreduced_taylor.until_slip(self._body, begun, y[:6], until)
 
         def at(times: FloatArray) -> FloatArray:
             return np.concatenate([states(times), np.zeros((len(times), 3))], axis=1)
 
-        early = walk.leg(self, True, begun, y, End.TIME).motion
+        early = walk.stretch(self, True, begun, y, End.TIME).motion
 
         def motion(times: FloatArray) -> BallMotion:
             return join_motions(times, [(-np.inf, early), (begun, lambda late: self.motion(at(late), True))], self.name)
 
-        return Leg(walk.start, end, True, at(np.array([end]))[0], End.CONE if slips else End.TIME, motion)
+        return BallStretch(walk.start, end, True, at(np.array([end]))[0], End.CONE if slips else End.TIME, motion)
 
-    def slip(self, time: float, state: FloatArray, until: float, slip: FloatArray | None = None) -> Leg:
+    def slip(self, time: float, state: FloatArray, until: float, slip: FloatArray | None = None) -> BallStretch:
         """See :class:`Route`."""
         if slip is not None:
             state = np.concatenate([state[:6], slip])
@@ -126,14 +126,14 @@ class Implicit(Route):
                 still[6:] = 0.0
                 if walk.time + left > until:
                     break
-                return walk.leg(self, False, walk.time + left, still, End.STILL)
+                return walk.stretch(self, False, walk.time + left, still, End.STILL)
             guess = None if started else self._first_guess(state)
             step, length = walk.step(min(length, self._approach(left)), guess)
             pull = partial(self._pull_along, step, False)
             gone = None if self._held else first_rise(pull, step.time, step.time + step.length)
             if gone is not None:
-                return walk.leg(self, False, gone, walk.cut(gone), End.LIFTOFF)
-        return walk.leg(self, False, until, walk.state, End.TIME)
+                return walk.stretch(self, False, gone, walk.cut(gone), End.LIFTOFF)
+        return walk.stretch(self, False, until, walk.state, End.TIME)
 
     def motion(self, y: FloatArray, sticking: bool) -> BallMotion:
         """Motion of the ball in the given states, shape (n, 9)."""
@@ -199,7 +199,7 @@ class Implicit(Route):
 
 
 class _Walk:
-    """Steps of one leg with error control."""
+    """Steps of one stretch with error control."""
 
     def __init__(self, system: System, time: float, state: FloatArray, until: float) -> None:
         self._system, self.start, self._state, self._until = system, time, state, until
@@ -250,8 +250,8 @@ class _Walk:
         """State at a time [s] within the last step, shape (9,)."""
         return np.asarray(self.steps[-1](np.array([time]))[0])
 
-    def leg(self, route: Implicit, sticking: bool, end: float, state: FloatArray, why: End) -> Leg:
-        """Leg made of the steps so far."""
+    def stretch(self, route: Implicit, sticking: bool, end: float, state: FloatArray, why: End) -> BallStretch:
+        """Stretch made of the steps so far."""
         steps, first = self.steps, self._state
         starts = np.array([step.time for step in steps])
 
@@ -267,4 +267,4 @@ class _Walk:
                     result.force[row] = route.force_at_start(y[row])
             return result
 
-        return Leg(self.start, end, sticking, state, why, motion)
+        return BallStretch(self.start, end, sticking, state, why, motion)

@@ -27,10 +27,10 @@ def classify(body: RollingBall, until: float) -> tuple[Regime, int, float]:
     path = follow(body, route, until)
     slips = [time for kind, time in path.events if kind == "slip"]
     first = slips[0] if slips else float("nan")
-    last = path.legs[-1]
+    last = path.stretches[-1]
     if not slips:
         return Regime.NEVER_SLIPS, 0, first
-    if any(leg.why is End.LIFTOFF for leg in path.legs):
+    if any(stretch.why is End.LIFTOFF for stretch in path.stretches):
         return Regime.FALLS, len(slips), first
     if last.sticking or _carries(body, *route.world(last.state)[:2]):
         return Regime.RECOVERS, len(slips), first

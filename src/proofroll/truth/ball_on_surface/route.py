@@ -1,4 +1,4 @@
-"""Protocol of a route, which integrates one leg of sticking or slipping at a time."""
+"""Protocol of a route, which integrates one stretch of sticking or slipping at a time."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def about_to_stop(left: float, pace: float, time: float) -> bool:
 
 
 class End(Enum):
-    """Reason that a leg ended."""
+    """Reason that a stretch ended."""
 
     TIME = auto()  # the time limit was reached
     CONE = auto()  # sticking: the needed friction left the static cone
@@ -38,11 +38,11 @@ class End(Enum):
     HALT = auto()  # sticking with rolling resistance: the centre stopped
     LIFTOFF = auto()  # the normal force reached zero
     LANDED = auto()  # flying: the ball is on the wall again
-    GROWN = auto()  # of the start of a slip, never of a leg: its direction can be integrated from here on
+    GROWN = auto()  # of the start of a slip, never of a stretch: its direction can be integrated from here on
 
 
 @dataclass(frozen=True)
-class Leg:
+class BallStretch:
     """A stretch of time in one mode.
 
     Attributes:
@@ -50,7 +50,7 @@ class Leg:
         sticking: True: the ball rolls without slip or rests; False: it slips or flies.
         state: at the end, in the route's variables; its slip velocity is zero unless the ball slips there.
         why: reason for its end.
-        motion: motion at rising times [s] within the leg.
+        motion: motion at rising times [s] within the stretch.
     """
 
     start: float
@@ -72,7 +72,7 @@ class Leg:
 
 
 class Route(ABC):
-    """A way of integrating legs, in state variables of its own.
+    """A way of integrating stretches, in state variables of its own.
 
     Attributes:
         name: method of integration, shown to people.
@@ -99,11 +99,11 @@ class Route(ABC):
         """Time derivative of the state while the ball sticks."""
 
     @abstractmethod
-    def stick(self, time: float, state: FloatArray, until: float) -> Leg:
+    def stick(self, time: float, state: FloatArray, until: float) -> BallStretch:
         """Rolls without slip from ``time`` to ``until`` at the latest [s]."""
 
     @abstractmethod
-    def slip(self, time: float, state: FloatArray, until: float, slip: FloatArray | None = None) -> Leg:
+    def slip(self, time: float, state: FloatArray, until: float, slip: FloatArray | None = None) -> BallStretch:
         """Slips from ``time`` to ``until`` at the latest [s].
 
         ``slip``: initial velocity of the contact point in the world [m/s], shape (3,); None: zero.
@@ -145,25 +145,25 @@ def join_motions(times: FloatArray, parts: Sequence[tuple[float, Motion]], route
 
 @dataclass(frozen=True)
 class Path:
-    """Legs and events of a whole motion.
+    """Stretches and events of a whole motion.
 
     Attributes:
-        legs: in order, from time 0.
+        stretches: in order, from time 0.
         events: kind and time [s] of each change.
         lands: time of a landing with unknown outcome, where the path ends [s]; None: there is none.
         blurs: uncertainty [s] of an event by its time [s], where both routes find it by the same method.
     """
 
-    legs: list[Leg]
+    stretches: list[BallStretch]
     events: list[tuple[EventKind, float]]
     lands: float | None = None
     blurs: dict[float, float] = field(default_factory=dict)
 
     def motion(self, times: FloatArray, route: str) -> BallMotion:
-        """Motion at rising ``times`` [s]; the time of an event belongs to the later leg."""
-        return join_motions(times, [(leg.start, leg.motion) for leg in self.legs], route)
+        """Motion at rising ``times`` [s]; the time of an event belongs to the later stretch."""
+        return join_motions(times, [(stretch.start, stretch.motion) for stretch in self.stretches], route)
 
     def sticking(self, times: FloatArray) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
         """Mask of the ``times`` [s] at which the ball sticks, shape (n,)."""
-        index = np.searchsorted([leg.start for leg in self.legs], times, side="right") - 1
-        return np.array([leg.sticking for leg in self.legs])[index]
+        index = np.searchsorted([stretch.start for stretch in self.stretches], times, side="right") - 1
+        return np.array([stretch.sticking for stretch in self.stretches])[index]

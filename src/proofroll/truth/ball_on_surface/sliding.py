@@ -9,7 +9,7 @@ from proofroll.core.arrays import FloatArray
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.motion import BallMotion
 from proofroll.truth.ball_on_surface.impact import by_coefficients
-from proofroll.truth.ball_on_surface.route import End, Leg, Route, World, join_motions
+from proofroll.truth.ball_on_surface.route import BallStretch, End, Route, World, join_motions
 
 _FLOOR = 1e-6  # |u| below which the rest of a slip is extrapolated, relative to |u| at the handover
 _BEGUN = 1e-8  # smallest handover of a slip that does not start from rest, relative to its initial |u|
@@ -87,16 +87,16 @@ class Sliding(Route):
         motion = self._motion(state[None, :5], np.zeros(1), None)
         return motion.p_WB[0], motion.v_WB[0], motion.w_WB[0]
 
-    def stick(self, time: float, state: FloatArray, until: float) -> Leg:
+    def stick(self, time: float, state: FloatArray, until: float) -> BallStretch:
         """See :class:`Route`."""
         run = self._stick(time, state, until)
 
         def motion(times: FloatArray) -> BallMotion:
             return self._motion(run.at(times), np.zeros(len(times)), None)
 
-        return Leg(time, run.end, True, run.last, run.why, motion)
+        return BallStretch(time, run.end, True, run.last, run.why, motion)
 
-    def slip(self, time: float, state: FloatArray, until: float, slip: FloatArray | None = None) -> Leg:
+    def slip(self, time: float, state: FloatArray, until: float, slip: FloatArray | None = None) -> BallStretch:
         """See :class:`Route`."""
         handover = self._grown(time, state, until)
         # A slip that does not start from rest has no slaved part.
@@ -108,7 +108,7 @@ class Sliding(Route):
 
         if slip is None:
             if creep.why is not End.GROWN:  # the time limit, or the slip stops before
-                return Leg(time, creep.end, False, creep.last[:5], creep.why, creeping)
+                return BallStretch(time, creep.end, False, creep.last[:5], creep.why, creeping)
             small, phi = creep.last, self._slaved(creep.last[None, :])[0]
         else:
             _, e2, e3 = self._axes(state).T
@@ -126,8 +126,8 @@ class Sliding(Route):
 
         y = self._stood_still(run.last) if run.why is End.STILL else run.last
         if run.why is End.TIME or y[7] >= until:
-            return Leg(time, until, False, y[:5], End.TIME, motion)
-        return Leg(time, float(y[7]), False, y[:5], run.why, motion)
+            return BallStretch(time, until, False, y[:5], End.TIME, motion)
+        return BallStretch(time, float(y[7]), False, y[:5], run.why, motion)
 
 
 def _at_clock(run: IntegratedRun, times: FloatArray) -> FloatArray:

@@ -46,7 +46,7 @@ def stick_slip(scene: Scene, times: FloatArray) -> tuple[xr.Dataset, list[Event]
 
     Returns:
         Dataset of :func:`.error_bars.dataset_of`, each variable with the attribute ``error_bar`` in its own unit, and
-        ``sticking`` (bool per sample; a sample at an event belongs to the later leg); events up to the last sample,
+        ``sticking`` (bool per sample; a sample at an event belongs to the later stretch); events up to the last sample,
         each with a bracket that contains both routes. If relative changes of the parameters by
         :data:`proofroll.truth.conditioning.MOVE` (:func:`with_changes`) change the events, the attribute ``ill_posed``
         says from which time on; only earlier events are returned, and error bars cover the difference of the routes.
@@ -139,7 +139,7 @@ def _unmoved(body: RollingBall, own: Path, pace: float, until: float) -> tuple[i
 
 
 def _dataset(scene: Scene, times: FloatArray, path: Path, route: str, quadrature: Quadrature) -> xr.Dataset:
-    kinks = [leg.end for leg in path.legs]
+    kinks = [stretch.end for stretch in path.stretches]
     motion = path.motion(times, route)
     result = dataset_of(scene, times, motion, lambda at: path.motion(at, route).w_WB, kinks, quadrature)
     attributes = {"units": "1", "long_name": "whether the ball sticks (rolls without slip)"}

@@ -1,7 +1,7 @@
 """Sequence of rolling, slipping, flight and rest of a ball, for any route.
 
-A :class:`Route` integrates one leg at a time and reports why it ended; this module decides what comes next.
-:func:`proofroll.truth.hybrid.follow` chains the legs.
+A :class:`Route` integrates one stretch at a time and reports why it ended; this module decides what comes next.
+:func:`proofroll.truth.hybrid.follow` chains the stretches.
 """
 
 from dataclasses import dataclass
@@ -22,7 +22,7 @@ from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.motion import BallMotion
 from proofroll.truth import hybrid
 from proofroll.truth.ball_on_surface.flight import Bounce, fly, landing_outcome, normal_force_per_mass
-from proofroll.truth.ball_on_surface.route import End, Leg, Path, Route, World
+from proofroll.truth.ball_on_surface.route import BallStretch, End, Path, Route, World
 from proofroll.truth.hybrid import Transition
 
 # Relative distance from the friction cone below which round-off (1e-15) decides on which side a state is.
@@ -40,7 +40,7 @@ _SHORTER = 1e-6
 
 @dataclass(frozen=True)
 class Mode:
-    """Mode of a ball's motion during a leg: flight, rolling, slip or rest.
+    """Mode of a ball's motion during a stretch: flight, rolling, slip or rest.
 
     Attributes:
         flight: position [m], velocity [m/s] and spin [rad/s] at the start of a flight; None: the ball touches the wall.
@@ -69,15 +69,15 @@ def follow(body: RollingBall, route: Route, until: float) -> Path:
     path = hybrid.follow(SwitchedBall(body, route), until)
     events = [(cast(EventKind, event.kind), event.time) for event in path.happenings]
     blurs = {event.time: event.blur for event in path.happenings if event.blur}
-    return Path(list(path.legs), events, None if path.known else path.legs[-1].end, blurs)
+    return Path(list(path.stretches), events, None if path.known else path.stretches[-1].end, blurs)
 
 
 class SwitchedBall:
-    """Legs of a ball by one route; implements :class:`proofroll.truth.hybrid.Legs`."""
+    """Stretches of a ball by one route; implements :class:`proofroll.truth.hybrid.SwitchingRoute`."""
 
     def __init__(self, body: RollingBall, route: Route) -> None:
         self.body, self.route = body, route
-        self._reversals, self._spans = 0, (0.0, 0.0)  # durations of the last two legs [s]
+        self._reversals, self._spans = 0, (0.0, 0.0)  # durations of the last two stretches [s]
 
     def begin(self) -> Transition[Mode]:
         """See the protocol."""
@@ -93,53 +93,53 @@ class SwitchedBall:
             return Transition(state, Mode(flight=(body.p0, body.v0, body.w0)), (("lift_off", ""),))
         return self._touching(state, body.slip0 if np.any(body.slip0) else None)
 
-    def walk(self, time: float, state: FloatArray, mode: Mode, until: float) -> Leg:
+    def walk(self, time: float, state: FloatArray, mode: Mode, until: float) -> BallStretch:
         """See the protocol."""
         if mode.flight is not None:
-            leg = fly(self.body, mode.flight, time, until, state)
+            stretch = fly(self.body, mode.flight, time, until, state)
         elif mode.rests:
-            leg = _rest(self.body, self.route, state, time, until)
+            stretch = _rest(self.body, self.route, state, time, until)
         elif mode.sticking:
-            leg = self.route.stick(time, state, until)
+            stretch = self.route.stick(time, state, until)
         else:
-            leg = self.route.slip(time, state, until, mode.slip)
-        self._spans = self._spans[1], leg.end - leg.start
-        return leg
+            stretch = self.route.slip(time, state, until, mode.slip)
+        self._spans = self._spans[1], stretch.end - stretch.start
+        return stretch
 
-    def change(self, leg: Leg) -> Transition[Mode]:
+    def change(self, stretch: BallStretch) -> Transition[Mode]:
         """See the protocol."""
-        body, route, state = self.body, self.route, leg.state
-        if leg.why is End.LANDED:
-            return self._landed(leg)
-        if leg.why is End.LIFTOFF:
+        body, route, state = self.body, self.route, stretch.state
+        if stretch.why is End.LANDED:
+            return self._landed(stretch)
+        if stretch.why is End.LIFTOFF:
             # ``at_end`` includes the slip, which the state lacks.
-            return Transition(route.start(), Mode(flight=leg.at_end()), (("lift_off", ""),))
-        if _comes_to_rest(body, route, leg):
-            stopped = () if leg.sticking else (("stick", ""),)
+            return Transition(route.start(), Mode(flight=stretch.at_end()), (("lift_off", ""),))
+        if _comes_to_rest(body, route, stretch):
+            stopped = () if stretch.sticking else (("stick", ""),)
             return Transition(route.nudged(state, np.zeros(3)), RESTS, stopped)
-        if leg.why is End.HALT:
+        if stretch.why is End.HALT:
             state = route.nudged(state, setting_off(body, route.world(state)[0]))
         before, span = self._spans
-        hastens = leg.why is End.STILL and not leg.sticking and span < (1 - _SHORTER) * before
+        hastens = stretch.why is End.STILL and not stretch.sticking and span < (1 - _SHORTER) * before
         self._reversals = self._reversals + 1 if hastens else 0
         if self._reversals > _REVERSALS:
             raise Refused(
-                f"from about {leg.end:.6g} s on the ball slips to and fro ever faster, for resistance stops the "
+                f"from about {stretch.end:.6g} s on the ball slips to and fro ever faster, for resistance stops the "
                 "rolling before friction stops the centre; "
                 "end the run earlier, or take more friction or less resistance"
             )
         # At |u| = 0 the ball sticks if the needed friction is inside the cone; otherwise it goes on slipping.
-        slips = leg.why is End.CONE or _must_slip(body, route, state)
-        if slips != leg.sticking:
+        slips = stretch.why is End.CONE or _must_slip(body, route, state)
+        if slips != stretch.sticking:
             return Transition(state, Mode() if slips else ROLLS, ())
         return Transition(state, Mode() if slips else ROLLS, (("slip" if slips else "stick", ""),))
 
-    def _landed(self, leg: Leg) -> Transition[Mode]:
-        outcome = landing_outcome(self.body, self.route, leg)
+    def _landed(self, stretch: BallStretch) -> Transition[Mode]:
+        outcome = landing_outcome(self.body, self.route, stretch)
         if outcome is None:
-            return Transition(leg.state, None, ())
+            return Transition(stretch.state, None, ())
         if isinstance(outcome, Bounce):
-            return Transition(leg.state, Mode(flight=outcome.world), (("bounce", ""),) if outcome.seen else ())
+            return Transition(stretch.state, Mode(flight=outcome.world), (("bounce", ""),) if outcome.seen else ())
         state = self.route.at(*outcome.world)
         state = state if outcome.slip is not None else self.route.nudged(state, outcome.world[1])
         after = self._touching(state, outcome.slip)
@@ -165,20 +165,20 @@ def _must_slip(body: RollingBall, route: Route, state: FloatArray) -> bool:
     return bool(pace > 0 and route.excess(route.ahead(state, 1e-3 * a / pace)) > _ON_CONE)
 
 
-def _comes_to_rest(body: RollingBall, route: Route, leg: Leg) -> bool:
-    """True if a ball with rolling resistance stops at the end of a leg and can stay there.
+def _comes_to_rest(body: RollingBall, route: Route, stretch: BallStretch) -> bool:
+    """True if a ball with rolling resistance stops at the end of a stretch and can stay there.
 
     It stops when its centre stops in rolling, or when a slip ends with all but no velocity. Where resistance slows the
     spin faster than friction slows the centre, the ball slips to a stop, rolls back part of the way, slips again and so
     on: on a level plane infinitely often in a finite time, each time shorter by the same factor.
     """
-    p, v, _ = route.world(leg.state)
+    p, v, _ = route.world(stretch.state)
     speed = np.sqrt(body.ball.radius * np.linalg.norm(body.gravity)) + np.linalg.norm(body.v0)
-    settled = leg.why is End.STILL and np.linalg.norm(v) <= _AT_REST * speed
-    return body.contact.rolling_resistance > 0 and bool(leg.why is End.HALT or settled) and can_rest(body, p)
+    settled = stretch.why is End.STILL and np.linalg.norm(v) <= _AT_REST * speed
+    return body.contact.rolling_resistance > 0 and bool(stretch.why is End.HALT or settled) and can_rest(body, p)
 
 
-def _rest(body: RollingBall, route: Route, state: FloatArray, time: float, until: float) -> Leg:
+def _rest(body: RollingBall, route: Route, state: FloatArray, time: float, until: float) -> BallStretch:
     p, _, w = route.world(state)
     e1 = body.surface.normal(p)
     force = -body.ball.mass * body.gravity
@@ -187,4 +187,4 @@ def _rest(body: RollingBall, route: Route, state: FloatArray, time: float, until
         p_WB, v_WB, w_WB, held = (np.broadcast_to(x, (len(times), 3)) for x in (p, np.zeros(3), (w @ e1) * e1, force))
         return BallMotion(p_WB, v_WB, w_WB, held, "at rest")
 
-    return Leg(time, until, True, state, End.TIME, motion)
+    return BallStretch(time, until, True, state, End.TIME, motion)

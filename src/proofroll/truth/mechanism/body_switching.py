@@ -21,7 +21,7 @@ SLACK = 1e-9  # violation of an inequality, relative to the forces involved, up 
 
 
 class SwitchedBodies(JointStretches):
-    """Legs of a mechanism in the coordinates of its separate bodies; the last component of a state is the time.
+    """Stretches of a mechanism in the coordinates of its separate bodies; the last component of a state is the time.
 
     Implements :class:`proofroll.truth.hybrid.HybridRoute`.
     """
@@ -51,27 +51,27 @@ class SwitchedBodies(JointStretches):
             near_stops(self.joints, mode),
         )
 
-    def _at_rest(self, leg: Stretch[Mode], state: Array, stopped: Sequence[int]) -> tuple[Array, Mode, float]:
-        still = [own in HOLDING or k in stopped for k, own in enumerate(leg.mode[: len(self.joints)])]
+    def _at_rest(self, stretch: Stretch[Mode], state: Array, stopped: Sequence[int]) -> tuple[Array, Mode, float]:
+        still = [own in HOLDING or k in stopped for k, own in enumerate(stretch.mode[: len(self.joints)])]
         return state, *self._decided(state, still, stopped)
 
-    def _hit(self, leg: Stretch[Mode], state: Array, which: int, _: float) -> tuple[Array, Mode, float, float]:
+    def _hit(self, stretch: Stretch[Mode], state: Array, which: int, _: float) -> tuple[Array, Mode, float, float]:
         last, joint, delay = state, self.joints[which], 0.0
         speed = abs(float(self._along(last)[1][which]))
-        state, margin = self._struck(last, leg.mode, which, joint.restitution)
+        state, margin = self._struck(last, stretch.mode, which, joint.restitution)
         if self._settles(which, speed, joint.restitution):
             laws = (
                 self.equations.switched(state[:-1], self.switched(m))
-                for m in (reversed_mode(leg.mode, which), leg.mode)
+                for m in (reversed_mode(stretch.mode, which), stretch.mode)
             )
             pull, falling = (abs(float(self._accelerations(law, state)[which])) for law in laws)
             delay = self._bouncing(joint.name, speed * joint.restitution, pull, joint.restitution, falling)
-            state, margin = self._struck(last, leg.mode, which, 0.0)
+            state, margin = self._struck(last, stretch.mode, which, 0.0)
         rates = self._along(state)[1]
         still = [
             (own in {"low", "high"} and abs(rates[k]) <= SLACK * speed)
             or (k == which and (delay > 0 or not joint.restitution))
-            for k, own in enumerate(leg.mode[: len(self.joints)])
+            for k, own in enumerate(stretch.mode[: len(self.joints)])
         ]
         decided, after = self._decided(state, still)
         return state, decided, min(margin, after), delay

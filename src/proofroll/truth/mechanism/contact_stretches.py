@@ -132,15 +132,15 @@ class ContactStretches(Stretches[ContactMode]):
         if self._stands(state, mode):
             return Stretch(time, until, mode, state, state, None)
         start, begun = self._kicked(time, state, mode)
-        leg = super().walk(begun, start, mode, until)
-        end, last = leg.end, leg.last
+        stretch = super().walk(begun, start, mode, until)
+        end, last = stretch.end, stretch.last
         guards = guards_of(self.contacts, mode)
-        if leg.guard is not None and leg.guard < len(guards):
-            k, kind = guards[leg.guard]
+        if stretch.guard is not None and stretch.guard < len(guards):
+            k, kind = guards[stretch.guard]
             if kind == "still":
                 last = self._spent(last, mode, k)
-                end += float(last[-1] - leg.last[-1])
-        return replace(leg, start=time, first=state, end=end, last=last)
+                end += float(last[-1] - stretch.last[-1])
+        return replace(stretch, start=time, first=state, end=end, last=last)
 
     def _spent(self, state: Array, mode: ContactMode, k: int) -> Array:
         """State at the end of a slip below FAINT, by a Runge-Kutta method in the logarithm of the slip speed.
@@ -174,28 +174,28 @@ class ContactStretches(Stretches[ContactMode]):
                 wait = max(wait, 2 * FAINT / float(np.linalg.norm(solved.slide_rate[k])))
         return (state, time) if not wait else (state + wait * self._equations.rate(state, mode), time + wait)
 
-    def change(self, leg: Stretch[ContactMode]) -> Transition[ContactMode]:
+    def change(self, stretch: Stretch[ContactMode]) -> Transition[ContactMode]:
         """See the protocol."""
-        guards = guards_of(self.contacts, leg.mode)
-        if leg.guard is None or leg.guard >= len(guards):  # a break of the rates, or the limit of an effort
-            return Transition(leg.last, leg.mode, ())
-        k, kind = guards[leg.guard]
-        mode, name = list(leg.mode), self.contacts[k].name
+        guards = guards_of(self.contacts, stretch.mode)
+        if stretch.guard is None or stretch.guard >= len(guards):  # a break of the rates, or the limit of an effort
+            return Transition(stretch.last, stretch.mode, ())
+        k, kind = guards[stretch.guard]
+        mode, name = list(stretch.mode), self.contacts[k].name
         if kind == "tear":
-            raise self._torn(leg)
+            raise self._torn(stretch)
         if kind == "lift":
             mode[k] = OPEN
-            return Transition(leg.last, tuple(mode), (("lift_off", name),))
+            return Transition(stretch.last, tuple(mode), (("lift_off", name),))
         if kind == "break":
             refuse_turning_onset(self.contacts[k], mode[k])
-            mode[k] = self._leaving(leg.last, leg.mode, k)
-            return Transition(leg.last, tuple(mode), (("slip", name),))
-        return self._stopped(leg) if kind == "still" else self._impact(leg, k)
+            mode[k] = self._leaving(stretch.last, stretch.mode, k)
+            return Transition(stretch.last, tuple(mode), (("slip", name),))
+        return self._stopped(stretch) if kind == "still" else self._impact(stretch, k)
 
-    def _torn(self, leg: Stretch[ContactMode]) -> NotUnique:
+    def _torn(self, stretch: Stretch[ContactMode]) -> NotUnique:
         """Error of a motion that is not unique after the end of a stretch."""
-        slipping = next(c.name for c, own in zip(self.contacts, leg.mode, strict=True) if own.kind == "slip")
-        return NotUnique(f"from t = {leg.end:.6g} s on " + PAINLEVE.format(name=slipping))
+        slipping = next(c.name for c, own in zip(self.contacts, stretch.mode, strict=True) if own.kind == "slip")
+        return NotUnique(f"from t = {stretch.end:.6g} s on " + PAINLEVE.format(name=slipping))
 
     def _leaving(self, state: Array, mode: ContactMode, k: int) -> Acting:
         """Slip that starts at the bound of friction, opposite to the friction that held."""
@@ -205,43 +205,43 @@ class ContactStretches(Stretches[ContactMode]):
         x, y, z = (sign * component for component in line)
         return Acting("slip", (x, y, z), (x, y, z))
 
-    def _impact(self, leg: Stretch[ContactMode], hit: int) -> Transition[ContactMode]:
+    def _impact(self, stretch: Stretch[ContactMode], hit: int) -> Transition[ContactMode]:
         """Transition at an impact."""
-        contacts, touching, law = self.contacts, self._touching(leg.last), self.contacts[hit].restitution
-        hits = striking(leg.mode, touching, hit, leg.end)
+        contacts, touching, law = self.contacts, self._touching(stretch.last), self.contacts[hit].restitution
+        hits = striking(stretch.mode, touching, hit, stretch.end)
         # dry friction of joints gives no impulse
         closed = [
             (own.kind != "open" or k in hits) and not contact.bound
-            for k, (own, contact) in enumerate(zip(leg.mode, contacts, strict=True))
+            for k, (own, contact) in enumerate(zip(stretch.mode, contacts, strict=True))
         ]
         laws = [contact.restitution if k in hits else 0.0 for k, contact in enumerate(contacts)]
         speed, delay = -float(touching[hit].normal @ touching[hit].slide), 0.0
-        state, stays, margin = self._struck(leg.last, leg.mode, closed, laws)
+        state, stays, margin = self._struck(stretch.last, stretch.mode, closed, laws)
         if self._settles(hit, speed, law):
-            pull = -float(touching[hit].normal @ self._solved(state, leg.mode).slide_rate[hit])
+            pull = -float(touching[hit].normal @ self._solved(state, stretch.mode).slide_rate[hit])
             delay = self._bouncing(self.contacts[hit].name, speed * law, pull, law)
-            state, stays, margin = self._struck(leg.last, leg.mode, closed, [0.0] * len(closed))
+            state, stays, margin = self._struck(stretch.last, stretch.mode, closed, [0.0] * len(closed))
         stays = [stay or bool(contact.bound) for stay, contact in zip(stays, contacts, strict=True)]
         happened = tuple(("settle" if delay and k == hit else "impact", contacts[k].name) for k in hits)
-        return self._after(leg, state, stays, happened, margin, delay)
+        return self._after(stretch, state, stays, happened, margin, delay)
 
-    def _stopped(self, leg: Stretch[ContactMode]) -> Transition[ContactMode]:
+    def _stopped(self, stretch: Stretch[ContactMode]) -> Transition[ContactMode]:
         """Transition where a slip stops: alone, or with all others.
 
         Bodies that turn while they slide stop all their slips at once: then all slips below FAINT count as stopped.
         """
-        closed, solved = [own.kind != "open" for own in leg.mode], self._solved(leg.last, leg.mode)
-        slides = [k for k, own in enumerate(leg.mode) if own.kind == "slip"]
+        closed, solved = [own.kind != "open" for own in stretch.mode], self._solved(stretch.last, stretch.mode)
+        slides = [k for k, own in enumerate(stretch.mode) if own.kind == "slip"]
         slips = np.linalg.norm([slip_velocity(solved.touching[k]) for k in slides], axis=1)
         if slips.max() <= FAINT:
-            ended = self._after(leg, leg.last, closed, (), stopped=FAINT)
+            ended = self._after(stretch, stretch.last, closed, (), stopped=FAINT)
             if ended.mode is not None and self._stands(ended.state, ended.mode):
                 return replace(ended, blur=float((slips / np.linalg.norm(solved.slide_rate[slides], axis=1)).max()))
-        return self._after(leg, leg.last, closed, ())
+        return self._after(stretch, stretch.last, closed, ())
 
     def _after(
         self,
-        leg: Stretch[ContactMode],
+        stretch: Stretch[ContactMode],
         state: Array,
         closed: Sequence[bool],
         happened: tuple[tuple[str, str], ...],
@@ -254,7 +254,7 @@ class ContactStretches(Stretches[ContactMode]):
         still = [shut and slip <= stopped for shut, slip in zip(closed, slips, strict=True)]
         state = self._equations.eliminated(state, modes_of(closed, still))
         mode, sure = self._decided(state, closed, still)
-        changed = changes(self.contacts, leg.mode, mode, self._stands(state, mode))
+        changed = changes(self.contacts, stretch.mode, mode, self._stands(state, mode))
         struck = {name for _, name in happened}
         happenings = (*happened, *(item for item in changed if item[1] not in struck))
         return Transition(state, mode, happenings, np.inf if delay else min(margin, sure), delay)

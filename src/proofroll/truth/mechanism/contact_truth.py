@@ -14,7 +14,7 @@ from proofroll.truth.mechanism.contact_equations import ContactEquations
 from proofroll.truth.mechanism.contact_tree import ContactTree
 from proofroll.truth.mechanism.maximal_coordinates import MaximalCoordinates
 from proofroll.truth.mechanism.natural_units import Units, natural_units
-from proofroll.truth.mechanism.two_paths import TOLERANCES, followed, refuse_uncovered, second_legs, two_route_motion
+from proofroll.truth.mechanism.two_paths import TOLERANCES, counterparts, followed, refuse_uncovered, two_route_motion
 from proofroll.truth.mechanism.two_routes import TwoRouteMotion, check_start, on_same_turns
 
 
@@ -43,19 +43,18 @@ def _in_units(mechanism: Mechanism, units: Units, times: Array) -> TwoRouteMotio
     bodies = ContactBodies(equations, TOLERANCES[1], size)
     until, kinks = float(times[-1]), breaks(own.signals)
     paths = followed(tree, bodies, until, kinks)
-    legs = paths[0].leg_at(times)
-    others = second_legs(paths, legs, kinds)
+    stretches = paths[0].stretch_at(times)
+    others = counterparts(paths, stretches, kinds)
     samples = [
-        dynamics.sample(*dynamics.parts(state)[:2], paths[0].legs[number].mode, float(state[-1]))
-        for state, number in zip(states_of(tree, paths[0], times, legs), legs, strict=True)
+        dynamics.sample(*dynamics.parts(state)[:2], paths[0].stretches[number].mode, float(state[-1]))
+        for state, number in zip(states_of(tree, paths[0], times, stretches), stretches, strict=True)
     ]
     one, pressed = record_of(times, [record for record, _ in samples]), np.array([force for _, force in samples])
     states = states_of(bodies, paths[1], times, others)
-    applied = [bodies.forces(state, paths[1].legs[number].mode) for state, number in zip(states, others, strict=True)]
+    modes = [paths[1].stretches[number].mode for number in others]
+    applied = [bodies.forces(state, mode) for state, mode in zip(states, modes, strict=True)]
     wrenches = [wrench for _, wrench in applied]
-    switched = [
-        equations.switched(state, paths[1].legs[number].mode) for state, number in zip(states, others, strict=True)
-    ]
+    switched = [equations.switched(state, mode) for state, mode in zip(states, modes, strict=True)]
     two = on_same_turns(own, one, second.recorded(times, states[:, :-1], switched, wrenches))
     routes = (
         "joint coordinates, DOP853, contacts by Coulomb's law at all of them at once",

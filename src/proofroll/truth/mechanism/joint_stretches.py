@@ -33,23 +33,23 @@ class JointStretches(Stretches[Mode]):
     motors: Motors
 
     @abstractmethod
-    def _at_rest(self, leg: Stretch[Mode], state: Array, stopped: Sequence[int]) -> tuple[Array, Mode, float]:
+    def _at_rest(self, stretch: Stretch[Mode], state: Array, stopped: Sequence[int]) -> tuple[Array, Mode, float]:
         """State, mode and margin after joints that moved against friction have stopped."""
 
     @abstractmethod
-    def _hit(self, leg: Stretch[Mode], state: Array, which: int, stop: float) -> tuple[Array, Mode, float, float]:
+    def _hit(self, stretch: Stretch[Mode], state: Array, which: int, stop: float) -> tuple[Array, Mode, float, float]:
         """State, mode, margin, and time until the rebounds are over [s], after a joint has hit a stop."""
 
     @abstractmethod
     def _along(self, state: Array) -> tuple[Array, Array]:
         """Coordinates and rates of the switched joints."""
 
-    def change(self, leg: Stretch[Mode]) -> Transition[Mode]:
+    def change(self, stretch: Stretch[Mode]) -> Transition[Mode]:
         """See the protocol."""
-        if leg.guard is None:  # at a break of the rates
-            return Transition(leg.last, leg.mode, ())
-        which, kind = guards_of(self.joints, leg.mode)[leg.guard]
-        state, mode = np.append(leg.last[:-1], leg.end), list(leg.mode)
+        if stretch.guard is None:  # at a break of the rates
+            return Transition(stretch.last, stretch.mode, ())
+        which, kind = guards_of(self.joints, stretch.mode)[stretch.guard]
+        state, mode = np.append(stretch.last[:-1], stretch.end), list(stretch.mode)
         if kind in MODES:
             mode[which] = kind
             return Transition(state, tuple(mode), (effort_event(self.motors[which - len(self.joints)], kind),))
@@ -60,15 +60,16 @@ class JointStretches(Stretches[Mode]):
             return Transition(state, tuple(mode), ((end_event(was), joint.name),))
         if kind == "still":
             rates = np.abs(self._along(state)[1])
-            slides = [k for k, own in enumerate(leg.mode) if own in {"forward", "backward"}]
-            state, decided, margin = self._at_rest(leg, state, [k for k in slides if k == which or rates[k] <= _STILL])
-            return Transition(state, decided, changes(self.joints, leg.mode, decided), margin)
+            slides = [k for k, own in enumerate(stretch.mode) if own in {"forward", "backward"}]
+            stopped = [k for k in slides if k == which or rates[k] <= _STILL]
+            state, decided, margin = self._at_rest(stretch, state, stopped)
+            return Transition(state, decided, changes(self.joints, stretch.mode, decided), margin)
         q, before = self._along(state.copy())
-        state, decided, margin, delay = self._hit(leg, state, which, joint.low if kind == "low" else joint.high)
-        if order_decides(self.joints, leg, q, before, self._along(state)[1], which):
+        state, decided, margin, delay = self._hit(stretch, state, which, joint.low if kind == "low" else joint.high)
+        if order_decides(self.joints, stretch, q, before, self._along(state)[1], which):
             return Transition(state, None, (), 0.0)
         settles = delay > 0 and decided[which] in HOLDING
-        changed = [item for item in changes(self.joints, leg.mode, decided) if item[1] != joint.name]
+        changed = [item for item in changes(self.joints, stretch.mode, decided) if item[1] != joint.name]
         happened = ("settle" if settles else "impact", joint.name), *changed
         return Transition(state, decided, happened, np.inf if settles else margin, delay)
 
@@ -80,7 +81,7 @@ def reversed_mode(mode: Mode, which: int) -> Mode:
 
 
 def guards_of(joints: tuple[SwitchedJoint, ...], mode: Mode) -> list[tuple[int, str]]:
-    """Guards of a leg in this mode: index of the joint (motors are numbered after all joints), and kind.
+    """Guards of a stretch in this mode: index of the joint (motors are numbered after all joints), and kind.
 
     ``up``, ``down``: the holding force reaches its bound and the joint moves in this direction; ``still``: a joint that
     moves against friction stops; ``low``, ``high``: a joint reaches a stop; ``least``, ``greatest``: an effort reaches
@@ -147,19 +148,19 @@ def _guard_value(joint: SwitchedJoint, mode: str, kind: str, q: float, v: float,
 
 
 def order_decides(
-    joints: tuple[SwitchedJoint, ...], leg: Stretch[Mode], q: Array, before: Array, after: Array, hit: int
+    joints: tuple[SwitchedJoint, ...], stretch: Stretch[Mode], q: Array, before: Array, after: Array, hit: int
 ) -> bool:
     """True if the order of two impacts on stops matters and cannot be resolved.
 
     Another joint would reach its stop within the accuracy of times, and the impact changes its rate. ``q``: coordinates
     of the switched joints at the impact; ``before``, ``after``: their rates.
     """
-    speed, within = abs(float(before[hit])), time_accuracy(leg.end)
-    for k, kind in guards_of(joints, leg.mode):
+    speed, within = abs(float(before[hit])), time_accuracy(stretch.end)
+    for k, kind in guards_of(joints, stretch.mode):
         if k >= len(joints) or k == hit or kind not in {"low", "high"}:
             continue
         closing = -float(before[k]) if kind == "low" else float(before[k])
-        gap = -_guard_value(joints[k], leg.mode[k], kind, float(q[k]), 0.0, 0.0)
+        gap = -_guard_value(joints[k], stretch.mode[k], kind, float(q[k]), 0.0, 0.0)
         if closing > 0 and gap <= closing * within and abs(after[k] - before[k]) > CLOSE * speed:
             return True
     return False
@@ -168,7 +169,7 @@ def order_decides(
 def noise_of(
     joints: tuple[SwitchedJoint, ...], motors: Motors, mode: Mode, q: Array, wanted: Sequence[float]
 ) -> FloatArray:
-    """Round-off of the guards of a leg that starts at joint coordinates q; zero away from stops and limits."""
+    """Round-off of the guards of a stretch that starts at joint coordinates q; zero away from stops and limits."""
     noise = []
     for number, kind in guards_of(joints, mode):
         if number >= len(joints):

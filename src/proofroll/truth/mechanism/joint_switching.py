@@ -14,7 +14,7 @@ from proofroll.truth.mechanism.stretches import StretchLaw
 
 
 class SwitchedTree(JointStretches):
-    """Legs of a mechanism in the coordinates of its tree; the last component of a state is the time.
+    """Stretches of a mechanism in the coordinates of its tree; the last component of a state is the time.
 
     Implements :class:`proofroll.truth.hybrid.HybridRoute`.
     """
@@ -43,14 +43,15 @@ class SwitchedTree(JointStretches):
             near_stops(self.joints, mode),
         )
 
-    def _at_rest(self, leg: Stretch[Mode], state: Array, stopped: Sequence[int]) -> tuple[Array, Mode, float]:
+    def _at_rest(self, stretch: Stretch[Mode], state: Array, stopped: Sequence[int]) -> tuple[Array, Mode, float]:
         q, v = self._parts(state)
         v[[self.joints[k].velocity for k in stopped]] = 0.0
-        return state, *self.equations.decided(q, v, leg.end)
+        return state, *self.equations.decided(q, v, stretch.end)
 
-    def _hit(self, leg: Stretch[Mode], state: Array, which: int, stop: float) -> tuple[Array, Mode, float, float]:
+    def _hit(self, stretch: Stretch[Mode], state: Array, which: int, stop: float) -> tuple[Array, Mode, float, float]:
         joint, (q, v) = self.joints[which], self._parts(state)
-        for other, own in zip(self.joints, leg.mode, strict=False):  # held joints are at rest; this removes round-off
+        # Held joints are at rest; this removes round-off.
+        for other, own in zip(self.joints, stretch.mode, strict=False):
             if own in HOLDING:
                 v[other.velocity] = 0.0
             if own in STOPPED:
@@ -61,12 +62,12 @@ class SwitchedTree(JointStretches):
         delay, rebound = 0.0, abs(float(v[joint.velocity]))
         if self._settles(which, speed, joint.restitution):
             pull, falling = (
-                abs(float(self.equations.solve(q, v, mode, time=leg.end).acceleration[joint.velocity]))
-                for mode in (reversed_mode(leg.mode, which), leg.mode)
+                abs(float(self.equations.solve(q, v, mode, time=stretch.end).acceleration[joint.velocity]))
+                for mode in (reversed_mode(stretch.mode, which), stretch.mode)
             )
             v[joint.velocity] = 0.0
             delay = self._bouncing(joint.name, rebound, pull, joint.restitution, falling)
-        decided, after = self.equations.decided(q, v, leg.end)
+        decided, after = self.equations.decided(q, v, stretch.end)
         return state, decided, min(margin, after), delay
 
     def holding(self, state: Array, mode: Mode) -> Array:

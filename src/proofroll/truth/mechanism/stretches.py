@@ -86,9 +86,9 @@ class Stretches(ABC, Generic[ModeT]):
         self._span = end - time if end > time else None
         return Stretch(time, end, mode, state, last, guard, visited, grazes)
 
-    def within(self, leg: Stretch[ModeT], times: FloatArray) -> FloatArray:
+    def within(self, stretch: Stretch[ModeT], times: FloatArray) -> FloatArray:
         """See the protocol."""
-        if not leg.visited:
-            return np.array([leg.first for _ in times])
-        law = self._law(leg.first, leg.mode)
-        return states_at(lambda _, y: law.rates(y), leg.visited, times, self._tolerance, law.corrected)
+        if not stretch.visited:
+            return np.array([stretch.first for _ in times])
+        law = self._law(stretch.first, stretch.mode)
+        return states_at(lambda _, y: law.rates(y), stretch.visited, times, self._tolerance, law.corrected)

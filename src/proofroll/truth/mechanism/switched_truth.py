@@ -18,7 +18,7 @@ from proofroll.truth.mechanism.contact_truth import contact_truth
 from proofroll.truth.mechanism.joint_switching import SwitchedTree
 from proofroll.truth.mechanism.maximal_coordinates import MaximalCoordinates
 from proofroll.truth.mechanism.natural_units import Units, natural_units
-from proofroll.truth.mechanism.two_paths import TOLERANCES, followed, refuse_uncovered, second_legs, two_route_motion
+from proofroll.truth.mechanism.two_paths import TOLERANCES, counterparts, followed, refuse_uncovered, two_route_motion
 from proofroll.truth.mechanism.two_routes import TwoRouteMotion, check_start, find_truth, on_same_turns
 
 # rad, natural lengths, or part of a limit: distance from a stop or a limit beyond which it surely does not act; more
@@ -107,18 +107,18 @@ def _switched(mechanism: Mechanism, units: Units, own: Mechanism, times: Array) 
     )
     until, kinks = float(times[-1]), breaks(own.signals)
     paths = followed(tree, bodies, until, kinks)
-    legs = paths[0].leg_at(times)
-    others = second_legs(paths, legs)
-    q_and_v = states_of(tree, paths[0], times, legs)
+    stretches = paths[0].stretch_at(times)
+    others = counterparts(paths, stretches)
+    q_and_v = states_of(tree, paths[0], times, stretches)
     nq = mechanism.nq
     one = record_of(
         times,
         [
-            equations.sample(state[:nq], state[nq:-1], paths[0].legs[number].mode, float(state[-1]))
-            for state, number in zip(q_and_v, legs, strict=True)
+            equations.sample(state[:nq], state[nq:-1], paths[0].stretches[number].mode, float(state[-1]))
+            for state, number in zip(q_and_v, stretches, strict=True)
         ],
     )
-    modes = [bodies.switched(paths[1].legs[number].mode) for number in others]
+    modes = [bodies.switched(paths[1].stretches[number].mode) for number in others]
     two = on_same_turns(own, one, second.recorded(times, states_of(bodies, paths[1], times, others)[:, :-1], modes))
     routes = ("joint coordinates, DOP853, modes by complementarity", "maximal coordinates, DOP853, modes by trial")
     reason = "a change of the parameters within their accuracy changes which joints hold or hit a stop"

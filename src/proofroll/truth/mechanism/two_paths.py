@@ -104,47 +104,48 @@ def _of_a_step(mechanism: Mechanism, record: Record, units: Units) -> dict[str, 
     return {name: TOLERANCES[0] * size for name, size in sizes.items()}
 
 
-def second_legs(
+def counterparts(
     paths: tuple[HybridPath[Stretch[ModeT]], HybridPath[Stretch[ModeT]]],
-    legs: Sequence[int],
+    stretches: Sequence[int],
     kinds: Callable[[Any], Any] = lambda mode: mode,
 ) -> list[int]:
-    """Numbers of the second route's legs in which it is while the first is in these legs."""
-    pairs, last = _alike(*paths, kinds)[0], len(paths[1].legs) - 1
+    """Numbers of the second route's stretches in which it is while the first is in these stretches."""
+    pairs, last = _alike(*paths, kinds)[0], len(paths[1].stretches) - 1
     found = []
-    for leg in legs:
-        before = pairs[max(bisect_right(pairs, (leg, last)) - 1, 0)] if pairs else (0, 0)
-        found.append(min(max(before[1] + leg - before[0], 0), last))
+    for stretch in stretches:
+        before = pairs[max(bisect_right(pairs, (stretch, last)) - 1, 0)] if pairs else (0, 0)
+        found.append(min(max(before[1] + stretch - before[0], 0), last))
     return found
 
 
 def _alike(
     one: FollowedPath, two: FollowedPath, kinds: Callable[[Any], Any]
 ) -> tuple[list[tuple[int, int]], list[Stretch[Any]]]:
-    """Numbers of legs of both routes that are in the same mode in turn, and the legs from where they part.
+    """Numbers of stretches of both routes that are in the same mode in turn, and the stretches from where they part.
 
     Changes at the same instant may come in either order; if that order matters, the margin of a decision is small.
     """
-    pairs, left = list[tuple[int, int]](), [list(path.legs) for path in (one, two)]
+    pairs, left = list[tuple[int, int]](), [list(path.stretches) for path in (one, two)]
     while all(left):
         if kinds(left[0][0].mode) == kinds(left[1][0].mode):
-            pairs.append((len(one.legs) - len(left[0]), len(two.legs) - len(left[1])))
+            pairs.append((len(one.stretches) - len(left[0]), len(two.stretches) - len(left[1])))
             del left[0][0], left[1][0]
-        elif passing := next((legs for legs in left if _instant(legs[0])), None):
+        elif passing := next((stretches for stretches in left if _instant(stretches[0])), None):
             del passing[0]
         else:
             break
-    return pairs, left[0] + left[1] if all(left) else [leg for leg in left[0] + left[1] if not _instant(leg)]
+    apart = left[0] + left[1]
+    return pairs, apart if all(left) else [stretch for stretch in apart if not _instant(stretch)]
 
 
 def _parted(one: FollowedPath, two: FollowedPath, kinds: Callable[[Any], Any]) -> float:
-    """Start of the first leg in which the two routes are in different modes [s]; inf: there is none."""
-    return min((leg.start for leg in _alike(one, two, kinds)[1]), default=np.inf)
+    """Start of the first stretch in which the two routes are in different modes [s]; inf: there is none."""
+    return min((stretch.start for stretch in _alike(one, two, kinds)[1]), default=np.inf)
 
 
-def _instant(leg: Stretch[Any]) -> bool:
-    """True if a leg is shorter than the accuracy of times."""
-    return bool(leg.end - leg.start <= time_accuracy(leg.end))
+def _instant(stretch: Stretch[Any]) -> bool:
+    """True if a stretch is shorter than the accuracy of times."""
+    return bool(stretch.end - stretch.start <= time_accuracy(stretch.end))
 
 
 def time_accuracy(time: float) -> float:

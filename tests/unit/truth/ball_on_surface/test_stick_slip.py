@@ -191,7 +191,7 @@ def test_slip_passes_through_zero_without_sticking() -> None:
     scene = cylinder(speed=4.6, mu_static=0.07, radial_spin=320.0)
     body = rolling_ball(scene)
     path = follow(body, first_route(body), 1.5)
-    turns = [leg.end for leg in path.legs[:-1]]
+    turns = [stretch.end for stretch in path.stretches[:-1]]
     assert [kind for kind, _ in path.events] == ["slip"]
     assert len(turns) == 3
     dataset, _ = stick_slip(scene, np.array([turns[0] - 1e-3, turns[0] + 1e-3]))
@@ -349,7 +349,7 @@ def test_long_sequences(
     assert counted["jacobians"] < 81 * kinds
 
 
-def test_a_long_leg_is_handed_to_a_compiled_series(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_long_stretch_is_handed_to_a_compiled_series(monkeypatch: pytest.MonkeyPatch) -> None:
     """However long the ball rolls, collocation makes a bounded number of steps, and events and path stay the same."""
     if not taylor.library.available():
         pytest.skip("heyoka is not installed")
