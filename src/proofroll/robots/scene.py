@@ -15,9 +15,9 @@ from scipy.spatial.transform import Rotation
 from proofroll.core.errors import InputError
 from proofroll.elements.mechanism.joint import LAWS
 from proofroll.elements.mechanism.rotations import to_rpy
+from proofroll.robots.actuators import scene_actuators
 from proofroll.robots.meaning import opened, robot_of_text
 from proofroll.robots.model import NO_BODY, Array, Mimic, Robot, RobotJoint
-from proofroll.robots.motors import motors
 from proofroll.robots.opening import BASES
 from proofroll.robots.robot_file import RobotFile
 from proofroll.robots.states import RobotStates, random_states
@@ -97,7 +97,7 @@ class RobotScenes:
         gravity = robot.gravity if robot.gravity.any() else np.array([0.0, 0.0, -1.0])
         bodies = [(names[joint.child], robot.groups[joint.name]) for joint in robot.moving]
         carriers = {robot.welded[joint.parent][0] for joint in robot.moving}
-        acting, silent = motors(file.root, robot) if values.get("actuators") else ([], [])
+        acting, silent = scene_actuators(file.root, robot) if values.get("actuators") else ([], [])
         return {
             "gravity": {"magnitude": values["gravity"], "direction": gravity.tolist()},
             "bodies": [

@@ -161,8 +161,8 @@ def test_an_actuator_moves_its_joint(law, effort):
     """The effort is that of its law at the present coordinate and velocity, and accelerates the mass."""
     body = Body("b", 2.0, inertia=(0.2, 0.2, 0.3))
     joint = Joint("j", "prismatic", "world", "b", q0=(0.1,), v0=(0.4,))
-    motor = Actuator("m", "j", **law)
-    run = runs.build("dependent", Mechanism((body,), (joint,), gravity=(0.0, 0.0, 0.0), actuators=(motor,)))
+    actuator = Actuator("m", "j", **law)
+    run = runs.build("dependent", Mechanism((body,), (joint,), gravity=(0.0, 0.0, 0.0), actuators=(actuator,)))
     for _ in range(2):
         sample = run.sample()
         expected = effort(sample.p_WB[0, 2], sample.v_WB[0, 2])

@@ -72,11 +72,11 @@ def test_a_limit_that_is_never_reached_changes_nothing() -> None:
 
 
 def test_one_effort_at_its_limit_all_the_time_is_clamped_beside_another_that_never_is() -> None:
-    """Of two motors with limits, one pushes with its limit from the start on, though nothing ever switches."""
+    """Of two actuators with limits, one pushes with its limit from the start on, though nothing ever switches."""
     bodies = (Body("a", 1.0, inertia=ONES), Body("b", 1.0, inertia=ONES))
     joints = (Joint("one", "prismatic", "world", "a"), Joint("two", "prismatic", "world", "b"))
-    motors = (Actuator("m", "one", "torque", 5.0, limit=2.0), Actuator("n", "two", "torque", 1.0, limit=2.0))
-    found = truth_of(Mechanism(bodies, joints, actuators=motors, gravity=(0, 0, 0)), np.array([0.0, 1.0]))
+    actuators = (Actuator("m", "one", "torque", 5.0, limit=2.0), Actuator("n", "two", "torque", 1.0, limit=2.0))
+    found = truth_of(Mechanism(bodies, joints, actuators=actuators, gravity=(0, 0, 0)), np.array([0.0, 1.0]))
     assert found.record.q[1] == pytest.approx([1.0, 0.5], abs=TIGHT)
     assert found.events == ()
 
@@ -180,12 +180,12 @@ def test_a_coupled_joint_that_sticks_holds_the_other() -> None:
     assert found.record.named[1] == pytest.approx([-0.4, 0.4], abs=TIGHT)
 
 
-def by_itself(mass: float, motor: Actuator, spring: float, target: Formula, until: float) -> tuple[float, list[float]]:
+def by_itself(mass: float, law: Actuator, spring: float, target: Formula, until: float) -> tuple[float, list[float]]:
     """Last place of a mass on a spring under a servo with a limit, and times at which the limit begins or ends."""
-    n, bound = motor.gear, motor.bound
+    n, bound = law.gear, law.bound
 
     def wanted(t: float, y: np.ndarray) -> float:
-        return float(n * (motor.kp * (target.at(t) - n * y[0]) - motor.kd * n * y[1]))
+        return float(n * (law.kp * (target.at(t) - n * y[0]) - law.kd * n * y[1]))
 
     def rate(t: float, y: np.ndarray) -> list[float]:
         free = wanted(t, y)
@@ -220,9 +220,9 @@ def test_servos_with_limits_agree_with_another_solver(seed: int) -> None:
     mass, spring, kp = random.uniform(0.5, 2), random.uniform(0, 20), random.uniform(20, 80)
     gear = float(random.choice([-2.0, 0.5, 1.5]))
     target = Formula(f"{random.uniform(0.5, 1.5)}*cos({random.uniform(1, 6)}*t) + 0.3*t")
-    motor = Actuator("a", "j", "position", target, kp, random.uniform(0, 4), gear, random.uniform(3, 12))
-    place, times = by_itself(mass, motor, spring, target, 1.5)
-    found = truth_of(slider(motor, mass, stiffness=spring), np.array([0.0, 1.5]))
+    actuator = Actuator("a", "j", "position", target, kp, random.uniform(0, 4), gear, random.uniform(3, 12))
+    place, times = by_itself(mass, actuator, spring, target, 1.5)
+    found = truth_of(slider(actuator, mass, stiffness=spring), np.array([0.0, 1.5]))
     assert len(times) > 1
     assert all(b - a > 1e-6 for a, b in pairwise(times))
     assert [event.time for event in found.events] == pytest.approx(times, abs=1e-8)

@@ -47,7 +47,7 @@ class Mechanism:
         joints: sorted depth-first from the world, whatever order is given; q and v have this order.
         loops, springs, points, geometries, pairs: in the order of the scene.
         gravity: acceleration in the world's axes, m/s².
-        actuators: motors of joints.
+        actuators: in the order of the scene; each drives a joint.
         couplings: pairs of joints that move together.
         unmodelled: features of its source that no model here has, in a few words each; with any of them every route and
             engine refuses the mechanism.

@@ -30,7 +30,7 @@ class Excess(NamedTuple):
     """Excess of a mode over one of its ends.
 
     Attributes:
-        which: index of the joint or contact; motors are numbered after all of them.
+        which: index of the joint or contact; actuators are numbered after all of them.
         kind: kind of the end.
         size: positive where the mode has ended.
         closing: rate of the size where the mode ends only while it grows, as of an overlap; inf: it always ends.
@@ -43,12 +43,12 @@ class Excess(NamedTuple):
 
 
 def ends_of_efforts(
-    motors: Iterable[Actuator], modes: Sequence[str], wanted: Sequence[float], first: int
+    actuators: Iterable[Actuator], modes: Sequence[str], wanted: Sequence[float], first: int
 ) -> list[Excess]:
     """Excess of the modes of efforts with a limit over their ends; ``first``: index of the first effort."""
     ends = list[Excess]()
-    for k, (motor, mode, effort) in enumerate(zip(motors, modes, wanted, strict=True), first):
-        over, under = effort - motor.bound, -motor.bound - effort
+    for k, (actuator, mode, effort) in enumerate(zip(actuators, modes, wanted, strict=True), first):
+        over, under = effort - actuator.bound, -actuator.bound - effort
         if mode == "linear":
             ends += [Excess(k, "least", under), Excess(k, "greatest", over)]
         else:

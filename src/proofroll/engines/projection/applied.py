@@ -45,14 +45,14 @@ class Applied:
         index, count = mechanism.body_index, len(mechanism.bodies)
         self._laws = [law for number, joint in enumerate(mechanism.joints) for law in _laws(number, joint)]
         number = {joint.name: index for index, joint in enumerate(mechanism.joints)}
-        self._motors = [
-            self._motor(place, actuator, number[actuator.joint], mechanism.joints[number[actuator.joint]])
+        self._actuator_laws = [
+            self._actuator_law(place, actuator, number[actuator.joint], mechanism.joints[number[actuator.joint]])
             for place, actuator in enumerate(mechanism.actuators)
         ]
         self._limited = [k for k, actuator in enumerate(mechanism.actuators) if actuator.limit is not None]
         self._actuators = mechanism.actuators
         self.modes: Mapping[int, str] = {}
-        self._laws += self._motors
+        self._laws += self._actuator_laws
         self.now = 0.0
         sprung = [law for law in self._laws if (law.stiffness or law.push) and law.axis != "slide"]
         start = ((law, mechanism.joints[law.connection].q0) for law in sprung)
@@ -106,7 +106,7 @@ class Applied:
 
     def efforts(self, ends: Ends) -> Array:
         """Efforts of the actuators, N or N m, (actuators,)."""
-        return np.array([self._size(law, ends) for law in self._motors])
+        return np.array([self._size(law, ends) for law in self._actuator_laws])
 
     def _size(self, law: _Law, ends: Ends) -> float:
         if law.push is not None:
@@ -126,13 +126,13 @@ class Applied:
 
     def wanted(self, ends: Ends) -> list[float]:
         """Efforts that the actuators with a limit would apply without it, N or N m."""
-        places = ((self._actuators[k], self._motors[k]) for k in self._limited)
+        places = ((self._actuators[k], self._actuator_laws[k]) for k in self._limited)
         return [
             float(actuator.wanted(self.now, self._coordinate(law, ends), self._rate(law, ends)))
             for actuator, law in places
         ]
 
-    def _motor(self, place: int, actuator: Actuator, number: int, joint: Joint) -> _Law:
+    def _actuator_law(self, place: int, actuator: Actuator, number: int, joint: Joint) -> _Law:
         """Force law of an actuator at its joint: linear spring, damper and drive.
 
         A function of t, q and v if the actuator is limited or varies with time.

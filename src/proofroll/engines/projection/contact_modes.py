@@ -92,7 +92,7 @@ class ContactMotion(AlternatingMotion[ContactMode]):
         self._arms = np.array([1.0] * len(self._bodies) + [scale.length if turn else 1.0 for turn in turns])
         self._timed = any(map(varies, mechanism.signals))
         self._faint = max(self._still, _REST * step * float(np.linalg.norm(mechanism.gravity)))
-        self._motors = {k: item for k, item in enumerate(mechanism.actuators) if item.limit is not None}
+        self._limited = {k: item for k, item in enumerate(mechanism.actuators) if item.limit is not None}
         start = np.append(equations.start, 0.0)
         self._limit_efforts(start)
         now = self.at(start)
@@ -102,8 +102,8 @@ class ContactMotion(AlternatingMotion[ContactMode]):
 
     def _limit_efforts(self, y: Array) -> None:
         """Sets the mode of each effort with a limit: linear, or clamped if the state requires more."""
-        wanted = zip(self._motors.items(), self._equations.wanted(self._at(y)), strict=True)
-        self._equations.applied.modes = {k: motor.mode_of(effort) for (k, motor), effort in wanted}
+        wanted = zip(self._limited.items(), self._equations.wanted(self._at(y)), strict=True)
+        self._equations.applied.modes = {k: actuator.mode_of(effort) for (k, actuator), effort in wanted}
 
     def at(self, y: Array) -> ContactsThere:
         """Contacts at a state, with their response to forces."""
@@ -291,13 +291,13 @@ class ContactMotion(AlternatingMotion[ContactMode]):
                     beyond = -beyond if held[k].kind == "stick" else beyond
                 ends.append(Excess(k, "slip", beyond))
         modes, wanted = list(self._equations.applied.modes.values()), self._equations.wanted(self._at(x))
-        return ends + ends_of_efforts(self._motors.values(), modes, wanted, len(self.mode))
+        return ends + ends_of_efforts(self._limited.values(), modes, wanted, len(self.mode))
 
     def _next(self, x: Array, k: int, kind: str) -> tuple[Array, ContactMode, list[tuple[str, str]]]:
         was, happened = self.mode, list[tuple[str, str]]()
         if k >= len(was):
-            motor = list(self._motors)[k - len(was)]
-            self._equations.applied.modes = {**self._equations.applied.modes, motor: kind}
+            number = list(self._limited)[k - len(was)]
+            self._equations.applied.modes = {**self._equations.applied.modes, number: kind}
             return x, was, happened
         if kind == "lift_off":
             x = self._settled(x, was)  # a closing speed that the method left would hit at once

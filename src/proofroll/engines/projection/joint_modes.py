@@ -50,7 +50,7 @@ class SwitchedMotion(AlternatingMotion[Mode]):
     ) -> None:
         super().__init__(equations, stepper, lambda t, x: accept(t, x, self._held), breaks(mechanism.signals))
         self._joints = switched_joints(mechanism)
-        self._motors = {k: item for k, item in enumerate(mechanism.actuators) if item.limit is not None}
+        self._limited = {k: item for k, item in enumerate(mechanism.actuators) if item.limit is not None}
         scale = natural_scale(mechanism)
         slides = [mechanism.joints[joint.number].kind == "prismatic" for joint in self._joints]
         self._units = [scale.rate * (scale.length if slide else 1.0) for slide in slides]  # natural speeds
@@ -90,7 +90,7 @@ class SwitchedMotion(AlternatingMotion[Mode]):
     def _enter(self, t: float, y: Array, mode: Mode) -> None:
         self._held = [self._joints[number].velocity for number in held_joints(mode)]
         self._push = self._load(mode)
-        self._equations.applied.modes = dict(zip(self._motors, mode[len(self._joints) :], strict=True))
+        self._equations.applied.modes = dict(zip(self._limited, mode[len(self._joints) :], strict=True))
         super()._enter(t, y, mode)
 
     def _rates(self, y: Array) -> Array:
@@ -113,8 +113,8 @@ class SwitchedMotion(AlternatingMotion[Mode]):
         """
         x, equations = self._at(y), self._equations
         equations.applied.modes = {}
-        wanted = zip(self._motors.values(), equations.wanted(x), strict=True)
-        motors = [motor.mode_of(effort) for motor, effort in wanted]
+        wanted = zip(self._limited.values(), equations.wanted(x), strict=True)
+        efforts = [actuator.mode_of(effort) for actuator, effort in wanted]
         mode = [
             joint.moving(rate) if rate else joint.resting(place)
             for joint, place, rate in zip(self._joints, q.tolist(), v.tolist(), strict=True)
@@ -128,7 +128,7 @@ class SwitchedMotion(AlternatingMotion[Mode]):
             for k, side in zip(still, _bounded(free[at], response[at], low, high)[1], strict=True):
                 if side:
                     mode[k] = self._joints[k].moving(-side)
-        return (*mode, *motors)
+        return (*mode, *efforts)
 
     def _struck(self, y: Array, q: Array, v: Array, hit: int) -> Array:
         """Change of all velocities ν by an impact of a joint on its stop, by Newton's law; updates ``v``.
@@ -177,13 +177,13 @@ class SwitchedMotion(AlternatingMotion[Mode]):
                 ends.append(Excess(k, "still", -rate if own == "forward" else rate))
             ends += [Excess(k, "low", joint.low - place, -rate), Excess(k, "high", place - joint.high, rate)]
         count, wanted = len(self._joints), self._equations.wanted(self._at(y))
-        return ends + ends_of_efforts(self._motors.values(), self.mode[count:], wanted, count)
+        return ends + ends_of_efforts(self._limited.values(), self.mode[count:], wanted, count)
 
     def _next(self, y: Array, k: int, kind: str) -> tuple[Array, Mode, list[tuple[str, str]]]:
         was, happened = self.mode, list[tuple[str, str]]()
         if k >= len(self._joints):
-            motor = list(self._motors.values())[k - len(self._joints)]
-            happened = [("release" if kind == "linear" else "saturate", motor.name)]
+            actuator = list(self._limited.values())[k - len(self._joints)]
+            happened = [("release" if kind == "linear" else "saturate", actuator.name)]
             mode = (*was[:k], kind, *was[k + 1 :])
         elif kind in {"up", "down"}:
             mode = (*was[:k], self._joints[k].moving(1.0 if kind == "up" else -1.0), *was[k + 1 :])

@@ -30,9 +30,9 @@ class SwitchedBodies(JointStretches):
         self.equations, self.joints = equations, joints
         mechanism = equations.equations.mechanism
         self._numbers = [joint.number for joint in joints]
-        self._motors = [k for k, actuator in enumerate(mechanism.actuators) if actuator.limit is not None]
-        self.motors = tuple(mechanism.actuators[k] for k in self._motors)
-        self._driven = [mechanism.joint_index[motor.joint] for motor in self.motors]
+        self._limited = [k for k, actuator in enumerate(mechanism.actuators) if actuator.limit is not None]
+        self.limited = tuple(mechanism.actuators[k] for k in self._limited)
+        self._driven = [mechanism.joint_index[actuator.joint] for actuator in self.limited]
         super().__init__(len(equations.equations.start()) + 1, tolerance)
 
     def begin(self) -> Transition[Mode]:
@@ -47,7 +47,7 @@ class SwitchedBodies(JointStretches):
             lambda y: np.append(equations.rate(float(y[-1]), y[:-1]), 1.0),
             lambda y: self._guards(equations, y, mode),
             lambda y: np.append(equations.eliminated(y[:-1]), y[-1]),
-            noise_of(self.joints, self.motors, mode, self._along(state)[0], self._wanted(state)),
+            noise_of(self.joints, self.limited, mode, self._along(state)[0], self._wanted(state)),
             near_stops(self.joints, mode),
         )
 
@@ -82,8 +82,8 @@ class SwitchedBodies(JointStretches):
         held = tuple(joint.number for joint, own in pairs if own in HOLDING)
         stopped = tuple(joint.number for joint, own in pairs if own in STOPPED)
         push = {joint.number: joint.push(own) for joint, own in pairs if joint.push(own)}
-        motors = zip(self._motors, self.motors, mode[len(self.joints) :], strict=True)
-        clamped = {k: motor.bound * MODES.index(own) - motor.bound for k, motor, own in motors if own != "linear"}
+        actuators = zip(self._limited, self.limited, mode[len(self.joints) :], strict=True)
+        clamped = {k: actuator.bound * (MODES.index(own) - 1) for k, actuator, own in actuators if own != "linear"}
         return Switched(held, stopped, push, clamped)
 
     def holding(self, equations: NumericEquations, state: Array, mode: Mode) -> Array:
@@ -98,15 +98,15 @@ class SwitchedBodies(JointStretches):
     def _guards(self, equations: NumericEquations, state: Array, mode: Mode) -> FloatArray:
         q, v = self._along(np.append(equations.normalised(state[:-1]), state[-1]))
         force = self.holding(equations, state, mode)
-        return guard_values(self.joints, self.motors, mode, q, v, force, self._wanted(state))
+        return guard_values(self.joints, self.limited, mode, q, v, force, self._wanted(state))
 
     def _along(self, state: Array) -> tuple[Array, Array]:
         return self.equations.along(state[:-1], self._numbers)
 
     def _wanted(self, state: Array) -> list[float]:
-        """Efforts that the motors with a limit would apply without it, N or N m."""
+        """Efforts that the actuators with a limit would apply without it, N or N m."""
         q, v = self.equations.along(self.equations.normalised(state[:-1]), self._driven)
-        return [float(m.wanted(state[-1], *at)) for m, *at in zip(self.motors, q, v, strict=True)]
+        return [float(m.wanted(state[-1], *at)) for m, *at in zip(self.limited, q, v, strict=True)]
 
     def _accelerations(self, equations: NumericEquations, state: Array) -> Array:
         """Accelerations of all switched joints along their coordinates, m/s² or rad/s²."""
@@ -127,8 +127,8 @@ class SwitchedBodies(JointStretches):
         """
         state = np.append(self.equations.normalised(state[:-1]), state[-1])
         q, v = self._along(state)
-        modes = zip(self.motors, self._wanted(state), strict=True)
-        efforts = tuple(motor.mode_of(wanted) for motor, wanted in modes)
+        modes = zip(self.limited, self._wanted(state), strict=True)
+        efforts = tuple(actuator.mode_of(wanted) for actuator, wanted in modes)
         choices = [
             list(_candidates(joint, float(q[k]), still[k], k in stopped))
             if still[k] or v[k] == 0

@@ -76,8 +76,8 @@ class ContactEquations:
         index = mechanism.body_index
         self._pairs = [(index[contact.body_a], index[contact.body_b]) for contact in mechanism.contacts]
         self._com = [np.array(body.com) for body in mechanism.bodies] + [np.zeros(3)]
-        self._limited = {k: motor for k, motor in enumerate(mechanism.actuators) if motor.limit is not None}
-        self._driven = [mechanism.joint_index[motor.joint] for motor in self._limited.values()]
+        self._limited = {k: actuator for k, actuator in enumerate(mechanism.actuators) if actuator.limit is not None}
+        self._driven = [mechanism.joint_index[actuator.joint] for actuator in self._limited.values()]
 
     def at(self, state: Array) -> BodiesState:
         """Rows and loads of the bodies at a state: coordinates, velocities, angles, and last the time [s]."""
@@ -214,7 +214,7 @@ class ContactEquations:
 
     def excess(self, state: Array) -> Array:
         """Efforts before clamping over their limits, minus 1."""
-        return np.abs(self._wanted(state)) / [motor.bound for motor in self._limited.values()] - 1
+        return np.abs(self._wanted(state)) / [actuator.bound for actuator in self._limited.values()] - 1
 
     def clamped(self, state: Array) -> Switched:
         """Switched state with the efforts that are clamped at their limits."""

@@ -17,7 +17,7 @@ from proofroll.truth.hybrid import Stretch, Transition
 from proofroll.truth.mechanism.stretches import Stretches
 from proofroll.truth.mechanism.two_paths import CLOSE, time_accuracy
 
-Motors = tuple[Actuator, ...]
+Actuators = tuple[Actuator, ...]
 _NEAR = 1e-12  # relative difference from a stop below which a coordinate is at it
 _DIGITS = 8  # round-off of a coordinate, in units of its last digit
 _STILL = 1e-13  # natural speed below which a joint stops together with another one, as where a loop links both
@@ -30,7 +30,7 @@ class JointStretches(Stretches[Mode]):
     """
 
     joints: tuple[SwitchedJoint, ...]
-    motors: Motors
+    limited: Actuators
 
     @abstractmethod
     def _at_rest(self, stretch: Stretch[Mode], state: Array, stopped: Sequence[int]) -> tuple[Array, Mode, float]:
@@ -52,7 +52,7 @@ class JointStretches(Stretches[Mode]):
         state, mode = np.append(stretch.last[:-1], stretch.end), list(stretch.mode)
         if kind in MODES:
             mode[which] = kind
-            return Transition(state, tuple(mode), (effort_event(self.motors[which - len(self.joints)], kind),))
+            return Transition(state, tuple(mode), (effort_event(self.limited[which - len(self.joints)], kind),))
         joint = self.joints[which]
         if kind in {"up", "down"}:
             # The force that held the joint has reached its bound: only this joint starts to move.
@@ -81,7 +81,7 @@ def reversed_mode(mode: Mode, which: int) -> Mode:
 
 
 def guards_of(joints: tuple[SwitchedJoint, ...], mode: Mode) -> list[tuple[int, str]]:
-    """Guards of a stretch in this mode: index of the joint (motors are numbered after all joints), and kind.
+    """Guards of a stretch in this mode: index of the joint (actuators are numbered after all joints), and kind.
 
     ``up``, ``down``: the holding force reaches its bound and the joint moves in this direction; ``still``: a joint that
     moves against friction stops; ``low``, ``high``: a joint reaches a stop; ``least``, ``greatest``: an effort reaches
@@ -106,7 +106,7 @@ def guards_of(joints: tuple[SwitchedJoint, ...], mode: Mode) -> list[tuple[int, 
 
 def guard_values(
     joints: tuple[SwitchedJoint, ...],
-    motors: Motors,
+    actuators: Actuators,
     mode: Mode,
     q: Array,
     v: Array,
@@ -119,7 +119,7 @@ def guard_values(
         if k < len(joints):
             values.append(_guard_value(joints[k], mode[k], kind, float(q[k]), float(v[k]), float(force[k])))
         else:
-            values.append(_beyond(wanted[k - len(joints)], motors[k - len(joints)].bound, mode[k], kind))
+            values.append(_beyond(wanted[k - len(joints)], actuators[k - len(joints)].bound, mode[k], kind))
     return np.array(values)
 
 
@@ -130,9 +130,9 @@ def _beyond(wanted: float, bound: float, mode: str, kind: str) -> float:
     return wanted - bound if kind == "greatest" else -bound - wanted
 
 
-def effort_event(motor: Actuator, kind: str) -> tuple[str, str]:
+def effort_event(actuator: Actuator, kind: str) -> tuple[str, str]:
     """Event of an effort that reaches or leaves its limit."""
-    return ("release" if kind == "linear" else "saturate", motor.name)
+    return ("release" if kind == "linear" else "saturate", actuator.name)
 
 
 def _guard_value(joint: SwitchedJoint, mode: str, kind: str, q: float, v: float, force: float) -> float:
@@ -167,15 +167,15 @@ def order_decides(
 
 
 def noise_of(
-    joints: tuple[SwitchedJoint, ...], motors: Motors, mode: Mode, q: Array, wanted: Sequence[float]
+    joints: tuple[SwitchedJoint, ...], actuators: Actuators, mode: Mode, q: Array, wanted: Sequence[float]
 ) -> FloatArray:
     """Round-off of the guards of a stretch that starts at joint coordinates q; zero away from stops and limits."""
     noise = []
     for number, kind in guards_of(joints, mode):
         if number >= len(joints):
-            motor = motors[number - len(joints)]
-            apart = abs(abs(wanted[number - len(joints)]) - motor.bound)
-            noise.append(_DIGITS * float(np.spacing(motor.bound)) if apart <= _NEAR * motor.bound else 0.0)
+            actuator = actuators[number - len(joints)]
+            apart = abs(abs(wanted[number - len(joints)]) - actuator.bound)
+            noise.append(_DIGITS * float(np.spacing(actuator.bound)) if apart <= _NEAR * actuator.bound else 0.0)
             continue
         at = {"low": joints[number].low, "high": joints[number].high}.get(kind)
         leaves = at is not None and abs(q[number] - at) <= _NEAR * max(1.0, abs(at))

@@ -21,7 +21,7 @@ class SwitchedTree(JointStretches):
 
     def __init__(self, equations: JointCoordinates, tolerance: float) -> None:
         self.equations, self.joints = equations, equations.switched
-        self.motors = tuple(actuator for actuator, *_ in equations.limited)
+        self.limited = tuple(actuator for actuator, *_ in equations.limited)
         self._nq = equations.mechanism.nq
         super().__init__(self._nq + equations.mechanism.nv + 1, tolerance)
 
@@ -39,7 +39,7 @@ class SwitchedTree(JointStretches):
             lambda y: np.append(self.equations.rate(float(y[-1]), y[:-1], mode), 1.0),
             lambda y: self._guards(y, mode),
             lambda y: np.append(corrected(y[:-1]), y[-1]),
-            noise_of(self.joints, self.motors, mode, q[at_q], self._wanted(float(state[-1]), q, v)),
+            noise_of(self.joints, self.limited, mode, q[at_q], self._wanted(float(state[-1]), q, v)),
             near_stops(self.joints, mode),
         )
 
@@ -88,7 +88,7 @@ class SwitchedTree(JointStretches):
         holds = any(own in HOLDING for own in mode)
         force = self.holding(state, mode) if holds else np.zeros(len(self.joints))
         return guard_values(
-            self.joints, self.motors, mode, *self._along(state), force, self._wanted(float(state[-1]), q, v)
+            self.joints, self.limited, mode, *self._along(state), force, self._wanted(float(state[-1]), q, v)
         )
 
     def _along(self, state: Array) -> tuple[Array, Array]:

@@ -109,9 +109,9 @@ class MaximalEquations:
             (index[s.body_a], self._place(s.body_a, s.position_a), index[s.body_b], self._place(s.body_b, s.position_b))
             for s in mechanism.springs
         ]
-        self._motors: dict[int, list[int]] = {}
+        self._driving: dict[int, list[int]] = {}
         for number, actuator in enumerate(mechanism.actuators):
-            self._motors.setdefault(mechanism.joint_index[actuator.joint], []).append(number)
+            self._driving.setdefault(mechanism.joint_index[actuator.joint], []).append(number)
         held = {mechanism.joint_index[actuator.joint] for actuator in mechanism.actuators if actuator.kp}
         # a spring on an angle counts whole turns, which an attitude does not
         self.angles = [
@@ -158,19 +158,19 @@ class MaximalEquations:
 
         def effort(number: int, q: Scalar, speed: Scalar) -> Scalar:
             """Force of drive and actuators along a joint's coordinate, without its spring and damper."""
-            for motor in self._motors.get(number, ()):
-                actuator = self.mechanism.actuators[motor]
-                clamped = switched.clamped.get(motor)
-                efforts[motor] = actuator.wanted(time, q, speed, functions) if clamped is None else clamped
+            for k in self._driving.get(number, ()):
+                actuator = self.mechanism.actuators[k]
+                clamped = switched.clamped.get(k)
+                efforts[k] = actuator.wanted(time, q, speed, functions) if clamped is None else clamped
             drive = value_at(self.mechanism.joints[number].torque, time, functions)
-            own = [efforts[motor] for motor in self._motors.get(number, ())]
+            own = [efforts[k] for k in self._driving.get(number, ())]
             return add(drive, switched.push.get(number, 0.0), *own)
 
         for number, connection in enumerate(self.connections):
             rows += made.of(number)
             if number < len(self.mechanism.joints):
                 own = [angle for angle, (k, _) in zip(angles, self.angles, strict=True) if k == number]
-                acts = bool(number in self._motors or number in switched.push)
+                acts = bool(number in self._driving or number in switched.push)
                 law, rates = self._law(number, connection, views, own, force, effort, acts)
                 laws.append(law)
                 angle_rate += rates

@@ -76,7 +76,7 @@ class Units(NamedTuple):
             springs=each(si.springs),
             points=each(si.points),
             geometries=each(si.geometries),
-            actuators=tuple(self._own(motor, slides[motor.joint]) for motor in si.actuators),
+            actuators=tuple(self._own(actuator, slides[actuator.joint]) for actuator in si.actuators),
             couplings=tuple(couplings),
             gravity=self._valued(si.gravity, "m/s^2"),
         )

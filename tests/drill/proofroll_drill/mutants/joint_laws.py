@@ -184,7 +184,7 @@ class NoClamp(Driven):
 
 
 class TightClamp(Driven):
-    """A motor that is half as strong."""
+    """An actuator that is half as strong."""
 
     fault = "limit of an effort halved"
     scene = CLAMPED

@@ -101,7 +101,7 @@ def everything() -> Mechanism:
         Joint("axle", "revolute", "slider", "wheel", child_position=(0.0, 0.02, 0.0), torque=turn),
         Joint("free", "free", "world", "loose", q0=(0.5, 0.1, 0.2, 1, 0, 0, 0), v0=(0.3, 0.2, 0.1, 1.0, 2.0, 3.0)),
     ]
-    motors = [
+    actuators = [
         Actuator("servo", "hinge", "position", turn, 3.0, 0.4, 2.0, 5.0),
         Actuator("drive", "rail", "velocity", slide, 0.0, 0.7),
         Actuator("push", "axle", "torque", 0.3),
@@ -111,7 +111,7 @@ def everything() -> Mechanism:
         tuple(joints),
         springs=(Spring("rubber", "wheel", "loose", (0.0, 0.05, 0.0), (0.01, 0.0, 0.0), 4.0, 0.2, 0.3),),
         points=(Point("tip", "arm", (0.3, 0.0, 0.0)),),
-        actuators=tuple(motors),
+        actuators=tuple(actuators),
         couplings=(Coupling("rack", "axle", "rail", 0.05, 0.2),),
     )
 

@@ -13,7 +13,7 @@ _PLAIN = {"motor", "position", "velocity", "general"}
 _OTHER = {"dyntype": "none", "gaintype": "fixed", "timeconst": "0", "dampratio": "0", "actlimited": "false"}
 
 
-def motors(root: Element, robot: Robot) -> tuple[list[dict[str, Any]], list[str]]:
+def scene_actuators(root: Element, robot: Robot) -> tuple[list[dict[str, Any]], list[str]]:
     """Tables of the actuators that a scene can represent, and a clause for each other one."""
     single = {joint.name for joint in robot.moving if joint.dofs == 1}
     actuators: list[dict[str, Any]] = []
