@@ -130,7 +130,7 @@ def columns(
     put("w_WB", placed.w_WB, "rad/s", "angular velocity in the world", "body", "xyz")
     put("q_WB", placed.q_WB, "1", "orientation, quaternion scalar first", "body", "wxyz")
     put("attitudes", placed.q_WB, "1", "quaternions of the bodies", "body", "wxyz")
-    put("positions", placed.points, "m", "tracked points, or origins of the bodies", "point", "xyz")
+    put("positions", placed.points, "m", "tracked points, or centres of mass", "point", "xyz")
     doubts = _doubts(placed, element.turn_interval)
     for name, (q, rate) in placed.coordinates().items():
         unit = "rad" if next(j for j in mechanism.joints if j.name == name).kind == "revolute" else "m"

@@ -135,6 +135,12 @@ class Mechanism:
         return found
 
     @cached_property
+    def followed(self) -> tuple[tuple[str, Vector], ...]:
+        """Body and place on it [m] of the tracked points, or without any of the centres of mass."""
+        tracked = tuple((point.body, point.position) for point in self.points)
+        return tracked or tuple((body.name, body.com) for body in self.bodies)
+
+    @cached_property
     def mass(self) -> float:
         """Mass of all bodies [kg]."""
         return sum(body.mass for body in self.bodies)

@@ -69,9 +69,8 @@ class Placed:
 
     @cached_property
     def points(self) -> FloatArray:
-        """Tracked points, or without any the origins of the bodies [m], shape (time, points, 3)."""
-        tracked = [self.point(point.body, point.position) for point in self.mechanism.points]
-        return read_only(np.stack(tracked, axis=1)) if tracked else self.p_WB
+        """Tracked points, or without any the centres of mass [m], shape (time, points, 3)."""
+        return read_only(np.stack([self.point(*each) for each in self.mechanism.followed], axis=1))
 
     def coordinates(self) -> dict[str, tuple[FloatArray, FloatArray]]:
         """Coordinate and rate of joints with one coordinate, by name [rad or m, per s]; angles count whole turns."""

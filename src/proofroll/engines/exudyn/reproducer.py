@@ -96,11 +96,9 @@ def seen():
 
 def mechanism_source(model: Any, mechanism: Mechanism, settings: ExudynSettings) -> str:
     """Part of the program that runs a mechanism. Adds markers to the system of ``model``, which must be at time 0."""
-    followed = [(point.body, point.position) for point in mechanism.points]
-    followed = followed or [(body.name, (0.0, 0.0, 0.0)) for body in mechanism.bodies]
     com = {body.name: body.com for body in mechanism.bodies}
     system = model.system
-    places = [int(model.marker(body, position)) for body, position in followed]
+    places = [int(model.marker(body, position)) for body, position in mechanism.followed]
     centres = [int(model.marker(joint.child, com[joint.child])) for joint in mechanism.joints]
     cut = CutOut([Integration], ["advance", "solver"])
     text = [f"{cut.head}\n{cut.text}\n\n# The system as Exudyn lists it.\n"]

@@ -83,8 +83,7 @@ def source(xml: str, model: Any, data: Any, body: RollingBall, settings: MujocoS
 
 def mechanism_source(xml: str, mechanism: Mechanism) -> str:
     """Part of the program that runs a mechanism, given as MJCF whose first keyframe is the start."""
-    places = [(point.body, [float(x) for x in point.position]) for point in mechanism.points]
-    places = places or [(body.name, [0.0, 0.0, 0.0]) for body in mechanism.bodies]
+    places = [(body, [float(x) for x in position]) for body, position in mechanism.followed]
     asks = "# Places that are followed: body, and where on it [m].\n" + assignment(PLACES=places)
     cut = CutOut([followed], [])
     return f'{cut.head}\n{cut.text}\n\nMODEL = """{xml}"""\n{asks}{_MECHANISM}'

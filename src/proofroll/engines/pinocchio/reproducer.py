@@ -100,8 +100,6 @@ def mechanism_source(run: MechanismRun, settings: PinocchioSettings) -> str:
     if run.tree.varies:
         raise Refused("a program cannot have drives that change in time yet")
     mechanism: Any = run.tree.mechanism
-    followed = [(point.body, point.position) for point in mechanism.points]
-    followed = followed or [(body.name, (0.0, 0.0, 0.0)) for body in mechanism.bodies]
     integrator = INTEGRATORS[settings.integrator]
     wanted = [integrator, MechanismMotion, *([Actuator] if mechanism.actuators else [])]
     never = "ConstraintDynamics" if settings.proximal is None else "NullSpace"
@@ -118,7 +116,7 @@ def mechanism_source(run: MechanismRun, settings: PinocchioSettings) -> str:
         START=[part.tolist() for part in mechanism.start()],
         PLACES_OF={joint.name: mechanism.place_of(joint.name) for joint in mechanism.joints if joint.nq == 1},
         HELD={loop.name: held_points(mechanism, loop) for loop in mechanism.loops},
-        PLACES=[(mechanism.body_index[body], [float(x) for x in at]) for body, at in followed],
+        PLACES=[(mechanism.body_index[body], [float(x) for x in at]) for body, at in mechanism.followed],
     )
     given = f"MECHANISM = {cut.literal(mechanism)}\nSETTINGS = {cut.literal(settings)}\n"
     return f"{cut.head}\n{cut.text}\n\n{numbers}{given}{_OF_A_MECHANISM}"

@@ -9,7 +9,7 @@ import numpy as np
 
 from proofroll.core.convergence import floor_text
 from proofroll.core.engine_abilities import by_hand
-from proofroll.core.number_format import counted, number
+from proofroll.core.number_format import counted, number, spaced
 from proofroll.core.observable import Role
 from proofroll.files.json_data import plain, record
 from proofroll.running.case import Status, host_sentences, hosts
@@ -233,6 +233,6 @@ def _conclusions(outcome: Tradeoff, budgets: Sequence[CurveBudget]) -> list[str]
     sentences.append(
         f"{counted(len(outcome.points), 'runs')}: {refused} refused, {built}{ended} that did not reach the end, "
         f"all with a reason; {len(broken)} that reached it silently "
-        f"with {quantity} off by more than {number(BROKEN * scale)} {unit}."
+        f"with {quantity} off by more than {number(BROKEN * scale)}{spaced(unit)}."
     )
     return sentences

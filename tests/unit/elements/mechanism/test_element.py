@@ -391,3 +391,18 @@ def test_a_joint_beside_its_stop_by_rounding_is_at_it(
         found = truth_of(mechanism, np.array([0.0, 0.05]))
         assert (found.horizon, found.events) == (np.inf, ())
         assert found.record.q[-1, 0] == beside
+
+
+def test_without_tracked_points_the_followed_places_move() -> None:
+    """Centres of mass are followed, not origins, which may lie on the hinge; a wheel is followed by its attitude."""
+    hinge = Joint("hinge", "revolute", "world", "rod", axis=(0, 1, 0), q0=(0.7,), v0=(3.0,))
+    rod, wheel = Body("rod", 1.0, (0, 0, -0.5), inertia=(0.1, 0.1, 0.01)), Body("rod", 1.0, inertia=(0.1, 0.1, 0.01))
+    deciding = {}
+    for name, body in (("rod", rod), ("wheel", wheel)):
+        scene = Scene(name, "", (MechanismElement(Mechanism((body,), (hinge,))),))
+        run = simulate(scene, "projection", until=0.1, every=0.1)
+        deciding[name] = scene.deciding
+        assert np.ptp(run[scene.deciding].to_numpy(), axis=0).max() > 1e-2
+    assert deciding == {"rod": "positions", "wheel": "attitudes"}
+    (centre,) = MechanismElement(Mechanism((rod,), (hinge,))).start.points[0]
+    np.testing.assert_allclose(centre, [-0.5 * np.sin(0.7), 0, -0.5 * np.cos(0.7)], atol=1e-15)

@@ -37,8 +37,6 @@ def extent(mechanism: Mechanism, motion: BodyMotion) -> float:
     own += [(point.body, point.position) for point in mechanism.points]
     index = mechanism.body_index
     places = [motion.p_WB[index[body]] + motion.R_WB[index[body]] @ np.array(at) for body, at in own]
-    if not mechanism.points:
-        places += list(motion.p_WB[:-1])
     places += [each.place for each in touches(mechanism, motion)]
     return float(np.max(np.linalg.norm(np.array(places)[:, None] - np.array(places)[None], axis=-1)))
 
