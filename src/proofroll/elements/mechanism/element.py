@@ -24,7 +24,7 @@ from proofroll.elements.mechanism.analysis import Analysis, analyse
 from proofroll.elements.mechanism.capabilities import MechanismCapability, required
 from proofroll.elements.mechanism.certificate import CAPS, certify
 from proofroll.elements.mechanism.contacts.observables import LAWS, RESIDUALS, contact_observables, event_observables
-from proofroll.elements.mechanism.contacts.start import extent, natural_length
+from proofroll.elements.mechanism.contacts.start import extent, followed_moves, natural_length
 from proofroll.elements.mechanism.dataset import from_samples
 from proofroll.elements.mechanism.failure_program import program
 from proofroll.elements.mechanism.joint import TURNING
@@ -34,7 +34,6 @@ from proofroll.elements.mechanism.named_forces import named_forces
 from proofroll.elements.mechanism.natural_sizes import natural_sizes
 from proofroll.elements.mechanism.optional_terms import optional_terms
 from proofroll.elements.mechanism.placed import Placed
-from proofroll.elements.mechanism.rotations import skew
 from proofroll.elements.mechanism.sampling import MechanismSample
 from proofroll.elements.mechanism.start_words import start_facts
 from proofroll.elements.mechanism.switches import first_change
@@ -59,8 +58,6 @@ ENERGY_GAIN, OPENED = "energy gain", "joints opened"
 _PART = 1e-4
 # Rate of a freedom on springs and servos of joints, relative to the fastest, below which they do not hold it.
 _HELD = 1e-7
-# Speed of a followed place per unit of a joint's, relative to the length, up to which it stands still: round-off is 1e-16.
-_STANDS = 1e-12
 _AXES = "xyz"
 
 
@@ -214,26 +211,15 @@ class MechanismElement:
         damped = any(spring.damping for spring in self.mechanism.springs)
         return not lossy and not damped and not any(any(law) for law in laws)
 
-    @property
-    def _followed_moves(self) -> bool:
-        """True if joints can move a followed place; a wheel about its centre of mass moves none."""
-        motion, index, length = self._solution.motion, self.mechanism.body_index, self.length
-        for body, position in self.mechanism.followed:
-            k = index[body]
-            arm = motion.R_WB[k] @ np.array(position)
-            if np.any(np.abs(motion.J[k, :3] - skew(arm) @ motion.J[k, 3:]) > _STANDS * length):
-                return True
-        return False
-
     @cached_property
     def observables(self) -> tuple[Observable, ...]:
         """See the protocol."""
         # A point at rest has no size but that of its motion, see `scales`.
         least = {unit: _LEAST * size if self._own_length else 0.0 for unit, size in self._sizes.items()}
         a, force = least["m"], least["N"]
-        what, moves = "tracked points" if self.mechanism.points else "centres of mass", self._followed_moves
-        path: dict[str, Any] = {"floor": a, "headline": moves, "decides": moves}
-        found = [Observable("positions", "m", f"the {what}", Role.MOTION, **path)]
+        what = "tracked points" if self.mechanism.points else "centres of mass"
+        moves = followed_moves(self.mechanism, self._solution.motion, self.length)
+        found = [Observable("positions", "m", f"the {what}", Role.MOTION, floor=a, headline=moves, decides=moves)]
         found += [
             Observable(f"{point.name}.{axis}", "m", f"{axis} of the point {point.name}", Role.MOTION, floor=a)
             for point in self.mechanism.points
@@ -250,8 +236,8 @@ class MechanismElement:
         meaning, turn = "velocities of the origins of the bodies' frames", _LEAST * self.speed / self.length
         found.append(Observable("v_WB", "m/s", meaning, Role.MOTION, floor=least["m/s"], **more))
         found.append(Observable("w_WB", "rad/s", "angular velocities of the bodies", Role.MOTION, floor=turn, **more))
-        turns: dict[str, Any] = {"floor": 1.0, "asked_for": not moves, "headline": not moves, "decides": not moves}
-        found.append(Observable("attitudes", "1", "quaternions of the bodies", Role.MOTION, **turns))
+        turns: dict[str, Any] = dict.fromkeys(("asked_for", "headline", "decides"), not moves)
+        found.append(Observable("attitudes", "1", "quaternions of the bodies", Role.MOTION, floor=1.0, **turns))
         if np.any(self.analysis.determinate[:, :3]):
             meaning = "determinate components of the forces on children"
             found.append(Observable("forces", "N", meaning, Role.REACTION, floor=force, headline=True, column=True))
@@ -264,12 +250,11 @@ class MechanismElement:
             floor, column = least[str(item.unit)], item.field == "coupling"
             found.append(Observable(item.name, str(item.unit), item.meaning, Role.REACTION, floor=floor, column=column))
         if self.conservative:
-            meaning, floor = "energy now minus energy at the start", least["J"]
-            never: dict[str, Any] = {"hangs_on_events": False, "difference_of": "energy"}
-            found.append(Observable("energy_error", "J", meaning, Role.RESIDUAL, "ΔE", floor, column=True, **never))
-        meaning = "how far joints and loops are open"
-        never = {"hangs_on_events": False, "difference_of": "p_WB"}
-        found.append(Observable("drift", "m", meaning, Role.RESIDUAL, floor=a, asked_for=False, **never))
+            never: dict[str, Any] = {"hangs_on_events": False, "difference_of": "energy", "floor": least["J"]}
+            meaning = "energy now minus energy at the start"
+            found.append(Observable("energy_error", "J", meaning, Role.RESIDUAL, "ΔE", column=True, **never))
+        never = {"hangs_on_events": False, "difference_of": "p_WB", "floor": a, "asked_for": False}
+        found.append(Observable("drift", "m", "how far joints and loops are open", Role.RESIDUAL, **never))
         return tuple(found)
 
     def step_numbers(self, h: float, truth: xr.Dataset | None) -> Sequence[StepNumber]:

@@ -12,11 +12,14 @@ from proofroll.elements.mechanism.contacts.touching import Moving, Touching, tou
 from proofroll.elements.mechanism.joint_coordinates import JointCoordinates, Solution
 from proofroll.elements.mechanism.kinematics import BodyMotion, Tree
 from proofroll.elements.mechanism.model import Mechanism
+from proofroll.elements.mechanism.rotations import skew
 
 # Gap or overlap of shapes that counts as touching, relative to a natural length, or in rad: digits of a file.
 TOUCHING = 1e-9
 # Speed that counts as none between touching shapes, relative to a natural speed: digits of a file.
 STILL = 1e-9
+# Speed of a followed place per unit of a joint's, relative to the length, up to which it stands: round-off is 1e-16.
+_STANDS = 1e-12
 
 
 def touches(mechanism: Mechanism, motion: BodyMotion) -> tuple[Touching, ...]:
@@ -39,6 +42,16 @@ def extent(mechanism: Mechanism, motion: BodyMotion) -> float:
     places = [motion.p_WB[index[body]] + motion.R_WB[index[body]] @ np.array(at) for body, at in own]
     places += [each.place for each in touches(mechanism, motion)]
     return float(np.max(np.linalg.norm(np.array(places)[:, None] - np.array(places)[None], axis=-1)))
+
+
+def followed_moves(mechanism: Mechanism, motion: BodyMotion, length: float) -> bool:
+    """True if joints can move a followed place at once, in a mechanism of a ``length`` [m]; a wheel moves none."""
+    for body, position in mechanism.followed:
+        k = mechanism.body_index[body]
+        by_joints = motion.J[k, :3] - skew(motion.R_WB[k] @ np.array(position)) @ motion.J[k, 3:]
+        if np.any(np.abs(by_joints) > _STANDS * length):
+            return True
+    return False
 
 
 class Scale(NamedTuple):
