@@ -52,7 +52,7 @@ from proofroll.studies.stability.records import (
     Boundary,
     BoundaryPoint,
     ExplainedBoundary,
-    MappedPlace,
+    MappedValue,
     StabilityStudy,
 )
 from proofroll.studies.study_store import Measured
@@ -163,7 +163,7 @@ COMPARISON = (
     ShownObservable, ShownBand,
 )  # fmt: skip
 LADDER = (LadderContent, RungFound, Ran, TermFound, SideFound, KnownTruth, Absence)
-MAP = (StabilityStudy, Axis, BoundaryPoint, Boundary, ExplainedBoundary, MappedPlace, Effort, Measured, JudgedFile)
+MAP = (StabilityStudy, Axis, BoundaryPoint, Boundary, ExplainedBoundary, MappedValue, Effort, Measured, JudgedFile)
 TRADEOFF = (
     TradeoffStudy, MeasuredQuantity, MeasuredPoint, SparseRun, Corner, DroppedStep, CurveBudget, TruthCost, Measured,
     JudgedFile,

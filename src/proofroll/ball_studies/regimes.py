@@ -12,7 +12,7 @@ import numpy as np
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.bounds import require_bounds
-from proofroll.core.errors import InputError, error_place
+from proofroll.core.errors import InputError, error_location
 from proofroll.core.scene import Scene
 from proofroll.core.validation import strict, validated
 from proofroll.elements.ball_on_surface.element import rolling_ball
@@ -104,7 +104,7 @@ def load_regimes(name: str) -> RegimesStudy:
         if not 1 <= given.count <= _MOST or not 0 < given.low <= given.high < math.inf:
             shown = f"from {given.low:g} to {given.high:g}, {given.count} values"
             raise InputError(f"{path.name}: {axis}", shown, f"give 0 < low <= high and a count of 1 to {_MOST}")
-    with error_place(path.name):
+    with error_location(path.name):
         require_bounds("until", study.until, above=0)
         for resistance in study.rolling_resistance:
             load_scene(study.scene, rolling_resistance=resistance, speed=study.speed.low, mu_static=study.mu_static.low)

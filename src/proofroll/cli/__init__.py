@@ -187,6 +187,6 @@ def _unwritten(error: OSError | SystemExit) -> Any:
     os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
     if isinstance(error, BrokenPipeError):
         return OK
-    place = f"{error.filename} cannot be used" if error.filename else "the output cannot be written"
-    complain(f"{place} ({error.strerror or error})")
+    fault = f"{error.filename} cannot be used" if error.filename else "the output cannot be written"
+    complain(f"{fault} ({error.strerror or error})")
     return USAGE

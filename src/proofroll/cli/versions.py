@@ -54,7 +54,7 @@ def versions(
 
         comparisons = comparisons_about(subject, engine)  # before minutes are spent on environments
     options.require_pages()
-    sides = _place(engine, old), _place(engine, new)
+    sides = _side(engine, old), _side(engine, new)
     if sides[0] == sides[1]:
         raise InputError("new", new, f"both are {sides[0]}; name two versions")
     if robot is not None:
@@ -104,7 +104,7 @@ def _keep(content: VersionsStudy, page: str, out: Path) -> Path:
     return file
 
 
-def _place(engine: str, text: str) -> str:
+def _side(engine: str, text: str) -> str:
     """Engine ``NAME`` or ``NAME@PLACE`` for a version, a label or a path; its environment is made if necessary."""
     from proofroll.core.plugins import engine_names
     from proofroll.running import environments

@@ -142,14 +142,14 @@ def checks(engine: Any, known: Mapping[str, str] | None = None, *, apart: bool =
 
 def _run_apart(engine: Any, name: str) -> None:
     """Runs the check of this name in the process of its formulation and preset, which is kept for the next check."""
-    place = f"{engine.__module__}.{engine.__qualname__}: {_of_one_process(engine, name)}"
-    if place not in _processes:
-        _processes[place] = ProcessPoolExecutor(1, mp_context=multiprocessing.get_context("spawn"))
-        atexit.register(_processes[place].shutdown, wait=False, cancel_futures=True)
+    key = f"{engine.__module__}.{engine.__qualname__}: {_of_one_process(engine, name)}"
+    if key not in _processes:
+        _processes[key] = ProcessPoolExecutor(1, mp_context=multiprocessing.get_context("spawn"))
+        atexit.register(_processes[key].shutdown, wait=False, cancel_futures=True)
     try:
-        how, text = _processes[place].submit(_outcome, engine, name).result()
+        how, text = _processes[key].submit(_outcome, engine, name).result()
     except BrokenProcessPool:
-        del _processes[place]
+        del _processes[key]
         raise AssertionError("its process ended without a word, as an engine's own crash ends it") from None
     if how == _SKIPPED:
         raise SkipTest(text)

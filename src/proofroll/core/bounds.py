@@ -7,7 +7,7 @@ from proofroll.core.errors import InputError
 
 
 class OutOfBounds(InputError, ValueError):  # noqa: N818 -- says what is wrong, as the other errors do
-    """A number outside the bounds of a model; a ValueError too, so that pydantic adds its place in the file."""
+    """A number outside the bounds of a model; a ValueError too, so that pydantic adds its location in the file."""
 
 
 def require_bounds(

@@ -82,7 +82,7 @@ class Columns:
         return Columns(self.variables, {**self.attrs, **attrs})
 
     def at(self, dim: str, chosen: npt.NDArray[np.bool_]) -> Columns:
-        """Columns restricted to the places along ``dim`` at which ``chosen`` is True."""
+        """Columns restricted to the indices along ``dim`` at which ``chosen`` is True."""
         variables = {
             name: item._replace(values=np.compress(chosen, item.values, item.dims.index(dim)))
             if dim in item.dims

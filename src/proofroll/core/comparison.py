@@ -131,7 +131,7 @@ class Comparison:
         rows: engines with settings.
         time_limit: wall seconds a case may take [s].
         timed: whether the speed of every run is measured, in clean runs of its own.
-        order: place in a report, the smallest first; those without come last, by name.
+        order: rank in a report, the smallest first; those without come last, by name.
         brief: parameter -> values; a report without names has only the combinations that have one of them for each.
         left_out: number of combinations left out of a report without names.
         budget: processor time that all cases may take together [s]; cases beyond it are left out; None: no limit.

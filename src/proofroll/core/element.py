@@ -132,7 +132,7 @@ class Element(Protocol):
 
     @property
     def observables(self) -> tuple[Observable, ...]:
-        """Its table of observables, the only place that lists them."""
+        """Its table of observables, listed here alone."""
 
     @property
     def length(self) -> float:
@@ -217,7 +217,7 @@ class ElementKind(Protocol):
             where: the file, for messages.
 
         Raises:
-            InputError: the first mistake, with its place.
+            InputError: the first mistake, with its location.
         """
 
     @staticmethod

@@ -64,7 +64,7 @@ class Term:
 
 @runtime_checkable
 class TellsLevels(Protocol):
-    """Ability of an engine that has a place on the ladder of models.
+    """Ability of an engine that has rungs on the ladder of models.
 
     Attributes:
         levels: formulation -> its rung.

@@ -35,10 +35,10 @@ class InputError(ProofrollError):
         """The same error, reported for a larger field that contains this one."""
         return InputError(field, value, str(self))
 
-    def of(self, place: str) -> InputError:
+    def of(self, where: str) -> InputError:
         """The same error with the name of a file, or of a part of it, before the field."""
-        known = self.field.startswith(place) or self.field == "file"
-        return self if known else InputError(f"{place}: {self.field}", self.value, self.advice)
+        known = self.field.startswith(where) or self.field == "file"
+        return self if known else InputError(f"{where}: {self.field}", self.value, self.advice)
 
 
 class Refused(ProofrollError):  # noqa: N818 -- a refusal is an honest answer, not an error
@@ -58,12 +58,12 @@ class Diverged(ProofrollError):  # noqa: N818 -- a finding about the engine
 
 
 @contextmanager
-def error_place(place: str) -> Iterator[None]:
+def error_location(where: str) -> Iterator[None]:
     """Context manager that adds the name of a file to an InputError, see :meth:`InputError.of`."""
     try:
         yield
     except InputError as error:
-        raise error.of(place) from None
+        raise error.of(where) from None
 
 
 def no_such_key(field: str, value: object, known: Iterable[str]) -> InputError:
@@ -113,8 +113,8 @@ def raised_at(error: BaseException) -> str:
     It is the innermost line in the first package outside the harness; lines of libraries that it calls are skipped.
     """
     frames = [frame for frame in traceback.extract_tb(error.__traceback__) if "importlib" not in frame.filename]
-    places = [(frame, Path(frame.filename)) for frame in frames]
-    outside = [one for one, file in places if not file.is_relative_to(_PACKAGE) or file.is_relative_to(_ENGINES)]
+    files = [(frame, Path(frame.filename)) for frame in frames]
+    outside = [one for one, file in files if not file.is_relative_to(_PACKAGE) or file.is_relative_to(_ENGINES)]
     if not outside:
         return ""
     home = Path(outside[0].filename).parent

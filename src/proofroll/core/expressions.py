@@ -45,7 +45,7 @@ def evaluated(
     """The number of an expression of parameters with + - * / ^ ** ( ) and ``pi``.
 
     Args:
-        field: its place, for the message.
+        field: location in the file, for the message.
         text: the expression.
         names: the parameters, with their units.
         unit: required unit of the result, as scene files write it, or several joined by OR; "": not checked. A formula

@@ -34,7 +34,7 @@ class Parameters:
 
         Args:
             content: of a file: ``"$name"`` is a parameter, ``"= ..."`` a formula, ``{i}`` in a text a number.
-            where: its place, for messages.
+            where: location in the file, for messages.
             units: key -> unit of its number.
             unit: of the content itself, if it is a number or a list of numbers.
 

@@ -29,11 +29,11 @@ class UnitsDiffer(Exception):  # noqa: N818 -- says what is wrong; the reader of
 def powers_of(unit: str) -> Powers:
     """Powers of base units in a unit as scene files write it, e.g. ``N m s/rad``; an unknown name is a base unit."""
     powers: Powers = {}
-    for place, part in enumerate(unit.split("/")):
+    for index, part in enumerate(unit.split("/")):
         for factor in part.split():
             matched = _POWER.fullmatch(factor)
             name, power = (matched[1], float(matched[2])) if matched else (factor, 1.0)
-            powers = _product(powers, _IN_BASE_UNITS.get(name, {name: 1.0}), -power if place else power)
+            powers = _product(powers, _IN_BASE_UNITS.get(name, {name: 1.0}), -power if index else power)
     return powers
 
 

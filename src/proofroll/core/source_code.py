@@ -28,16 +28,16 @@ def package_of(kind: type) -> Path | None:
 
 def code_of(item: Any) -> list[str]:
     """Hashes of the other packages that define dataclasses found in ``item`` at any depth; this package is left out."""
-    places = {package_of(kind) for kind in set(_kinds(item))}
-    return sorted(hash_of(with_imports(place)) for place in places - {None, OWN} if place is not None)
+    paths = {package_of(kind) for kind in set(_kinds(item))}
+    return sorted(hash_of(with_imports(path)) for path in paths - {None, OWN} if path is not None)
 
 
-def with_imports(place: Path) -> list[Path]:
+def with_imports(path: Path) -> list[Path]:
     """A module or package outside this one and, at any depth, the modules and packages that it imports, sorted.
 
     The standard library, this package and other installed packages are left out.
     """
-    sources, waiting = set[Path](), [place]
+    sources, waiting = set[Path](), [path]
     while waiting:
         sources.add(source := waiting.pop())
         files = source.rglob("*.py") if source.is_dir() else [source]
@@ -82,16 +82,16 @@ def _kinds(item: Any) -> Iterator[type]:
             yield from _kinds(part)
 
 
-def hash_of(places: Iterable[Path], aside: frozenset[str] = frozenset()) -> str:
+def hash_of(paths: Iterable[Path], aside: frozenset[str] = frozenset()) -> str:
     """Hash of Python files and of all Python files in folders.
 
     Modules and folders whose name is in ``aside`` are left out at any depth. So are modules ``robot_…``, which read
     robot files and affect no result.
     """
     content = hashlib.sha256()
-    for place in places:
-        for file in sorted(place.rglob("*.py")) if place.is_dir() else [place]:
-            named = set(file.relative_to(place.parent).with_suffix("").parts)
+    for path in paths:
+        for file in sorted(path.rglob("*.py")) if path.is_dir() else [path]:
+            named = set(file.relative_to(path.parent).with_suffix("").parts)
             if not (aside & named or file.stem.startswith("robot_")):
                 content.update(file.read_bytes())
     return content.hexdigest()[:16]

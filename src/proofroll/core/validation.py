@@ -51,7 +51,7 @@ def validated(kind: type[_T], content: Mapping[str, Any], where: str, **own: obj
         own: fields whose values the program knows; the file must not have them.
 
     Raises:
-        InputError: the first mistake, with its place.
+        InputError: the first mistake, with its location.
     """
     for name in (name for name in content if name in own):
         raise no_such_key(f"{where}: {name}", content[name], _keys(kind, (), own))
@@ -61,19 +61,19 @@ def validated(kind: type[_T], content: Mapping[str, Any], where: str, **own: obj
         raise _first_problem(error, where, kind, content, own) from None
     except OverflowError:
         raise InputError(where, content, "a product or power of its numbers is too large; give smaller ones") from None
-    for place, given in _turned(content, content_of_kind):
-        raise InputError(f"{where}: {'.'.join(place)}", given, "this is not a number; give one")
+    for location, given in _booleans(content, content_of_kind):
+        raise InputError(f"{where}: {'.'.join(location)}", given, "this is not a number; give one")
     return content_of_kind
 
 
-def _turned(content: Any, read: Any, place: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], bool]]:
-    """Places of every true and false that pydantic took for a number."""
+def _booleans(content: Any, read: Any, location: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], bool]]:
+    """Every true and false that pydantic took for a number."""
     if isinstance(content, bool) and not isinstance(read, bool):
-        yield place, content
+        yield location, content
     parts = content if isinstance(content, Mapping) else dict(enumerate(content if isinstance(content, list) else ()))
     for name, item in parts.items():
         inside = read[name] if isinstance(read, (Mapping, list, tuple)) else getattr(read, str(name), item)
-        yield from _turned(item, inside, (*place, str(name)))
+        yield from _booleans(item, inside, (*location, str(name)))
 
 
 @cache
@@ -87,26 +87,26 @@ def _tables(kind: Any) -> list[Any]:
     return [kind] if is_dataclass(kind) else [table for part in get_args(kind) for table in _tables(part)]
 
 
-def _keys(kind: Any, place: Sequence[str | int], own: Iterable[str]) -> list[str]:
-    """Allowed keys of the tables at a place in a type, as files spell them."""
+def _keys(kind: Any, location: Sequence[str | int], own: Iterable[str]) -> list[str]:
+    """Allowed keys of the tables at a location in a type, as files spell them."""
     tables = _tables(kind)
-    for part in place:
+    for part in location:
         hints = [get_type_hints(table, include_extras=True) for table in tables]
         inside = [table for hint in hints if part in hint for table in _tables(hint[part])]
         tables = inside or [table for table in tables if getattr(table, "kind", None) == part] or tables
     keys = [item.metadata.get("key", item.name) for table in tables for item in fields(table) if item.init]
-    return [key for key in dict.fromkeys(keys) if place or key not in own]
+    return [key for key in dict.fromkeys(keys) if location or key not in own]
 
 
-def _place(location: Iterable[str | int], content: Any) -> list[str]:
-    """Place of a mistake in a file, without the names of types that pydantic inserts."""
-    places = []
+def _location(location: Iterable[str | int], content: Any) -> list[str]:
+    """Location of a mistake in a file, without the names of types that pydantic inserts."""
+    keys = []
     for part in location:
         inside = isinstance(content, Mapping) and part in content
         inside = inside or (isinstance(content, (list, tuple)) and isinstance(part, int) and part < len(content))
-        places += [str(part)] * inside
+        keys += [str(part)] * inside
         content = content[part] if inside else content
-    return places
+    return keys
 
 
 def _first_problem(
@@ -116,7 +116,7 @@ def _first_problem(
     # An unknown key goes before a missing one, as it may be the missing one misspelt.
     problem = min(error.errors(), key=lambda one: one["type"] not in _UNKNOWN)
     absent = problem["type"] in {"missing", "missing_argument"} and not isinstance(problem["loc"][-1], int)
-    location = ".".join(_place(problem["loc"], content) + [str(part) for part in problem["loc"][-1:]] * absent)
+    location = ".".join(_location(problem["loc"], content) + [str(part) for part in problem["loc"][-1:]] * absent)
     if problem["type"] in _UNKNOWN:
         return no_such_key(f"{where}: {location}", problem["input"], _keys(kind, problem["loc"][:-1], own))
     if absent:
@@ -154,12 +154,12 @@ def units_of_kind(table: type, kind: object) -> dict[str, Unit]:
 
 
 def all_units_of(*types: type) -> dict[str, str]:
-    """Every unit that a number of these dataclasses may have, by ``key``, ``key.kind`` or ``key.kind.place``."""
+    """Every unit that a number of these dataclasses may have, by ``key``, ``key.kind`` or ``key.kind.index``."""
     units: dict[str, str] = {}
     for each in types:
         for item in fields(each):
             unit = item.metadata.get("unit", "")
             for kind, own in unit.items() if isinstance(unit, Mapping) else [("", unit)]:
-                for place, one in enumerate(own.split(OR) if isinstance(own, str) else own):
-                    units[".".join(filter(None, [item.name, kind, str(place or "")]))] = one
+                for index, one in enumerate(own.split(OR) if isinstance(own, str) else own):
+                    units[".".join(filter(None, [item.name, kind, str(index or "")]))] = one
     return {name: unit for name, unit in units.items() if unit}

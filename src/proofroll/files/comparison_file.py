@@ -9,7 +9,7 @@ from typing import Any
 from proofroll.core.bounds import require_bounds, require_pair
 from proofroll.core.comparison import Band, Comparison, Edge, ExceptAt, Row, Tolerance
 from proofroll.core.convergence import LADDER_RUNGS
-from proofroll.core.errors import InputError, error_place, require_known
+from proofroll.core.errors import InputError, error_location, require_known
 from proofroll.core.observable import Observable
 from proofroll.core.plugins import parse_engine, require_engine
 from proofroll.core.time_grid import time_grid
@@ -64,7 +64,7 @@ def load_comparison(name: str) -> Comparison:
 
 
 def _comparison(path: Path, content: dict[str, Any]) -> Comparison:
-    with error_place(path.name):
+    with error_location(path.name):
         return _checked(path, content)
 
 

@@ -76,8 +76,8 @@ def study_content(path: Path, study: str) -> dict[str, Any]:
 
 def named_file(name: str) -> Path | None:
     """Path of the file of a study or comparison, from a path or from its name with or without ``.toml``; or None."""
-    places = [Path(name), *(folder / file for folder in study_folders() for file in (f"{name}.toml", name))]
-    return next((place for place in places if place.is_file() and place.name != "scene.toml"), None)
+    paths = [Path(name), *(folder / file for folder in study_folders() for file in (f"{name}.toml", name))]
+    return next((path for path in paths if path.is_file() and path.name != "scene.toml"), None)
 
 
 def study_file(name: str, study: str) -> tuple[Path, dict[str, Any]]:

@@ -74,7 +74,7 @@ def write(trajectory: xr.Dataset | Columns, path: Path) -> None:
     netCDF-3 has no integers beyond 32 bits: a larger number is refused. Other numbers are kept exactly.
 
     Raises:
-        ProofrollError: the place cannot be written.
+        ProofrollError: the file cannot be written.
         ValueError: the format cannot hold a number.
     """
     # Made in memory first, so that a full disk gives one clear error.

@@ -163,7 +163,7 @@ def runs_of(lines: Iterable[TableLine]) -> dict[tuple[str, str, str, int], dict[
         size = step(line.resolution, line.step, 6)
         run = " ".join(filter(None, (line.engine, line.formulation, line.setting, size)))
         rows[line.study, line.place, run].setdefault(line.row, {})[line.quantity] = line
-    return {(*key, place): run for key, places in rows.items() for place, run in enumerate(places.values())}
+    return {(*key, number): run for key, own in rows.items() for number, run in enumerate(own.values())}
 
 
 def _changes(

@@ -61,8 +61,8 @@ def _numbers(value: Any, address: str, known: TableLine) -> Iterator[TableLine]:
             if key not in _ELSEWHERE and key not in _WORDS:
                 yield from _numbers(item, f"{address}.{key}".removeprefix("."), known)
     elif isinstance(value, list):
-        for place, item in enumerate(value):
-            yield from _numbers(item, f"{address}[{place}]", known)
+        for index, item in enumerate(value):
+            yield from _numbers(item, f"{address}[{index}]", known)
     elif isinstance(value, str):
         if _NUMBER.search(value):
             yield replace(known, record=address, message=value)
@@ -74,8 +74,8 @@ def _certified(line: Mapping[str, Any], address: str, known: TableLine) -> Itera
     """A line for each component of a quantity of a certificate; one without a value if it is not reported."""
     known = replace(known, error=line["difference"], tolerance=line["tolerance"], verdict=line["standing"])
     found, expected = line["found"] or [None], line["expected"] or [None]
-    for place, (one, other) in enumerate(zip_longest(found, expected)):
-        yield replace(known, record=f"{address}[{place}]", value=one, expected=other)
+    for index, (one, other) in enumerate(zip_longest(found, expected)):
+        yield replace(known, record=f"{address}[{index}]", value=one, expected=other)
 
 
 def _fits(value: Any, column: Any) -> bool:

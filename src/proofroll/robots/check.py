@@ -136,9 +136,9 @@ class _Checked:
         """
 
         def ask(given: Path) -> reading.ReaderAnswer:
-            with self._lent(spec) as (worker, place):
+            with self._lent(spec) as (worker, folder):
                 request = self._request(options, given)
-                return reading.ask(worker, spec.name, request, place, self.time_limit)
+                return reading.ask(worker, spec.name, request, folder, self.time_limit)
 
         try:
             answer = ask(self.written)
@@ -161,17 +161,17 @@ class _Checked:
         if not self.file.contained or importer.version is None:
             return None
         try:
-            with self._lent(spec) as (worker, place):
+            with self._lent(spec) as (worker, folder):
                 own = self._request(options, self.written)
-                given = reading.ask_as_written(worker, spec.name, own, self.path, place, self.time_limit)
+                given = reading.ask_as_written(worker, spec.name, own, self.path, folder, self.time_limit)
         except WorkerDied as error:
             return f"its process ended ({error})"
         return None if given is None else row_with_copy(given, importer)
 
     @contextmanager
     def _lent(self, spec: EngineSpec) -> Iterator[tuple[Worker, Path]]:
-        with self.workers.lend(spec.name) as worker, tempfile.TemporaryDirectory(dir=self.folder) as place:
-            yield worker, Path(place)
+        with self.workers.lend(spec.name) as worker, tempfile.TemporaryDirectory(dir=self.folder) as folder:
+            yield worker, Path(folder)
 
     def _request(self, options: dict[str, bool], given: Path) -> Request:
         robot, truth = self.truth.robot, self.truth
@@ -189,9 +189,9 @@ def _accepted(path: Path, given: Sequence[str]) -> set[str]:
     if not isinstance(written, list):
         raise InputError(f"{beside}: causes", written, 'write a list of causes, ["damping_left_out"]')
     known = [item.id for item in hypotheses()]
-    for place, names in (("--accept", given), (f"{beside}: causes", written)):
+    for where, names in (("--accept", given), (f"{beside}: causes", written)):
         for name in names:
-            require_known(place, str(name), known, "there is no such cause; choose from")
+            require_known(where, str(name), known, "there is no such cause; choose from")
     return {*given, *written}
 
 

@@ -73,7 +73,7 @@ def _written_out(element: Element) -> float:
 
 
 def _add(
-    root: Element, path: Path, place: Path, inside: Path, parts: dict[str, Element]
+    root: Element, path: Path, file: Path, inside: Path, parts: dict[str, Element]
 ) -> tuple[list[LintRemark], bool]:
     """Adds the stripped copy of a file, and of the files that it attaches, to ``parts`` under unique names.
 
@@ -84,11 +84,11 @@ def _add(
     root.tag = "mujoco"
     if root.find(".//include") is not None:
         own = len(root.findall("worldbody"))
-        _include(root, path, place.parent, inside, (place,))
+        _include(root, path, file.parent, inside, (file,))
         _merge_defaults(root)
         if len(root.findall("worldbody")) > own:
             _merge_worlds(root)
-    contained = names_files_inside(root, place.parent, inside)
+    contained = names_files_inside(root, file.parent, inside)
     for part in ("actuator", "extension"):
         for element in [*root.iter(part)]:
             element[:] = [child for child in element if part == "actuator" and child.tag != "plugin"]
@@ -102,10 +102,10 @@ def _add(
                 parent.remove(child)
         parent.attrib.pop("material", None)
     remove_height_fields(root, shapes)
-    remarks = [*remove_meshes(root, shapes, place.parent, inside), *_gravity_compensations(root)]
+    remarks = [*remove_meshes(root, shapes, file.parent, inside), *_gravity_compensations(root)]
     parts[f"{len(parts)}.xml"] = root
     for model in root.iter("model"):
-        target = required_file(place.parent, model, inside)
+        target = required_file(file.parent, model, inside)
         if len(parts) >= _MOST_MODELS:
             raise InputError("<model file>", model.get("file"), f"more than {_MOST_MODELS} models are attached")
         model.attrib.setdefault("name", target.stem)

@@ -34,13 +34,13 @@ def remove_meshes(root: Element, shapes: Sequence[Classed], folder: Path, inside
         InputError: a mesh that gives mass lies outside the folder ``inside``.
     """
     inferred = any(compiler.get("inertiafromgeom") == "true" for compiler in root.iter("compiler"))
-    place, strip = _mesh_folder(root, folder)
+    meshes, strip = _mesh_folder(root, folder)
     given = {name for mesh in root.iter("mesh") if mesh.get("vertex") and (name := _mesh_name(mesh))}
     named = {_mesh_name(mesh): mesh for mesh in root.iter("mesh") if mesh.get("file")}
     if strip:
         for mesh in named.values():
             mesh.set("file", Path(mesh.get("file", "")).name)
-    files = {name: file_inside(place, mesh.get("file", ""), inside) for name, mesh in named.items()}
+    files = {name: file_inside(meshes, mesh.get("file", ""), inside) for name, mesh in named.items()}
     used: set[str] = set()
     lost: Counter[Element] = Counter()
     for shape in shapes:
@@ -48,7 +48,7 @@ def remove_meshes(root: Element, shapes: Sequence[Classed], folder: Path, inside
         if wanted is None:
             continue
         weighed = body.tag == "body" and (inferred or body.find("inertial") is None)
-        target = required_file(place, named[wanted], inside) if weighed and wanted in named else None
+        target = required_file(meshes, named[wanted], inside) if weighed and wanted in named else None
         if weighed and (wanted in given or (target is not None and target.is_file())):
             used.add(wanted)
         else:

@@ -142,8 +142,8 @@ class Robot:
     @cached_property
     def columns(self) -> dict[str, slice]:
         """Moving joint -> slice of its velocities in a stacked vector."""
-        places = slices(joint.dofs for joint in self.moving)
-        return {joint.name: place for joint, place in zip(self.moving, places, strict=True)}
+        spans = slices(joint.dofs for joint in self.moving)
+        return {joint.name: span for joint, span in zip(self.moving, spans, strict=True)}
 
     @property
     def dofs(self) -> int:

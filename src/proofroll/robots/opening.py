@@ -4,7 +4,7 @@ import os
 from pathlib import Path
 from xml.etree.ElementTree import Element
 
-from proofroll.core.errors import InputError, error_place, require_known
+from proofroll.core.errors import InputError, error_location, require_known
 from proofroll.robots import mjcf, urdf
 from proofroll.robots.robot_file import RUN_XACRO, Expand, RobotFile, names_files_inside, read_xml
 
@@ -27,11 +27,11 @@ def open_robot(path: Path, base: str = "fixed", root: Path | None = None, expand
         InputError: the file is broken, of another kind, too large, or asks for files outside the folder.
     """
     require_known("base", base, BASES)
-    with error_place(str(path)):
+    with error_location(str(path)):
         # Path.resolve() fails at a loop of links
-        inside, place = (Path(os.path.realpath(each)) for each in (path.parent if root is None else root, path))
-        if not place.is_relative_to(inside):
-            advice = f"{path.name} is in {place.parent}, not in this folder; name one that holds it with --root"
+        inside, file = (Path(os.path.realpath(each)) for each in (path.parent if root is None else root, path))
+        if not file.is_relative_to(inside):
+            advice = f"{path.name} is in {file.parent}, not in this folder; name one that holds it with --root"
             raise InputError("--root", inside, advice)
         return _opened(path, base, inside, expand)
 

@@ -142,7 +142,7 @@ def names_files_inside(root: Element, folder: Path, inside: Path) -> bool:
     """True if all files that are named lie in the folder ``inside`` or below, in every folder they may refer to."""
     folders = {folder, *(folder / element.get(key, "") for element in root.iter("compiler") for key in _FOLDERS)}
     names = {name for element in root.iter() for key in _FILES if (name := element.get(key)) and _ADDRESS not in name}
-    return all(file_inside(place, name, inside) is not None for place in folders for name in names)
+    return all(file_inside(one, name, inside) is not None for one in folders for name in names)
 
 
 def required_file(folder: Path, element: Element, inside: Path) -> Path:

@@ -9,7 +9,7 @@ from xml.etree.ElementTree import Element
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from proofroll.core.errors import InputError, choices, error_place
+from proofroll.core.errors import InputError, choices, error_location
 from proofroll.robots.model import DOFS, NO_BODY, Array, Mimic, Robot, RobotBody, RobotJoint
 from proofroll.robots.robot_file import LintRemark, RobotFile, numbers
 
@@ -72,7 +72,7 @@ def read_urdf(file: RobotFile) -> Robot:
     Raises:
         InputError: the file violates the specification so that it has no meaning, or has a planar or floating joint.
     """
-    with error_place(str(file.path)):
+    with error_location(str(file.path)):
         return _robot(file)
 
 
@@ -83,11 +83,11 @@ def _robot(file: RobotFile) -> Robot:
         raise InputError("file", file.path, "it has no links")
     bodies, sources = {}, {}
     for name, link in links.items():
-        with error_place(f"<link {name}>"):
+        with error_location(f"<link {name}>"):
             bodies[name], sources[name] = _body(name, link)
     joints = []
     for name, element in elements.items():
-        with error_place(f"<joint {name}>"):
+        with error_location(f"<joint {name}>"):
             joints.append(_joint(name, element, links))
     mimics = [
         Mimic(name, mimic.get("joint", ""), *(numbers(mimic, key, value, 1)[0] for key, value in _RATIO))

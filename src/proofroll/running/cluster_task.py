@@ -87,9 +87,9 @@ def run_case(asked: Asked, content: dict[str, Any], files: Mapping[str, bytes]) 
     """
     case = Case.from_dict(content)
     with tempfile.TemporaryDirectory() as name:
-        place = Path(name)
+        folder = Path(name)
         if files:
-            scene = place / Path(case.scene).name
+            scene = folder / Path(case.scene).name
             if scene.name not in files:  # a folder, and not the file of a robot
                 scene.mkdir()
             for file, text in files.items():
@@ -97,7 +97,7 @@ def run_case(asked: Asked, content: dict[str, Any], files: Mapping[str, bytes]) 
             case = dataclasses.replace(case, scene=str(scene))
         workers = _workers_of(asked)
         _check(asked, case, workers)
-        out = place / f"run{STORED}"
+        out = folder / f"run{STORED}"
         try:
             result = run_one(case, out, workers)
         except InputError as error:

@@ -135,7 +135,7 @@ def making(folder: Path) -> Iterator[None]:
     """Context manager with a lock on an environment, so that no other process makes or deletes it.
 
     Raises:
-        ProofrollError: another process has the lock, or the place cannot be written.
+        ProofrollError: another process has the lock, or the folder cannot be written.
     """
     import fcntl
 
@@ -143,7 +143,7 @@ def making(folder: Path) -> Iterator[None]:
         root().mkdir(parents=True, exist_ok=True)
         lock = os.open(root() / f".{folder.parent.name}@{folder.name}.lock", os.O_CREAT | os.O_RDWR, 0o644)
     except OSError as error:
-        fault = f"{root()} cannot be written ({error.strerror or error}); choose another place by {VARIABLE}"
+        fault = f"{root()} cannot be written ({error.strerror or error}); choose another folder by {VARIABLE}"
         raise ProofrollError(fault) from None
     try:
         fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)

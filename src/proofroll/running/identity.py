@@ -129,7 +129,7 @@ def _code_of(*kinds: Any) -> str:
 
 
 def _digest_of(*kinds: Any) -> str:
-    return digest(sorted({place for kind in kinds for place in _of(kind)}))
+    return digest(sorted({source for kind in kinds for source in _of(kind)}))
 
 
 # Cached for engines of this package: to read all files takes as long as a short run.
@@ -144,5 +144,5 @@ def _of(kind: Any) -> list[Path]:
     if (whole := package_of(kind)) != OWN:
         return with_imports(whole or Path(inspect.getfile(kind)))
     _, *inside = kind.__module__.split(".")
-    place = OWN.joinpath(*inside[: 1 if inside[0] == "truth" else 2])
-    return [place if place.is_dir() else place.with_suffix(".py")]
+    source = OWN.joinpath(*inside[: 1 if inside[0] == "truth" else 2])
+    return [source if source.is_dir() else source.with_suffix(".py")]

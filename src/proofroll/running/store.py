@@ -23,7 +23,7 @@ def write_text(path: Path, text: str) -> None:
     """Writes a text file atomically.
 
     Raises:
-        ProofrollError: the place cannot be written.
+        ProofrollError: the folder cannot be written.
     """
     with replacing(path) as temporary:
         temporary.write_text(text, encoding="utf-8")
@@ -39,8 +39,8 @@ class Store:
     def __init__(self, folder: Path) -> None:
         self.folder = folder
         self._held: WeakValueDictionary[str, StoredTrajectory] = WeakValueDictionary()
-        place = folder.absolute()
-        if made := [each for each in (place, *place.parents) if not each.exists()]:
+        absolute = folder.absolute()
+        if made := [each for each in (absolute, *absolute.parents) if not each.exists()]:
             atexit.register(_remove_empty, made)
         try:
             folder.mkdir(parents=True, exist_ok=True)
@@ -50,15 +50,15 @@ class Store:
             self._sweep()
         except OSError as error:
             raise ProofrollError(
-                f"{folder} cannot be written ({error.strerror or error}); choose another place with --out"
+                f"{folder} cannot be written ({error.strerror or error}); choose another folder with --out"
             ) from None
 
     def _sweep(self) -> None:
         """Removes unfinished trajectories of processes that were killed; those in use are locked and stay."""
         with self._locked(fcntl.LOCK_EX):
-            for place in self.folder.glob(f"{_INCOMING}*"):
-                with contextlib.suppress(OSError), _holding(place, fcntl.LOCK_EX | fcntl.LOCK_NB):  # else in use
-                    shutil.rmtree(place, ignore_errors=True)
+            for left in self.folder.glob(f"{_INCOMING}*"):
+                with contextlib.suppress(OSError), _holding(left, fcntl.LOCK_EX | fcntl.LOCK_NB):  # else in use
+                    shutil.rmtree(left, ignore_errors=True)
 
     def trajectory(self, case: Case) -> Path:
         """File of the case's trajectory."""
@@ -73,18 +73,18 @@ class Store:
         """Context manager with a file for a trajectory in a temporary folder, which is removed at the end.
 
         Raises:
-            ProofrollError: the place cannot be written.
+            ProofrollError: the folder cannot be written.
         """
         with contextlib.ExitStack() as stack:
             try:
                 with self._locked(fcntl.LOCK_SH):  # or _sweep of another process would remove it before it is locked
-                    place = tempfile.mkdtemp(prefix=_INCOMING, dir=self.folder)
-                    stack.callback(shutil.rmtree, place, ignore_errors=True)  # with an unfinished file, if any
+                    incoming = tempfile.mkdtemp(prefix=_INCOMING, dir=self.folder)
+                    stack.callback(shutil.rmtree, incoming, ignore_errors=True)  # with an unfinished file, if any
                     with contextlib.suppress(OSError):  # the file system cannot lock
-                        stack.enter_context(_holding(Path(place), fcntl.LOCK_SH))
+                        stack.enter_context(_holding(Path(incoming), fcntl.LOCK_SH))
             except OSError as error:
                 raise ProofrollError(f"{self.folder} cannot be written ({error.strerror or error})") from None
-            yield Path(place) / self.trajectory(case).name
+            yield Path(incoming) / self.trajectory(case).name
 
     def has(self, case: Case) -> bool:
         """True if there is a record of the case, damaged or not."""
@@ -102,7 +102,7 @@ class Store:
             written: file of the trajectory, which is moved into place; None: it is in place already, or there is none.
 
         Raises:
-            ProofrollError: the place cannot be written; an earlier result is still there.
+            ProofrollError: the folder cannot be written; an earlier result is still there.
         """
         if result.trajectory is not None:
             path = written or self.trajectory(case)
@@ -113,11 +113,11 @@ class Store:
             result = dataclasses.replace(result, checksum=checksum)
         if result.status in LASTING:
             content = {"case": dataclasses.asdict(case), "result": dataclasses.asdict(result)}
-            place = self.folder / f"{case.key}.json"
-            with self._locked(fcntl.LOCK_EX), replacing(place) as record:
+            path = self.folder / f"{case.key}.json"
+            with self._locked(fcntl.LOCK_EX), replacing(path) as record:
                 record.write_text(json.dumps(content | {"seal": seal(content)}, indent=1), encoding="utf-8")
-                for old in (place, self.trajectory(case)):
-                    if old.is_dir() and not old.is_symlink():  # a folder in the place of a result is damage
+                for old in (path, self.trajectory(case)):
+                    if old.is_dir() and not old.is_symlink():  # a folder instead of a result is damage
                         shutil.rmtree(old)
                 self._held.pop(case.key, None)
                 if written and result.trajectory is not None:

@@ -156,7 +156,7 @@ def write_benchmarks(timings: Mapping[str, Timing], path: Path) -> None:
     """Writes all timings as a pyperf suite, for ``python -m pyperf stats`` and ``compare_to``; none are no file.
 
     Raises:
-        ProofrollError: the place cannot be written.
+        ProofrollError: the file cannot be written.
     """
     import pyperf
 

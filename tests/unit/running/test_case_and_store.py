@@ -148,7 +148,7 @@ def test_files_can_be_read_by_others(tmp_path: Path) -> None:
 def test_a_folder_without_permission(tmp_path: Path) -> None:
     """A folder that may not be written is refused before anything is run."""
     tmp_path.chmod(0o500)
-    with pytest.raises(ProofrollError, match="choose another place with --out"):
+    with pytest.raises(ProofrollError, match="choose another folder with --out"):
         Store(tmp_path / "cases")
     tmp_path.chmod(0o700)
 
@@ -156,7 +156,7 @@ def test_a_folder_without_permission(tmp_path: Path) -> None:
 def test_a_folder_that_is_a_file(tmp_path: Path) -> None:
     """A file where the folder should be is refused before anything is run."""
     (tmp_path / "cases").write_text("")
-    with pytest.raises(ProofrollError, match="choose another place with --out"):
+    with pytest.raises(ProofrollError, match="choose another folder with --out"):
         Store(tmp_path / "cases")
 
 

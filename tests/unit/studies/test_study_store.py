@@ -16,7 +16,7 @@ from proofroll.studies import study_store
 from proofroll.studies.stability.axes import QUICK, Axis, Effort
 from proofroll.studies.stability.claims import file_for
 from proofroll.studies.stability.map import stability_path
-from proofroll.studies.stability.records import MappedPlace, StabilityStudy
+from proofroll.studies.stability.records import MappedValue, StabilityStudy
 from proofroll.studies.study_store import keep_study, valid_study
 from proofroll.studies.tradeoff.records import Corner, TradeoffStudy
 
@@ -66,7 +66,7 @@ def test_an_axis_to_infinity_comes_back(tmp_path: Path) -> None:
     unbounded = {"mu_static": math.inf}
     axes = [Axis("friction", "1", "how it grips", [0.3, math.inf])]
     points = [boundary_point(axis="friction", value=math.inf, parameters=unbounded)]
-    places = [MappedPlace("friction", math.inf, unbounded, None)]
+    places = [MappedValue("friction", math.inf, unbounded, None)]
     study = dataclasses.replace(stability_study(), axes=axes, points=points, places=places)
     keep_study(study, tmp_path / "study.json")
     assert valid_study(tmp_path / "study.json", StabilityStudy) == (study, [])

@@ -73,7 +73,7 @@ class Cause:
         says: behaviour of the engine, as a clause.
         quantity, unit: of the difference that it closes.
         before, after: difference without and with the hypothesis, in ``unit``.
-        remedy: place for an author to look at.
+        remedy: advice to an author on where to look.
         fitted: number of fitted parameters.
         covers: further quantities that it explains, for which no other cause is sought.
         closes: largest part of the difference that it may leave.

@@ -193,8 +193,8 @@ def general_place(
     _, C = rows(start)
     direction = 1.0 + np.modf(np.arange(1, C.shape[1] + 1) * 0.6180339887498949)[0]  # golden ratio: no two alike
     direction -= np.linalg.pinv(C, RANK) @ (C @ direction)
-    place = moved(start, NEARBY * direction / max(np.abs(direction).max(initial=0.0), 1e-300))
+    state = moved(start, NEARBY * direction / max(np.abs(direction).max(initial=0.0), 1e-300))
     for _ in range(10 if C.size else 0):  # Newton's method doubles the digits; four rounds do from so near
-        residual, C = rows(place)
-        place = moved(place, -np.linalg.pinv(C, RANK) @ residual)
-    return place
+        residual, C = rows(state)
+        state = moved(state, -np.linalg.pinv(C, RANK) @ residual)
+    return state

@@ -49,31 +49,31 @@ class Actuator:
     limit: float | None = field(default=None, metadata=_EFFORT)
 
     def __post_init__(self) -> None:
-        place = f"actuators.{checks.name(self.name, 'actuators')}"
-        require_known(f"{place}.kind", self.kind, _GAINS)
-        checks.assign(self, target=checked(f"{place}.target", self.target))
+        where = f"actuators.{checks.name(self.name, 'actuators')}"
+        require_known(f"{where}.kind", self.kind, _GAINS)
+        checks.assign(self, target=checked(f"{where}.target", self.target))
         for key in ("kp", "kd"):
-            value = checks.number(f"{place}.{key}", getattr(self, key), at_least=0)
+            value = checks.number(f"{where}.{key}", getattr(self, key), at_least=0)
             if value and key not in _GAINS[self.kind]:
                 advice = f"an actuator of kind {self.kind} has none; leave it out"
-                raise InputError(f"{place}.{key}", value, advice)
+                raise InputError(f"{where}.{key}", value, advice)
             checks.assign(self, **{key: value})
         first = next(iter(_GAINS[self.kind]), None)
         if first and not getattr(self, first):
             raise InputError(
-                f"{place}.{first}", 0.0, f"without it an actuator of kind {self.kind} does nothing; give it"
+                f"{where}.{first}", 0.0, f"without it an actuator of kind {self.kind} does nothing; give it"
             )
-        gear = checks.number(f"{place}.gear", self.gear)
+        gear = checks.number(f"{where}.gear", self.gear)
         if not gear:
-            raise InputError(f"{place}.gear", gear, "a motor that never turns does nothing; give a number other than 0")
+            raise InputError(f"{where}.gear", gear, "a motor that never turns does nothing; give a number other than 0")
         if not math.isfinite(gear * gear * max(self.kp, self.kd)):
-            raise InputError(f"{place}.gear", gear, "its square times a gain is infinite; give smaller numbers")
+            raise InputError(f"{where}.gear", gear, "its square times a gain is infinite; give smaller numbers")
         checks.assign(self, gear=gear)
         if self.limit is not None:
-            limit = checks.number(f"{place}.limit", self.limit)
+            limit = checks.number(f"{where}.limit", self.limit)
             if limit <= 0:
                 advice = "an effort that is clamped to nothing does nothing; give a positive limit or leave it out"
-                raise InputError(f"{place}.limit", limit, advice)
+                raise InputError(f"{where}.limit", limit, advice)
             checks.assign(self, limit=limit)
 
     @property
@@ -127,15 +127,15 @@ class Coupling:
     offset: float = field(default=0.0, metadata=_PLACE)
 
     def __post_init__(self) -> None:
-        place = f"couplings.{checks.name(self.name, 'couplings')}"
+        where = f"couplings.{checks.name(self.name, 'couplings')}"
         for key in ("ratio", "offset"):
-            checks.assign(self, **{key: checks.number(f"{place}.{key}", getattr(self, key))})
+            checks.assign(self, **{key: checks.number(f"{where}.{key}", getattr(self, key))})
         if not self.ratio:
             raise InputError(
-                f"{place}.ratio", 0.0, "it would hold joint_b and leave joint_a free; fix the joint instead"
+                f"{where}.ratio", 0.0, "it would hold joint_b and leave joint_a free; fix the joint instead"
             )
         if self.joint_a == self.joint_b:
-            raise InputError(f"{place}.joint_b", self.joint_b, "a coupling connects two joints; these are the same")
+            raise InputError(f"{where}.joint_b", self.joint_b, "a coupling connects two joints; these are the same")
 
 
 def check_drives(joints: Sequence[Joint], actuators: Sequence[Actuator], couplings: Sequence[Coupling]) -> None:

@@ -168,67 +168,67 @@ class Joint:
     dependent: bool = False
 
     def __post_init__(self) -> None:
-        place = f"joints.{checks.name(self.name, 'joints')}"
-        require_known(f"{place}.kind", self.kind, FACTS)
+        where = f"joints.{checks.name(self.name, 'joints')}"
+        require_known(f"{where}.kind", self.kind, FACTS)
         if self.parent == self.child:
-            raise InputError(f"{place}.child", self.child, "a joint connects two bodies; parent and child are the same")
+            raise InputError(f"{where}.child", self.child, "a joint connects two bodies; parent and child are the same")
         if self.child == WORLD:
-            raise InputError(f"{place}.child", WORLD, "the world cannot be a child; exchange parent and child")
+            raise InputError(f"{where}.child", WORLD, "the world cannot be a child; exchange parent and child")
         for key in ("position", "orientation", "child_position"):
-            checks.assign(self, **{key: checks.vector(f"{place}.{key}", getattr(self, key))})
-        checks.assign(self, axis=checks.axis(f"{place}.axis", self.axis))
+            checks.assign(self, **{key: checks.vector(f"{where}.{key}", getattr(self, key))})
+        checks.assign(self, axis=checks.axis(f"{where}.axis", self.axis))
         if self.kind not in WITH_AXIS and (self.axis != Z or self.second_axis is not None):
-            raise InputError(f"{place}.axis", self.axis, f"a {self.kind} joint has no axis; remove it")
+            raise InputError(f"{where}.axis", self.axis, f"a {self.kind} joint has no axis; remove it")
         if self.second_axis is not None:
-            second = checks.axis(f"{place}.second_axis", self.second_axis)
+            second = checks.axis(f"{where}.second_axis", self.second_axis)
             if abs(np.dot(second, self.axis)) > 1e-9:
-                raise InputError(f"{place}.second_axis", self.second_axis, "must be perpendicular to axis")
+                raise InputError(f"{where}.second_axis", self.second_axis, "must be perpendicular to axis")
             checks.assign(self, second_axis=second)
-        self._check_start(place)
+        self._check_start(where)
         for key, kinds in LAWS.items():
             least = None if key in {"rest", "torque"} else 0.0
-            given, here = getattr(self, key), f"{place}.{key}"
+            given, here = getattr(self, key), f"{where}.{key}"
             moving = key == "torque" and varies(given)
             value = checked(here, given) if moving else checks.number(here, given, at_least=least)
             if value and self.kind not in kinds:
-                raise InputError(f"{place}.{key}", value, f"a {self.kind} joint has none; it is for {', '.join(kinds)}")
+                raise InputError(f"{where}.{key}", value, f"a {self.kind} joint has none; it is for {', '.join(kinds)}")
             checks.assign(self, **{key: value})
         if self.limits is not None:
-            low, high = checks.numbers(f"{place}.limits", self.limits, 2)
+            low, high = checks.numbers(f"{where}.limits", self.limits, 2)
             if self.nq != 1 or low >= high:
                 advice = "a joint with several has no stops" if self.nq > 1 else "the first must be below the second"
                 advice = f"give [least, greatest] of the joint's coordinate; {advice}"
-                raise InputError(f"{place}.limits", self.limits, advice)
+                raise InputError(f"{where}.limits", self.limits, advice)
             checks.assign(self, limits=(low, high))
             if not low - self.stop_digits <= self.q0[0] <= high + self.stop_digits:
                 advice = f"the joint starts beyond a stop; its limits are {low:g} and {high:g}"
-                raise InputError(f"{place}.q0", self.q0[0], advice)
-        self._check_restitution(place)
+                raise InputError(f"{where}.q0", self.q0[0], advice)
+        self._check_restitution(where)
 
     @property
     def stop_digits(self) -> float:
         """Distance from a stop that counts as none [rad or m]; 0 without stops."""
         return AT_STOP * (self.limits[1] - self.limits[0]) if self.limits else 0.0
 
-    def _check_restitution(self, place: str) -> None:
-        value = checks.number(f"{place}.restitution", self.restitution, at_least=0)
+    def _check_restitution(self, where: str) -> None:
+        value = checks.number(f"{where}.restitution", self.restitution, at_least=0)
         if value > 1:
-            raise InputError(f"{place}.restitution", value, "no impact returns more than it takes; give 0 to 1")
+            raise InputError(f"{where}.restitution", value, "no impact returns more than it takes; give 0 to 1")
         if value and self.limits is None:
-            raise InputError(f"{place}.restitution", value, "there is no stop without limits; add them or leave it out")
+            raise InputError(f"{where}.restitution", value, "there is no stop without limits; add them or leave it out")
         checks.assign(self, restitution=value)
 
-    def _check_start(self, place: str) -> None:
+    def _check_start(self, where: str) -> None:
         zero = [0.0] * self.nq
         if self.kind in WITH_QUATERNION:
             zero[-4] = 1.0
-        q0 = list(checks.numbers(f"{place}.q0", zero if _none(self.q0) else self.q0, self.nq))
+        q0 = list(checks.numbers(f"{where}.q0", zero if _none(self.q0) else self.q0, self.nq))
         if self.kind in WITH_QUATERNION:
             length = float(np.linalg.norm(q0[-4:]))
             if length == 0.0:
-                raise InputError(f"{place}.q0", self.q0, "a quaternion of length zero is no rotation; give a unit one")
+                raise InputError(f"{where}.q0", self.q0, "a quaternion of length zero is no rotation; give a unit one")
             q0[-4:] = [component / length for component in q0[-4:]]
-        v0 = checks.numbers(f"{place}.v0", [0.0] * self.nv if _none(self.v0) else self.v0, self.nv)
+        v0 = checks.numbers(f"{where}.v0", [0.0] * self.nv if _none(self.v0) else self.v0, self.nv)
         checks.assign(self, q0=tuple(q0), v0=v0)
 
     @property

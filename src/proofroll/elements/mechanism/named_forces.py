@@ -16,14 +16,14 @@ class NamedForce(NamedTuple):
     Attributes:
         name: as files and commands write it, e.g. ``effort.motor``.
         field: field of a sample that holds it: ``effort``, ``coupling``, ``friction`` or ``stop``.
-        place: index in that field.
+        number: index in that field.
         unit: N m about an axis, N along one.
         meaning: one line for a person.
     """
 
     name: str
     field: str
-    place: int
+    number: int
     unit: Unit
     meaning: str
 
@@ -62,8 +62,8 @@ def lengths(mechanism: Mechanism) -> Mapping[str, int]:
 
 
 def pick_named(mechanism: Mechanism, fields: Mapping[str, Array]) -> Array:
-    """Named forces [N, N m] picked from fields, (…, places), in the order of :func:`named_forces`, (forces, …)."""
-    return np.array([fields[item.field][..., item.place] for item in named_forces(mechanism)], dtype=float)
+    """Named forces [N, N m] picked from fields, (…, indices), in the order of :func:`named_forces`, (forces, …)."""
+    return np.array([fields[item.field][..., item.number] for item in named_forces(mechanism)], dtype=float)
 
 
 def joint_force_shares(at_stop: bool, friction: float, force: float) -> tuple[float, float]:

@@ -32,13 +32,13 @@ class Body:
     inertia: Inertia = field(default=(ZERO, ZERO, ZERO), metadata={"unit": "kg m^2"})
 
     def __post_init__(self) -> None:
-        place = f"bodies.{checks.name(self.name, 'bodies')}"
+        where = f"bodies.{checks.name(self.name, 'bodies')}"
         if self.name == WORLD:
             raise InputError("bodies.name", WORLD, "this name means the world; choose another")
-        inertia = checks.inertia(f"{place}.inertia", self.inertia)
-        if checks.number(f"{place}.mass", self.mass, at_least=0) == 0 and np.any(inertia):
-            raise InputError(f"{place}.inertia", self.inertia, "a body without mass has no inertia; give it a mass")
-        checks.assign(self, mass=float(self.mass), com=checks.vector(f"{place}.com", self.com), inertia=inertia)
+        inertia = checks.inertia(f"{where}.inertia", self.inertia)
+        if checks.number(f"{where}.mass", self.mass, at_least=0) == 0 and np.any(inertia):
+            raise InputError(f"{where}.inertia", self.inertia, "a body without mass has no inertia; give it a mass")
+        checks.assign(self, mass=float(self.mass), com=checks.vector(f"{where}.com", self.com), inertia=inertia)
 
 
 @dataclass(frozen=True)
@@ -68,16 +68,16 @@ class Loop:
     orientation: Vector = field(default=ZERO, metadata=RADIANS)
 
     def __post_init__(self) -> None:
-        place = f"loops.{checks.name(self.name, 'loops')}"
-        require_known(f"{place}.kind", self.kind, FACTS)
+        where = f"loops.{checks.name(self.name, 'loops')}"
+        require_known(f"{where}.kind", self.kind, FACTS)
         if self.kind == "free":
-            raise InputError(f"{place}.kind", self.kind, "a free loop holds nothing; remove it")
+            raise InputError(f"{where}.kind", self.kind, "a free loop holds nothing; remove it")
         if self.body_a == self.body_b:
-            raise InputError(f"{place}.body_b", self.body_b, "a loop connects two bodies; these are the same")
+            raise InputError(f"{where}.body_b", self.body_b, "a loop connects two bodies; these are the same")
         for key in ("position_a", "position_b", "orientation"):
-            checks.assign(self, **{key: checks.vector(f"{place}.{key}", getattr(self, key))})
+            checks.assign(self, **{key: checks.vector(f"{where}.{key}", getattr(self, key))})
         for key in ("axis_a", "axis_b"):
-            checks.assign(self, **{key: checks.axis(f"{place}.{key}", getattr(self, key))})
+            checks.assign(self, **{key: checks.axis(f"{where}.{key}", getattr(self, key))})
 
     @cached_property
     def frame_a(self) -> Array:
@@ -117,13 +117,13 @@ class Spring:
     length: float = field(default=0.0, metadata=METRES)
 
     def __post_init__(self) -> None:
-        place = f"springs.{checks.name(self.name, 'springs')}"
+        where = f"springs.{checks.name(self.name, 'springs')}"
         if self.body_a == self.body_b:
-            raise InputError(f"{place}.body_b", self.body_b, "a spring connects two bodies; these are the same")
+            raise InputError(f"{where}.body_b", self.body_b, "a spring connects two bodies; these are the same")
         for key in ("position_a", "position_b"):
-            checks.assign(self, **{key: checks.vector(f"{place}.{key}", getattr(self, key))})
+            checks.assign(self, **{key: checks.vector(f"{where}.{key}", getattr(self, key))})
         for key in ("stiffness", "damping", "length"):
-            checks.assign(self, **{key: checks.number(f"{place}.{key}", getattr(self, key), at_least=0)})
+            checks.assign(self, **{key: checks.number(f"{where}.{key}", getattr(self, key), at_least=0)})
 
 
 @dataclass(frozen=True)
@@ -141,5 +141,5 @@ class Point:
     position: Vector = field(default=ZERO, metadata=METRES)
 
     def __post_init__(self) -> None:
-        place = f"points.{checks.name(self.name, 'points')}"
-        checks.assign(self, position=checks.vector(f"{place}.position", self.position))
+        where = f"points.{checks.name(self.name, 'points')}"
+        checks.assign(self, position=checks.vector(f"{where}.position", self.position))

@@ -51,11 +51,11 @@ def made_mechanism(content: Mapping[str, Any], gravity: checks.Vector, numbers: 
         InputError: something in it is wrong; one line says where, what and what to do.
     """
     made: dict[str, list[Any]] = {
-        kind: [_made(kind, f"{kind}.{place}", table, numbers) for place, table in enumerate(_tables(content, kind))]
+        kind: [_made(kind, f"{kind}.{number}", table, numbers) for number, table in enumerate(_tables(content, kind))]
         for kind in KINDS
     }
-    for place, repeat in enumerate(_tables(content, "repeat")):
-        for kind, item in _repeated(f"repeat.{place}", repeat, numbers):
+    for number, repeat in enumerate(_tables(content, "repeat")):
+        for kind, item in _repeated(f"repeat.{number}", repeat, numbers):
             made[kind].append(item)
     if not made["bodies"]:
         raise InputError("bodies", "none", "a mechanism needs a body; add a [[bodies]] table")
@@ -86,8 +86,8 @@ def _repeated(field: str, repeat: Any, numbers: Parameters) -> Iterator[tuple[st
     for i in range(first, first + count):
         here = numbers.beside(index, i)
         for kind in KINDS:
-            for place, table in enumerate(_tables(repeat, kind)):
-                yield kind, _made(kind, f"{field}.{kind}.{place}", table, here)
+            for number, table in enumerate(_tables(repeat, kind)):
+                yield kind, _made(kind, f"{field}.{kind}.{number}", table, here)
 
 
 def _made(kind: str, field: str, table: Any, numbers: Parameters) -> Any:

@@ -36,8 +36,8 @@ class SwitchedJoint:
 
     Attributes:
         name: of the joint.
-        number: its place among the joints.
-        coordinate, velocity: its places in q and v.
+        number: index among the joints.
+        coordinate, velocity: indices in q and v.
         friction: N or N m; 0: none.
         low, high: rad or m; infinite: no stop.
         restitution: of an impact on a stop.
@@ -77,11 +77,11 @@ class SwitchedJoint:
     def lasts(self, q: float, v: float, a: float) -> float:
         """Time until it reaches a stop, or turns against friction, at a constant acceleration [s]; infinite: never."""
         times = [-v / a] if self.friction and v * a < 0 else []
-        for stop, place, outward in (("low", self.low, -v), ("high", self.high, v)):
+        for stop, end, outward in (("low", self.low, -v), ("high", self.high, v)):
             if self.stop_at(q) == stop:  # it strikes at once, stays, or leaves and may come back
                 times += [0.0] if outward > 0 else [-2 * v / a] if v * a < 0 else []
-            elif math.isfinite(place):
-                times += [root.real for root in np.roots([a / 2, v, q - place]) if root.imag == 0 < root.real]
+            elif math.isfinite(end):
+                times += [root.real for root in np.roots([a / 2, v, q - end]) if root.imag == 0 < root.real]
         return min(times, default=math.inf)
 
     def push(self, mode: str) -> float:

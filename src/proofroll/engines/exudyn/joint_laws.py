@@ -27,14 +27,14 @@ class JointLaw(NamedTuple):
         item: Exudyn's object.
         number: number of the joint.
         factor: force along the coordinate over the force that Exudyn reports.
-        field, place: field of a sample, and place in it, that hold the force; none for drives in time and armature.
+        field, entry: field of a sample, and index in it, that hold the force; none for drives in time and armature.
     """
 
     item: Any
     number: int
     factor: float = -1.0
     field: str = ""
-    place: int = 0
+    entry: int = 0
 
 
 class JointLaws:
@@ -54,12 +54,12 @@ class JointLaws:
                 self._add(self._pushing(joint.name, _drive(joint)), joint.name)
             if joint.armature:
                 self._add(self._rotor(joint), joint.name, factor=1.0)
-        for place, actuator in enumerate(mechanism.actuators):
-            self._add(self._acting(actuator), actuator.joint, field="effort", place=place)
-        for place, coupling in enumerate(mechanism.couplings):
+        for entry, actuator in enumerate(mechanism.actuators):
+            self._add(self._acting(actuator), actuator.joint, field="effort", entry=entry)
+        for entry, coupling in enumerate(mechanism.couplings):
             markers = [self._coordinate(name) for name in (coupling.joint_b, coupling.joint_a)]
             item = self._coupled(markers, coupling.ratio, coupling.offset)
-            self._add(item, coupling.joint_b, factor=1.0, field="coupling", place=place)
+            self._add(item, coupling.joint_b, factor=1.0, field="coupling", entry=entry)
             self._add(item, coupling.joint_a, factor=-coupling.ratio)
 
     def _add(self, item: Any, joint: str, **others: Any) -> None:
@@ -148,11 +148,11 @@ class JointLaws:
         forces = {name: np.full(count, np.nan) for name, count in lengths(self._mechanism).items()}
         for law, push in pushes:
             if law.field == "joint":
-                joint = self._mechanism.joints[law.number]
+                joint = self._mechanism.joints[law.entry]
                 parts = joint_force_shares(bool(joint.limits), joint.friction, push)
-                forces["friction"][law.number], forces["stop"][law.number] = parts
+                forces["friction"][law.entry], forces["stop"][law.number] = parts
             elif law.field:
-                forces[law.field][law.place] = push
+                forces[law.field][law.entry] = push
         return forces if pushes else {}
 
 

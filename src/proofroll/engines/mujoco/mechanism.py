@@ -77,11 +77,11 @@ class MujocoMechanism(SteppedModel):
         self._gears = [actuator.gear for actuator in mechanism.actuators]
         couplings = map(mechanism_model.coupling_name, mechanism.couplings)
         equalities = {self._model.equality(name).id: k for k, name in enumerate(couplings)}
-        places = {self._model.joint(joint.name).id: k for k, joint in enumerate(mechanism.joints) if joint.nq == 1}
-        dofs = {int(self._model.jnt_dofadr[own]): k for own, k in places.items()}
-        self._numbers = places, dofs, equalities
+        single = {self._model.joint(joint.name).id: k for k, joint in enumerate(mechanism.joints) if joint.nq == 1}
+        dofs = {int(self._model.jnt_dofadr[own]): k for own, k in single.items()}
+        self._numbers = single, dofs, equalities
         self._at_rest = np.full((2, len(mechanism.joints)), np.nan)
-        self._at_rest[:, list(places.values())] = 0.0
+        self._at_rest[:, list(single.values())] = 0.0
         # Sensors give the reactions, and only samples need them: in every step they would cost 5 to 20 % of it.
         self._model.opt.disableflags |= _NO_SENSORS
         for joint in mechanism.joints:
@@ -147,8 +147,8 @@ class MujocoMechanism(SteppedModel):
 
     def _drive(self, _: Any, data: Any) -> None:
         """Sets drives and targets to their values at the time of ``data``."""
-        for signal, field, place in self._moving:
-            getattr(data, field)[place] = float(value_at(signal, data.time))
+        for signal, field, index in self._moving:
+            getattr(data, field)[index] = float(value_at(signal, data.time))
 
     def sample(self) -> MechanismSample:
         """See :class:`proofroll.core.engine.Engine`."""
@@ -170,7 +170,7 @@ class MujocoMechanism(SteppedModel):
 
     def _along(self, data: Any) -> dict[str, Array]:
         """Efforts of actuators, and forces of couplings, dry friction and stops, along coordinates [N or N m]."""
-        model, (places, dofs, equalities) = self._model, self._numbers
+        model, (single, dofs, equalities) = self._model, self._numbers
         friction, stop = self._at_rest.copy()
         coupling = np.zeros(len(equalities))
         kinds = data.efc_type[: data.nefc].tolist()
@@ -181,9 +181,9 @@ class MujocoMechanism(SteppedModel):
                 coupling[equalities[own]] = force
             elif kind == _ROW.mjCNSTR_FRICTION_DOF and own in dofs:
                 friction[dofs[own]] = force
-            elif kind == _ROW.mjCNSTR_LIMIT_JOINT and own in places and rows is not None:
+            elif kind == _ROW.mjCNSTR_LIMIT_JOINT and own in single and rows is not None:
                 # a stop pushes up where the coordinate has a positive sign in its row
-                stop[places[own]] += force * float(np.sign(rows[row, int(model.jnt_dofadr[own])]))
+                stop[single[own]] += force * float(np.sign(rows[row, int(model.jnt_dofadr[own])]))
         return {"effort": data.actuator_force * self._gears, "coupling": coupling, "friction": friction, "stop": stop}
 
     def _reactions(self, data: Any) -> tuple[Array, Array]:
@@ -310,7 +310,7 @@ class MujocoMechanism(SteppedModel):
 
 
 def _signals(model: Any, mechanism: Mechanism) -> list[tuple[Signal, str, int]]:
-    """Signals with the field of MjData and the place in it where they act: targets, and drives that change."""
+    """Signals with the field of MjData and the index in it at which they act: targets, and drives that change."""
     signals = [(item.target, "ctrl", number) for number, item in enumerate(mechanism.actuators)]
     for joint in mechanism.joints:
         if varies(joint.torque):

@@ -166,11 +166,11 @@ class Adaptive(TangentIntegrator):
             require_tangent_map()
         # In both formulations the orientation comes last. Without it (see FixedStep) only the position is integrated,
         # and its rates are joint velocities.
-        self._places = self._model.nq if self.turns else self._model.nq - QUATERNION
+        self._count_q = self._model.nq if self.turns else self._model.nq - QUATERNION
         self._rtol = float(settings.rtol or 0.0)
         # Components in the ball's turning axes pass through zero often: with a hundredth of their natural size the
         # tolerance is relative over most of their range.
-        self._atol = 1e-2 * self._rtol * np.concatenate([mechanism.q_scale[: self._places], mechanism.v_scale])
+        self._atol = 1e-2 * self._rtol * np.concatenate([mechanism.q_scale[: self._count_q], mechanism.v_scale])
         self._turning_time = mechanism.q_scale[0] / mechanism.v_scale[0]
         self._solver: Any = None
         self._short_steps = 0
@@ -178,11 +178,11 @@ class Adaptive(TangentIntegrator):
 
     def _joined(self, q: FloatArray, v: FloatArray) -> FloatArray:
         """Integrated state vector."""
-        return np.concatenate([q[: self._places], v])
+        return np.concatenate([q[: self._count_q], v])
 
     def _split(self, y: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Configuration and velocity; the next call overwrites the configuration."""
-        n = self._places
+        n = self._count_q
         if self.turns:  # the rates must not depend on the quaternion's length, which drifts
             return pin.normalize(self._model, y[:n]), y[n:]
         self._q[:n] = y[:n]
@@ -191,7 +191,7 @@ class Adaptive(TangentIntegrator):
     def _moved(self, q: FloatArray, v: FloatArray, acceleration: FloatArray) -> FloatArray:
         """Time derivative of the integrated state vector."""
         return np.concatenate(
-            [pin.tangentMap(self._model, q).dot(v) if self.turns else v[: self._places], acceleration]
+            [pin.tangentMap(self._model, q).dot(v) if self.turns else v[: self._count_q], acceleration]
         )
 
     def _rates(self, _: float, y: FloatArray) -> FloatArray:
@@ -199,7 +199,7 @@ class Adaptive(TangentIntegrator):
             q, v = self._split(y)
             return self._moved(q, v, self._mechanism.accelerate(self._data, q, v))
         # The same in plain statements, as it runs a dozen times per step.
-        n, q = self._places, self._q
+        n, q = self._count_q, self._q
         v = y[n:]
         q[:n] = y[:n]
         return np.concatenate((v[:n], self._mechanism.accelerate(self._data, q, v)))
@@ -232,7 +232,7 @@ class Adaptive(TangentIntegrator):
         longest = SHORT * self._turning_time
         is_short = solver.step_size < longest
         if is_short:
-            faster = float(np.max(np.abs(solver.y[self._places :]) / self._mechanism.v_scale))
+            faster = float(np.max(np.abs(solver.y[self._count_q :]) / self._mechanism.v_scale))
             is_short = solver.step_size * max(1.0, faster) < longest
         self._short_steps = self._short_steps + 1 if is_short else 0
         if self._short_steps > PATIENCE:

@@ -158,7 +158,7 @@ class JointTree:
         for signal, at_v in self._timed:
             tau[at_v] += value_at(signal, self.now)
         if self._actuators:
-            np.add.at(tau, [place for _, _, place in self._actuators], self.efforts(q, v))
+            np.add.at(tau, [at for _, _, at in self._actuators], self.efforts(q, v))
         return tau
 
     def efforts(self, q: Array, v: Array) -> Array:

@@ -46,8 +46,8 @@ class Applied:
         self._laws = [law for number, joint in enumerate(mechanism.joints) for law in _laws(number, joint)]
         number = {joint.name: index for index, joint in enumerate(mechanism.joints)}
         self._actuator_laws = [
-            self._actuator_law(place, actuator, number[actuator.joint], mechanism.joints[number[actuator.joint]])
-            for place, actuator in enumerate(mechanism.actuators)
+            self._actuator_law(k, actuator, number[actuator.joint], mechanism.joints[number[actuator.joint]])
+            for k, actuator in enumerate(mechanism.actuators)
         ]
         self._limited = [k for k, actuator in enumerate(mechanism.actuators) if actuator.limit is not None]
         self._actuators = mechanism.actuators
@@ -126,13 +126,13 @@ class Applied:
 
     def wanted(self, ends: Ends) -> list[float]:
         """Efforts that the actuators with a limit would apply without it, N or N m."""
-        places = ((self._actuators[k], self._actuator_laws[k]) for k in self._limited)
+        pairs = ((self._actuators[k], self._actuator_laws[k]) for k in self._limited)
         return [
             float(actuator.wanted(self.now, self._coordinate(law, ends), self._rate(law, ends)))
-            for actuator, law in places
+            for actuator, law in pairs
         ]
 
-    def _actuator_law(self, place: int, actuator: Actuator, number: int, joint: Joint) -> _Law:
+    def _actuator_law(self, k: int, actuator: Actuator, number: int, joint: Joint) -> _Law:
         """Force law of an actuator at its joint: linear spring, damper and drive.
 
         A function of t, q and v if the actuator is limited or varies with time.
@@ -140,7 +140,7 @@ class Applied:
         n, target = actuator.gear, actuator.target
         axis = "slide" if joint.kind == "prismatic" else "z"
         if actuator.limit is not None or not isinstance(target, float):
-            push = lambda t, q, v: actuator.effort(t, q, v, self.modes.get(place))  # noqa: E731 -- closes over its number
+            push = lambda t, q, v: actuator.effort(t, q, v, self.modes.get(k))  # noqa: E731 -- closes over its number
             return _Law(number, axis, 0.0, 0.0, 0.0, 0.0, push)
         gain = {"torque": 1.0, "velocity": actuator.kd, "position": actuator.kp}[actuator.kind]
         return _Law(number, axis, n * n * actuator.kp, 0.0, n * n * actuator.kd, n * gain * target)

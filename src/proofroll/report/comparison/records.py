@@ -261,8 +261,8 @@ class ReportedComparison:
 
     def lines(self) -> Iterator[tuple[str, ReportedRow, list[ReportedRun]]]:
         """Rows with a unique short name each and their runs."""
-        for place, (name, row) in enumerate(zip(names(self.rows), self.rows, strict=True)):
-            yield name, row, self.runs_of(place)
+        for index, (name, row) in enumerate(zip(names(self.rows), self.rows, strict=True)):
+            yield name, row, self.runs_of(index)
 
     def headlines(self, role: str) -> list[str]:
         """Names of the observables of a role (:class:`proofroll.core.observable.Role`) that summaries show."""

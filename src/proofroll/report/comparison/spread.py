@@ -80,8 +80,8 @@ def spread_of(name: str, point: ComparedPoint, runs: Mapping[int, xr.Dataset], r
         last = {row: np.ravel(run[key].to_numpy()[-1]) for row, run in whole.items() if key in run}
         finite = {row: values for row, values in last.items() if np.all(np.isfinite(values))}
         size = max((float(np.max(np.abs(values))) for values in finite.values()), default=0.0)
-        for place, column in enumerate(column_names(truth[key]) if size else ()):
-            values = {row: float(numbers[place]) for row, numbers in finite.items()}
+        for index, column in enumerate(column_names(truth[key]) if size else ()):
+            values = {row: float(numbers[index]) for row, numbers in finite.items()}
             low, high = min(values.values()), max(values.values())
             if high - low > ALIKE * size:
                 shown = [values.get(row) for row in range(rows)]

@@ -1,4 +1,4 @@
-"""Candidates for a choice: each setting with each of its steps in each study, over all places of the study."""
+"""Candidates for a choice: each setting with each of its steps in each study, over all points of the study."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -37,7 +37,7 @@ class LadderResult:
 
 @dataclass(frozen=True)
 class Candidate:
-    """One setting with one step in one study, over all its places.
+    """One setting with one step in one study, over all its points.
 
     Attributes:
         row: number of its row in the study.
@@ -45,13 +45,13 @@ class Candidate:
         motion, forces: largest error of a coordinate, and of a reaction, relative to its size; None: not reported.
         motion_held, forces_held: smallest tolerance that it holds without luck: the largest of that error, of those of
             its next two finer steps, and of the least error that its limit of small steps can have.
-        cost: wall seconds per simulated second at the slowest place; None: not measured.
+        cost: wall seconds per simulated second at the slowest point; None: not measured.
         clean: True if clean runs measured the cost.
-        blame: verdict of a place without a result; None: every place has one.
+        blame: verdict of a point without a result; None: every point has one.
         motion_ladder, forces_ladder: result of its ladder of steps for either.
-        href: HTML id of the evidence of the place with the largest error.
-        status: status of that place; empty: every place has a result.
-        message: reason why that place has none.
+        href: HTML id of the evidence of the point with the largest error.
+        status: status of that point; empty: every point has a result.
+        message: reason why that point has none.
     """
 
     row: int
@@ -86,15 +86,15 @@ class Candidate:
 def candidates(lines: Sequence[TableLine], href: str, runs: Mapping[tuple[int, str], str]) -> list[Candidate]:
     """Candidates of one row of a study, its own step first.
 
-    ``href``: HTML id of the study's evidence; ``runs``: those of its runs, by row and place.
+    ``href``: HTML id of the study's evidence; ``runs``: those of its runs, by row and point.
     """
     needed = list(dict.fromkeys(line.place for line in lines))
     own = lines[0].step
     ladders, bounds = [_ladder(lines, role) for role in _ROLES], held_tolerances(lines)
-    anchors = {"": href} | {place: run for (row, place), run in runs.items() if row == lines[0].row}
+    anchors = {"": href} | {point: run for (row, point), run in runs.items() if row == lines[0].row}
     steps = []
     for value in dict.fromkeys(line.step for line in lines):
-        at = {place: [line for line in lines if line.step == value and line.place == place] for place in needed}
+        at = {point: [line for line in lines if line.step == value and line.place == point] for point in needed}
         steps.append(_candidate(lines[0], value, at, bounds=bounds, ladders=ladders, anchors=anchors))
     return sorted(steps, key=lambda item: item.name != _name(lines[0], own))
 
@@ -108,21 +108,21 @@ def _candidate(
     ladders: Sequence[LadderResult],
     anchors: dict[str, str],
 ) -> Candidate:
-    """Candidate for one step of a row; ``anchors``: HTML ids of the evidence by place (the study's: empty place)."""
+    """Candidate for one step of a row; ``anchors``: HTML ids of the evidence by point (the study's: empty point)."""
     name, href = _name(first, value), anchors.get("", "")
     judged = {
-        place: [line for line in lines if line.verdict not in {Verdict.ILL_POSED, Verdict.NOT_JUDGED}]
-        for place, lines in at.items()
+        point: [line for line in lines if line.verdict not in {Verdict.ILL_POSED, Verdict.NOT_JUDGED}]
+        for point, lines in at.items()
     }
-    judged = {place: lines for place, lines in judged.items() if lines or not at[place]}
+    judged = {point: lines for point, lines in judged.items() if lines or not at[point]}
     costs = [lines[0].cost for lines in at.values() if lines]
     cost = None if None in costs else max((item for item in costs if item is not None), default=None)
     clean = all(lines[0].clean for lines in at.values() if lines)
     own = {line: line.relative for line in bounds}
-    errors = {place: [largest(lines, role, own) for role in _ROLES] for place, lines in judged.items()}
+    errors = {point: [largest(lines, role, own) for role in _ROLES] for point, lines in judged.items()}
     blame, status, message = _blame(judged)
     if judged:
-        furthest = max(errors, key=lambda place: max(errors[place][0] or 0.0, errors[place][1] or 0.0))
+        furthest = max(errors, key=lambda point: max(errors[point][0] or 0.0, errors[point][1] or 0.0))
         href = anchors.get(furthest, href)
     motion, forces = (_worst([pair[which] for pair in errors.values()]) for which in (0, 1))
     held = [_worst([largest(lines, role, bounds) for lines in judged.values()]) for role in _ROLES]
@@ -133,12 +133,12 @@ def _candidate(
 
 
 def _blame(judged: dict[str, list[TableLine]]) -> tuple[Verdict | None, str, str]:
-    """Verdict, status and message of the first place without a result; None and empty texts if every place has one."""
+    """Verdict, status and message of the first point without a result; None and empty texts if every point has one."""
     if not judged:
         return Verdict.NOT_JUDGED, "", "no engine can be judged here"
-    for place, lines in judged.items():
+    for point, lines in judged.items():
         if not lines:
-            return Verdict.FAILED, "", f"no run with this step at {place}"
+            return Verdict.FAILED, "", f"no run with this step at {point}"
         if lines[0].status != "done":
             verdict = {str(item): item for item in Verdict}.get(lines[0].verdict, Verdict.FAILED)
             return verdict, lines[0].status, lines[0].message

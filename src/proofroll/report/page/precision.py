@@ -17,11 +17,11 @@ _SEVERITY = {str(item): number for number, item in enumerate(Verdict)}
 
 
 class PrecisionPoint(NamedTuple):
-    """One step of a curve, over all places of its study at which it was run.
+    """One step of a curve, over all points of its study at which it was run.
 
     Attributes:
         step: for a person.
-        cost: wall seconds per simulated second at the slowest place.
+        cost: wall seconds per simulated second at the slowest point.
         clean: True if clean runs measured the cost.
         verdict: the worst; empty: a step of a ladder, which has no verdict.
         errors: largest error of each quantity of the picture, relative to its size; None: not reported; 1e300: not

@@ -29,7 +29,7 @@ def stability_parts(study: StabilityStudy, path: Path) -> Iterator[Table | str]:
         yield "The largest errors that the engines do not report:"
     yield from (f"  {line}" for line in silent)
     yield from study.findings
-    yield from (f"{place.axis} = {place.value:g}: {place.problem}" for place in study.places if place.problem)
+    yield from (f"{at.axis} = {at.value:g}: {at.problem}" for at in study.places if at.problem)
     yield from (f"{name}: {reason}" for name, reason in study.absent.items())
     yield from (f"!! {line}" for line in study.claims.contradictions)
     yield f"The map is in {path.with_suffix('.svg')}, everything in {path}."

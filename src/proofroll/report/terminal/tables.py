@@ -66,7 +66,7 @@ def verdict_table(content: ReportedComparison) -> Table:
     ]
     numbers = {
         "order": [item.order if item else None for item in worst],
-        "s before": [before.get(place) for place in range(len(content.rows))],
+        "s before": [before.get(index) for index in range(len(content.rows))],
         "s/s": [row.seconds_per_second for row in content.rows],
     }
     numbers = {name: found for name, found in numbers.items() if any(value is not None for value in found)}
@@ -80,14 +80,14 @@ def verdict_table(content: ReportedComparison) -> Table:
         *unbroken(""),
         title=content.title,
     )
-    for place, row in enumerate(content.rows):
+    for index, row in enumerate(content.rows):
         verdict, judged = row.verdict, row.observables
         table.add_row(
             Text(" ".join(filter(None, (row.name, row.formulation, row.setting)))),
             step(row.resolution, row.resolution_value),
-            Text(f"{SYMBOLS[verdict]} {verdict_text(row, content.runs_of(place))}", style=STYLES[verdict]),
+            Text(f"{SYMBOLS[verdict]} {verdict_text(row, content.runs_of(index))}", style=STYLES[verdict]),
             *(number(judged[name].error if name in judged else None) for name, _ in names),
-            *(number(found[place]) for found in numbers.values()),
+            *(number(found[index]) for found in numbers.values()),
             Text("") if row.as_expected else Text("!!", style="bold red"),
         )
     return table

@@ -11,7 +11,7 @@ import numpy as np
 from proofroll.core.arrays import FloatArray
 from proofroll.core.comparison import Comparison, Edge, Row
 from proofroll.core.engine import whole_steps
-from proofroll.core.errors import InputError, ProofrollError, error_place
+from proofroll.core.errors import InputError, ProofrollError, error_location
 from proofroll.core.multi_element import represents
 from proofroll.core.plugins import parse_engine, place_of, plain_name
 from proofroll.core.scene import Scene
@@ -179,7 +179,7 @@ def scene_at(comparison: Comparison, point: Mapping[str, float]) -> Scene:
     Raises:
         InputError: the scene has no such parameter, or not with this value; the text names the comparison's file.
     """
-    with error_place(f"{comparison.name}.toml"):
+    with error_location(f"{comparison.name}.toml"):
         return load_scene(comparison.scene, **point)
 
 
@@ -233,20 +233,20 @@ def require_fit(comparison: Comparison, facts: Sequence[EngineFacts | ProofrollE
             description = known[item.name]
             if isinstance(description, ProofrollError) or _UNFIT & set(row.expected(numbers)):
                 continue
-            formulation, place = item.settings["formulation"], f"{comparison.name}.toml: rows.{index}.engine"
+            formulation, where = item.settings["formulation"], f"{comparison.name}.toml: rows.{index}.engine"
             if not represents(scene, formulation, description.provides):
                 lacking = ", ".join(sorted(scene.requires - set(description.provides[formulation])))
                 advice = f"it does not have {lacking}{at_point(numbers)}; expect refused there, or leave it out"
-                raise InputError(place, row.engine, advice)
+                raise InputError(where, row.engine, advice)
             if (step := item.step) is None:
                 continue
             if error := _misfit([1.0], step, times):
-                raise error.within(place, row.engine)
+                raise error.within(where, row.engine)
             ladder = _fitting(row, step, times).ladder
             if _misfit(ladder, step, times):
                 advice = "a step of it does not divide the interval between samples (`every`); "
                 advice += f"{_fitting(replace(row, ladder=_USUAL), step, times).ladder} does"
-                raise InputError(f"{place.removesuffix('engine')}ladder", ladder, advice)
+                raise InputError(f"{where.removesuffix('engine')}ladder", ladder, advice)
 
 
 def _rungs(

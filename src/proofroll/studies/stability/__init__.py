@@ -1,1 +1,1 @@
-"""Stability maps: places along an axis of parameters at which runs fail, and numbers that explain them."""
+"""Stability maps: steps beyond which runs fail, along axes of parameters, and numbers that explain them."""

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Literal
 
 from proofroll.core.bounds import require_pair
-from proofroll.core.errors import InputError, error_place, require_known
+from proofroll.core.errors import InputError, error_location, require_known
 from proofroll.core.plugins import parse_engine
 from proofroll.core.validation import strict, validated
 from proofroll.files.scene_file import is_scene, load_scene, read_scene_file
@@ -171,7 +171,7 @@ def _load(path: Path) -> StabilityFile:
     where = path.name
     content = study_content(path, STUDY)
     file = validated(StabilityFile, content, where, name=path.stem)
-    with error_place(where):
+    with error_location(where):
         _check(where, file)
     return file
 
@@ -193,7 +193,7 @@ def _check(where: str, file: StabilityFile) -> None:
         at = f"{where}: claims.{index}"
         if not claim.because:
             raise InputError(f"{at}.because", "nothing", "every claim needs its reason; add it")
-        with error_place(at):
+        with error_location(at):
             parse_engine(claim.engine)
         for name in claim.axes:
             require_known(f"{at}.axes", name, known, "there is no such axis; choose from")

@@ -17,9 +17,9 @@ from proofroll.running.case import Case, EngineFacts, Result, Status
 from proofroll.running.runner import Runner
 from proofroll.studies.failure import TOO_SLOW, RunOutcome, run_outcome
 from proofroll.studies.stability.axes import Axis, Effort
+from proofroll.studies.stability.axis_values import AxisValue, axis_values, case_at, measure
 from proofroll.studies.stability.bisection import SearchResult, search
-from proofroll.studies.stability.places import Place, case_at, measure, places_of
-from proofroll.studies.stability.records import MappedPlace
+from proofroll.studies.stability.records import MappedValue
 from proofroll.studies.tradeoff.curve import Curve
 from proofroll.studies.tradeoff.sweep import curves_of
 
@@ -32,17 +32,17 @@ _TIMEOUTS = 2
 
 @dataclass
 class MapPoint:
-    """One engine with its settings at one place.
+    """One engine with its settings at one value of an axis.
 
     Attributes:
-        curve, place: which.
+        curve, at: what is run, and at which value of an axis.
         ladder: steps [s] or tolerances, coarse first.
         found: outcomes of the runs, by rung.
         cases, results: of the runs, by rung.
     """
 
     curve: Curve
-    place: Place
+    at: AxisValue
     ladder: list[float]
     found: SearchResult = field(default_factory=SearchResult)
     cases: dict[int, Case] = field(default_factory=dict)
@@ -60,7 +60,7 @@ class MapPoint:
         """
         if self.timeouts >= _TIMEOUTS:
             return True
-        return rung > 0 and self.curve.fixed_step and self.place.until / self.ladder[rung] > effort.steps * (1 + 1e-9)
+        return rung > 0 and self.curve.fixed_step and self.at.until / self.ladder[rung] > effort.steps * (1 + 1e-9)
 
     @property
     def timeouts(self) -> int:
@@ -76,8 +76,8 @@ class StabilityMap:
         scene: name of the scene.
         default: the scene with its default parameters.
         axes, effort: question of the map.
-        places: the values of the axes.
-        points: every engine at every place.
+        values: of the axes, with truths.
+        points: every engine at every value.
         absent: engine -> why it is not on the map.
     """
 
@@ -85,7 +85,7 @@ class StabilityMap:
     default: Scene
     axes: list[Axis]
     effort: Effort
-    places: list[MappedPlace]
+    values: list[MappedValue]
     points: list[MapPoint]
     absent: dict[str, str]
 
@@ -129,21 +129,19 @@ def stability(
         absent[curve.engine] = "has neither step nor tolerance: exact at any time, it has no boundary to look for"
     curves = [curve for curve in curves if curve.facts.resolution is not None]
     curves = _matched(curves) if effort.matched else curves
-    asked = places_of(scene, axes, effort)
-    places = [place for place in asked if isinstance(place, Place)]
-    measure(scene, places, runner, lambda: tell("the truth", 0))
-    points = [
-        MapPoint(curve, place, place.steps if curve.fixed_step else _TOLERANCES) for curve in curves for place in places
-    ]
+    asked = axis_values(scene, axes, effort)
+    values = [at for at in asked if isinstance(at, AxisValue)]
+    measure(scene, values, runner, lambda: tell("the truth", 0))
+    points = [MapPoint(curve, at, at.steps if curve.fixed_step else _TOLERANCES) for curve in curves for at in values]
     _search(scene, points, effort, runner, tell)
     refused = _refused(points)
     points = [point for point in points if point.curve.engine not in refused]
-    mapped = [MappedPlace(place.axis, place.value, place.parameters, place.problem) for place in asked]
+    mapped = [MappedValue(at.axis, at.value, at.parameters, at.problem) for at in asked]
     return StabilityMap(scene, default, list(axes), effort, mapped, points, absent | refused)
 
 
 def _refused(points: Sequence[MapPoint]) -> dict[str, str]:
-    """Engine that refuses the scene at every place for the same reason -> that reason; it has no boundary."""
+    """Engine that refuses the scene at every value for the same reason -> that reason; it has no boundary."""
     endings: dict[str, set[tuple[str, str]]] = {}
     for point in points:
         answers = {(str(result.status), result.message) for result in point.results.values()}
@@ -171,7 +169,7 @@ def _search(name: str, points: Sequence[MapPoint], effort: Effort, runner: Runne
     def ended(point: MapPoint) -> None:
         nonlocal finished
         finished += 1
-        where = f"{point.curve.facts.name}, {point.place.axis} = {point.place.value:g}"
+        where = f"{point.curve.facts.name}, {point.at.axis} = {point.at.value:g}"
         tell(f"{where}: {finished} of {len(points)} points", 1)
 
     def ask(point: MapPoint, searching: Searching, rung: int | None) -> list[Case]:
@@ -180,7 +178,7 @@ def _search(name: str, points: Sequence[MapPoint], effort: Effort, runner: Runne
             if point.too_long(rung, effort):
                 rung = _send(point, searching, None)
                 continue
-            case = point.cases[rung] = case_at(name, point.place, point.facts(rung), effort.limit)
+            case = point.cases[rung] = case_at(name, point.at, point.facts(rung), effort.limit)
             if case.key not in known:
                 asking.setdefault(case.key, []).append((point, searching, rung))
                 return [case] if len(asking[case.key]) == 1 else []
@@ -194,7 +192,7 @@ def _search(name: str, points: Sequence[MapPoint], effort: Effort, runner: Runne
         if result.status == Status.TIMEOUT:  # the outcome is open: a faster machine might have finished
             return _send(point, searching, None)
         dataset = None if result.trajectory is None else runner.store.stored(case).dataset
-        return _send(point, searching, run_outcome(result, dataset, point.place.yardstick))
+        return _send(point, searching, run_outcome(result, dataset, point.at.yardstick))
 
     def arrived(case: Case, result: Result) -> list[Case]:
         known[case.key] = result

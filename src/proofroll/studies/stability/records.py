@@ -18,7 +18,7 @@ _SAME = {True: 2.3, False: 15.0}
 
 @dataclass(frozen=True)
 class Boundary:
-    """Boundary at which a curve stops being stable, or accurate, at one place.
+    """Boundary at which a curve stops being stable, or accurate, at one value of an axis.
 
     Attributes:
         largest: largest step [s] or tolerance that holds; None: no affordable one does.
@@ -108,8 +108,8 @@ class ExplainedBoundary(Explanation):
 
 
 @dataclass(frozen=True)
-class MappedPlace:
-    """Place on an axis: its value, the scene's parameters there, and the reason if there is no truth."""
+class MappedValue:
+    """Value on an axis, the scene's parameters there, and the reason if there is no truth."""
 
     axis: str
     value: FloatOrInf
@@ -133,7 +133,7 @@ class StabilityStudy:
         never_accurate: number of points at which no affordable step is accurate.
         meanings: kind of failure -> its meaning.
         step_symbols: dimensionless number of a step -> its symbol.
-        points: every engine at every place.
+        points: every engine at every value.
         explanations: numbers that explain boundaries.
         findings: conclusions, as sentences.
         places: the values of the axes.
@@ -160,7 +160,7 @@ class StabilityStudy:
     points: list[BoundaryPoint]
     explanations: list[ExplainedBoundary]
     findings: list[str]
-    places: list[MappedPlace]
+    places: list[MappedValue]
     absent: dict[str, str]
     hosts: dict[str, int] = field(default_factory=dict)
     effort: Effort
@@ -187,8 +187,8 @@ def dependence(points: Sequence[BoundaryPoint], name: str) -> str:
     what = " of the natural time" if fixed_step else ""
     largest_of_all = f"{number(max(sizes)[0])}{what} at {max(sizes)[1]:g}"
     if without:
-        places = ", ".join(f"{point.value:g} ({point.sides[name].failure})" for point in without)
-        return f"{largest_of_all}, but nowhere at {places}"
+        values = ", ".join(f"{point.value:g} ({point.sides[name].failure})" for point in without)
+        return f"{largest_of_all}, but nowhere at {values}"
     return f"{largest_of_all}, but {number(min(sizes)[0])}{what} at {min(sizes)[1]:g}"
 
 

@@ -43,7 +43,7 @@ def with_programs(
         wanted, programs([item[-1] for item in wanted], workers), strict=True
     ):
         made, point = stability_map.points[index], study.points[index]
-        element = made.place.scene.elements[0]
+        element = made.at.scene.elements[0]
         if not isinstance(element, WritesPrograms):
             points[index] = replace(point, reproducer_note="elements of this kind offer no program")
             continue
@@ -57,7 +57,7 @@ def with_programs(
 
 
 def _failed(made: MapPoint, point: BoundaryPoint, case: Case, boundary: str, note: str | None) -> FailedRun:
-    yardstick, facts, side = made.place.yardstick, case.engine, point.sides[boundary]
+    yardstick, facts, side = made.at.yardstick, case.engine, point.sides[boundary]
     assert side.failure is not None  # it is shown
     return FailedRun(
         scene=case.scene,

@@ -74,7 +74,7 @@ def stability_study(stability_map: StabilityMap) -> StabilityStudy:
         points=points,
         explanations=_explanations(points),
         findings=_scale_conclusions(stability_map, points),
-        places=stability_map.places,
+        places=stability_map.values,
         absent=stability_map.absent,
         hosts=hosts(result for point in stability_map.points for result in point.results.values()),
         effort=stability_map.effort,
@@ -83,10 +83,10 @@ def stability_study(stability_map: StabilityMap) -> StabilityStudy:
 
 
 def _point(point: MapPoint) -> BoundaryPoint:
-    place, facts = point.place, point.curve.facts
+    at, facts = point.at, point.curve.facts
     settings = {key: value for key, value in facts.settings.items() if key != facts.resolution}
     sides = {name: _side(point, name) for name in BOUNDARIES}
-    if place.yardstick.true is None:
+    if at.yardstick.true is None:
         sides["accurate"] = replace(sides["accurate"], largest=None, numbers={})  # unknown without a truth
     # Without a boundary of stability that of accuracy is shown.
     boundary = "stable" if sides["stable"].failure else "accurate"
@@ -94,11 +94,11 @@ def _point(point: MapPoint) -> BoundaryPoint:
     errors = [item.error for item in point.found.seen.values() if item.stable and item.error is not None]
     return BoundaryPoint(
         **point.curve.setting(replace(facts, settings=settings)),
-        axis=place.axis,
-        value=place.value,
-        parameters=place.parameters,
-        until=place.until,
-        period=place.scene.natural_time,
+        axis=at.axis,
+        value=at.value,
+        parameters=at.parameters,
+        until=at.until,
+        period=at.scene.natural_time,
         largest_stable=sides["stable"].largest,
         largest_accurate=sides["accurate"].largest,
         boundary=boundary,
@@ -111,7 +111,7 @@ def _point(point: MapPoint) -> BoundaryPoint:
         too_slow=point.ladder[point.found.limit] if point.found.limit < len(point.ladder) else None,
         timed_out=point.timeouts > 0,
         runs=len(point.results),
-        problem=place.problem,
+        problem=at.problem,
     )
 
 
@@ -119,7 +119,7 @@ def _side(point: MapPoint, name: str) -> Boundary:
     """One boundary of a point: the largest step or tolerance that holds, and the failure beyond it."""
     holding, failing = point.found.boundary(attrgetter(name))
     beyond = failure_beyond(point, failing)
-    scene, yardstick = point.place.scene, point.place.yardstick
+    scene, yardstick = point.at.scene, point.at.yardstick
     largest = None if holding is None else point.ladder[holding]
     return Boundary(
         largest=largest,

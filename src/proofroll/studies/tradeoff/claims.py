@@ -16,7 +16,7 @@ from typing import Any
 from proofroll.core.bounds import require_bounds, require_pair
 from proofroll.core.comparison import Tolerance
 from proofroll.core.engine_abilities import Level
-from proofroll.core.errors import InputError, error_place
+from proofroll.core.errors import InputError, error_location
 from proofroll.core.plugins import parse_engine
 from proofroll.core.validation import strict, validated
 from proofroll.files.scene_file import load_scene
@@ -235,7 +235,7 @@ def _claims(path: Path, given: dict[str, Any]) -> TradeoffClaims:
                 if kind == "cheapest" and isinstance(claim.get("engine"), str):
                     claim["engine"] = [claim["engine"]]
     claims = validated(TradeoffClaims, given, where, name=path.stem)
-    with error_place(where):
+    with error_location(where):
         _check(where, claims)
     return claims
 
@@ -252,7 +252,7 @@ def _check(where: str, file: TradeoffClaims) -> None:
             if not claim.because:
                 raise InputError(f"{at}.because", "nothing", "every claim needs its reason; add it")
             for text in claim.engine if kind == "cheapest" else [claim.engine]:
-                with error_place(at):
+                with error_location(at):
                     parse_engine(text)
             if kind == "holds":
                 require_bounds(f"{at}.step", claim.step, above=0)

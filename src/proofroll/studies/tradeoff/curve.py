@@ -91,8 +91,8 @@ class Question:
         """Reference with this sampling interval [s], taken from the samples of the truth with the shortest one."""
         if every != self.every:
             known, times = truth["time"].to_numpy(), time_grid(self.until, every)
-            places = np.abs(known[:, None] - times).argmin(axis=0)
-            truth = truth.drop_dims(BETWEEN, errors="ignore").isel(time=places)
+            indices = np.abs(known[:, None] - times).argmin(axis=0)
+            truth = truth.drop_dims(BETWEEN, errors="ignore").isel(time=indices)
         return Reference.of(self.loaded, truth)
 
 

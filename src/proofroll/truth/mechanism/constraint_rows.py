@@ -51,8 +51,8 @@ class ConstraintRow:
     def less(self, ratio: float, other: ConstraintRow) -> ConstraintRow:
         """Row of a coupling: this row minus ``ratio`` times another; on rates only, without a residual."""
         coefficients = dict(self.coefficients)
-        for place, value in other.coefficients.items():
-            coefficients[place] = sub(coefficients.get(place, 0.0), mul(ratio, value))
+        for index, value in other.coefficients.items():
+            coefficients[index] = sub(coefficients.get(index, 0.0), mul(ratio, value))
         bias = sub(self.bias, mul(ratio, other.bias))
         besides = (other.connection, scaled(-ratio, other.force), scaled(-ratio, other.torque))
         return ConstraintRow(0.0, coefficients, bias, self.connection, self.force, self.torque, besides)
@@ -144,9 +144,9 @@ class ConstraintRows:
         for body, (push, moment) in ((c.b, on_b), (c.a, on_a)):
             if body >= 0:
                 entries = self._bodies[body].projected(self._views[body], push, moment)
-                for place, entry in enumerate(entries, self._u_slices[body].start):
+                for index, entry in enumerate(entries, self._u_slices[body].start):
                     if not is_zero(entry):
-                        coefficients[place] = entry
+                        coefficients[index] = entry
         return ConstraintRow(residual, coefficients, bias, number, *at_joint)
 
 

@@ -150,9 +150,9 @@ class NumericEquations:
         e = self.equations
         rows = e.rate_rows(state.tolist(), joints)
         rates = self._matrix(rows) @ state[e.nx : e.nx + e.nu]
-        kept = {number: state[e.nx + e.nu + place] for place, (number, _) in enumerate(e.angles)}
-        places = [kept.get(number, float(row.residual)) for number, row in zip(joints, rows, strict=True)]
-        return np.array(places, dtype=float), np.asarray(rates, dtype=float)
+        kept = {number: state[e.nx + e.nu + index] for index, (number, _) in enumerate(e.angles)}
+        positions = [kept.get(number, float(row.residual)) for number, row in zip(joints, rows, strict=True)]
+        return np.array(positions, dtype=float), np.asarray(rates, dtype=float)
 
     def normalised(self, state: Array) -> Array:
         """State with quaternions of unit length."""
@@ -200,8 +200,8 @@ class NumericEquations:
     def _matrix(self, rows: Sequence[ConstraintRow]) -> Array:
         C = np.zeros((len(rows), self.equations.nu))
         for number, row in enumerate(rows):
-            for place, value in row.coefficients.items():
-                C[number, place] = value
+            for index, value in row.coefficients.items():
+                C[number, index] = value
         return C
 
 

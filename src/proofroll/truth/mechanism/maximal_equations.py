@@ -253,8 +253,8 @@ class MaximalEquations:
         if body < 0:
             return
         entries = self.bodies[body].projected(views[body], push, plus(cross(arm, push), moment))
-        for place, entry in enumerate(entries, self.u_slices[body].start):
-            force[place] = add(force[place], entry)
+        for at, entry in enumerate(entries, self.u_slices[body].start):
+            force[at] = add(force[at], entry)
 
     def _law(
         self,
@@ -295,8 +295,8 @@ class MaximalEquations:
             speeds = [dot(axis, turning) for axis in axes]
             if angles:
                 rates = speeds
-            for place, (axis, speed) in enumerate(zip(axes, speeds, strict=True)):
-                angle = angles[place] if angles else 0.0
+            for at, (axis, speed) in enumerate(zip(axes, speeds, strict=True)):
+                angle = angles[at] if angles else 0.0
                 moment = plus(moment, scaled(add(_along(joint, angle, speed), effort(number, angle, speed)), axis))
         self._apply(force, views, c.b, push, arm_b, moment)
         self._apply(force, views, c.a, scaled(-1.0, push), plus(arm_a, d), scaled(-1.0, moment))

@@ -81,7 +81,7 @@ def compiled_rates(equations: MaximalEquations, rows: Sequence[int]) -> Callable
 
 def _in_symbols(equations: MaximalEquations, rows: Sequence[int], time: Any) -> tuple[list[Any], list[Scalar]]:
     """Variables of a state, and its rates as expressions in them."""
-    state = [heyoka.make_vars(f"s{place}") for place in range(len(equations.start()))]
+    state = [heyoka.make_vars(f"s{index}") for index in range(len(equations.start()))]
     at_state = equations.at(state, {name: getattr(heyoka, name) for name in FUNCTIONS}, time=time)
     u_rate = accelerations(equations, at_state, [at_state.rows[k] for k in rows])
     return state, [*at_state.rate, *u_rate, *at_state.angle_rate]
@@ -140,8 +140,8 @@ def _of_light_bodies(
                 A[p, i] = row.coefficients[k]
                 later, earlier = (i, p) if i < held else (p, i)
                 after.setdefault(later, set()).add(earlier)
-        for other, place in enumerate(equations.light[: p - len(rows) + 1], len(rows)):
-            A[p, other] = -float(equations.mass_matrix[k, place])
+        for other, index in enumerate(equations.light[: p - len(rows) + 1], len(rows)):
+            A[p, other] = -float(equations.mass_matrix[k, index])
     return after
 
 
@@ -183,9 +183,9 @@ def _solved(A: dict[tuple[int, int], Scalar], right: list[Scalar], after: Mappin
         others = sorted(neighbours.pop(pivot))
         diagonal = entries[frozenset([pivot])]
         factor = {i: entries[frozenset([pivot, i])] / diagonal for i in others}
-        for place, i in enumerate(others):
+        for index, i in enumerate(others):
             neighbours[i].discard(pivot)
-            for j in others[: place + 1]:
+            for j in others[: index + 1]:
                 key = frozenset([i, j])
                 entries[key] = sub(entries.get(key, 0.0), mul(factor[i], entries[frozenset([pivot, j])]))
                 if i != j:

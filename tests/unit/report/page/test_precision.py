@@ -30,7 +30,7 @@ def test_the_front_takes_no_luck() -> None:
 
 
 def test_places_are_joined_by_the_worst() -> None:
-    """Error and cost are those of the worst place; a step that fails at one place is no point."""
+    """Error and cost are those of the worst point; a step that fails at one point is no point."""
     heavy = [line(place="mass=2", error=9e-4, cost=0.03)]
     found = work_precision([*ARM, *heavy])
     assert found is not None

@@ -27,9 +27,9 @@ from proofroll.running.runner import Runner
 from proofroll.running.store import Store
 from proofroll.studies.failure import meanings
 from proofroll.studies.stability.axes import Axis, AxisTerm, Effort, chosen, evenly_chosen
+from proofroll.studies.stability.axis_values import axis_values
 from proofroll.studies.stability.claims import Claim, file_for
 from proofroll.studies.stability.map import _refused, stability
-from proofroll.studies.stability.places import places_of
 from proofroll.studies.stability.records import Boundary, BoundaryPoint, StabilityStudy, dependence
 from proofroll.studies.stability.reproducers import with_programs
 from proofroll.studies.stability.step_numbers import OSCILLATION, explanation, values
@@ -94,7 +94,7 @@ def test_a_search_hangs_on_no_clock(small: Any) -> None:
     slower = dataclasses.replace(point, results=slow)
     rungs = range(len(point.ladder))
     assert [point.too_long(rung, SHORT) for rung in rungs] == [slower.too_long(rung, SHORT) for rung in rungs]
-    longest = [point.place.until / point.ladder[rung] for rung in rungs if not point.too_long(rung, SHORT)]
+    longest = [point.at.until / point.ladder[rung] for rung in rungs if not point.too_long(rung, SHORT)]
     assert SHORT.steps / 2 < max(longest) <= SHORT.steps
 
 
@@ -147,7 +147,7 @@ def test_a_map_resumes(small: Any, resumed: tuple[Any, int, Path]) -> None:
     again = Runner(Store(folder), jobs=1)
     other = stability("sphere_in_cylinder", [SPEED], again, engines=[ENGINE], effort=SHORT)
     assert stability_study(other).points == stability_study(small).points
-    assert again.reused == small.runs + 2  # and the truth of both places
+    assert again.reused == small.runs + 2  # and the truth at both values
 
 
 def test_reports_of_a_map(small: Any) -> None:
@@ -295,7 +295,7 @@ def test_of_each_formulation_the_matched_settings(tmp_path: Path) -> None:
 def test_axes_share_the_runs_where_they_meet() -> None:
     """A value that is the scene's default is no parameter of its own: the case is that of the other axis."""
     axes = [Axis(name, "1", name, [1.0], {name: AxisTerm(times=name)}) for name in ("mass", "radius")]
-    assert [place.parameters for place in places_of("sphere_in_cylinder", axes, SHORT)] == [{}, {}]
+    assert [at.parameters for at in axis_values("sphere_in_cylinder", axes, SHORT)] == [{}, {}]
 
 
 def test_axes_as_data() -> None:

@@ -313,7 +313,7 @@ class ContactDynamics:
         record = self.equations.sample(q, v, joints, time, load, applied)
         loose = {c.joint.number for c, own in zip(self._of_joints, found.determinate[count:], strict=True)
                  if not own[c.direction != 0].all()}  # fmt: skip
-        named = [item.field in {"friction", "stop"} and item.place in loose for item in named_forces(self.mechanism)]
+        named = [item.field in {"friction", "stop"} and item.number in loose for item in named_forces(self.mechanism)]
         record["named"] = np.where(named, np.nan, record["named"])
         return record, np.where(found.determinate[:count], pressed, np.nan)
 

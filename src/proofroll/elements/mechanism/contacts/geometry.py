@@ -75,33 +75,33 @@ class Geometry:
     size: Vector | None = field(default=None, metadata=METRES)
 
     def __post_init__(self) -> None:
-        place = f"geometries.{checks.name(self.name, 'geometries')}"
-        require_known(f"{place}.kind", self.kind, _KEYS)
-        checks.assign(self, position=checks.vector(f"{place}.position", self.position))
-        checks.assign(self, orientation=checks.vector(f"{place}.orientation", self.orientation))
+        where = f"geometries.{checks.name(self.name, 'geometries')}"
+        require_known(f"{where}.kind", self.kind, _KEYS)
+        checks.assign(self, position=checks.vector(f"{where}.position", self.position))
+        checks.assign(self, orientation=checks.vector(f"{where}.orientation", self.orientation))
         for key in ("normal", "axis"):
-            checks.assign(self, **{key: checks.axis(f"{place}.{key}", getattr(self, key))})
+            checks.assign(self, **{key: checks.axis(f"{where}.{key}", getattr(self, key))})
         usual = {"orientation": ZERO, "normal": Z, "axis": Z}
         for key in ("radius", "axes", "size", *usual):
             value, asked = getattr(self, key), key in _KEYS[self.kind]
             if not asked and value != usual.get(key):
-                raise InputError(f"{place}.{key}", value, f"{_a(self.kind)} has none; it has {_key_list(self.kind)}")
+                raise InputError(f"{where}.{key}", value, f"{_a(self.kind)} has none; it has {_key_list(self.kind)}")
             if asked and value is None:
-                raise InputError(f"{place}.{key}", "nothing", f"{_a(self.kind)} needs it; add it")
+                raise InputError(f"{where}.{key}", "nothing", f"{_a(self.kind)} needs it; add it")
         if self.radius is not None:
-            radius = checks.number(f"{place}.radius", self.radius, at_least=0)
+            radius = checks.number(f"{where}.radius", self.radius, at_least=0)
             if self.kind != "sphere" and not radius:
-                raise InputError(f"{place}.radius", radius, f"a {self.kind} has a radius above 0; a vertex is a sphere")
+                raise InputError(f"{where}.radius", radius, f"a {self.kind} has a radius above 0; a vertex is a sphere")
             checks.assign(self, radius=radius)
         for key in ("axes", "size"):
             if getattr(self, key) is not None:
-                found = checks.vector(f"{place}.{key}", getattr(self, key))
+                found = checks.vector(f"{where}.{key}", getattr(self, key))
                 if min(found) <= 0:
-                    raise InputError(f"{place}.{key}", found, "each must be above 0")
+                    raise InputError(f"{where}.{key}", found, "each must be above 0")
                 checks.assign(self, **{key: found})
         if self.axes is not None and max(self.axes) > _FLATTEST * min(self.axes):
             advice = f"the largest may be at most {_FLATTEST:g} times the smallest; a flat disc is a circle"
-            raise InputError(f"{place}.axes", self.axes, advice)
+            raise InputError(f"{where}.axes", self.axes, advice)
 
     @cached_property
     def frame(self) -> Array:
@@ -147,15 +147,15 @@ class Pair:
     restitution: float = field(default=0.0, metadata=RATIO)
 
     def __post_init__(self) -> None:
-        place = f"pairs.{checks.name(self.name, 'pairs')}"
+        where = f"pairs.{checks.name(self.name, 'pairs')}"
         if len(self.geometries) != 2:
-            raise InputError(f"{place}.geometries", self.geometries, "give the names of two")
+            raise InputError(f"{where}.geometries", self.geometries, "give the names of two")
         checks.assign(self, geometries=tuple(self.geometries))
         for key in ("friction", "restitution"):
-            checks.assign(self, **{key: checks.number(f"{place}.{key}", getattr(self, key), at_least=0)})
+            checks.assign(self, **{key: checks.number(f"{where}.{key}", getattr(self, key), at_least=0)})
         if self.restitution > 1:
             advice = "no impact returns more than it takes; give 0 to 1"
-            raise InputError(f"{place}.restitution", self.restitution, advice)
+            raise InputError(f"{where}.restitution", self.restitution, advice)
 
 
 @dataclass(frozen=True)
@@ -186,31 +186,31 @@ def contacts_of(geometries: Sequence[Geometry], pairs: Sequence[Pair]) -> tuple[
     found: list[BodyContact] = []
     listed: dict[frozenset[str], str] = {}
     for pair in pairs:
-        place = f"pairs.{pair.name}.geometries"
+        where = f"pairs.{pair.name}.geometries"
         for name in pair.geometries:
-            require_known(place, name, known, "there is no such geometry; choose from")
+            require_known(where, name, known, "there is no such geometry; choose from")
         a, b = (known[name] for name in pair.geometries)
         if a.body == b.body:
             owner = "the world" if a.body == WORLD else f"the body {a.body}"
-            raise InputError(place, pair.geometries, f"both belong to {owner}, which cannot touch itself")
+            raise InputError(where, pair.geometries, f"both belong to {owner}, which cannot touch itself")
         if frozenset(pair.geometries) in listed:
             advice = f"these are the pair {listed[frozenset(pair.geometries)]} already; remove one"
-            raise InputError(place, pair.geometries, advice)
+            raise InputError(where, pair.geometries, advice)
         listed[frozenset(pair.geometries)] = pair.name
         kinds = {a.kind, b.kind}
         if kinds in ({"plane"}, {"plane", "bore"}) or not (
             "plane" in kinds or kinds in ({"sphere"}, {"sphere", "bore"})
         ):
-            raise InputError(place, pair.geometries, _RULES)
+            raise InputError(where, pair.geometries, _RULES)
         if "bore" in kinds:
             bore, ball = (a, b) if a.kind == "bore" else (b, a)
             if (ball.radius or 0.0) >= (1 - _ROOM) * (bore.radius or 0.0):
                 advice = (
                     f"a sphere of radius {ball.radius:g} m has no room in a bore of {bore.radius:g} m; make it smaller"
                 )
-                raise InputError(place, pair.geometries, advice)
+                raise InputError(where, pair.geometries, advice)
         if kinds == {"sphere"} and not (a.radius or b.radius):
-            raise InputError(place, pair.geometries, "two points have no direction between them; give one a radius")
+            raise InputError(where, pair.geometries, "two points have no direction between them; give one a radius")
         touching = list(itertools.product(a.shapes, b.shapes))
         for number, (one, other) in enumerate(touching, 1):
             name = pair.name if len(touching) == 1 else f"{pair.name}.{number}"

@@ -1,4 +1,4 @@
-"""Places of a stability map: the scene at each value of an axis, with its truth and its runs."""
+"""Values on the axes of a stability map: the scene at each, with its truth and its runs."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
@@ -14,7 +14,7 @@ from proofroll.running.runner import Runner
 from proofroll.studies.cases import case_of
 from proofroll.studies.failure import Yardstick
 from proofroll.studies.stability.axes import Axis, Effort
-from proofroll.studies.stability.records import MappedPlace
+from proofroll.studies.stability.records import MappedValue
 
 # Sampling intervals per natural time; the coarsest step is one of them, the finer ones divide it.
 PER_PERIOD = 8
@@ -27,7 +27,7 @@ _MOST_SAMPLES = 400
 
 
 @dataclass
-class Place:
+class AxisValue:
     """A value of an axis for which there is a scene, with its truth.
 
     Attributes:
@@ -55,10 +55,10 @@ class Place:
         return [self.scene.natural_time / PER_PERIOD / part for part in _PARTS]
 
 
-def places_of(name: str, axes: Sequence[Axis], effort: Effort) -> list[Place | MappedPlace]:
-    """Places of all axes, without truths yet; a value that gives no scene is a MappedPlace with the reason."""
+def axis_values(name: str, axes: Sequence[Axis], effort: Effort) -> list[AxisValue | MappedValue]:
+    """Values of all axes, without truths yet; a value that gives no scene is a MappedValue with the reason."""
     default = load_scene(name)
-    places: list[Place | MappedPlace] = []
+    values: list[AxisValue | MappedValue] = []
     for axis in axes:
         for value in effort.values_of(axis):
             # Parameters equal to their defaults are left out, so that axes share runs where they meet.
@@ -68,34 +68,34 @@ def places_of(name: str, axes: Sequence[Axis], effort: Effort) -> list[Place | M
             try:
                 scene = load_scene(name, **given)
             except ProofrollError as error:
-                places.append(MappedPlace(axis.name, value, given, str(error)))
+                values.append(MappedValue(axis.name, value, given, str(error)))
                 continue
             intervals = round(PER_PERIOD * (value if axis.horizon else effort.periods))
             stride = 1 + 2 * (intervals // (2 * _MOST_SAMPLES))
             every = stride * scene.natural_time / PER_PERIOD
-            places.append(Place(axis.name, value, given, scene, every * max(1, intervals // stride), every))
-    return places
+            values.append(AxisValue(axis.name, value, given, scene, every * max(1, intervals // stride), every))
+    return values
 
 
-def measure(name: str, places: Sequence[Place], runner: Runner, tell: Callable[[], None]) -> None:
-    """Computes the truth of every place and sets its yardstick, and its problem if there is no truth."""
+def measure(name: str, values: Sequence[AxisValue], runner: Runner, tell: Callable[[], None]) -> None:
+    """Computes the truth at every value and sets its yardstick, and its problem if there is no truth."""
     _, facts = resolve_with_truth([], runner.workers)
     cases = [
         replace(
-            case_at(name, place, facts, STUDY_TIME_LIMIT),
-            between=off_grids(time_grid(place.until, place.every), [None, *place.steps]),
+            case_at(name, at, facts, STUDY_TIME_LIMIT),
+            between=off_grids(time_grid(at.until, at.every), [None, *at.steps]),
         )
-        for place in places
+        for at in values
     ]
     results = runner.run(cases, lambda *_: tell())
-    for place, case in zip(places, cases, strict=True):
+    for at, case in zip(values, cases, strict=True):
         result = results[case.key]
         truth = runner.store.stored(case).dataset if result.status == Status.DONE else None
         if truth is None:
-            place.problem = f"there is no truth here: {result.message}"
-        place.yardstick = Yardstick.of(place.scene, truth)
+            at.problem = f"there is no truth here: {result.message}"
+        at.yardstick = Yardstick.of(at.scene, truth)
 
 
-def case_at(name: str, place: Place, facts: EngineFacts, limit: float) -> Case:
-    """Case at a place with a time limit [s]."""
-    return case_of(name, place.scene, place.parameters, facts, place.until, place.every, time_limit=limit)
+def case_at(name: str, at: AxisValue, facts: EngineFacts, limit: float) -> Case:
+    """Case at a value with a time limit [s]."""
+    return case_of(name, at.scene, at.parameters, facts, at.until, at.every, time_limit=limit)
