@@ -119,11 +119,12 @@ class Allowance:
 
 @dataclass(frozen=True)
 class TrueCurve:
-    """True values of an observable; ``doubt``: verdicts that an ill-posed question does not allow."""
+    """True values of an observable; ``doubt``: verdicts that an ill-posed question does not allow, and ``why`` it is."""
 
     values: FloatArray
     error_bar: float
     doubt: Doubt = Doubt.NONE
+    why: str = ""
 
 
 @dataclass(frozen=True)
@@ -198,7 +199,7 @@ def judge_curve(
         remarks.append(f"within tolerance, but the limit of small steps is shown not to be the truth: {rungs.text}")
     if run.own_bar > tolerance and verdict in {Verdict.AGREES, Verdict.UNCONFIRMED}:
         remarks.append("within tolerance by luck: the run leaves its events open by more than the tolerance")
-    reason = _reason(verdict, error, allowance, (true.error_bar, own_bar), rungs)
+    reason = _reason(verdict, error, allowance, true, own_bar, rungs)
     if hidden:
         reason += f"; at the samples alone {number(on_grid)}{allowance.shown_unit}, so the error is between them"
     return Judgement(
@@ -289,14 +290,17 @@ def _verdict(error: float, tolerance: float, rungs: _Ladder, doubt: Doubt) -> Ve
     return Verdict.DIFFERS if doubt == Doubt.NONE else Verdict.ILL_POSED
 
 
-def _reason(verdict: Verdict, error: float, allowance: Allowance, bars: tuple[float, float], rungs: _Ladder) -> str:
-    """Reason of the verdict, as a clause with numbers; error bars are the truth's and the run's own."""
-    (truth_error_bar, own_bar), tolerance, unit = bars, allowance.tolerance, allowance.shown_unit
+def _reason(
+    verdict: Verdict, error: float, allowance: Allowance, true: TrueCurve, own_bar: float, rungs: _Ladder
+) -> str:
+    """Reason of the verdict, as a clause with numbers; ``own_bar``: the run's error bar."""
+    truth_error_bar, tolerance, unit = true.error_bar, allowance.tolerance, allowance.shown_unit
     shown_error, allowed, bar = *_distinct_texts(error, tolerance), f"{number(truth_error_bar)}{unit}"
     if np.isinf(truth_error_bar):
         return "not judged: the truth does not tell it here"
     if truth_error_bar > tolerance:
-        return f"not judged: the truth's error bar {bar} exceeds the tolerance {allowed}{unit}"
+        why = f"; ill-posed: {true.why.removeprefix('ill-posed: ')}" if true.why else ""
+        return f"not judged: the truth's error bar {bar} exceeds the tolerance {allowed}{unit}{why}"
     if verdict == Verdict.NOT_JUDGED:
         whose = "the truth's error bar"
         if own_bar > truth_error_bar:

@@ -63,7 +63,7 @@ def evaluate(planned: Plan, results: dict[str, Result], runner: Runner) -> Outco
         }
         band = comparison.bands[run.row.tolerance]
         if reference.ill_posed and not reference.curves.keys() & {*band.bounds, *run.row.bound}:
-            reason = f"no motion is unique here, and no law has a tolerance: {reference.dataset.attrs['ill_posed']}"
+            reason = f"no motion is unique here, and no law has a tolerance: {reference.ill_posed}"
             judged.append(_run(run, replace(result, status=Status.NO_TRUTH, message=reason)))
             continue
         judgements, errors = _judgements(run, band, reference, trajectories, _lost(run, results))

@@ -61,9 +61,9 @@ class Reference:
         return None
 
     @property
-    def ill_posed(self) -> bool:
-        """True if the motion depends on less than the accuracy of the parameters."""
-        return bool(self.dataset.attrs.get("ill_posed"))
+    def ill_posed(self) -> str:
+        """Reason why the motion depends on less than the accuracy of the parameters; empty: it does not."""
+        return str(self.dataset.attrs.get("ill_posed", ""))
 
     def shared(self, routes: Collection[str]) -> str:
         """Sentence about a route of the truth that is among ``routes``, and its check; empty if none is."""
@@ -90,7 +90,8 @@ class Reference:
 
     def true(self, name: str, values: FloatArray) -> TrueCurve:
         """True curve of an observable, of infinite error bar if there are no values; ``values`` are an engine's."""
-        return TrueCurve(*self._known(name, values), self.doubt(name))
+        doubt = self.doubt(name)
+        return TrueCurve(*self._known(name, values), doubt, "" if doubt == Doubt.NONE else self.ill_posed)
 
     def _known(self, name: str, values: FloatArray) -> tuple[FloatArray, float]:
         """True values of an observable and their error bar."""

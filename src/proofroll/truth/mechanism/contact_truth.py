@@ -2,19 +2,27 @@
 
 import numpy as np
 
+from proofroll.elements.mechanism.analysis import RANK
 from proofroll.elements.mechanism.contacts.acting import kinds
 from proofroll.elements.mechanism.contacts.dynamics import ContactDynamics
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.record import record_of
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.elements.mechanism.signal import breaks
-from proofroll.truth.hybrid import states_of
+from proofroll.truth.hybrid import first_close, states_of
 from proofroll.truth.mechanism.contact_bodies import ContactBodies
 from proofroll.truth.mechanism.contact_equations import ContactEquations
 from proofroll.truth.mechanism.contact_tree import ContactTree
 from proofroll.truth.mechanism.maximal_coordinates import MaximalCoordinates
 from proofroll.truth.mechanism.natural_units import Units, natural_units
-from proofroll.truth.mechanism.two_paths import TOLERANCES, counterparts, followed, refuse_uncovered, two_route_motion
+from proofroll.truth.mechanism.two_paths import (
+    CLOSE,
+    TOLERANCES,
+    counterparts,
+    followed,
+    refuse_uncovered,
+    two_route_motion,
+)
 from proofroll.truth.mechanism.two_routes import TwoRouteMotion, check_start, on_same_turns
 
 
@@ -60,10 +68,24 @@ def _in_units(mechanism: Mechanism, units: Units, times: Array) -> TwoRouteMotio
         "joint coordinates, DOP853, contacts by Coulomb's law at all of them at once",
         "bodies alone, DOP853, contacts by trial of what they can do",
     )
-    reason = "a change of the parameters within their accuracy changes which contacts stick, slide or open"
+    reason = _shared_load(dynamics) if first_close(paths, CLOSE) == 0 else ""
+    reason = reason or "a change of the parameters within their accuracy changes which contacts stick, slide or open"
     forces = pressed * units.force, np.array([force for force, _ in applied]) * units.force
     one, two = units.record(mechanism, one), units.record(mechanism, two)
     return two_route_motion(mechanism, paths, one, two, routes, reason, units, kinds=kinds, pressed=forces)
+
+
+def _shared_load(dynamics: ContactDynamics) -> str:
+    """Reason why a start is not unique, naming the contacts whose normal forces are not determinate; empty: all are."""
+    found = dynamics.solve(*dynamics.mechanism.start(), dynamics.begin()[0])
+    pairs = zip(dynamics.contacts, found.determinate, found.state.touching, strict=True)
+    names = [contact.name for contact, known, each in pairs if not known[np.abs(each.normal) > RANK].all()]
+    if not names:
+        return ""
+    return (
+        f"{', '.join(names)} carry the load together in more ways than one, so that friction at each is not "
+        "determinate (a body on three points, or on a line of two in the plane, has a truth)"
+    )
 
 
 def _size(dynamics: ContactDynamics) -> float:

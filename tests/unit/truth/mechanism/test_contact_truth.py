@@ -15,6 +15,7 @@ from proofroll.core.errors import Refused
 from proofroll.core.events import events_of
 from proofroll.core.observable import Role
 from proofroll.core.plugins import load_engine
+from proofroll.core.scene import Scene
 from proofroll.core.truth import truth
 from proofroll.elements.ball_on_surface.element import scene_with
 from proofroll.elements.mechanism.contacts import coulomb
@@ -26,6 +27,7 @@ from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.parts import Body
 from proofroll.elements.mechanism.signal import Formula
 from proofroll.files.scene_file import load_scene
+from proofroll.running.simulation import simulate
 from proofroll.truth.mechanism.switched_truth import truth_of
 from proofroll.truth.mechanism.two_routes import TwoRouteMotion
 from proofroll_drill.published import true_values
@@ -450,6 +452,23 @@ def test_a_disc_rolls_on_its_edge_without_loss() -> None:
     assert energy == pytest.approx(energy[0], abs=DIGITS)
     assert found.pressed is not None
     assert (found.pressed[:, 0, 2] > 0).all()
+
+
+def test_a_box_that_slides_on_four_corners_is_ill_posed_by_its_shared_load_and_certified() -> None:
+    """Four corners share a load in many ways, as the reason says; round-off of their forces fails no certificate."""
+    box = Body("box", 2.0, inertia=(0.02, 0.02, 0.02))
+    free = Joint("free", "free", "world", "box", q0=(0, 0, 0.1, 1, 0, 0, 0))
+    corners = [(x, y, -0.1) for x in (-0.1, 0.1) for y in (-0.1, 0.1)]
+    feet = [Geometry(f"foot{k}", "box", "sphere", corner, radius=0.0) for k, corner in enumerate(corners)]
+    pairs = tuple(Pair(f"touch{k}", (f"foot{k}", "floor"), friction=0.3) for k in range(4))
+    gravity = (9.81 * np.sin(0.5), 0.0, -9.81 * np.cos(0.5))
+    shapes = (Geometry("floor", "world", "plane"), *feet)
+    mechanism = Mechanism((box,), (free,), gravity=gravity, geometries=shapes, pairs=pairs)
+    found = truth_of(mechanism, np.array([0.0, 1e-4]))
+    assert found.horizon == 0
+    assert "touch0, touch1, touch2, touch3 carry the load together" in found.reason
+    run = simulate(Scene("box", "", (MechanismElement(mechanism),)), "projection", until=1e-4, every=1e-4)
+    assert run.attrs["status"] == "done", run.attrs["message"]
 
 
 def test_a_row_of_balls_is_ill_posed_and_keeps_momentum_and_energy() -> None:
