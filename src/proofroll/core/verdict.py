@@ -119,7 +119,7 @@ class Allowance:
 
 @dataclass(frozen=True)
 class TrueCurve:
-    """True values of an observable; ``doubt``: verdicts that an ill-posed question does not allow, and ``why`` it is."""
+    """True values of an observable; ``doubt``: verdicts that an ill-posed question does not allow; ``why``: cause."""
 
     values: FloatArray
     error_bar: float

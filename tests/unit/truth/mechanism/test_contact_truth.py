@@ -454,6 +454,7 @@ def test_a_disc_rolls_on_its_edge_without_loss() -> None:
     assert (found.pressed[:, 0, 2] > 0).all()
 
 
+@pytest.mark.drill
 def test_a_box_that_slides_on_four_corners_is_ill_posed_by_its_shared_load_and_certified() -> None:
     """Four corners share a load in many ways, as the reason says; round-off of their forces fails no certificate."""
     box = Body("box", 2.0, inertia=(0.02, 0.02, 0.02))
