@@ -8,11 +8,10 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
-from proofroll.core.arrays import slices
+from proofroll.core.arrays import FloatArray, slices
 
-Array = npt.NDArray[np.float64]
+Array = FloatArray  # its short name, for signatures of robots
 # Parent of joints in the world. It is no name of a body or joint: many root links are called ``world``.
 NO_BODY = ""
 # Relative violation of inertia's inequalities that counts as round-off of the file's digits.

@@ -4,9 +4,11 @@ import math
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-Array = NDArray[np.float64]
+from proofroll.core.arrays import FloatArray
+
+Array = FloatArray  # its short name, for signatures of mechanisms
 _UNIT = np.eye(3)
 
 
