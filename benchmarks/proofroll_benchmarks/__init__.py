@@ -1,1 +1,1 @@
-"""Benchmarks: what speed the project claims for itself, and what it costs, measured here and now."""
+"""Benchmarks of the speed that the project claims for itself and of its cost, measured here and now."""

@@ -38,14 +38,14 @@ class AdapterRow:
     """One engine with one model.
 
     Attributes:
-        engine, formulation, preset, variant: what was run; the variant is one of the ball's, or a mechanism's scene.
+        engine, formulation, preset, variant: names of the run; the variant is a ball's, or the scene of a mechanism.
         ratio: adapter over bare loop, with its interval; None if there is none.
         message: why there is none, else how far apart the two ended.
         adapter, bare: median seconds of the process per simulated second, if measured.
         distance: between the ball's centres, or the bodies' origins, at the end [m].
-        tolerance, because: what it may be [m], and why it is not zero.
+        tolerance, because: allowed difference [m], and the reason why it is not zero.
         until: simulated seconds of one run [s].
-        within_goal: whether the ratio is at most :data:`GOAL`.
+        within_goal: True if the ratio is at most :data:`GOAL`.
     """
 
     engine: str

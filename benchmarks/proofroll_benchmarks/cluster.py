@@ -35,8 +35,8 @@ def bench_cluster(
 
     Args:
         scheduler: as of ``--scheduler``; or ``threads``: one in this process, with two threads for workers.
-        cases: how many.
-        seconds: that each of them waits [s].
+        cases: number of cases.
+        seconds: wait of each [s].
         progress: called after each of them.
 
     Returns:

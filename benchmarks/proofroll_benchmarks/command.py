@@ -1,4 +1,4 @@
-"""Benchmarks: what speed the project claims for itself, and what it costs, measured on this machine."""
+"""Benchmarks of the speed that the project claims for itself and of its cost, measured on this machine."""
 
 from __future__ import annotations
 

@@ -34,7 +34,7 @@ class Timed:
         name: for a person.
         error: largest error of the centre's position at the samples and at the end [m].
         tolerance: of a step [-].
-        build_seconds: what building, and compiling where it was not yet, took [s].
+        build_seconds: time of building, and of compiling if it was not compiled yet [s].
         measure: measures one run and gives its wall seconds.
     """
 
@@ -50,7 +50,7 @@ def compiled(scene: Scene, model: Model, times: FloatArray, true_p: FloatArray, 
 
     Args:
         scene: with bounded friction.
-        model: which.
+        model: name of the model.
         times: at which the error is looked at, the last at the first slip or just past it [s], shape (n,).
         true_p: position of the centre then [m], shape (n, 3).
         bound: on the error of the position [m].

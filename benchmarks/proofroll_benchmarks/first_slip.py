@@ -38,7 +38,7 @@ def first_slip(scene: Scene, until: float, model: Model = "reduced") -> float | 
 
     Args:
         scene: a ball in a cylinder along whose axis gravity points.
-        until: how long to look [s].
+        until: end of the search [s].
         model: the reduced equations, or the projection method with quasi-velocities or with Euler angles.
 
     Raises:

@@ -44,7 +44,7 @@ def first_slips(scene: Scene, until: float, v2: npt.ArrayLike, mu: npt.ArrayLike
 
     Args:
         scene: a ball in a cylinder along whose axis gravity points.
-        until: how long to look [s].
+        until: end of the search [s].
         v2: initial speed of the centre along e2, V0 [m/s], shape (n,), or one for all.
         mu: static friction [-], likewise; inf never slips.
         f: rolling resistance [m], likewise.

@@ -39,7 +39,7 @@ class Configuration:
         case: engine, settings and samples.
         error: largest error of z at the samples [m].
         seconds: of the run that gave the error, for a first ranking [s].
-        contact: whether the ball is held by the engine's contact model.
+        contact: True if the ball is held by the engine's contact model.
     """
 
     case: Case
@@ -73,8 +73,8 @@ def search(
         until: last time [s].
         true_z: z at the samples [m], shape (SAMPLES + 1,).
         bound: on the error of z [m].
-        runner: where cases are run.
-        finalists: how many of either.
+        runner: runs the cases.
+        finalists: number of either.
         progress: called with a sentence about what is done next.
     """
     progress("asking the engines")

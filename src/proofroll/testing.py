@@ -43,7 +43,7 @@ def assert_agrees(
         The judgement, if it agrees.
 
     Raises:
-        AssertionError: it differs, or did not reach the end; the text has each error with its time, its tolerance and
+        AssertionError: the run differs, or ended early; the text has each error with its time, its tolerance and
             the error bar of the truth.
         InputError: an argument names something unknown or makes no sense.
         Missing, Refused: the engine is not installed, or cannot represent the scene.

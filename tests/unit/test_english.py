@@ -19,6 +19,12 @@ _OPENERS = (
 _OPENS = re.compile(rf"(?:{_OPENERS})\b", re.IGNORECASE)
 # Words without a noun behind them; a reader has to guess who does what.
 _VAGUE = re.compile(r"\b(?:such as|nobody|another than|otherwise than|told|said of|said by|of which)\b")
+# An entry of Args, Attributes or Raises that opens with a clause or a pronoun: "it fails" after the name of an error.
+_ENTRY = re.compile(
+    r"^ +\*{0,2}[A-Za-z_][\w.]*(?:, \*{0,2}[A-Za-z_][\w.]*)*: "
+    r"(?:whether|what|where|which|who|those|that|it|they|such|when|how|if)\b.*",
+    re.MULTILINE,
+)
 
 
 def _statements(node: ast.AST) -> Iterator[ast.AST]:
@@ -44,6 +50,8 @@ def hard_to_read(source: str) -> Iterator[str]:
         first = text.splitlines()[0]
         if _OPENS.match(first):
             yield f"{line}: opens with a clause: {first}"
+        for entry in _ENTRY.findall(text):
+            yield f"{line}: an entry opens with a clause: {entry.strip()}"
         for vague in _VAGUE.finditer(text):
             yield f"{line}: says {vague[0]!r}: {first}"
 
@@ -73,6 +81,9 @@ def test_docstrings_open_with_a_noun_or_a_verb(folder: str) -> None:
         ("Asks the worker to read a file.", False),
         ("Formulation of an element.", False),
         ("Items, the first of them 0.", False),
+        ("A run.\n\nRaises:\n    Diverged: it ended.\n", True),
+        ("A run.\n\nAttributes:\n    low, high: where it ended.\n", True),
+        ("A run.\n\nRaises:\n    Diverged: the run ended.\n", False),
     ],
 )
 def test_a_clause_is_seen(first: str, hard: bool) -> None:

@@ -26,7 +26,7 @@ class MechanismLoop:
         sprung: stiffness and rest of a joint, and where its coordinate and velocity are.
         drives, damping: of each velocity.
         rank: number of independent rows of the loops.
-        eliminates: whether violations of the loops are taken away after each step.
+        eliminates: True if violations of the loops are taken away after each step.
         rtol: of DOP853; 0: the classical Runge-Kutta method with steps of ``dt`` [s].
         held: loops as Pinocchio's own constraints, with its proximal settings; None: projection on the null space.
     """

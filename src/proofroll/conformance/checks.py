@@ -84,8 +84,8 @@ class Check:
         """Runs the check.
 
         Raises:
-            AssertionError: it failed; the text says why and how to run it alone.
-            SkipTest: it does not apply, or the failure is known.
+            AssertionError: the check failed; the text says why and how to run it alone.
+            SkipTest: the check does not apply, or the failure is known.
         """
         try:
             self.run()

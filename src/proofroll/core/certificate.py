@@ -82,7 +82,7 @@ def certify(engine: Any, scene: Scene, settings: Any = None) -> list[Line]:
     Args:
         engine: just built.
         scene: the scene it was built from.
-        settings: those it was built with; in single precision each line allows its roundings.
+        settings: of the engine that was built; in single precision each line allows its roundings.
 
     Raises:
         Diverged: a sample, or a field of what was built, has another shape than the scene's bodies.

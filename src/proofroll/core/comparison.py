@@ -18,7 +18,7 @@ class Tolerance:
 
     Attributes:
         value: in the unit of the observable, or as a fraction of its scale.
-        relative: whether it is a fraction.
+        relative: True if the value is a fraction.
         unit: as it is written; ``%`` for a fraction.
     """
 
@@ -130,7 +130,7 @@ class Comparison:
         bands: tolerances by name.
         rows: engines with settings.
         time_limit: wall seconds a case may take [s].
-        timed: whether the speed of every run is measured, in clean runs of its own.
+        timed: True if the speed of every run is measured, in clean runs of its own.
         order: rank in a report, the smallest first; those without come last, by name.
         brief: parameter -> values; a report without names has only the combinations that have one of them for each.
         left_out: number of combinations left out of a report without names.

@@ -75,7 +75,7 @@ class CountsTurns(Protocol):
     def turn_interval(self) -> float | None:
         """Longest sampling interval over which rates still count whole turns [s].
 
-        None: it has no such angle.
+        None: the observable has no such angle.
         """
 
 

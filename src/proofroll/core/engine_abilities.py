@@ -48,7 +48,7 @@ class Term:
 
     Attributes:
         name: for a person, e.g. ``elimination of violations``.
-        formulations: those that have it.
+        formulations: names of the formulations that have the term.
         on, off: settings with and without it, which override a preset.
         because: purpose of the term.
         rung: True if a model with it is a rung of the ladder by itself, as a contact of more dimensions is.
@@ -235,7 +235,7 @@ def require_provided(engine: Any, formulation: str, scene: Scene) -> None:
     """Checks that a formulation provides all that a scene requires.
 
     Raises:
-        Refused: it lacks a capability; the text names it, the reason if the engine gives one, and able formulations.
+        Refused: the formulation lacks a capability; the text has its name, the engine's reason if any, and able ones.
     """
     reasons = engine.lacking.get(formulation, {}) if isinstance(engine, SaysWhyNot) else {}
     missing = sorted(scene.requires - engine.provides[formulation])

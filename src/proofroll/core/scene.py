@@ -101,7 +101,7 @@ class Scene:
 
         Args:
             name: in the scene.
-            field: where the name was written, for the message.
+            field: location of the name in the file, for the message.
 
         Raises:
             InputError: no element has it, or no run of this scene determines it.

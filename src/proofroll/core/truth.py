@@ -63,7 +63,7 @@ class FindsEdges(Protocol):
             until: last time at which the event is looked for [s].
 
         Raises:
-            InputError: it finds no edges of this parameter.
+            InputError: the truth finds no edges of this parameter.
         """
 
 

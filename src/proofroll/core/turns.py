@@ -99,7 +99,7 @@ def on_turns_of(
 
     Args:
         other: values of the other run, or None.
-        values: those to shift.
+        values: of this run, to be shifted.
         name: of the observable.
         datasets: both runs.
 

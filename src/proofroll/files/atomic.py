@@ -33,7 +33,7 @@ def ordinary_content(path: Path) -> bytes:
     """Content of an ordinary file. A pipe would block, and a device may have no end.
 
     Raises:
-        OSError: it cannot be read, or is no ordinary file.
+        OSError: the file cannot be read, or is no ordinary file.
     """
     with open(os.open(path, os.O_RDONLY | os.O_NONBLOCK), "rb") as file:
         if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):

@@ -45,7 +45,7 @@ def read_csv(text: str) -> xr.Dataset:
     """Trajectory in a CSV file.
 
     Raises:
-        ValueError: it is no table of numbers with a header, or lacks the column time.
+        ValueError: the text is no table of numbers with a header, or lacks the column time.
     """
     reader = csv.reader(io.StringIO(text.removeprefix("\ufeff")), strict=True)
     try:

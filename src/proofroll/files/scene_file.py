@@ -33,7 +33,7 @@ class SceneFile:
 
     Attributes:
         title: description in one line.
-        source: where it comes from.
+        source: origin of the scene, as a reference.
         gravity: the table that all kinds of elements share.
         parameters: numbers that a user sets by name.
         asks: results wanted besides the motion, e.g. ``orientation``.
@@ -186,7 +186,7 @@ def _of_each(known: Sequence[Sequence[str]], tables: Mapping[str, Any], where: s
     """Tables of each kind of element. A row of a table that several kinds read goes to the kind whose things it names.
 
     Raises:
-        InputError: such a table is no list of rows, or a row does not name things of exactly one kind.
+        InputError: a table is no list of rows, or a row does not name things of exactly one kind.
     """
     shared = {name for name in tables if sum(name in own for own in known) > 1}
     own_tables = [{name: tables[name] for name in own if name in tables and name not in shared} for own in known]

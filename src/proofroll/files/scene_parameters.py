@@ -21,11 +21,11 @@ class Parameter:
         unit: of the value; nothing is converted.
         symbol: as equations write it.
         meaning: description in one line, used in messages.
-        source: where the number comes from.
+        source: origin of the number.
         above, at_least, below, at_most: bounds, as numbers or names of other parameters.
         nonzero: reason for which the value must not be zero.
-        unbounded: whether inf is allowed.
-        integer: whether it counts something.
+        unbounded: True if inf is allowed.
+        integer: True for a count.
     """
 
     value: float | str

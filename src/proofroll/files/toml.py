@@ -65,7 +65,7 @@ def study_content(path: Path, study: str) -> dict[str, Any]:
     """Content of a file of a study, without the key ``study``.
 
     Raises:
-        InputError: it is broken, or belongs to another study.
+        InputError: the file is broken, or belongs to another study.
     """
     content = read_toml(path)
     given = content.pop("study", "nothing")

@@ -120,7 +120,7 @@ def read(path: Path) -> xr.Dataset:
     """Trajectory from a file made by :func:`write`, read into memory; one from CSV has no attributes but units.
 
     Raises:
-        OSError, ValueError: it cannot be read, or does not have the format of its ending.
+        OSError, ValueError: the file cannot be read, or does not have the format of its ending.
     """
     if path.suffix == STORED:
         return read_columns(path).dataset()
@@ -172,7 +172,7 @@ def read_columns(path: Path) -> Columns:
     """Trajectory from a ``.npz`` file made by :func:`write`, without xarray.
 
     Raises:
-        OSError, ValueError: it cannot be read, or is no such file.
+        OSError, ValueError: the file cannot be read, or has another format.
     """
     content = ordinary_content(path)
     try:
@@ -188,7 +188,7 @@ def read_arrays(path: Path) -> dict[str, npt.NDArray[Any]]:
     """Arrays from a file made by ``numpy.savez``, by name.
 
     Raises:
-        OSError, ValueError: it cannot be read, or is no such file.
+        OSError, ValueError: the file cannot be read, or has another format.
     """
     try:
         with np.load(io.BytesIO(ordinary_content(path)), allow_pickle=False) as file:

@@ -112,7 +112,7 @@ class EarlierReport:
         """Earlier report from its ``report.json``, the value of the command's ``option``.
 
         Raises:
-            InputError: it cannot be read, or has no long table.
+            InputError: the report cannot be read, or has no long table.
         """
         try:
             content: dict[str, Any] = json.loads(ordinary_content(path))

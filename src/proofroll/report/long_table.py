@@ -49,7 +49,7 @@ class TableLine:
         cost: wall seconds per simulated second.
         cost_low, cost_high: its interval; None: it was measured once.
         record: address of a number in its study's record (:mod:`proofroll.report.recorded`); empty: a line of a run.
-        value: that number; None: it stands in the sentence ``message``.
+        value: number of the line; None: the sentence ``message`` has it.
         expected: number that the scene asks for where ``value`` is what an engine built.
         clean: True if clean runs of their own measured the cost; else it is that of the sampled run, during which other
             processes ran, by processor time where that is less.

@@ -120,15 +120,17 @@ def _of_changed(file: RobotFile, make: Callable[[RobotFile, Path], _Made | None]
     return lambda root: made(tostring(root, "utf-8"))
 
 
-def _offending(truth: RobotTruth, held: Reading) -> list[str]:
+def _offending(truth: RobotTruth, reading: Reading) -> list[str]:
     """Joints whose carried body an engine holds with another mass, centre of mass or inertia, or lacks."""
     groups = truth.robot.groups
-    offending = [name for name in groups if name not in held.joints]
+    offending = [name for name in groups if name not in reading.joints]
     spin = max((float(np.abs(group.inertia).max()) for group in groups.values()), default=1.0) or 1.0
     for name, group in groups.items():
-        if name in held.mass:
-            off = max(abs(held.mass[name] - group.mass), float(np.abs(held.inertia[name] - group.inertia).max()) / spin)
-            apart = float(np.abs(held.com[name] - group.com).max()) if group.mass > 0 < held.mass[name] else 0.0
+        if name in reading.mass:
+            off = max(
+                abs(reading.mass[name] - group.mass), float(np.abs(reading.inertia[name] - group.inertia).max()) / spin
+            )
+            apart = float(np.abs(reading.com[name] - group.com).max()) if group.mass > 0 < reading.mass[name] else 0.0
             if max(off, apart) > 1e-6:
                 offending.append(name)
     return offending

@@ -78,7 +78,7 @@ def compiled_robot(worker: Worker, file: RobotFile, written: Path, time_limit: f
 
     Raises:
         InputError: the engine that defines the format cannot compile it, or is not installed.
-        WorkerDied: it crashed or took too long.
+        WorkerDied: the compiler crashed or took too long.
     """
     original = str(file.path.resolve()) if file.contained else None
     answer = worker.request(call(compile_robot, path=str(written), original=original), time_limit)

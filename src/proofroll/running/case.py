@@ -43,7 +43,7 @@ class EngineDescription:
     """Description of an engine before any settings are chosen.
 
     Attributes:
-        name: of the engine, with the place of another interpreter in which it runs, ``mujoco@3.8.1``.
+        name: of the engine; with ``@`` and the place of its interpreter, if another one, ``mujoco@3.8.1``.
         version: of the engine.
         interpreter: path of the Python that it runs in.
         provides: formulation -> its capabilities, sorted.
@@ -77,7 +77,7 @@ class EngineFacts:
     """Facts of an engine with some settings, which decide its results.
 
     Attributes:
-        name: of the engine, with the place of another interpreter in which it runs, ``mujoco@3.8.1``.
+        name: of the engine; with ``@`` and the place of its interpreter, if another one, ``mujoco@3.8.1``.
         version: of the engine.
         code: hash of the adapter and of all code that it runs on; a change invalidates stored results.
         settings: complete settings of the formulation, by name.
@@ -89,7 +89,7 @@ class EngineFacts:
         shares: routes of the truth that it shares, see :class:`proofroll.core.engine_abilities.SharesEquations`.
         caveat: part of these settings that is not the engine's own, shown beside its verdicts; empty: none.
         families: capability -> law that it solves, see :class:`proofroll.core.engine_abilities.TellsFamily`.
-        family: those laws that the scene requires, in one text; empty: none.
+        family: clauses on the laws of its model that the scene requires, in one text; may be empty.
         precision: of its arithmetic, see :func:`proofroll.core.engine.precision_of`.
         scheme: integration rule, see :class:`proofroll.core.engine.Scheme`; empty: it declares none.
         level: rung of the ladder of models, see :class:`proofroll.core.engine_abilities.Level`; empty: not declared.

@@ -30,7 +30,7 @@ class Environment:
         name, label: of the engine ``NAME@LABEL``.
         folder: its folder.
         version: of the engine, read from the engine when the environment was made.
-        requirements: those that it was made with.
+        requirements: list given to pip when it was made.
         interpreter: version of its Python.
         packages: all installed packages, ``name==version``.
     """
@@ -101,7 +101,7 @@ def remove(engine: str) -> None:
 
     Raises:
         InputError: there is none.
-        ProofrollError: it cannot be deleted.
+        ProofrollError: the folder cannot be deleted.
     """
     known = [f"{item.name}@{item.label}" for item in remembered()]
     folder = folder_of(plain_name(engine), place_of(engine)) if place_of(engine) else None
@@ -116,7 +116,7 @@ def delete(folder: Path) -> None:
     """Deletes the folder of an environment, its stamp first, so that an incomplete rest is recognised.
 
     Raises:
-        ProofrollError: it cannot be deleted.
+        ProofrollError: the folder cannot be deleted.
     """
     try:
         (folder / STAMP).unlink(missing_ok=True)

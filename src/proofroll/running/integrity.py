@@ -33,10 +33,10 @@ def changed(kind: Any) -> str | None:
         return None
     package = kind.__module__.partition(".")[0]
     foreign = package != OWN.name
-    for name, held in _judging_members().items():
-        if not all(map(operator.is_, _watched.setdefault(name, held), held)):
+    for name, members in _judging_members().items():
+        if not all(map(operator.is_, _watched.setdefault(name, members), members)):
             return name
-        if foreign and str(getattr(held[0], "__module__", "")).partition(".")[0] == package:
+        if foreign and str(getattr(members[0], "__module__", "")).partition(".")[0] == package:
             return name
     return None
 
@@ -44,7 +44,7 @@ def changed(kind: Any) -> str | None:
 def _judging_members() -> dict[str, tuple[Any, ...]]:
     """Functions, classes with their members, and constants of all judging modules, by full name."""
     modules = [module for name, module in list(sys.modules.items()) if name.startswith(_JUDGING)]
-    return {name: held for module in modules for name, held in _of_module(module)}
+    return {name: members for module in modules for name, members in _of_module(module)}
 
 
 def _of_module(module: ModuleType) -> Iterator[tuple[str, tuple[Any, ...]]]:

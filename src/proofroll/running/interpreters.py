@@ -36,7 +36,7 @@ def start(engine: str, memory: float | None = None) -> Worker:
     Raises:
         InputError: there is no such place.
         Missing: there is no Python, or it does not have this proofroll.
-        WorkerDied: it crashed or hung before it answered.
+        WorkerDied: the interpreter crashed or hung before an answer.
     """
     place = place_of(engine)
     if not place or place.startswith(PREFIX):  # a program is started by a worker of ours

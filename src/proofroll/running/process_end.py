@@ -41,8 +41,8 @@ def interrupt_held() -> Iterator[None]:
         signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
         for number, handler in before.items():
             signal.signal(number, handler)
-        for held in waiting:  # also after an error, or it would be lost
-            signal.raise_signal(held)
+        for late in waiting:  # also after an error, or it would be lost
+            signal.raise_signal(late)
 
 
 def end_at_once(*_: object) -> None:

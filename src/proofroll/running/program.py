@@ -61,7 +61,7 @@ class Pipe:
 
         Raises:
             Refused, Diverged: the program answers so.
-            ProofrollError: it ended, or its line is no JSON object.
+            ProofrollError: the program ended, or its line is no JSON object.
         """
         process = self._process
         assert process.stdin is not None  # both were opened with pipes

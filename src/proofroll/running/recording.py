@@ -72,7 +72,7 @@ def record(
 
     Args:
         engine: at time 0.
-        scene: that it was built from.
+        scene: source of the engine's model.
         asked: times of the samples [s].
         probes: a few times off that grid [s], from :func:`proofroll.core.time_grid.off_grid`.
         counting: further times at which turns are counted [s], from :func:`proofroll.core.turns.samples_between`; their

@@ -35,7 +35,7 @@ class Runner:
     """Runs cases side by side, reuses stored results, and always returns one result per case.
 
     Args:
-        store: where results are kept.
+        store: keeper of the results.
         jobs: number of workers at once.
         fresh: run every case again, once, though its result is stored.
         cluster: runs the cases; None: this machine does. Engines are asked and speeds measured on this machine always.
@@ -80,7 +80,7 @@ class Runner:
         """Results of cases, by key.
 
         Args:
-            cases: those to be run.
+            cases: to be run.
             progress: called in this thread with each case and result as it arrives.
             budget: processor time of all cases; cases beyond it are left out.
             priority: see :meth:`follow`.

@@ -97,8 +97,8 @@ class Store:
         time (:data:`LASTING`) is not stored.
 
         Args:
-            case: that was run.
-            result: of the case.
+            case: of the run.
+            result: outcome of the run.
             written: file of the trajectory, which is moved into place; None: it is in place already, or there is none.
 
         Raises:

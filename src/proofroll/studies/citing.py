@@ -35,7 +35,7 @@ class Cited:
     Attributes:
         kind: ``suite``, ``truth``, ``engine`` or ``scene``.
         name: of the subject.
-        versions: those that made the results; several results may have several.
+        versions: of all results, each once.
         source: origin of a scene, in the words of its file.
         references: entries of BibTeX; empty if none is known.
     """

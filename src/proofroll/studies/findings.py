@@ -125,7 +125,7 @@ def run_findings(
     """Runs the program of each finding in a process of its own.
 
     Args:
-        findings: those to run.
+        findings: to be run.
         python: path of another interpreter; by default this one.
         time_limit: of each program [s].
 

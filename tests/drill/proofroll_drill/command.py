@@ -1,4 +1,4 @@
-"""Drills: what must not break anything is done on purpose."""
+"""Drills: faults on purpose, other arithmetic, and a referee."""
 
 from __future__ import annotations
 

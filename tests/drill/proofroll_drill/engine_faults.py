@@ -25,7 +25,7 @@ class EngineFault:
     Attributes:
         name: for a person.
         formulation: of the drill's engine.
-        status, words: how the row must end, and what it must say.
+        status, words: required status of the row, and words of its message.
     """
 
     name: str
@@ -67,7 +67,7 @@ def drill_engine(site: Site, sound: Path, fault: EngineFault) -> Drilled:
     Args:
         site: of the drill.
         sound: a folder of results that are there before, :func:`prepare`.
-        fault: what happens.
+        fault: name of the fault.
     """
     folder = site.folder / fault.formulation
     shutil.copytree(sound, folder)

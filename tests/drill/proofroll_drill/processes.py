@@ -89,9 +89,9 @@ def run(store: Path, cases: Sequence[Case], room: int = 0, alone: bool = False) 
 
     Args:
         store: folder of the results.
-        cases: which.
+        cases: cases to be run.
         room: largest size of a file [bytes]; 0: as one likes.
-        alone: whether that holds for the process itself, not for its workers, and ends it.
+        alone: True if the limit holds for the process itself, not for its workers, and ends it.
     """
     asked = [str(store), [dataclasses.asdict(case) for case in cases], room, alone]
     return start("-c", _CASES, json.dumps(asked))

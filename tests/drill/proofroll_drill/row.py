@@ -11,17 +11,17 @@ class Drilled:
     """One fault, and what it cost.
 
     Attributes:
-        fault: what was done.
-        contained: whether it cost nothing but its own case.
+        fault: fault on purpose.
+        contained: True if it cost nothing but its own case.
         said: the sentence that the row, or the command, gave about it.
-        others: how many other cases there were.
-        others_arrived: how many of them gave their result in spite of it.
-        stored: how many sound results were stored when it was over, those from before it among them.
-        kept: how many of these the next run left untouched.
-        missing: how many results the next run had to make.
-        recomputed: how many it made.
+        others: number of other cases.
+        others_arrived: number of them that gave their result in spite of it.
+        stored: number of sound results after it, with those from before.
+        kept: number of these that the next run left untouched.
+        missing: number of results that the next run had to make.
+        recomputed: number of results that it made.
         problem: why it is not contained; empty if it is.
-        hung: whether the drill itself hangs because of it, so that a thread of it may never end.
+        hung: True if the drill itself hangs because of it, so that a thread of it may never end.
     """
 
     fault: str
@@ -52,14 +52,14 @@ def drilled(
     """The verdict.
 
     Args:
-        fault: what was done.
-        said: what was said about it.
+        fault: fault on purpose.
+        said: message about it.
         expected: words that must be in it.
         others: for every other case whether its result arrived.
         before: hashes of the sound results by key, before the fault.
         after: likewise, after it.
         again: likewise, after the next run.
-        missing: how many results the next run had to make.
+        missing: number of results that the next run had to make.
         problems: further sentences, each with whether it applies.
     """
     kept = sum(again.get(key) == content for key, content in after.items())

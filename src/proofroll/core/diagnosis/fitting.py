@@ -198,14 +198,14 @@ def any_gravity(
     def test(evidence: Evidence) -> Iterator[Cause]:
         element = evidence.element
         g = gravity_of(element)
-        for held in residuals(evidence):
-            at = held.left(falling(element, g))
-            slopes = [held.left(falling(element, g + axis)) - at for axis in np.eye(3)]
+        for each in residuals(evidence):
+            at = each.left(falling(element, g))
+            slopes = [each.left(falling(element, g + axis)) - at for axis in np.eye(3)]
             gravity = g - np.linalg.lstsq(np.stack(slopes, axis=-1), at, rcond=None)[0]
             gravity = np.where(np.abs(gravity) < 1e-6 * max(float(np.max(np.abs(gravity))), 1e-300), 0.0, gravity)
             off, size = (float(np.linalg.norm(x)) for x in (gravity - g, g))
             says = f"the engine's gravity is ({', '.join(f'{x:.4g}' for x in gravity)}) m/s^2"
             model, remedy = falling(element, gravity), "look at the axes of gravity"
-            yield held.cause("direction of gravity", says, model, remedy, 3, off / size if size else np.inf)
+            yield each.cause("direction of gravity", says, model, remedy, 3, off / size if size else np.inf)
 
     return test

@@ -1,4 +1,4 @@
-"""Certificate of a ball on a surface, line by line, with the largest softening accepted of a model."""
+"""Certificate of a ball on a surface, line by line, and the limits of a model's softening."""
 
 import dataclasses
 from collections.abc import Iterable, Mapping

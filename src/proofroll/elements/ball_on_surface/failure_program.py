@@ -48,7 +48,7 @@ def signs(stopped, p, v, w):
 
 
 def through_proofroll(body: RollingBall, failed: FailedRun) -> str:
-    """Engine's part that runs the engine through proofroll, for failures that involve proofroll's own code."""
+    """Engine's part of the program, with calls of proofroll, for failures that involve proofroll's own code."""
     head = "import numpy as np\nfrom proofroll import load_scene, simulate\n"
     head += "from proofroll.elements.ball_on_surface.element import rolling_ball\n\n"
     return (

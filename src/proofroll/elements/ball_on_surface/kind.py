@@ -105,8 +105,8 @@ class BallOnSurfaceKind:
         scenes = BallOnSurfaceKind.conformance_scenes()
         return {
             "plane": scenes["plane"],
-            "slow": _turned(scenes["cylinder-resisting"], -1.0, 0.05, velocity=(1.2, 0.2), spin=5.0),
-            "fast": _turned(scenes["cylinder"], 2.0, -0.2, velocity=(4.5, -0.7)),
+            "slow": _with_tilt(scenes["cylinder-resisting"], -1.0, 0.05, velocity=(1.2, 0.2), spin=5.0),
+            "fast": _with_tilt(scenes["cylinder"], 2.0, -0.2, velocity=(4.5, -0.7)),
             "bottom": load_scene("bowl", start=-0.02, speed=0.6, cross_speed=0.02, normal_spin=12.0),
             "turntable": load_scene("turntable", tilt=0.2, normal_spin=12.0),
         }
@@ -119,7 +119,7 @@ class BallOnSurfaceKind:
         return HYPOTHESES
 
 
-def _turned(scene: Scene, gamma: float, tilt: float, **motion: Any) -> Scene:
+def _with_tilt(scene: Scene, gamma: float, tilt: float, **motion: Any) -> Scene:
     """Copy of a scene that starts at the angle ``gamma``, with its cylinder's axis tilted by ``tilt``, both in rad."""
     (element,) = scene.elements
     assert isinstance(element, BallOnSurface)

@@ -50,8 +50,8 @@ def reduced_rates(body: RollingBall, state: FloatArray) -> tuple[FloatArray, Flo
         drive2, drive3 = drive2 + kappa * gain2, drive3 + kappa * gain3
     speed = math.hypot(v2, v3)
     if f and speed:  # e1 × M = -f N v/V; at rest the moment is zero, as in resistance_moment
-        held = f * N / (m * a)
-        drive2, drive3 = drive2 - held * (v2 / speed), drive3 - held * (v3 / speed)
+        resisted = f * N / (m * a)
+        drive2, drive3 = drive2 - resisted * (v2 / speed), drive3 - resisted * (v3 / speed)
     tangential2, tangential3 = drive2 / (1 + kappa), drive3 / (1 + kappa)
     along2, along3 = (
         x - row[0] * udot1 - row[1] * udot2 for x, row in zip((tangential2, tangential3), curving, strict=True)

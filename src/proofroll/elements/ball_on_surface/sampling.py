@@ -67,5 +67,5 @@ def terms_held(*, resists: object, slips: object = False, turns: object = False)
 
     ``resists``: rolling resistance; ``slips``: bounded friction; ``turns``: orientation of the ball.
     """
-    held = {"ROLLING_RESISTANCE": resists, "BOUNDED_FRICTION": slips, "ORIENTATION": turns}
-    return frozenset(BallCapability[name] for name, is_there in held.items() if is_there)
+    required = {"ROLLING_RESISTANCE": resists, "BOUNDED_FRICTION": slips, "ORIENTATION": turns}
+    return frozenset(BallCapability[name] for name, is_there in required.items() if is_there)

@@ -59,7 +59,7 @@ def numbers(field: str, value: Any, count: int, *, at_least: float | None = None
     """The value as ``count`` finite floats; a single number stands for a list of one.
 
     Raises:
-        InputError: it is not ``count`` finite numbers, or one lies below ``at_least``.
+        InputError: the value is not ``count`` finite numbers, or one lies below ``at_least``.
     """
     try:
         found = np.atleast_1d(np.asarray(value))
@@ -98,7 +98,7 @@ def inertia(field: str, value: Any) -> Matrix:
     """Inertia matrix of a rigid body, from three principal moments or a symmetric 3×3 matrix [kg m²].
 
     Raises:
-        InputError: it is not symmetric, has a negative principal moment, or breaks the triangle inequality.
+        InputError: the tensor is not symmetric, has a negative principal moment, or breaks the triangle inequality.
     """
     try:
         found = np.asarray(value, dtype=float)

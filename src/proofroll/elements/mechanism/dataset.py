@@ -71,7 +71,7 @@ def along(sample: MechanismSample, name: str, count: int) -> FloatArray:
     """Array of a sample's field with a force for each actuator, coupling or joint [N, N m]; NaN where it is None.
 
     Raises:
-        Diverged: it has another shape, or is not of numbers.
+        Diverged: the field has another shape, or is not of numbers.
     """
     given = getattr(sample, name)
     if given is None:
@@ -86,7 +86,7 @@ def reactions(element: MechanismElement, sample: MechanismSample, name: str) -> 
     """``joint_force`` [N] or ``joint_torque`` [N m] of a sample, shape (joints + loops, 3); NaN where it is None.
 
     Raises:
-        Diverged: it is not of numbers, or has neither this shape nor its flat form, (3 (joints + loops),).
+        Diverged: the field is not of numbers, or has neither this shape nor its flat form, (3 (joints + loops),).
     """
     shape, given = (len(element.mechanism.connections), 3), getattr(sample, name)
     if given is None:

@@ -30,8 +30,8 @@ class Actuator:
     Attributes:
         name: unique among actuators.
         joint: a revolute or prismatic joint.
-        kind: what its target r is. Effort at the joint: n r (torque), n kd (r - n dq/dt) (velocity), n (kp (r - n q) -
-            kd n dq/dt) (position), with n the gear.
+        kind: meaning of its target r. Effort at the joint, n being the gear: n r (torque), n kd (r - n dq/dt)
+            (velocity), n (kp (r - n q) - kd n dq/dt) (position).
         target: of the motor; a number, a formula ``"= 0.3*sin(2*pi*t)"``, or a table ``{times = [..], values = [..]}``.
         kp: gain of a position, at the motor.
         kd: gain of a velocity, at the motor.

@@ -60,7 +60,7 @@ class MujocoSettings:
             evaluation of the forces; ``facets``: a free ball in a ring of boxes; ``joints``: a mechanism of MuJoCo's
             joints, tendons and equality constraints, which has no contact and none of its options; ``geoms``: the same
             with contacts between bodies.
-        preset: where the other values come from.
+        preset: source of the other values.
         dt: step [s].
         integrator: MuJoCo's name of it.
         cone: friction cone, exact (``elliptic``) or MuJoCo's default approximation (``pyramidal``).
@@ -76,9 +76,9 @@ class MujocoSettings:
             creep from the missing J̇v (``free`` only).
         start: ``touching``: at depth zero, where a soft contact is not loaded yet; ``settled``: at the depth at which
             the contact already bends the path as the wall does.
-        curvature: whether the adapter adds to the contact's reference acceleration the term J̇v, which MuJoCo leaves
+        curvature: True if the adapter adds to the contact's reference acceleration the term J̇v, which MuJoCo leaves
             out (``free`` only).
-        cone_correction: whether the adapter takes from the contact's reference acceleration, while the ball slips,
+        cone_correction: True if the adapter takes from the contact's reference acceleration, while the ball slips,
             the lift that MuJoCo's convex cone gives it.
         condim: dimensions of the contact's friction: 3 slides; 4 also resists turning about the normal, 6 also rolling,
             with MuJoCo's documented coefficients. No scene asks for either; they are there to be compared.
@@ -195,7 +195,7 @@ def check(settings: MujocoSettings, *, bounded: bool) -> None:
 
     Args:
         settings: to check.
-        bounded: whether the scene gives the coefficients of friction.
+        bounded: True if the scene gives the coefficients of friction.
 
     Raises:
         InputError: the first such combination.

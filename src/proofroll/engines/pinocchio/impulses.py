@@ -111,7 +111,7 @@ class ImpulseSteps:
         """Checks that PGS returns right impulses for contact ``k`` with the mobility ``G``, shape (3, 3).
 
         Raises:
-            Diverged: it does not.
+            Diverged: PGS returns wrong ones.
         """
         one, two = float(G[0, 0]), float(G[1, 1])
         if self._settings.solver == "pgs" and self.contacts[k].friction and max(one, two) > _UNEQUAL * min(one, two):

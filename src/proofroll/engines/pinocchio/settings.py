@@ -39,7 +39,7 @@ class PinocchioSettings:
             mechanisms: ``null_space`` (joint tree, loops by projection on the null space of their rows),
             ``constraint_dynamics`` (loops as Pinocchio's own rigid constraints) or ``impulses`` (a tree whose bodies
             touch, by Pinocchio's solver of contact with friction).
-        preset: where the other values come from.
+        preset: source of the other values.
         integrator: ``semi_implicit_euler`` and ``rk4`` as they are usually written with ``pin.integrate``;
             ``rk4_dexpinv`` the same with the missing term of rotations; ``dop853`` adaptive, order 8. ``contact`` has
             ``semi_implicit_euler`` and ``leapfrog``, whose velocities are half a step ahead of the positions;

@@ -45,7 +45,7 @@ class Kinematics(NamedTuple):
         pose: numbers of the rotation, see :meth:`Orientation.pose`.
         v: D s, six numbers.
         drift: Ḋ s of the centre, along e1, e2, e3 [m/s²].
-        drawn: acceleration of the centre along e2, e3 that changes no slip: by the turning of the axes, and of the
+        convected: acceleration of the centre along e2, e3 that changes no slip: by the turning of the axes, and of the
             wall's velocity at the contact [m/s²].
         turned: rate of ω' by the turning of the axes alone [rad/s²].
         carried: velocity of the wall at the contact, along e2 and e3 [m/s]; zero for a wall at rest.
@@ -58,7 +58,7 @@ class Kinematics(NamedTuple):
     pose: tuple[float, ...]
     v: tuple[float, ...]
     drift: Vector
-    drawn: tuple[float, float]
+    convected: tuple[float, float]
     turned: Vector
     carried: tuple[float, float]
 
@@ -122,13 +122,13 @@ class ProjectedBall:
         w1, w2, w3 = self._orientation.angular_velocity(pose, r, frame)
         v2, v3 = t2u * first + t2v * second, t3u * first + t3v * second
         v = (0.0, v2, v3, w1, w2, w3)
-        drawn, carried = (-o1 * v3, o1 * v2), (0.0, 0.0)
+        convected, carried = (-o1 * v3, o1 * v2), (0.0, 0.0)
         if self._wall_rate is not None:
             carried, gain2, gain3 = self._carried(matrix(frame), state[:2], self._wall_rate, (v2, v3), (o1, o2, o3))
-            drawn = drawn[0] + gain2, drawn[1] + gain3
+            convected = convected[0] + gain2, convected[1] + gain3
         turned = (o2 * w3 - o3 * w2, o3 * w1 - o1 * w3, o1 * w2 - o2 * w1)
         rates = (first, second, *self._orientation.rates(angles, r, frame))
-        return Kinematics(frame, shape, rates, r, pose, v, drift, drawn, turned, carried)
+        return Kinematics(frame, shape, rates, r, pose, v, drift, convected, turned, carried)
 
     def _carried(
         self, F: FloatArray, place: Sequence[float], W: FloatArray, v: tuple[float, float], turning: Vector
@@ -173,7 +173,7 @@ class ProjectedBall:
         a, m, J = self.radius, self.mass, self.inertia
         # a2, a3: translational part of M⁻¹ f along e2 and e3; b2, b3: rotational part, zero along e1
         g1, a2, a3 = self.weight(kin)
-        (d1, d2, d3), (r2, r3), (_, q2, q3) = kin.drift, kin.drawn, kin.turned
+        (d1, d2, d3), (r2, r3), (_, q2, q3) = kin.drift, kin.convected, kin.turned
         N, b2, b3 = m * (g1 - d1), 0.0, 0.0
         if self.active == "centre":
             F2, F3, a2, a3, slip_rate = -m * a2, -m * a3, 0.0, 0.0, (0.0, 0.0)

@@ -79,7 +79,7 @@ class Orientation(ABC):
         """Checks the description at time ``t`` [s]; ``step``: size of a fixed step [s], else 0.
 
         Raises:
-            Diverged: it fails.
+            Diverged: the description fails.
         """
 
     def renewed(self, t: float, angles: FloatArray, r: FloatArray) -> tuple[FloatArray, FloatArray] | None:  # noqa: ARG002 -- most never fail

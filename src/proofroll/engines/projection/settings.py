@@ -24,7 +24,7 @@ class ProjectionSettings:
             velocity along the local axes, without. The angles are always part of the equations; in the rotating frame
             the orientation is followed, as a quaternion, only for a scene that asks for it. Of mechanisms,
             ``dependent``, the coordinates of the bodies, cut apart.
-        preset: where the other values come from.
+        preset: source of the other values.
         integrator: ``rk4`` with the fixed step ``dt``, ``dop853`` with the tolerance ``rtol``, or ``taylor`` with it:
             the same equations in compiled Taylor series (heyoka), on a cylinder or plane, without bounded friction.
         dt: step of rk4 [s].

@@ -211,7 +211,7 @@ class ReducedSettings:
 
     Attributes:
         formulation: ``equations`` (integrated) or ``closed_form`` (where one is known).
-        preset: where the other values come from.
+        preset: source of the other values.
         integrator: ``dop853`` (scipy, on any surface) or ``taylor`` (heyoka, compiled, on a cylinder or plane); None
             in ``closed_form``.
         rtol: relative tolerance of a step [1]; None in ``closed_form``.

@@ -45,7 +45,7 @@ class TermFound:
 
     Attributes:
         term, kind, engine, formulation, because: see :class:`Switch`.
-        verdict: whether the term is worth its cost, as ``needed``.
+        verdict: worth of the term, as ``needed``.
         reason: ground of the verdict.
         on, off: with it and without.
         cost: ratio of the run's times with it and without.

@@ -98,7 +98,7 @@ class ReportContent:
     """Content of a report.
 
     Attributes:
-        date: when it was written.
+        date: of its writing.
         comparisons: in their order.
         awaited: titles of comparisons that are still being run.
         left_out: names of the comparisons that a report of all studies leaves out.

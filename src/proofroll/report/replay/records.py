@@ -120,7 +120,7 @@ class ReplayKind(NamedTuple):
 
     Attributes:
         name: name of the kind in the page's program.
-        seen: function of a scene: largest error of a body's place that looks right [m].
+        seen: largest invisible error of a position [m], as a function of the scene.
         draw: function that draws a truth and its ghosts.
     """
 

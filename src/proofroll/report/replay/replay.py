@@ -28,9 +28,9 @@ SMOOTH_TURN, WIDEST_TURN = 1.2, 2.5
 def replay_content(outcomes: list[Outcome], kind: ReplayKind) -> Replay:
     """Replay of comparisons, all of scenes of one kind.
 
-    There is one case for each truth with a known motion. Its ghosts are the engines' runs with ``default`` settings,
-    and of each engine the run with other settings furthest from the truth, if its error is visible. Of each engine's
-    runs with ``default`` settings the one furthest from the truth is shown at first.
+    There is one case for each truth with a known motion. Its ghosts are two kinds of runs: all with ``default``
+    settings, and for each engine the worst run with other settings, if its error is visible. At first the page shows
+    each engine's worst run with ``default`` settings.
     """
     shown_in: dict[str, tuple[ComparedPoint, list[tuple[Outcome, str]]]] = {}
     for outcome in outcomes:

@@ -142,7 +142,7 @@ class HeatMap:
 
     Attributes:
         axes: axes with points, each with the values that have points.
-        groups: by engine the name of each setting, and for each value of each axis the number of its point, or None.
+        groups: engine -> rows of the table: name of a setting, and in each column the number of its point, or None.
         letters: letters that occur, and the failures that they stand for.
     """
 

@@ -132,13 +132,13 @@ def inertial_rotation_ignored(evidence: RobotEvidence) -> Robot | None:
 )
 def total_mass_ignored(evidence: RobotEvidence) -> Robot | None:
     """Settotalmass is ignored: masses are as written."""
-    robot, held = evidence.robot, evidence.reading.mass
+    robot, masses = evidence.robot, evidence.reading.mass
     if not any(compiler.get("settotalmass") for compiler in evidence.file.root.iter("compiler")):
         return None
-    scaled = sum(group.mass for name, group in robot.groups.items() if name in held)
+    scaled = sum(group.mass for name, group in robot.groups.items() if name in masses)
     if not scaled:
         return None
-    factor = sum(mass for name, mass in held.items() if name in robot.groups) / scaled
+    factor = sum(mass for name, mass in masses.items() if name in robot.groups) / scaled
     return robot.with_bodies(
         dataclasses.replace(body, mass=factor * body.mass, inertia=factor * body.inertia)
         for body in robot.bodies.values()

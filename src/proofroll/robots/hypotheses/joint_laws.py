@@ -70,11 +70,11 @@ def defaults_not_inherited(evidence: RobotEvidence) -> Robot | None:
     compiled = evidence.recompiled(root) if bare else None
     if compiled is None:
         return None
-    held = {joint.name: joint for joint in compiled.joints}
+    of_engine = {joint.name: joint for joint in compiled.joints}
     changes: dict[str, dict[str, Any]] = {
-        joint.name: {law: 0.0 for law in _LAWS if getattr(joint, law) and not getattr(held[joint.name], law)}
+        joint.name: {law: 0.0 for law in _LAWS if getattr(joint, law) and not getattr(of_engine[joint.name], law)}
         for joint in robot.joints
-        if joint.name in held
+        if joint.name in of_engine
     }
     if not any(changes.values()):
         return None

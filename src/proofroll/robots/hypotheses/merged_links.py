@@ -32,8 +32,8 @@ def merged_at_link_origins(evidence: RobotEvidence) -> Robot | None:
         for name, _, R in members:
             body = robot.bodies[name]
             written = np.array(robot.sources.get(name, {}).get("written", body.inertia))
-            held = R.T @ np.diag(_moments(written)) @ R  # in the link's frame: diagonal in the axes of the composite
-            bodies.append(dataclasses.replace(body, com=np.zeros(3), inertia=held))
+            inertia = R.T @ np.diag(_moments(written)) @ R  # in the link's frame: diagonal in the axes of the composite
+            bodies.append(dataclasses.replace(body, com=np.zeros(3), inertia=inertia))
     return robot.with_bodies(bodies) if bodies else None
 
 

@@ -30,7 +30,7 @@ def compare(
 
     Args:
         name: of a comparison, or the path of its file; or of a scene, the path of its folder or of a robot file.
-        engines: those to be run; by default all of the comparison, or all that can represent the scene.
+        engines: to be run; by default all of the comparison, or all that can represent the scene.
         out: folder for results; stored results are reused.
         jobs: workers at once; by default one for each core.
         budget: processor time of all runs of a scene [s]; by default 60.

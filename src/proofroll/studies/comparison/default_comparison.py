@@ -34,7 +34,7 @@ def default_comparison(
 
     Args:
         name: of the scene.
-        parameters: those that differ from the defaults.
+        parameters: of the scene, if not its defaults.
         workers: pool for the questions to engines; None: new workers.
         budget: processor time of all runs [s]; None: no limit.
 

@@ -62,7 +62,7 @@ class Reference:
 
     @property
     def ill_posed(self) -> str:
-        """Reason why the motion depends on less than the accuracy of the parameters; empty: it does not."""
+        """Reason why changes of the parameters below their accuracy change the motion; empty: they do not."""
         return str(self.dataset.attrs.get("ill_posed", ""))
 
     def shared(self, routes: Collection[str]) -> str:

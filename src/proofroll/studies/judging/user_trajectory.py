@@ -43,7 +43,7 @@ class GivenRun:
         labels: dimension -> its labels (names of bodies) in order.
         besides: variable that is not part of the state, or a velocity -> reason why it is not judged, or None if that
             is not known yet; empty for a run of proofroll's own.
-        reactions: those of them that do not follow from the state: forces and moments.
+        reactions: columns that do not follow from the state: forces and moments.
     """
 
     dataset: xr.Dataset

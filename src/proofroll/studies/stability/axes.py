@@ -33,8 +33,8 @@ class Axis:
         meaning: effect of the axis, for a person.
         values: usually spaced logarithmically.
         parameters: parameter -> its dependence on the value; the others keep their defaults.
-        horizon: whether the value is the length of the run in natural times.
-        scale_free: whether the dimensionless problem is the same at every value, so that no boundary may depend on it.
+        horizon: True if the value is the length of the run in natural times.
+        scale_free: True if the dimensionless problem is the same at every value, so that no boundary may depend on it.
     """
 
     name: str

@@ -37,12 +37,12 @@ class Claim:
         because: why.
         axes: names of the axes; all if empty.
         values: lowest and highest value of the axis; all if empty.
-        never: whether no step holds; then nothing else is claimed but ``failure`` and ``silent``.
-        same: whether the boundary, in natural times, is the same all along each axis.
+        never: True if no step holds; then nothing else is claimed but ``failure`` and ``silent``.
+        same: True if the boundary, in natural times, is the same all along each axis.
         number: dimensionless number of the boundary that is claimed to lie in ``between``.
         between: lowest and highest.
         failure: kinds of failure allowed beyond it.
-        silent: whether the engine does not report the failure.
+        silent: True if the engine does not report the failure.
     """
 
     engine: str
@@ -136,7 +136,7 @@ class StabilityFile:
         scene: name of the scene.
         axes: along which it is taken to its extremes.
         claims: expectations.
-        on_request: whether a report without names has this map only if it is stored already.
+        on_request: True if a report without names has this map only when it is stored already.
     """
 
     name: str

@@ -35,7 +35,8 @@ class MapPoint:
     """One engine with its settings at one value of an axis.
 
     Attributes:
-        curve, at: what is run, and at which value of an axis.
+        curve: engine and settings.
+        at: value of an axis.
         ladder: steps [s] or tolerances, coarse first.
         found: outcomes of the runs, by rung.
         cases, results: of the runs, by rung.

@@ -48,7 +48,7 @@ class BoundaryPoint(SweptSetting):
     """One engine with its settings, without step or tolerance, at one value of an axis.
 
     Attributes:
-        axis, value, parameters: where.
+        axis, value, parameters: location on the map.
         until: length of every run [s].
         period: natural time of the scene there [s].
         largest_stable, largest_accurate: of the two boundaries.
@@ -172,7 +172,7 @@ def dependence(points: Sequence[BoundaryPoint], name: str) -> str:
     """Text on the change of a boundary along an axis, in natural times; empty if it does not change.
 
     Args:
-        points: those of one curve; one without a boundary does not count if its search was cut.
+        points: of one curve; a point without a boundary does not count if its search was cut.
         name: of the boundary.
     """
     fixed_step = any(point.resolution == "dt" for point in points)

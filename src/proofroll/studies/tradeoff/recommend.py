@@ -52,7 +52,7 @@ class Answer:
         runner_up: the cheapest of another engine or formulation.
         first_failure: the most accurate of the cheaper points, which all fail.
         least_model: the cheapest solution of equations derived by hand for the scene.
-        closest: if there is no choice, the most accurate point.
+        closest: the most accurate point if there is no choice; else None.
     """
 
     quantity: str
@@ -91,7 +91,7 @@ class Recommendation:
         scene, parameters: of the study.
         budget: allowed wall time per simulated second, or None.
         affordable: True if the choice is within the budget.
-        best_within_budget: if it is not, the most accurate point that is.
+        best_within_budget: the most accurate point within the budget if the choice is not; else None.
         checked: range of parameters.
         measured: time, machine and versions.
         not_measured: engines that were not asked about.

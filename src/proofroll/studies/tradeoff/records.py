@@ -158,7 +158,7 @@ class CurveBudget:
     """Parts of the error of one quantity along a curve, in the quantity's unit.
 
     Attributes:
-        engine, curve, quantity: which.
+        engine, curve, quantity: names of the curve and of its observable.
         model_form: distance of the limit of small steps from the truth; None if too few runs reached the end.
         model_form_bar: uncertainty of that limit.
         order: observed order of the time step; None with an adaptive step or if no power law shows.
@@ -230,7 +230,7 @@ class TradeoffStudy:
         findings: conclusions, as sentences.
         brief: True if speeds were measured less often.
         measured: time, machine and versions.
-        engines: those to which it is restricted; empty: all.
+        engines: names of a restricted study; empty: all.
         claims: judgements of the claims in its file.
     """
 

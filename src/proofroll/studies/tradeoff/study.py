@@ -55,7 +55,7 @@ def make_tradeoff(
         question: of the sweep.
         runner: runs the cases.
         folder: of all results.
-        engines: those to which it is restricted; empty: all.
+        engines: names of a restricted study; empty: all.
         over: parameter -> values; range over which the best points are checked.
         claims: of a file, or None.
         brief: True to measure less.

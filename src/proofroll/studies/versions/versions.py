@@ -83,7 +83,7 @@ class SettingDifference:
     """All points of a setting in both versions.
 
     Attributes:
-        comparison, setting: which.
+        comparison, setting: names of the row.
         cases: number of points.
         verdicts: ``old`` and ``new`` -> verdict -> number of cases.
         numbers: of the case with the largest difference.

@@ -44,7 +44,7 @@ class Mode:
 
     Attributes:
         flight: position [m], velocity [m/s] and spin [rad/s] at the start of a flight; None: the ball touches the wall.
-        sticking: it rolls without slip, or rests.
+        sticking: True if the ball rolls without slip, or rests.
         slip: velocity of the contact point at the start of a slip [m/s], shape (3,); None: zero.
         rests: nothing moves except a spin about the normal.
     """
@@ -184,7 +184,7 @@ def _rest(body: RollingBall, route: Route, state: FloatArray, time: float, until
     force = -body.ball.mass * body.gravity
 
     def motion(times: FloatArray) -> BallMotion:
-        p_WB, v_WB, w_WB, held = (np.broadcast_to(x, (len(times), 3)) for x in (p, np.zeros(3), (w @ e1) * e1, force))
-        return BallMotion(p_WB, v_WB, w_WB, held, "at rest")
+        p_WB, v_WB, w_WB, wall = (np.broadcast_to(x, (len(times), 3)) for x in (p, np.zeros(3), (w @ e1) * e1, force))
+        return BallMotion(p_WB, v_WB, w_WB, wall, "at rest")
 
     return BallStretch(time, until, True, state, End.TIME, motion)

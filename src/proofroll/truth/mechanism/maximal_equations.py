@@ -37,7 +37,7 @@ class Switched(NamedTuple):
 
     Attributes:
         held: indices of the joints whose coordinates do not move.
-        stopped: those of them that a stop holds.
+        stopped: the joints of ``held`` that a stop holds.
         push: index of a joint -> additional force along its coordinate, N or N m.
         clamped: index of an actuator at its limit -> its effort, N or N m.
     """

@@ -26,7 +26,7 @@ class StretchLaw(NamedTuple):
         guards: values that are negative while the mode lasts, shape (guards,).
         corrected: projects a state onto its constraints.
         noise: round-off of the guards at the start, shape (guards,).
-        near: height of a crest of each guard below which it is uncertain whether it reaches zero; 0: no matter.
+        near: distance from zero of each guard's maximum below which a zero is uncertain, shape (guards,).
     """
 
     rates: Callable[[Array], Array]

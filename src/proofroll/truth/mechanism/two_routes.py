@@ -173,7 +173,7 @@ def check_start(first: JointCoordinates, second: MaximalCoordinates, unit: float
     Lengths of the routes are in a ``unit`` [m].
 
     Raises:
-        Refused: they do not.
+        Refused: the routes place a body apart.
     """
     at = np.zeros(1)
     one, two = record_of(at, [first.sample(*first.mechanism.start())]), second.at_start()
@@ -190,7 +190,7 @@ def _check_branch(one: Record, precise: Record, chaotic: NDArray[np.bool_]) -> N
     """Checks that two routes do not part without chaos.
 
     Raises:
-        Diverged: they do, so they have taken different branches.
+        Diverged: the difference shows that the routes have taken different branches.
     """
     parted = np.flatnonzero((_apart(one, precise) > BRANCH) & ~chaotic)
     if len(parted):

@@ -20,9 +20,9 @@ class Difference:
 
     Attributes:
         kind: of arithmetic, held against the reference.
-        comparison: where it shows.
+        comparison: name of the comparison that shows it.
         what: the decision, by its place in the record; or the number.
-        reference, found: what each says; of numbers the difference and what the error bars allow.
+        reference, found: both values; of numbers the difference and its bound by the error bars.
     """
 
     kind: str

@@ -35,7 +35,7 @@ class Arithmetic:
 
     Attributes:
         name: name of its option.
-        says: what is different, in words.
+        says: difference in words.
         environment: variables of its processes.
         python: interpreter with this package; by default the one that runs this.
         threads: of linear algebra, in each process.
@@ -102,7 +102,7 @@ def make_ready(kind: Arithmetic) -> None:
     """Installs this package for the kind's interpreter, as ``make install`` does, where it is not yet.
 
     Raises:
-        subprocess.CalledProcessError: it cannot be installed.
+        subprocess.CalledProcessError: a package cannot be installed.
     """
     python = Path(kind.python)
     if python.parent.parent.parent == REPOSITORY and python.parent.parent.name.startswith(".venv-"):

@@ -27,10 +27,10 @@ class Tried:
 
     Attributes:
         kind: its name.
-        says: what is different, in words.
+        says: difference in words.
         untried: why it was not tried; empty: it was.
-        runs: how many runs were held against the reference.
-        differences: what of them is not as in the reference.
+        runs: number of runs compared with the reference.
+        differences: deviations from the reference.
         failed: tests that failed, by name; or how the runs, or pytest without a test, ended.
         passed: the last line of pytest; empty: no tests were asked for.
         late: runs that ran out of time, here or in the reference: they are compared with nothing.

@@ -22,11 +22,11 @@ class Mutant:
     """Base of mutants: the scene in the projection method, misread.
 
     Attributes:
-        fault: what is planted, in a few words.
+        fault: planted fault, in a few words.
         scene: on which it is tried, with its parameters.
         named: the cause in plain words; the diagnosis must have one of these words.
         until, every, step: length of the run, interval of its samples, and step [s].
-        asks: what is wanted besides the motion.
+        asks: results wanted besides the motion.
     """
 
     name: ClassVar[str] = "mutant"
@@ -102,7 +102,7 @@ class OneStepBehind(Mutant):
     """Base of mutants with a second model, one step behind.
 
     Attributes:
-        behind: that model.
+        behind: the second model.
     """
 
     def __init__(self, scene: Scene, settings: Any) -> None:

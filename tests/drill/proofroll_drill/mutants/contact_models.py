@@ -31,7 +31,7 @@ class ContactMutant(MechanismMutant):
     """Follows the changed mechanism by the truth's first route.
 
     Attributes:
-        late: how much later it tells its events [s].
+        late: delay of the reported events [s].
     """
 
     scene: ClassVar[Any] = SLED

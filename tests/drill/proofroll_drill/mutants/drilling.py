@@ -64,13 +64,13 @@ class Mutated:
     """Result of one mutant.
 
     Attributes:
-        fault: what was planted.
+        fault: planted fault.
         mutant: its class.
         scene: on which it ran.
-        detected: whether certificate or verdicts show that something is wrong.
-        by: what showed it.
-        named: whether the diagnosis says the cause.
-        said: what the diagnosis says; empty if nothing.
+        detected: True if certificate or verdicts show that something is wrong.
+        by: part of the judge that showed it.
+        named: True if the diagnosis names the cause.
+        said: text of the diagnosis; may be empty.
         ran_on: name of the machine of a cluster on which it ran; empty: here.
     """
 
@@ -138,7 +138,7 @@ def judged_without_fault(kind: type[Mutant]) -> Sequence[Judgement]:
     """All observables of the mutant's engine without its fault on its scene, whose errors are no sign of the fault.
 
     Raises:
-        ValueError: that engine does not build the scene, or fails in it.
+        ValueError: the engine does not build the scene, or fails in it.
     """
     plain = without_fault(kind)
     key = (plain.__bases__, plain.step, _asked(plain))

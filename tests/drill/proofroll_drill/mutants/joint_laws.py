@@ -81,7 +81,7 @@ class MovedStop(MechanismMutant):
     """The stop lies below.
 
     Attributes:
-        by: how far [m].
+        by: shift [m].
     """
 
     fault = "stop at another place"

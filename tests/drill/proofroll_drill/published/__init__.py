@@ -29,7 +29,7 @@ class Held:
     """A published number beside ours.
 
     Attributes:
-        scene, what: which.
+        scene, what: names of the scene and of its number.
         kind: a true ``value``, or the ``error`` of an engine.
         published, ours: the numbers; nan where there is no run.
         misses: True if a value is further off than its digits, or an error larger than allowed.

@@ -33,7 +33,7 @@ class Told:
         events: kind and time [s] of what the ball does on the wall.
         bounces: times of all impacts [s].
         end: until when it is known [s].
-        why: what ends it; empty: the last time.
+        why: reason for its end; empty: the last time.
     """
 
     seen: list[dict[str, Long]] = field(default_factory=list)

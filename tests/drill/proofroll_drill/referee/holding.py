@@ -37,11 +37,11 @@ class Held:
     """One mechanism, ball or scene of contacts.
 
     Attributes:
-        seed, style: which.
+        seed, style: choice of the random scene.
         kinds: of its joints, then of its loops; of a ball or of contacts the events.
         refused: why there is no truth, or the truth's own word where it is ill-posed; empty if it is well-posed.
         worst: largest error of each quantity, in parts of its bar.
-        determinate: how many components of reactions were compared.
+        determinate: number of components of reactions that were compared.
     """
 
     seed: int

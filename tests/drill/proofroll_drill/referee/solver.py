@@ -34,7 +34,7 @@ class System(NamedTuple):
     Attributes:
         push, twist: force and moment on each body of a unit multiplier of each row, (rows, bodies, 3).
         bias: second rate of each row without accelerations.
-        yields: what each row gives way per multiplier: one over an armature, 0 for others.
+        yields: compliance of each row per multiplier: one over an armature, 0 for others.
         of_push, of_twist: accelerations by a unit multiplier.
         a0, alpha0: accelerations without multipliers.
         inverse: of the inertias, world axes.

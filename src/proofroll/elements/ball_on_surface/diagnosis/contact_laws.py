@@ -39,8 +39,8 @@ def other_law(
     def test(evidence: Evidence) -> Iterator[Cause]:
         body = evidence.element.rolling
         if applies(body):
-            for held in residuals_of(evidence):
-                yield held.cause(name, says, law(body), remedy, 0)
+            for residuals in residuals_of(evidence):
+                yield residuals.cause(name, says, law(body), remedy, 0)
 
     return test
 

@@ -68,8 +68,8 @@ class Law:
         body: ball with the numbers that the law assumes.
         force: additional force [N] as a function of the velocity.
         moment: additional moment [N m] as a function of e1, the velocity and the angular velocity.
-        resisting: moment of rolling resistance [N m] for a ball, N and the angular velocity; None: the scene's law.
-        slipping: friction [N] of a slipping ball for a ball, N and the centre's velocity; None: Coulomb's.
+        resisting: moment of rolling resistance [N m] as a function of ball, N and spin; None: the scene's law.
+        slipping: friction [N] during slip as a function of ball, N and the centre's velocity; None: Coulomb's.
     """
 
     body: RollingBall

@@ -46,7 +46,7 @@ def number(
         what: the number, in the words of the cause.
         value: number in the scene, 0 if it has none.
         change: ball with another value of the number.
-        remedy: what to do.
+        remedy: advice to the author.
         only: True for balls whose scene has the number.
         signed: True if the engine may have the wrong sign of the number.
     """
@@ -64,12 +64,12 @@ def number(
             except InputError:
                 return None  # there is no such ball
 
-        for held in residuals_of(evidence):
-            factor, fitted = _snapped(held.fit(law, 1.0))
+        for residuals in residuals_of(evidence):
+            factor, fitted = _snapped(residuals.fit(law, 1.0))
             if possible(factor, signed):
                 factor_words = f"{factor_text(factor)} ({factor * scene:.6g} instead of {scene:.6g})"
                 says = f"the engine moves a ball with {what} {factor_words}"
-                yield held.cause(name, says, law(factor), remedy, fitted, change_by(factor))
+                yield residuals.cause(name, says, law(factor), remedy, fitted, change_by(factor))
 
     return test
 
@@ -91,12 +91,12 @@ def damping(what: str, velocity: float, spin: float) -> Hypothesis:
         def law(rate: float) -> Law:
             return Law(body, force=lambda v: -rate * mass * v, moment=lambda _e1, _v, w: -rate * inertia * w)
 
-        for held in residuals_of(evidence):
-            rate = held.fit(law, 0.0)
+        for residuals in residuals_of(evidence):
+            rate = residuals.fit(law, 0.0)
             if rate > 0:
                 says = f"{what} damped at a rate of {rate:.4g} per second"
                 remedy = "find the engine's own damping, drag or sleeping, and switch it off"
-                yield held.cause("damping", says, law(rate), remedy, 1, rate * evidence.element.natural_time)
+                yield residuals.cause("damping", says, law(rate), remedy, 1, rate * evidence.element.natural_time)
 
     return test
 

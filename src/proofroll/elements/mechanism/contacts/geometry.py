@@ -51,7 +51,7 @@ class Geometry:
 
     Attributes:
         name: unique among geometries.
-        body: that it is fixed to, or ``world``.
+        body: name of the body that carries it, or ``world``.
         kind: a box touches with its eight vertices; a plane pairs with any other kind but a bore, a sphere also with
             a sphere or a bore, an endless cylindrical hole that it moves in.
         position: of its centre, or of any point of a plane or of a bore's axis, in the body's frame [m].

@@ -192,7 +192,7 @@ def given_forces(mechanism: Mechanism, samples: Sequence[MechanismSample]) -> Fl
     """Forces on body a of each contact [N], shape (time, contacts, 3); NaN where the engine does not know them.
 
     Raises:
-        Diverged: they have another shape.
+        Diverged: the forces have another shape.
     """
     count = len(mechanism.contacts)
     empty = np.full((count, 3), np.nan)

@@ -37,7 +37,7 @@ class SeenContact:
     """Contacts of a run and of the truth, with forces; arrays over (time, contacts).
 
     Attributes:
-        evidence: what the run is judged by.
+        evidence: run, truth and certificate.
         time: [s], (time,).
         found, true: gaps, normals and slides of the run and of the truth.
         force, true_force: on body a of each contact [N], (time, contacts, 3).
@@ -256,15 +256,15 @@ def forces_at_start(evidence: Evidence) -> Iterator[Cause]:
 def creep(evidence: Evidence) -> Iterator[Cause]:
     """Hypothesis: sticking contacts creep, as by a regularised law of friction."""
     for touch in touch_of(evidence) if "positions" not in evidence.settled else ():  # it explains no wrong force
-        held = touch.presses & (touch.true.slip <= _HELD * evidence.element.speed) & (touch.friction > 0)
-        slip = touch.found.slip[held]
+        sticks = touch.presses & (touch.true.slip <= _HELD * evidence.element.speed) & (touch.friction > 0)
+        slip = touch.found.slip[sticks]
         run, truth = evidence.run, evidence.truth
         assert run is not None
         assert truth is not None
         moved = float(np.abs(run["positions"].to_numpy() - truth["positions"].to_numpy()).max())
         if len(slip) < 4 or slip.max() * (touch.time[-1] - touch.time[0]) < moved:
             continue  # the creep alone cannot explain the error of the motion
-        used = np.linalg.norm(touch.T[held], axis=-1) / (touch.friction * touch.N)[held]
+        used = np.linalg.norm(touch.T[sticks], axis=-1) / (touch.friction * touch.N)[sticks]
         speed = float(np.sum(slip * used) / np.sum(used * used))
         says = f"contacts that stick creep at {speed:.3g} m/s times T/(μN): friction is regularised"
         after = float(np.abs(slip - speed * used).max())

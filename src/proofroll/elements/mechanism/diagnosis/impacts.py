@@ -90,7 +90,7 @@ class _Impact(NamedTuple):
 
     Attributes:
         k: last sample before it.
-        time: where the flights meet [s].
+        time: instant at which the flights meet [s].
         delay, delay_bar: of that after the gap closes [s].
         restitution, restitution_bar: of the gap's rate.
     """
@@ -161,29 +161,29 @@ def laws_of_impacts(evidence: Evidence) -> Iterator[Cause]:
         before = float(np.max(np.abs(_missed(mechanism, seen)), initial=0.0))
         if not max(_JUMP * evidence.element.speed, ABOVE * own) < before < np.inf:
             continue
-        held = Residuals(
+        residuals = Residuals(
             functools.partial(_missed, struck=seen),
             *("velocities after impacts", "m/s", before, CLOSES, COVERS, mechanism),
             functools.partial(_others, mechanism),
         )
         says, remedy = "convex cone: contacts part after an impact by μ|u_t| too fast", "take Coulomb's own law"
         after = float(np.max(np.abs(_missed(mechanism, seen, convex=True))))
-        yield contact_cause("convex cone", says, held.quantity, held.unit, before, after, remedy)
+        yield contact_cause("convex cone", says, residuals.quantity, residuals.unit, before, after, remedy)
         for law in ("friction", "restitution"):
-            factor = held.fit(functools.partial(_scaled, mechanism, law), 1.0)
+            factor = residuals.fit(functools.partial(_scaled, mechanism, law), 1.0)
             if possible(factor, signed=False):
                 model, says = _scaled(mechanism, law, factor), f"{law} of impacts is {factor_text(factor)}"
-                yield held.cause(f"{law} of impacts", says, model, _REMEDY, 1, change_by(factor))
+                yield residuals.cause(f"{law} of impacts", says, model, _REMEDY, 1, change_by(factor))
         for plane in (geometry for geometry in mechanism.geometries if geometry.kind == "plane"):
 
-            def missed(by: FloatArray, plane: Geometry = plane, held: Residuals[Mechanism] = held) -> FloatArray:
-                return held.left(_turned(held.plain, plane, by))
+            def missed(by: FloatArray, plane: Geometry = plane, own: Residuals[Mechanism] = residuals) -> FloatArray:
+                return own.left(_with_turned_plane(own.plain, plane, by))
 
             by = least_squares_parameters(missed, np.zeros(2), 1.0)
             after, off = float(np.max(np.abs(missed(by)))), float(np.linalg.norm(by))
             says, remedy = f"the normal of {plane.name} is turned by {off:.4g} rad", "look at the axes of geometries"
             explains = int(np.sum(np.abs(missed(np.zeros(2))) > CLOSES * before))
-            proof = "normal of a plane", says, held.quantity, held.unit, before, after, remedy, 2
+            proof = "normal of a plane", says, residuals.quantity, residuals.unit, before, after, remedy, 2
             yield contact_cause(*proof, explains=explains, change=np.inf if after <= _EXACT * before else off)
 
 
@@ -255,7 +255,7 @@ def _scaled(mechanism: Mechanism, law: str, factor: float) -> Mechanism | None:
         return None
 
 
-def _turned(mechanism: Mechanism, plane: Geometry, by: FloatArray) -> Mechanism:
+def _with_turned_plane(mechanism: Mechanism, plane: Geometry, by: FloatArray) -> Mechanism:
     """A mechanism with the normal of a plane turned towards its two axes [rad]."""
     normal = tuple((plane.frame[:, 2] + plane.frame[:, :2] @ by).tolist())
     others = (replace(g, normal=normal) if g is plane else g for g in mechanism.geometries)

@@ -78,9 +78,9 @@ def of_actuators(evidence: Evidence) -> Iterator[Cause]:
         (bool(actuators), "the gears", lambda x: _effort(gear=x)),
     ]
     remedy = "look at gains, gear and limit of the actuators: the limit clamps the whole effort, at the joint"
-    for held in residuals_of(evidence) if actuators else ():
+    for residuals in residuals_of(evidence) if actuators else ():
         known = [
-            held.cause(f"actuators: {name}", f"the engine {says}", Change(mechanism, effort=effort), remedy, 0)
+            residuals.cause(f"actuators: {name}", f"the engine {says}", Change(mechanism, effort=effort), remedy, 0)
             for asked, name, says, effort in rules
             if asked
         ]
@@ -89,13 +89,13 @@ def of_actuators(evidence: Evidence) -> Iterator[Cause]:
         for asked, what, law in numbers:
             if not asked or (unlimited and what == "the limits"):  # any limit that is large enough
                 continue
-            factor, count = best(held, lambda x, law=law: Change(mechanism, effort=law(x)))  # type: ignore[misc]  # bound now
+            factor, count = best(residuals, lambda x, law=law: Change(mechanism, effort=law(x)))  # type: ignore[misc]  # bound now
             if what in {"the limits", "the gears"} and count:  # the equations are not linear in these
-                factor = held.fit(lambda x, law=law: Change(mechanism, effort=law(x)), 1.0)  # type: ignore[misc]  # bound now
+                factor = residuals.fit(lambda x, law=law: Change(mechanism, effort=law(x)), 1.0)  # type: ignore[misc]  # bound now
             if possible(factor, signed=what != "the limits"):
                 says = f"the engine moves it with {what} of the actuators {factor_text(factor)}"
                 model = Change(mechanism, effort=law(factor))
-                yield held.cause(f"actuators: {what}", says, model, remedy, count, change_by(factor))
+                yield residuals.cause(f"actuators: {what}", says, model, remedy, count, change_by(factor))
 
 
 def _geared(actuators: tuple[Actuator, ...]) -> bool:
@@ -203,7 +203,7 @@ class _Rebound:
 
     Attributes:
         before, after: coefficients of the parabolas through the samples before and after it, from the first sample on.
-        place: where they meet.
+        place: coordinate at which they meet.
         side: sign of the velocity after it.
         h: time between the samples [s].
     """

@@ -30,18 +30,18 @@ def factor_of_all(
         what: the number, in the words of the cause.
         change: of a mechanism, for a factor.
         has: True if a mechanism has the number at all.
-        remedy: what to do.
+        remedy: advice to the author.
         signed: True if the engine may have the wrong sign of the number; masses are never negative.
     """
 
     @hypothesis(name, "the equations of motion are linear in it: one factor balances them at every state of the run")
     def test(evidence: Evidence) -> Iterator[Cause]:
         mechanism = evidence.element.mechanism
-        for held in residuals_of(evidence) if has(mechanism) else ():
-            factor, fitted = best(held, lambda x: change(mechanism, x))
+        for residuals in residuals_of(evidence) if has(mechanism) else ():
+            factor, fitted = best(residuals, lambda x: change(mechanism, x))
             if possible(factor, signed):
                 says = f"the engine moves it with {what} {factor_text(factor)}"
-                yield held.cause(name, says, change(mechanism, factor), remedy, fitted, change_by(factor))
+                yield residuals.cause(name, says, change(mechanism, factor), remedy, fitted, change_by(factor))
 
     return test
 
@@ -125,7 +125,7 @@ def of_each_body(evidence: Evidence) -> Iterator[Cause]:
     mechanism = evidence.element.mechanism
     mass = np.array([body.mass for body in mechanism.bodies])
     inertia, com = (np.array([getattr(body, key) for body in mechanism.bodies]) for key in ("inertia", "com"))
-    for held in residuals_of(evidence):
+    for residuals in residuals_of(evidence):
         for i, body in enumerate(mechanism.bodies if len(mechanism.bodies) > 1 else ()):
             one = np.arange(len(mass)) == i
 
@@ -135,33 +135,33 @@ def of_each_body(evidence: Evidence) -> Iterator[Cause]:
                     scaled = (np.where(one, x, 1.0) * own.T).T
                     return Change(mechanism, **{what: scaled})  # type: ignore[arg-type]  # an array by its name
 
-                factor, number = best(held, change)
+                factor, number = best(residuals, change)
                 if not possible(factor, False):
                     continue
                 says = f"the engine moves the body {body.name} with its {what} {factor_text(factor)}"
                 model, remedy = change(factor), f"give {body.name} its {what} once"
-                yield held.cause(f"{what} of {body.name}", says, model, remedy, number, change_by(factor))
-        yield from _reordered(held, mechanism, inertia)
+                yield residuals.cause(f"{what} of {body.name}", says, model, remedy, number, change_by(factor))
+        yield from _reordered(residuals, mechanism, inertia)
         if np.any(com):
-            yield from _about_origin(held, mechanism, mass, com, inertia)
+            yield from _about_origin(residuals, mechanism, mass, com, inertia)
 
 
-def _reordered(held: Residuals[Change], mechanism: Mechanism, inertia: FloatArray) -> Iterator[Cause]:
+def _reordered(residuals: Residuals[Change], mechanism: Mechanism, inertia: FloatArray) -> Iterator[Cause]:
     """Hypotheses: moments of inertia along other axes, products of inertia with the wrong sign."""
     remedy = "look at the order of moments and products of inertia, and at the sign of the products"
     for order in list(itertools.permutations(range(3)))[1:]:
         changed = inertia[:, order][:, :, order]
         shown = ", ".join("xyz"[k] for k in order)
         says = f"the moments of inertia are in another order: those about x, y, z are the scene's about {shown}"
-        yield held.cause("order of inertia", says, Change(mechanism, inertia=changed), remedy, 0)
+        yield residuals.cause("order of inertia", says, Change(mechanism, inertia=changed), remedy, 0)
     mirrored = inertia * (2 * np.eye(3) - 1)
     if not np.array_equal(mirrored, inertia):
         says = "the products of inertia have the wrong sign"
-        yield held.cause("order of inertia", says, Change(mechanism, inertia=mirrored), remedy, 0)
+        yield residuals.cause("order of inertia", says, Change(mechanism, inertia=mirrored), remedy, 0)
 
 
 def _about_origin(
-    held: Residuals[Change], mechanism: Mechanism, mass: FloatArray, com: FloatArray, inertia: FloatArray
+    residuals: Residuals[Change], mechanism: Mechanism, mass: FloatArray, com: FloatArray, inertia: FloatArray
 ) -> Iterator[Cause]:
     """Hypotheses: Steiner's part added once too often or too few, centres of mass ignored."""
     steiner = mass[:, None, None] * (
@@ -173,13 +173,15 @@ def _about_origin(
         for which in (np.ones(len(mass)), *np.eye(len(mass))):
             moved = inertia + sign * which[:, None, None] * steiner
             if np.min(np.linalg.eigvalsh(moved)) >= 0:
-                yield held.cause("point of inertia", says, Change(mechanism, inertia=moved), remedy, 0)
+                yield residuals.cause("point of inertia", says, Change(mechanism, inertia=moved), remedy, 0)
     says = "the weights act at the origins of the bodies' frames, not at the centres of mass"
-    yield held.cause(
+    yield residuals.cause(
         "place of weight", says, Change(mechanism, weight_at_origin=True), "put the weight at the centre of mass", 0
     )
     says = "the centres of mass are taken to be at the origins of the bodies' frames"
-    yield held.cause("centre of mass", says, Change(mechanism, com=np.zeros_like(com)), "give the centres of mass", 0)
+    yield residuals.cause(
+        "centre of mass", says, Change(mechanism, com=np.zeros_like(com)), "give the centres of mass", 0
+    )
 
 
 @hypothesis(
@@ -189,19 +191,19 @@ def friction_of_each_joint(evidence: Evidence) -> Iterator[Cause]:
     """Hypothesis: one of several joints has dry friction with a factor."""
     mechanism = evidence.element.mechanism
     rough = [(joint, at) for joint, at in zip(mechanism.joints, mechanism.v_slices, strict=True) if joint.friction]
-    for held in residuals_of(evidence) if len(rough) > 1 else ():
+    for residuals in residuals_of(evidence) if len(rough) > 1 else ():
         for joint, at in rough:
             one = np.eye(mechanism.nv)[at].sum(axis=0)
 
             def change(x: float, one: FloatArray = one) -> Change:
                 return Change(mechanism, friction=1 + (x - 1) * one)
 
-            factor, number = best(held, change)
+            factor, number = best(residuals, change)
             if possible(factor, signed=True):
                 says = f"the engine moves it with the dry friction of the joint {joint.name} {factor_text(factor)}"
                 remedy = f"give {joint.name} its dry friction, against the motion"
                 name = f"friction of {joint.name}"
-                yield held.cause(name, says, change(factor), remedy, number, change_by(factor))
+                yield residuals.cause(name, says, change(factor), remedy, number, change_by(factor))
 
 
 @hypothesis("joint", "the equations are linear in it: one coefficient balances them at every state of the run")
@@ -215,7 +217,7 @@ def of_each_joint(evidence: Evidence) -> Iterator[Cause]:
     equations = JointCoordinates(mechanism)
     q, v = mechanism.start()
     inertia = np.diag(equations.inertial(equations.tree.at(q, v))[1])
-    for held in residuals_of(evidence):
+    for residuals in residuals_of(evidence):
         joints = zip(mechanism.joints, mechanism.v_slices, strict=True)
         each = [(f"the joint {joint.name}", np.eye(mechanism.nv)[at].sum(axis=0)) for joint, at in joints]
         own = {key: [getattr(j, key) for j in mechanism.joints for _ in range(j.nv)] for key in ("armature", "damping")}
@@ -224,8 +226,8 @@ def of_each_joint(evidence: Evidence) -> Iterator[Cause]:
         for where, which in each:
             for what, has in (("an armature (rotor inertia)", "armature"), ("damping", "damping")):
                 key = f"added_{has}"
-                at = held.left(Change(mechanism))
-                slope = held.left(Change(mechanism, **{key: which})) - at
+                at = residuals.left(Change(mechanism))
+                slope = residuals.left(Change(mechanism, **{key: which})) - at
                 square = float(slope @ slope)
                 if not square:
                     continue
@@ -237,4 +239,4 @@ def of_each_joint(evidence: Evidence) -> Iterator[Cause]:
                 remedy = f"set {has} of the joints yourself, also where it is zero"
                 change = Change(mechanism, **{key: value * which})
                 part = abs(size) / float(np.min(inertia[which > 0]))
-                yield held.cause(f"{what} in {where}", says, change, remedy, 1, part)
+                yield residuals.cause(f"{what} in {where}", says, change, remedy, 1, part)

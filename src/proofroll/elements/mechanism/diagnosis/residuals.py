@@ -114,20 +114,20 @@ def _others(plain: Change) -> list[Change]:
     return found
 
 
-def best(held: Residuals[Change], change: Callable[[float], Change]) -> tuple[float, int]:
+def best(residuals: Residuals[Change], change: Callable[[float], Change]) -> tuple[float, int]:
     """Factor that balances an equation linear in it, and number of fitted values: 0 if the factor is a known one.
 
     With a single equation any factor would fit, so that only factors of known mistakes are tried.
     """
-    at = held.left(change(1.0))
-    slope = held.left(change(2.0)) - at
+    at = residuals.left(change(1.0))
+    slope = residuals.left(change(2.0)) - at
 
     def left_by(factor: float) -> float:
         left: FloatArray = at + (factor - 1.0) * slope
         return float(np.max(np.abs(left), initial=0.0))
 
     known = min(FACTORS, key=left_by)
-    if held.single_equation or left_by(known) <= held.closes * held.before:
+    if residuals.single_equation or left_by(known) <= residuals.closes * residuals.before:
         return known, 0
     square = float(slope @ slope)
     return (1.0 - float(slope @ at) / square if square else 1.0), 1

@@ -165,14 +165,14 @@ def lost_coupling(evidence: Evidence) -> Iterator[Cause]:
         return
     says = "the mass matrix lacks terms between a body and those that hang on it, as when a tree is not depth-first"
     remedy = "add bodies depth-first, or take the mass matrix from an algorithm that does not need that order"
-    for held in residuals_of(evidence):
+    for residuals in residuals_of(evidence):
         singles = []
         for row, column in np.argwhere(np.triu(pairs)):
             single = np.zeros_like(pairs)
             single[row, column] = single[column, row] = 1.0
             singles.append(single)
         for lost in [pairs, *singles]:
-            yield held.cause("tree out of order", says, Change(mechanism, coupling=lost), remedy, 0)
+            yield residuals.cause("tree out of order", says, Change(mechanism, coupling=lost), remedy, 0)
 
 
 def _ancestry(mechanism: Mechanism) -> FloatArray:

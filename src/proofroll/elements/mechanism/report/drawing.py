@@ -168,7 +168,7 @@ def direction(element: MechanismElement) -> tuple[FloatArray, FloatArray]:
     axes = [_axis(element, n) for n, joint in enumerate(mechanism.joints) if joint.kind == "revolute"]
     down = np.array(mechanism.gravity)
     up = -down / np.linalg.norm(down) if np.any(down) else np.array([0.0, 0.0, 1.0])
-    viewer = _turned(np.array(_OBLIQUE), up)
+    viewer = _from_z_up(np.array(_OBLIQUE), up)
     plane = axes and all(np.linalg.norm(np.cross(axes[0], axis)) < 1e-6 for axis in axes)
     slides = any(joint.kind not in {"revolute", "prismatic", "fixed"} for joint in mechanism.joints)
     if plane and not slides:
@@ -178,7 +178,7 @@ def direction(element: MechanismElement) -> tuple[FloatArray, FloatArray]:
     return viewer / np.linalg.norm(viewer), up
 
 
-def _turned(direction: FloatArray, up: FloatArray) -> FloatArray:
+def _from_z_up(direction: FloatArray, up: FloatArray) -> FloatArray:
     """A direction given for z up, turned along with z to another upward direction."""
     first = np.eye(3)[int(np.argmin(np.abs(up)))]
     second = unit(np.cross(up, first))

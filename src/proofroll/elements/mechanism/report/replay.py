@@ -215,12 +215,12 @@ def _placed(element: MechanismElement, sampled: dict[str, npt.NDArray[Any]], tim
     p_WB = np.asarray(CubicHermiteSpline(grid, sampled["p_WB"], sampled["v_WB"])(times))
     v_WB, w_WB = (np.zeros_like(p_WB) for _ in range(2))  # not drawn
     q_WB = np.stack(
-        [_turned(grid, sampled["q_WB"][:, n], sampled["w_WB"][:, n], times) for n in range(p_WB.shape[1])], axis=1
+        [_orientations(grid, sampled["q_WB"][:, n], sampled["w_WB"][:, n], times) for n in range(p_WB.shape[1])], axis=1
     )
     return Placed(element.mechanism, times, p_WB, v_WB, w_WB, q_WB)
 
 
-def _turned(grid: FloatArray, q: FloatArray, w: FloatArray, times: FloatArray) -> FloatArray:
+def _orientations(grid: FloatArray, q: FloatArray, w: FloatArray, times: FloatArray) -> FloatArray:
     """Orientations between samples, with the whole turns that the spin implies, shape (frames, 4)."""
     stored = Rotation.from_quat(q, scalar_first=True)
     turn = (stored[1:] * stored[:-1].inv()).as_rotvec()
