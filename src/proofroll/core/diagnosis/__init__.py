@@ -1,4 +1,4 @@
-"""Causes of a motion unlike the scene's: hypotheses, each proven by how much of the difference it leaves.
+"""Causes of a motion unlike the scene's: hypotheses, each proven by the share of the difference that it explains.
 
 A kind of element brings its hypotheses (:class:`ExplainsRuns`). Each looks at a run, its truth and its certificate, and
 computes what the engine would report if it made one particular mistake. The cause is named only if that mistake closes

@@ -99,10 +99,10 @@ def rank_of(values: Array) -> int:
 
 
 class RowSign:
-    """Sign of the product of the singular values of rows along a motion; it changes where the rows lose rank.
+    """Sign that constraint rows have along a motion; it changes where they lose rank.
 
-    One matrix alone has no such sign: the singular vectors, which turn little from pose to pose, carry it along the
-    motion. ``rank`` is that of the rows at a general pose.
+    It is that of the product of their singular values, whose vectors are followed continuously from pose to pose: for
+    one matrix alone all singular values are positive. ``rank`` is that of the rows at a general pose.
     """
 
     def __init__(self, rank: int) -> None:

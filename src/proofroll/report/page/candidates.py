@@ -165,7 +165,7 @@ def held_tolerances(lines: Sequence[TableLine]) -> dict[TableLine, float]:
 
 
 def largest(lines: Sequence[TableLine], role: str, errors: dict[TableLine, float]) -> float | None:
-    """Largest of some errors over the quantities of a role that summaries show."""
+    """Largest error among the lines of a role whose quantity summaries show; None without such a line."""
     return max((errors[line] for line in _shown(lines, role)), default=None)
 
 

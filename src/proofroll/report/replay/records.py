@@ -131,7 +131,7 @@ class ReplayKind(NamedTuple):
 
 @dataclass(frozen=True)
 class ReplayedRun:
-    """One motion of a case; ``shown``: at first; ``frames``: their number; ``message``: reason for an early end."""
+    """One motion of a case; ``shown``: True if visible at first; ``frames``: count; ``message``: reason of an early end."""
 
     name: str
     colour: int

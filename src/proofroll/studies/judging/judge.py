@@ -51,7 +51,7 @@ class Compared:
 
     @property
     def agrees(self) -> bool:
-        """True if it is within its tolerance, and the truth is known well enough to judge."""
+        """True if the error is within its tolerance, and the truth is known well enough to judge."""
         return self.judgement.verdict is Verdict.AGREES
 
     def __str__(self) -> str:

@@ -151,7 +151,7 @@ class Path:
         stretches: in order, from time 0.
         events: kind and time [s] of each change.
         lands: time of a landing with unknown outcome, where the path ends [s]; None: there is none.
-        blurs: uncertainty [s] of an event by its time [s], where both routes find it by the same method.
+        blurs: time of an event [s] -> its uncertainty [s], for events that both routes find by the same method.
     """
 
     stretches: list[BallStretch]

@@ -101,7 +101,7 @@ class Parallel(Revolved):
 
     Attributes:
         of: the surface of revolution.
-        apart: the distance [m], on the side of balls.
+        apart: the distance [m], towards the balls.
     """
 
     of: Revolved

@@ -1,4 +1,4 @@
-"""Hypotheses of contacts at time 0: the first accelerations are those of other contacts."""
+"""Hypotheses on contacts at time 0, tested by the first accelerations."""
 
 import itertools
 from collections.abc import Callable, Iterator, Sequence

@@ -53,7 +53,7 @@ class Reactions:
         return self.placed.mechanism
 
     def causes(self, step: float | None) -> Iterator[Cause]:
-        """Possible causes of wrong reactions; none if they do not differ."""
+        """Possible causes of wrong reactions; none if the reactions are right."""
         if self.reported.differs:
             yield from self.reported.causes(step)
             yield from self._of_other_joints()
