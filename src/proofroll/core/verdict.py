@@ -137,7 +137,7 @@ class RunCurve:
             explain is no difference.
         sampled_bar: largest part of ``own_bar`` that may excuse an error: the part that the sampling interval explains.
         between: values at a few times off the grid, and the true ones; None: there are none.
-        magnitude: of the numbers whose round-off the curve has, if larger than its scale: of positions, for a gap.
+        magnitude: size of the numbers whose round-off enters, if above the curve's scale: of a gap, that of positions.
         precision: in which the run was computed, see :func:`proofroll.core.engine.precision_of`.
     """
 

@@ -44,7 +44,7 @@ class RobotTruth:
 
     Attributes:
         robot, states: the robot and the states.
-        like: truth from which this one was changed; gives scales and torques, and values that are the same.
+        like: truth of the unchanged robot, with its scales, torques and unchanged values; None: this one is unchanged.
     """
 
     robot: Robot

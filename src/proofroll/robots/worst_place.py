@@ -1,4 +1,4 @@
-"""Place of an engine's largest difference at a layer: joint or body, state, the engine's value and the true one."""
+"""Location of an engine's largest difference at a layer: joint or body, state, the engine's value and the true one."""
 
 import numpy as np
 

@@ -104,7 +104,7 @@ class Cause:
 
     @property
     def proven(self) -> bool:
-        """True if it closes the difference, and explains more independent numbers than were fitted."""
+        """True if the cause closes the difference, and explains more independent numbers than were fitted."""
         enough = self.explains is None or self.explains > self.fitted
         return bool(enough and self.before > 0 and np.isfinite(self.after) and self.after <= self.closes * self.before)
 

@@ -74,7 +74,7 @@ def normal_force(body: RollingBall, p_WB: FloatArray, force: FloatArray) -> Floa
 
 
 def natural_acceleration(body: RollingBall) -> float:
-    """Scale of accelerations at time 0, and times the mass of forces: max(g, |p̈|) [m/s²], never zero.
+    """Scale of accelerations at time 0, max(g, |p̈|) [m/s²], never zero; times the mass it is that of forces.
 
     The certificate's relative differences of acceleration, N, F2 and F3 refer to it.
     """

@@ -51,7 +51,7 @@ def natural_time(body: RollingBall) -> float:
 
 
 def turn_interval(body: RollingBall) -> float | None:
-    """See :class:`proofroll.core.element_abilities.CountsTurns`; from the periods of a round along the wall and of a swing."""
+    """See :class:`proofroll.core.element_abilities.CountsTurns`; from the periods of a round and a swing."""
     if not any(body.surface.periods):
         return None
     gravity, bend = float(np.linalg.norm(body.gravity)), float(np.linalg.norm(body.surface.normal_gradient(body.p0), 2))

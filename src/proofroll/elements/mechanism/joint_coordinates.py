@@ -157,7 +157,7 @@ class JointCoordinates:
         ]
 
     def decided(self, q: Array, v: Array, time: float = 0.0) -> tuple[Mode, float]:
-        """Mode of joints (by complementarity) and of limited efforts (by size), and the relative margin of the joints."""
+        """Mode of joints (by complementarity) and of limited efforts (by size), and the joints' relative margin."""
         mode, apart = decided_mode(self.switched, q, v, partial(self._responses, time, q, v))
         return mode + tuple(item.mode(time, float(q[at_q]), float(v[at_v])) for item, at_q, at_v in self.limited), apart
 

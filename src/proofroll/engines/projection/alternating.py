@@ -27,13 +27,13 @@ _CLOSES = 1e-9  # rate at the start of a step that is no round-off, relative to 
 
 
 class Excess(NamedTuple):
-    """Excess of a mode over one of its ends.
+    """Distance of a state beyond one of the bounds of its mode.
 
     Attributes:
         which: index of the joint or contact; actuators are numbered after all of them.
-        kind: kind of the end.
-        size: positive where the mode has ended.
-        closing: rate of the size where the mode ends only while it grows, as of an overlap; inf: it always ends.
+        kind: kind of the bound.
+        size: the distance; positive: the mode has ended.
+        closing: rate of the size, of modes that end only while it grows (an overlap); inf for all others.
     """
 
     which: int

@@ -171,7 +171,7 @@ def with_results(content: ReportedComparison, spread: Spread) -> list[tuple[int,
 
 
 def one_scheme(content: ReportedComparison) -> list[str]:
-    """Sentences that name rows of several engines with one declared scheme, and further rows with equal errors.
+    """Sentences on rows of different engines with the same declared scheme, and on other rows with equal errors.
 
     Codes with one scheme print the same digits, right or wrong; so do those with one wrong model.
     """

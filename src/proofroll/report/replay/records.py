@@ -47,7 +47,7 @@ class Ghost:
 
     @property
     def default(self) -> bool:
-        """True if it has the settings of the obvious model (preset ``default``)."""
+        """True if the run has the settings of the obvious model (preset ``default``)."""
         return self.settings.get("preset") == "default"
 
     def ending(self, reached: float) -> str:
@@ -131,7 +131,7 @@ class ReplayKind(NamedTuple):
 
 @dataclass(frozen=True)
 class ReplayedRun:
-    """One motion of a case; ``shown``: True if visible at first; ``frames``: count; ``message``: reason of an early end."""
+    """One motion of a case; ``shown``: True if visible at first; ``message``: reason for an early end."""
 
     name: str
     colour: int

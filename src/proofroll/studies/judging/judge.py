@@ -258,7 +258,7 @@ def _is_main(item: Observable) -> bool:
 
 
 def _unknown(reference: Reference, name: str) -> bool:
-    """True if it is a force that the truth does not know at some time, as across a line to which joints confine it."""
+    """True for a force that the truth does not know at some time, as across a line to which joints confine it."""
     return reference.scene.observables[name].role is Role.REACTION and name not in reference.curves
 
 

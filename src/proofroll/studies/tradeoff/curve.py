@@ -162,7 +162,7 @@ class Curve:
 
     @property
     def fixed_step(self) -> bool:
-        """True if it is swept over steps, False for tolerances."""
+        """True if the curve is swept over steps; False: over tolerances."""
         return self.facts.resolution == "dt"
 
     def setting(self, facts: EngineFacts) -> dict[str, Any]:
