@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 from scipy.integrate import DOP853
 
-Array = NDArray[np.float64]
+from proofroll.core.arrays import FloatArray
+from proofroll_benchmarks.bare.steps import dop853, rk4
 
 
 @dataclass
@@ -32,12 +32,12 @@ class MechanismLoop:
     """
 
     model: Any
-    start: Array
+    start: FloatArray
     loops: Sequence[tuple[int, int, Sequence[int], Sequence[tuple[int, int]]]]
     springs: Sequence[tuple[int, int, float, float, float]]
     sprung: Sequence[tuple[float, float, int, int]]
-    drives: Array
-    damping: Array
+    drives: FloatArray
+    damping: FloatArray
     rank: int
     eliminates: bool
     dt: float = 0.0
@@ -53,8 +53,8 @@ class MechanismLoop:
                 self.results.append(constraint.createData())
             pin.initConstraintDynamics(self.model, self.data, self.held[0], self.results)
 
-    def end(self, frame: int) -> tuple[Array, Array, Array, Array, Array]:
-        """Place, axes, Jacobian, velocity, and acceleration where no joint accelerates, of a frame; world axes."""
+    def end(self, frame: int) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
+        """Position, axes, Jacobian, velocity, and acceleration where no joint accelerates, of a frame; world axes."""
         model, data, axes = self.model, self.data, pin.LOCAL_WORLD_ALIGNED
         pose, J, twist, rate = data.oMf[frame], np.zeros((6, model.nv)), np.zeros(6), np.zeros(6)
         if model.frames[frame].parentJoint:
@@ -63,13 +63,13 @@ class MechanismLoop:
             rate = pin.getFrameClassicalAcceleration(model, data, frame, axes).vector
         return pose.translation, pose.rotation, J, twist, rate
 
-    def place(self, q: Array, v: Array) -> None:
+    def place(self, q: FloatArray, v: FloatArray) -> None:
         """Places all frames, with what moves them."""
         pin.forwardKinematics(self.model, self.data, q, v, self.rest)
         pin.computeJointJacobians(self.model, self.data, q)
         pin.updateFramePlacements(self.model, self.data)
 
-    def rows(self) -> tuple[Array, Array, Array]:
+    def rows(self) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Residuals of the loops, their rows C with C v = 0, and Cdot v, where the frames were placed."""
         residual, C, drift = [], [], []
         for first, second, places, turns in self.loops:
@@ -89,7 +89,7 @@ class MechanismLoop:
                 drift.append(t @ a[3:] + bend)
         return np.array(residual), np.array(C), np.array(drift)
 
-    def forces(self, q: Array, v: Array) -> Array:
+    def forces(self, q: FloatArray, v: FloatArray) -> FloatArray:
         """Generalised forces of drives, dampers and springs."""
         tau = self.drives - self.damping * v
         for stiffness, rest, at_q, at_v in self.sprung:
@@ -102,14 +102,14 @@ class MechanismLoop:
             tau += pull * d / distance @ (J_a - J_b)[:3]
         return tau
 
-    def split(self, q: Array, C: Array) -> tuple[Array, Array, Array]:
+    def split(self, q: FloatArray, C: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """The rows' split of velocities in the metric of the mass matrix, of a rank found once."""
         M = pin.crba(self.model, self.data, q)
         into = np.linalg.inv(np.linalg.cholesky(np.triu(M) + np.triu(M, 1).T)).T
         U, S, Vt = np.linalg.svd(C @ into, full_matrices=False)
         return into, into @ Vt[: self.rank].T, U[:, : self.rank].T / S[: self.rank, None]
 
-    def acceleration(self, q: Array, v: Array) -> Array:
+    def acceleration(self, q: FloatArray, v: FloatArray) -> FloatArray:
         """Acceleration of the joints."""
         model, data = self.model, self.data
         if self.loops or self.springs:
@@ -124,12 +124,12 @@ class MechanismLoop:
         free = into @ (into.T @ (tau - pin.rnea(model, data, q, v, self.rest)))
         return np.asarray(free - locked @ (back @ (drift + C @ free)))
 
-    def rates(self, y: Array) -> Array:
+    def rates(self, y: FloatArray) -> FloatArray:
         """Rates of configuration and velocity together."""
         q, v = pin.normalize(self.model, y[: self.model.nq]), y[self.model.nq :]
         return np.concatenate([pin.tangentMap(self.model, q) @ v, self.acceleration(q, v)])
 
-    def accepted(self, y: Array) -> Array:
+    def accepted(self, y: FloatArray) -> FloatArray:
         """A state after a step, with violations of the loops taken away."""
         q, v = pin.normalize(self.model, y[: self.model.nq]), y[self.model.nq :]
         if self.eliminates:
@@ -140,55 +140,15 @@ class MechanismLoop:
             q = pin.integrate(self.model, q, -locked @ (back @ residual))
         return np.concatenate([q, v])
 
-    def states(self, times: Iterable[float]) -> Iterator[Array]:
-        """Configuration and velocity at each time [s]."""
-        if self.rtol:
-            rates, rtol = (lambda _, y: self.rates(y)), self.rtol
-            yield from steps(DOP853(rates, 0.0, self.start, np.inf, rtol=rtol, atol=rtol), times, self.accept)
-            return
-        y, done, h = self.start, 0, self.dt
-        for t in times:
-            while done < round(t / h):
-                k1 = self.rates(y)
-                k2 = self.rates(y + h / 2 * k1)
-                k3 = self.rates(y + h / 2 * k2)
-                y, done = self.accepted(y + h / 6 * (k1 + 2 * (k2 + k3) + self.rates(y + h * k3))), done + 1
-                if not np.isfinite(y.sum()):
-                    raise RuntimeError(f"the state is not finite at {done * h:g} s")
-            yield y
+    def last(self, times: FloatArray) -> FloatArray:
+        """Configuration and velocity at the last of these times [s]."""
+        if not self.rtol:
+            return rk4(self.rates, self.start, times, self.dt, self.accepted)
+        solver = DOP853(lambda _, y: self.rates(y), 0.0, self.start, np.inf, rtol=self.rtol, atol=self.rtol)
+        dop853(solver, times, self.accept)
+        return np.asarray(solver.y)
 
-    def accept(self, solver: Any) -> None:
+    def accept(self, solver: DOP853, _: float) -> None:
         """Takes away violations of loops after a step of a solver of scipy."""
         solver.y = self.accepted(solver.y)
         solver.f = self.rates(solver.y)
-
-    def run(self, times: Iterable[float], followed: Sequence[int]) -> Iterator[tuple[list[Array], float, float]]:
-        """Places of frames [m], energy [J] and how far loops are open [m], at each time [s]."""
-        model, data = self.model, self.data
-        try:
-            for y in self.states(times):
-                q, v = y[: model.nq], y[model.nq :]
-                energy = pin.computeKineticEnergy(model, data, q, v) + pin.computePotentialEnergy(model, data, q)
-                energy += sum(stiffness * (q[at] - rest) ** 2 / 2 for stiffness, rest, at, _ in self.sprung)
-                self.place(q, v)
-                for first, second, stiffness, _, length in self.springs:
-                    d = data.oMf[second].translation - data.oMf[first].translation
-                    energy += stiffness * (np.linalg.norm(d) - length) ** 2 / 2
-                opened = float(np.abs(self.rows()[0]).max(initial=0.0))
-                yield [data.oMf[frame].translation.copy() for frame in followed], float(energy), opened
-        except np.linalg.LinAlgError as error:
-            raise RuntimeError(f"the equations became singular ({error})") from None
-
-
-def steps(solver: Any, times: Iterable[float], accept: Callable[[Any], None]) -> Iterator[Any]:
-    """States at each time by scipy's DOP853, whose steps end there; ``accept`` may change the solver's state."""
-    for t in times:
-        solver.t_bound, solver.status = t, "running" if t > solver.t else "finished"
-        while solver.status == "running":
-            wanted, message = solver.h_abs, solver.step()
-            if message is not None:
-                raise RuntimeError(f"no step is small enough past {solver.t:g} s: {message}")
-            if solver.t == t:  # a step cut short at a sample says nothing about the next
-                solver.h_abs = max(wanted, solver.h_abs)
-            accept(solver)
-        yield solver.y

@@ -58,7 +58,7 @@ def _mechanism(scene: Scene, settings: Any) -> Bare:
     loop, frames = _loop_of(mechanism_run, settings), mechanism_run.tree.body
 
     def run(times: FloatArray) -> FloatArray:
-        *_, last = loop.states(times.tolist())
+        last = loop.last(times)
         loop.place(last[: loop.model.nq], last[loop.model.nq :])
         return np.array([loop.data.oMf[frame].translation for frame in frames])
 

@@ -20,7 +20,7 @@ from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.mechanism.sampling import mechanism_of
 from proofroll.engines.projection.dependent import DependentCoordinates
 from proofroll.engines.projection.geometry import geometry_of
-from proofroll.engines.projection.method import ProjectedBall
+from proofroll.engines.projection.method import ProjectedBall, start_and_scales
 from proofroll.engines.projection.orientation import EulerAngles, Orientation, RotatingFrame
 from proofroll_benchmarks.bare import Bare, in_vertical_cylinder, is_mechanism
 from proofroll_benchmarks.bare.steps import dop853, rk4
@@ -36,9 +36,7 @@ def prepare(scene: Scene, settings: Any) -> Bare:
 def _ball(body: RollingBall, settings: Any) -> Callable[[FloatArray], FloatArray]:
     orientation: Orientation = EulerAngles() if settings.formulation == "euler" else RotatingFrame()
     ball = ProjectedBall(body, geometry_of(body.surface), orientation)
-    frame, mu, n = body.surface.frame(body.u0), body.contact.mu_static, 2 + orientation.size
-    angles, spin = orientation.start(frame, frame.T @ body.w0)
-    start = np.concatenate([body.u0, angles, body.udot0, spin])
+    mu, (start, scales) = body.contact.mu_static, start_and_scales(body, orientation)
 
     def after(x: FloatArray) -> FloatArray:
         if settings.eliminates:
@@ -54,7 +52,6 @@ def _ball(body: RollingBall, settings: Any) -> Callable[[FloatArray], FloatArray
         solver.f = ball.rates(solver.y)
 
     def controlled(times: FloatArray) -> FloatArray:
-        scales = _scales(body, n - 2)
         solver = DOP853(lambda _, x: ball.rates(x), 0.0, start, np.inf, rtol=settings.rtol, atol=settings.rtol * scales)
         dop853(solver, times, accepted)
         return np.asarray(solver.y)
@@ -65,13 +62,6 @@ def _ball(body: RollingBall, settings: Any) -> Callable[[FloatArray], FloatArray
         return np.asarray(body.surface.position(x[:2]))
 
     return run
-
-
-def _scales(body: RollingBall, angles: int) -> FloatArray:
-    """Natural sizes of the state: lengths by the ball's radius, speeds by the initial ones."""
-    a, c = body.ball.radius, body.surface.length_scales[0]
-    speed = math.sqrt(body.v0 @ body.v0 + a * a * (body.w0 @ body.w0) + a * math.sqrt(body.gravity @ body.gravity))
-    return np.array([a / c, a, *[1.0] * angles, speed / c, speed, *[speed / a] * 3])
 
 
 def _bodies(scene: Scene, settings: Any) -> Bare:

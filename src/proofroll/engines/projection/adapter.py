@@ -15,14 +15,13 @@ from proofroll.core.integrators import INTEGRATORS, Integrator
 from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.compiled.library import with_heyoka
 from proofroll.elements.ball_on_surface.element import rolling_ball
-from proofroll.elements.ball_on_surface.mechanics import natural_speed
 from proofroll.elements.ball_on_surface.model import ALL_OF_A_BALL, BallCapability, RollingBall
 from proofroll.elements.ball_on_surface.sampling import BallBuilt, BallSample, terms_held
 from proofroll.elements.mechanism.contacts.family import Family, of_contact
 from proofroll.engines.projection import mechanism
 from proofroll.engines.projection.geometry import geometry_of, matrix
 from proofroll.engines.projection.mechanism import ProjectionMechanism
-from proofroll.engines.projection.method import ProjectedBall
+from proofroll.engines.projection.method import ProjectedBall, start_and_scales
 from proofroll.engines.projection.orientation import EulerAngles, FollowedFrame, Orientation, RotatingFrame
 from proofroll.engines.projection.settings import PRESETS, ProjectionSettings
 from proofroll.engines.projection.switching import Switching
@@ -102,10 +101,7 @@ class Projection:
         self._eliminate = settings.eliminates
         self._bounded = math.isfinite(body.contact.mu_static)
         self._fixed_step = settings.dt if settings.resolution == "dt" else 0.0
-        frame = body.surface.frame(body.u0)
-        angles, r = self._orientation.start(frame, frame.T @ body.w0)
-        x, resolution = np.concatenate([body.u0, angles, body.udot0, r]), getattr(settings, settings.resolution)
-        scales = _scales(body, self._orientation.size)
+        resolution, (x, scales) = getattr(settings, settings.resolution), start_and_scales(body, self._orientation)
         self._motion: Integrator | Switching | TaylorSeries
         if settings.integrator == "taylor":
             assert settings.formulation != "dependent"  # refused by the settings
@@ -214,13 +210,3 @@ class Projection:
             angular_acceleration=frame @ acceleration[3:],
             terms=terms_held(resists=ball.rolling_resistance, slips=self._bounded, turns=len(x) > _WITHOUT_ORIENTATION),
         )
-
-
-def _scales(body: RollingBall, angles: int) -> FloatArray:
-    """Natural size of each component of the state, the unit of absolute errors in an adaptive step.
-
-    Lengths are of the order of the ball's radius, speeds of the natural speed.
-    """
-    a, speed = body.ball.radius, natural_speed(body)
-    per_metre = 1 / np.asarray(body.surface.length_scales)
-    return np.concatenate([a * per_metre, np.ones(angles), speed * per_metre, np.full(3, speed / a)])

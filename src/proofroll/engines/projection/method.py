@@ -28,6 +28,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from proofroll.core.arrays import FloatArray, cross
+from proofroll.elements.ball_on_surface.mechanics import natural_speed
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.engines.projection.geometry import Frame, Geometry, Shape, Vector, along, matrix
 from proofroll.engines.projection.orientation import Orientation
@@ -247,3 +248,15 @@ class ProjectedBall:
         *q, first, second, r1, r2, r3 = x.tolist()
         first, second = first - first2 * v2 - first3 * v3, second - second2 * v2 - second3 * v3
         return np.array((*q, first, second, r1 - spin1, r2 - spin2, r3 - spin3))
+
+
+def start_and_scales(body: RollingBall, orientation: Orientation) -> tuple[FloatArray, FloatArray]:
+    """State at time 0, and the natural size of each component: the unit of absolute errors in an adaptive step.
+
+    Lengths are of the order of the ball's radius, speeds of the natural speed.
+    """
+    a, speed, frame = body.ball.radius, natural_speed(body), body.surface.frame(body.u0)
+    angles, r = orientation.start(frame, frame.T @ body.w0)
+    per_metre = 1 / np.asarray(body.surface.length_scales)
+    scales = np.concatenate([a * per_metre, np.ones(orientation.size), speed * per_metre, np.full(3, speed / a)])
+    return np.concatenate([body.u0, angles, body.udot0, r]), scales
