@@ -164,7 +164,8 @@ def test_a_tolerance_that_nothing_holds(proofroll: Proofroll, folder: Path) -> N
         (["--tolerance", "-1"], "positive number"),
         (["--quantity", "speed"], "there is no such observable"),
         (["--engine", "pinocchio"], "measured are exudyn, mujoco"),
-        (["--budget", "0"], "positive number of seconds"),
+        (["--max-cost", "0"], "positive number of seconds"),
+        (["--budget", "1"], "here it is --max-cost"),
         (["--set", "speed=3.21"], "no curves are stored for this question"),
     ],
 )

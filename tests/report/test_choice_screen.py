@@ -141,6 +141,28 @@ def test_the_answer_and_the_frames_are_of_the_chosen_engines(seen: Visit, matrix
     assert seen.page.locator("#answer").inner_text() == matrix.answer(10.0**-decade, forces)
 
 
+def test_a_chosen_scene_is_alone(seen: Visit, matrix: ChoiceMatrix) -> None:
+    """Its column, the rows that ran there, its sentence and its advice are left; all come back."""
+    for place, column in enumerate(matrix.columns):
+        option = seen.page.locator(f"#scene option[value='{place}']")
+        if not option.count():
+            continue
+        seen.page.locator("#scene").select_option(str(place))
+        alone = replace(matrix, columns=[replace(column, group=column.name, whole=True)])
+        decade = int(seen.page.locator("#tolerance").input_value())
+        forces = seen.page.locator("#forces").is_checked()
+        seen.wait("document.querySelectorAll('#choice thead th:not(.beside)').length === 2")
+        assert seen.page.locator("#answer").inner_text() == alone.answer(10.0**-decade, forces)
+        assert seen.page.locator("#choice thead th:visible").count() == 2
+        ran = [row.name for row in matrix.rows if not row.setting and row.found.keys() & set(column.studies)]
+        shown = seen.page.locator("#choice tbody tr:not([data-of]):visible [data-model]")
+        assert [text.strip() for text in shown.all_inner_texts()] == ran
+        assert seen.page.locator("#words li:not([hidden])").count() == 1
+    seen.page.locator("#scene").select_option("")
+    seen.wait("!document.querySelector('#choice .beside')")
+    assert seen.page.locator("#answer").inner_text() == matrix.answer(10.0**-decade, forces)
+
+
 def test_one_tolerance_on_the_first_screen(report_page: Path) -> None:
     """The answer, the slider and the sentences below speak of the same one."""
     text = report_page.read_text(encoding="utf-8")
@@ -202,7 +224,7 @@ def test_names_of_rows_stay_in_their_column_and_in_sight(
       return Math.max(...[...text.getClientRects()].map((part) => part.right)) - head.getBoundingClientRect().right;
     }})"""
     with visit(path, viewport={"width": width, "height": 800}) as seen:
-        seen.wait("document.querySelector('#choose .tools')")
+        seen.wait("document.querySelector('#choose .tools button')")
         seen.page.evaluate("document.querySelectorAll('#choice [aria-expanded=false]').forEach((fold) => fold.click())")
         assert max(seen.page.evaluate(ends)) <= 0
         seen.page.evaluate("document.getElementById('choice').style.width = '3000px'")
@@ -216,17 +238,21 @@ def test_names_of_rows_stay_in_their_column_and_in_sight(
 
 @pytest.mark.parametrize("width", [400, 900, 1400])
 def test_nothing_moves_while_the_page_loads(report_page: Path, visit: Visiting, width: int) -> None:
-    """The form has its place before the first script runs, so that the matrix below it stays where it is."""
+    """The form has its place before the first script runs, heads of the matrix keep theirs, and nothing shifts."""
     place = "Math.round(document.querySelector('.scroll.choice').getBoundingClientRect().top)"
     # The first node after the matrix is parsed before any script at the end of the page runs.
     before = f"""new MutationObserver((_, watch) => {{
       if (!document.querySelector('#choices')) return;
       watch.disconnect(); window.atFirst = {place};
-    }}).observe(document, {{ childList: true, subtree: true }});"""
+    }}).observe(document, {{ childList: true, subtree: true }});
+    window.shifts = 0;
+    const sum = (list) => list.getEntries().forEach((entry) => {{ window.shifts += entry.value; }});
+    new PerformanceObserver(sum).observe({{ type: "layout-shift", buffered: true }});"""
     with visit(report_page, before=before, viewport={"width": width, "height": 800}) as seen:
-        seen.wait("document.querySelector('#choose .tools')")
-        first, last = seen.page.evaluate(f"[window.atFirst, {place}]")
+        seen.wait("document.querySelector('.choice').dataset.sorts === ''")
+        first, last, shifts = seen.page.evaluate(f"[window.atFirst, {place}, window.shifts]")
     assert abs(last - first) <= 0.02 * 800
+    assert shifts < 1e-3
 
 
 def test_without_scripts_there_is_no_form(report_page: Path, visit: Visiting) -> None:

@@ -42,6 +42,17 @@ def test_each_engine_has_a_panel_with_the_others_in_grey(seen: Visit) -> None:
 
 
 @pytest.mark.drill
+@pytest.mark.parametrize("width", [400, 1280])
+def test_a_picture_has_its_height_before_it_is_drawn(report_page: Path, visit: Visiting, width: int) -> None:
+    """What lies below it stays in its place."""
+    with visit(report_page, viewport={"width": width, "height": 900}) as opened:
+        before = opened.page.evaluate(f"{PICTURE}.style.height")
+        opened.page.locator(PART).scroll_into_view_if_needed()
+        opened.wait(f"({PICTURE}.data ?? []).length > 0")
+        assert opened.page.evaluate(f"{PICTURE}.style.height") == before
+
+
+@pytest.mark.drill
 def test_a_mouse_points_and_zooms(seen: Visit) -> None:
     """No legend lies on a panel; a point says what it is; a drag zooms all panels, and a double click returns."""
     part = seen.page.locator(PART)

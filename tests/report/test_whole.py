@@ -15,6 +15,7 @@ from proofroll.report.page.choice_matrix import FIRST_TOLERANCE, choice_matrix
 from proofroll.report.page.first_sentences import three_sentences
 from proofroll.report.page.growing import Report, begun
 from proofroll.report.page.html import page
+from proofroll.report.pages import slug
 from proofroll.report.parts import PartEntry, absent, all_parts, attempt, part_kinds, parts_of
 from proofroll.report.stability.part import StabilityPart
 from proofroll.running.store import Store
@@ -85,7 +86,10 @@ def test_sections_answer_in_order(written_page: str, parse: Any) -> None:
     assert "stability/sphere_in_cylinder/good-V0-8.py" in elements.text
     links = {attributes["href"][1:] for tag, attributes in elements.tags if tag == "a"}
     assert links <= {attributes.get("id") for _, attributes in elements.tags}
-    assert {"study-stability-0", "study-stability-1"} <= links, "each cell of the map leads to its boundary"
+    curve = slug(stability_study().points[0].curve)
+    assert {f"study-stability.{curve}-v0-{value}" for value in (4, 8)} <= links, (
+        "each cell of the map leads to its boundary"
+    )
 
 
 def test_error_against_cost_is_drawn_where_runs_allow_it(report: Report, written_page: str) -> None:

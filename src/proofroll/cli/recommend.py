@@ -33,9 +33,10 @@ def recommend(
     tolerance: Annotated[
         str, typer.Option(help="Largest error: 1e-3 in its unit, '1 mm', or '1 %' of its scale.")
     ] = "",
-    budget: Annotated[
-        float | None, typer.Option(help="Wall seconds per simulated second that a run may take; not of --measure.")
+    max_cost: Annotated[
+        float | None, typer.Option(help="Wall seconds per simulated second that a run may take.")
     ] = None,
+    budget: Annotated[float | None, typer.Option(hidden=True)] = None,
     settings: options.Set = None,
     engine: Annotated[
         list[str] | None, typer.Option(help="Choose among these engines, name[key=value,…]; repeat.")
@@ -65,12 +66,14 @@ def recommend(
     """
     from proofroll.files.scene_file import is_scene
 
+    if budget is not None:
+        raise InputError("--budget", budget, "here it is --max-cost; elsewhere a budget is processor time")
     found = out / "report.json"
     grouped = found.is_file() and not is_scene(scenes[0]) and not scenes[0].endswith(".toml")
     if len(scenes) > 1 or forces or grouped or report is not None:
         given = {
             "--quantity": quantity,
-            "--budget": budget,
+            "--max-cost": max_cost,
             "--set": settings,
             "--over": over,
             "--until": until,
@@ -94,7 +97,7 @@ def recommend(
     for text in engine or []:
         require_engine(parse_engine(text).name)
     unit = question.loaded.observables[question.quantity].unit
-    required = Requirements(question.quantity, _tolerance(tolerance, unit), _seconds(budget), tuple(engine or ()))
+    required = Requirements(question.quantity, _tolerance(tolerance, unit), _seconds(max_cost), tuple(engine or ()))
     ranges = ranges_of(question, over) if over is not None else None
     study = _stored_study(question, engine or [], claims, ranges, out, jobs, measure_first=measure_first)
     known = {*study.absent, *(point.engine for point in study.points)}
@@ -155,10 +158,10 @@ def _tolerance(text: str, unit: str) -> Any:
         raise InputError("tolerance", text, advice) from None
 
 
-def _seconds(budget: float | None) -> float | None:
-    if budget is not None and not 0 < budget < float("inf"):
-        raise InputError("budget", budget, "give a positive number of seconds")
-    return budget
+def _seconds(max_cost: float | None) -> float | None:
+    if max_cost is not None and not 0 < max_cost < float("inf"):
+        raise InputError("--max-cost", max_cost, "give a positive number of seconds")
+    return max_cost
 
 
 def _stored_study(

@@ -7,6 +7,7 @@ import gzip
 import html as markup
 import json
 import re
+import zlib
 from collections import Counter
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,14 +16,15 @@ if TYPE_CHECKING:
     import jinja2
 
 
-# What decides the address of a row: ids around its table, the label of that, the engine of a part of it, the row.
+# What decides the address of a row: ids around its table, the label of that, the engine of a part of it, its keys.
 _PLACES = re.compile(
     r'<(?:section|details|h[1-4])\b[^>]*? id="(?P<section>[^"]+)"'
     r'|<div class="scroll\b[^>]*? aria-label="(?P<label>[^"]*)"'
     r'|<thead>.*?</thead>|<tbody(?: data-engine="(?P<engine>[^"]*)")?>'
-    r'|<tr(?P<row>(?! class="group")[^>]*)>(?P<cell>.*?)(?=</t[hd]>)',
+    r'|<tr(?P<row>(?! class="group")[^>]*)>(?P<cell>.*?)(?P<rest></t[hd]>.*?</tr>)',
     re.DOTALL,
 )
+_KEY = re.compile(r"<td\b[^>]* data-key\b[^>]*>(.*?)</td>", re.DOTALL)
 
 # What is no running text, and what is: between two tags. A browser breaks a line at the hyphen of ``1e-3``.
 _NO_TEXT = re.compile(r"(<(script|style|svg|option|title)\b.*?</\2>)", re.DOTALL)
@@ -71,8 +73,8 @@ def _kept_whole(found: re.Match[str]) -> str:
 def addressed(html: str) -> str:
     """Page whose rows of tables each have an id and, in their first cell, a link to it.
 
-    The id is made from the id of the section, the label of the table and the text of the first cell, so that the row
-    has it again in a page of other runs.
+    The id is made from the id of the section, the label of the table, and the texts of the first cell and of those with
+    the attribute ``data-key``, so that the row has it again in a page of other runs.
     """
     at = {"section": "", "label": "", "engine": ""}
     taken: Counter[str] = Counter()
@@ -86,12 +88,14 @@ def addressed(html: str) -> str:
             return found[0]
         own = re.search(r' id="([^"]*)"', parts["row"])
         of = re.search(r' data-of="([^"]*)"', parts["row"])
-        name = f"{at['engine']} {of[1] if of else ''} {re.sub('<[^>]*>', '', parts['cell'])}"
+        keys = " ".join([parts["cell"], *_KEY.findall(parts["rest"])])
+        name = f"{at['engine']} {of[1] if of else ''} {re.sub('<[^>]*>', '', keys)}"
         address = ".".join(filter(None, (at["section"], slug(at["label"], _WORDS), slug(name, _WORDS) or "row")))
         taken[address] += 1
         address += f"-{taken[address]}" if taken[address] > 1 else ""
-        start = found[0] if own else f'<tr id="{address}"{parts["row"]}>{parts["cell"]}'
-        return f'{start}<a class="row" href="#{own[1] if own else address}" aria-label="link to this row"></a>'
+        start = found[0].removesuffix(parts["rest"]) if own else f'<tr id="{address}"{parts["row"]}>{parts["cell"]}'
+        link = f'<a class="row" href="#{own[1] if own else address}" aria-label="link to this row"></a>'
+        return start + link + parts["rest"]
 
     return _PLACES.sub(address, html)
 
@@ -102,8 +106,13 @@ def section_id(kind: str, name: str) -> str:
 
 
 def slug(text: str, most: int | None = None) -> str:
-    """Text as a part of an address: its words, or the first of them, in lower case, joined by hyphens."""
-    return "-".join(re.findall(r"\w+", markup.unescape(text).lower())[:most])
+    """Text as a part of an address: its words, in lower case, joined by hyphens.
+
+    Of more than ``most`` words the first remain, with a hash of all.
+    """
+    words = re.findall(r"(?:(?<!\w)-(?=\d))?\w+", markup.unescape(text).lower())
+    kept = words[:most]
+    return "-".join([*kept, *([f"{zlib.crc32(' '.join(words).encode()):08x}"] if len(kept) < len(words) else [])])
 
 
 def packed(content: bytes) -> str:

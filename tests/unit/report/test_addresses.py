@@ -32,3 +32,22 @@ def test_an_address_stays_where_results_change() -> None:
     twice = re.findall('<tr id="(own|[^"]*)"', addressed(f"{PAGE}{PAGE}"))
     assert len(set(twice)) == len(twice) - 1, "the id of its own alone"
     assert f"{first[0]}-2" in twice
+
+
+KEYED = """<section id="c"><div class="scroll" role="group" aria-label="Front" tabindex="0"><table><tbody>
+<tr><th scope="row">alpha</th><td data-key>1e-3 s</td><td class="n">5</td></tr>
+<tr><th scope="row">alpha</th><td data-key>-1e-3 s</td><td class="n">6</td></tr>
+<tr><th scope="row">{words} one</th></tr><tr><th scope="row">{words} other</th></tr></tbody></table></div></section>"""
+
+
+def test_an_address_does_not_hang_on_the_rows_before() -> None:
+    """Rows whose first cells are alike differ by their keys, long names by a hash, and signs count."""
+    page = addressed(KEYED.format(words="word " * 12))
+    ids = re.findall(r'<tr id="([^"]*)"', page)
+    assert ids[:2] == ["c.front.alpha-1e-3-s", "c.front.alpha--1e-3-s"]
+    words = "c.front." + "-".join(["word"] * 12)
+    assert all(re.fullmatch(f"{words}-[0-9a-f]{{8}}", name) for name in ids[2:])
+    assert ids[2] != ids[3]
+    assert re.findall(r'class="row" href="#([^"]*)"', page) == ids
+    alone = addressed(re.sub("<tr>.*?5</td></tr>", "", KEYED.format(words="word " * 12)))
+    assert re.findall(r'<tr id="([^"]*)"', alone) == ids[1:]

@@ -132,7 +132,7 @@ def _use(costs: dict[str, float], missing: set[str]) -> tuple[int, float]:
 
 def _asked(matrix: ChoiceMatrix, column: ChoiceColumn, tolerance: float, forces: bool) -> tuple[str, bool | None]:
     """Head of a sentence, and whether the answer is about forces, too; None: motion is not judged."""
-    title = column.title if column.whole else f"“{column.title}”"
+    title = column.title if column.whole else f"{column.name} (“{column.title}”)"
     if column.whole and len(column.studies) == 1:
         title += f" ({column.studies[0]})"
     size = number(tolerance)

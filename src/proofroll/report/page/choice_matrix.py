@@ -90,6 +90,11 @@ class ChoiceColumn:
     studies: tuple[str, ...]
     whole: bool = True
 
+    @property
+    def name(self) -> str:
+        """Name of the group or of the study."""
+        return self.group if self.whole else self.studies[0]
+
 
 @dataclass(frozen=True)
 class ChoiceRow:
@@ -220,13 +225,14 @@ class ChoiceMatrix:
         return cell.name.removeprefix(row.name).strip()
 
     def _phrase(self, column: ChoiceColumn, place: int, cell: ChoiceCell) -> str:
-        return f"{cell.name or self.rows[place].name} for {column.group} ({cell.text}{cell.share})"
+        return f"{cell.name or self.rows[place].name} for {column.name} ({cell.text}{cell.share})"
 
     @cached_property
     def judged_groups(self) -> tuple[list[str], list[str]]:
-        """Groups in which motion is judged, and groups in which forces are judged, too."""
-        whole = [column for column in self.columns if column.whole]
-        motion, both = ([x.group for x in whole if not lacking.issuperset(x.studies)] for lacking in self.unjudged)
+        """Groups and studies in which motion is judged, and those in which forces are judged, too."""
+        motion, both = (
+            [item.name for item in self.columns if not lacking.issuperset(item.studies)] for lacking in self.unjudged
+        )
         return motion, both
 
     @cached_property
@@ -250,8 +256,16 @@ class ChoiceMatrix:
             ]
             for need, at in ASKED
         ]
+        names = [column.name for column in self.columns]
         groups = [column.group if column.whole else "" for column in self.columns]
-        content = {"cells": list(pool), "grid": grid, "ranks": ranks, "groups": groups, "judged": self.judged_groups}
+        content = {
+            "cells": list(pool),
+            "grid": grid,
+            "ranks": ranks,
+            "groups": groups,
+            "names": names,
+            "judged": self.judged_groups,
+        }
         return json.dumps(content, separators=(",", ":"))
 
     @property

@@ -1,6 +1,7 @@
 """Work–precision pictures of a study: error against cost of every run."""
 
 import math
+from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -55,6 +56,12 @@ class WorkPrecision:
 
     quantities: list[str]
     curves: list[PrecisionCurve]
+
+    @property
+    def entries(self) -> list[int]:
+        """Numbers of curves of the engines that have the first quantity, which decide the height of its picture."""
+        drawn = (x.engine for x in self.curves if any(p.cost > 0 and p.errors[0] is not None for p in x.points))
+        return list(Counter(drawn).values())
 
 
 def work_precision(lines: Iterable[TableLine]) -> WorkPrecision | None:

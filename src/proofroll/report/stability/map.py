@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 from proofroll.core.number_format import counted, number
 from proofroll.report.figure import panels, svg_text
 from proofroll.report.labels import name_of, step
+from proofroll.report.pages import slug
 from proofroll.studies.failure import CRASHED, DIVERGED, GAVE_UP, LOST_PHASE, NOT_RUN, REFUSED, TOO_SLOW, WRONG_MODEL
 
 if TYPE_CHECKING:
@@ -118,6 +119,11 @@ def _rectangle(x: int, y: int, face: Any, hatch: str | None) -> Any:
     from matplotlib.patches import Rectangle
 
     return Rectangle((x - 0.5, y - 0.5), 1, 1, facecolor=face, hatch=hatch, edgecolor="0.8", lw=0.5)
+
+
+def address(point: BoundaryPoint) -> str:
+    """Part of the HTML id of a point that is the same in a map of more points."""
+    return slug(f"{point.curve} {point.axis} {point.value:g}")
 
 
 def cell(study: StabilityStudy, point: BoundaryPoint) -> tuple[str, float | None]:

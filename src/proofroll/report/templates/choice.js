@@ -5,9 +5,10 @@
   const form = document.getElementById("choose");
   const slider = document.getElementById("tolerance");
   const forces = document.getElementById("forces");
+  const scene = document.getElementById("scene");
   const told = document.getElementById("tolerated");
   const answer = document.getElementById("answer");
-  const rows = [...table.tBodies[0].rows];
+  const rows = [...table.tBodies[0].rows], heads = [...table.tHead.rows[0].cells];
   const symbols = {{ symbols|tojson }};
   const first = {{ decades.start }}, count = {{ decades|length }};
 
@@ -60,11 +61,23 @@
   // A text whose numbers as 1e-3 are not broken, as `unbroken`.
   const put = (place, text) => place.replaceChildren(...text.split(/(\d[\d.]*e-\d+)/).map(
     (part, at) => at % 2 ? Object.assign(document.createElement("span"), { className: "whole", textContent: part }) : part));
+  // The chosen scene, or group of scenes, alone: its column, the rows that ran there, and the sentences.
+  function narrow() {
+    const only = scene.value === "" ? null : Number(scene.value) + 1;
+    const fold = only && table.querySelector(`[data-group="${CSS.escape(heads[only].dataset.of ?? "")}"][aria-expanded=false]`);
+    if (fold) unfoldChoice(fold, true);
+    for (const row of [heads[0].parentElement, ...rows]) {
+      [...row.cells].forEach((cell, at) => cell.classList.toggle("beside", only !== null && at > 0 && at !== only));
+      row.classList.toggle("beside", only !== null && row.cells[only].matches(".none"));
+    }
+    document.querySelectorAll("#words li").forEach((line, at) => { line.hidden = only !== null && at !== only - 1; });
+  }
   async function show() {
     const place = (forces.checked ? count : 0) + Number(slider.value) - first;
     told.textContent = `1e-${slider.value}`;
     slider.setAttribute("aria-valuetext", told.textContent);
     const data = JSON.parse(await unpack("choices"));
+    if (scene.value !== "") data.groups = data.names.map((name, j) => j === Number(scene.value) ? name : "");
     const cheapest = (asked) => data.ranks[asked].map((ranked) => ranked.find(([at]) => !rows[at].classList.contains("off")));
     const best = cheapest(place);
     rows.forEach((row, i) => data.grid[i].forEach((numbers, j) => fill(row.cells[j + 1], data.cells[numbers[place]], best[j]?.[0] === i, best[j]?.[2])));
@@ -72,6 +85,7 @@
     put(document.getElementById("also"), forces.checked ? "" : also(best, cheapest(place + count), data));
     const words = advised(JSON.parse(await unpack("all-words"))[place]);
     document.querySelectorAll("#words li").forEach((line, i) => put(line, words[i]));
+    narrow();
     table.dataset.at = place;
     table.dispatchEvent(new Event("filled"));
   }
@@ -93,17 +107,6 @@
     const button = event.target.closest("[data-group], [data-model]");
     if (event.target.closest("thead :is([data-group], a)")) event.stopPropagation();
     if (!button) return;
-    const open = button.getAttribute("aria-expanded") !== "true";
-    const { group, model } = button.dataset;
-    button.setAttribute("aria-expanded", open);
-    const parts = group === undefined ? "tr" : "th, td";
-    table.querySelectorAll(parts).forEach((part) => { if (part.dataset.of === (group ?? model)) part.hidden = !open; });
+    unfoldChoice(button, button.getAttribute("aria-expanded") !== "true");
   }, true);
-
-  // Scenes of a group are unfolded at first where the screen has room, small groups first.
-  const scenes = (button) => button.title.split(", ").length;
-  for (const button of innerWidth > 800 ? [...table.querySelectorAll("button[data-group][aria-expanded=false]")].sort((one, other) => scenes(one) - scenes(other)) : []) {
-    button.click();
-    if (table.offsetWidth > table.parentElement.clientWidth) button.click();
-  }
 })();

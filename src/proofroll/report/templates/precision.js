@@ -33,14 +33,16 @@
       `<br>cost ${clean ? "" : "~"}${short(cost)} s/s<br>${verdict ? `verdict: ${literal(verdict)}` : "a step of its ladder"}<extra></extra>`;
   }
 
+  // Heights of the rows of panels. Each has its settings below, where they lie over no point: as many lines as its longest list.
+  function sized(entries, width) {
+    const columns = Math.max(1, Math.min(entries.length, Math.floor(width / 330))), rows = Math.ceil(entries.length / columns) || 1;
+    const blocks = [...Array(rows).keys()].map((row) => PANEL + TICKS + ENTRY * Math.max(...entries.slice(row * columns, (row + 1) * columns), 0) + (row < rows - 1 && HEAD));
+    return { columns, blocks, total: blocks.reduce((sum, block) => sum + block, 0) };
+  }
   function content(study, quantity, width) {
     const all = curves(study, quantity), engines = [...new Set(study.curves.map(({ engine }) => engine))];
     const shown = engines.filter((engine) => all.some((curve) => curve.engine === engine));
-    const columns = Math.max(1, Math.min(shown.length, Math.floor(width / 330))), rows = Math.ceil(shown.length / columns) || 1;
-    // Each row of panels has its settings below, where they lie over no point: as many lines as its longest list.
-    const entries = shown.map((engine) => all.filter((curve) => curve.engine === engine).length);
-    const blocks = [...Array(rows).keys()].map((row) => PANEL + TICKS + ENTRY * Math.max(...entries.slice(row * columns, (row + 1) * columns), 0) + (row < rows - 1 && HEAD));
-    const total = blocks.reduce((sum, block) => sum + block, 0);
+    const { columns, blocks, total } = sized(shown.map((engine) => all.filter((curve) => curve.engine === engine).length), width);
     const points = all.flatMap(({ points }) => points), costs = points.map(({ cost }) => cost);
     const span = [Math.log10(Math.min(...costs)) - 0.3, Math.log10(Math.max(...costs)) + 0.3];
     const least = Math.min(...points.map(({ y }) => y), 10 ** -decade());
@@ -108,7 +110,12 @@
     const part = target.closest(".precision"), element = drawn.get(part);
     if (element.clientWidth && Math.abs(element.layout.width - element.clientWidth) > 1) show(part);
   }));
-  everywhere((part) => part.querySelectorAll(".precision").forEach((each) => near.observe(each)));
+  everywhere((part) => part.querySelectorAll(".precision").forEach((each) => {
+    // The picture has its height before it is drawn, so that nothing moves then.
+    const canvas = each.querySelector(".canvas");
+    canvas.style.height = `${sized(canvas.dataset.entries.split(" ").map(Number), canvas.clientWidth || each.closest("main").clientWidth).total + HEAD + 8}px`;
+    near.observe(each);
+  }));
   document.addEventListener("change", (event) => { if (drawn.has(event.target.closest(".precision"))) show(event.target.closest(".precision")); });
   form?.addEventListener("change", again);
   addEventListener("beforeprint", again);

@@ -9,9 +9,7 @@
     });
     return library;
   }
-  // A map is no list: its numbers are rows of the table of its boundaries.
-  const sorts = (table) => !table.matches(".heat") && rowsOf(table) > 0;
-  const rowsOf = (table) => table.querySelectorAll("tbody tr:not(.group)").length;
+  const sorts = (table) => table.querySelector("tbody tr:not(.group)");
 
   // Rows of engines one after the other, each with its engine: a table that sorts has neither groups nor joined cells.
   function flatten(table) {
@@ -68,7 +66,7 @@
     copy.querySelectorAll("[aria-hidden], .dt-column-order").forEach((part) => part.remove());
     copy.querySelectorAll("br, small, b").forEach((part) => part.before(" "));
     const setting = cell.scope === "row" ? cell.parentElement.dataset.of ?? "" : "";
-    return `${setting} ${copy.textContent}`.replace(/\s+/g, " ").trim();
+    return `${setting} ${cell.dataset.axis ?? ""} ${copy.textContent}`.replace(/\s+/g, " ").trim();
   }
   async function enliven(table) {
     const { default: DataTable } = await load();
@@ -76,7 +74,7 @@
     const label = region.getAttribute("aria-label");
     const form = table.id === "choice" ? document.getElementById("choose") : null;
     if (!form) flatten(table);
-    const heads = [...table.tHead.rows[0].cells], rows = [...table.tBodies[0].rows];
+    const heads = [...[...table.tHead.rows].at(-1).cells], rows = [...table.tBodies[0].rows];
     const key = form ? keyMatrix : keyTable;
     key(rows, heads);
     const asked = () => form ? ` to ${form.querySelector("output").textContent}${form.querySelector("#forces").checked ? " with forces" : ""}` : "";
@@ -84,7 +82,7 @@
       paging: false, info: false, autoWidth: false, order: [], orderDescReverse: false,
       language: { search: "Filter", zeroRecords: "no row has this" },
       layout: {
-        topStart: rows.length < 4 ? null : "search",
+        topStart: rows.length < 2 ? null : "search",
         topEnd: { buttons: [{ extend: "csv", text: "CSV", filename: () => `${label}${asked()}`, title: null,
           exportOptions: { format: { body: (_, __, ___, cell) => said(cell), header: (_, __, cell) => said(cell ?? heads[__]) } } }] },
         bottomStart: null, bottomEnd: null,
@@ -94,8 +92,7 @@
     tools.classList.add("tools");
     tools.querySelector("input")?.setAttribute("aria-label", `Filter: ${label}`);
     tools.querySelector("button").setAttribute("aria-label", `CSV: ${label}`);
-    if (form) form.append(tools); else region.previousElementSibling.replaceWith(tools);
-    table.classList.remove("later");
+    (form?.querySelector(".tools") ?? region.previousElementSibling).replaceWith(tools);
     table.addEventListener("filled", () => { key(rows, heads); made.rows().invalidate("dom").draw(false); });
     region.dataset.sorts = "";
   }
@@ -107,7 +104,7 @@
   everywhere((part) => part.querySelectorAll(".scroll > table").forEach((table) => {
     if (!sorts(table)) return;
     // Room for the signs and the tools of a table that sorts, so that nothing moves when they come.
-    table.classList.add("later");
+    table.classList.add("sorts");
     if (table.id !== "choice") table.closest(".scroll").before(Object.assign(document.createElement("div"), { className: "tools" }));
     near.observe(table);
   }));

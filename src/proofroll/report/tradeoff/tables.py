@@ -244,14 +244,14 @@ def answer_lines(advice: Recommendation) -> Iterator[str]:
     else:
         yield f"For {asked}, use {_line(answer.choice, answer.unit)}"
         if not advice.affordable:
-            yield f"That is more than the budget of {number(advice.budget)} s per simulated second."
+            yield f"That costs more than the {number(advice.max_cost)} s per simulated second of --max-cost."
     if answer.ties:
         tie = min(answer.ties, key=lambda t: t.point.envelope_of(answer.quantity))
         many = f"{len(answer.ties)} others tie in cost, as far as the intervals tell; the most accurate"
         words = many if len(answer.ties) > 1 else "A tie in cost, as far as the intervals tell"
         yield f"{words}: {_line(tie, answer.unit)}"
     for choice, words in (
-        (advice.best_within_budget, "Within the budget"),
+        (advice.best_affordable, "Of those that cost no more"),
         (answer.runner_up, "Runner-up"),
         (answer.first_failure, "Cheaper ones fail; the most accurate of them"),
         (answer.least_model, "If this scene is all you need, its own equations do"),

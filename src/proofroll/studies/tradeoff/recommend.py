@@ -89,9 +89,9 @@ class Recommendation:
     Attributes:
         answer: the recommended engine and setting.
         scene, parameters: of the study.
-        budget: allowed wall time per simulated second, or None.
-        affordable: True if the choice is within the budget.
-        best_within_budget: the most accurate point within the budget if the choice is not; else None.
+        max_cost: allowed wall time per simulated second, or None.
+        affordable: True if the choice costs no more.
+        best_affordable: the most accurate point that costs no more if the choice does; else None.
         checked: range of parameters.
         measured: time, machine and versions.
         not_measured: engines that were not asked about.
@@ -100,9 +100,9 @@ class Recommendation:
     answer: Answer = field(metadata=MERGED)
     scene: str
     parameters: Mapping[str, float]
-    budget: float | None
+    max_cost: float | None
     affordable: bool
-    best_within_budget: Choice | None
+    best_affordable: Choice | None
     checked: CheckedOver
     measured: Measured
     not_measured: list[str] | None = field(default=None, metadata=OPTIONAL)
@@ -132,7 +132,7 @@ def recommend(study: TradeoffStudy, required: Requirements) -> Recommendation:
 
     asked = [p for p in timed if _asked(p, required)]
     choice = next((p for p in asked if why_not(p) is None), None)
-    affordable = choice is not None and (required.budget is None or choice.cost <= required.budget)
+    affordable = choice is not None and (required.max_cost is None or choice.cost <= required.max_cost)
     others = [p for p in asked if choice is not None and p.id != choice.id and why_not(p) is None]
     failing, closest = (best(asked[: asked.index(choice)]), None) if choice else (None, best(asked))
     hand = next((p for p in timed if by_hand(p.level) and why_not(p) is None), None)
@@ -148,14 +148,14 @@ def recommend(study: TradeoffStudy, required: Requirements) -> Recommendation:
         least_model=None if hand is not None and choice is not None and hand.id == choice.id else chosen(hand),
         closest=chosen(closest, f"{why_not(closest)}; {_CLOSEST}") if closest is not None else None,
     )
-    within = [p for p in asked if required.budget is not None and p.cost <= required.budget]
+    within = [p for p in asked if required.max_cost is not None and p.cost <= required.max_cost]
     return Recommendation(
         answer,
         study.scene,
         study.parameters,
-        required.budget,
+        required.max_cost,
         affordable,
-        None if affordable else chosen(best(within), "the most accurate within the budget"),
+        None if affordable else chosen(best(within), "the most accurate that costs no more"),
         CheckedOver(
             {name: [min(values), max(values)] for name, values in study.over.items()},
             max((len(p.corners) for p in study.points if p.corners is not None), default=0),

@@ -25,7 +25,7 @@ class Requirements:
     Attributes:
         quantity: an observable.
         tolerance: largest error of it.
-        budget: allowed wall time per simulated second, or None.
+        max_cost: allowed wall time per simulated second, or None.
         engines: the engines among which to choose; if empty, all but equations derived by hand for the scene.
 
         levels: the rungs among which to choose; all if empty.
@@ -33,7 +33,7 @@ class Requirements:
 
     quantity: str
     tolerance: Tolerance
-    budget: float | None = None
+    max_cost: float | None = None
     engines: tuple[str, ...] = ()
     levels: tuple[str, ...] = ()
 

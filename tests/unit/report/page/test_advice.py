@@ -94,8 +94,8 @@ def test_what_was_left_out_is_not_told_to_fail() -> None:
     beta = replace(late, engine="beta", row=3)
     reason = "no run could be judged, for lack of time or of a truth."
     _, arm, chain, whole = said([*ARM, late, beta], 1e-3)
-    assert arm.startswith("For “A arm” to 1e-3 take alpha")
-    assert chain == f"For “A chain” to 1e-3: {reason}"
+    assert arm.startswith("For arm (“A arm”) to 1e-3 take alpha")
+    assert chain == f"For chain (“A chain”) to 1e-3: {reason}"
     assert whole == said(ARM, 1e-3)[-1]
     assert said([late], 1e-3) == [f"For trees (chain) to 1e-3: {reason}", f"Over all: {reason}"]
     assert "beta joints was not judged" in said([*ARM, replace(beta, study="arm", scene="arm")], 1e-3)[0]

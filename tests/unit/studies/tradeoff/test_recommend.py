@@ -206,13 +206,13 @@ def test_nothing_beyond_what_was_measured() -> None:
     assert answer["first_failure"] is None, "what is not chosen has nothing that is cheaper"
 
 
-def test_a_budget_that_is_too_small() -> None:
-    """A choice dearer than the budget is named as such, with the most accurate that the budget allows."""
-    answer = recommend(study(FAST, MIDDLE, SLOW), required(1e-5, budget=0.02))
+def test_a_largest_cost_that_is_too_small() -> None:
+    """A choice that costs more than is allowed is named as such, with the most accurate that does not."""
+    answer = recommend(study(FAST, MIDDLE, SLOW), required(1e-5, max_cost=0.02))
     assert answer["choice"]["engine"] == "slow"
     assert not answer["affordable"]
-    assert answer["best_within_budget"]["engine"] == "middle"
-    assert recommend(study(FAST, MIDDLE, SLOW), required(1e-5, budget=0.2))["affordable"]
+    assert answer["best_affordable"]["engine"] == "middle"
+    assert recommend(study(FAST, MIDDLE, SLOW), required(1e-5, max_cost=0.2))["affordable"]
 
 
 def test_equations_worked_out_by_hand_are_named_apart() -> None:
