@@ -1,7 +1,7 @@
 "use strict";
 // What a reader of a page would notice, measured. Each question is answered with what is wrong: nothing is good.
 window.reading = (() => {
-  const all = () => [...document.body.querySelectorAll("*")].filter((element) => element.checkVisibility());
+  const all = () => [...document.body.querySelectorAll("*")].filter((element) => element.checkVisibility({ visibilityProperty: true }));
   const named = (element) => `${element.tagName}.${element.getAttribute("class") ?? ""} ${element.getAttribute("aria-label") ?? ""}`;
   const pause = (time) => new Promise((resolve) => setTimeout(resolve, time));
 
