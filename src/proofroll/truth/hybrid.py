@@ -6,7 +6,7 @@ Two routes may share this module and its root finder of guards, and nothing else
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, Generic, Protocol, TypeVar
+from typing import Any, Generic, NamedTuple, Protocol, TypeVar
 
 import numpy as np
 
@@ -20,7 +20,6 @@ from proofroll.core.stalling import StepCount
 State = FloatArray
 ModeT = TypeVar("ModeT")
 SpanT = TypeVar("SpanT", bound="Span")
-Rates = Callable[[float, State], FloatArray]
 # Successive stretches of zero length after which a route makes no progress.
 _STUCK = 50
 # A route makes no progress either after _MANY successive stretches, each shorter than _SHORT times the elapsed time,
@@ -65,6 +64,24 @@ class Span(Protocol):
     @property
     def guard(self) -> object | None:
         """Guard that ended it; None: it reached its time limit."""
+
+
+class StretchLaw(NamedTuple):
+    """Equations of a mode.
+
+    Attributes:
+        rates: right-hand side, a function of the state, which has the time if they depend on it.
+        guards: values that are negative while the mode lasts, shape (guards,).
+        corrected: projects a state onto its constraints; applied after every step.
+        noise: round-off of the guards at the start, shape (guards,); a guard counts as risen only above it.
+        near: distance from zero of each guard's maximum below which a zero is uncertain, shape (guards,).
+    """
+
+    rates: Callable[[State], State]
+    guards: Callable[[State], FloatArray]
+    corrected: Callable[[State], State]
+    noise: FloatArray
+    near: FloatArray
 
 
 @dataclass(frozen=True)
@@ -245,75 +262,47 @@ def _narrows(stretches: Sequence[Span]) -> bool:
 
 
 def integrate_to_guard(
-    rates: Rates,
+    law: StretchLaw,
+    mode: ModeT,
     time: float,
     state: State,
     until: float,
-    *,
     tolerance: FloatArray,
-    guards: Callable[[State], FloatArray],
-    corrected: Callable[[State], State],
     first_step: float | None = None,
-    noise: FloatArray | None = None,
-    visited: list[tuple[float, State]] | None = None,
-    near: FloatArray | float = 0.0,
-    grazes: list[float] | None = None,
-) -> tuple[float, State, int | None]:
-    """Integrates by DOP853 to the first rise of a guard through zero, or to ``until`` [s].
+) -> Stretch[ModeT]:
+    """Stretch from a time and state by DOP853 to the first rise of a guard through zero, or to ``until`` [s].
 
-    Args:
-        rates: right-hand side.
-        time: start of the stretch [s].
-        state: state at the start.
-        until: time limit [s].
-        tolerance: absolute, of each component of the state.
-        guards: values that are negative while the mode lasts, shape (guards,).
-        corrected: projects a state onto its constraints; applied after every step.
-        first_step: length of the first step at most [s], from the stretch before, as rebounds get shorter and shorter;
-            None: chosen from the rates.
-        noise: round-off of the guards, shape (guards,); a guard counts as risen only above it. None: zero.
-        visited: list to which time and state at the start of each step are appended, for :func:`states_at`.
-        near: height of a crest of each guard below which it is uncertain whether it reaches zero; 0: no matter.
-        grazes: list to which the times of these crests are appended [s].
-
-    Returns:
-        Time [s] and state at the end, and index of the guard that rose; None: the time limit.
+    ``tolerance``: absolute, of each component of the state. ``first_step``: length of the first step at most [s], from
+    the stretch before, as rebounds get shorter and shorter; None: chosen from the rates.
 
     Raises:
         Diverged: the integration fails, or would take too many steps.
     """
     if not until > time:
-        return time, state, None
-    solver, back = solver_from(rates, time, state, float(np.min(tolerance)), tolerance), corrected_by(corrected)
-    count = StepCount(time, until)
+        return Stretch(time, time, mode, state, state, None)
+    solver = solver_from(lambda _, y: law.rates(y), time, state, float(np.min(tolerance)), tolerance)
+    back, count, visited, grazes = corrected_by(law.corrected), StepCount(time, until), [], list[float]()
     if first_step is not None:
         solver.h_abs = min(solver.h_abs, max(first_step, 16 * float(np.spacing(time))))
     while solver.t < until:
-        if visited is not None:
-            visited.append((solver.t, solver.y.copy()))
+        visited.append((solver.t, solver.y.copy()))
         controlled_step(solver, None, until)
         count.took(solver.t)
-        at_start = solver.t_old == time
-        if rise := locate_rise(solver, guards, 0.0 if noise is None else noise, at_start, near, grazes):
-            return rise.time, corrected(rise.state), rise.guard
+        if rise := locate_rise(solver, law.guards, law.noise, solver.t_old == time, law.near, grazes):
+            return Stretch(time, rise.time, mode, state, law.corrected(rise.state), rise.guard, visited, grazes)
         go_on_from(solver, back(solver.t, solver.y))
-    return until, np.asarray(solver.y), None
+    return Stretch(time, until, mode, state, np.asarray(solver.y), None, visited, grazes)
 
 
 def states_at(
-    rates: Rates,
-    visited: Sequence[tuple[float, State]],
-    times: FloatArray,
-    tolerance: FloatArray,
-    corrected: Callable[[State], State],
+    law: StretchLaw, visited: Sequence[tuple[float, State]], times: FloatArray, tolerance: FloatArray
 ) -> FloatArray:
     """States at rising times [s], each integrated from the start of the step that holds it, shape (times, state)."""
     starts = np.searchsorted([begun for begun, _ in visited], times, side="right") - 1
-    steps = [visited[max(int(k), 0)] for k in starts]
-    rtol = float(np.min(tolerance))
+    steps, rtol = [visited[max(int(k), 0)] for k in starts], float(np.min(tolerance))
     return np.array(
         [
-            corrected(integrated_to(rates, at, y, t, rtol, tolerance))
+            law.corrected(integrated_to(lambda _, y: law.rates(y), at, y, t, rtol, tolerance))
             for t, (at, y) in zip(times.tolist(), steps, strict=True)
         ]
     )

@@ -2,26 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 import pytest
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Diverged, Refused
-from proofroll.truth.hybrid import Stretch, Transition, follow, integrate_to_guard, states_at, states_of
+from proofroll.truth.hybrid import Stretch, StretchLaw, Transition, follow, integrate_to_guard, states_at, states_of
 
 TOLERANCE = np.full(2, 1e-13)
 
 
-def swing(_: float, y: FloatArray) -> FloatArray:
-    """Rates of a unit oscillator."""
-    return np.array([y[1], -y[0]])
-
-
-def kept(y: FloatArray) -> FloatArray:
-    """The state as it is."""
-    return y
+def swing(guards: Callable[[FloatArray], FloatArray], count: int) -> StretchLaw:
+    """A unit oscillator with guards."""
+    return StretchLaw(
+        lambda y: np.array([y[1], -y[0]]), guards, lambda y: y, noise=np.zeros(count), near=np.zeros(count)
+    )
 
 
 @pytest.mark.arithmetic
@@ -32,23 +29,17 @@ def test_a_crest_within_a_step_is_seen(below: float) -> None:
     def crest(y: FloatArray) -> FloatArray:
         return np.array([y[0] - 1.0 + below])
 
-    time, _, guard = integrate_to_guard(
-        swing, 0.0, np.array([0.0, 1.0]), 3.0, tolerance=TOLERANCE, guards=crest, corrected=kept
-    )
-    assert guard == 0
+    stretch = integrate_to_guard(swing(crest, 1), "on", 0.0, np.array([0.0, 1.0]), 3.0, TOLERANCE)
+    assert stretch.guard == 0
     # what the guard is off by, over the rate at which it rises
-    assert time == pytest.approx(np.arcsin(1.0 - below), abs=20 * TOLERANCE[0] / np.sqrt(2 * below))
+    assert stretch.end == pytest.approx(np.arcsin(1.0 - below), abs=20 * TOLERANCE[0] / np.sqrt(2 * below))
 
 
 def test_states_within_a_stretch_follow_from_its_steps() -> None:
     """Any time of a stretch is reached from the step that holds it, as accurately as its end."""
-    visited: list[tuple[float, FloatArray]] = []
-    start = np.array([0.0, 1.0])
-    integrate_to_guard(
-        swing, 0.0, start, 3.0, tolerance=TOLERANCE, guards=lambda _: np.zeros(0), corrected=kept, visited=visited
-    )
-    times = np.array([0.0, 0.4, 1.7, 3.0])
-    found = states_at(swing, visited, times, TOLERANCE, kept)
+    law, times = swing(lambda _: np.zeros(0), 0), np.array([0.0, 0.4, 1.7, 3.0])
+    stretch = integrate_to_guard(law, "on", 0.0, np.array([0.0, 1.0]), 3.0, TOLERANCE)
+    found = states_at(law, stretch.visited, times, TOLERANCE)
     assert found[:, 0] == pytest.approx(np.sin(times), abs=1e-12)
 
 

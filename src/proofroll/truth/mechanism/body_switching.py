@@ -10,11 +10,10 @@ from proofroll.core.errors import NotUnique, Refused
 from proofroll.elements.mechanism.drives import MODES
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.elements.mechanism.switches import HOLDING, REDUNDANT, STOPPED, Mode, SwitchedJoint
-from proofroll.truth.hybrid import Stretch, Transition
+from proofroll.truth.hybrid import Stretch, StretchLaw, Transition
 from proofroll.truth.mechanism.joint_stretches import JointStretches, guard_values, near_stops, noise_of, reversed_mode
 from proofroll.truth.mechanism.maximal_coordinates import NumericEquations
 from proofroll.truth.mechanism.maximal_equations import Switched
-from proofroll.truth.mechanism.stretches import StretchLaw
 
 _MOST = 6  # largest number of joints at rest at the same time: each has up to three candidate modes
 SLACK = 1e-9  # violation of an inequality, relative to the forces involved, up to which it counts as kept

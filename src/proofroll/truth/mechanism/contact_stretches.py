@@ -18,7 +18,7 @@ from proofroll.elements.mechanism.contacts.touching import Touching
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.elements.mechanism.signal import varies
-from proofroll.truth.hybrid import Stretch, Transition
+from proofroll.truth.hybrid import Stretch, StretchLaw, Transition
 from proofroll.truth.mechanism.contact_guards import (
     AT_REST,
     SLIP_ENDED,
@@ -32,7 +32,7 @@ from proofroll.truth.mechanism.contact_guards import (
     refuse_turning_onset,
     striking,
 )
-from proofroll.truth.mechanism.stretches import Stretches, StretchLaw
+from proofroll.truth.mechanism.stretches import Stretches
 from proofroll.truth.mechanism.two_paths import CLOSE
 
 _AHEAD = 1e-9  # time step, relative to the natural time, after which an effort is compared with its limit

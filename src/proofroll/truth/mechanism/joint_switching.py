@@ -8,9 +8,8 @@ from proofroll.core.arrays import FloatArray
 from proofroll.elements.mechanism.joint_coordinates import JointCoordinates
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.elements.mechanism.switches import HOLDING, STOPPED, Mode, held_joints
-from proofroll.truth.hybrid import Stretch, Transition
+from proofroll.truth.hybrid import Stretch, StretchLaw, Transition
 from proofroll.truth.mechanism.joint_stretches import JointStretches, guard_values, near_stops, noise_of, reversed_mode
-from proofroll.truth.mechanism.stretches import StretchLaw
 
 
 class SwitchedTree(JointStretches):

@@ -2,8 +2,7 @@
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Callable
-from typing import Generic, NamedTuple, TypeVar
+from typing import Generic, TypeVar
 
 import numpy as np
 
@@ -11,29 +10,11 @@ from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Refused
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.elements.mechanism.switches import Settling
-from proofroll.truth.hybrid import Stretch, integrate_to_guard, states_at
+from proofroll.truth.hybrid import Stretch, StretchLaw, integrate_to_guard, states_at
 
 ModeT = TypeVar("ModeT")
 # Least deceleration of rebounds whose time is summed, in natural units; below it is round-off.
 _PULL = 1e-9
-
-
-class StretchLaw(NamedTuple):
-    """Equations of a mode.
-
-    Attributes:
-        rates: right-hand side.
-        guards: values that are negative while the mode lasts, shape (guards,).
-        corrected: projects a state onto its constraints.
-        noise: round-off of the guards at the start, shape (guards,).
-        near: distance from zero of each guard's maximum below which a zero is uncertain, shape (guards,).
-    """
-
-    rates: Callable[[Array], Array]
-    guards: Callable[[Array], FloatArray]
-    corrected: Callable[[Array], Array]
-    noise: FloatArray
-    near: FloatArray
 
 
 class Stretches(ABC, Generic[ModeT]):
@@ -68,27 +49,12 @@ class Stretches(ABC, Generic[ModeT]):
 
     def walk(self, time: float, state: Array, mode: ModeT, until: float) -> Stretch[ModeT]:
         """See the protocol."""
-        law, visited, grazes = self._law(state, mode), list[tuple[float, Array]](), list[float]()
-        end, last, guard = integrate_to_guard(
-            lambda _, y: law.rates(y),
-            time,
-            state,
-            until,
-            tolerance=self._tolerance,
-            guards=law.guards,
-            corrected=law.corrected,
-            first_step=self._span,
-            noise=law.noise,
-            visited=visited,
-            near=law.near,
-            grazes=grazes,
-        )
-        self._span = end - time if end > time else None
-        return Stretch(time, end, mode, state, last, guard, visited, grazes)
+        found = integrate_to_guard(self._law(state, mode), mode, time, state, until, self._tolerance, self._span)
+        self._span = found.end - time if found.end > time else None
+        return found
 
     def within(self, stretch: Stretch[ModeT], times: FloatArray) -> FloatArray:
         """See the protocol."""
         if not stretch.visited:
             return np.array([stretch.first for _ in times])
-        law = self._law(stretch.first, stretch.mode)
-        return states_at(lambda _, y: law.rates(y), stretch.visited, times, self._tolerance, law.corrected)
+        return states_at(self._law(stretch.first, stretch.mode), stretch.visited, times, self._tolerance)
