@@ -27,7 +27,47 @@ from proofroll.elements.mechanism.diagnosis.equations import of_start
 from proofroll.elements.mechanism.rotations import frame_of_axis
 
 _PLACED = 1e-3  # part of the difference that a wrong place may leave: of three numbers two are fitted
+_OWN = "give each pair its own coefficient"
 _NOWHERE = 1e-8  # largest coordinate that counts as zero, relative to the mechanism's length
+
+
+class _FirstAccelerations:
+    """First accelerations of a run, against those of its mechanism with other pairs and geometries."""
+
+    def __init__(self, evidence: Evidence, found: FloatArray) -> None:
+        self.element, self.mechanism = evidence.element, evidence.element.mechanism
+        self.pairs: Sequence[Any] = self.mechanism.pairs
+        self._found = found * np.array([1.0, 1.0, 1.0, *[self.element.length] * 3])
+        # beyond the allowance of a line nothing is the error of a step, however near to the scene's
+        self._wrong = any(OF_FIRST_STEPS in str(line["quantity"]) and not line["holds"] for line in evidence.lines)
+        self.before = self.off(self.pairs)
+
+    def apart(self, pairs: Sequence[Any], geometries: Sequence[Any] | None = None) -> FloatArray:
+        """Accelerations [m/s²] of a mechanism with these contacts minus those of the run; inf if it is refused."""
+        parts = {"pairs": tuple(pairs), "geometries": tuple(geometries or self.mechanism.geometries)}
+        try:
+            first = type(self.element)(replace(self.mechanism, **parts)).first_motion
+        except Refused:
+            return np.full(1, np.inf)
+        turning = self.element.length * first.angular_acceleration
+        return np.ravel(np.concatenate([first.acceleration, turning], axis=-1) - self._found)
+
+    def off(self, pairs: Sequence[Any]) -> float:
+        """Largest component of :meth:`apart`."""
+        return float(np.abs(self.apart(pairs)).max())
+
+    def scaled(self, factor: float, which: Sequence[Any]) -> list[Any]:
+        """All pairs, some of them with a factor on their friction."""
+        factor = max(factor, 0.0)
+        return [replace(pair, friction=factor * pair.friction) if pair in which else pair for pair in self.pairs]
+
+    def cause(
+        self, says: str, after: float, remedy: str, number: int = 0, change: float = np.inf, closes: float = CLOSES
+    ) -> Cause:
+        """Cause that leaves ``after`` of the accelerations, with ``number`` fitted values."""
+        proof = "contacts at time 0", says, "acceleration at time 0", "m/s^2", self.before, after, remedy, number
+        change = np.inf if self._wrong else change
+        return contact_cause(*proof, explains=self._found.size, change=change, closes=closes)
 
 
 @hypothesis(
@@ -35,85 +75,67 @@ _NOWHERE = 1e-8  # largest coordinate that counts as zero, relative to the mecha
 )
 def at_start(evidence: Evidence) -> Iterator[Cause]:
     """Hypotheses on the first accelerations: a pair missing, friction scaled, off or swapped, a geometry moved."""
-    element, start = evidence.element, None
-    if element.mechanism.contacts:
-        start = of_start(evidence, derived=True)
-    if start is None:
-        return
-    mechanism, size = element.mechanism, element.length
-    found = start.each[0].acceleration * np.array([1, 1, 1, size, size, size])
+    start = of_start(evidence, derived=True) if evidence.element.mechanism.contacts else None
+    if start is not None:
+        first = _FirstAccelerations(evidence, start.each[0].acceleration)
+        if first.before > FORCE * first.element.first_motion.scale:
+            for causes in (_other_pairs, _other_friction, _other_places):
+                yield from causes(first)
 
-    def apart(pairs: Sequence[Any], geometries: Sequence[Any] = mechanism.geometries) -> FloatArray:
-        try:
-            first = type(element)(replace(mechanism, pairs=tuple(pairs), geometries=tuple(geometries))).first_motion
-        except Refused:
-            return np.full(1, np.inf)
-        return np.ravel(np.concatenate([first.acceleration, size * first.angular_acceleration], axis=-1) - found)
 
-    def off(pairs: Sequence[Any]) -> float:
-        return float(np.abs(apart(pairs)).max())
-
-    pairs = mechanism.pairs
-    before = off(pairs)
-
-    # beyond the allowance of a line nothing is the error of a step, however near to the scene's
-    wrong = [line for line in evidence.lines if OF_FIRST_STEPS in str(line["quantity"]) and not line["holds"]]
-
-    def cause(
-        says: str, after: float, remedy: str, number: int = 0, change: float = np.inf, closes: float = CLOSES
-    ) -> Cause:
-        proof = "contacts at time 0", says, "acceleration at time 0", "m/s^2", before, after, remedy, number
-        return contact_cause(*proof, explains=found.size, change=np.inf if wrong else change, closes=closes)
-
-    def scaled(factor: float, which: Sequence[Any] = pairs) -> list[Any]:
-        return [replace(pair, friction=max(factor, 0.0) * pair.friction) if pair in which else pair for pair in pairs]
-
-    if not before > FORCE * element.first_motion.scale:
-        return
-    own = "give each pair its own coefficient"
-    for pair in pairs:
-        if len(pairs) > 1:
-            left = off([other for other in pairs if other is not pair])
-            yield cause(f"the contact {pair.name} is left out", left, "let the pair touch")
-    yield cause("friction of all contacts is off", off(scaled(0.0)), own)
-    for a, b in itertools.combinations(pairs, 2):
+def _other_pairs(first: _FirstAccelerations) -> Iterator[Cause]:
+    """Causes: a pair is left out, friction is off, or that of two pairs is swapped."""
+    for pair in first.pairs if len(first.pairs) > 1 else ():
+        left = first.off([other for other in first.pairs if other is not pair])
+        yield first.cause(f"the contact {pair.name} is left out", left, "let the pair touch")
+    yield first.cause("friction of all contacts is off", first.off(first.scaled(0.0, first.pairs)), _OWN)
+    for a, b in itertools.combinations(first.pairs, 2):
         if a.friction != b.friction:
             swap = {a.name: b.friction, b.name: a.friction}
-            after = off([replace(pair, friction=swap.get(pair.name, pair.friction)) for pair in pairs])
-            yield cause(f"friction of {a.name} and {b.name} is swapped", after, own)
+            after = first.off([replace(pair, friction=swap.get(pair.name, pair.friction)) for pair in first.pairs])
+            yield first.cause(f"friction of {a.name} and {b.name} is swapped", after, _OWN)
+
+
+def _other_friction(first: _FirstAccelerations) -> Iterator[Cause]:
+    """Causes: a factor on the friction of all pairs, or of one."""
     from scipy.optimize import minimize_scalar  # half a second, which few runs need
 
-    fit = minimize_scalar(
-        lambda factor: off(scaled(factor)), bounds=(0.0, 3.0), method="bounded", options={"xatol": 1e-6}
-    )
-    groups: list[tuple[str, Sequence[Any], float]] = [("all contacts", pairs, float(fit.x))]
-    for pair in pairs if len(pairs) > 1 else ():
+    def of_all(factor: float) -> float:
+        return first.off(first.scaled(factor, first.pairs))
+
+    fit = minimize_scalar(of_all, bounds=(0.0, 3.0), method="bounded", options={"xatol": 1e-6})
+    groups: list[tuple[str, Sequence[Any], float]] = [("all contacts", first.pairs, float(fit.x))]
+    for pair in first.pairs if len(first.pairs) > 1 else ():
 
         def changed(factor: float, pair: Any = pair) -> FloatArray:
-            return apart(scaled(factor, (pair,)))
+            return first.apart(first.scaled(factor, (pair,)))
 
         groups.append((pair.name, (pair,), least_squares_parameter(changed, 1.0, 1.0)))
     for name, which, factor in groups:
-        after = off(scaled(factor, which)) if possible(factor, signed=False) else np.inf
-        yield cause(f"friction of {name} is {factor_text(factor)}", after, own, 1, change_by(factor))
-    for number, across in _on_planes(element):
+        after = first.off(first.scaled(factor, which)) if possible(factor, signed=False) else np.inf
+        yield first.cause(f"friction of {name} is {factor_text(factor)}", after, _OWN, 1, change_by(factor))
+
+
+def _other_places(first: _FirstAccelerations) -> Iterator[Cause]:
+    """Causes: a geometry lies at another place of the plane that it touches."""
+    size = first.element.length
+    for number, across in _on_planes(first.element):
 
         def moved(way: FloatArray, k: int = number, across: FloatArray = across) -> list[Geometry]:
-            others = list(mechanism.geometries)
+            others = list(first.mechanism.geometries)
             x, y, z = (np.array(others[k].position) + across @ way).tolist()
             others[k] = replace(others[k], position=(x, y, z))
             return others
 
         def with_moved(way: FloatArray, moved: Callable[[FloatArray], list[Geometry]] = moved) -> FloatArray:
-            return apart(pairs, moved(way))
+            return first.apart(first.pairs, moved(way))
 
         way = least_squares_parameters(with_moved, np.zeros(2), size)
         geometry, after = moved(way)[number], float(np.abs(with_moved(way)).max())
-        at = ", ".join(
-            f"{x:.5g}" for x in np.where(np.abs(geometry.position) > _NOWHERE * size, geometry.position, 0.0)
-        )
-        says, off_by = f"the geometry {geometry.name} is at ({at}) m", float(np.linalg.norm(way)) / size
-        yield cause(says, after, "look at the places of geometries", 2, off_by, _PLACED)
+        shown = np.where(np.abs(geometry.position) > _NOWHERE * size, geometry.position, 0.0)
+        says = f"the geometry {geometry.name} is at ({', '.join(f'{x:.5g}' for x in shown)}) m"
+        off_by = float(np.linalg.norm(way)) / size
+        yield first.cause(says, after, "look at the places of geometries", 2, off_by, _PLACED)
 
 
 def _on_planes(element: Any) -> Iterator[tuple[int, FloatArray]]:
