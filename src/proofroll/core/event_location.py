@@ -123,7 +123,7 @@ def locate_rise(
         guards: state -> values, shape (guards,).
         noise: a guard counts as risen when it exceeds this.
         leaving: True if guards that are positive at the start of the step count as zero there.
-        near: height of a crest of each guard below which it is uncertain whether it reaches zero; 0: no matter.
+        near: distance from zero of each guard's maximum below which a zero is uncertain; 0: never.
         grazes: list to which the times of these crests are appended [s].
     """
     dense, start, end = solver.dense_output(), float(solver.t_old), float(solver.t)

@@ -161,13 +161,14 @@ class MechanismElement:
 
     @cached_property
     def natural_time(self) -> float:
-        """Period [s] of a pendulum of its size, or if shorter of its slowest motion on springs and servos of joints.
+        """Period [s] of a pendulum of its size, or of its slowest motion on springs and servos of joints if shorter.
 
-        Without gravity and these, of its mass on its stiffest spring between points, or else of a turn; at rest 1 s.
+        Without gravity, springs and servos of joints: period of its mass on the stiffest spring between points, else
+        the time of a turn, else 1 s.
         """
-        gravity, held = float(np.linalg.norm(self.mechanism.gravity)), self._law_rates[1]
-        slowest = float(held.min(initial=np.inf))
-        slowest = slowest if slowest > _HELD * float(held.max(initial=0.0)) and np.isfinite(slowest) else 0.0
+        gravity, rates = float(np.linalg.norm(self.mechanism.gravity)), self._law_rates[1]
+        slowest = float(rates.min(initial=np.inf))
+        slowest = slowest if slowest > _HELD * float(rates.max(initial=0.0)) and np.isfinite(slowest) else 0.0
         if gravity:
             return 2 * np.pi / max(slowest, float(np.sqrt(gravity / self.length)))
         stiffest = max((spring.stiffness for spring in self.mechanism.springs), default=0.0)

@@ -65,8 +65,8 @@ def values_off_grid(reference: Reference, name: str, dataset: xr.Dataset) -> tup
 def off_grid(reference: Reference, name: str, dataset: xr.Dataset) -> tuple[FloatArray, FloatArray, FloatArray] | None:
     """Times [s] of samples off the grid, an observable or state there, and its true values; None: nothing to compare.
 
-    Intervals with an event of the truth are left out, and a neighbour if the run has it there: for up to a step of the
-    engine its forces may be those from before the event.
+    Sampling intervals with an event of the truth are left out, and the interval beside it in which the run has that
+    event: for up to a step of the engine its forces may be those from before the event.
     """
     own, item = f"{BETWEEN}.{name}", reference.scene.observables.get(name)
     if own not in dataset or own not in reference.dataset:

@@ -53,10 +53,10 @@ class GivenRun:
     reactions: Collection[str] = ()
 
     def require_units(self, truth: xr.Dataset) -> None:
-        """Checks that variables have the units of the truth, if they have one, and bodies its order.
+        """Checks that variables with a unit have that of the truth, and that bodies have its order.
 
         Raises:
-            InputError: one has not.
+            InputError: a variable has another unit, or the bodies another order.
         """
         for dim, given in self.labels.items():
             wanted = truth.variables[dim].values.tolist() if dim in truth.coords else given
