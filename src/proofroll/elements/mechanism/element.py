@@ -163,8 +163,7 @@ class MechanismElement:
     def natural_time(self) -> float:
         """Period [s] of a pendulum of its size, or of its slowest motion on springs and servos of joints if shorter.
 
-        Without gravity, springs and servos of joints: period of its mass on the stiffest spring between points, else
-        the time of a turn, else 1 s.
+        Without these: of its mass on the stiffest spring between points, else the time of a turn, else 1 s.
         """
         gravity, rates = float(np.linalg.norm(self.mechanism.gravity)), self._law_rates[1]
         slowest = float(rates.min(initial=np.inf))
