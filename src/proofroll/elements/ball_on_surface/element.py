@@ -17,16 +17,17 @@ from proofroll.core.element import FirstMotion, OptionalTerm, Sign, StepNumber
 from proofroll.core.element_abilities import RunWatch
 from proofroll.core.errors import InputError, Refused
 from proofroll.core.gravity import Gravity
+from proofroll.core.number_format import vector
 from proofroll.core.observable import Observable
 from proofroll.core.program_text import FailedRun
 from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface import certificate, events, failure, natural_scales, observables
 from proofroll.elements.ball_on_surface.dataset import from_samples
 from proofroll.elements.ball_on_surface.failure_program import program
+from proofroll.elements.ball_on_surface.mechanics import initial_response, normal_force
 from proofroll.elements.ball_on_surface.model import Ball, BallCapability, Contact, InitialMotion, RollingBall
 from proofroll.elements.ball_on_surface.optional_terms import optional_terms
 from proofroll.elements.ball_on_surface.sampling import BallSample
-from proofroll.elements.ball_on_surface.start_words import start_facts
 from proofroll.elements.ball_on_surface.surfaces import Surface
 
 if TYPE_CHECKING:
@@ -112,8 +113,23 @@ class BallOnSurface:
 
     @property
     def start_facts(self) -> Sequence[str]:
-        """See :class:`proofroll.core.element_abilities.TellsStart`."""
-        return start_facts(self.rolling)
+        """Sentences on centre, velocity, normal force, and whether the ball rolls, slips, rests or leaves at once."""
+        body = self.rolling
+        named = zip(body.wall.coordinates, body.u0.tolist(), body.wall.units, strict=True)
+        at = ", ".join(f"{name} = {value:.4g}{'' if unit == '1' else f' {unit}'}" for name, value, unit in named)
+        said = [
+            f"{body.ball.name}: centre at {vector(body.p0)} m in the world ({at}), velocity {vector(body.v0)} m/s, "
+            f"spin {vector(body.w0)} rad/s"
+        ]
+        if body.gap0:
+            return [*said, f"it starts {body.gap0:.4g} m above the {body.wall.kind} and falls"]
+        _, force = initial_response(body)
+        press = float(normal_force(body, body.p0, force))
+        if not np.any(force):
+            return [*said, f"it leaves the {body.wall.kind} at once: nothing presses it on"]
+        slip = float(np.linalg.norm(body.slip0))
+        moves = f"it slips at {slip:.4g} m/s" if slip else "it rolls" if np.any(body.v0) else "its centre is at rest"
+        return [*said, f"{moves}; the {body.wall.kind} presses it with {press:.4g} N"]
 
     @cached_property
     def rolling(self) -> RollingBall:

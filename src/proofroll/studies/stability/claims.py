@@ -9,14 +9,13 @@ from pathlib import Path
 from typing import Literal
 
 from proofroll.core.bounds import require_pair
-from proofroll.core.errors import InputError, error_location, require_known
+from proofroll.core.errors import InputError, ProofrollError, error_location, require_known
 from proofroll.core.plugins import parse_engine
 from proofroll.core.validation import strict, validated
 from proofroll.files.scene_file import is_scene, load_scene, read_scene_file
 from proofroll.files.toml import study_content, study_files
 from proofroll.studies.failure import meanings
 from proofroll.studies.stability.axes import Axis, AxisTerm
-from proofroll.studies.stability.default_axes import axes_of
 from proofroll.studies.stability.records import Boundary, BoundaryPoint, StabilityStudy, dependence
 from proofroll.studies.stability.step_numbers import step_numbers
 
@@ -25,6 +24,8 @@ STUDY = "stability"
 _FEWEST_ALIKE = 2
 # Fewest steps that must fail to confirm that no step holds; each is a fraction of the one before.
 _TRIED = 4
+# Values of a parameter along a default axis, relative to its default, as far as its bounds allow.
+_PARTS = (0.1, 1.0, 10.0)
 
 
 @dataclass(frozen=True)
@@ -164,7 +165,7 @@ def file_for(scene: str) -> StabilityFile:
         if content.get("scene") == scene:
             return _load(path)
     question = "Up to which step or tolerance is each engine stable, and up to which is it right to 1 %?"
-    return StabilityFile(Path(scene).stem, read_scene_file(scene).title, question, scene, axes_of(scene))
+    return StabilityFile(Path(scene).stem, read_scene_file(scene).title, question, scene, default_axes(scene))
 
 
 def _load(path: Path) -> StabilityFile:
@@ -210,3 +211,25 @@ def _check(where: str, file: StabilityFile) -> None:
 
 strict(StabilityFile, Claim, Axis)
 strict(AxisTerm, finite=True)
+
+
+def default_axes(name: str) -> list[Axis]:
+    """Axes of a stability map: each continuous parameter of the scene that is not zero, and the length of the run."""
+    file = read_scene_file(name)
+    values = load_scene(name).parameters
+    axes = []
+    for key, item in file.parameters.items():
+        if item.integer or not values[key]:
+            continue
+        allowed = [part for part in _PARTS if _loads(name, key, part * values[key])]
+        if len(allowed) > 1:
+            axes.append(Axis(key, "1", f"{item.meaning}, in parts of the default", allowed, {key: AxisTerm(key)}))
+    return [*axes, Axis("horizon", "swings", "length of the run in natural times", [1.0, 3.0], horizon=True)]
+
+
+def _loads(name: str, key: str, value: float) -> bool:
+    try:
+        load_scene(name, **{key: value})
+    except ProofrollError:
+        return False
+    return True
