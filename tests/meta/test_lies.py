@@ -21,6 +21,7 @@ from proofroll.core.convergence import richardson, tightest
 from proofroll.core.dataset import BETWEEN
 from proofroll.core.diagnosis.scene_diagnosis import diagnose_scene
 from proofroll.core.errors import Diverged, InputError, Refused
+from proofroll.core.events import Event, events_of, with_events
 from proofroll.core.first_steps import certificate
 from proofroll.core.multi_element import build
 from proofroll.core.observable import Role
@@ -171,6 +172,23 @@ def test_a_lie_where_nobody_says_what_is_judged(about: str, name: str, words: st
     found = judge_run(run, scene_of(about))
     assert words in str(found)
     assert found.agrees is ("not judged" in words)
+
+
+def test_a_bracket_that_ends_before_it_begins_is_named() -> None:
+    """An event's bracket with swapped ends is no bracket: the engine's run fails by name, a user's is refused."""
+    swaps = Lie("swapped", ("slips",), events=lambda right, _: [swap(event) for event in right])
+    run = simulate(scene_of("slips"), liar("slips", swaps), until=UNTIL["slips"], every=EVERY)
+    assert run.attrs["status"] == "diverged"
+    assert "time_low comes before time_high" in run.attrs["message"]
+    honest = simulate(scene_of("slips"), liar("slips", Lie("nothing", ("slips",))), until=UNTIL["slips"], every=EVERY)
+    given = with_events(honest, [swap(event) for event in events_of(honest)])
+    with pytest.raises(InputError, match="time_low comes before time_high"):
+        judge_run(given, scene_of("slips"))
+
+
+def swap(event: Event) -> Event:
+    """The event with the ends of its bracket swapped, 1 ms apart."""
+    return replace(event, time_low=event.time + 5e-4, time_high=event.time - 5e-4)
 
 
 @pytest.mark.parametrize(

@@ -38,6 +38,17 @@ class Event:
     name: str = ""
 
 
+def swapped_bracket(events: Sequence[Event]) -> str:
+    """Sentence on the first event whose bracket ends before it begins; empty: there is none."""
+    for event in events:
+        if event.time_low > event.time_high:
+            return (
+                f"the event {' '.join(filter(None, (event.kind, event.name)))} at {event.time:g} s has the bracket "
+                f"{event.time_low:g} to {event.time_high:g} s; time_low comes before time_high"
+            )
+    return ""
+
+
 def event_columns(events: Sequence[Event]) -> dict[str, Variable]:
     """Variables ``event_kind``, ``event_name``, ``event_time``, ``event_low``, ``event_high`` [s] along ``event``."""
     columns = {
