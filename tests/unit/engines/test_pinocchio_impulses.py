@@ -15,6 +15,7 @@ from proofroll.elements.mechanism.contacts.geometry import Geometry, Pair
 from proofroll.elements.mechanism.element import MechanismElement
 from proofroll.elements.mechanism.sampling import mechanism_of
 from proofroll.files.scene_file import load_scene
+from proofroll.truth.mechanism.natural_units import Units
 from proofroll_drill.published import true_values
 
 pytest.importorskip("pinocchio")
@@ -45,6 +46,22 @@ def test_a_sled_comes_as_near_as_its_law_and_its_steps_allow(
     run.advance(0.7)
     off = float(np.hypot(*(run.sample().p_WB[0, :2] - REST)))
     assert low < max(risen, off) < high
+
+
+@pytest.mark.parametrize("units", [Units(1.0, 2.0**20, 1.0), Units(2.0**-10, 1.0, 1.0), Units(1.0, 1.0, 2.0**7)])
+@pytest.mark.parametrize("preset", ["default", "matched", "tuned"])
+def test_an_error_of_the_solver_does_not_hang_on_units(preset: str, units: Units) -> None:
+    """A light, a large and a slow sled slide as the one on the slope does: tolerances know no kilogram and no metre."""
+    scene, steps = load_scene("sled_on_slope"), 20
+    (element,) = scene.elements
+    other = replace(scene, elements=(replace(element, mechanism=units.mechanism(mechanism_of(scene))),))
+    places = []
+    for each, unit in ((scene, Units(1.0, 1.0, 1.0)), (other, units)):
+        dt = 1e-3 / unit.time
+        run = PINOCCHIO.build(each, replace(PRESETS[preset], dt=dt))
+        run.advance(steps * dt)
+        places.append(run.sample().p_WB[0] * unit.length)
+    np.testing.assert_allclose(*places, rtol=0, atol=1e-12)
 
 
 def test_normal_forces_are_those_at_rest() -> None:

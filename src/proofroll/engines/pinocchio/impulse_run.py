@@ -94,12 +94,12 @@ class ImpulseRun(MechanismRun):
         )
         step = self._accelerations(self.steps.kick(self.steps.q, self.steps.v), self._dt)
         softened = dict[str, Regularised]()
+        unsure = float(self._settings.solver_tolerance or 0.0) * self.steps.fastest(span) / span
         for name, value in hard.items():
             size = float(np.abs(value).max()) or 1.0  # 1 if all accelerations are zero
             others = twice[name], step[name], getattr(plain, name)
-            unsure = float(self._settings.solver_tolerance or 0.0) / span / size
             apart = sum(float(np.abs(value - other).max()) / size for other in others)
-            softened[name] = Regularised(_MARGIN * (unsure + apart), _PARTS if self._settings.convex else _FOUND)
+            softened[name] = Regularised(_MARGIN * (unsure / size + apart), _PARTS if self._settings.convex else _FOUND)
         return replace(plain, **self.steps.read() if self.steps.contacts else {}, regularised=softened)
 
     def _accelerations(self, kick: Impulses, span: float) -> dict[str, Array]:

@@ -36,6 +36,8 @@ LACKING: Mapping[str, str] = dict.fromkeys(ALL_LOOPS | {_CAPABILITY.COUPLINGS}, 
 _SOFT = 5.0
 # Fraction of a gap that a step by the midpoint rule closes; closing all of it would eject what has penetrated.
 _CLOSED = 0.1
+# Part of the largest speed of a row that a speed along a normal has to be, to count.
+_SMALL = 1e-9
 # Ratio of the contact's mobility in two directions of the surface above which PGS returns a wrong impulse.
 _UNEQUAL = 2.0
 
@@ -198,6 +200,11 @@ class ImpulseSteps:
             J[k] = self._posed(all_of, k, each)
         return J, free, inverse, touching
 
+    def fastest(self, span: float) -> float:
+        """Largest speed of a row after a time without impulses, from the present state [m/s, rad/s]."""
+        J, free, *_ = self.terms(self.q, self.v, span)
+        return float(np.abs(np.concatenate([J.reshape(-1, len(free)), self.joints.J]) @ free).max(initial=0.0))
+
     def _moving(self, body: str) -> Moving:
         k, data = self._index[body], self._data
         if k < 0:
@@ -286,12 +293,6 @@ class ImpulseSteps:
                 return Impulses(v, impulse, along)
             which, changed = tuple(sorted({*which, *closing})), False
             solver = self._solver(which)
-            for own, k in enumerate(which):
-                if k < count:
-                    self._posed(solver, own, touching[k])
-                elif k < rubs:
-                    solver.points[own].setTimeStep(span)  # bounds are forces; the default step would be 1 s
-                    solver.points[own].calc(self._model, self._data, solver.point_datas[own])
             rows = np.concatenate([blocks[k] for k in which])
             to_joints = inverse @ rows.T
             G = rows @ to_joints
@@ -299,11 +300,26 @@ class ImpulseSteps:
             for end, k in zip(ends, which, strict=True):
                 if k < count:
                     self._check(k, G[end - 3 : end, end - 3 : end])
+            g = rows @ free + np.concatenate([of_blocks[k] for k in which])
+            # Pinocchio's tolerances and regularisations are numbers without scale: 1e-8, below which its ADMM adapts
+            # its penalty the wrong way, would be a large part of the impulses of short steps or light bodies. In these
+            # units of speed and impulse the problem is the same for all masses, steps and lengths.
+            speed = max(float(np.abs(g[ends - 1]).max()), _SMALL * float(np.abs(g).max())) or 1.0
+            unit = speed / float(np.diag(G).max())
+            for own, k in enumerate(which):
+                if k < count:
+                    self._posed(solver, own, touching[k])
+                elif k < rubs:
+                    solver.points[own].setTimeStep(span / unit)  # bounds are forces; the default step would be 1 s
+                    solver.points[own].calc(self._model, self._data, solver.point_datas[own])
             solver.result.reset()
             solver.options.solve_ncp = not convex
+            tolerance = float(self._settings.solver_tolerance or 0.0)
+            # a product of impulses and velocities, which both have the tolerance; velocities are 1 along normals
+            solver.options.absolute_complementarity_tol = tolerance * max(1.0, float(np.abs(g).max()) / speed)
             if not solver.solve.solve(
-                pin.DelassusOperatorDense(G),
-                rows @ free + np.concatenate([of_blocks[k] for k in which]),
+                pin.DelassusOperatorDense(G * (unit / speed)),
+                g / speed,
                 solver.models,
                 solver.datas,
                 solver.options,
@@ -313,7 +329,7 @@ class ImpulseSteps:
                     f"Pinocchio's {self._settings.solver} solver did not reach "
                     f"solver_tolerance={self._settings.solver_tolerance:g} at {self.t:g} s; a larger one may do"
                 )
-            got = np.array(solver.result.retrieveConstraintImpulses())
+            got = unit * np.array(solver.result.retrieveConstraintImpulses())
             v = free + to_joints @ got
             impulse[:], along[:] = 0.0, 0.0
             for end, k in zip(ends, which, strict=True):

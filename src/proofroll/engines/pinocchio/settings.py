@@ -53,8 +53,8 @@ class PinocchioSettings:
         projection: put the state back on the constraints after each step; not in ``contact``, where the solver does.
         solver: of ``contact`` and ``impulses``: projected Gauss-Seidel or alternating directions (ADMM); None with the
             others.
-        solver_tolerance: of these: feasibility [m/s] and complementarity [J], both also relative [1]; None with the
-            others.
+        solver_tolerance: of ``contact``: feasibility [m/s] and complementarity [J], both also relative [1]; of
+            ``impulses``: of both, relative to speeds and impulses of the step [1]; None with the others.
         convex: of ``impulses``: whether the solver leaves De Saxcé's term out, so that what slips parts.
         proximal: of ``constraint_dynamics``: the term μ that makes dependent rows solvable, taken back by iteration;
             None with the others.

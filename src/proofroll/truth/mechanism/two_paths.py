@@ -96,11 +96,17 @@ def two_route_motion(
 
 
 def _of_a_step(mechanism: Mechanism, record: Record, units: Units) -> dict[str, float]:
-    """Error in each field that the tolerance of one step allows: closer agreement of the routes is chance."""
+    """Error in each field that the tolerance of one step allows: closer agreement of the routes is chance.
+
+    A force has a part that is quadratic in velocities, and so twice their error times their size in natural units.
+    """
     ones = {name: np.ones_like(getattr(record, name)[:1]) for name in JUDGED}
     natural = units.record(mechanism, replace(record, time=record.time[:1], residual=record.residual[:1], **ones))
     sizes = {name: float(largest(getattr(natural, name))[0]) for name in ones}
-    sizes |= {"points": units.length, "energy": units.force * units.length, "pressed": units.force}
+    sizes |= {"points": units.length, "energy": units.force * units.length}
+    spin, speed = (float(np.abs(each).max(initial=0.0)) for each in (record.w_WB, record.v_WB))
+    quadratic = 2 * max(1.0, units.time * spin, units.time * speed / units.length)
+    sizes |= {"wrench": quadratic * sizes["wrench"], "pressed": quadratic * units.force}
     return {name: TOLERANCES[0] * size for name, size in sizes.items()}
 
 

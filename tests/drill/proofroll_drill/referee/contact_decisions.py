@@ -48,11 +48,10 @@ class ContactDecisions(ContactEquations):
         Raises:
             UndecidedError: there is none, or several.
         """
-        state = y[:-1]
-        system, touch, kept = self.system(state), self.touching(state), []
+        system, touch, kept = self.system(y), self.touching(y), []
         for modes in itertools.product(*(self._choices(*each) for each in zip(self.pairs, closed, still, strict=True))):
-            for headed in self._headed(system, touch, modes, aims, state):
-                found = self.solved(state, system, touch, headed, aims)
+            for headed in self._headed(system, touch, modes, aims, y):
+                found = self.solved(y, system, touch, headed, aims)
                 margin = self._margin(headed, closed, touch, found, aims)
                 if margin >= -_KEPT:
                     kept.append((margin, found, list(headed)))
@@ -73,13 +72,13 @@ class ContactDecisions(ContactEquations):
 
     def _balanced(self, y: Long, closed: Sequence[bool], still: Sequence[bool]) -> bool:
         """True if nothing moves, and forces within cones of many sides balance all loads."""
-        n, state = self.n, y[:-1]
+        n = self.n
         if np.abs(y[7 * n : 13 * n]).max() > STILL or list(closed) != list(still):
             return False
-        system, (r, *_) = self.system(state), self._parts(state)
+        system, (r, *_) = self.system(y), self._parts(y)
         columns = [np.concatenate([p.ravel(), t.ravel()]) for p, t in zip(system.push, system.twist, strict=True)]
         columns += [-column for column in columns]
-        for k, t in enumerate(self.touching(state)):
+        for k, t in enumerate(self.touching(y)):
             normal, one, two = frame_of(t.normal)
             for angle in np.linspace(0, 2 * np.pi, _SIDES, endpoint=False) if closed[k] else ():
                 force = normal + self.pairs[k].friction * (np.cos(angle) * one + np.sin(angle) * two)

@@ -1,7 +1,7 @@
 """Event-driven motion of bodies that touch, in long doubles; only data of geometries and pairs is read.
 
-Slips are followed in a variable that stretches time near their end: dt is the product of u/√(u² + U²) over the slip
-speeds u, so that no slip speed passes zero within a step.
+Slips are followed in a variable that stretches time near their end: its rate is the sum of √(u² + U²)/u over the slip
+speeds u, so that no slip speed passes zero within a step, and several that end at once do so exponentially.
 """
 
 from __future__ import annotations
@@ -50,9 +50,10 @@ class ContactReferee(ContactDecisions):
     def follow(self, times: Sequence[float]) -> Told:
         """The account at growing times [s]."""
         told, left = Told(), list(times)
-        y = np.append(self.start(), np.longdouble(0))
-        touch = self.touching(y[:-1])
+        y = self.start()
+        touch = self.touching(y)
         closed = [bool(abs(t.gap) < _TOUCHES and abs(t.normal @ t.slide) < _TOUCHES) for t in touch]
+        self._clamped_anew(y)
         try:
             modes = self.decided(y, closed, [bool(size_of(t.slip) < _TOUCHES) for t in touch])
             while left:
@@ -83,7 +84,7 @@ class ContactReferee(ContactDecisions):
                 y[-1] = left[0]
                 self._look(told, y, modes, left.pop(0))
                 continue
-            y, touch = moved, self.touching(moved[:-1])
+            y, touch = moved, self.touching(moved)
             if slips and min(size_of(touch[k].slip) for k in slips) < _STOPS:
                 return self._stopped(told, y, modes)
         return y, modes
@@ -94,15 +95,22 @@ class ContactReferee(ContactDecisions):
     def _meaning(self, modes: list[Mode]) -> list[tuple[int, str]]:
         """Contact and kind of each guard."""
         kinds = {"open": ["close"], "slip": ["lift"], "stick": ["lift", "break"]}
-        return [(k, kind) for k, mode in enumerate(modes) for kind in kinds[mode.kind]]
+        found = [(k, kind) for k, mode in enumerate(modes) for kind in kinds[mode.kind]]
+        for k, motor in enumerate(self.mechanism.actuators):
+            if motor.limit is not None:
+                found += [(k, "release")] if self.clamped.get(motor.name) else [(k, "above"), (k, "below")]
+        return found
 
     def _guards(self, modes: list[Mode], aim: Any) -> Callable[[Long], list[Any]]:
         """Values that are positive while the modes last, and the time to look first."""
 
         def values(y: Long) -> list[Any]:
-            touch, found = self.touching(y[:-1]), [aim - y[-1]]
-            forces = self.accelerated(y[:-1], modes).force
+            touch, found, room = self.touching(y), [aim - y[-1]], self._room(y)
+            forces = self.accelerated(y, modes).force
             for k, kind in self._meaning(modes):
+                if kind in {"above", "below", "release"}:
+                    found.append(room[self.mechanism.actuators[k].name, kind])
+                    continue
                 n = touch[k].normal
                 N = n @ forces[k]
                 if kind == "break":
@@ -113,35 +121,53 @@ class ContactReferee(ContactDecisions):
 
         return values
 
+    def _room(self, y: Long) -> dict[tuple[str, str], Any]:
+        """Distance of each limited effort from a change of its law, by actuator and change."""
+        found = dict[tuple[str, str], Any]()
+        joints = {joint.name: (q, rate) for q, rate, joint in self._coordinates(*self._parts(y))}
+        for motor in self.mechanism.actuators:
+            if motor.limit is not None:
+                effort, bound = self.wanted(motor, y[-1], *joints[motor.joint]), long(motor.limit)
+                beyond = self.clamped.get(motor.name, 0) * effort - bound
+                found |= {(motor.name, kind): value for kind, value in
+                          (("above", bound - effort), ("below", bound + effort), ("release", beyond))}  # fmt: skip
+        return found
+
+    def _clamped_anew(self, y: Long) -> None:
+        """Clamps efforts beyond their limits, after a change of velocities."""
+        self.clamped = {}
+        signs = {"above": 1, "below": -1}
+        self.clamped = {name: signs[kind] for (name, kind), room in self._room(y).items() if kind in signs and room < 0}
+
     def _stretched(self, modes: list[Mode]) -> Callable[[Long], Long]:
         slips = self._slips(modes)
 
         def rate(y: Long) -> Long:
-            touch, pace = self.touching(y[:-1]), np.longdouble(1)
+            touch, wait = self.touching(y), np.longdouble(not slips)
             for k in slips:
                 u = size_of(touch[k].slip)
-                pace = pace * u / np.sqrt(u * u + _SLOW**2)
-            return self._in_time(y, modes) * pace
+                wait += np.sqrt(u * u + _SLOW**2) / u
+            return self._in_time(y, modes) / wait
 
         return rate
 
     def _in_time(self, y: Long, modes: list[Mode]) -> Long:
         """Rate of a state and its time."""
-        found = self.accelerated(y[:-1], modes)
-        return np.append(self.rate(y[:-1], found.linear, found.angular), np.longdouble(1))
+        found = self.accelerated(y, modes)
+        return self.rate(y, found.linear, found.angular)
 
     def _begun(self, y: Long, modes: list[Mode]) -> Long:
         """State shortly after slips from rest began, when they have a speed."""
-        touch, wait = self.touching(y[:-1]), np.longdouble(0)
+        touch, wait = self.touching(y), np.longdouble(0)
         for k, mode in enumerate(modes):
             if mode.kind == "slip" and mode.heading is not None and size_of(touch[k].slip) < 2 * _STOPS:
-                slide = self.accelerated(y[:-1], modes).slide[k]
+                slide = self.accelerated(y, modes).slide[k]
                 wait = max(wait, 4 * _STOPS / size_of(across(slide, touch[k].normal)))
         return y + wait * self._in_time(y, modes) if wait else y
 
     def _stopped(self, told: Told, y: Long, modes: list[Mode]) -> tuple[Long, list[Mode]]:
         """State and modes at the end of the slowest slip."""
-        touch, found = self.touching(y[:-1]), self.accelerated(y[:-1], modes)
+        touch, found = self.touching(y), self.accelerated(y, modes)
         k = min(self._slips(modes), key=lambda k: size_of(touch[k].slip))
         y = y + size_of(touch[k].slip) / size_of(across(found.slide[k], touch[k].normal)) * self._in_time(y, modes)
         after = self.decided(y, [mode.kind != "open" for mode in modes], self._still(y, modes))
@@ -151,12 +177,16 @@ class ContactReferee(ContactDecisions):
     def _still(self, y: Long, modes: list[Mode]) -> list[bool]:
         """True for each contact that does not slip."""
         return [mode.kind == "stick" or (mode.kind == "slip" and bool(size_of(t.slip) < _STUCK))
-                for t, mode in zip(self.touching(y[:-1]), modes, strict=True)]  # fmt: skip
+                for t, mode in zip(self.touching(y), modes, strict=True)]  # fmt: skip
 
     def _changed(self, told: Told, y: Long, modes: list[Mode], k: int, kind: str) -> tuple[Long, list[Mode]]:
-        """State and modes after a contact closes, lifts off or breaks loose."""
+        """State and modes after a contact closes, lifts off or breaks loose, or an effort meets or leaves its limit."""
         if kind == "close":
             return self._struck(told, y, modes, k)
+        if kind in {"above", "below", "release"}:
+            motor = self.mechanism.actuators[k].name
+            self.clamped[motor] = {"above": 1, "below": -1, "release": 0}[kind]
+            return y, modes
         closed = [mode.kind != "open" and not (kind == "lift" and i == k) for i, mode in enumerate(modes)]
         after = self.decided(y, closed, self._still(y, modes))
         self._happened(told, y, modes, after)
@@ -164,7 +194,7 @@ class ContactReferee(ContactDecisions):
 
     def _struck(self, told: Told, y: Long, modes: list[Mode], k: int) -> tuple[Long, list[Mode]]:
         """State and modes after an impact."""
-        touch = self.touching(y[:-1])
+        touch = self.touching(y)
         speeds = [t.normal @ t.slide for t in touch]
         if any(mode.kind == "open" and i != k and speeds[i] < 0 and touch[i].gap <= -speeds[i] * 1e-9
                for i, mode in enumerate(modes)):  # fmt: skip
@@ -179,7 +209,8 @@ class ContactReferee(ContactDecisions):
         found, _ = self.tried(y, closed, [True] * len(modes), aims)
         y, n = y.copy(), self.n
         y[7 * n : 10 * n], y[10 * n : 13 * n] = found.linear.ravel(), found.angular.ravel()
-        now = self.touching(y[:-1])
+        self._clamped_anew(y)
+        now = self.touching(y)
         stays = [shut and bool(t.normal @ t.slide < 1e-11) for t, shut in zip(now, closed, strict=True)]
         still = [stay and bool(size_of(t.slip) < _STUCK) for t, stay in zip(now, stays, strict=True)]
         after = self.decided(y, stays, still)
@@ -205,17 +236,18 @@ class ContactReferee(ContactDecisions):
 
     def _rests(self, y: Long, modes: list[Mode]) -> bool:
         n = self.n
-        if any(mode.kind == "slip" for mode in modes) or np.abs(y[7 * n : 13 * n]).max() > STILL:
+        driven = bool(self.mechanism.actuators)
+        if driven or any(mode.kind == "slip" for mode in modes) or np.abs(y[7 * n : 13 * n]).max() > STILL:
             return False
-        found = self.accelerated(y[:-1], modes)
+        found = self.accelerated(y, modes)
         return bool(max(np.abs(found.linear).max(), np.abs(found.angular).max()) < 1e-10)
 
     def _look(self, told: Told, y: Long, modes: list[Mode], time: float) -> None:
-        n, state = self.n, y[:-1]
-        r, R, v, w, _ = self._parts(state)
+        n = self.n
+        r, R, v, w, _ = self._parts(y)
         arms = np.einsum("nij,nj->ni", R, self._com)
-        found = self.accelerated(state, modes)
-        wrench = self.wrenches(state, self.system(state), found.multipliers)
+        found = self.accelerated(y, modes)
+        wrench = self.wrenches(y, self.system(y), found.multipliers)
         placed = {"p_WB": (r - arms)[:n], "v_WB": (v - cross(w, arms))[:n], "w_WB": w[:n], "R_WB": R[:n]}
         told.seen.append({**placed, "pressed": found.force, "wrench": wrench})
         told.end = float(time)

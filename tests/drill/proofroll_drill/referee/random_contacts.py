@@ -10,6 +10,8 @@ from scipy.spatial.transform import Rotation
 
 from proofroll.elements.mechanism import Body, Joint, Mechanism
 from proofroll.elements.mechanism.contacts.geometry import Geometry, Pair
+from proofroll.elements.mechanism.drives import Actuator
+from proofroll.elements.mechanism.signal import Formula
 
 _G = (0.0, 0.0, -9.81)  # m/s²
 _APART = 0.005  # m between the tip of an arm and its floor at the start, at least
@@ -25,7 +27,9 @@ def random_contacts(seed: int) -> tuple[str, Mechanism, float]:
     make, until = STYLES[style]
     bodies, joints, geometries, pairs = make(rng, friction, style)
     gravity = _floats(rng.normal(size=3) * 3) if style == "spheres" else _G
-    return style, Mechanism(bodies, joints, geometries=geometries, pairs=pairs, gravity=gravity), until
+    motors = (_motor(rng, joints[0]),) if style in {"plate", "arm"} and rng.random() < 0.5 else ()
+    mechanism = Mechanism(bodies, joints, geometries=geometries, pairs=pairs, gravity=gravity, actuators=motors)
+    return style, mechanism, until
 
 
 def _sphere(rng: np.random.Generator, friction: float, style: str) -> Made:
@@ -227,6 +231,16 @@ STYLES: dict[str, tuple[Callable[[np.random.Generator, float, str], Made], float
 
 def _floats(values: Any) -> Any:
     return tuple(float(value) for value in values)
+
+
+def _motor(rng: np.random.Generator, joint: Joint) -> Actuator:
+    """A servo, or a torque, that changes in time; half of them meet their limit."""
+    kind: Any = str(rng.choice(["torque", "velocity", "position"]))
+    size, rate, start = rng.uniform(0.5, 2), rng.uniform(5, 40), rng.uniform(0, 6)
+    target = Formula(f"{size}*cos({rate}*t + {start})")
+    limit = float(rng.uniform(0.2, 1)) if rng.random() < 0.5 else None
+    gains = {"torque": {}, "velocity": {"kd": 0.3}, "position": {"kp": 3.0, "kd": 0.05}}[kind]
+    return Actuator("m", joint.name, kind, target, gear=float(rng.choice([1, -2])), limit=limit, **gains)
 
 
 def _unit(rng: np.random.Generator) -> Any:

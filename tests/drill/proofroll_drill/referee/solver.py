@@ -12,6 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from proofroll.elements.mechanism import Joint, Mechanism
+from proofroll.elements.mechanism.drives import Actuator
+from proofroll.elements.mechanism.signal import Formula
 
 from .extrapolation import Long, extrapolated
 from .linear_algebra import cross, inverse, long, of_quaternion, of_rpy, quaternion, semidefinite_solve, turn
@@ -91,9 +93,10 @@ class Referee:
         self._u, self._at_a, self._at_b = (long(columns[k]).reshape(-1, 3) for k in (2, 4, 6))
         self._points = np.array(columns[7], dtype=bool)
         self._turning = [(k, j) for k, j in enumerate(mechanism.joints) if j.kind in {"revolute", "universal"}]
+        self.clamped: dict[str, int] = {}  # sign of the limit that an actuator applies
 
     def start(self) -> Long:
-        """Centres of mass, quaternions, velocities, angular velocities in world axes, angles, one after the other."""
+        """Centres of mass, quaternions, velocities, angular velocities in world axes, angles, time, in a row."""
         n = self.n
         p, R = np.zeros((n + 1, 3), np.longdouble), np.zeros((n + 1, 3, 3), np.longdouble)
         v, w = np.zeros((n + 1, 3), np.longdouble), np.zeros((n + 1, 3), np.longdouble)
@@ -127,7 +130,7 @@ class Referee:
         arms = np.einsum("nij,nj->ni", R, self._com)
         r, rate = (p + arms)[:n], (v + cross(w, arms))[:n]
         angles = [value for _, joint in self._turning for value in joint.q0]
-        return np.concatenate([r.ravel(), quaternions.ravel(), rate.ravel(), w[:n].ravel(), long(angles)])
+        return np.concatenate([r.ravel(), quaternions.ravel(), rate.ravel(), w[:n].ravel(), long([*angles, 0])])
 
     def run(self, times: NDArray[np.float64]) -> list[dict[str, Long]]:
         """True state at growing times, s, see :meth:`seen`."""
@@ -149,7 +152,7 @@ class Referee:
         for q, rate, joint in self._coordinates(r, R, v, w, angles):
             energy += (joint.stiffness * (q - long(joint.rest)) ** 2 + joint.armature * rate**2) / 2
         found = {"p_WB": (r - arms)[:n], "v_WB": (v - cross(w, arms))[:n], "w_WB": w[:n], "R_WB": R[:n]}
-        return found | {"wrench": wrench, "angles": angles, "energy": energy, "broken": broken}
+        return found | {"wrench": wrench, "angles": angles[:-1], "energy": energy, "broken": broken}
 
     def solve(self, state: Long) -> tuple[Long, Long, Any]:
         """Rate of the state, wrenches of joints and loops on their second body, largest violation of a constraint."""
@@ -239,7 +242,7 @@ class Referee:
         p = state[3 * n : 7 * n].reshape(n, 4)
         p = p / np.sqrt((p**2).sum(1))[:, None]
         p_rate = np.concatenate([-_dots(w[:n], p[:, 1:])[:, None], p[:, :1] * w[:n] + cross(w[:n], p[:, 1:])], 1) / 2
-        parts = (v[:n], p_rate, acceleration, alpha, long(angle_rates))
+        parts = (v[:n], p_rate, acceleration, alpha, long([*angle_rates, 1]))
         return np.concatenate([part.ravel() for part in parts])
 
     def _connect(self, number: int, kind: str, at_a: Any, frame_a: Long, at_b: Any, frame_b: Long) -> None:
@@ -302,6 +305,17 @@ class Referee:
                 place += 1
         return found
 
+    def wanted(self, motor: Actuator, time: Any, q: Any, rate: Any) -> Any:
+        """Effort of an actuator at its joint without its limit."""
+        n, target = long(motor.gear), motor.target
+        r = target.at(time) if isinstance(target, Formula) else long(target)
+        return n * {"torque": r, "velocity": motor.kd * (r - n * rate),
+                    "position": motor.kp * (r - n * q) - motor.kd * n * rate}[motor.kind]  # fmt: skip
+
+    def _effort(self, motor: Actuator, time: Any, q: Any, rate: Any) -> Any:
+        sign = self.clamped.get(motor.name)
+        return sign * long(motor.limit) if sign else self.wanted(motor, time, q, rate)
+
     def _loads(self, r: Long, R: Long, v: Long, w: Long, angles: Long, force: Long, moment: Long, given: Long) -> None:
         """Adds springs, dampers and drives to the loads on the bodies, and of joints to what they transmit."""
         for spring, d, (a, b, arm_a, arm_b, rate) in self._springs(r, R, v, w):
@@ -320,7 +334,9 @@ class Referee:
                 t = -joint.damping * (w[b] - w[a])
             ways = [axis, R[b] @ x]
             for way, (q, rate, _) in zip(ways, [c for c in coordinates if c[2] is joint], strict=False):
-                along = (joint.torque - joint.stiffness * (q - long(joint.rest)) - joint.damping * rate) * way
+                motors = [motor for motor in self.mechanism.actuators if motor.joint == joint.name]
+                effort = joint.torque + sum(self._effort(motor, angles[-1], q, rate) for motor in motors)
+                along = (effort - joint.stiffness * (q - long(joint.rest)) - joint.damping * rate) * way
                 f, t = (f + along, t) if joint.kind == "prismatic" else (f, t + along)
             arm = R[b] @ self._arms[number]
             force[b] += f
