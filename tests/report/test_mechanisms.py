@@ -22,7 +22,7 @@ from proofroll.elements.mechanism.joint import Joint
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.parts import Body
 from proofroll.elements.mechanism.report.drawing import mechanism_drawing
-from proofroll.elements.mechanism.report.replay import _turned, draw_mechanism
+from proofroll.elements.mechanism.report.replay import _orientations, draw_mechanism
 from proofroll.files.comparison_file import load_comparison
 from proofroll.files.scene_file import load_scene
 from proofroll.report.comparison.plots import point_curves
@@ -109,7 +109,7 @@ def test_bodies_turn_as_often_as_their_spin_says() -> None:
     grid, rate = np.linspace(0.0, 1.0, 11), np.array([30.0, -40.0, 10.0])
     turned = Rotation.from_rotvec(grid[:, None] * rate) * Rotation.from_rotvec([0.3, 0.1, -0.2])
     times = np.linspace(0.0, 1.0, 101)
-    found = _turned(grid, turned.as_quat(scalar_first=True), np.tile(rate, (11, 1)), times)
+    found = _orientations(grid, turned.as_quat(scalar_first=True), np.tile(rate, (11, 1)), times)
     exact = Rotation.from_rotvec(times[:, None] * rate) * Rotation.from_rotvec([0.3, 0.1, -0.2])
     assert (Rotation.from_quat(found, scalar_first=True) * exact.inv()).magnitude().max() < 1e-9
     assert np.linalg.norm(rate) * 0.1 > np.pi, "the samples alone would not show it"

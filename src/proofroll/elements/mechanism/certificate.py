@@ -169,9 +169,9 @@ def _compare_press(
     if given is not None:
         given = None if softest > CAPS["forces of contact"].tolerance else np.reshape(given, wanted.shape)
     natural = element.mechanism.mass * element.first_motion.scale
-    # forces that are determinate may all be none, as across the slide of a box on four corners
-    scale = max(float(np.nanmax(np.abs(wanted), initial=0.0)), _LEAST * natural)
-    compare("forces of contact", "N", wanted, given, scale)
+    largest = float(np.nanmax(np.abs(wanted), initial=0.0))
+    # forces that are determinate may all be none but for round-off, as across the slide of a box on four corners
+    compare("forces of contact", "N", wanted, given, largest if largest > _LEAST * natural else natural)
 
 
 def _compare_reactions(

@@ -9,6 +9,7 @@ import pinocchio as pin
 from proofroll.core.engine import Regularised, whole_steps
 from proofroll.core.errors import Diverged
 from proofroll.elements.mechanism import WORLD, Mechanism
+from proofroll.elements.mechanism.certificate import COMPOSED
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.elements.mechanism.sampling import MechanismBuilt, MechanismSample
 from proofroll.engines.pinocchio.impulses import Impulses, ImpulseSteps
@@ -99,7 +100,9 @@ class ImpulseRun(MechanismRun):
             size = float(np.abs(value).max()) or 1.0  # 1 if all accelerations are zero
             others = twice[name], step[name], getattr(plain, name)
             apart = sum(float(np.abs(value - other).max()) / size for other in others)
-            softened[name] = Regularised(_MARGIN * (unsure / size + apart), _PARTS if self._settings.convex else _FOUND)
+            tolerance = _MARGIN * (unsure / size + apart)
+            if tolerance > COMPOSED:
+                softened[name] = Regularised(tolerance, _PARTS if self._settings.convex else _FOUND)
         return replace(plain, **self.steps.read() if self.steps.contacts else {}, regularised=softened)
 
     def _accelerations(self, kick: Impulses, span: float) -> dict[str, Array]:

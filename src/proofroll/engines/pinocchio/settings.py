@@ -201,9 +201,9 @@ PRESETS: Mapping[str, Mapping[str, PinocchioSettings]] = {
         # tolerance
         "default": _impulses("default", "semi_implicit_euler", 1e-6),
         # solved as accurately as ADMM can within its iterations, impacts included
-        "matched": _impulses("matched", "semi_implicit_euler", 1e-9),
+        "matched": _impulses("matched", "semi_implicit_euler", 1e-8),
         # all terms in the middle of the step
-        "tuned": _impulses("tuned", "midpoint", 1e-9),
+        "tuned": _impulses("tuned", "midpoint", 1e-8),
     },
     "null_space": {
         "default": PinocchioSettings("null_space", "default", "rk4", 1e-3, None, projection=False),
