@@ -63,6 +63,8 @@ const folds = (() => {
     for (const fold of target.querySelectorAll(":scope > details:only-of-type")) fold.open = true;
     if (target.hidden) document.querySelector(`#choice [data-model="${CSS.escape(target.dataset.of)}"]`).click();
     target.classList.add("target");
+    // A section that is not drawn has no place for what is in it yet.
+    target.closest("main > section")?.style.setProperty("content-visibility", "visible");
     target.scrollIntoView();
   }
   addEventListener("hashchange", reveal);

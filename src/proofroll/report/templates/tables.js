@@ -83,8 +83,9 @@
       language: { search: "Filter", zeroRecords: "no row has this" },
       layout: {
         topStart: rows.length < 2 ? null : "search",
+        // A file has one row of heads: the last one, whose cells name their groups.
         topEnd: { buttons: [{ extend: "csv", text: "CSV", filename: () => `${label}${asked()}`, title: null,
-          exportOptions: { format: { body: (_, __, ___, cell) => said(cell), header: (_, __, cell) => said(cell ?? heads[__]) } } }] },
+          exportOptions: { customizeData: (data) => { data.headerStructure = data.headerStructure.slice(-1); }, format: { body: (_, __, ___, cell) => said(cell), header: (_, __, cell) => said(cell ?? heads[__]) } } }] },
         bottomStart: null, bottomEnd: null,
       },
     });
