@@ -47,7 +47,8 @@ from proofroll.robots.records import (
 from proofroll.robots.robot_file import LintRemark
 from proofroll.studies.claim_judgement import JudgedFile
 from proofroll.studies.ladder.models import Ran
-from proofroll.studies.stability.axes import Axis, Effort
+from proofroll.studies.stability.axes import Axis
+from proofroll.studies.stability.effort import Effort
 from proofroll.studies.stability.records import (
     Boundary,
     BoundaryPoint,

@@ -18,8 +18,9 @@ from proofroll.running.case import Status
 from proofroll.running.runner import Runner
 from proofroll.running.store import Store
 from proofroll.studies import study_store
-from proofroll.studies.stability.axes import QUICK, Axis
+from proofroll.studies.stability.axes import Axis
 from proofroll.studies.stability.claims import file_for
+from proofroll.studies.stability.effort import QUICK
 from proofroll.studies.stability.records import Boundary, BoundaryPoint, ExplainedBoundary, StabilityStudy
 from proofroll.studies.tradeoff.claims import claims_for
 from proofroll.studies.tradeoff.records import CurveBudget, MeasuredPoint, MeasuredQuantity, TradeoffStudy, TruthCost

@@ -2,26 +2,22 @@
 
 from __future__ import annotations
 
-import re
 import sys
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from proofroll.cli import options
 from proofroll.cli.tradeoff import Over, measure, question_of, ranges_of, require_observables
-from proofroll.core.errors import InputError, ProofrollError, require_known
+from proofroll.core.errors import InputError, require_known
 
 if TYPE_CHECKING:
     from proofroll.report.changes import EarlierReport
     from proofroll.studies.tradeoff.claims import TradeoffClaims
     from proofroll.studies.tradeoff.curve import Question
     from proofroll.studies.tradeoff.records import TradeoffStudy
-
-# SI prefixes before the unit of a tolerance; the second µ is the Greek letter.
-_PREFIXES = {"k": 1e3, "m": 1e-3, "µ": 1e-6, "\u03bc": 1e-6, "u": 1e-6, "n": 1e-9}
 
 
 def recommend(
@@ -90,14 +86,14 @@ def recommend(
     from proofroll.core.plugins import engine_names, parse_engine, require_engine
     from proofroll.report.tradeoff.tables import answer_lines
     from proofroll.studies.tradeoff.recommend import recommend as answered
-    from proofroll.studies.tradeoff.requirements import Requirements
+    from proofroll.studies.tradeoff.requirements import Requirements, read_tolerance
 
     claims, question = question_of(scene, settings, [quantity] if quantity else None, until)
     require_observables(question, [question.quantity])  # before minutes are spent on measuring
     for text in engine or []:
         require_engine(parse_engine(text).name)
     unit = question.loaded.observables[question.quantity].unit
-    required = Requirements(question.quantity, _tolerance(tolerance, unit), _seconds(max_cost), tuple(engine or ()))
+    required = Requirements(question.quantity, read_tolerance(tolerance, unit), _seconds(max_cost), tuple(engine or ()))
     ranges = ranges_of(question, over) if over is not None else None
     study = _stored_study(question, engine or [], claims, ranges, out, jobs, measure_first=measure_first)
     known = {*study.absent, *(point.engine for point in study.points)}
@@ -113,6 +109,7 @@ def _from_report(
     """Prints advice for several scenes from the runs of a report; exit code 1 if in one nothing holds the tolerance."""
     from proofroll.report.page.advice import advice
     from proofroll.report.page.choice_matrix import FIRST_TOLERANCE, ChoiceStudy, choice_matrix
+    from proofroll.studies.tradeoff.requirements import read_tolerance
 
     path, lines = report.path, report.lines
     for name in engines:
@@ -125,7 +122,7 @@ def _from_report(
             known = ", ".join(dict.fromkeys(line.group for line in lines))
             raise InputError("scenes", name, f"{path} has none; proofroll report {name} runs it; groups there: {known}")
         studies |= {line.study: ChoiceStudy(line.study, "") for line in own}
-    part = _tolerance(tolerance, "1").absolute(1.0) if tolerance else FIRST_TOLERANCE
+    part = read_tolerance(tolerance, "1").absolute(1.0) if tolerance else FIRST_TOLERANCE
     matrix = choice_matrix(lines, studies)
     advised = advice(matrix, part, forces)
     content = {"report": str(path), "tolerance": part, "with_forces": forces, "advice": advised}
@@ -134,28 +131,6 @@ def _from_report(
     single = [item for item, column in zip(advised, matrix.columns, strict=False) if len(column.studies) == 1]
     chosen = [bool(item.choice) for item in single if item.judged]
     raise typer.Exit(options.OK if chosen and all(chosen) else options.CONTRADICTED)
-
-
-def _tolerance(text: str, unit: str) -> Any:
-    """Reads ``1e-3``, ``1e-3 m``, ``1 mm`` or ``1 %``. Raises InputError for another form or unit."""
-    from proofroll.core.comparison import Tolerance
-
-    if not text:
-        words = "give the largest error that you can bear, e.g. --tolerance 1e-3, or --tolerance '1 %' of the scale"
-        raise ProofrollError(f"--tolerance is missing: {words}")
-    advice = f"write a positive number in {unit}, e.g. 1e-3, or 1 % of the quantity's scale"
-    match = re.fullmatch(r"\s*([-+]?[\d.]+(?:[eE][-+]?\d+)?)\s*(\S*)\s*", text)
-    if match is None:
-        raise InputError("tolerance", text, advice)
-    number, given = match[1], match[2] or unit
-    if given not in {unit, "%"} and (given[1:] != unit or given[0] not in _PREFIXES):
-        raise InputError("tolerance", text, f"the unit of this quantity is {unit}")
-    try:
-        if given not in {unit, "%"}:
-            number = f"{float(number) * _PREFIXES[given[0]]:.17g}"
-        return Tolerance.parse("tolerance", f"{number} {given if given == '%' else unit}")
-    except (InputError, ValueError):
-        raise InputError("tolerance", text, advice) from None
 
 
 def _seconds(max_cost: float | None) -> float | None:

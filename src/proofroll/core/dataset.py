@@ -193,10 +193,11 @@ def _of_either_side(scene: Scene, truth: xr.Dataset, run: xr.Dataset, on: npt.ND
 def shared_events(
     scene: Scene, truth: xr.Dataset, runs: Mapping[Key, xr.Dataset]
 ) -> tuple[xr.Dataset, dict[Key, xr.Dataset]]:
-    """Truth and runs without events at their end that some of them have, and others would have a moment later.
+    """Truth and runs without the events at the end of the time that only some of them reached.
 
-    Such an event lies no farther from the end than the widest bracket of an event and one sampling interval. The widest
-    bracket that is left out of a run remains in its attributes.
+    Where all surplus events lie within one sampling interval, and within the widest bracket of an event, from the last
+    sample, the others would have had them a moment later. The widest bracket that is left out of a run remains in its
+    attributes.
     """
     everything, times = [truth, *runs.values()], truth.variables["time"].values
     for element in scene.elements:

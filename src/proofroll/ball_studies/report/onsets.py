@@ -144,7 +144,10 @@ class SlipLine:
 
 @dataclass(frozen=True)
 class SlipTable:
-    """Table of slips: the truth, then a line for each run; ``wrong``: verdict that wrong events have here."""
+    """Table of slips: the truth, then a line for each run.
+
+    ``wrong``: the verdict on a run whose events differ in kind or number from the truth's.
+    """
 
     columns: int
     wrong: str

@@ -19,6 +19,7 @@ from proofroll.elements.ball_on_surface.sampling import BallBuilt, BallSample, t
 from proofroll.elements.mechanism.capabilities import MechanismCapability
 from proofroll.elements.mechanism.sampling import mechanism_of
 from proofroll.engines.mujoco import mechanism, mechanism_geoms
+from proofroll.engines.mujoco.certificate_bounds import softness
 from proofroll.engines.mujoco.chart import Chart
 from proofroll.engines.mujoco.contact import contact_coefficient, contact_force
 from proofroll.engines.mujoco.formulation import Formulation
@@ -29,7 +30,6 @@ from proofroll.engines.mujoco.mechanism_geoms import MujocoGeoms
 from proofroll.engines.mujoco.model import read_spec, write_physics
 from proofroll.engines.mujoco.running import SteppedModel, compiled, forget_callbacks, silent, written
 from proofroll.engines.mujoco.settings import PRESETS, ROLLS, TERMS, MujocoSettings, check, check_restitution, lowered
-from proofroll.engines.mujoco.softness import softness
 from proofroll.engines.mujoco.start import EVALUATIONS, accelerations, start
 
 _FORMULATIONS: Mapping[str, type[Formulation]] = {"free": Free, "chart": Chart, "facets": Facets}

@@ -184,9 +184,9 @@ class Stick(_Held):
         return Survey((*cone, speed - self._pace.still), trend, longest=longest)
 
     def glance(self, y: FloatArray, before: Survey, elapsed: float) -> Survey:
-        """Margins after a step of ``elapsed`` [s], from those before it, of a rolling that ends at standstill alone.
+        """Margins after a step of ``elapsed`` [s] without an evaluation of the equations, if only standstill ends it.
 
-        The deceleration of the centre is estimated from that step, which saves an evaluation of the equations.
+        The deceleration of the centre is estimated from that step; ``before``: the margins at its start.
         """
         speed = self._ball.speed(y)
         margin = speed - self._pace.still
