@@ -32,6 +32,7 @@ from proofroll.studies.comparison.planning import point_name
 from proofroll.studies.tradeoff.claims import claims_for
 from proofroll.studies.tradeoff.records import TradeoffStudy
 from proofroll.studies.tradeoff.study import make_tradeoff
+from proofroll.studies.tradeoff.tradeoff import Extent
 
 ROOT = Path(__file__).resolve().parents[1]
 TOLERANCES = (1e-2, 1e-3, 1e-4, 1e-6)
@@ -86,7 +87,7 @@ def measured(runner: Runner, folder: Path) -> TradeoffStudy:
     """The trade-off that the comparison file asks for, without the finest steps: four lines need none of them."""
     claims = claims_for("sphere_in_cylinder")
     assert claims is not None  # the file is part of this repository
-    study, _ = make_tradeoff(claims.swept, runner, folder, over=claims.over, claims=claims, brief=True)
+    study, _ = make_tradeoff(claims.swept, runner, folder, Extent(over=claims.over, brief=True), claims)
     for sentence in (*claims.contradictions(study), *claims.undecided(study)):
         sys.stderr.write(f"{sentence}\n")
     return study

@@ -21,7 +21,7 @@ from proofroll.studies import study_store
 from proofroll.studies.study_store import keep_study
 from proofroll.studies.tradeoff.curve import Question
 from proofroll.studies.tradeoff.records import MeasuredPoint, TradeoffStudy
-from proofroll.studies.tradeoff.tradeoff import study_path
+from proofroll.studies.tradeoff.tradeoff import Extent, study_path
 
 Proofroll = Callable[..., tuple[int, str, str]]
 ENGINE = "exudyn[formulation=generic,preset=matched]"
@@ -37,9 +37,8 @@ def measured(tmp_path_factory: pytest.TempPathFactory) -> TradeoffStudy:
 
     question = Question("sphere_in_cylinder", {"rolling_resistance": 5e-4}, 0.5, "z")
     engines = [ENGINE, "mujoco[formulation=free,preset=default]"]
-    found = tradeoff(
-        question, Runner(Store(tmp_path_factory.mktemp("cases"))), engines=engines, over={"speed": [3, 5]}, rounds=2
-    )
+    extent = Extent(engines, over={"speed": [3, 5]}, rounds=2)
+    found = tradeoff(question, Runner(Store(tmp_path_factory.mktemp("cases"))), extent)
     return tradeoff_study(found)
 
 
@@ -258,8 +257,8 @@ def test_an_answer_over_a_range(proofroll: Proofroll, folder: Path, monkeypatch:
     assert "not checked over these ranges" in err
     given: list[Any] = []
 
-    def measuring(*_: object, over: object, **__: object) -> None:
-        given.append(over)
+    def measuring(_question: object, _runner: object, extent: Extent, _progress: object) -> None:
+        given.append(extent.over)
         raise ProofrollError("enough")
 
     monkeypatch.setattr("proofroll.studies.tradeoff.study.tradeoff", measuring)

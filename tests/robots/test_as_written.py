@@ -13,6 +13,7 @@ from robot_templates import mjcf, urdf
 from proofroll.core.errors import InputError
 from proofroll.robots import check
 from proofroll.robots.importer_row import row_with_copy
+from proofroll.robots.meaning import CheckSettings
 from proofroll.robots.protocol import Whole
 from proofroll.robots.reading import AsWritten
 from proofroll.robots.records import ImporterRow
@@ -22,7 +23,7 @@ LOOKS = '<geom type="mesh" mesh="look" contype="0" conaffinity="0" mass="0"/>'
 
 
 def _rows(path: Path, *engines: str, **given: Any) -> dict[str, ImporterRow]:
-    return {row.engine: row for row in check.check(path, engines, states=2, **given).engines}
+    return {row.engine: row for row in check.check(path, engines, CheckSettings(states=2, **given)).engines}
 
 
 def test_read(tmp_path: Path) -> None:

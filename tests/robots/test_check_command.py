@@ -13,6 +13,7 @@ from robot_templates import inertial, mjcf, urdf
 from proofroll.report.terminal.tables import console
 from proofroll.robots import check
 from proofroll.robots.layers import LAYERS
+from proofroll.robots.meaning import CheckSettings
 from proofroll.robots.records import DrawnRobot, HeldLayer, ImporterRow, RobotCheck, UsedTruth
 from proofroll.robots.terminal import SHORT, WIDTH, lines, table
 
@@ -204,7 +205,7 @@ def test_an_answer_that_cannot_be_judged(monkeypatch: pytest.MonkeyPatch, arm: P
         return honest(*given)
 
     monkeypatch.setattr(check, "importer_row", importer_row)
-    odd, other = check.check(arm, ["exudyn", "pinocchio"], states=2).engines
+    odd, other = check.check(arm, ["exudyn", "pinocchio"], CheckSettings(states=2)).engines
     assert odd.status == "crashed"
     assert "ZeroDivisionError: planted" in str(odd.message)
     assert other.status == "holds"

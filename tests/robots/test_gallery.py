@@ -12,6 +12,7 @@ from proofroll.core.errors import InputError
 from proofroll.robots.check import check
 from proofroll.robots.explain import RobotCause
 from proofroll.robots.gallery import locate, outcome, read_gallery
+from proofroll.robots.meaning import CheckSettings
 from proofroll.robots.records import HeldLayer, ImporterRow
 from proofroll.running.engine_questions import lent_workers
 
@@ -91,7 +92,7 @@ def test_what_was_read_before_changes_nothing() -> None:
             asked = {entry.name: (files[entry.name], entry.base) for entry in order}
             found.append(
                 {
-                    name: check(path, ["mujoco", "pinocchio", "exudyn"], base=base, workers=workers).engines
+                    name: check(path, ["mujoco", "pinocchio", "exudyn"], CheckSettings(base), workers=workers).engines
                     for name, (path, base) in asked.items()
                     if path is not None
                 }

@@ -17,6 +17,7 @@ from proofroll.robots import mjcf_compiler, reading
 from proofroll.robots.check import check
 from proofroll.robots.importer_row import importer_row
 from proofroll.robots.layers import RobotTruth
+from proofroll.robots.meaning import CheckSettings
 from proofroll.robots.model import Robot
 from proofroll.robots.opening import open_robot
 from proofroll.robots.protocol import Request
@@ -318,7 +319,7 @@ def test_round_off_of_what_cancels_is_no_difference(tmp_path: Path) -> None:
     path = tmp_path / "ball.urdf"
     link = '<inertial><mass value="0"/><inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial>'
     path.write_text(f'<robot name="r"><link name="a">{link}</link></robot>')
-    (row,) = check(path, ["pinocchio"], base="free").engines
+    (row,) = check(path, ["pinocchio"], CheckSettings(base="free")).engines
     assert row.status == "holds", row.layers
 
 

@@ -156,7 +156,7 @@ def _stored_study(
     from proofroll.studies.study_store import valid_study
     from proofroll.studies.tradeoff.recommend import covers
     from proofroll.studies.tradeoff.records import TradeoffStudy
-    from proofroll.studies.tradeoff.tradeoff import restricted_paths, study_path
+    from proofroll.studies.tradeoff.tradeoff import Extent, restricted_paths, study_path
 
     reasons: list[str] = []
     for path in (
@@ -181,4 +181,4 @@ def _stored_study(
         advice = f"{why}; add --measure, which takes some minutes, or run proofroll tradeoff first"
         raise InputError("stored curves", "none", advice)
     over = ranges if ranges is not None else (claims.over if claims else {})
-    return measure(question, engines, over, claims, options.new_runner(out, False, jobs), out)[0]
+    return measure(question, Extent(engines, over), claims, options.new_runner(out, False, jobs), out)[0]

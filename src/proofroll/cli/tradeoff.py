@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -15,6 +16,7 @@ if TYPE_CHECKING:
     from proofroll.studies.tradeoff.claims import TradeoffClaims
     from proofroll.studies.tradeoff.curve import Question
     from proofroll.studies.tradeoff.records import TradeoffStudy
+    from proofroll.studies.tradeoff.tradeoff import Extent
 
 SceneOrFile = Annotated[
     str, typer.Argument(help="A scene, or a comparison file for it, e.g. comparisons/tradeoff.toml.")
@@ -50,12 +52,13 @@ def tradeoff(
     from proofroll.report.tradeoff.tables import default_quantities, tradeoff_parts
     from proofroll.report.tradeoff.work_precision import svg
     from proofroll.running.store import write_text
+    from proofroll.studies.tradeoff.tradeoff import Extent
 
     claims, question = question_of(scene, settings, quantity, until)
     require_observables(question, quantity or [])
     ranges = ranges_of(question, over) if over is not None else (claims.over if claims else {})
     runner = options.new_runner(out, fresh, jobs, scheduler)
-    study, path = measure(question, engine or [], ranges, claims, runner, out, budget)
+    study, path = measure(question, Extent(engine or [], ranges, budget=budget), claims, runner, out)
     shown = [name for name in quantity or [] if name in study.quantities] or default_quantities(study)
     diagram = f"The diagram is in {path.with_suffix('.svg')}, everything in {path}."
     if not as_json:
@@ -116,21 +119,15 @@ def ranges_of(question: Question, texts: list[str]) -> dict[str, list[float]]:
 
 
 def measure(
-    question: Question,
-    engines: list[str],
-    over: dict[str, list[float]],
-    claims: TradeoffClaims | None,
-    runner: Runner,
-    out: Path,
-    budget: float | None = None,
+    question: Question, extent: Extent, claims: TradeoffClaims | None, runner: Runner, out: Path
 ) -> tuple[TradeoffStudy, Path]:
-    """Measures and stores the curves of a trade-off, with a progress bar."""
+    """Measures and stores the curves of a trade-off, with a progress bar.
+
+    It has the default budget if all engines are asked, here, and no file has claims about the scene.
+    """
     from proofroll.studies.comparison.default_comparison import BUDGET
     from proofroll.studies.tradeoff.study import make_tradeoff
 
-    seconds = budget or (None if claims or engines or runner.cluster else BUDGET)
-
+    seconds = extent.budget or (None if claims or extent.engines or runner.cluster else BUDGET)
     with options.progress_bar("runs and timings") as advance:
-        return make_tradeoff(
-            question, runner, out, engines=engines, over=over, claims=claims, budget=seconds, progress=advance
-        )
+        return make_tradeoff(question, runner, out, replace(extent, budget=seconds), claims, advance)

@@ -12,7 +12,6 @@ from pathlib import Path
 import numpy as np
 
 from proofroll.core.errors import InputError, Missing, require_known
-from proofroll.core.limits import TIME_LIMIT
 from proofroll.core.plugins import EngineSpec, parse_engine, place_of, plain_name
 from proofroll.files.toml import read_toml
 from proofroll.robots import reading
@@ -21,7 +20,7 @@ from proofroll.robots.hypotheses import hypotheses
 from proofroll.robots.importer_row import importer_row, row_with_copy
 from proofroll.robots.layers import LAYERS, RobotTruth
 from proofroll.robots.lint import lint
-from proofroll.robots.meaning import moving_robot, source_of
+from proofroll.robots.meaning import USUAL, CheckSettings, moving_robot, source_of
 from proofroll.robots.mjcf_compiler import Compiler
 from proofroll.robots.protocol import Request
 from proofroll.robots.records import DrawnBody, DrawnJoint, DrawnRobot, ImporterRow, RobotCheck, UsedTruth
@@ -37,12 +36,8 @@ from proofroll.running.process import Worker, WorkerDied
 def check(
     path: Path,
     engines: Sequence[str] = (),
+    settings: CheckSettings = USUAL,
     *,
-    base: str = "fixed",
-    root: Path | None = None,
-    states: int = 20,
-    seed: int = 0,
-    time_limit: float = TIME_LIMIT,
     accept: Sequence[str] = (),
     progress: Callable[[str], None] | None = None,
     workers: Workers | None = None,
@@ -52,11 +47,7 @@ def check(
     Args:
         path: path of a URDF or MJCF.
         engines: ``name`` or ``name[option=true,…]``; by default all with an installed reader.
-        base: support of the root of a URDF, ``fixed`` or ``free``.
-        root: folder that holds the file and all files named in it; by default the file's own.
-        states: number of random states to compare.
-        seed: seed of the states.
-        time_limit: limit for each engine [s].
+        settings: base of the robot, states and limit of time.
         accept: ids of accepted causes of differences; those in ``ROBOT.accept.toml`` beside the file are added.
         progress: called with the name of each engine that is done.
         workers: processes in which engines read; by default new ones that end with this call.
@@ -72,9 +63,9 @@ def check(
         asked.append((spec, reading.options_of(spec.options, spec.name)))
     with lent_workers(workers) as lent, tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        file, written, robot, compiler = moving_robot(path, base, root, time_limit, lent, folder)
-        truth = RobotTruth.of(robot, random_states(robot, states, seed))
-        checked = _Checked(path, file, written, base, truth, bar_of(truth), compiler, folder, time_limit, lent)
+        file, written, robot, compiler = moving_robot(path, settings, lent, folder)
+        truth = RobotTruth.of(robot, random_states(robot, settings.states, settings.seed))
+        checked = _Checked(path, file, written, settings, truth, bar_of(truth), compiler, folder, lent)
 
         def row(item: tuple[EngineSpec, dict[str, bool]]) -> ImporterRow:
             try:
@@ -92,9 +83,9 @@ def check(
     return RobotCheck(
         file=str(path),
         kind=file.kind,
-        base=base if file.kind == "urdf" else "as in the file",
+        base=settings.base if file.kind == "urdf" else "as in the file",
         lint=[*file.remarks, *lint(file, robot)],
-        truth=UsedTruth(source_of(compiler), checked.bar, states, seed, robot.dofs),
+        truth=UsedTruth(source_of(compiler), checked.bar, settings.states, settings.seed, robot.dofs),
         layers=LAYERS,
         engines=rows,
         robot=robot_drawing(truth),
@@ -108,24 +99,22 @@ class _Checked:
     Attributes:
         path, file: path of the user's file, and its content.
         written: path of the copy that engines read.
-        base: support of the root of a URDF.
+        settings: base of the robot and limit of time.
         truth: the file's meaning at random states.
         bar: relative error bar of the truth.
         compiler: the engine that defines the format, if its compiler gave the meaning.
         folder: folder for the files of engines.
-        time_limit: limit for each answer [s].
         workers: processes in which engines read.
     """
 
     path: Path
     file: RobotFile
     written: Path
-    base: str
+    settings: CheckSettings
     truth: RobotTruth
     bar: float
     compiler: Compiler | None
     folder: Path
-    time_limit: float
     workers: Workers
 
     def row(self, spec: EngineSpec, options: dict[str, bool]) -> ImporterRow:
@@ -138,7 +127,7 @@ class _Checked:
         def ask(given: Path) -> reading.ReaderAnswer:
             with self._lent(spec) as (worker, folder):
                 request = self._request(options, given)
-                return reading.ask(worker, spec.name, request, folder, self.time_limit)
+                return reading.ask(worker, spec.name, request, folder, self.settings.time_limit)
 
         try:
             answer = ask(self.written)
@@ -163,7 +152,7 @@ class _Checked:
         try:
             with self._lent(spec) as (worker, folder):
                 own = self._request(options, self.written)
-                given = reading.ask_as_written(worker, spec.name, own, self.path, folder, self.time_limit)
+                given = reading.ask_as_written(worker, spec.name, own, self.path, folder, self.settings.time_limit)
         except WorkerDied as error:
             return f"its process ended ({error})"
         return None if given is None else row_with_copy(given, importer)
@@ -177,7 +166,7 @@ class _Checked:
         robot, truth = self.truth.robot, self.truth
         children = {joint.name: joint.child for joint in robot.moving}
         return Request(
-            given, self.file.kind, self.base, BASE_JOINT, options, children, truth.states, truth.torques,
+            given, self.file.kind, self.settings.base, BASE_JOINT, options, children, truth.states, truth.torques,
             robot.gravity, robot,
         )  # fmt: skip
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
@@ -50,21 +50,22 @@ def check(
     if plot is not None:
         raise InputError("--plot", plot, "this is for scenes; --out FOLDER writes a page about a robot file")
     from proofroll.robots.check import check as checked
+    from proofroll.robots.meaning import CheckSettings
     from proofroll.robots.terminal import WIDTH, check_parts
 
-    how: dict[str, Any] = {"base": base, "root": root, "states": states, "seed": seed, "time_limit": time_limit}
+    how = CheckSettings(base, root, states, seed, time_limit)
     if against is None:
         if names:
             raise InputError("--map", ", ".join(names), "this is for two files; name the other by --against FILE")
         with options.progress_bar("engines") as advance:
             accepted = [name.strip() for name in ",".join(accept or ()).split(",") if name.strip()]
-            content = checked(file, engine or (), accept=accepted, progress=advance, **how)
+            content = checked(file, engine or (), how, accept=accepted, progress=advance)
     else:
         from proofroll.robots.two_files import against as compared
 
         if engine:
             raise InputError("--engine", ", ".join(engine), "--against compares two files and asks no engine; drop one")
-        content = compared(file, against, _partners(names or ()), **how)
+        content = compared(file, against, _partners(names or ()), how)
     if out is not None:
         from proofroll.robots.page import page
         from proofroll.running.store import write_text

@@ -20,6 +20,7 @@ from proofroll.files.toml import read_toml
 from proofroll.robots import reading
 from proofroll.robots.check import check
 from proofroll.robots.hypotheses import hypotheses
+from proofroll.robots.meaning import CheckSettings
 from proofroll.robots.records import GalleryContent, GalleryReading, GalleryRow, ImporterRow
 from proofroll.running.engine_questions import lent_workers
 
@@ -121,7 +122,7 @@ def _row(engines: Sequence[str], entry: Entry, workers: Workers | None = None) -
     if path is None or not wanted:
         return GalleryRow(entry.name, entry.package, None if path is None else str(path))
     readings, unexpected = [], []
-    for item in check(path, wanted, base=entry.base, workers=workers).engines:
+    for item in check(path, wanted, CheckSettings(base=entry.base), workers=workers).engines:
         found = outcome(item)
         readings.append(GalleryReading(item.engine, item.version, item.status, item.causes, item.message, found))
         if item.status != "missing" and set(found) != set(entry.engines[item.engine]):

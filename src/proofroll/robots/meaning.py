@@ -2,6 +2,7 @@
 
 import tempfile
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 from typing import TypeVar
@@ -24,17 +25,39 @@ _Answer = TypeVar("_Answer")
 _defines: dict[str, str] = {}
 
 
+@dataclass(frozen=True)
+class CheckSettings:
+    """Settings of a check of robot files.
+
+    Attributes:
+        base: support of the root of a URDF, ``fixed`` or ``free``.
+        root: folder that holds a file and all files named in it; None: the file's own.
+        states: number of random states to compare.
+        seed: seed of the states.
+        time_limit: limit for each answer of an engine [s].
+    """
+
+    base: str = "fixed"
+    root: Path | None = None
+    states: int = 20
+    seed: int = 0
+    time_limit: float = TIME_LIMIT
+
+
+USUAL = CheckSettings()
+
+
 def moving_robot(
-    path: Path, base: str, root: Path | None, time_limit: float, workers: Workers, folder: Path
+    path: Path, settings: CheckSettings, workers: Workers, folder: Path
 ) -> tuple[RobotFile, Path, Robot, mjcf_compiler.Compiler | None]:
     """A file, its copy for engines in a folder, and what :func:`meaning` says of it.
 
     Raises:
         InputError: the file is broken, or nothing in it moves.
     """
-    file = opened(path, base, root, time_limit, workers)
+    file = opened(path, settings.base, settings.root, settings.time_limit, workers)
     written = reading.write(file, folder)
-    robot, compiler = meaning(file, written, time_limit, workers)
+    robot, compiler = meaning(file, written, settings.time_limit, workers)
     if not robot.moving:
         hint = "; try --base free" if file.kind == "urdf" and file.base == "fixed" else ""
         raise InputError("file", path, f"nothing in it moves{hint}")

@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 
 from proofroll.core.errors import InputError, require_known
-from proofroll.core.limits import TIME_LIMIT
 from proofroll.core.plugins import EngineSpec
 from proofroll.robots import reading
 from proofroll.robots.body_recursion import body_recursion
@@ -19,7 +18,7 @@ from proofroll.robots.check import bar_of, robot_drawing
 from proofroll.robots.importer_row import importer_row
 from proofroll.robots.layers import LAYERS, RobotTruth
 from proofroll.robots.lint import lint
-from proofroll.robots.meaning import moving_robot, source_of
+from proofroll.robots.meaning import USUAL, CheckSettings, moving_robot, source_of
 from proofroll.robots.model import Array, Mimic, Robot
 from proofroll.robots.protocol import Reading
 from proofroll.robots.records import AgainstCheck, ImporterRow, UnlikeValue, UsedTruth
@@ -37,12 +36,7 @@ def against(
     path: Path,
     other: Path,
     names: Mapping[str, str] | None = None,
-    *,
-    base: str = "fixed",
-    root: Path | None = None,
-    states: int = 20,
-    seed: int = 0,
-    time_limit: float = TIME_LIMIT,
+    settings: CheckSettings = USUAL,
 ) -> AgainstCheck:
     """Compares the model of a second file with that of the first, at random states of the first.
 
@@ -50,36 +44,30 @@ def against(
         path: path of a URDF or MJCF, which counts as true.
         other: path of the other file.
         names: joint of the first -> joint of the second, where they have different names.
-        base: support of the root of a URDF, ``fixed`` or ``free``.
-        root: folder that holds each file and all files named in it; by default the file's own.
-        states: number of random states to compare.
-        seed: seed of the states.
-        time_limit: limit for compiling a file [s].
+        settings: base of the robots, states and limit of time.
 
     Raises:
         InputError: a file is wrong, or has no joint of a given name.
     """
     with lent_workers(None) as workers:
-        (file, robot, by), (second, other_robot, by_other) = (
-            _meant(each, base, root, time_limit, workers) for each in (path, other)
-        )
+        (file, robot, by), (second, other_robot, by_other) = (_meant(each, settings, workers) for each in (path, other))
         matched = _matched(robot, other_robot, names or {})
         renamed = _renamed(other_robot, matched)
-        truth = RobotTruth.of(robot, random_states(robot, states, seed))
+        truth = RobotTruth.of(robot, random_states(robot, settings.states, settings.seed))
         bar = bar_of(truth)
         other_label, label = (each.name if path.name != other.name else str(each) for each in (other, path))
         rows = [importer_row(file, truth, bar, EngineSpec(other_label, {}), _answer(renamed, truth), workers)]
         if rows[0].unexplained:  # with the second file as truth, causes in that file can be found
-            turned = RobotTruth.of(renamed, random_states(renamed, states, seed))
+            turned = RobotTruth.of(renamed, random_states(renamed, settings.states, settings.seed))
             row = importer_row(second, turned, bar_of(turned), EngineSpec(label, {}), _answer(robot, turned), workers)
             rows = [row] if row.status == "explained" else rows
     ours, theirs = ({joint.name for joint in each.moving} for each in (robot, other_robot))
     return AgainstCheck(
         file=str(path),
         kind=file.kind,
-        base=base if "urdf" in {file.kind, second.kind} else "as in the file",
+        base=settings.base if "urdf" in {file.kind, second.kind} else "as in the file",
         lint=[*_lint(file, robot), *(_of_file(other, remark) for remark in _lint(second, other_robot))],
-        truth=UsedTruth(by, bar, states, seed, robot.dofs),
+        truth=UsedTruth(by, bar, settings.states, settings.seed, robot.dofs),
         layers=LAYERS,
         engines=[_as_file(row) for row in rows],
         robot=robot_drawing(truth),
@@ -92,12 +80,10 @@ def against(
     )
 
 
-def _meant(
-    path: Path, base: str, root: Path | None, time_limit: float, workers: Workers
-) -> tuple[RobotFile, Robot, str]:
+def _meant(path: Path, settings: CheckSettings, workers: Workers) -> tuple[RobotFile, Robot, str]:
     """A file, its robot, and a clause that says whose reading gave the robot."""
     with tempfile.TemporaryDirectory() as folder:
-        file, _, robot, compiler = moving_robot(path, base, root, time_limit, workers, Path(folder))
+        file, _, robot, compiler = moving_robot(path, settings, workers, Path(folder))
     return file, robot, source_of(compiler)
 
 

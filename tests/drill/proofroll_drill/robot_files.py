@@ -11,6 +11,7 @@ from rich.table import Table
 
 from proofroll.core.errors import InputError
 from proofroll.robots.check import check
+from proofroll.robots.meaning import CheckSettings
 from proofroll.robots.records import RobotCheck
 from proofroll.running.engine_questions import lent_workers
 from proofroll.running.idle_workers import Workers
@@ -52,12 +53,13 @@ def checked(path: Path, folder: Path, states: int, workers: Workers) -> FileOutc
     """A file with a fixed base, or with a free one where nothing moves else."""
     name = str(path.relative_to(folder.parent))
     try:
+        settings = CheckSettings(root=folder, states=states, time_limit=60)
         try:
-            found = check(path, root=folder, states=states, time_limit=60, workers=workers)
+            found = check(path, (), settings, workers=workers)
         except InputError as error:
             if "try --base free" not in str(error):
                 raise
-            found = check(path, base="free", root=folder, states=states, time_limit=60, workers=workers)
+            found = check(path, (), dataclasses.replace(settings, base="free"), workers=workers)
     except InputError as error:
         part = any(words in str(error) for words in _PARTS)
         return FileOutcome(name, "part of a file" if part else "refused", [f"the file: {error.advice}"])

@@ -30,7 +30,6 @@ class Analysis:
     Attributes:
         rows: number of constraint rows of all loops.
         rank: rank of the rows at a general pose; what a solver should fix.
-        rank_at_start: at the start; smaller where the start is a singular pose.
         redundant: rows that follow from the others.
         mobility: degrees of freedom at a general pose.
         singular_start: True if the start is a singular pose, or too near to one for lengths to tell.
@@ -40,7 +39,6 @@ class Analysis:
 
     rows: int
     rank: int
-    rank_at_start: int
     redundant: int
     mobility: int
     singular_start: bool
@@ -71,7 +69,6 @@ def analyse(mechanism: Mechanism) -> Analysis:
     return Analysis(
         rows=len(rows.residual),
         rank=rank,
-        rank_at_start=at_start,
         redundant=len(rows.residual) - rank,
         mobility=mechanism.nv - rank,
         # nearby, a least value that starts at zero has come to NEARBY of its usual size

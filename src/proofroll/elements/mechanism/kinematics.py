@@ -25,7 +25,7 @@ class BodyMotion:
         J: derivative of (v_WB, w_WB) by the velocities of the tree, (bodies + 1, 6, nv).
         bias: acceleration (linear, angular) of each body where v̇ = 0, (bodies + 1, 6).
         p_joint: position of each joint on its child, (joints, 3).
-        R_parent, R_child: its frames A and B, (joints, 3, 3).
+        R_parent: its frame A, (joints, 3, 3).
         q: coordinates of the tree, (nq).
     """
 
@@ -37,7 +37,6 @@ class BodyMotion:
     bias: Array
     p_joint: Array
     R_parent: Array
-    R_child: Array
     q: Array
 
 
@@ -139,7 +138,7 @@ class Tree:
         arm_rates = vel.T[:, :, None] - v_joint[:, None, self._joint]
         turned_rate = _cross(turning_rate, arms) + _cross(turning, arm_rates)
         J_rate = self._twists(rates - turning_rate, turning_rate, turned_rate)
-        return BodyMotion(p, R, vel, w, J, J_rate @ v, p_joint, frames[0], frames[1], q)
+        return BodyMotion(p, R, vel, w, J, J_rate @ v, p_joint, frames[0], q)
 
     def _twists(self, sliding: Array, turning: Array, turned: Array) -> Array:
         """Jacobian of each body, (bodies + 1, 6, nv), from columns that slide and turn it and ω × arm."""

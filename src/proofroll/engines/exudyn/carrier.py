@@ -26,13 +26,11 @@ class RollingRow(NamedTuple):
 
     Attributes:
         item: number of the constraint in Exudyn.
-        generator: motion of the carrier whose rate is constrained.
         along: motion of the ball along e2 or e3 per unit of that coordinate [m/unit].
         axis: axis of the spin, in the world at time 0.
     """
 
     item: Any
-    generator: Generator
     along: float
     axis: FloatArray
 
@@ -92,7 +90,7 @@ class Carrier(BallRun):
                 factor1=-sign * a / row[k],
                 velocityLevel=True,
             )
-            result.append(RollingRow(self.system.AddObject(item), generator, float(row[k]), axis))
+            result.append(RollingRow(self.system.AddObject(item), float(row[k]), axis))
         return result
 
     def _factor(self, row: RollingRow) -> float:

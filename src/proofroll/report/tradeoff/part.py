@@ -28,7 +28,7 @@ from proofroll.studies.tradeoff.recommend import Answer, recommend
 from proofroll.studies.tradeoff.records import CurveBudget, TradeoffStudy
 from proofroll.studies.tradeoff.requirements import Requirements
 from proofroll.studies.tradeoff.study import make_tradeoff
-from proofroll.studies.tradeoff.tradeoff import study_path
+from proofroll.studies.tradeoff.tradeoff import Extent, study_path
 
 # Tolerances, relative to the quantity's scale, for advice without claims: visible errors, engineering, reference
 # solutions, and orders of methods.
@@ -91,9 +91,13 @@ class TradeoffPart(Part):
     def make(self, runner: Runner, out: Path, tell: Tell) -> None:
         """Makes a brief study, without runs over ranges of parameters."""
         self.study, _ = make_tradeoff(
-            self.asked.swept, runner, out, engines=self.engines, claims=self.asked, brief=True,
+            self.asked.swept,
+            runner,
+            out,
+            Extent(self.engines, brief=True),
+            self.asked,
             progress=lambda text: tell(text, 1),
-        )  # fmt: skip
+        )
 
     def entry(self) -> TradeoffEntry:
         """See the protocol."""

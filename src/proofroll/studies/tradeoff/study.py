@@ -32,34 +32,27 @@ from proofroll.studies.tradeoff.records import (
     TruthCost,
 )
 from proofroll.studies.tradeoff.sweep import BROKEN
-from proofroll.studies.tradeoff.tradeoff import Tradeoff, pareto_entries, study_path, tradeoff
+from proofroll.studies.tradeoff.tradeoff import Extent, Tradeoff, pareto_entries, study_path, tradeoff
 
 
 def make_tradeoff(
     question: Question,
     runner: Runner,
     folder: Path,
-    *,
-    engines: Sequence[str] = (),
-    over: Mapping[str, Sequence[float]] | None = None,
+    extent: Extent,
     claims: TradeoffClaims | None = None,
-    brief: bool = False,
-    budget: float | None = None,
     progress: Callable[[str], None] | None = None,
 ) -> tuple[TradeoffStudy, Path]:
     """Measures a trade-off (:func:`tradeoff`), and stores it with all its timings in pyperf's format.
 
-    Claims are judged unless the study is restricted to some engines.
+    Claims are judged unless the study is restricted to some engines; a brief study refines claimed curves further.
 
     Args:
         question: of the sweep.
         runner: runs the cases.
         folder: of all results.
-        engines: names of a restricted study; empty: all.
-        over: parameter -> values; range over which the best points are checked.
+        extent: engines, range of parameters, and thoroughness.
         claims: of a file, or None.
-        brief: True to measure less.
-        budget: processor time [s]; None: no limit.
         progress: called with short texts.
 
     Returns:
@@ -70,18 +63,16 @@ def make_tradeoff(
         ProofrollError: there is no truth, or the folder cannot be written.
     """
     claimed = [item.engine for kind in (claims.holds, claims.converges) for item in kind] if claims else []
-    outcome = tradeoff(
-        question, runner, engines=engines, over=over, brief=brief, claimed=claimed, budget=budget, progress=progress
-    )
+    outcome = tradeoff(question, runner, dataclasses.replace(extent, claimed=claimed), progress)
     study = tradeoff_study(outcome)
-    judged = claims if not engines else None
+    judged = claims if not extent.engines else None
     judgement = JudgedFile(
         claims.name if claims else None,
         judged.contradictions(study) if judged else [],
         judged.undecided(study) if judged else [],
     )
-    study = dataclasses.replace(study, engines=sorted(engines), claims=judgement)
-    path = study_path(folder, question, engines, brief=outcome.brief)
+    study = dataclasses.replace(study, engines=sorted(extent.engines), claims=judgement)
+    path = study_path(folder, question, extent.engines, brief=extent.is_brief)
     keep_study(study, path)
     timings = {
         f"{curve.engine} {point.step or ''}".strip(): point.timing
@@ -125,9 +116,9 @@ def tradeoff_study(outcome: Tradeoff) -> TradeoffStudy:
         pareto=_fronts(outcome, outcome.curves, numbers),
         pareto_engines=_fronts(outcome, [curve for curve in outcome.curves if not by_hand(curve.facts.level)], numbers),
         truth=TruthCost(**_cost(outcome.truth_timing), route=reference.dataset.attrs.get("route", "")),
-        over=outcome.over,
+        over={name: [float(value) for value in values] for name, values in outcome.extent.over.items()},
         findings=_conclusions(outcome, budgets),
-        brief=outcome.brief,
+        brief=outcome.extent.is_brief,
         measured=conditions_now(),
     )
     return record(TradeoffStudy, plain(study))
@@ -218,7 +209,7 @@ def _conclusions(outcome: Tradeoff, budgets: Sequence[CurveBudget]) -> list[str]
         sentences.append(f"No tolerance breaks {names}, sampled every {outcome.question.sparse:g} s either.")
     done = [point for point in outcome.points if point.result.status == Status.DONE]
     broken = [point for point in done if not point.errors.get(quantity, np.inf) < BROKEN * scale]
-    reason = TimeBudget(outcome.budget or 0.0).sentence
+    reason = TimeBudget(outcome.extent.budget or 0.0).sentence
     beyond = [
         f"{curve.engine} from {max(dropped):g} on"
         for curve in outcome.curves

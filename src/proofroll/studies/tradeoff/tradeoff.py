@@ -40,6 +40,33 @@ BRIEF_ROUNDS, BRIEF_ONCE, BRIEF_SECONDS, ONCE = 2, 0.1, 0.02, 10.0
 BRIEF_FINER, BRIEF_CLAIMED, BRIEF_GAIN = 2e-3, 1e-3, 0.65
 
 
+@dataclass(frozen=True)
+class Extent:
+    """Extent of a trade-off: engines, range of parameters, and thoroughness.
+
+    Attributes:
+        engines: names or ``name[key=value,…]``; all that are installed if empty.
+        over: parameter -> values; every combination is a corner of the range over which the best points are checked.
+        rounds: number of measurements of every speed.
+        brief: True to measure every speed :data:`BRIEF_ROUNDS` times at most, and to leave out most of the finest
+            steps.
+        claimed: engines, ``name[key=value,…]``, whose curves are refined further in a brief study.
+        budget: processor time of the sweep and the timing [s]; the study is brief then, and runs beyond it are dropped.
+    """
+
+    engines: Sequence[str] = ()
+    over: Mapping[str, Sequence[float]] = field(default_factory=dict)
+    rounds: int = ROUNDS
+    brief: bool = False
+    claimed: Sequence[str] = ()
+    budget: float | None = None
+
+    @property
+    def is_brief(self) -> bool:
+        """True if the study is brief, as any with a budget is."""
+        return self.brief or bool(self.budget)
+
+
 @dataclass
 class Tradeoff:
     """Trade-off before it is summarised.
@@ -49,19 +76,16 @@ class Tradeoff:
         curves: with their points.
         absent: engine -> why it has no curve.
         references: sampling interval [s] -> truth.
+        extent: as it was asked for.
         truth_timing: time of the truth itself, measured in the rounds of the points; None if it failed.
-        over: parameter -> values; the range over which the best points were checked.
-        brief, budget: see :func:`tradeoff`.
     """
 
     question: Question
     curves: list[Curve]
     absent: dict[str, str]
     references: dict[float, Reference]
+    extent: Extent
     truth_timing: Timing | None = None
-    over: dict[str, list[float]] = field(default_factory=dict)
-    brief: bool = False
-    budget: float | None = None
 
     @property
     def reference(self) -> Reference:
@@ -82,40 +106,23 @@ class Tradeoff:
 Progress = Callable[[str], None]
 
 
-def tradeoff(
-    question: Question,
-    runner: Runner,
-    *,
-    engines: Iterable[str] = (),
-    over: Mapping[str, Sequence[float]] | None = None,
-    rounds: int = ROUNDS,
-    brief: bool = False,
-    claimed: Sequence[str] = (),
-    budget: float | None = None,
-    progress: Progress | None = None,
-) -> Tradeoff:
+def tradeoff(question: Question, runner: Runner, extent: Extent, progress: Progress | None = None) -> Tradeoff:
     """Runs the study.
 
     Args:
         question: the scene, the length of runs, and the quantity that decides how far each curve goes.
         runner: runs the cases.
-        engines: names or ``name[key=value,…]``; all that are installed if empty.
-        over: parameter -> values; every combination is a corner of the range.
-        rounds: number of measurements of every speed.
-        brief: True to measure every speed :data:`BRIEF_ROUNDS` times at most, and to leave out most of the finest
-            steps.
-        claimed: engines, ``name[key=value,…]``, whose curves are refined further in a brief study.
-        budget: processor time of the sweep and the timing [s]; the study is brief then, and runs beyond it are dropped.
+        extent: engines, range of parameters, and thoroughness.
         progress: called with a short text after every run and every measurement.
 
     Raises:
         InputError: an unknown scene, parameter, quantity or engine.
         Missing: no engine can be asked.
     """
-    limit, brief = TimeBudget(budget) if budget else None, brief or bool(budget)
+    limit = TimeBudget(extent.budget) if extent.budget else None
     scene = question.loaded
     scene.observable(question.quantity)
-    curves, absent = curves_of(engines, runner.workers, scene.requires)
+    curves, absent = curves_of(extent.engines, runner.workers, scene.requires)
     if not curves:
         raise Missing("there is no engine to measure: " + "; ".join(f"{name}: {why}" for name, why in absent.items()))
     tell = progress or (lambda _: None)
@@ -123,13 +130,12 @@ def tradeoff(
     def arrived(case: Case, _: Result) -> None:
         tell(case.engine.name)
 
-    finer, gain = (partial(_briefly, claimed), BRIEF_GAIN) if brief else (lambda _: FINER, GAIN)
+    finer, gain = (partial(_briefly, extent.claimed), BRIEF_GAIN) if extent.is_brief else (lambda _: FINER, GAIN)
     references = sweep(question, curves, runner, arrived, finer, gain, limit)
-    ranges = {name: [float(value) for value in values] for name, values in (over or {}).items()}
-    study = Tradeoff(question, curves, absent, references, over=ranges, brief=brief, budget=budget)
+    study = Tradeoff(question, curves, absent, references, extent)
     _, truth = resolve_with_truth([], runner.workers)
-    _time(study, question.case(truth, question.every), runner.workers, rounds, tell, limit)
-    if ranges:
+    _time(study, question.case(truth, question.every), runner.workers, tell, limit)
+    if extent.over:
         _check(study, truth, runner, arrived)
     return study
 
@@ -140,18 +146,17 @@ def _briefly(claimed: Sequence[str], curve: Curve) -> list[float]:
     return [part for part in FINER if part >= (BRIEF_CLAIMED if named else BRIEF_FINER)]
 
 
-def _time(
-    tradeoff: Tradeoff, truth: Case, workers: Workers, rounds: int, tell: Progress, budget: TimeBudget | None
-) -> None:
+def _time(tradeoff: Tradeoff, truth: Case, workers: Workers, tell: Progress, budget: TimeBudget | None) -> None:
     """Measures the speed of every point that reached the end, and of the truth."""
     cases = {point.case.key: point.case for point in tradeoff.points if point.result.status == Status.DONE}
     cases[truth.key] = truth
-    seconds = BRIEF_SECONDS if tradeoff.brief else None
+    rounds, brief = tradeoff.extent.rounds, tradeoff.extent.is_brief
+    seconds = BRIEF_SECONDS if brief else None
     with Stopwatch(workers) as stopwatch:
         timings = time_in_rounds(
             {key: partial(stopwatch, case, seconds) for key, case in cases.items()},
-            min(rounds, BRIEF_ROUNDS) if tradeoff.brief else rounds,
-            once_above=BRIEF_ONCE if tradeoff.brief else ONCE,
+            min(rounds, BRIEF_ROUNDS) if brief else rounds,
+            once_above=BRIEF_ONCE if brief else ONCE,
             progress=lambda key: tell(f"timing {cases[key].engine.name}"),
             enough=lambda: budget is not None and not budget.left,
         )
@@ -176,8 +181,8 @@ def _check(tradeoff: Tradeoff, truth: EngineFacts, runner: Runner, arrived: Call
         for point in front(pareto_entries(curves, quantity))
     }
     asked = []
-    for values in itertools.product(*tradeoff.over.values()):
-        given = dict(zip(tradeoff.over, values, strict=True))
+    for values in itertools.product(*tradeoff.extent.over.values()):
+        given = dict(zip(tradeoff.extent.over, map(float, values), strict=True))
         question = dataclasses.replace(tradeoff.question, parameters={**tradeoff.question.parameters, **given})
         runs = {key: question.cases(point.case.engine, point.case.every) for key, point in chosen.items()}
         true = question.truth(truth, [case for both in runs.values() for case in both])

@@ -27,7 +27,7 @@ from proofroll.studies.tradeoff.curve import Question
 from proofroll.studies.tradeoff.recommend import holding
 from proofroll.studies.tradeoff.requirements import Requirements
 from proofroll.studies.tradeoff.study import tradeoff_study
-from proofroll.studies.tradeoff.tradeoff import tradeoff
+from proofroll.studies.tradeoff.tradeoff import Extent, tradeoff
 
 # A ladder of models has no file: it is asked for by this word and a scene.
 LADDER = "ladder:"
@@ -99,7 +99,7 @@ def _tradeoff(path: Path, runner: Runner, found: Decided) -> None:
     claims = load_claims(path)
     question = Question(claims.scene, claims.parameters, claims.until, claims.quantity)
     claimed: list[Holds | Converges] = [*claims.holds, *claims.converges]
-    study = tradeoff_study(tradeoff(question, runner, brief=True, claimed=[item.engine for item in claimed]))
+    study = tradeoff_study(tradeoff(question, runner, Extent(brief=True, claimed=[item.engine for item in claimed])))
     for point in study.points:
         place, late = f"{point.curve} {point.resolution} = {point.step}", point.status == Status.TIMEOUT
         found.put(place, {"ends": point.status}, late=late, missing=point.status == Status.MISSING)

@@ -94,7 +94,8 @@ def test_joint_frames_coincide_at_zero():
         if joint.kind in {"free", "spherical"}:
             q[at.stop - 4] = 1.0
     motion = tree.at(q, np.zeros(mechanism.nv))
-    assert np.abs(motion.R_parent - motion.R_child).max() < 1e-15
     for k, joint in enumerate(mechanism.joints):
         i = mechanism.body_index[joint.parent]
+        R_child = motion.R_WB[mechanism.body_index[joint.child]] @ joint.child_frame
+        assert np.abs(motion.R_parent[k] - R_child).max() < 1e-15
         assert motion.p_joint[k] == pytest.approx(motion.p_WB[i] + motion.R_WB[i] @ joint.position, abs=1e-14)
