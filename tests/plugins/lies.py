@@ -392,6 +392,8 @@ def _small() -> Iterator[Lie]:
 
 def _further_impacts() -> Iterator[Lie]:
     both = ("bounces", "stops")
+    unbounded: dict[str, Any] = {"time_low": lambda *_: np.nan, "time_high": lambda *_: np.inf}
+    yield Lie("brackets not finite", both, ("has the bracket nan to inf s",), events=_each(**unbounded))
     yield Lie("an impact after the end", both, _EVENTS, events=_more(lambda _: [(1e9, 1e9, 1e9)]))
     crowd = _more(lambda until: [(until - EVERY / 2, until - EVERY, until)] * 100)
     yield Lie("a hundred impacts somewhere in the last interval", both, (*_EVENTS, "by luck"), events=crowd)

@@ -38,13 +38,13 @@ class Event:
     name: str = ""
 
 
-def swapped_bracket(events: Sequence[Event]) -> str:
-    """Sentence on the first event whose bracket ends before it begins; empty: there is none."""
+def wrong_bracket(events: Sequence[Event]) -> str:
+    """Sentence on the first event whose bracket is not finite or ends before it begins; empty: there is none."""
     for event in events:
-        if event.time_low > event.time_high:
+        if not -np.inf < event.time_low <= event.time_high < np.inf:
             return (
                 f"the event {' '.join(filter(None, (event.kind, event.name)))} at {event.time:g} s has the bracket "
-                f"{event.time_low:g} to {event.time_high:g} s; time_low comes before time_high"
+                f"{event.time_low:g} to {event.time_high:g} s; both are finite, and time_low comes before time_high"
             )
     return ""
 

@@ -144,7 +144,7 @@ def arrays(scene: Scene, sample: AnySample, t: float) -> Iterator[tuple[str, Flo
     """Every array of a sample at time ``t`` [s] with its name.
 
     Raises:
-        Diverged: one is missing, is not numeric, or does not have the shape for the scene's bodies.
+        Diverged: one is missing, is not of real numbers, or does not have the shape for the scene's bodies.
     """
     for element in scene.elements:
         own, bodies = sample_of(scene, element, sample), len(element.bodies)
@@ -153,9 +153,11 @@ def arrays(scene: Scene, sample: AnySample, t: float) -> Iterator[tuple[str, Flo
             if given is None and name not in REQUIRED:
                 continue
             try:
-                values = np.asarray(given, dtype=np.float64)
-            except (TypeError, ValueError):
-                raise Diverged(f"the engine gave {name}, which is no array of numbers at {t:g} s") from None
+                values = np.asarray(given)
+            except ValueError:  # rows of different lengths
+                values = np.asarray(None)
+            if values.dtype.kind not in "fiu":
+                raise Diverged(f"the engine gave {name}, which is no array of real numbers at {t:g} s")
             shape = (width,) if bodies == 1 else (bodies, width)
             if values.shape not in {shape, (bodies, width)}:
                 raise Diverged(f"the engine gave {name} with shape {values.shape} instead of {shape} at {t:g} s")
@@ -170,6 +172,15 @@ def shaped(scene: Scene, sample: AnySample, t: float) -> AnySample:
 
 
 def events_of_engine(engine: Any, element: Element) -> Sequence[Event] | None:
-    """Events located by the engine for an element (:class:`proofroll.core.engine_abilities.LocatesEvents`), or None."""
+    """Events located by the engine for an element (:class:`proofroll.core.engine_abilities.LocatesEvents`), or None.
+
+    Raises:
+        Diverged: the engine gave something else than events.
+    """
     part = engine.parts[element.name] if isinstance(engine, IndependentElements) else engine
-    return list(part.events()) if isinstance(part, LocatesEvents) else None
+    if not isinstance(part, LocatesEvents):
+        return None
+    given = part.events()
+    if not (isinstance(given, Sequence) and all(isinstance(event, Event) for event in given)):
+        raise Diverged("the engine's events() gave something else than a sequence of Event")
+    return list(given)

@@ -18,7 +18,7 @@ from proofroll.core.element_abilities import RunWatch, WatchesRuns
 from proofroll.core.engine import Sample
 from proofroll.core.engine_abilities import TellsRemarks
 from proofroll.core.errors import Diverged, lack_behind
-from proofroll.core.events import Event, swapped_bracket
+from proofroll.core.events import Event, wrong_bracket
 from proofroll.core.multi_element import AnySample, arrays, events_of_engine, sample_of
 from proofroll.core.scene import Scene
 
@@ -115,8 +115,8 @@ def record(
         element.lacks([sample_of(scene, element, sample) for sample in samples], scene.asks)
         for element in scene.elements
     )
-    swapped = (swapped_bracket(own_events) for _, own_events in events)
-    failure = (None if ended else failure) or next(filter(None, (*lacking, *swapped)), None)
+    wrong = (wrong_bracket(own_events) for _, own_events in events)
+    failure = (None if ended else failure) or next(filter(None, (*lacking, *wrong)), None)
     reached = times[: len(samples)]
     last = reached[np.isin(reached, asked)][-1]
     taken = dict(zip(reached.tolist(), samples, strict=True)) | {at: one for at, one in between.items() if at < last}

@@ -192,7 +192,10 @@ def test_a_scene_may_be_named() -> None:
     [
         ({"p_WB": np.zeros(2)}, r"p_WB with shape \(2,\) instead of \(3,\) at 0 s"),
         ({"force": np.zeros((2, 3))}, r"force with shape \(2, 3\) instead of \(3,\) at 0 s"),
-        ({"v_WB": [[1.0, 2.0], [3.0]]}, "v_WB, which is no array of numbers at 0 s"),
+        ({"v_WB": [[1.0, 2.0], [3.0]]}, "v_WB, which is no array of real numbers at 0 s"),
+        ({"v_WB": np.zeros(3, complex)}, "v_WB, which is no array of real numbers at 0 s"),
+        ({"v_WB": np.zeros(3, object)}, "v_WB, which is no array of real numbers at 0 s"),
+        ({"v_WB": ["0", "0", "0"]}, "v_WB, which is no array of real numbers at 0 s"),
     ],
 )
 def test_a_sample_of_a_wrong_shape(wrong: dict[str, Any], words: str) -> None:
@@ -214,6 +217,8 @@ def test_a_sample_of_a_wrong_shape(wrong: dict[str, Any], words: str) -> None:
         ("sample", {"p_WB": np.zeros(3)}, r"sample\(\) gave dict instead of a BallSample"),
         ("built", None, r"built\(\) gave NoneType, which has no "),
         ("built", {"mass": 1.0}, r"built\(\) gave dict, which has no "),
+        ("events", 7, r"events\(\) gave something else than a sequence of Event"),
+        ("events", [("bounce", 0.1)], r"events\(\) gave something else than a sequence of Event"),
     ],
 )
 def test_what_is_no_sample_and_nothing_built(method: str, given: Any, words: str) -> None:

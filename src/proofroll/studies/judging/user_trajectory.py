@@ -13,7 +13,7 @@ from proofroll.core.arrays import FloatArray
 from proofroll.core.dataset import BETWEEN, add_events, columns_of, observe
 from proofroll.core.element_abilities import WatchesRuns
 from proofroll.core.errors import Diverged, InputError
-from proofroll.core.events import events_of, swapped_bracket
+from proofroll.core.events import events_of, wrong_bracket
 from proofroll.core.multi_element import REQUIRED
 from proofroll.core.observable import Role
 from proofroll.core.scene import Scene
@@ -100,8 +100,8 @@ def read_run(run: RunInput, scene: Scene) -> GivenRun:
     if times[-1] == 0:
         raise InputError("run", "time", "it has only the start, t = 0 s, where nothing has moved; add samples after it")
     _require_finite_state(dataset, scene)
-    if swapped := swapped_bracket(events_of(dataset)):
-        raise InputError("run", "event_low", swapped)
+    if wrong := wrong_bracket(events_of(dataset)):
+        raise InputError("run", "event_low", wrong)
     if made_of is not None:
         if _whole(dataset, scene):
             return GivenRun(dataset, units, labels, {})
