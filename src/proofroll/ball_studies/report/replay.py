@@ -6,7 +6,7 @@ import dataclasses
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -15,25 +15,20 @@ from proofroll.core.arrays import FloatArray
 from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.elements.ball_on_surface.model import RollingBall
-from proofroll.elements.ball_on_surface.surfaces import Declared, Surface
+from proofroll.elements.ball_on_surface.stretches import carried
+from proofroll.elements.ball_on_surface.surfaces import Declared
 from proofroll.files.json_data import plain
 from proofroll.report.labels import symbol, unit
 from proofroll.report.replay.records import PackedNumbers, Replayed, some
 from proofroll.report.replay.replay import frame_times, in_sight
 
-if TYPE_CHECKING:
-    from scipy.spatial.transform import Rotation
-
-
 # Variables of a trajectory by name, "time" included.
 Sampled = Mapping[str, npt.NDArray[Any]]
 # Names of the variables that a replay uses, if present.
-NEEDED = (
-    "time", "p_WB", "v_WB", "w_WB", "q_WB", "omega1", "omega2", "omega3", "N", "F2", "F3", "sticking", "event_kind",
-    "event_time",
-)  # fmt: skip
+NEEDED = ("time", "p_WB", "v_WB", "w_WB", "q_WB", "N", "F2", "F3", "sticking", "event_kind", "event_time")
 
-# Steps of the quadrature of the spin from one frame to the next; with 1.2 rad a frame its error is below 1e-5 rad.
+# Steps of the quadrature of the spin from one sample to the next; with 1.3 rad between samples its error is below
+# 1e-5 rad.
 _SUBSTEPS = 4
 
 SLIPS, STICKS, AWAY = 0, 1, 2
@@ -90,7 +85,7 @@ def poses(body: RollingBall, sampled: Sampled, times: FloatArray) -> Poses:
     return Poses(
         time=times,
         p_WB=p_WB,
-        q_WB=_orientation(body.surface, sampled, times),
+        q_WB=_orientation(sampled, times),
         contact=p_WB + (body.ball.radius + body.surface.gap(p_WB))[:, None] * normal,
         normal=normal,
         press=press,
@@ -108,58 +103,27 @@ def _state(sampled: Sampled, times: FloatArray, flies: bool) -> npt.NDArray[np.u
         return None
     first = AWAY if flies else int(sampled["sticking"][0]) if "sticking" in sampled else STICKS
     state = np.full(times.shape, first, dtype=np.uint8)
-    for kind, time in zip(sampled.get("event_kind", ()), sampled.get("event_time", ()), strict=True):
-        state[times >= time] = _AFTER[kind.decode() if isinstance(kind, bytes) else str(kind)]  # never at NaN
+    for kind, time in _events(sampled):
+        state[times >= time] = _AFTER[kind]  # never at NaN
     return state
 
 
-def _orientation(surface: Surface, sampled: Sampled, times: FloatArray) -> FloatArray | None:
-    from scipy.spatial.transform import Rotation, Slerp
+def _orientation(sampled: Sampled, times: FloatArray) -> FloatArray | None:
+    """Orientation at each frame, moved from the sample before by the ball's own spin, shape (n, 4); None: unknown."""
+    from scipy.spatial.transform import Rotation
 
     if "q_WB" not in sampled:
         return None
-    grid, stored = sampled["time"], sampled["q_WB"]
+    grid, w_WB, stored = sampled["time"], sampled["w_WB"], Rotation.from_quat(sampled["q_WB"], scalar_first=True)
     if times.size < 2:
-        return np.asarray(stored[:1])
-    # The stored orientation at every sample, moved by the ball's own spin in between. Orientations with the same spin
-    # differ by a constant rotation in the ball's frame; its change between samples, which the spin does not explain, is
-    # interpolated.
-    everywhere = np.union1d(grid, times)
-    carried = _orientations(surface, sampled, everywhere)
-    apart = carried[np.searchsorted(everywhere, grid)].inv() * Rotation.from_quat(stored, scalar_first=True)
-    between = Slerp(grid, apart)(np.clip(times, grid[0], grid[-1]))
-    return np.asarray((carried[np.searchsorted(everywhere, times)] * between).as_quat(scalar_first=True))
-
-
-def _orientations(surface: Surface, sampled: Sampled, times: FloatArray) -> Rotation:
-    """Orientations at rising times from 0 [s] by quadrature of the spin; identity at the first time.
-
-    The components of the spin in the local frame, which vary slowly, are interpolated; those in the world vary as fast
-    as the ball goes round. Each step is the fourth-order Magnus step with two Gauss points (Iserles and Norsett 1999,
-    Phil. Trans. R. Soc. A 357, 983-1019, equation 4.5 with the commutator as a cross product).
-    """
-    from scipy.interpolate import Akima1DInterpolator, CubicHermiteSpline
-    from scipy.spatial.transform import Rotation
-
-    grid = sampled["time"]
-    spin = Akima1DInterpolator(grid, np.stack([sampled[f"omega{i}"] for i in (1, 2, 3)], axis=1))
-    centre = CubicHermiteSpline(grid, sampled["p_WB"], sampled["v_WB"])
-
-    def world(t: FloatArray) -> FloatArray:
-        frame = surface.frame(surface.locate(centre(t)))
-        return np.asarray(np.einsum("tij,tj->ti", frame, spin(np.minimum(t, grid[-1]))))
-
-    fine = np.interp(np.arange((times.size - 1) * _SUBSTEPS + 1) / _SUBSTEPS, np.arange(times.size), times)
-    h = np.diff(fine)[:, None]
-    middle = fine[:-1, None] + h / 2
-    early, late = (world((middle + sign * np.sqrt(3) / 6 * h)[:, 0]) for sign in (-1, 1))
-    steps = Rotation.from_rotvec(h / 2 * (early + late) + np.sqrt(3) / 12 * h**2 * np.cross(late, early))
-    turned = Rotation.concatenate([Rotation.identity(), steps])
-    reach = 1  # number of steps that each product spans, at last all before it
-    while reach < len(turned):
-        turned = Rotation.concatenate([turned[:reach], turned[reach:] * turned[:-reach]])
-        reach *= 2
-    return turned[::_SUBSTEPS]
+        return np.asarray(sampled["q_WB"][:1])
+    # The turn between two samples that the spin does not explain is shared out evenly.
+    unexplained = (carried(stored[:-1], grid, w_WB, _SUBSTEPS).inv() * stored[1:]).as_rotvec()
+    before = np.clip(np.searchsorted(grid, times, side="right") - 1, 0, grid.size - 2)
+    part = (times - grid[before]) / np.diff(grid)[before]
+    turned = carried(stored[before], grid, w_WB, _SUBSTEPS, (grid[before], times))
+    turned *= Rotation.from_rotvec(part[:, None] * unexplained[before])
+    return np.asarray(turned.as_quat(scalar_first=True))
 
 
 # Divisions of a periodic coordinate, and number of divisions between drawn lines (30 degrees).
@@ -288,16 +252,16 @@ def draw_ball(replayed: Replayed) -> tuple[dict[str, Any], list[int], PackedNumb
             {"symbol": symbol(name), "unit": unit(text)}
             for name, text in zip(coordinates, body.surface.units, strict=True)
         ],
-        "events": _events(sampled),
+        "events": [{"kind": kind, "time": plain(time)} for kind, time in _events(sampled)],
         "wall": {"rows": len(built.points), "columns": built.points.shape[1], "lines": list(built.lines)},
     }
     return case, [shown.time.size for shown in ghosts], numbers
 
 
-def _events(sampled: Sampled) -> list[dict[str, Any]]:
+def _events(sampled: Sampled) -> list[tuple[str, float]]:
+    """Kind and time [s] of each event."""
     kinds = [kind.decode() if isinstance(kind, bytes) else str(kind) for kind in sampled.get("event_kind", ())]
-    times = np.asarray(sampled.get("event_time", ())).tolist()
-    return [{"kind": kind, "time": plain(time)} for kind, time in zip(kinds, times, strict=True)]
+    return list(zip(kinds, np.asarray(sampled.get("event_time", ())).tolist(), strict=True))
 
 
 def _reachable(shown: Poses, true: Poses, body: RollingBall) -> Poses:
