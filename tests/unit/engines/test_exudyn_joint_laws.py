@@ -62,6 +62,22 @@ def test_a_hinge_rubs():
     assert run.sample().joint_torque[0, 2] == pytest.approx(-0.2, rel=1e-6)
 
 
+def test_each_force_is_that_of_its_joint():
+    """Beside a joint without a law, friction is reported at the joint that rubs, and a stop's force at its joint."""
+    names = ("free", "rubs", "rests")
+    joints = (
+        Joint("free", "prismatic", "world", "free", v0=(1.0,)),
+        Joint("rubs", "prismatic", "world", "rubs", v0=(2.0,), friction=8.0),
+        Joint("rests", "prismatic", "world", "rests", q0=(0.1,), limits=(0.0, 1.0)),
+    )
+    run = runs.build("redundant", Mechanism(tuple(Body(name, 2.0, inertia=CUBE.inertia) for name in names), joints))
+    run.advance(1.0)
+    sample = run.sample()
+    assert sample.friction[1:] == pytest.approx([8.0, 0.0], rel=1e-6)
+    assert sample.stop[1:] == pytest.approx([0.0, 2 * G], rel=1e-4)
+    assert np.isnan([sample.friction[0], sample.stop[0]]).all()
+
+
 def test_rebounds_are_refused():
     """A stop with restitution is refused with the reason."""
     with pytest.raises(Refused, match="springs with dampers"):

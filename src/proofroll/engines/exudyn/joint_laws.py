@@ -27,7 +27,8 @@ class JointLaw(NamedTuple):
         item: Exudyn's object.
         number: number of the joint.
         factor: force along the coordinate over the force that Exudyn reports.
-        field, entry: field of a sample, and index in it, that hold the force; none for drives in time and armature.
+        field: of a sample, that holds the force; ``joint``: friction or stop; empty for drives in time and armature.
+        entry: index in that field; of friction and stops the joint's ``number`` stands for it.
     """
 
     item: Any
@@ -148,9 +149,9 @@ class JointLaws:
         forces = {name: np.full(count, np.nan) for name, count in lengths(self._mechanism).items()}
         for law, push in pushes:
             if law.field == "joint":
-                joint = self._mechanism.joints[law.entry]
+                joint = self._mechanism.joints[law.number]
                 parts = joint_force_shares(bool(joint.limits), joint.friction, push)
-                forces["friction"][law.entry], forces["stop"][law.number] = parts
+                forces["friction"][law.number], forces["stop"][law.number] = parts
             elif law.field:
                 forces[law.field][law.entry] = push
         return forces if pushes else {}

@@ -68,7 +68,6 @@ class Spheres(Redundant):
     def _add_contacts(self, mechanism: Mechanism, settings: ExudynSettings) -> None:
         """Adds contacts at the depth of their load at the start, with spheres enlarged by that depth."""
         self._contacts: list[_Made] = []
-        self._contact_settings = settings
         self._softness, self._larger, self._builds_up = 0.0, 0.0, False
         if not mechanism.contacts:
             return
