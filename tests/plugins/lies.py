@@ -393,6 +393,19 @@ def _small() -> Iterator[Lie]:
 def _further_impacts() -> Iterator[Lie]:
     both = ("bounces", "stops")
     unbounded: dict[str, Any] = {"time_low": lambda *_: np.nan, "time_high": lambda *_: np.inf}
+    yield Lie(
+        "v by differences of places over an interval",
+        (*MECHANISMS, "slips", "sled"),
+        _V,
+        lambda m: {"v_WB": (m.right.p_WB - m.at(m.t - EVERY).p_WB) / EVERY},
+        ("late",),
+    )
+    yield Lie(
+        "contacts + 0.02 of the largest upwards",
+        ("sled",),
+        ("contact_forces is", "normal_forces is"),
+        lambda m: {"contact_force": m.right.contact_force + 0.02 * np.abs(m.right.contact_force).max() * np.eye(3)[2]},
+    )
     yield Lie("brackets not finite", both, ("has the bracket nan to inf s",), events=_each(**unbounded))
     yield Lie("an impact after the end", both, _EVENTS, events=_more(lambda _: [(1e9, 1e9, 1e9)]))
     crowd = _more(lambda until: [(until - EVERY / 2, until - EVERY, until)] * 100)

@@ -7,6 +7,7 @@ import numpy as np
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.diagnosis import Cause, Evidence, Hypothesis, hypothesis, largest_gap
+from proofroll.core.diagnosis.samples import run_and_truth
 from proofroll.core.events import events_of
 from proofroll.elements.ball_on_surface.diagnosis.equations import (
     COVERED,
@@ -80,21 +81,22 @@ def starts_to_slip(evidence: Evidence) -> Iterator[Cause]:
 )
 def pyramidal_cone(evidence: Evidence) -> Iterator[Cause]:
     """Hypothesis: the friction cone is a pyramid, so that friction depends on the direction of the slip."""
-    run, body = evidence.run, evidence.element.rolling
-    if run is None or "sticking" not in run or "N" not in run or not is_bounded(body):
+    pair, body = run_and_truth(evidence), evidence.element.rolling
+    if pair is None or "sticking" not in pair[0] or "N" not in pair[0] or not is_bounded(body):
         return
+    run = pair[0]
     slips = run["sticking"].to_numpy() == 0
     slip = np.stack([run[name].to_numpy()[slips] for name in ("slip2", "slip3")], axis=-1)
-    reported = np.stack([run[name].to_numpy()[slips] for name in ("F2", "F3")], axis=-1)
+    reported, true = (np.stack([of[name].to_numpy()[slips] for name in ("F2", "F3")], axis=-1) for of in pair)
     most = body.contact.mu_kinetic * run["N"].to_numpy()[slips][:, None]
     sizes = np.linalg.norm(slip, axis=-1, keepdims=True)
     if len(slip) < _FEWEST or not np.all(sizes > 0) or not np.all(np.isfinite(reported)):
         return
     if max(np.ptp(np.unwrap(np.arctan2(of[:, 1], of[:, 0]))) for of in (slip, reported)) < _TURNS:
         return
-    before = largest_gap(reported, -most * slip / sizes)
-    if not before > _PYRAMID * float(np.max(np.abs(most))):
-        return
+    before, least = largest_gap(reported, -most * slip / sizes), _PYRAMID * float(np.max(np.abs(most)))
+    if not before > least or largest_gap(reported, true) <= least:
+        return  # friction as the law has it, or the true one against a slip that is wrong
     after = np.inf
     for angle in np.arange(_ANGLES) * np.pi / 2 / _ANGLES:
         turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])

@@ -84,6 +84,12 @@ class SeenContact:
         slip = np.where(self.found.slip > 0, self.found.slip, 1.0)
         return np.asarray(-(self.friction * self.N / slip)[..., None] * self.across)
 
+    def has_true_friction(self, which: NDArray[np.bool_]) -> bool:
+        """True if the friction of some samples and contacts is the true one: no law of friction explains an error."""
+        force, normal = self.true_force[which], self.true.normal[which]
+        true = force - np.sum(force * normal, axis=-1, keepdims=True) * normal
+        return bool(np.abs(self.T[which] - true).max() <= FORCE * self.evidence.element.force)
+
 
 @cached_on_evidence
 def touch_of(evidence: Evidence) -> Iterator[SeenContact]:
@@ -140,9 +146,9 @@ def friction_factor(evidence: Evidence) -> Iterator[Cause]:
         names = [contact.name for contact in touch.mechanism.contacts]
         groups = [(list(range(len(names))), "all contacts"), *(([k], name) for k, name in enumerate(names))]
         for which, name in groups[: 1 if len(names) == 1 else None]:
-            at = touch.slides[:, which] & (touch.friction[which] > 0)
-            T, full = touch.T[:, which][at], touch.against[:, which][at]
-            if len(T) < 2 or np.abs(T - full).max() <= FORCE * evidence.element.force:
+            at = touch.slides & (touch.friction > 0) & np.isin(range(len(names)), which)
+            T, full = touch.T[at], touch.against[at]
+            if len(T) < 2 or np.abs(T - full).max() <= FORCE * evidence.element.force or touch.has_true_friction(at):
                 continue
             factor = float(np.sum(T * full) / np.sum(full * full))
             off = abs(factor) <= _OFF
@@ -193,7 +199,7 @@ def pyramid(evidence: Evidence) -> Iterator[Cause]:
     """Hypothesis: friction is bounded by a pyramid, whose axes are fitted by one angle, instead of a cone."""
     for touch in touch_of(evidence):
         at = touch.slides & (touch.friction > 0)
-        if at.sum() > _FEW:
+        if at.sum() > _FEW and not touch.has_true_friction(at):
             forces = touch.T[at], touch.against[at], (touch.friction * touch.N)[at]
             yield from _of_a_square(touch.found.normal[at], touch.across[at], *forces, evidence.element.force)
 
