@@ -14,13 +14,13 @@ from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.parts import Body
 from proofroll.files.scene_file import load_scene
 from proofroll.truth.hybrid import HybridPath, Stretch, first_close, follow
-from proofroll.truth.mechanism import two_paths
+from proofroll.truth.mechanism import followed_paths
 from proofroll.truth.mechanism.body_switching import SwitchedBodies
+from proofroll.truth.mechanism.followed_paths import CLOSE, TOLERANCES
 from proofroll.truth.mechanism.joint_switching import SwitchedTree
 from proofroll.truth.mechanism.maximal_coordinates import MaximalCoordinates
 from proofroll.truth.mechanism.natural_units import natural_units
 from proofroll.truth.mechanism.switched_truth import truth_of
-from proofroll.truth.mechanism.two_paths import CLOSE, TOLERANCES
 from proofroll_drill.published import true_values
 
 TIGHT = 1e-11  # of what two routes at 1e-14 leave after some ten switches, with room
@@ -404,7 +404,7 @@ def test_stops_hit_at_once_by_bodies_apart_are_well_posed(later: float) -> None:
     """What one does nothing to the other: both routes go on, whichever they take first."""
     paths = paths_of(two_pendulums(later, 0.0, cart=False), 0.53)
     assert first_close(paths, CLOSE) == np.inf
-    assert two_paths._parted(*paths, lambda mode: mode) == np.inf
+    assert followed_paths._parted(*paths, lambda mode: mode) == np.inf
     assert [sorted(item.name for item in path.happenings) for path in paths] == [["left", "right"]] * 2
 
 
@@ -420,7 +420,7 @@ def test_a_stretch_of_no_length_of_one_route_shifts_no_later_stretch(extra: int)
     short = [long[0], *long[2:]]
     paths = [HybridPath(tuple(stretches), (), ()) for stretches in ((long, short), (short, long))[extra]]
     stretches = paths[0].stretch_at(np.array([0.5, 1.5, 2.5]))
-    others = two_paths.counterparts((paths[0], paths[1]), stretches)
+    others = followed_paths.counterparts((paths[0], paths[1]), stretches)
     assert [paths[1].stretches[number].mode for number in others] == ["high", "high", "free"]
 
 

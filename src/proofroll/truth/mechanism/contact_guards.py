@@ -12,7 +12,7 @@ from proofroll.elements.mechanism.contacts.geometry import BodyContact
 from proofroll.elements.mechanism.contacts.joint_laws import JointContact
 from proofroll.elements.mechanism.contacts.touching import Touching
 from proofroll.elements.mechanism.rotations import Array
-from proofroll.truth.mechanism.two_paths import time_accuracy
+from proofroll.truth.mechanism.followed_paths import time_accuracy
 
 # In natural units (natural_units.py): speeds that count as rest, and accelerations too small to start a motion. Both
 # routes stop there, so that they do not integrate the round-off of a state at rest.

@@ -32,8 +32,8 @@ from proofroll.truth.mechanism.contact_guards import (
     refuse_turning_onset,
     striking,
 )
+from proofroll.truth.mechanism.followed_paths import CLOSE
 from proofroll.truth.mechanism.stretches import Stretches
-from proofroll.truth.mechanism.two_paths import CLOSE
 
 _AHEAD = 1e-9  # time step, relative to the natural time, after which an effort is compared with its limit
 _CLAMPED = 1e-9  # difference of an effort from its limit, relative to the limit, up to which it starts at the limit

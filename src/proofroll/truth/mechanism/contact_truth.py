@@ -13,9 +13,8 @@ from proofroll.truth.hybrid import first_close, states_of
 from proofroll.truth.mechanism.contact_bodies import ContactBodies
 from proofroll.truth.mechanism.contact_equations import ContactEquations
 from proofroll.truth.mechanism.contact_tree import ContactTree
-from proofroll.truth.mechanism.maximal_coordinates import MaximalCoordinates
-from proofroll.truth.mechanism.natural_units import Units, natural_units
-from proofroll.truth.mechanism.two_paths import (
+from proofroll.truth.mechanism.error_bars import TwoRouteMotion, check_start, on_same_turns
+from proofroll.truth.mechanism.followed_paths import (
     CLOSE,
     TOLERANCES,
     counterparts,
@@ -23,7 +22,8 @@ from proofroll.truth.mechanism.two_paths import (
     refuse_uncovered,
     two_route_motion,
 )
-from proofroll.truth.mechanism.two_routes import TwoRouteMotion, check_start, on_same_turns
+from proofroll.truth.mechanism.maximal_coordinates import MaximalCoordinates
+from proofroll.truth.mechanism.natural_units import Units, natural_units
 
 
 def contact_truth(mechanism: Mechanism, times: Array) -> TwoRouteMotion:

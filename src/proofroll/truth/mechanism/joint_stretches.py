@@ -14,8 +14,8 @@ from proofroll.elements.mechanism.drives import MODES, Actuator
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.elements.mechanism.switches import HOLDING, Mode, SwitchedJoint, changes, end_event
 from proofroll.truth.hybrid import Stretch, Transition
+from proofroll.truth.mechanism.followed_paths import CLOSE, time_accuracy
 from proofroll.truth.mechanism.stretches import Stretches
-from proofroll.truth.mechanism.two_paths import CLOSE, time_accuracy
 
 Actuators = tuple[Actuator, ...]
 _NEAR = 1e-12  # relative difference from a stop below which a coordinate is at it

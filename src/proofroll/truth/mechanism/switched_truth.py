@@ -15,11 +15,18 @@ from proofroll.elements.mechanism.switches import STOPPED
 from proofroll.truth.hybrid import states_of
 from proofroll.truth.mechanism.body_switching import SwitchedBodies
 from proofroll.truth.mechanism.contact_truth import contact_truth
+from proofroll.truth.mechanism.error_bars import TwoRouteMotion, check_start, on_same_turns
+from proofroll.truth.mechanism.followed_paths import (
+    TOLERANCES,
+    counterparts,
+    followed,
+    refuse_uncovered,
+    two_route_motion,
+)
 from proofroll.truth.mechanism.joint_switching import SwitchedTree
 from proofroll.truth.mechanism.maximal_coordinates import MaximalCoordinates
 from proofroll.truth.mechanism.natural_units import Units, natural_units
-from proofroll.truth.mechanism.two_paths import TOLERANCES, counterparts, followed, refuse_uncovered, two_route_motion
-from proofroll.truth.mechanism.two_routes import TwoRouteMotion, check_start, find_truth, on_same_turns
+from proofroll.truth.mechanism.smooth_truth import find_truth
 
 # rad, natural lengths, or part of a limit: distance from a stop or a limit beyond which it surely does not act; more
 # than the error of the scouting run

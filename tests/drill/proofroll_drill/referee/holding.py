@@ -16,8 +16,9 @@ from proofroll.elements.mechanism.assembly import check_start
 from proofroll.elements.mechanism.contacts.start import check_contacts
 from proofroll.elements.mechanism.record import Record
 from proofroll.elements.mechanism.rotations import Array
+from proofroll.truth.mechanism.error_bars import TwoRouteMotion
+from proofroll.truth.mechanism.smooth_truth import find_truth
 from proofroll.truth.mechanism.switched_truth import truth_of
-from proofroll.truth.mechanism.two_routes import TwoRouteMotion, find_truth
 
 from .balls import BallReferee
 from .contacts import ContactReferee, Told

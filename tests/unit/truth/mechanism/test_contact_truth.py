@@ -28,8 +28,8 @@ from proofroll.elements.mechanism.parts import Body
 from proofroll.elements.mechanism.signal import Formula
 from proofroll.files.scene_file import load_scene
 from proofroll.running.simulation import simulate
+from proofroll.truth.mechanism.error_bars import TwoRouteMotion
 from proofroll.truth.mechanism.switched_truth import truth_of
-from proofroll.truth.mechanism.two_routes import TwoRouteMotion
 from proofroll_drill.published import true_values
 
 DIGITS = 1e-10  # s, m: of the laboratory's numbers, which have twelve

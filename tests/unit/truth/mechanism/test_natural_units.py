@@ -25,9 +25,9 @@ from proofroll.elements.mechanism.record import record_of
 from proofroll.elements.mechanism.signal import Formula, Table
 from proofroll.files.scene_file import load_scene
 from proofroll.truth.mechanism.contact_tree import ContactTree
+from proofroll.truth.mechanism.error_bars import TwoRouteMotion
 from proofroll.truth.mechanism.natural_units import Units, natural_units
 from proofroll.truth.mechanism.switched_truth import truth_of
-from proofroll.truth.mechanism.two_routes import TwoRouteMotion
 
 SAME = 1e-12  # of the size of the scene; 1e-14 is seen
 SMALL, LARGE = (1e-5, 1.0, 1e-5**0.5), (1e4, 1.0, 1e2)

@@ -16,7 +16,7 @@ from proofroll.truth.mechanism.closed_forms import closed_form
 from proofroll.truth.mechanism.joint_switching import SwitchedTree
 from proofroll.truth.mechanism.plug_in import MechanismTruth
 from proofroll.truth.mechanism.singular_poses import singular_poses
-from proofroll.truth.mechanism.two_routes import find_truth
+from proofroll.truth.mechanism.smooth_truth import find_truth
 
 
 @pytest.mark.drill

@@ -13,7 +13,7 @@ from proofroll.truth.mechanism import maximal_taylor
 from proofroll.truth.mechanism.maximal_bodies import GeneralBody, Planar, made_bodies
 from proofroll.truth.mechanism.maximal_coordinates import MaximalCoordinates
 from proofroll.truth.mechanism.plug_in import MechanismTruth
-from proofroll.truth.mechanism.two_routes import CHAOS, find_truth
+from proofroll.truth.mechanism.smooth_truth import CHAOS, find_truth
 
 MODELS = Path(__file__).parents[4] / "models"
 

@@ -15,8 +15,8 @@ from proofroll.elements.mechanism.record import Record
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.truth import SAFETY
 from proofroll.truth.hybrid import HybridPath, HybridRoute, ModeT, Stretch, first_close, follow
+from proofroll.truth.mechanism.error_bars import JUDGED, ROUND_OFF, TwoRouteMotion, fields_with_bars, largest, round_off
 from proofroll.truth.mechanism.natural_units import Units
-from proofroll.truth.mechanism.two_routes import JUDGED, ROUND_OFF, TwoRouteMotion, fields_with_bars, largest, round_off
 
 # Tolerances of each step of the two routes, in natural units. With equal tolerances their steps, and so their errors,
 # are nearly equal, and the difference hides them: three free bodies of twelve were 1.7 times their bars off.

@@ -1,0 +1,111 @@
+"""Motion by two routes with its error bars, which all truths of a mechanism give; records made comparable."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from proofroll.core.errors import Refused
+from proofroll.core.events import Event
+from proofroll.elements.mechanism.joint_coordinates import JointCoordinates
+from proofroll.elements.mechanism.model import Mechanism
+from proofroll.elements.mechanism.placed import Placed
+from proofroll.elements.mechanism.record import Record, record_of
+from proofroll.elements.mechanism.rotations import Array
+from proofroll.truth.mechanism.maximal_coordinates import MaximalCoordinates
+
+NUDGE = float(np.finfo(float).eps)  # m, rad, part of velocities: the smallest difference that a scene file can express
+SAME_START = 1e-9  # m, 1: round-off of positions is 1e-15 of them, the error of a wrong formula far larger
+ROUND_OFF = 16 * float(np.finfo(float).eps)  # relative round-off after some ten operations
+JUDGED = ("p_WB", "v_WB", "q_WB", "w_WB", "q", "v", "wrench", "named")
+
+
+@dataclass(frozen=True)
+class TwoRouteMotion:
+    """Motion taken as the truth, with its accuracy.
+
+    Attributes:
+        record: the motion; after the horizon its error bars are large.
+        bars: error bar of each field of the record, of ``points``, ``energy`` and ``drift`` at each time: the
+            largest over bodies, components and earlier times, in the field's unit, (times).
+        differences: largest difference between the two routes, by field, up to the horizon.
+        horizon: time from which the question is ill-posed, s; inf: after the last time.
+        branches: times, s, at which a motion known in closed form passes singular poses of its loops.
+        determinate: mask of determinate components of the wrenches, (joints + loops, 6).
+        routes: names of the routes, the one of the record first.
+        checked_by: title of a closed form for a part of the motion, and its largest difference from the record.
+        events: switches along the motion.
+        reason: cause why the question is ill-posed from the horizon on.
+        pressed: contact forces on the first bodies [N], (times, contacts, 3), NaN where not determinate; None: no
+            contacts.
+    """
+
+    record: Record
+    bars: dict[str, Array]
+    differences: dict[str, float]
+    horizon: float
+    branches: list[float]
+    determinate: NDArray[np.bool_]
+    routes: tuple[str, ...]
+    checked_by: tuple[str, float] | None
+    events: Sequence[Event] = ()
+    reason: str = f"a start moved by {NUDGE:.1g} leads elsewhere: the motion is chaotic"
+    pressed: Array | None = None
+
+
+def fields_with_bars(mechanism: Mechanism, record: Record) -> dict[str, Array]:
+    """Fields with an error bar: those of the record, and tracked points and energy, which follow from the poses."""
+    placed = record.placed(mechanism)
+    fields = {name: getattr(record, name) for name in JUDGED}
+    return fields | {"points": placed.points, "energy": placed.energy()}
+
+
+def round_off(fields: Mapping[str, Array], placed: Placed) -> dict[str, Array]:
+    """Round-off of fields at each time, from the largest value so far; of energy from its parts, which may cancel."""
+    sizes = {name: largest(values) for name, values in fields.items()}
+    sizes["energy"] = np.abs(placed.energies()).sum(axis=-1)
+    return {name: ROUND_OFF * np.maximum.accumulate(size) for name, size in sizes.items()}
+
+
+def check_start(first: JointCoordinates, second: MaximalCoordinates, unit: float = 1.0) -> None:
+    """Checks that both routes place all bodies alike at the start, where only their formulas matter.
+
+    Lengths of the routes are in a ``unit`` [m].
+
+    Raises:
+        Refused: the routes place a body apart.
+    """
+    at = np.zeros(1)
+    one, two = record_of(at, [first.sample(*first.mechanism.start())]), second.at_start()
+    two = on_same_turns(first.mechanism, one, two)
+    apart = unit * max(float(largest(getattr(one, name) - getattr(two, name))[0]) for name in ("p_WB", "q_WB"))
+    if apart > SAME_START * unit * max(1.0, float(largest(one.p_WB)[0])):
+        raise Refused(
+            f"the two routes place the bodies {apart:.3g} m (or 1, of quaternions) apart at t = 0 s, where nothing has "
+            "moved yet: an error of proofroll's truth, not a property of the scene; please report it"
+        )
+
+
+def on_same_turns(mechanism: Mechanism, guide: Record, other: Record) -> Record:
+    """Record with quaternions of the same sign and angles on the same turn as in ``guide``."""
+    q_WB = _same_sign(guide.q_WB, other.q_WB)
+    q = other.q.copy()
+    for joint, at in zip(mechanism.joints, mechanism.q_slices, strict=True):
+        if joint.kind in {"spherical", "free"}:
+            quaternion = slice(at.stop - 4, at.stop)
+            q[:, quaternion] = _same_sign(guide.q[:, quaternion], q[:, quaternion])
+        elif joint.kind in {"revolute", "universal", "planar"}:
+            angles = slice(at.stop - 1, at.stop) if joint.kind == "planar" else at
+            q[:, angles] += 2 * np.pi * np.round((guide.q[:, angles] - q[:, angles]) / (2 * np.pi))
+    return replace(other, q_WB=q_WB, q=q)
+
+
+def _same_sign(best: Array, other: Array) -> Array:
+    return np.where((best * other).sum(axis=-1, keepdims=True) < 0, -other, other)
+
+
+def largest(values: Array) -> Array:
+    """Largest absolute value at each time, without NaN, (times)."""
+    flat = np.abs(values.reshape(len(values), -1))
+    return np.asarray(np.where(np.isnan(flat), 0.0, flat).max(axis=1, initial=0.0), dtype=np.float64)
