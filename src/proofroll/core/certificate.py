@@ -105,7 +105,7 @@ def _rounded(line: Line, precision: str) -> Line:
 
 
 def tolerated(soft: Regularised | None, cap: Regularised | None, tolerance: float, because: str) -> tuple[float, str]:
-    """Tolerance of a quantity that an engine may soften, and its reason.
+    """Tolerance of a quantity that an engine may soften, and its reason, at least that without softening.
 
     Args:
         soft: softening that the engine declares, or None.
@@ -113,7 +113,7 @@ def tolerated(soft: Regularised | None, cap: Regularised | None, tolerance: floa
         tolerance: tolerance without softening.
         because: reason for that tolerance.
     """
-    if soft is None:
+    if soft is None or soft.tolerance <= tolerance:
         return tolerance, because
     if cap is None:
         return tolerance, f"cannot be softened, though the engine asks for {number(soft.tolerance)} ({soft.because})"

@@ -9,7 +9,6 @@ import pinocchio as pin
 from proofroll.core.engine import Regularised, whole_steps
 from proofroll.core.errors import Diverged
 from proofroll.elements.mechanism import WORLD, Mechanism
-from proofroll.elements.mechanism.certificate import COMPOSED
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.elements.mechanism.sampling import MechanismBuilt, MechanismSample
 from proofroll.engines.pinocchio.impulses import Impulses, ImpulseSteps
@@ -101,8 +100,7 @@ class ImpulseRun(MechanismRun):
             others = twice[name], step[name], getattr(plain, name)
             apart = sum(float(np.abs(value - other).max()) / size for other in others)
             tolerance = _MARGIN * (unsure / size + apart)
-            if tolerance > COMPOSED:
-                softened[name] = Regularised(tolerance, _PARTS if self._settings.convex else _FOUND)
+            softened[name] = Regularised(tolerance, _PARTS if self._settings.convex else _FOUND)
         return replace(plain, **self.steps.read() if self.steps.contacts else {}, regularised=softened)
 
     def _accelerations(self, kick: Impulses, span: float) -> dict[str, Array]:
