@@ -11,9 +11,10 @@ import typer
 
 from proofroll.cli import options
 from proofroll.cli.tradeoff import Over, measure, question_of, ranges_of, require_observables
-from proofroll.core.errors import InputError, require_known
+from proofroll.core.errors import InputError, ProofrollError, require_known
 
 if TYPE_CHECKING:
+    from proofroll.core.comparison import Tolerance
     from proofroll.report.changes import EarlierReport
     from proofroll.studies.tradeoff.claims import TradeoffClaims
     from proofroll.studies.tradeoff.curve import Question
@@ -86,14 +87,14 @@ def recommend(
     from proofroll.core.plugins import engine_names, parse_engine, require_engine
     from proofroll.report.tradeoff.tables import answer_lines
     from proofroll.studies.tradeoff.recommend import recommend as answered
-    from proofroll.studies.tradeoff.requirements import Requirements, read_tolerance
+    from proofroll.studies.tradeoff.requirements import Requirements
 
     claims, question = question_of(scene, settings, [quantity] if quantity else None, until)
     require_observables(question, [question.quantity])  # before minutes are spent on measuring
     for text in engine or []:
         require_engine(parse_engine(text).name)
     unit = question.loaded.observables[question.quantity].unit
-    required = Requirements(question.quantity, read_tolerance(tolerance, unit), _seconds(max_cost), tuple(engine or ()))
+    required = Requirements(question.quantity, _tolerance(tolerance, unit), _seconds(max_cost), tuple(engine or ()))
     ranges = ranges_of(question, over) if over is not None else None
     study = _stored_study(question, engine or [], claims, ranges, out, jobs, measure_first=measure_first)
     known = {*study.absent, *(point.engine for point in study.points)}
@@ -109,7 +110,6 @@ def _from_report(
     """Prints advice for several scenes from the runs of a report; exit code 1 if in one nothing holds the tolerance."""
     from proofroll.report.page.advice import advice
     from proofroll.report.page.choice_matrix import FIRST_TOLERANCE, ChoiceStudy, choice_matrix
-    from proofroll.studies.tradeoff.requirements import read_tolerance
 
     path, lines = report.path, report.lines
     for name in engines:
@@ -122,7 +122,7 @@ def _from_report(
             known = ", ".join(dict.fromkeys(line.group for line in lines))
             raise InputError("scenes", name, f"{path} has none; proofroll report {name} runs it; groups there: {known}")
         studies |= {line.study: ChoiceStudy(line.study, "") for line in own}
-    part = read_tolerance(tolerance, "1").absolute(1.0) if tolerance else FIRST_TOLERANCE
+    part = _tolerance(tolerance, "1").absolute(1.0) if tolerance else FIRST_TOLERANCE
     matrix = choice_matrix(lines, studies)
     advised = advice(matrix, part, forces)
     content = {"report": str(path), "tolerance": part, "with_forces": forces, "advice": advised}
@@ -131,6 +131,16 @@ def _from_report(
     single = [item for item, column in zip(advised, matrix.columns, strict=False) if len(column.studies) == 1]
     chosen = [bool(item.choice) for item in single if item.judged]
     raise typer.Exit(options.OK if chosen and all(chosen) else options.CONTRADICTED)
+
+
+def _tolerance(text: str, unit: str) -> Tolerance:
+    """Tolerance of the option. Raises InputError for another form or unit, ProofrollError if there is none."""
+    from proofroll.core.comparison import Tolerance
+
+    if not text:
+        words = "give the largest error that you can bear, e.g. --tolerance 1e-3, or --tolerance '1 %' of the scale"
+        raise ProofrollError(f"--tolerance is missing: {words}")
+    return Tolerance.of_quantity("tolerance", text, unit)
 
 
 def _seconds(max_cost: float | None) -> float | None:

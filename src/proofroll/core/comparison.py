@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import itertools
 import math
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 from proofroll.core.errors import InputError
 from proofroll.core.limits import TIME_LIMIT
 from proofroll.core.verdict import Verdict
+
+# SI prefixes before the unit of a tolerance; the second µ is the Greek letter.
+_PREFIXES = {"k": 1e3, "m": 1e-3, "µ": 1e-6, "\u03bc": 1e-6, "u": 1e-6, "n": 1e-9}
 
 
 @dataclass(frozen=True)
@@ -41,6 +45,26 @@ class Tolerance:
         if not (math.isfinite(value) and value > 0 and unit.strip()):
             raise InputError(field_name, text, 'write a positive number and a unit, "6e-5 m", or "0.1 %" of the scale')
         return cls(value / 100, True) if unit.strip() == "%" else cls(value, False, unit.strip())
+
+    @classmethod
+    def of_quantity(cls, field_name: str, text: object, unit: str) -> Tolerance:
+        """Reads ``1e-3``, ``1e-3 m``, ``1 mm`` or ``1 %`` for a quantity in this unit.
+
+        Raises:
+            InputError: another form or unit.
+        """
+        match = re.fullmatch(r"\s*([-+]?[\d.]+(?:[eE][-+]?\d+)?)\s*(.*?)\s*", str(text))
+        given = (match[2] or unit) if match else unit
+        if given not in {unit, "%"} and (given[1:] != unit or given[0] not in _PREFIXES):
+            raise InputError(field_name, text, f"its unit is {unit}")
+        try:
+            if match is None:
+                raise ValueError
+            number = match[1] if given in {unit, "%"} else f"{float(match[1]) * _PREFIXES[given[0]]:.17g}"
+            return cls.parse(field_name, f"{number} {given if given == '%' else unit}")
+        except (InputError, ValueError):
+            advice = f"write a positive number and a unit: 1e-3 {unit}, or 1 % of the scale"
+            raise InputError(field_name, text, advice) from None
 
 
 @dataclass(frozen=True)

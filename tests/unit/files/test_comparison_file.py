@@ -140,6 +140,17 @@ def test_tolerance() -> None:
     assert Tolerance.parse("x", "0.1 %").absolute(10) == pytest.approx(0.01)
 
 
+@pytest.mark.parametrize(
+    ("text", "unit", "value"),
+    [("1e-3", "m", 1e-3), (2, "m", 2.0), ("1 mm", "m", 1e-3), ("1e-3 N m", "N m", 1e-3), ("2 kN", "N", 2e3)],
+)
+def test_a_tolerance_of_a_quantity_has_its_unit(text: object, unit: str, value: float) -> None:
+    """Without a unit a number is in that of the quantity, which may have several parts or a prefix."""
+    assert Tolerance.of_quantity("x", text, unit) == Tolerance(value, False, unit)
+    with pytest.raises(InputError, match=f"its unit is {unit}"):
+        Tolerance.of_quantity("x", "1 lb", unit)
+
+
 @pytest.mark.parametrize("text", ["6e-5", "m", "", "6e-5m", "0 m", "-1 m", "nan m", "inf m", "1 ", 6e-5, None])
 def test_tolerances_of_another_form(text: object) -> None:
     """A tolerance without number or unit, or that is not positive, gives one line that shows the form."""

@@ -249,7 +249,8 @@ def _bounds(
         raise InputError("tolerance", "{}", "say how far what may be off")
     for name in given:
         require_known("tolerance", name, able, "this trajectory has")
-    return {name: _tolerance(name, text, _unit(reference, name)) for name, text in given.items()}
+    units = {name: _unit(reference, name) for name in given}
+    return {name: Tolerance.of_quantity(f"tolerance of {name}", text, units[name]) for name, text in given.items()}
 
 
 def _is_main(item: Observable) -> bool:
@@ -279,16 +280,6 @@ def _size(reference: Reference, name: str, true: FloatArray, unit: str) -> float
         own = {"m": element.length, "m/s": element.length * speed, "rad/s": speed, "rad": 1.0}
         natural = max(natural, own.get(unit, 0.0))
     return max(reference.sizes.get(name, 0.0), float(np.ptp(true)), _LEAST * natural) or 1.0
-
-
-def _tolerance(name: str, given: object, unit: str) -> Tolerance:
-    if isinstance(given, int | float) and not isinstance(given, bool):
-        given = f"{given!r} {unit}"
-    text = str(given).strip()
-    bound = Tolerance.parse(f"tolerance of {name}", text if " " in text else text.replace("%", " %"))
-    if not bound.relative and bound.unit != unit:
-        raise InputError(f"tolerance of {name}", given, f"its unit is {unit}")
-    return bound
 
 
 def _comparable(reference: Reference, name: str) -> bool:

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from proofroll.core.comparison import Tolerance
 from proofroll.core.convergence import floor_text
-from proofroll.core.errors import InputError, ProofrollError, require_known
+from proofroll.core.errors import InputError, require_known
 from proofroll.core.number_format import number
 
 if TYPE_CHECKING:
@@ -17,8 +16,6 @@ if TYPE_CHECKING:
 # Ratio of the tolerance to the error that is required at the scene's own parameters.
 MARGIN = 2.0
 _COARSE = "the step is too coarse"
-# SI prefixes before the unit of a tolerance; the second µ is the Greek letter.
-_PREFIXES = {"k": 1e3, "m": 1e-3, "µ": 1e-6, "\u03bc": 1e-6, "u": 1e-6, "n": 1e-9}
 
 
 @dataclass(frozen=True)
@@ -38,31 +35,6 @@ class Requirements:
     max_cost: float | None = None
     engines: tuple[str, ...] = ()
     levels: tuple[str, ...] = ()
-
-
-def read_tolerance(text: str, unit: str) -> Tolerance:
-    """Tolerance of ``--tolerance``: ``1e-3``, ``1e-3 m``, ``1 mm`` or ``1 %``.
-
-    Raises:
-        ProofrollError: the text is empty.
-        InputError: another form or unit.
-    """
-    if not text:
-        words = "give the largest error that you can bear, e.g. --tolerance 1e-3, or --tolerance '1 %' of the scale"
-        raise ProofrollError(f"--tolerance is missing: {words}")
-    advice = f"write a positive number in {unit}, e.g. 1e-3, or 1 % of the quantity's scale"
-    match = re.fullmatch(r"\s*([-+]?[\d.]+(?:[eE][-+]?\d+)?)\s*(\S*)\s*", text)
-    if match is None:
-        raise InputError("tolerance", text, advice)
-    number, given = match[1], match[2] or unit
-    if given not in {unit, "%"} and (given[1:] != unit or given[0] not in _PREFIXES):
-        raise InputError("tolerance", text, f"the unit of this quantity is {unit}")
-    try:
-        if given not in {unit, "%"}:
-            number = f"{float(number) * _PREFIXES[given[0]]:.17g}"
-        return Tolerance.parse("tolerance", f"{number} {given if given == '%' else unit}")
-    except (InputError, ValueError):
-        raise InputError("tolerance", text, advice) from None
 
 
 def absolute_tolerance(study: TradeoffStudy, required: Requirements) -> float:
