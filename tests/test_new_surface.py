@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from proofroll.ball_studies.report.drawings import overview
-from proofroll.ball_studies.report.replay import wall
+from proofroll.ball_studies.report.replay_wall import wall
 from proofroll.core import plugins
 from proofroll.elements.ball_on_surface import kind
 from proofroll.elements.ball_on_surface.element import rolling_ball

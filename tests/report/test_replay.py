@@ -20,7 +20,8 @@ from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
 from proofroll.ball_studies.report.kind import BallReport
-from proofroll.ball_studies.report.replay import AWAY, LENGTH, SLIPS, STICKS, middle, poses, wall
+from proofroll.ball_studies.report.replay import AWAY, LENGTH, SLIPS, STICKS, poses
+from proofroll.ball_studies.report.replay_wall import middle, wall
 from proofroll.core.truth import truth
 from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.files.json_data import plain

@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, NoReturn
 
 import typer
 
@@ -106,8 +106,8 @@ def recommend(
 
 def _from_report(
     names: list[str], tolerance: str, engines: list[str], report: EarlierReport, *, forces: bool, as_json: bool
-) -> None:
-    """Prints advice for several scenes from the runs of a report; exit code 1 if in one nothing holds the tolerance."""
+) -> NoReturn:
+    """Prints advice for several scenes from a report's runs, and exits: 1 if in one nothing holds the tolerance."""
     from proofroll.report.page.advice import advice
     from proofroll.report.page.choice_matrix import FIRST_TOLERANCE, ChoiceStudy, choice_matrix
 

@@ -111,12 +111,10 @@ def report(
     with alone_in(out, lambda: options.complain(f"another report is being made in {out}; this one waits for it")):
         growing = _Growing(loaded, parts, out, lambda ended, awaited: begun(ended, command, awaited, left_out))
         with growing.resumable():
-            stage = _begin(1, total, "comparisons") if loaded else ""
-            outcomes = (
-                outcomes_of(loaded, engine or [], runner, stage, growing.add, budget, _processor_seconds() - before)
-                if loaded
-                else []
-            )
+            outcomes: list[Outcome] = []
+            if loaded:
+                stage, spent = _begin(1, total, "comparisons"), _processor_seconds() - before
+                outcomes = outcomes_of(loaded, engine or [], runner, stage, growing.add, budget, spent)
         made = begun(outcomes, command, left_out=left_out)
         made.earlier = earlier
         missing = made.expect(parts, out, fresh=fresh)

@@ -44,7 +44,7 @@ class Applied:
     def __init__(self, mechanism: Mechanism) -> None:
         index, count = mechanism.body_index, len(mechanism.bodies)
         self._laws = [law for number, joint in enumerate(mechanism.joints) for law in _laws(number, joint)]
-        number = {joint.name: index for index, joint in enumerate(mechanism.joints)}
+        number = mechanism.joint_index
         self._actuator_laws = [
             self._actuator_law(k, actuator, number[actuator.joint], mechanism.joints[number[actuator.joint]])
             for k, actuator in enumerate(mechanism.actuators)
