@@ -73,7 +73,9 @@ def test_normal_forces_are_those_at_rest() -> None:
     np.testing.assert_allclose(run.sample().contact_force[:, 2], N, rtol=1e-6)
 
 
-@pytest.mark.parametrize("name", ["sled", "eccentric_sphere", "free_turntable", "rattleback", "tilted_disc", "ladder"])
+@pytest.mark.parametrize(
+    "name", ["sled", "eccentric_sphere", "free_turntable", "rattleback", "tilted_disc", "ladder", "flick"]
+)
 @pytest.mark.parametrize("preset", ["default", "matched", "tuned"])
 def test_a_start_is_certified(name: str, preset: str) -> None:
     """Geometry, friction and first accelerations of every shape are the scene's, also on a plane that moves."""

@@ -94,12 +94,15 @@ class ImpulseRun(MechanismRun):
         )
         step = self._accelerations(self.steps.kick(self.steps.q, self.steps.v), self._dt)
         softened = dict[str, Regularised]()
-        unsure = float(self._settings.solver_tolerance or 0.0) * self.steps.fastest(span) / span
+        now = Impulses(self.steps.v, np.zeros(0), np.zeros(0))
+        still, errors = self._accelerations(now, span), self.steps.unsure(span)
+        off = [self._accelerations(now._replace(v=now.v + error), span) for error in errors]
         for name, value in hard.items():
             size = float(np.abs(value).max()) or 1.0  # 1 if all accelerations are zero
             others = twice[name], step[name], getattr(plain, name)
-            apart = sum(float(np.abs(value - other).max()) / size for other in others)
-            tolerance = _MARGIN * (unsure / size + apart)
+            apart = sum(float(np.abs(value - other).max()) for other in others)
+            unsure = max((float(np.abs(each[name] - still[name]).max()) for each in off), default=0.0)
+            tolerance = _MARGIN * (unsure + apart) / size
             softened[name] = Regularised(tolerance, _PARTS if self._settings.convex else _FOUND)
         return replace(plain, **self.steps.read() if self.steps.contacts else {}, regularised=softened)
 

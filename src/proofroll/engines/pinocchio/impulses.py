@@ -200,10 +200,15 @@ class ImpulseSteps:
             J[k] = self._posed(all_of, k, each)
         return J, free, inverse, touching
 
-    def fastest(self, span: float) -> float:
-        """Largest speed of a row after a time without impulses, from the present state [m/s, rad/s]."""
-        J, free, *_ = self.terms(self.q, self.v, span)
-        return float(np.abs(np.concatenate([J.reshape(-1, len(free)), self.joints.J]) @ free).max(initial=0.0))
+    def unsure(self, span: float) -> Array:
+        """Velocities by which errors of each row within the tolerance change those after a ``span`` [s], (rows, nv)."""
+        J, free, inverse, _ = self.terms(self.q, self.v, span)
+        rows = np.concatenate([J.reshape(-1, len(free)), self.joints.J])
+        speed = float(np.abs(rows @ free).max(initial=0.0)) * float(self._settings.solver_tolerance or 0.0)
+        ways = rows @ inverse
+        ease = np.einsum("ri,ri->r", rows, ways)
+        changes: Array = speed * ways[ease > 0] / ease[ease > 0, None]
+        return changes
 
     def _moving(self, body: str) -> Moving:
         k, data = self._index[body], self._data

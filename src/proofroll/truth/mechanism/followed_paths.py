@@ -160,12 +160,12 @@ def time_accuracy(time: float) -> float:
 
 
 def _events(one: FollowedPath, two: FollowedPath, unit: float) -> Sequence[Event]:
-    """Events of both routes, each with a bracket that contains both times, round-off and blur; ``unit`` [s]."""
-    events = []
+    """Events of both routes, each with a bracket that contains both times, a step's error and blur; ``unit`` [s]."""
+    events, least = [], ROUND_OFF + TOLERANCES[0]  # closer agreement of the routes is chance
     for a, b in zip(one.happenings, two.happenings, strict=False):  # one route may have more events after they part
         time, wide = (
             unit * float(a.time),
-            unit * (SAFETY * abs(a.time - b.time) + ROUND_OFF * max(1.0, a.time) + a.blur),
+            unit * (SAFETY * abs(a.time - b.time) + least * max(1.0, a.time) + a.blur),
         )
         events.append(Event(a.kind, time, float(time - wide), float(time + wide), a.name))
     return tuple(events)

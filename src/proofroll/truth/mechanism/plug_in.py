@@ -25,9 +25,9 @@ if TYPE_CHECKING:
 _BARS = {
     "p_WB": "p_WB", "v_WB": "v_WB", "w_WB": "w_WB", "q_WB": "q_WB", "attitudes": "q_WB", "positions": "points",
     "forces": "wrench", "torques": "wrench", "energy": "energy", "energy_error": "energy",
-    "energy_change": "energy", "drift": "drift", "gaps": "p_WB", "slips": "v_WB", "normal_forces": "pressed",
-    "contact_forces": "pressed", "penetration": "p_WB", "contact_pull": "pressed", "cone_excess": "pressed",
-    "hop_speed": "v_WB", "energy_gain": "energy",
+    "energy_change": "energy", "drift": "drift", "gaps": "gap", "slips": "slip", "normal_forces": "pressed",
+    "contact_forces": "pressed", "penetration": "gap", "contact_pull": "pressed", "cone_excess": "pressed",
+    "hop_speed": "slip", "energy_gain": "energy",
 }  # fmt: skip
 _POSES = ("p_WB", "v_WB", "w_WB", "q_WB")
 _PREFIXES = {"q.": "q", "v.": "v", "force.": "wrench", "torque.": "wrench"}
@@ -64,11 +64,15 @@ class MechanismTruth:
             for contact in element.mechanism.contacts
             for kind, axes, field in (
                 ("force", (".x", ".y", ".z"), "pressed"),
-                ("gap", ("",), "p_WB"),
-                ("slip", ("",), "v_WB"),
+                ("gap", ("",), "gap"),
+                ("slip", ("",), "slip"),
             )
             for axis in axes
         }
+        place, turn, velocity, spin = (motion.bars[field] for field in ("p_WB", "q_WB", "v_WB", "w_WB"))
+        # at the end of a body's arm; a quaternion changes by half the angle
+        bars = motion.bars | {"gap": place + 2 * element.length * turn}
+        bars |= {"slip": velocity + element.length * spin + 2 * element.speed * turn}
         for name, variable in dataset.data_vars.items():
             field = (
                 of_contacts.get(str(name))
@@ -80,7 +84,7 @@ class MechanismTruth:
             size = float(np.nanmax(np.abs(variable.to_numpy()), initial=0.0))
             bar = _bar_of_a_law(str(name), element, motion.bars)
             if field is not None:
-                bar = float(motion.bars[field][-1])
+                bar = float(bars[field][-1])
             variable.attrs["error_bar"] = 4 * np.finfo(float).eps * size if bar is None else bar
         dataset.attrs["route"], *others = motion.routes
         dataset.attrs["second_route"] = ", ".join(others)

@@ -548,6 +548,29 @@ def test_a_ball_that_just_rolls_is_ill_posed(part: int) -> None:
     assert (found.horizon, tuple(found.events)) == (0.0, ())
 
 
+@pytest.mark.drill
+def test_a_pendulum_rebounds_from_a_wall_by_newtons_law_whatever_the_friction() -> None:
+    """Its one velocity after an impact is -e times that before; gap and slip of its tip have the bars of its angle."""
+    rod = Body("rod", 1.0, (0, 0, -0.5), np.diag([1 / 12, 1 / 12, 1e-3]))
+    hinge = Joint("hinge", "revolute", "world", "rod", axis=(0, 1, 0), q0=(1.0,))
+    tip = Geometry("tip", "rod", "sphere", (0, 0, -1.0), radius=0.05)
+    wall = Geometry("wall", "world", "plane", (0.05, 0, 0), normal=(-1.0, 0, 0))
+    pair = Pair("hit", ("tip", "wall"), friction=0.3, restitution=0.7)
+    pendulum = Mechanism(bodies=(rod,), joints=(hinge,), geometries=(tip, wall), pairs=(pair,))
+    fall = 9.81 * (1 - np.cos(1.0))
+    found = truth_of(pendulum, np.array([0.0, 0.5, 1.0]))
+    assert happened(found) == [("impact", "hit")]
+    assert found.record.placed(pendulum).energy()[-1] == pytest.approx(
+        -9.81 / 2 + 0.49 * fall / 2, abs=float(found.bars["energy"][-1])
+    )
+    assert max(float(bar[-1]) for bar in found.bars.values()) < BARS
+    element = MechanismElement(pendulum)
+    dataset = truth(Scene("pendulum", "", (element,)), np.array([0.0, 0.5, 1.0]))
+    bar = {name: variable.attrs.get("error_bar") for name, variable in dataset.data_vars.items()}
+    assert bar["gap.hit"] >= bar["q.hinge"]
+    assert bar["slip.hit"] >= bar["v.hinge"]
+
+
 def dragged(*, sole: float = 0.2, pull: float = 0.0, **rail: Any) -> Mechanism:
     """A cart on a rail, at 1 m/s, with a foot on a floor; laws of the ``rail``, and a pull along it [m/s²]."""
     inertia = (1.0, 1.0, 1.0)

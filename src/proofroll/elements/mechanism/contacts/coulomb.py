@@ -58,6 +58,7 @@ def contact_forces(
     """
     f, done = np.zeros(len(c)), list[Outcome](["open"] * len(friction))
     bounds = np.zeros(len(friction)) if bounds is None else bounds
+    least = _RESTS * float(np.abs(c).max())
     for _ in range(_SWEEPS):
         before = f.copy()
         for k, mu in enumerate(friction):
@@ -66,10 +67,9 @@ def contact_forces(
             if bounds[k]:
                 f[own], done[k] = _rubbing(G[own, own], free, bounds[k], sliding[k])
             else:
-                f[own], done[k] = _one(G[own, own], free, mu, sliding[k], names[k])
+                f[own], done[k] = _one(G[own, own], free, mu, sliding[k], names[k], least)
         if np.abs(f - before).max() <= _SETTLED * np.abs(f).max():
             w = (c + G @ f).reshape(-1, 3)
-            least = _RESTS * float(np.abs(c).max())
             for k, along in enumerate(sliding):
                 rubs = friction[k] or bounds[k]
                 if done[k] == "slip" and along is None and rubs and np.linalg.norm(w[k, 1:]) <= least:
@@ -119,8 +119,8 @@ def _rubbing(G: Array, c: Array, bound: float, sliding: Array | None) -> tuple[A
     return (held, "stick") if size <= bound * (1 + _AT_BOUND) else (held * (bound / size), "slip")
 
 
-def _one(G: Array, c: Array, mu: float, sliding: Array | None, name: str) -> tuple[Array, Outcome]:
-    """Force and outcome of one contact while the other forces stay."""
+def _one(G: Array, c: Array, mu: float, sliding: Array | None, name: str, least: float) -> tuple[Array, Outcome]:
+    """Force and outcome of one contact while the other forces stay; a motion up to ``least`` counts as none."""
     if c[0] >= 0:
         return np.zeros(3), "open"
     if sliding is not None or not mu:
@@ -128,7 +128,8 @@ def _one(G: Array, c: Array, mu: float, sliding: Array | None, name: str) -> tup
     from scipy.optimize import brentq  # half a second, which most uses of a mechanism do not need
 
     held = -np.linalg.pinv(G, 1e-12, hermitian=True) @ c
-    if np.linalg.norm(held[1:]) <= mu * held[0] * (1 + _AT_BOUND):
+    rests = float(np.abs(c + G @ held).max()) <= least  # joints may let a contact that rebounds do nothing but slide
+    if rests and np.linalg.norm(held[1:]) <= mu * held[0] * (1 + _AT_BOUND):
         return held, "stick"
 
     def across(angle: float) -> float:

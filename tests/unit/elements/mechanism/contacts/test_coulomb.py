@@ -50,6 +50,16 @@ def test_what_slides_keeps_its_direction() -> None:
     assert f[0] == pytest.approx([2.0, -0.36, -0.48])
 
 
+def test_a_contact_that_a_hinge_turns_rebounds_by_newtons_law() -> None:
+    """Where one velocity moves a contact along its normal and along its surface, none of them sticks in a rebound."""
+    way, law = np.array([1.0, 0.05, 0.0]), 0.7
+    c = -way - np.array([law, 0.0, 0.0])
+    f, done = contact_forces(np.outer(way, way), c, np.array([0.3]), [None], ["tip"])
+    assert done == ["slip"]
+    assert way @ f[0] == pytest.approx(1 + law, abs=1e-12)
+    obeys(np.outer(way, way), c, f, np.array([0.3]))
+
+
 def test_friction_that_tears_is_told() -> None:
     """Where friction lifts more than the normal force presses, there is no unique answer."""
     G = np.array([[1.0, 1.0, 0.0], [1.0, 2.0, 0.0], [0.0, 0.0, 1.0]])
