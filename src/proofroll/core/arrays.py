@@ -70,3 +70,12 @@ def largest_difference(one: FloatArray, other: FloatArray) -> float:
         return float("inf")
     difference = float(np.max(np.abs(one - other), initial=0.0))
     return difference if np.isfinite(difference) else float("inf")
+
+
+def known_difference(one: FloatArray, other: FloatArray) -> float:
+    """Largest difference of the known values of two arrays; infinite if one value is not finite and its partner is.
+
+    Pairs of NaN are left out.
+    """
+    unknown = np.isnan(one) & np.isnan(other)
+    return largest_difference(np.where(unknown, 0.0, one), np.where(unknown, 0.0, other))

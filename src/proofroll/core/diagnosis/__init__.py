@@ -15,7 +15,6 @@ from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
 
 import numpy as np
 
-from proofroll.core.arrays import FloatArray, largest_difference
 from proofroll.core.element import Element
 from proofroll.core.errors import NotUnique
 from proofroll.core.number_format import number, spaced
@@ -210,12 +209,3 @@ def hypotheses_of(element: Element) -> Sequence[Hypothesis]:
 def above_round_off(difference: float, size: float) -> bool:
     """True if a difference is too large for round-off."""
     return bool(np.isfinite(difference) and difference > _LEAST * max(size, 1e-300))
-
-
-def largest_gap(one: FloatArray, other: FloatArray) -> float:
-    """Largest difference of two arrays; infinite if one value is not finite and its counterpart is.
-
-    Pairs of NaN are ignored.
-    """
-    unknown = np.isnan(one) & np.isnan(other)
-    return largest_difference(np.where(unknown, 0.0, one), np.where(unknown, 0.0, other))

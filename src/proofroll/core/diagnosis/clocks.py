@@ -6,8 +6,7 @@ spline would have to be extrapolated, are left out.
 
 import numpy as np
 
-from proofroll.core.arrays import FloatArray
-from proofroll.core.diagnosis import largest_gap
+from proofroll.core.arrays import FloatArray, known_difference
 from proofroll.core.diagnosis.fitting import least_squares_parameter
 
 _SPLINE = 5
@@ -52,7 +51,11 @@ def best_delay(time: FloatArray, reported: FloatArray, true: FloatArray) -> tupl
             return None
         delay -= float(np.sum((flat - curve(time[inner] - delay)) * slope)) / square
         delay = float(np.clip(delay, -reach, reach))
-    return delay, largest_gap(flat, exact[inner]), largest_gap(flat, curve(time[inner] - delay))
+    return (
+        delay,
+        known_difference(flat, exact[inner]),
+        known_difference(flat, curve(time[inner] - delay)),
+    )
 
 
 def best_clock_factor(time: FloatArray, reported: FloatArray, true: FloatArray) -> tuple[float, float, float] | None:

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from proofroll.core.arrays import FloatArray, in_single_precision
+from proofroll.core.arrays import FloatArray, in_single_precision, known_difference
 from proofroll.core.certificate import ROUNDED
-from proofroll.core.diagnosis import CLOSES, Cause, Evidence, Hypothesis, above_round_off, hypothesis, largest_gap
+from proofroll.core.diagnosis import CLOSES, Cause, Evidence, Hypothesis, above_round_off, hypothesis
 from proofroll.core.diagnosis.clocks import best_clock_factor, best_delay, delay_text, in_steps
 from proofroll.core.diagnosis.fitting import change_by
 from proofroll.core.diagnosis.lines import differing, single_precision
@@ -55,7 +55,7 @@ def single_precision_run(evidence: Evidence) -> Iterator[Cause]:
     required = [run[name].to_numpy() for name in REQUIRED]
     if all(in_single_precision(reported) for reported in required):
         true, says = truth[REQUIRED[0]].to_numpy(), "every number of the run is a single-precision one (float32)"
-        before = largest_gap(required[0], true) if required[0].shape == true.shape else np.inf
+        before = known_difference(required[0], true) if required[0].shape == true.shape else np.inf
         yield Cause("float32", says, REQUIRED[0], "m", before, 0.0, "compute and report in double precision")
 
 
@@ -76,7 +76,7 @@ def another_clock(state: Callable[[Any, xr.Dataset], FloatArray], covers: tuple[
             return
         reported, true = (state(evidence.element, data) for data in pair)
         if reported.shape != true.shape or not above_round_off(
-            largest_gap(reported, true), float(np.max(np.abs(true)))
+            known_difference(reported, true), float(np.max(np.abs(true)))
         ):
             return
         time, weights = pair[1]["time"].to_numpy(), _alike(reported, true)
@@ -174,10 +174,10 @@ def _departure(evidence: Evidence, name: str) -> float:
     if run is None or truth is None or name not in run or name not in truth or run[name].shape != truth[name].shape:
         return 0.0
     reported, true = run[name].to_numpy(), truth[name].to_numpy()
-    off = _largest_turn(reported, true) if name == "q_WB" else largest_gap(reported, true)
+    off = _largest_turn(reported, true) if name == "q_WB" else known_difference(reported, true)
     length, time = element.length, element.natural_time
     natural = {"p_WB": length, "v_WB": length / time, "w_WB": 1 / time, "q_WB": 1.0}[name]
-    return off / max(largest_gap(true, np.broadcast_to(true[:1], true.shape)), float(_STILL * natural))
+    return off / max(known_difference(true, np.broadcast_to(true[:1], true.shape)), float(_STILL * natural))
 
 
 def reported_quaternions(true_ones: Callable[[Evidence], FloatArray]) -> Hypothesis:
@@ -194,7 +194,7 @@ def reported_quaternions(true_ones: Callable[[Evidence], FloatArray]) -> Hypothe
         reported, true = pair[0]["q_WB"].to_numpy(), true_ones(evidence)
         if reported.shape != true.shape or moves_otherwise(evidence, "q_WB"):
             return
-        if len(reported) > 1 and largest_gap(np.abs(reported[0]), np.abs(true[0])) < _START:
+        if len(reported) > 1 and known_difference(np.abs(reported[0]), np.abs(true[0])) < _START:
             reported, true = reported[1:], true[1:]  # an engine may give at time 0 what it was given
         before = _largest_turn(reported, true)
         if not above_round_off(before, 1.0):
@@ -215,7 +215,7 @@ def reported_quaternions(true_ones: Callable[[Evidence], FloatArray]) -> Hypothe
 def _largest_turn(reported: FloatArray, other: FloatArray) -> float:
     """Largest difference of quaternions, up to their signs."""
     signs = np.where(np.sum(reported * other, axis=-1, keepdims=True) < 0, -1.0, 1.0)
-    return largest_gap(reported * signs, other)
+    return known_difference(reported * signs, other)
 
 
 def at_start(frames_of: Callable[[Any], Mapping[str, FloatArray]], follows: frozenset[str]) -> Hypothesis:

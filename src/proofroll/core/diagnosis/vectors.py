@@ -12,8 +12,8 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from proofroll.core.arrays import FloatArray
-from proofroll.core.diagnosis import CLOSES, Cause, above_round_off, largest_gap
+from proofroll.core.arrays import FloatArray, known_difference
+from proofroll.core.diagnosis import CLOSES, Cause, above_round_off
 from proofroll.core.diagnosis.clocks import best_delay, delay_text, in_steps
 from proofroll.core.diagnosis.fitting import change_by, factor_text, known_factor
 
@@ -80,7 +80,7 @@ class ReportedVector:
         if (
             len(reported) < 2
             or reported.shape != true.shape
-            or above_round_off(largest_gap(reported[0], true[0]), self.size)
+            or above_round_off(known_difference(reported[0], true[0]), self.size)
         ):
             return self
         frames = {key: frame[1:] for key, frame in self.frames.items()}
@@ -89,7 +89,7 @@ class ReportedVector:
     @property
     def before(self) -> float:
         """Largest difference between report and truth."""
-        return largest_gap(self.reported, self.true)
+        return known_difference(self.reported, self.true)
 
     def cause(
         self,
@@ -109,7 +109,7 @@ class ReportedVector:
         partly = np.any(np.isnan(self.true), axis=-1, keepdims=True)
         aside = partly & (np.isnan(explained) | np.isnan(self.reported))
         reported, true, explained = (np.where(aside, np.nan, each) for each in (self.reported, self.true, explained))
-        before, after = largest_gap(reported, true), largest_gap(reported, explained)
+        before, after = known_difference(reported, true), known_difference(reported, explained)
         if before < self.before / 2:
             after = np.inf  # most of the difference is in what is left aside
         proof = self.name, self.unit, before, after
@@ -154,7 +154,7 @@ class ReportedVector:
             reported = self.reported if frame is None else components_along(frame, self.reported)
             for order, signs in _PERMUTATIONS:
                 changed = local[..., order] * signs
-                if largest_gap(reported, changed) * 4 > self.before:
+                if known_difference(reported, changed) * 4 > self.before:
                     continue
                 where = "" if frame is None else f" in {name}"
                 shown = ", ".join("-" * (s < 0) + "xyz"[k] for k, s in zip(order, signs, strict=True))

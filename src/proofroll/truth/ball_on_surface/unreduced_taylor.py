@@ -46,7 +46,7 @@ def available(body: RollingBall) -> bool:
 
 
 def unreduced(body: RollingBall, times: FloatArray) -> BallMotion:
-    """Motion at rising times [s].
+    """Motion by the unreduced equations at rising times [s], from their compiled series.
 
     Raises:
         Diverged: the series could not be continued.

@@ -5,8 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from proofroll.core.arrays import FloatArray
-from proofroll.core.diagnosis import Cause, Evidence, Hypothesis, hypothesis, largest_gap
+from proofroll.core.arrays import FloatArray, known_difference
+from proofroll.core.diagnosis import Cause, Evidence, Hypothesis, hypothesis
 from proofroll.core.diagnosis.samples import run_and_truth
 from proofroll.core.events import events_of
 from proofroll.elements.ball_on_surface.diagnosis.equations import (
@@ -94,8 +94,8 @@ def pyramidal_cone(evidence: Evidence) -> Iterator[Cause]:
         return
     if max(np.ptp(np.unwrap(np.arctan2(of[:, 1], of[:, 0]))) for of in (slip, reported)) < _TURNS:
         return
-    before, least = largest_gap(reported, -most * slip / sizes), _PYRAMID * float(np.max(np.abs(most)))
-    if not before > least or largest_gap(reported, true) <= least:
+    before, least = known_difference(reported, -most * slip / sizes), _PYRAMID * float(np.max(np.abs(most)))
+    if not before > least or known_difference(reported, true) <= least:
         return  # friction as the law has it, or the true one against a slip that is wrong
     after = np.inf
     for angle in np.arange(_ANGLES) * np.pi / 2 / _ANGLES:
@@ -103,7 +103,7 @@ def pyramidal_cone(evidence: Evidence) -> Iterator[Cause]:
         along = slip @ turn
         corner = np.abs(along) == np.max(np.abs(along), axis=-1, keepdims=True)
         for kind in (corner, 1.0):
-            after = min(after, largest_gap(reported, -most * (np.sign(along) * kind) @ turn.T))
+            after = min(after, known_difference(reported, -most * (np.sign(along) * kind) @ turn.T))
     says = "the friction cone is a pyramid: the friction depends on the direction of the slip"
     remedy = "choose an elliptic (quadratic) cone"
     covered = ("motion", *COVERED)

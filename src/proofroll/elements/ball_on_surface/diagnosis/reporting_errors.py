@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from proofroll.core.arrays import FloatArray, cross
-from proofroll.core.diagnosis import Cause, Evidence, above_round_off, hypothesis, largest_gap
+from proofroll.core.arrays import FloatArray, cross, known_difference
+from proofroll.core.diagnosis import Cause, Evidence, above_round_off, hypothesis
 from proofroll.core.diagnosis.clocks import delay_text, in_steps
 from proofroll.core.diagnosis.fitting import least_squares_parameter
 from proofroll.core.diagnosis.lines import differing
@@ -145,9 +145,17 @@ def at_the_contact(evidence: Evidence) -> Iterator[Cause]:
         said, true = run[name].to_numpy(), truth[name].to_numpy()
         if said.shape == true.shape and len(said) > 1:
             said, true = said[1:], true[1:]
-            before = largest_gap(said, true)
+            before = known_difference(said, true)
             remedy = f"give {name} of the ball's centre, along the axes of the world"
-            yield Cause("contact point", says, name, _UNITS[name][1], before, largest_gap(said, changed[1:]), remedy)
+            yield Cause(
+                "contact point",
+                says,
+                name,
+                _UNITS[name][1],
+                before,
+                known_difference(said, changed[1:]),
+                remedy,
+            )
 
 
 @hypothesis("stale normal", "N, F2 and F3 of the truth along e1, e2, e3 of one time before give the force that is said")
@@ -161,7 +169,7 @@ def stale_normal(evidence: Evidence) -> Iterator[Cause]:
     if (
         said.shape != true.shape
         or not np.all(np.isfinite(said))
-        or not above_round_off(largest_gap(said, true), float(np.max(abs(true))))
+        or not above_round_off(known_difference(said, true), float(np.max(abs(true))))
     ):
         return
     local = components_along(body.surface.frame(body.surface.locate(p)), true)
@@ -170,13 +178,16 @@ def stale_normal(evidence: Evidence) -> Iterator[Cause]:
         return np.asarray(np.einsum("tij,tj->ti", body.surface.frame(body.surface.locate(p - delay * v)), local))
 
     delay = least_squares_parameter(lambda x: np.ravel(turned(x) - said), 0.0, evidence.step or 1e-3)
-    if 2 * largest_gap(run["p_WB"].to_numpy()[1:], p) > float(np.max(np.abs(delay * v))):
+    if 2 * known_difference(run["p_WB"].to_numpy()[1:], p) > float(np.max(np.abs(delay * v))):
         return  # the ball itself is as far off, which explains its force
     moment = delay_text(delay, evidence.step).removesuffix(" late")
     says = f"the force is along the axes of the normal of {moment} before"
-    after, remedy = largest_gap(said, turned(delay)), "take the normal where the ball is when the force is read"
+    after, remedy = (
+        known_difference(said, turned(delay)),
+        "take the normal where the ball is when the force is read",
+    )
     change = in_steps(delay, evidence.step)
-    yield Cause("stale normal", says, "force", "N", largest_gap(said, true), after, remedy, 1, change=change)
+    yield Cause("stale normal", says, "force", "N", known_difference(said, true), after, remedy, 1, change=change)
 
 
 @hypothesis("force at time 0", "the scene's own force with another sign, unit or axes is the one of the certificate")

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from proofroll.core.arrays import FloatArray
-from proofroll.core.diagnosis import Cause, Evidence, hypothesis, largest_gap
+from proofroll.core.arrays import FloatArray, known_difference
+from proofroll.core.diagnosis import Cause, Evidence, hypothesis
 from proofroll.core.diagnosis.lines import differing
 from proofroll.core.diagnosis.samples import (
     another_clock,
@@ -75,7 +75,12 @@ def centres_at_start(evidence: Evidence) -> Iterator[Cause]:
         off = np.reshape(line["found"], (-1, 3)) - np.reshape(line["expected"], (-1, 3))
         if off.shape == arm.shape:
             says = f"{said[name]} of the centres of mass, not of the origins of the bodies' frames"
-            proof = f"{name} at time 0", str(line["unit"]), largest_gap(off, 0 * off), largest_gap(off, shifts[name])
+            proof = (
+                f"{name} at time 0",
+                str(line["unit"]),
+                known_difference(off, 0 * off),
+                known_difference(off, shifts[name]),
+            )
             yield Cause("centre of mass", says, *proof, "give the origins of the frames")
 
 
