@@ -112,10 +112,7 @@ def load_regimes(name: str) -> RegimesStudy:
 
 
 def regime_maps(
-    study: RegimesStudy,
-    workers: int,
-    progress: Callable[[int], None] | None = None,
-    cluster: Cluster | None = None,
+    study: RegimesStudy, workers: int, progress: Callable[[int], None] | None = None, cluster: Cluster | None = None
 ) -> list[xr.Dataset]:
     """Maps of a study, one per rolling resistance, see :func:`regime_map`; made once in a process."""
     scenes = [load_scene(study.scene, rolling_resistance=f) for f in study.rolling_resistance]

@@ -16,8 +16,7 @@ def judge(
     ],
     named: Annotated[str | None, typer.Argument(metavar="SCENE", help="The scene, unless --scene has it.")] = None,
     scene: Annotated[
-        str | None,
-        typer.Option(help="The scene, or the path of its folder.", autocompletion=options.scenes_like),
+        str | None, typer.Option(help="The scene, or the path of its folder.", autocompletion=options.scenes_like)
     ] = None,
     settings: options.Set = None,
     tolerance: Annotated[

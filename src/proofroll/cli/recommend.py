@@ -23,8 +23,7 @@ if TYPE_CHECKING:
 
 def recommend(
     scenes: Annotated[
-        list[str],
-        typer.Argument(help="A scene, or a file of a trade-off; several scenes, studies or groups."),
+        list[str], typer.Argument(help="A scene, or a file of a trade-off; several scenes, studies or groups.")
     ],
     quantity: Annotated[str, typer.Option(help="Observable that matters.")] = "",
     tolerance: Annotated[

@@ -46,16 +46,14 @@ def report(
         typer.Option(min=1, help="Processor-seconds; without names all comparisons there are, in folders too."),
     ] = None,
     only: Annotated[
-        str | None,
-        typer.Option(help="Groups of scenes, as loops,contact: all comparisons of these, and no studies."),
+        str | None, typer.Option(help="Groups of scenes, as loops,contact: all comparisons of these, and no studies.")
     ] = None,
     against: Annotated[
         Path | None,
         typer.Option(help="An earlier report.json: tells what changed; exit 1 if a verdict, an error or a cost did."),
     ] = None,
     history: Annotated[
-        Path | None,
-        typer.Option(help="Runs nothing: draws the reports in this folder over time, in history.html."),
+        Path | None, typer.Option(help="Runs nothing: draws the reports in this folder over time, in history.html.")
     ] = None,
     as_json: options.Json = False,
 ) -> None:
@@ -229,12 +227,7 @@ def _begin(number: int, total: int, words: str) -> str:
 
 
 def _make_all(
-    made: Report,
-    parts: list[Part],
-    missing: list[Part],
-    runner: Runner,
-    out: Path,
-    rest: Callable[[], float] | None,
+    made: Report, parts: list[Part], missing: list[Part], runner: Runner, out: Path, rest: Callable[[], float] | None
 ) -> set[str]:
     """Makes the further studies that are missing; returns names of those for which a budget left no ``rest`` [s]."""
     keys = {part.key: part.words for part in parts}

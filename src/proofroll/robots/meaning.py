@@ -92,11 +92,7 @@ def meaning(
 
 
 def opened(
-    path: Path,
-    base: str,
-    root: Path | None = None,
-    time_limit: float = TIME_LIMIT,
-    workers: Workers | None = None,
+    path: Path, base: str, root: Path | None = None, time_limit: float = TIME_LIMIT, workers: Workers | None = None
 ) -> RobotFile:
     """A file as :func:`proofroll.robots.opening.open_robot` reads it, with macros written out.
 

@@ -33,10 +33,7 @@ _ROUNDING = 1e-9
 
 
 def against(
-    path: Path,
-    other: Path,
-    names: Mapping[str, str] | None = None,
-    settings: CheckSettings = USUAL,
+    path: Path, other: Path, names: Mapping[str, str] | None = None, settings: CheckSettings = USUAL
 ) -> AgainstCheck:
     """Compares the model of a second file with that of the first, at random states of the first.
 

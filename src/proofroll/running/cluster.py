@@ -80,10 +80,7 @@ class Cluster:
         return self._threads
 
     def serve(
-        self,
-        take: Callable[[str | None], Case | None],
-        arrived: Arrived,
-        failed: Callable[[Exception], None],
+        self, take: Callable[[str | None], Case | None], arrived: Arrived, failed: Callable[[Exception], None]
     ) -> None:
         """Runs cases for a runner until there are no more.
 

@@ -78,9 +78,7 @@ def describe_each(
 
 
 def resolve(
-    engines: Sequence[tuple[str, Mapping[str, Any]]],
-    workers: Workers | None = None,
-    requires: Collection[str] = (),
+    engines: Sequence[tuple[str, Mapping[str, Any]]], workers: Workers | None = None, requires: Collection[str] = ()
 ) -> list[EngineFacts | ProofrollError]:
     """Complete settings and facts for engines with options, or an error for each, in the order given.
 
@@ -93,9 +91,7 @@ def resolve(
 
 
 def resolve_with_truth(
-    engines: Sequence[tuple[str, Mapping[str, Any]]],
-    workers: Workers | None = None,
-    requires: Collection[str] = (),
+    engines: Sequence[tuple[str, Mapping[str, Any]]], workers: Workers | None = None, requires: Collection[str] = ()
 ) -> tuple[list[EngineFacts | ProofrollError], EngineFacts]:
     """Facts of engines as by :func:`resolve`, and of the truth. Raises ProofrollError if the truth cannot be asked."""
     *facts, truth = resolve([*engines, ("truth", {})], workers, requires)

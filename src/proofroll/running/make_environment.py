@@ -44,11 +44,7 @@ def label_of(requirements: Sequence[str]) -> str:
 
 
 def add(
-    name: str,
-    requirements: Sequence[str],
-    label: str = "",
-    python: str = "",
-    tell: Callable[[str], None] | None = None,
+    name: str, requirements: Sequence[str], label: str = "", python: str = "", tell: Callable[[str], None] | None = None
 ) -> Environment:
     """Makes an environment, imports its engine there, and keeps it as ``NAME@LABEL``.
 

@@ -129,11 +129,7 @@ def record(
 
 
 def _conclusions(
-    scene: Scene,
-    engine: Any,
-    watches: Sequence[tuple[Any, RunWatch]],
-    times: FloatArray,
-    samples: list[AnySample],
+    scene: Scene, engine: Any, watches: Sequence[tuple[Any, RunWatch]], times: FloatArray, samples: list[AnySample]
 ) -> tuple[list[tuple[Element, Sequence[Event]]], str | None]:
     """Events that watches found, by element, and why a watch ended the run; its samples after that are deleted."""
     events: list[tuple[Element, Sequence[Event]]] = []

@@ -17,12 +17,7 @@ from proofroll.core.arrays import cross
 from proofroll.core.dop853 import integrate
 from proofroll.core.errors import Diverged, Refused
 from proofroll.elements.mechanism.analysis import BRANCHES, RANK, RowSign, analyse, reactions
-from proofroll.elements.mechanism.complementarity import (
-    after_impact,
-    decided_mode,
-    load_of,
-    refuse_switching,
-)
+from proofroll.elements.mechanism.complementarity import after_impact, decided_mode, load_of, refuse_switching
 from proofroll.elements.mechanism.kinematics import BodyMotion, Rows, Tree
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.named_forces import joint_force_shares, lengths, pick_named

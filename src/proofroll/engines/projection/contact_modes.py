@@ -67,12 +67,7 @@ class ContactMotion(AlternatingMotion[ContactMode]):
     alternates = "contacts"
 
     def __init__(
-        self,
-        equations: DependentCoordinates,
-        mechanism: Mechanism,
-        stepper: Integrator,
-        accept: Accept,
-        step: float,
+        self, equations: DependentCoordinates, mechanism: Mechanism, stepper: Integrator, accept: Accept, step: float
     ) -> None:
         """Takes the size of a fixed ``step`` [s]; 0: the step adapts."""
         super().__init__(equations, stepper, accept, breaks(mechanism.signals))

@@ -199,14 +199,7 @@ class Ran:
 
 
 def need_of_term(
-    on: Ran,
-    off: Ran,
-    change: float | None,
-    cost: Interval | None,
-    *,
-    tolerance: float | None,
-    bar: float,
-    scale: float,
+    on: Ran, off: Ran, change: float | None, cost: Interval | None, *, tolerance: float | None, bar: float, scale: float
 ) -> tuple[Need, str]:
     """Need of a term, and its reason.
 

@@ -130,13 +130,7 @@ class ConstraintRows:
         return self.row(number, dot(n, d), bias, (n, on_b), (scaled(-1.0, n), on_a), (n, NONE))
 
     def row(
-        self,
-        number: int,
-        residual: Scalar,
-        bias: Scalar,
-        on_b: _Wrench,
-        on_a: _Wrench,
-        at_joint: _Wrench,
+        self, number: int, residual: Scalar, bias: Scalar, on_b: _Wrench, on_a: _Wrench, at_joint: _Wrench
     ) -> ConstraintRow:
         """Row from the wrenches of a unit multiplier: on each body, at its centre of mass; and on b, at the joint."""
         c = self._connections[number]

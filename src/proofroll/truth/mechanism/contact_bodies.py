@@ -119,11 +119,7 @@ class ContactBodies(ContactStretches):
         return modes
 
     def _tried(
-        self,
-        bodies: BodiesState,
-        closed: Sequence[bool],
-        still: Sequence[bool],
-        trial: Trial,
+        self, bodies: BodiesState, closed: Sequence[bool], still: Sequence[bool], trial: Trial
     ) -> list[tuple[float, BodiesSolution, ContactMode]]:
         """Candidate modes that violate no inequality, best first: relative margin, solution, mode.
 

@@ -100,11 +100,7 @@ def _jacobian(rates: Callable[[Array], Array], states: Array) -> Array:
 
 
 def _collocated(
-    rates: Callable[[Array], Array],
-    start: Array,
-    times: Array,
-    tolerance: float,
-    corrected: Callable[[Array], Array],
+    rates: Callable[[Array], Array], start: Array, times: Array, tolerance: float, corrected: Callable[[Array], Array]
 ) -> Array:
     """States at rising times from a state at time 0; ``rates`` takes states with the time as last column."""
 

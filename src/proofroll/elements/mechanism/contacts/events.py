@@ -50,10 +50,7 @@ class ContactWatch:
         return False
 
     def conclude(
-        self,
-        times: FloatArray,
-        samples: Sequence[MechanismSample],
-        located: Sequence[Event] | None,
+        self, times: FloatArray, samples: Sequence[MechanismSample], located: Sequence[Event] | None
     ) -> SeenInRun:
         """Events of the contacts; None for the events if forces of contact are not known at all times.
 

@@ -9,11 +9,7 @@ from numpy.typing import NDArray
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.diagnosis import Cause, Evidence, hypothesis
-from proofroll.core.diagnosis.fitting import (
-    cached_on_evidence,
-    change_by,
-    factor_text,
-)
+from proofroll.core.diagnosis.fitting import cached_on_evidence, change_by, factor_text
 from proofroll.core.diagnosis.samples import run_and_truth
 from proofroll.core.diagnosis.vectors import ReportedVector
 from proofroll.elements.mechanism.contacts.observables import PRESSES, SLIDES, Followed, follow_contacts, normal_forces
