@@ -121,13 +121,13 @@ def _obvious(content: ReportedComparison, scored: list[Candidate]) -> str:
             worst = (score.motion / best.motion, score, best)
     failed = f" {_joined(lost)} did not even finish everywhere." if lost else ""
     if worst is None:
-        return "What the obvious model costs cannot be said: no default setting stands beside another one." + failed
+        return "What accuracy the obvious model loses cannot be said: no default setting stands beside another one." + failed
     factor, score, best = worst
     blamed = with_caveat(score.name, rows[score.row].caveat)
     off = furthest_off(content, content.runs_of(score.row))
     assert off is not None  # its motion was scored
     return (
-        f"The obvious model costs most with {blamed}: {off_by(off)}, which relative to the range is "
+        f"The obvious model loses most accuracy with {blamed}: {off_by(off)}, which relative to the range is "
         f"{number(factor, 1)} times the error of {best.name}.{failed}"
     )
 

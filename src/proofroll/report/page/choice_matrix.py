@@ -26,6 +26,7 @@ NEEDS = ("motion to {0} of the path", "motion to {0} of the path and forces to {
 UNIT = "in seconds of computing per second of motion"
 WITH_FORCES = "With forces to {0} of the largest, too"
 SAME = "the same for"
+UNJUDGED_FORCES = "forces are not judged for"
 NOTHING = "nothing that was run and timed holds it for"
 UNJUDGED = "that is judged in no scene that was run"
 NO_RUN = "none"
@@ -204,7 +205,10 @@ class ChoiceMatrix:
 
     def with_forces(self, tolerance: float) -> str:
         """Sentence that follows an answer about motion: changes if forces count; empty if forces are judged nowhere."""
-        groups = [column for column in self.columns if column.whole and column.group in self.judged_groups[True]]
+        motion_judged, judged = self.judged_groups
+        whole = [column for column in self.columns if column.whole]
+        groups = [column for column in whole if column.group in judged]
+        silent = [column.group for column in whole if column.group in set(motion_judged).difference(judged)]
         other: list[str] = []
         same: list[str] = []
         without: list[str] = []
@@ -216,7 +220,8 @@ class ChoiceMatrix:
                 same.append(column.group)
             else:
                 other.append(self._phrase(column, *both[0]))
-        rest = [f"{words} {', '.join(names)}" for words, names in ((SAME, same), (NOTHING, without)) if names]
+        lists = (SAME, same), (NOTHING, without), (UNJUDGED_FORCES, silent)
+        rest = [f"{words} {', '.join(names)}" for words, names in lists if names]
         clauses = [", ".join(other), *rest] if other else rest
         return f"{WITH_FORCES.format(number(tolerance))}: {'; '.join(clauses)}." if groups else ""
 

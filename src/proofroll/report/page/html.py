@@ -130,6 +130,7 @@ def _templates(kinds: tuple[type[Part] | type[ReportKind], ...]) -> jinja2.Envir
             "needs": choice_matrix.NEEDS,
             "with_forces": choice_matrix.WITH_FORCES,
             "same": choice_matrix.SAME,
+            "unjudged_forces": choice_matrix.UNJUDGED_FORCES,
             "unit": choice_matrix.UNIT,
             "nothing": choice_matrix.NOTHING,
             "unjudged": choice_matrix.UNJUDGED,

@@ -27,7 +27,7 @@
     cell.append(link);
   }
   const chosen = (on) => [...form.querySelectorAll("[name=engine]")].filter((box) => box.checked === on).map((box) => box.value);
-  const { needs, unit, nothing, unjudged, tolerances, with_forces, same, lacking: unheld } = {{ answer_words|tojson }};
+  const { needs, unit, nothing, unjudged, tolerances, with_forces, same, unjudged_forces, lacking: unheld } = {{ answer_words|tojson }};
   // The cheapest of the chosen engines, worded as `ChoiceMatrix.answer`.
   function sentence(best, { groups, judged }) {
     const held = best.filter((found, j) => found && groups[j]).map((found) => found[1]);
@@ -43,7 +43,9 @@
     const listed = (words, test) => { const found = asked.filter(test).map(({ group }) => group); return found.length ? `${words} ${found.join(", ")}` : ""; };
     const other = asked.filter(({ before, now }) => now && now !== before).map(({ now }) => now).join(", ");
     const said = [other, listed(same, ({ before, now }) => now && now === before), listed(nothing, ({ now }) => !now)];
-    return asked.length ? `${with_forces.replace("{0}", tolerances[Number(slider.value) - first])}: ${said.filter(Boolean).join("; ")}.` : "";
+    const silent = groups.filter((group) => group && judged[0].includes(group) && !judged[1].includes(group));
+    if (silent.length) said.push(`${unjudged_forces} ${silent.join(", ")}`);
+    return judged[1].length ? `${with_forces.replace("{0}", tolerances[Number(slider.value) - first])}: ${said.filter(Boolean).join("; ")}.` : "";
   }
   // Advice for each column, of the chosen engines, worded as `of_column` but without the effect of forces.
   function advised({ said, heads, engines }) {
