@@ -121,7 +121,7 @@ def _obvious(content: ReportedComparison, scored: list[Candidate]) -> str:
             worst = (score.motion / best.motion, score, best)
     failed = f" {_joined(lost)} did not even finish everywhere." if lost else ""
     if worst is None:
-        return "What accuracy the obvious model loses cannot be said: no default setting stands beside another one." + failed
+        return "Nothing shows what accuracy the obvious model loses: no default setting stands beside another." + failed
     factor, score, best = worst
     blamed = with_caveat(score.name, rows[score.row].caveat)
     off = furthest_off(content, content.runs_of(score.row))
