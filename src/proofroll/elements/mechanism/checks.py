@@ -1,5 +1,6 @@
 """Checks of user input: numbers, vectors, axes, inertias; each failure is one clear line."""
 
+from collections.abc import Callable
 from typing import Annotated, Any
 
 import numpy as np
@@ -38,6 +39,15 @@ def assign(item: object, **values: Any) -> None:
     """Sets fields of a frozen dataclass during its construction."""
     for key, value in values.items():
         object.__setattr__(item, key, value)
+
+
+def read(item: object, where: str, reader: Callable[..., Any], *keys: str, **options: Any) -> None:
+    """Replaces fields of a frozen dataclass, during its construction, by what a check, e.g. :func:`vector`, returns.
+
+    ``where``: location of the item in the user's file; ``options``: of the check.
+    """
+    for key in keys:
+        assign(item, **{key: reader(f"{where}.{key}", getattr(item, key), **options)})
 
 
 def name(value: Any, kind: str) -> str:

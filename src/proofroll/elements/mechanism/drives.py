@@ -128,8 +128,7 @@ class Coupling:
 
     def __post_init__(self) -> None:
         where = f"couplings.{checks.name(self.name, 'couplings')}"
-        for key in ("ratio", "offset"):
-            checks.assign(self, **{key: checks.number(f"{where}.{key}", getattr(self, key))})
+        checks.read(self, where, checks.number, "ratio", "offset")
         if not self.ratio:
             raise InputError(
                 f"{where}.ratio", 0.0, "it would hold joint_b and leave joint_a free; fix the joint instead"

@@ -174,9 +174,8 @@ class Joint:
             raise InputError(f"{where}.child", self.child, "a joint connects two bodies; parent and child are the same")
         if self.child == WORLD:
             raise InputError(f"{where}.child", WORLD, "the world cannot be a child; exchange parent and child")
-        for key in ("position", "orientation", "child_position"):
-            checks.assign(self, **{key: checks.vector(f"{where}.{key}", getattr(self, key))})
-        checks.assign(self, axis=checks.axis(f"{where}.axis", self.axis))
+        checks.read(self, where, checks.vector, "position", "orientation", "child_position")
+        checks.read(self, where, checks.axis, "axis")
         if self.kind not in WITH_AXIS and (self.axis != Z or self.second_axis is not None):
             raise InputError(f"{where}.axis", self.axis, f"a {self.kind} joint has no axis; remove it")
         if self.second_axis is not None:

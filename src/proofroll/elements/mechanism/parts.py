@@ -74,10 +74,8 @@ class Loop:
             raise InputError(f"{where}.kind", self.kind, "a free loop holds nothing; remove it")
         if self.body_a == self.body_b:
             raise InputError(f"{where}.body_b", self.body_b, "a loop connects two bodies; these are the same")
-        for key in ("position_a", "position_b", "orientation"):
-            checks.assign(self, **{key: checks.vector(f"{where}.{key}", getattr(self, key))})
-        for key in ("axis_a", "axis_b"):
-            checks.assign(self, **{key: checks.axis(f"{where}.{key}", getattr(self, key))})
+        checks.read(self, where, checks.vector, "position_a", "position_b", "orientation")
+        checks.read(self, where, checks.axis, "axis_a", "axis_b")
 
     @cached_property
     def frame_a(self) -> Array:
@@ -120,10 +118,8 @@ class Spring:
         where = f"springs.{checks.name(self.name, 'springs')}"
         if self.body_a == self.body_b:
             raise InputError(f"{where}.body_b", self.body_b, "a spring connects two bodies; these are the same")
-        for key in ("position_a", "position_b"):
-            checks.assign(self, **{key: checks.vector(f"{where}.{key}", getattr(self, key))})
-        for key in ("stiffness", "damping", "length"):
-            checks.assign(self, **{key: checks.number(f"{where}.{key}", getattr(self, key), at_least=0)})
+        checks.read(self, where, checks.vector, "position_a", "position_b")
+        checks.read(self, where, checks.number, "stiffness", "damping", "length", at_least=0)
 
 
 @dataclass(frozen=True)
@@ -142,4 +138,4 @@ class Point:
 
     def __post_init__(self) -> None:
         where = f"points.{checks.name(self.name, 'points')}"
-        checks.assign(self, position=checks.vector(f"{where}.position", self.position))
+        checks.read(self, where, checks.vector, "position")

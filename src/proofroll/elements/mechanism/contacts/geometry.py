@@ -77,10 +77,8 @@ class Geometry:
     def __post_init__(self) -> None:
         where = f"geometries.{checks.name(self.name, 'geometries')}"
         require_known(f"{where}.kind", self.kind, _KEYS)
-        checks.assign(self, position=checks.vector(f"{where}.position", self.position))
-        checks.assign(self, orientation=checks.vector(f"{where}.orientation", self.orientation))
-        for key in ("normal", "axis"):
-            checks.assign(self, **{key: checks.axis(f"{where}.{key}", getattr(self, key))})
+        checks.read(self, where, checks.vector, "position", "orientation")
+        checks.read(self, where, checks.axis, "normal", "axis")
         usual = {"orientation": ZERO, "normal": Z, "axis": Z}
         for key in ("radius", "axes", "size", *usual):
             value, asked = getattr(self, key), key in _KEYS[self.kind]
@@ -151,8 +149,7 @@ class Pair:
         if len(self.geometries) != 2:
             raise InputError(f"{where}.geometries", self.geometries, "give the names of two")
         checks.assign(self, geometries=tuple(self.geometries))
-        for key in ("friction", "restitution"):
-            checks.assign(self, **{key: checks.number(f"{where}.{key}", getattr(self, key), at_least=0)})
+        checks.read(self, where, checks.number, "friction", "restitution", at_least=0)
         if self.restitution > 1:
             advice = "no impact returns more than it takes; give 0 to 1"
             raise InputError(f"{where}.restitution", self.restitution, advice)
