@@ -84,10 +84,7 @@ def _set_pair_law(pair: Any, contact: BodyContact, settings: MujocoSettings) -> 
     """
     pair.condim = 3 if contact.friction else 1
     pair.friction = (contact.friction, contact.friction, 0.0, 0.0, 0.0)
-    if settings.time_constant is not None:
-        pair.solref = (settings.contact_time, 1.0)
-    if settings.impedance is not None:
-        pair.solimp = (*settings.impedances, 1e-3, 0.5, 2.0)
+    settings.soften(pair)
     if contact.restitution:
         pair.solref = (-1.0, -(1 + contact.restitution) / settings.dt)
         pair.solreffriction = (-1e-9, -1 / settings.dt)

@@ -81,7 +81,7 @@ def write(mechanism: Mechanism, settings: MujocoSettings) -> Any:
         )
         added.name1, added.name2 = coupling.joint_b, coupling.joint_a
         added.data[:2] = coupling.offset, coupling.ratio
-        _set_softness(added, settings)
+        settings.soften(added)
     if mechanism.contacts:
         write_contacts(spec, bodies, mechanism, settings)
     return spec
@@ -136,14 +136,6 @@ def _add_actuator(spec: Any, actuator: Actuator) -> None:
         added.forcelimited, added.forcerange = True, (-most, most)
 
 
-def _set_softness(item: Any, settings: MujocoSettings) -> None:
-    """Sets the softness of an equality constraint."""
-    if settings.time_constant is not None:
-        item.solref = (settings.contact_time, 1.0)
-    if settings.impedance is not None:
-        item.solimp = (*settings.impedances, 1e-3, 0.5, 2.0)
-
-
 def _set_switches(part: Any, joint: Joint, settings: MujocoSettings) -> None:
     """Sets the stops of a joint, and the softness of stops and of dry friction.
 
@@ -157,7 +149,7 @@ def _set_switches(part: Any, joint: Joint, settings: MujocoSettings) -> None:
     if settings.time_constant is not None:
         part.solref_friction = (_SHORTEST, 1.0)
     if settings.impedance is not None:
-        part.solimp_limit = part.solimp_friction = (*settings.impedances, 1e-3, 0.5, 2.0)
+        part.solimp_limit = part.solimp_friction = settings.solimp
 
 
 def _set_law(item: Any, stiffness: float, damping: float) -> None:
@@ -180,4 +172,4 @@ def _add_loop(
             bodies[body].add_site(name=name, pos=position + along * frame[:, 2], quat=to_quaternion(frame))
         added = spec.add_equality(name=f"loop{number}.{point}", type=kind, objtype=mujoco.mjtObj.mjOBJ_SITE)
         added.name1, added.name2 = names
-        _set_softness(added, settings)
+        settings.soften(added)

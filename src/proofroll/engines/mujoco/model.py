@@ -124,7 +124,7 @@ def write_physics(spec: Any, body: RollingBall, settings: MujocoSettings) -> Non
         geom.friction = settings.friction_coefficients(mu)
         # MuJoCo's defaults are written too: the file may hold others.
         geom.solref = [settings.contact_time, 1.0]
-        geom.solimp = [*settings.impedances, 0.001, 0.5, 2.0]
+        geom.solimp = settings.solimp
     if settings.friction_damping is not None:
         _write_pair(spec, settings, mu, settings.friction_damping)
     if body.contact.restitution is not None:

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import mujoco
 from annotated_types import Ge, Gt, Le, Lt
@@ -147,6 +147,18 @@ class MujocoSettings:
     def impedances(self) -> tuple[float, float]:
         """Impedance of the contact at depth zero and at large depth (dmin, dmax of ``solimp``)."""
         return DEFAULT_IMPEDANCE if self.impedance is None else (self.impedance, self.impedance)
+
+    @property
+    def solimp(self) -> tuple[float, float, float, float, float]:
+        """MuJoCo's ``solimp``; its width, midpoint and power are the defaults."""
+        return (*self.impedances, 1e-3, 0.5, 2.0)
+
+    def soften(self, item: Any) -> None:
+        """Sets ``solref`` and ``solimp`` of an MjSpec's item, each unless it is MuJoCo's default."""
+        if self.time_constant is not None:
+            item.solref = (self.contact_time, 1.0)
+        if self.impedance is not None:
+            item.solimp = self.solimp
 
     @property
     def own_share(self) -> float:
