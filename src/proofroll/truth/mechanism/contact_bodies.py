@@ -123,6 +123,8 @@ class ContactBodies(ContactStretches):
     ) -> list[tuple[float, BodiesSolution, ContactMode]]:
         """Candidate modes that violate no inequality, best first: relative margin, solution, mode.
 
+        Where none of them has unique forces, those count whose motion is unique all the same: no contact rubs.
+
         Raises:
             Refused: there is none, or too many contacts are closed.
         """
@@ -130,15 +132,19 @@ class ContactBodies(ContactStretches):
         if count > _MOST:
             raise Refused(f"{count} contacts are closed at once; at most {_MOST} are tried")
         choices = [list(self._candidates(k, own, still[k], bodies)) for k, own in enumerate(self._own(bodies, closed))]
-        kept: list[tuple[float, BodiesSolution, ContactMode]] = []
+        unique, shared = (list[tuple[float, BodiesSolution, ContactMode]]() for _ in range(2))
+        rubs = self.equations.friction + self.equations.bounds > 0
         for mode in itertools.product(*choices):
             attempt = self._headed(bodies, mode, trial)
-            if attempt is None or attempt[0].loose:
+            if attempt is None:
                 continue
             solution, headed = attempt
+            if solution.loose and any(own.kind == "slip" and rub for own, rub in zip(headed, rubs, strict=True)):
+                continue
             apart = (self._kept(k, headed[k], still[k], bodies, solution) for k in range(len(mode)) if closed[k])
             if (least := min(apart, default=np.inf)) >= -SLACK:
-                kept.insert(0, (max(least, 0.0), solution, headed))
+                (shared if solution.loose else unique).insert(0, (max(least, 0.0), solution, headed))
+        kept = unique or shared
         if not kept:
             raise Refused("nothing that the contacts can do keeps all inequalities of contact")
         return sorted(kept, key=lambda one: -one[0])

@@ -571,6 +571,28 @@ def test_a_pendulum_rebounds_from_a_wall_by_newtons_law_whatever_the_friction() 
     assert bar["slip.hit"] >= bar["v.hinge"]
 
 
+@pytest.mark.drill
+def test_a_capsule_slides_and_rolls_on_both_its_ends() -> None:
+    """Its ends share what holds them along its axis in many ways; its motion is the one of a roller all the same."""
+    mass, inertia, radius, mu = 0.5, 6e-4, 0.05, 0.3
+    body = Body("capsule", mass, inertia=(2e-3, inertia, 2e-3))
+    start = Joint("free", "free", "world", "capsule", q0=(0, 0, radius, 1, 0, 0, 0), v0=(1, 0, 0, 0, 0, 0))
+    ends = [Geometry(name, "capsule", "sphere", (0, y, 0), radius=radius) for name, y in (("a", 0.1), ("b", -0.1))]
+    pairs = tuple(Pair(end.name, (end.name, "floor"), friction=mu) for end in ends)
+    floor = Geometry("floor", "world", "plane")
+    roller = Mechanism(bodies=(body,), joints=(start,), geometries=(*ends, floor), pairs=pairs)
+    found = truth_of(roller, np.array([0.0, 0.05, 0.5]))
+    rolls = 1 / (mu * 9.81 * (1 + mass * radius**2 / inertia))
+    assert happened(found) == [("stick", "a"), ("stick", "b")]
+    times_of(found, rolls, rolls)
+    speed = 1 - mu * 9.81 * rolls
+    assert found.record.p_WB[2, 0, 0] == pytest.approx((1 + speed) / 2 * rolls + speed * (0.5 - rolls), abs=DIGITS)
+    assert max(float(bar[-1]) for bar in found.bars.values()) < BARS
+    assert found.pressed is not None
+    assert found.pressed[2, :, 2] == pytest.approx(mass * 9.81 / 2, abs=DIGITS)
+    assert np.isnan(found.pressed[2, :, 1]).all()
+
+
 def dragged(*, sole: float = 0.2, pull: float = 0.0, **rail: Any) -> Mechanism:
     """A cart on a rail, at 1 m/s, with a foot on a floor; laws of the ``rail``, and a pull along it [m/s²]."""
     inertia = (1.0, 1.0, 1.0)
