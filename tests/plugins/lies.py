@@ -277,7 +277,7 @@ def _slips() -> Iterator[Lie]:
     yield lie("events 30 ms late", _later(0.03))
     yield lie("events 5 ms late", _later(0.005))
     yield lie("events before they are", _later(-0.03))
-    yield lie("event times not finite", _each(time=lambda *_: np.nan))
+    yield lie("event times not finite", _each(time=lambda *_: np.nan), said=("has the bracket",))
     wide: dict[str, Any] = {"time_low": lambda *_: 0.0, "time_high": lambda _, until: until}
     yield lie("brackets as wide as the run", _each(**wide), said=("by luck",))
     yield lie(
@@ -436,12 +436,50 @@ def _forces_of_couplings_and_stops() -> Iterator[Lie]:
     yield Lie("a stop that presses in flight", ("stops",), ("stop.guide is",), lambda m: {"stop": m.right.stop + 1})
 
 
+def _parts_of_motion() -> Iterator[Lie]:
+    def of_last(m: Moment, name: str, factor: float) -> Any:
+        values = np.array(getattr(m.right, name))
+        values[-1] *= factor
+        return values
+
+    def at_middle(change: Callable[[Moment], Any]) -> Callable[[Moment], Any]:
+        return lambda m: change(m) if abs(m.t - m.until / 2) < EVERY / 2 + 1e-9 else {}
+
+    rest = (*ALL, "bounces", "stops", "rubs", "gears")
+    drift, turned = (lambda m: {"p_WB": m.right.p_WB + 0.01 * m.length * m.t / m.until}), Rotation.from_rotvec(_TWIST)
+    yield Lie("places that tremble", ("bounces",), _PLACES, lambda m: {"p_WB": m.right.p_WB + _trembling(m)})
+    yield Lie("places that drift, rubbing", ("rubs",), _PLACES, drift)
+    yield Lie("places that drift, at a stop", ("stops",), _PLACES, drift)
+    yield Lie("places elsewhere, rubbing", ("rubs",), _PLACES, lambda m: {"p_WB": m.right.p_WB + m.length})
+    yield Lie("half a step late", tuple(set(rest) - {"slips", "bounces", "stops", "servo"}), _PLACES,
+              lambda m: m.at(m.t - 5e-4), ("0.0005 s late",))  # fmt: skip
+    yield Lie("the last sample frozen", rest, (*_PLACES, *_W), lambda m: m.at(min(m.t, m.until - EVERY)))
+    yield Lie("samples in the middle 3 ms late", rest, (*_PLACES, *_W), at_middle(lambda m: m.at(m.t - 0.003)))
+    yield Lie("v turned by half a degree", ("rolls", "slips", "loop", "sled"), (*_V, "slip is"),
+              lambda m: {"v_WB": turned.apply(m.right.v_WB)})  # fmt: skip
+    yield Lie("v of the last body x 1.01", ("tree", "loop", "driven", "servo"), _V,
+              lambda m: {"v_WB": of_last(m, "v_WB", 1.01)}, _FACTOR)  # fmt: skip
+    yield Lie("one joint's reactions x 1.02", ("tree", "loop", "driven", "servo"), (*_FORCES, "torques is"),
+              lambda m: {name: of_last(m, name, 1.02) for name in _WRENCH}, _FACTOR)  # fmt: skip
+    yield Lie("places as texts", rest, ("real numbers",), lambda m: {"p_WB": np.asarray(m.right.p_WB).astype(str)})
+
+
+def _parts_of_events() -> Iterator[Lie]:
+    beside: dict[str, Any] = {name: lambda event, _, by=by: event.time + by
+                              for name, by in (("time_low", 1e-3), ("time_high", 2e-3))}  # fmt: skip
+    elsewhere = _each(name=lambda *_: "elsewhere")
+    yield Lie("impacts of another stop", ("stops",), ORDER, events=elsewhere)
+    yield Lie("limits of another actuator", ("servo",), ORDER, events=elsewhere)
+    for about in ("slips", "bounces", "stops", "servo"):
+        yield Lie(f"brackets beside their times, {about}", (about,), ("has the bracket",), events=_each(**beside))
+
+
 def table() -> list[Lie]:
     """All lies of the table."""
     states = _times, _places, _frames, _velocities, _spins, _orientations
     forces = _forces_of_balls, _reactions_of_joints, _efforts, _forces_of_contacts, _friction_of_joints
     # New ones come last: the place of a lie decides of which scenes it is told.
-    last = _models, _small, _further_impacts, _forces_of_couplings_and_stops
+    last = _models, _small, _further_impacts, _forces_of_couplings_and_stops, _parts_of_motion, _parts_of_events
     return [lie for part in (*states, *forces, _slips, _impacts, *last) for lie in part()]
 
 
@@ -452,6 +490,13 @@ def _off_grid(change: Callable[[Moment], Any]) -> Callable[[Moment], Any]:
 
 # Rotations to wrong world frames: slanted, and with cyclically permuted axes.
 _SLANTED, _CYCLED = Rotation.from_rotvec([0.1, 0.2, 0.2]), Rotation.from_matrix(np.roll(np.eye(3), 1, axis=0))
+
+
+_TWIST = (0.0087, 0.0, 0.0087)  # half a degree
+
+
+def _trembling(m: Moment) -> float:
+    return float(0.003 * m.length * (-1) ** round(m.t / EVERY))
 
 
 def _quaternions(turns: Rotation) -> Any:

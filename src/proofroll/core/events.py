@@ -18,6 +18,8 @@ if TYPE_CHECKING:
 EVENT_ORDER = "event_order"
 # Kinds of events at which velocities jump, of all kinds of elements.
 JUMPS = frozenset({"impact", "bounce", "settle"})
+# Room of a time beside its bracket, relative to it: round-off.
+_ROUNDED = 1e-9
 
 
 @dataclass(frozen=True)
@@ -39,12 +41,15 @@ class Event:
 
 
 def wrong_bracket(events: Sequence[Event]) -> str:
-    """Sentence on the first event whose bracket is not finite or ends before it begins; empty: there is none."""
+    """Sentence on the first event whose bracket is not finite or does not contain its time; empty: there is none."""
     for event in events:
-        if not -np.inf < event.time_low <= event.time_high < np.inf:
+        room = _ROUNDED * abs(event.time)
+        inside = event.time_low - room <= event.time <= event.time_high + room
+        if not (inside and -np.inf < event.time_low <= event.time_high < np.inf):
             return (
                 f"the event {' '.join(filter(None, (event.kind, event.name)))} at {event.time:g} s has the bracket "
-                f"{event.time_low:g} to {event.time_high:g} s; both are finite, and time_low comes before time_high"
+                f"{event.time_low:g} to {event.time_high:g} s; both are finite, time_low comes before time_high, "
+                "and the time lies between them"
             )
     return ""
 

@@ -99,7 +99,8 @@ class Reference:
         if item.name == EVENT_ORDER:
             return np.zeros(1), 0.0
         if item.role == Role.EVENT:
-            return self.curves[name], max((event.time_high - event.time_low for event in self.events), default=0.0)
+            times = self.curves.get(name, np.zeros(0))  # of a scene without events there are none
+            return times, max((event.time_high - event.time_low for event in self.events), default=0.0)
         known = self.curves.get(name)
         if known is None:  # for example a force that the equations do not determine all the time
             return np.full_like(values, np.nan), np.inf

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from collections import Counter
 from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
@@ -121,6 +122,11 @@ def turned_alike(values: FloatArray, true: FloatArray) -> FloatArray:
 
 
 def event_order(dataset: xr.Dataset, truth: xr.Dataset) -> FloatArray:
-    """Number of events that differ in kind from the truth's, are missing or are too many; shape (1,)."""
-    kinds = itertools.zip_longest(*([event.kind for event in events_of(item)] for item in (dataset, truth)))
-    return np.array([float(sum(a != b for a, b in kinds))])
+    """Number of events that differ in kind or part from the truth's, are missing or are too many; shape (1,).
+
+    Events at one time may come in another order of their parts. A run need not name them.
+    """
+    own, true = (events_of(item) for item in (dataset, truth))
+    kinds = itertools.zip_longest(*([event.kind for event in events] for events in (own, true)))
+    named, known = (Counter((event.kind, event.name) for event in events if event.name) for events in (own, true))
+    return np.array([float(max(sum(a != b for a, b in kinds), (named - known).total() if known else 0))])

@@ -12,7 +12,7 @@ import numpy as np
 
 from proofroll.core.arrays import FloatArray, largest_difference
 from proofroll.core.convergence import envelope, is_floor
-from proofroll.core.dataset import BETWEEN
+from proofroll.core.dataset import BETWEEN, off_impacts
 from proofroll.core.limits import STUDY_TIME_LIMIT
 from proofroll.core.scene import Scene
 from proofroll.core.time_grid import off_grids, time_grid
@@ -243,6 +243,7 @@ def judge_point(points: Sequence[CurvePoint], references: Mapping[float, Referen
 
 def with_errors(point: CurvePoint, reference: Reference, run: xr.Dataset) -> CurvePoint:
     """Point with its observables and their errors; the error of an event is at least half the width of its bracket."""
+    run = off_impacts(reference.scene, reference.dataset, {0: run})[0]
     given = run_values.observables_of(reference, run)
     curves = {name: values for name, values in given.items() if np.isfinite(reference.true(name, values).error_bar)}
     return replace(

@@ -9,6 +9,7 @@ import pytest
 import xarray as xr
 
 from proofroll.core.engine_abilities import SharesEquations
+from proofroll.core.events import Event, events_of, with_events
 from proofroll.core.truth import truth
 from proofroll.core.verdict import Allowance, RunCurve, Verdict, judge_curve
 from proofroll.elements.ball_on_surface.element import rolling_ball
@@ -55,6 +56,51 @@ def test_nothing_is_held_against_what_the_truth_does_not_tell() -> None:
     judgement = judge_curve(allowance, RunCurve(told), held.true("contact_forces", told))
     assert judgement.verdict is Verdict.NOT_JUDGED
     assert judgement.reason == "not judged: the truth does not tell it here"
+
+
+def test_events_of_a_scene_without_any_are_too_many() -> None:
+    """A run that tells a lift-off where the truth knows no event is wrong about events, and has errors elsewhere."""
+    scene = load_scene("sphere_in_cylinder")
+    true = truth(scene, np.linspace(0, 0.1, 11))
+    told = with_events(true, [Event("lift_off", 0.05, 0.05, 0.05)])
+    point = with_errors(CurvePoint(None, Result(Status.DONE, "")), Reference.of(scene, true), told)  # type: ignore[arg-type]  # what it ran is a dataset here
+    assert point.errors["event_times"] == np.inf
+    assert point.errors["event_order"] == 1
+    assert point.errors["z"] == 0
+
+
+def test_a_velocity_at_an_impact_may_be_that_of_either_side() -> None:
+    """A trade-off counts no error where a sample lies on an impact and has the velocity before or after it."""
+    scene = load_scene("two_spheres")
+    (hit,) = (event.time for event in events_of(truth(scene, np.linspace(0, 0.12, 13))))
+    true = truth(scene, np.linspace(0, 2 * hit, 11))
+    for side in (4, 6):
+        velocity = true["v_WB"].copy()
+        velocity[5] = velocity[side]
+        run = true.assign(v_WB=velocity)
+        point = with_errors(CurvePoint(None, Result(Status.DONE, "")), Reference.of(scene, true), run)  # type: ignore[arg-type]  # what it ran is a dataset here
+        assert point.errors["v_WB"] < 1e-9
+
+
+@pytest.mark.parametrize(
+    ("own", "wrong"),
+    [
+        ([("impact", "a"), ("impact", "b")], 0),
+        ([("impact", "b"), ("impact", "a")], 0),
+        ([("impact", ""), ("impact", "")], 0),
+        ([("impact", "a"), ("impact", "a")], 1),
+        ([("impact", "a"), ("stick", "b")], 1),
+        ([("impact", "a")], 1),
+        ([("impact", "a"), ("impact", "c"), ("impact", "b")], 1),
+    ],
+)
+def test_events_of_another_part_are_wrong(own: list[tuple[str, str]], wrong: int) -> None:
+    """Parts of events at one time have no order, and a run need not name them; an event of another is no true one."""
+
+    def told(events: list[tuple[str, str]]) -> xr.Dataset:
+        return with_events(xr.Dataset(), [Event(kind, 0.1, 0.1, 0.1, name) for kind, name in events])
+
+    assert run_values.event_order(told(own), told([("impact", "a"), ("impact", "b")])) == wrong
 
 
 def test_a_trade_off_leaves_out_what_the_truth_does_not_tell(monkeypatch: pytest.MonkeyPatch) -> None:

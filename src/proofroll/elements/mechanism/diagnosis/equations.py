@@ -34,6 +34,9 @@ _DEPENDENT = 1e-7
 _GONE = 1e-9
 _TURNS = 0.1
 _CONSISTENT = 1e-3
+# Part of an error of places that an integral of velocities from few samples misses; least error that is looked at,
+# relative to the mechanism's size; change of a velocity between samples, in usual changes, that counts as a jump.
+_UNEXPLAINED, _LEAST_ERROR, _JUMPS = 0.7, 1e-6, 5.0
 _AT_REST = 1e-9  # rate that counts as rest, relative to the coordinate's largest
 
 
@@ -254,6 +257,26 @@ def is_motion(dataset: Any) -> bool:
     return all(np.all(np.isfinite(part)) for part in parts) and bool(
         np.all(np.linalg.norm(parts[-1], axis=-1) > _TURNS)
     )
+
+
+def is_one_motion(run: Any, truth: Any, length: float) -> bool:
+    """False if errors of places are none that errors of velocities make: the report is wrong then, and no law.
+
+    Intervals in which a velocity jumps are left out. ``length``: size of the mechanism [m].
+    """
+    count = min(dataset.sizes["time"] for dataset in (run, truth))
+    h = np.diff(truth["time"].to_numpy()[:count])[:, None]
+    (p, v), (true_p, true_v) = (
+        [dataset[name].to_numpy()[:count].reshape(count, -1) for name in ("p_WB", "v_WB")] for dataset in (run, truth)
+    )
+    smooth = np.ones(len(h), dtype=bool)
+    for velocities in (v, true_v):
+        changes = np.max(np.abs(np.diff(velocities, axis=0)), axis=1)
+        smooth &= changes <= _JUMPS * np.median(changes)
+    off, rate = p - true_p, v - true_v
+    unexplained = np.cumsum((np.diff(off, axis=0) - h * (rate[1:] + rate[:-1]) / 2)[smooth], axis=0)
+    least = max(_UNEXPLAINED * float(np.max(np.abs(off))), _LEAST_ERROR * length)
+    return float(np.max(np.abs(unexplained), initial=0.0)) <= least
 
 
 def _modes(mechanism: Mechanism, placed: Placed) -> list[tuple[object, ...]]:

@@ -25,7 +25,7 @@ from proofroll.elements.mechanism.contacts.dynamics import ContactDynamics
 from proofroll.elements.mechanism.contacts.geometry import Geometry
 from proofroll.elements.mechanism.contacts.observables import PRESSES, Followed, normal_forces
 from proofroll.elements.mechanism.diagnosis.contacts import COVERS, contact_cause, touch_of
-from proofroll.elements.mechanism.diagnosis.equations import placed_of
+from proofroll.elements.mechanism.diagnosis.equations import is_one_motion, placed_of
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.placed import Placed
 
@@ -153,6 +153,8 @@ class _Struck:
 def laws_of_impacts(evidence: Evidence) -> Iterator[Cause]:
     """Hypotheses: an engine scales the friction or restitution of impacts, uses a convex cone, or turns a plane."""
     for touch in touch_of(evidence) if not evidence.by_step else ():
+        if not is_one_motion(evidence.run, evidence.truth, evidence.element.length):
+            return
         mechanism, least = touch.mechanism, evidence.element.force
         true_presses = np.asarray(PRESSES * least < normal_forces(touch.true, touch.true_force))
         seen = list(_struck(mechanism, evidence.run, touch.found, touch.presses))

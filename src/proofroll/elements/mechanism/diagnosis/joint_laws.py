@@ -9,7 +9,7 @@ from proofroll.core.arrays import FloatArray
 from proofroll.core.diagnosis import CLOSES_EXACTLY, Cause, Evidence, above_round_off, hypothesis
 from proofroll.core.diagnosis.fitting import change_by, factor_text, possible
 from proofroll.core.diagnosis.samples import run_and_truth
-from proofroll.elements.mechanism.diagnosis.equations import Change, is_motion, of_start, placed_of
+from proofroll.elements.mechanism.diagnosis.equations import Change, is_motion, is_one_motion, of_start, placed_of
 from proofroll.elements.mechanism.diagnosis.residuals import COVERED, best, residuals_of
 from proofroll.elements.mechanism.drives import Actuator
 from proofroll.elements.mechanism.joint_coordinates import JointCoordinates
@@ -163,6 +163,8 @@ def of_stops(evidence: Evidence) -> Iterator[Cause]:
     """
     mechanism, found = evidence.element.mechanism, run_and_truth(evidence)
     if found is None or not is_motion(found[0]) or not any(joint.limits for joint in mechanism.joints):
+        return
+    if not is_one_motion(*found, evidence.element.length):
         return
     (seen, speeds), (true, rates) = (placed_of(mechanism, dataset).of_tree() for dataset in found)
     times = np.asarray(found[0]["time"], dtype=float)

@@ -11,7 +11,14 @@ from proofroll.core.diagnosis import CLOSES, CLOSES_EXACTLY, Evidence
 from proofroll.core.diagnosis.fitting import ABOVE, FACTORS, Residuals, cached_on_evidence
 from proofroll.core.diagnosis.lines import differing
 from proofroll.core.first_steps import OF_FIRST_STEPS
-from proofroll.elements.mechanism.diagnosis.equations import Change, MechanismStates, of_run, of_start, stretch
+from proofroll.elements.mechanism.diagnosis.equations import (
+    Change,
+    MechanismStates,
+    is_one_motion,
+    of_run,
+    of_start,
+    stretch,
+)
 
 # Equations with a larger relative residual for the true run prove nothing.
 _TELLS = 1e-4
@@ -48,7 +55,7 @@ def residuals_of(evidence: Evidence) -> Iterator[Residuals[Change]]:
     if evidence.run is None or evidence.truth is None or evidence.by_step:
         return
     part = stretch(mechanism, evidence.run, evidence.truth)
-    if part is None:
+    if part is None or not is_one_motion(evidence.run, evidence.truth, evidence.element.length):
         return
     seen, true = of_run(mechanism, evidence.run, part), of_run(mechanism, evidence.truth, part)
     if not seen.consistent:
