@@ -75,6 +75,18 @@ const folds = (() => {
   reveal();
 })();
 
+// Sections below the screen get their heights once the browser is idle, for links, searches and the scroll bar.
+addEventListener("load", () => {
+  const waiting = [...document.querySelectorAll("main > section")], idle = window.requestIdleCallback ?? setTimeout;
+  function next() {
+    const section = waiting.shift();
+    if (!section) return;
+    section.style.contentVisibility = "visible";
+    idle(next);
+  }
+  idle(next);
+});
+
 // The contents mark the section that is being read, and keep its link in sight.
 (() => {
   const contents = document.querySelector("nav");
