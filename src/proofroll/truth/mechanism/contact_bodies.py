@@ -31,7 +31,7 @@ class ContactBodies(ContactStretches):
 
     def __init__(self, equations: ContactEquations, tolerance: float, size: float) -> None:
         super().__init__(equations, len(equations.equations.equations.start()), tolerance, size)
-        self.equations = equations
+        self.equations, self._rubs = equations, equations.friction + equations.bounds > 0
 
     def begin(self) -> Transition[ContactMode]:
         """See the protocol."""
@@ -52,8 +52,7 @@ class ContactBodies(ContactStretches):
             return self.equations.accelerated(bodies, tuple(directed))
 
         if any(closed) and list(still) == list(closed) and self._balanced(bodies, closed):
-            rubs = self.equations.friction + self.equations.bounds > 0
-            own = zip(self._own(bodies, closed), rubs, strict=True)
+            own = zip(self._own(bodies, closed), self._rubs, strict=True)
             return tuple(
                 each if rub or each.kind == "open" else each._replace(kind="slip") for each, rub in own
             ), np.inf
@@ -123,7 +122,7 @@ class ContactBodies(ContactStretches):
     ) -> list[tuple[float, BodiesSolution, ContactMode]]:
         """Candidate modes that violate no inequality, best first: relative margin, solution, mode.
 
-        Where none of them has unique forces, those count whose motion is unique all the same: no contact rubs.
+        Where none of them has unique forces, those count whose motion is unique all the same: nothing that closes rubs.
 
         Raises:
             Refused: there is none, or too many contacts are closed.
@@ -133,14 +132,11 @@ class ContactBodies(ContactStretches):
             raise Refused(f"{count} contacts are closed at once; at most {_MOST} are tried")
         choices = [list(self._candidates(k, own, still[k], bodies)) for k, own in enumerate(self._own(bodies, closed))]
         unique, shared = (list[tuple[float, BodiesSolution, ContactMode]]() for _ in range(2))
-        rubs = self.equations.friction + self.equations.bounds > 0
         for mode in itertools.product(*choices):
             attempt = self._headed(bodies, mode, trial)
             if attempt is None:
                 continue
             solution, headed = attempt
-            if solution.loose and any(own.kind == "slip" and rub for own, rub in zip(headed, rubs, strict=True)):
-                continue
             apart = (self._kept(k, headed[k], still[k], bodies, solution) for k in range(len(mode)) if closed[k])
             if (least := min(apart, default=np.inf)) >= -SLACK:
                 (shared if solution.loose else unique).insert(0, (max(least, 0.0), solution, headed))
@@ -172,7 +168,10 @@ class ContactBodies(ContactStretches):
     def _headed(
         self, bodies: BodiesState, mode: ContactMode, trial: Trial
     ) -> tuple[BodiesSolution, ContactMode] | None:
-        """Solution and mode of a candidate, with unknown slip directions solved for; None: none is consistent."""
+        """Solution and mode of a candidate, with unknown slip directions solved for.
+
+        None: none is consistent, or contacts that rub share forces, which leaves more than one motion.
+        """
         from scipy.optimize import root
 
         frames = [frame_of_axis(each.normal) for each in bodies.touching]
@@ -197,10 +196,12 @@ class ContactBodies(ContactStretches):
             across_slide = zip(unknown, directions(angles), strict=True)
             return np.array([float(cross(way, slides[k]) @ bodies.touching[k].normal) for k, way in across_slide])
 
-        still = np.zeros(len(unknown))
+        first = tried(np.zeros(len(unknown)))
+        if first.loose and any(own.kind == "slip" and rub for own, rub in zip(mode, self._rubs, strict=True)):
+            return None  # whatever the directions are
         if not unknown:
-            return tried(still), mode
-        loose = tried(still).slide
+            return first, mode
+        loose = first.slide
         start = np.array([float(np.arctan2(frames[k][:, 1] @ loose[k], frames[k][:, 0] @ loose[k])) for k in unknown])
         for turn in (0.0, 1.0, -1.0, 2.0, -2.0):
             answer = root(sideways, start + turn, tol=1e-15)

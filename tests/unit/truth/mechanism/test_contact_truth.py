@@ -19,6 +19,7 @@ from proofroll.core.scene import Scene
 from proofroll.core.truth import truth
 from proofroll.elements.ball_on_surface.element import scene_with
 from proofroll.elements.mechanism.contacts import coulomb
+from proofroll.elements.mechanism.contacts.acting import OPEN
 from proofroll.elements.mechanism.contacts.geometry import Geometry, Pair
 from proofroll.elements.mechanism.drives import Actuator
 from proofroll.elements.mechanism.element import MechanismElement
@@ -28,7 +29,10 @@ from proofroll.elements.mechanism.parts import Body
 from proofroll.elements.mechanism.signal import Formula
 from proofroll.files.scene_file import load_scene
 from proofroll.running.simulation import simulate
+from proofroll.truth.mechanism.contact_bodies import ContactBodies
+from proofroll.truth.mechanism.contact_equations import ContactEquations
 from proofroll.truth.mechanism.error_bars import TwoRouteMotion
+from proofroll.truth.mechanism.maximal_coordinates import MaximalCoordinates
 from proofroll.truth.mechanism.switched_truth import truth_of
 from proofroll_drill.published import true_values
 
@@ -591,6 +595,24 @@ def test_a_capsule_slides_and_rolls_on_both_its_ends() -> None:
     assert found.pressed is not None
     assert found.pressed[2, :, 2] == pytest.approx(mass * 9.81 / 2, abs=DIGITS)
     assert np.isnan(found.pressed[2, :, 1]).all()
+
+
+def test_corners_that_share_forces_as_they_rub_are_not_searched_for_directions(monkeypatch: pytest.MonkeyPatch) -> None:
+    """An impact of four corners takes hundreds of solutions, not thousands: most modes of theirs have no one motion."""
+    body = Body("box", 1.0, inertia=(2e-3, 3e-3, 4e-3))
+    start = Joint("free", "free", "world", "box", q0=(0, 0, 0.05, 1, 0, 0, 0), v0=(0.3, 0.1, 0, 0.02, 1, 0))
+    shapes = (Geometry("hull", "box", "box", size=(0.2, 0.1, 0.1)), Geometry("floor", "world", "plane"))
+    pairs = (Pair("ground", ("hull", "floor"), friction=0.1),)
+    box = Mechanism(bodies=(body,), joints=(start,), geometries=shapes, pairs=pairs)
+    equations = ContactEquations(box, MaximalCoordinates(box).lean)
+    bodies, solved, tried = ContactBodies(equations, 3e-14, 1.0), equations.struck, []
+    monkeypatch.setattr(equations, "struck", lambda *given: tried.append(1) or solved(*given))
+    state = np.append(equations.equations.equations.start(), 0.0)
+    closed = [each.gap < 1e-9 for each in equations.at(state).touching]
+    assert sum(closed) == 4
+    _, stays, _ = bodies._struck(state, (OPEN,) * 8, closed, [0.0] * 8)
+    assert sum(stays) == 2
+    assert len(tried) < 1000
 
 
 def dragged(*, sole: float = 0.2, pull: float = 0.0, **rail: Any) -> Mechanism:
