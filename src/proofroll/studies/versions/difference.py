@@ -105,7 +105,7 @@ class CaseDifference:
         old, new: its runs.
         numbers: difference of the trajectories; None if one has none.
         orders: observed orders that changed.
-        changed: verdicts that changed, ``refused (why) → agrees``.
+        changed: verdicts that changed, ``refused (why) → agrees``, and observables that one of them alone gives.
     """
 
     comparison: str
@@ -133,6 +133,7 @@ def case_difference(outcome: Outcome, before: Run, after: Run) -> CaseDifference
     elif before.verdict != after.verdict or verdicts:
         which = ", ".join(f"{name} {one} → {other}" for name, one, other in verdicts)
         changed.append(which or f"{before.verdict} → {after.verdict}")
+    changed += _given_by_one(outcome, before, after)
     orders = [
         OrderChange(one.observable, one.order, other.order)
         for one in before.judgements
@@ -155,6 +156,16 @@ def case_difference(outcome: Outcome, before: Run, after: Run) -> CaseDifference
 
 def _ending(run: Run) -> str:
     return str(run.verdict) if run.result.status == Status.DONE else f"{run.result.status} ({run.result.message})"
+
+
+def _given_by_one(outcome: Outcome, before: Run, after: Run) -> list[str]:
+    """A sentence for each observable that one run gives and the other one does not."""
+    if before.trajectory is None or after.trajectory is None:
+        return []
+    scene = outcome.points[point_name(before.parameters)].scene
+    old, new = (observe(scene, run.trajectory.dataset).keys() for run in (before, after) if run.trajectory)
+    lost, gained = sorted(old - new), sorted(new - old)
+    return [f"{name} is given no more" for name in lost] + [f"{name} is given now" for name in gained]
 
 
 def _numbers(outcome: Outcome, before: Run, after: Run) -> NumbersApart | None:
