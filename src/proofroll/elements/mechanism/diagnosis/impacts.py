@@ -31,6 +31,7 @@ from proofroll.elements.mechanism.placed import Placed
 
 _DELAY, _RATIO = 0.05, 1e-3  # largest delay, in steps, and error of restitution that count as none
 _JUMP = 1e-4  # least velocity that counts as missed, relative to the mechanism's speed
+_NO_JUMP = 1e-6  # of the origins of bodies beside that of the gap's rate: round-off
 _ROUNDS = 4
 _CONTRACTIONS = 20  # until slip and speed along the normal fit each other
 _REMEDY = "look at what the engine makes of it"
@@ -200,12 +201,18 @@ def _struck(mechanism: Mechanism, dataset: Any, found: Followed, presses: Any) -
             others = np.delete(u_n[k : k + 2], contact, axis=1)
             if presses[k - 1 : k + 3].any() or ((others[0] < 0) & (others[1] > 0)).any():
                 continue
-            time = each.time
+            time, gaps, rates = each.time, found.gap[:, contact], u_n[:, contact]
             for _ in range(_ROUNDS):  # Gauss-Newton: bodies are in one place, and their velocities jump
                 (p, v), (p_after, v_after) = (
                     _extrapolated(t, placed.p_WB, placed.v_WB, i, j, time) for i, j in ((k, k - 1), (k + 1, k + 2))
                 )
-                time -= float(np.sum((p - p_after) * (v - v_after)) / np.sum((v - v_after) ** 2))
+                (gap, rate), (gap_after, rate_after) = (
+                    _extrapolated(t, gaps, rates, i, j, time) for i, j in ((k, k - 1), (k + 1, k + 2))
+                )
+                apart, jump = p - p_after, v - v_after
+                if np.abs(jump).max() <= _NO_JUMP * abs(rate - rate_after):  # bodies that turn about their origins
+                    apart, jump = gap - gap_after, rate - rate_after
+                time -= float(np.sum(apart * jump) / np.sum(jump**2))
             spins = [w[i] + (w[i] - w[j]) / (t[i] - t[j]) * (time - t[i]) for i, j in ((k, k - 1), (k + 1, k + 2))]
             R = Rotation.from_rotvec((time - t[k]) * (w[k] + spins[0]) / 2) * Rotation.from_matrix(placed.R_WB[k, :-1])
             turns = np.roll(R.as_quat(), 1, axis=-1)

@@ -11,7 +11,13 @@ import pytest
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.diagnosis import Evidence, diagnose, hypotheses_of
+from proofroll.core.scene import Scene
 from proofroll.core.truth import truth
+from proofroll.elements.mechanism.contacts.geometry import Geometry, Pair
+from proofroll.elements.mechanism.element import MechanismElement
+from proofroll.elements.mechanism.joint import Joint
+from proofroll.elements.mechanism.model import Mechanism
+from proofroll.elements.mechanism.parts import Body
 from proofroll.files.scene_file import load_scene
 from proofroll.running.simulation import simulate
 
@@ -102,6 +108,30 @@ def test_one_impact_tells_a_law_by_all_velocities_after_it(law: str) -> None:
     told = [cause.says for cause in diagnose(Evidence(element, [], run, true, STEP), hypotheses_of(element))]
     assert told == [f"{law} of impacts is 0.9 times"]
     assert diagnose(Evidence(element, [], true, true, STEP), hypotheses_of(element)) == []
+
+
+@pytest.mark.drill
+def test_an_impact_of_a_body_whose_origin_rests_is_followed() -> None:
+    """A pendulum's frame on its hinge does not jump: the gap says when the impact was; one velocity proves no law."""
+    rod = Body("rod", 1.0, (0, 0, -0.5), (0.1, 0.1, 1e-3))
+    hinge = Joint("hinge", "revolute", "world", "rod", axis=(0, 1, 0), q0=(0.3,))
+    tip = Geometry("tip", "rod", "sphere", (0, 0, -1.0), radius=0.05)
+    wall = Geometry("wall", "world", "plane", (0.05, 0, 0), normal=(-1.0, 0, 0))
+    true, run = (
+        truth(Scene("pendulum", "", (MechanismElement(_mechanism(rod, hinge, tip, wall, e)),)), np.arange(0, 0.8, 0.01))
+        for e in (0.7, 0.63)
+    )
+    element = MechanismElement(_mechanism(rod, hinge, tip, wall, 0.7))
+    told = [cause.says for cause in diagnose(Evidence(element, [], run, true, STEP), hypotheses_of(element))]
+    assert told == []
+    (touch,) = impacts.touch_of(Evidence(element, [], run, true, STEP))
+    (struck,) = impacts._struck(touch.mechanism, run, touch.found, touch.presses)
+    assert -struck.after[0] / struck.before[0] == pytest.approx(0.63, rel=2e-3)
+
+
+def _mechanism(body: Body, joint: Joint, tip: Geometry, wall: Geometry, e: float) -> Mechanism:
+    pair = Pair("hit", (tip.name, wall.name), friction=0.3, restitution=e)
+    return Mechanism(bodies=(body,), joints=(joint,), geometries=(tip, wall), pairs=(pair,))
 
 
 @pytest.mark.drill
