@@ -202,6 +202,14 @@ def test_a_slip_is_missed_in_a_first_look(name: str, agrees: bool) -> None:
     assert agrees or "first_slip" in heard.words
 
 
+def test_a_slip_is_missed_where_places_alone_are_asked_for() -> None:
+    """A tolerance of the places alone excuses no ball that is said to stick while it slips."""
+    for name, agrees in (("nothing", True), ("always sticking", False)):
+        lie = next((lie for lie in table() if lie.name == name), Lie(name, ("slips",)))
+        run = simulate(scene_of("slips"), liar("slips", lie), until=UNTIL["slips"], every=EVERY)
+        assert judge_run(run, scene_of("slips"), {"p_WB": "1 %"}).agrees is agrees
+
+
 def first_look(about: str) -> dict[str, str]:
     """Tolerances of a comparison about which no file says anything."""
     found = bounds(scene_of(about), EVERY)

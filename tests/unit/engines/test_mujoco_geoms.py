@@ -109,6 +109,7 @@ def test_the_delassus_matrix_is_read_back(name, settings):
     (element,) = load_scene(name).elements
     run = MUJOCO.build(load_scene(name), preset(settings))
     line = next(item for item in element.certify(run.built(), run.sample()) if item.quantity == "responses of contacts")
+    # Near what is seen, 7.2e-11 with every kind of arithmetic that was tried: it is no round-off.
     assert line.difference < 1e-10, line
 
 

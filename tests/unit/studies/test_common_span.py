@@ -66,6 +66,19 @@ def test_who_ends_too_early_is_not_excused() -> None:
     assert curve.shape != held.true("gamma", curve).values.shape
 
 
+@pytest.mark.parametrize("told", [0.0, 0.2, 0.272])
+def test_a_lift_off_that_is_told_early_hides_no_force(told: float) -> None:
+    """Forces are judged until the true lift-off, less two samples, whenever a run says that it leaves the wall."""
+    scene = lying()
+    run = record(build(scene, "reduced"), scene, TIMES).dataset
+    run = with_events(run.assign(N=100 * run["N"]), [Event("lift_off", told, told, told)])
+    held, cut = reference(scene).common_span({1.0: run})
+    told_ones, pressed = observables_of(held, cut[1.0])["N"], held.curves["N"]  # from the first step on
+    judged = held.dataset["time"].to_numpy()[-len(pressed) :] < 0.26
+    assert np.all(pressed[judged] > 0)
+    assert np.all(np.abs(told_ones - pressed)[judged] > 90 * pressed[judged])
+
+
 def test_an_event_at_the_end_may_be_a_moment_later() -> None:
     """A run and a truth of which one has an event within its bracket of the end are judged alike; others count."""
     scene = load_scene("bouncing_ball", height=0.1, restitution=0.5, tangential_restitution=0.0)

@@ -137,6 +137,7 @@ def lift_off_time(dataset: xr.Dataset) -> float:
 def common_span(truth: xr.Dataset, runs: Mapping[Key, xr.Dataset]) -> tuple[xr.Dataset, dict[Key, xr.Dataset]]:
     """Truth and runs cut to the samples of the shortest run; variables of the wall set to 0 from the first lift-off on.
 
+    A lift-off earlier than two samples before the true one does not count there: it would hide forces.
     A model that holds the ball on the wall ends its run where the ball leaves it. This is right if the truth's ball
     leaves the wall too, at most one sample later. A run that ends earlier is not cut to, and differs.
     """
@@ -145,7 +146,8 @@ def common_span(truth: xr.Dataset, runs: Mapping[Key, xr.Dataset]) -> tuple[xr.D
         return truth, dict(runs)
     fewest = int(np.searchsorted(true, leaves)) - 1  # samples on the wall, less one
     count = min([len(true), *(run.sizes["time"] for run in runs.values() if run.sizes["time"] >= fewest)])
-    until = min([leaves, *(lift_off_time(run) for run in runs.values())])
+    earliest = float(true[max(fewest - 1, 0)])
+    until = max(min([leaves, *(lift_off_time(run) for run in runs.values())]), earliest)
 
     def cut(dataset: xr.Dataset) -> xr.Dataset:
         short = dataset.isel(time=slice(count))

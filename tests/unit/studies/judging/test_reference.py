@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from proofroll.core.dataset import off_impacts
 from proofroll.core.engine_abilities import SharesEquations
 from proofroll.core.events import Event, events_of, with_events
 from proofroll.core.truth import truth
@@ -69,6 +70,7 @@ def test_events_of_a_scene_without_any_are_too_many() -> None:
     assert point.errors["z"] == 0
 
 
+@pytest.mark.drill
 def test_a_velocity_at_an_impact_may_be_that_of_either_side() -> None:
     """A trade-off counts no error where a sample lies on an impact and has the velocity before or after it."""
     scene = load_scene("two_spheres")
@@ -80,6 +82,17 @@ def test_a_velocity_at_an_impact_may_be_that_of_either_side() -> None:
         run = true.assign(v_WB=velocity)
         point = with_errors(CurvePoint(None, Result(Status.DONE, "")), Reference.of(scene, true), run)  # type: ignore[arg-type]  # what it ran is a dataset here
         assert point.errors["v_WB"] < 1e-9
+
+
+@pytest.mark.drill
+def test_where_most_samples_lie_on_impacts_they_are_judged() -> None:
+    """Runs stay as they are where half of the samples after the first lie on impacts: else nothing would be judged."""
+    scene = load_scene("two_spheres")
+    (hit,) = (event.time for event in events_of(truth(scene, np.linspace(0, 0.12, 13))))
+    for times, kept in ((np.array([0.0, hit]), True), (np.linspace(0, 2 * hit, 11), False)):
+        true = truth(scene, times)
+        run = true.assign(v_WB=true["v_WB"].copy())
+        assert (off_impacts(scene, true, {0: run})[0] is run) is kept
 
 
 @pytest.mark.parametrize(
