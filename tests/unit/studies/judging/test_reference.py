@@ -89,7 +89,7 @@ def test_where_most_samples_lie_on_impacts_they_are_judged() -> None:
     """Runs stay as they are where half of the samples after the first lie on impacts: else nothing would be judged."""
     scene = load_scene("two_spheres")
     (hit,) = (event.time for event in events_of(truth(scene, np.linspace(0, 0.12, 13))))
-    for times, kept in ((np.array([0.0, hit]), True), (np.linspace(0, 2 * hit, 11), False)):
+    for times, kept in ((np.array([0.0, hit * (1 + 1e-8)]), True), (np.linspace(0, 2 * hit, 11), False)):
         true = truth(scene, times)
         run = true.assign(v_WB=true["v_WB"].copy())
         assert (off_impacts(scene, true, {0: run})[0] is run) is kept
