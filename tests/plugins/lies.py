@@ -451,7 +451,8 @@ def _parts_of_motion() -> Iterator[Lie]:
     yield Lie("places that drift, rubbing", ("rubs",), _PLACES, drift)
     yield Lie("places that drift, at a stop", ("stops",), _PLACES, drift)
     yield Lie("places elsewhere, rubbing", ("rubs",), _PLACES, lambda m: {"p_WB": m.right.p_WB + m.length})
-    yield Lie("half a step late", tuple(set(rest) - {"slips", "bounces", "stops", "servo"}), _PLACES,
+    smooth = ("rolls", "tree", "loop", "driven", "sled", "rubs", "gears")
+    yield Lie("half a step late", smooth, _PLACES,
               lambda m: m.at(m.t - 5e-4), ("0.0005 s late",))  # fmt: skip
     yield Lie("the last sample frozen", rest, (*_PLACES, *_W), lambda m: m.at(min(m.t, m.until - EVERY)))
     yield Lie("samples in the middle 3 ms late", rest, (*_PLACES, *_W), at_middle(lambda m: m.at(m.t - 0.003)))
