@@ -315,6 +315,16 @@ def test_corners_hit_at_once_are_refused_where_only_one_of_them_is_pressed(frict
         truth_of(replace(block, joints=(lands,)), np.array([0.0, 0.15]))
 
 
+@pytest.mark.parametrize("restitution", [0.0, 0.5])
+def test_a_disc_that_lands_flat_is_refused(restitution: float) -> None:
+    """Its whole edge lands at once: one contact at its centre would stop the routes, or leave it a spin for ever."""
+    disc = mechanism_of("tilted_disc")
+    flat = replace(disc.joints[0], q0=(0, 0, 0.05, 1, 0, 0, 0), v0=(1, 0, 0, 0, 0, 5))
+    pairs = tuple(replace(pair, restitution=restitution) for pair in disc.pairs)
+    with pytest.raises(Refused, match=r"the disc of .* lies flat: what its whole edge does at once is not determinate"):
+        truth_of(replace(disc, joints=(flat,), pairs=pairs), np.array([0.0, 0.2]))
+
+
 def test_a_smooth_plank_that_falls_flat_rests() -> None:
     """Either end hit first presses the other more and more: without friction and rebound it lies still."""
     plank = mechanism_of("rocking_block", friction=0.0, moment=0.005)

@@ -24,7 +24,7 @@ from proofroll.elements.mechanism.contacts.acting import (
 from proofroll.elements.mechanism.contacts.coulomb import robust_forces
 from proofroll.elements.mechanism.contacts.geometry import BodyContact
 from proofroll.elements.mechanism.contacts.joint_laws import JointContact, joint_contacts, mode_of_joints
-from proofroll.elements.mechanism.contacts.start import STILL, closed_and_still, natural_scale, touches
+from proofroll.elements.mechanism.contacts.start import STILL, closed_and_still, flat_discs, natural_scale, touches
 from proofroll.elements.mechanism.contacts.touching import Touching
 from proofroll.elements.mechanism.joint_coordinates import JointCoordinates, Solution
 from proofroll.elements.mechanism.kinematics import BodyMotion
@@ -242,9 +242,13 @@ class ContactDynamics:
             closed: True for contacts whose gap is closed and does not open by its speed.
             still: True for those of them that do not slide either.
             time: at which drives and targets are taken [s].
+
+        Raises:
+            NotUnique: a disc lies flat.
         """
         state = self.at(q, v, time)
         which = [k for k, shut in enumerate(closed) if shut]
+        self._refuse_flat(state, which)
         if not which:
             return tuple(OPEN for _ in closed), np.inf
         frames = {k: frame_of_axis(state.touching[k].normal)[:, [2, 0, 1]] for k in which}
@@ -278,9 +282,10 @@ class ContactDynamics:
             The velocities, the impulses (closed, 3), and the margin to another outcome: inf, or 0 if it is not unique.
 
         Raises:
-            NotUnique: several contacts press each other, so that the outcome depends on an order.
+            NotUnique: several contacts press each other, so that the outcome depends on an order; or a disc lies flat.
         """
         state = self.at(q, v)
+        self._refuse_flat(state, closed)
         frames = [frame_of_axis(state.touching[k].normal)[:, [2, 0, 1]] for k in closed]
         J = np.concatenate([frame.T @ state.J[k] for frame, k in zip(frames, closed, strict=True)])
         c = J @ v
@@ -295,6 +300,13 @@ class ContactDynamics:
             a, b = (names[k] for k in pair)
             raise NotUnique(f"an impact presses {a} and {b} at once: its outcome depends on their order")
         return v + state.W @ J.T @ impulse.ravel(), impulse, np.inf if same else 0.0
+
+    def _refuse_flat(self, state: ContactsNow, closed: Sequence[int]) -> None:
+        """Raises NotUnique if one of these contacts is of a disc that lies flat."""
+        for k, flat in enumerate(flat_discs(self.mechanism, state.solution.motion)):
+            if flat and k in closed:
+                name = self.contacts[k].name
+                raise NotUnique(f"the disc of {name} lies flat: what its whole edge does at once is not determinate")
 
     def sample(self, q: Array, v: Array, mode: ContactMode, time: float = 0.0) -> tuple[dict[str, Any], Array]:
         """Fields of a record at one time [s], and contact forces between bodies [N], (contacts, 3).

@@ -8,7 +8,8 @@ from numpy.typing import ArrayLike
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import InputError
-from proofroll.elements.mechanism.contacts.touching import Moving, Touching, touch
+from proofroll.elements.mechanism.contacts.geometry import BodyContact
+from proofroll.elements.mechanism.contacts.touching import Moving, Touching, lies_flat, touch
 from proofroll.elements.mechanism.joint_coordinates import JointCoordinates, Solution
 from proofroll.elements.mechanism.kinematics import BodyMotion, Tree
 from proofroll.elements.mechanism.model import Mechanism
@@ -24,13 +25,19 @@ _STANDS = 1e-12
 
 def touches(mechanism: Mechanism, motion: BodyMotion) -> tuple[Touching, ...]:
     """Gap, normal and slide of all contacts at one instant."""
-    index = mechanism.body_index
+    return tuple(touch(contact, *_moving(mechanism, motion, contact)) for contact in mechanism.contacts)
 
-    def moving(body: str) -> Moving:
-        k = index[body]
-        return Moving(motion.p_WB[k], motion.R_WB[k], motion.v_WB[k], motion.w_WB[k])
 
-    return tuple(touch(contact, moving(contact.body_a), moving(contact.body_b)) for contact in mechanism.contacts)
+def flat_discs(mechanism: Mechanism, motion: BodyMotion) -> list[bool]:
+    """True for each contact of a disc that lies flat at one instant."""
+    return [lies_flat(contact, *_moving(mechanism, motion, contact)) for contact in mechanism.contacts]
+
+
+def _moving(mechanism: Mechanism, motion: BodyMotion, contact: BodyContact) -> tuple[Moving, Moving]:
+    """Motions of the two bodies of a contact."""
+    of = [mechanism.body_index[body] for body in (contact.body_a, contact.body_b)]
+    a, b = (Moving(motion.p_WB[k], motion.R_WB[k], motion.v_WB[k], motion.w_WB[k]) for k in of)
+    return a, b
 
 
 def extent(mechanism: Mechanism, motion: BodyMotion) -> float:
@@ -129,7 +136,7 @@ def closed_and_still(found: Sequence[Touching], lengths: FloatArray, rate: float
 
 
 def check_contacts(mechanism: Mechanism) -> None:
-    """Raises InputError if two bodies overlap or strike at the start, or a joint strikes its stop."""
+    """Raises InputError if two bodies overlap or strike at the start, a disc lies flat, or a joint strikes its stop."""
     stopped = [joint for joint in mechanism.joints if joint.limits]
     if not (mechanism.contacts or stopped):
         return
@@ -144,10 +151,14 @@ def check_contacts(mechanism: Mechanism) -> None:
         if (q <= low + digits and v < -still) or (q >= high - digits and v > still):
             advice = "the joint starts on its stop and moves into it, an impact at time 0; correct v0 or start it apart"
             raise InputError(f"joints.{joint.name}.v0", v, advice)
-    for contact, each in zip(mechanism.contacts, touches(mechanism, motion), strict=True):
+    touching, flat = touches(mechanism, motion), flat_discs(mechanism, motion)
+    for contact, each, lies in zip(mechanism.contacts, touching, flat, strict=True):
         between = f"{contact.body_a} and {contact.body_b}"
         if each.gap < -scale.gap:
             advice = f"they overlap by {-each.gap:.3g} m at the start; move one"
+            raise InputError(f"pairs.{contact.name}", between, advice)
+        if lies and each.gap <= scale.gap:
+            advice = "the disc lies flat and touches along its whole edge, not at one point; give it three spheres"
             raise InputError(f"pairs.{contact.name}", between, advice)
         closing = -float(each.normal @ each.slide)
         if each.gap <= scale.gap and closing > scale.speed:

@@ -5,8 +5,11 @@ from typing import NamedTuple
 import numpy as np
 
 from proofroll.elements.mechanism.contacts.geometry import BodyContact
-from proofroll.elements.mechanism.contacts.shapes import Bore, ConvexShape, HalfSpace, SphereShape, Wall
+from proofroll.elements.mechanism.contacts.shapes import Bore, CircleShape, ConvexShape, HalfSpace, SphereShape, Wall
 from proofroll.elements.mechanism.rotations import Array, cross
+
+# Sine of the angle between a disc and its plane up to which it lies flat: digits of a file.
+_FLAT = 1e-9
 
 
 class Moving(NamedTuple):
@@ -59,6 +62,16 @@ def touch(contact: BodyContact, a: Moving, b: Moving) -> Touching:
         assert isinstance(contact.shape_b, SphereShape)
         gap, n, n_rate, place, rate = _two_spheres(contact.shape_a, a, contact.shape_b, b)
     return Touching(gap, n, n_rate, place, rate, a.velocity(place) - b.velocity(place))
+
+
+def lies_flat(contact: BodyContact, a: Moving, b: Moving) -> bool:
+    """True if a disc is parallel to its plane, so that it touches along its whole edge and not at one point."""
+    normals = [
+        of.R @ shape.normal
+        for shape, of in ((contact.shape_a, a), (contact.shape_b, b))
+        if isinstance(shape, CircleShape | HalfSpace)
+    ]
+    return len(normals) == 2 and float(np.linalg.norm(cross(*normals))) <= _FLAT
 
 
 _Lying = tuple[float, Array, Array, Array, Array]

@@ -133,6 +133,14 @@ def test_nothing_strikes_at_the_start() -> None:
         made(PLANE, BALL, pairs=(PAIR,), q0=(0, 0, 0.1, 1, 0, 0, 0), v0=(1, 0, -0.5, 0, 0, 0))
 
 
+def test_a_disc_does_not_start_flat_on_its_plane() -> None:
+    """A puck touches along its whole edge, where there is no point of contact; above the floor it may be flat."""
+    puck = {**BALL, "kind": "circle"}
+    with pytest.raises(InputError, match=r"pairs\.foot = 'b and world': the disc lies flat and touches along its"):
+        made(PLANE, puck, pairs=(PAIR,), q0=(0, 0, 0, 1, 0, 0, 0), v0=(1, 0, 0, 0, 0, 5))
+    made(PLANE, puck, pairs=(PAIR,))
+
+
 def test_a_box_touches_with_its_vertices() -> None:
     """A box of edges 2, 4 and 6 cm, turned a quarter about z, has eight contacts at its corners."""
     box = {"name": "box", "body": "b", "kind": "box", "size": [0.02, 0.04, 0.06], "orientation": [0, 0, np.pi / 2]}
