@@ -56,6 +56,18 @@ def test_forces_and_engines_of_several_scenes(proofroll: Proofroll, report: Path
     assert "nothing holds it for ball" in " ".join(out.split())
 
 
+def test_names_of_a_list_and_names_that_a_report_lacks(proofroll: Proofroll, report: Path) -> None:
+    """Names may be joined by commas, as in ``report --only``; a name without runs gets a command that works."""
+    given = ("--tolerance", "1e-3", "--report", str(report))
+    code, out, _ = proofroll("recommend", "trees,rolling", *given)
+    assert (code, out.count("For ")) == (0, 2)
+    for name, advice in {
+        "pendulum": f"{report} has no runs of it; proofroll report pendulum makes them",
+        "nothing": f"{report} has no such scene, comparison or group; the groups there are trees, ball rolling",
+    }.items():
+        assert proofroll("recommend", "arm", name, *given)[::2] == (2, f"proofroll: scenes = '{name}': {advice}\n")
+
+
 def test_forces_that_are_not_judged_are_no_failure(proofroll: Proofroll, report: Path) -> None:
     """Where some of the scenes have no judged forces the advice for them is by the motion, says so, and exits 0."""
     given = ("--forces", "--tolerance", "1e-3", "--json", "--report", str(report))
@@ -89,7 +101,7 @@ def test_without_a_report_no_option_is_blamed_that_was_not_given(proofroll: Proo
 @pytest.mark.parametrize(
     ("more", "words"),
     [
-        (["arm", "cart"], "proofroll report cart runs it"),
+        (["arm", "cart"], "has no such scene, comparison or group; the groups there are trees"),
         (["arm", "ball", "--measure"], "--measure"),
         (["arm", "ball", "--engine", "nobody"], "nobody"),
         (["arm", "ball", "--tolerance", "1 mm"], "1 mm"),

@@ -87,8 +87,8 @@ def checked_file(name: str) -> SoundFile:
             raise error from None
         if file is None:
             advice = (
-                f"there is no such scene or file; the scenes are {choices(scene_names())}, "
-                f"the comparisons {choices(comparison_names())}"
+                f"there is no such scene or file; the scenes are {choices(scene_names(), name)}, "
+                f"the comparisons {choices(comparison_names(), name)}"
             )
             raise InputError("check", name, advice) from None
         return _comparison(file) if study_of(file) is None else _study(file, str(study_of(file)))

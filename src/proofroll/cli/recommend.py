@@ -107,6 +107,8 @@ def _from_report(
     names: list[str], tolerance: str, engines: list[str], report: EarlierReport, *, forces: bool, as_json: bool
 ) -> NoReturn:
     """Prints advice for several scenes from a report's runs, and exits: 1 if in one nothing holds the tolerance."""
+    from proofroll.files.scene_file import is_scene
+    from proofroll.files.toml import named_file
     from proofroll.report.page.advice import advice
     from proofroll.report.page.choice_matrix import FIRST_TOLERANCE, ChoiceStudy, choice_matrix
 
@@ -115,11 +117,14 @@ def _from_report(
         require_known("--engine", name, sorted({line.engine for line in lines}), f"{path} has")
     lines = [line for line in lines if not engines or line.engine in engines]
     studies: dict[str, ChoiceStudy] = {}
-    for name in names:
+    for name in [name for text in names for name in text.split(",")]:
         own = [line for line in lines if name in {line.study, line.scene, line.group, *line.group.split()}]
         if not own:
             known = ", ".join(dict.fromkeys(line.group for line in lines))
-            raise InputError("scenes", name, f"{path} has none; proofroll report {name} runs it; groups there: {known}")
+            lacking = f"has no such scene, comparison or group; the groups there are {known}"
+            if is_scene(name) or named_file(name):
+                lacking = f"has no runs of it; proofroll report {name} makes them"
+            raise InputError("scenes", name, f"{path} {lacking}")
         studies |= {line.study: ChoiceStudy(line.study, "") for line in own}
     part = _tolerance(tolerance, "1").absolute(1.0) if tolerance else FIRST_TOLERANCE
     matrix = choice_matrix(lines, studies)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import traceback
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
+from difflib import get_close_matches
 from pathlib import Path
 
 _PACKAGE = Path(__file__).parents[1]
@@ -88,7 +89,7 @@ def require_known(
     """
     names = list(known)
     if name not in names:
-        raise InputError(field, name if given is None else given, f"{advice} {choices(names)}")
+        raise InputError(field, name if given is None else given, f"{advice} {choices(names, name)}")
 
 
 def refuse_first(engine: str, settings: object, rules: Iterable[tuple[bool, str, str]]) -> None:
@@ -130,9 +131,11 @@ def lack_behind(error: BaseException) -> BaseException | None:
     return cause
 
 
-def choices(names: Iterable[str]) -> str:
-    """List of names to choose from; of more than twenty the first twenty."""
+def choices(names: Iterable[str], wrong: object = "") -> str:
+    """List of names to choose from; of more than twenty those that resemble a wrong one, or the first twenty."""
     shown = list(names)
+    if len(shown) > 20 and (near := get_close_matches(str(wrong), shown)):
+        return ", ".join([*near, "…"])
     return ", ".join(shown[:20] + ["…"] * (len(shown) > 20)) or "none"
 
 

@@ -9,14 +9,14 @@ from typing import Any
 from proofroll.core.bounds import require_bounds, require_pair
 from proofroll.core.comparison import Band, Comparison, Edge, ExceptAt, Row, Tolerance
 from proofroll.core.convergence import LADDER_RUNGS
-from proofroll.core.errors import InputError, error_location, require_known
+from proofroll.core.errors import InputError, choices, error_location, require_known
 from proofroll.core.observable import Observable
 from proofroll.core.plugins import parse_engine, require_engine
 from proofroll.core.time_grid import time_grid
 from proofroll.core.validation import strict, validated
 from proofroll.core.verdict import Verdict
 from proofroll.files.data_folders import study_folders
-from proofroll.files.scene_file import load_scene
+from proofroll.files.scene_file import load_scene, scene_names
 from proofroll.files.toml import named_file, read_toml, study_of
 
 # Most combinations of parameters; a run takes about a second, so more are a mistake.
@@ -53,9 +53,8 @@ def load_comparison(name: str) -> Comparison:
     """
     path = named_file(name)
     if path is None:
-        raise InputError(
-            "comparison", name, f"there is no such comparison; choose one of {', '.join(comparison_names())} or a file"
-        )
+        known = choices([*comparison_names(), *further_comparison_names(), *scene_names()], Path(name).stem)
+        raise InputError("comparison", name, f"there is no such comparison or scene; choose one of {known} or a file")
     content = read_toml(path)
     if "study" in content:
         advice = f"this file is for another command: proofroll {content['study']} {content.get('scene', '')}".strip()

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from proofroll.core.element import Element
-from proofroll.core.errors import InputError, no_such_key
+from proofroll.core.errors import InputError, choices, no_such_key
 from proofroll.core.gravity import Gravity
 from proofroll.core.parameters import Parameters
 from proofroll.core.plugins import load_element_kinds
@@ -118,7 +118,7 @@ def scene_folder(name: str) -> Path:
                 missing = "this folder has no scene.toml; proofroll new scene writes one"
         except (OSError, ValueError):  # the name is too long for the file system, or has a zero byte
             break
-    raise InputError("scene", name, f"{missing}; choose one of {', '.join(scene_names())}")
+    raise InputError("scene", name, f"{missing}; choose one of {choices(scene_names(), name)}")
 
 
 def means_scene(name: str, *, alone: bool = False) -> bool:

@@ -223,9 +223,14 @@ def _interval(line: TableLine) -> tuple[float, float, float] | None:
 
 
 def _noise(pairs: Iterable[tuple[TableLine, TableLine]]) -> tuple[float, float]:
-    """Median ratio of new to old costs, and the factor beyond it that counts as a change; defaults for few costs."""
-    both = [(_interval(old), _interval(new)) for old, new in pairs]
-    ratios = [math.log(new[1] / old[1]) for old, new in both if old and new and old[1] > 0 and new[1] > 0]
+    """Median ratio of new to old costs, and the factor beyond it that counts as a change; defaults for few costs.
+
+    Those of clean runs, without an interval, too; where these are few, of sampled runs as well: all show the machine.
+    """
+    timed = [(old, new) for old, new in pairs if old.cost and new.cost]
+    clean = [(old, new) for old, new in timed if old.clean and new.clean]
+    both = clean if len(clean) >= _ENOUGH else timed
+    ratios = [math.log(new.cost / old.cost) for old, new in both if old.cost and new.cost]
     if len(ratios) < _ENOUGH:
         return 1.0, _COST
     drift = median(ratios)

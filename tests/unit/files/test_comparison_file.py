@@ -11,6 +11,7 @@ from proofroll.core.comparison import Comparison, Tolerance
 from proofroll.core.errors import InputError
 from proofroll.core.verdict import Verdict
 from proofroll.files.comparison_file import comparison_names, load_comparison
+from proofroll.files.scene_file import load_scene
 
 TEXT = """
 title = "A claim"
@@ -275,9 +276,14 @@ def test_a_comparison_without_rows(tmp_path: Path) -> None:
 
 
 def test_an_unknown_comparison() -> None:
-    """An unknown comparison is answered with those that exist."""
-    with pytest.raises(InputError, match="there is no such comparison"):
+    """An unknown comparison is answered with those that exist, a mistyped name with what resembles it."""
+    with pytest.raises(InputError, match=r"there is no such comparison or scene; choose one of paper, .*, … or a file"):
         load_comparison("no_such_claim")
+    for wrong in ("pendulumm", "mechanisms/pendulumm", "pendulumm.toml"):
+        with pytest.raises(InputError, match=r"choose one of pendulum, ([\w/]+, ){0,2}… or a file"):
+            load_comparison(wrong)
+    with pytest.raises(InputError, match=r"there is no such scene; choose one of pendulum, ([\w/]+, ){0,2}…$"):
+        load_scene("pendulm")
 
 
 def test_comparisons_come_in_the_order_that_they_ask_for(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -107,6 +107,20 @@ def test_costs_of_a_busy_machine_accuse_no_engine() -> None:
     assert [(item.run.split()[0], item.kind) for item in held(new, old=old).changes] == [("e4", "cost")]
 
 
+def test_costs_without_intervals_show_how_the_machine_scatters() -> None:
+    """Where few costs have intervals, the others tell how much slower the machine was, and how they scatter."""
+    old = [replace(LINE, row=at, engine=f"e{at}", cost_low=None, cost_high=None) for at in range(11)]
+    old[5] = replace(old[5], cost=0.11, cost_low=0.091, cost_high=0.13)
+    ratios = (1.31, 1.27, 1.02, 0.62, 0.56, 0.53, 0.73, 0.44, 1.11, 0.72, 0.74)
+    new = [replace(line, cost=ratio * float(line.cost or 0)) for line, ratio in zip(old, ratios, strict=True)]
+    new[5] = replace(new[5], cost_low=0.054, cost_high=0.063)
+    assert held(new, old=old).changes == []
+    rough = [replace(line, clean=at == 5) for at, line in enumerate(old)]
+    assert held([replace(line, clean=at == 5) for at, line in enumerate(new)], old=rough).changes == []
+    new[5] = replace(new[5], cost=1.1, cost_low=1.0, cost_high=1.2)
+    assert [(item.run.split()[0], item.kind) for item in held(new, old=old).changes] == [("e5", "cost")]
+
+
 def test_runs_that_are_gone_count_and_new_ones_do_not() -> None:
     """A run that is not made any more is a change; one that is new is told; other studies are left alone."""
     assert [(item.kind, item.run) for item in held(LINES[:2]).changes] == [("gone", "beta joints default dt 1e-3 s")]
