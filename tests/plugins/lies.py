@@ -233,7 +233,7 @@ def _forces_of_contacts() -> Iterator[Lie]:
     yield lie("contacts of nothing", lambda m: 0 * m.right.contact_force, *_OMITTED)
     yield lie("contacts on the other body", lambda m: -m.right.contact_force, *_SIGN)
     yield lie("contacts of another foot", lambda m: m.right.contact_force[[1, 2, 0]])
-    yield lie("contacts without friction", lambda m: m.right.contact_force * [0, 0, 1], "friction")
+    yield lie("contacts without friction", lambda m: m.right.contact_force * [0, 0, 1])
     yield lie("contacts of the start", lambda m: m.at(0.0).contact_force)
     yield lie("contacts 3 ms late", lambda m: m.at(m.t - 0.003).contact_force, *_LATE)
     yield lie("contacts not finite", lambda m: np.nan * m.right.contact_force)
@@ -475,12 +475,31 @@ def _parts_of_events() -> Iterator[Lie]:
         yield Lie(f"brackets beside their times, {about}", (about,), ("has the bracket",), events=_each(**beside))
 
 
+def _of_one_body_or_sum() -> Iterator[Lie]:
+    def first_elsewhere(m: Moment) -> dict[str, Any]:
+        places = np.array(m.right.p_WB)
+        places[0] += 0.005 * m.length
+        return {"p_WB": places}
+
+    def first_for_all(m: Moment) -> dict[str, Any]:
+        return {"q_WB": np.repeat(m.right.q_WB[:1], len(m.right.q_WB), axis=0)}
+
+    def evenly(m: Moment) -> dict[str, Any]:
+        return {"contact_force": np.broadcast_to(m.right.contact_force.mean(axis=0), m.right.contact_force.shape)}
+
+    yield Lie("the first body half a hundredth further", ("tree", "driven", "loop", "servo"), ("p_WB is",),
+              first_elsewhere)  # fmt: skip
+    yield Lie("quaternions of the first body for all", ("loop",), _Q, first_for_all)
+    yield Lie("contacts that share their sum evenly", ("sled",), ("contact_forces is", "normal_forces is"), evenly)
+
+
 def table() -> list[Lie]:
     """All lies of the table."""
     states = _times, _places, _frames, _velocities, _spins, _orientations
     forces = _forces_of_balls, _reactions_of_joints, _efforts, _forces_of_contacts, _friction_of_joints
     # New ones come last: the place of a lie decides of which scenes it is told.
     last = _models, _small, _further_impacts, _forces_of_couplings_and_stops, _parts_of_motion, _parts_of_events
+    last = *last, _of_one_body_or_sum
     return [lie for part in (*states, *forces, _slips, _impacts, *last) for lie in part()]
 
 

@@ -216,7 +216,7 @@ class MechanismElement:
         """See the protocol."""
         # A point at rest has no size but that of its motion, see `scales`.
         least = {unit: _LEAST * size if self._own_length else 0.0 for unit, size in self._sizes.items()}
-        a, force = least["m"], least["N"]
+        a, force, turn = least["m"], least["N"], _LEAST * self.speed / self.length
         what = "tracked points" if self.mechanism.points else "centres of mass"
         moves = followed_moves(self.mechanism, self._solution.motion, self.length)
         found = [Observable("positions", "m", f"the {what}", Role.MOTION, floor=a, headline=moves, decides=moves)]
@@ -232,10 +232,10 @@ class MechanismElement:
                 found.append(
                     Observable(f"q.{joint.name}", unit, f"coordinate of {joint.name}", Role.MOTION, floor=floor)
                 )
-        more: dict[str, Any] = {"asked_for": False, "watched": True}
-        meaning, turn = "velocities of the origins of the bodies' frames", _LEAST * self.speed / self.length
-        found.append(Observable("v_WB", "m/s", meaning, Role.MOTION, floor=least["m/s"], **more))
-        found.append(Observable("w_WB", "rad/s", "angular velocities of the bodies", Role.MOTION, floor=turn, **more))
+        more: dict[str, Any] = {"role": Role.MOTION, "asked_for": False, "watched": True}
+        for key, unit, of in (("p_WB", "m", "places"), ("v_WB", "m/s", "velocities")):
+            found.append(Observable(key, unit, f"{of} of the origins of the bodies' frames", floor=least[unit], **more))
+        found.append(Observable("w_WB", "rad/s", "angular velocities of the bodies", floor=turn, **more))
         turns: dict[str, Any] = dict.fromkeys(("asked_for", "headline", "decides"), not moves)
         found.append(Observable("attitudes", "1", "quaternions of the bodies", Role.MOTION, floor=1.0, **turns))
         if np.any(self.analysis.determinate[:, :3]):

@@ -80,8 +80,15 @@ class SeenContact:
         slip = np.where(self.found.slip > 0, self.found.slip, 1.0)
         return np.asarray(-(self.friction * self.N / slip)[..., None] * self.across)
 
+    @property
+    def moves_as_true(self) -> bool:
+        """True if the slides of the contacts are the true ones: forces that differ there are only reported."""
+        return bool(np.abs(self.found.slide - self.true.slide).max() <= _SUNK * self.evidence.element.speed)
+
     def has_true_friction(self, which: NDArray[np.bool_]) -> bool:
-        """True if the friction of some samples and contacts is the true one: no law of friction explains an error."""
+        """True if the friction, or the motion of all, is the true one: no law of friction explains an error."""
+        if self.moves_as_true:
+            return True
         force, normal = self.true_force[which], self.true.normal[which]
         true = force - np.sum(force * normal, axis=-1, keepdims=True) * normal
         return bool(np.abs(self.T[which] - true).max() <= FORCE * self.evidence.element.force)
@@ -123,7 +130,7 @@ def contact_forces(evidence: Evidence) -> Iterator[Cause]:
     """Hypothesis: contact forces are reported on the other body, in other axes, or at another time."""
     for touch in touch_of(evidence):
         known = np.isfinite(touch.true_force[1:]).all(axis=(0, 2))
-        if np.abs(touch.found.slide - touch.true.slide).max() > _SUNK * evidence.element.speed:
+        if not touch.moves_as_true:
             continue  # forces of another motion cannot be compared
         reported, true = touch.force[1:, known], touch.true_force[1:, known]
         if known.any() and "contact_forces" not in evidence.settled:
