@@ -27,6 +27,7 @@ from proofroll.core.errors import InputError, Refused
 from proofroll.core.plugins import load_engine
 from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.sampling import BallSample
+from proofroll.running.simulation import simulate
 
 
 @pytest.fixture(autouse=True)
@@ -89,6 +90,14 @@ def test_a_buffer_that_is_filled_anew_is_named(engine: type[Tiny]) -> None:
     """Whoever fills the arrays of a sample again, by a step or the next sample, reads that copies are missing."""
     text = failure(engine, "reading_back_changes_nothing")
     assert text.startswith("the arrays of a sample change with later steps: return copies")
+
+
+@pytest.mark.parametrize("engine", [Views, OneBuffer, OneForAll])
+def test_a_buffer_that_is_filled_anew_spoils_no_run(engine: type[Tiny]) -> None:
+    """A run of such an engine is that of one that returns copies, and its model is not called a wrong one."""
+    ran, right = (simulate("inclined_plane", kind, until=0.1) for kind in (engine, Tiny))
+    for name in ("p_WB", "v_WB", "w_WB", "N"):
+        assert ran[name].to_numpy().tolist() == right[name].to_numpy().tolist()
 
 
 def test_a_precision_that_is_not_told_is_the_first_failure() -> None:

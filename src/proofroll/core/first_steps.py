@@ -12,7 +12,7 @@ from proofroll.core.element import Element, FirstMotion
 from proofroll.core.engine import EPSILON, fixed_step, precision_of
 from proofroll.core.engine_abilities import declared_order, laws
 from proofroll.core.errors import Diverged, InputError, Refused
-from proofroll.core.multi_element import build, sample_of, shaped
+from proofroll.core.multi_element import build, copied, sample_of, shaped
 from proofroll.core.number_format import number
 from proofroll.core.scene import Scene
 
@@ -151,7 +151,7 @@ def _derivatives(
     for t in (0.0, h, 2 * h, 3 * h):
         if t:
             engine.advance(t)
-        samples.append(sample_of(scene, element, shaped(scene, engine.sample(), t)))
+        samples.append(sample_of(scene, element, copied(shaped(scene, engine.sample(), t))))
     shape = (len(element.bodies), 3)
     pairs = [[np.reshape(part, shape) for part in (sample.v_WB, sample.w_WB)] for sample in samples]
     velocities = np.array(pairs)

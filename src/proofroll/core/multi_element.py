@@ -171,6 +171,18 @@ def shaped(scene: Scene, sample: AnySample, t: float) -> AnySample:
     return sample
 
 
+def copied(sample: AnySample) -> AnySample:
+    """The sample with arrays of its own, for an engine may fill its arrays anew at its next step."""
+    if isinstance(sample, Mapping):
+        return {name: _copied(own) if isinstance(own, Sample) else own for name, own in sample.items()}
+    return _copied(sample)
+
+
+def _copied(sample: Sample) -> Sample:
+    each = ((item.name, getattr(sample, item.name)) for item in dataclasses.fields(sample))
+    return dataclasses.replace(sample, **{name: np.array(own) for name, own in each if isinstance(own, np.ndarray)})
+
+
 def events_of_engine(engine: Any, element: Element) -> Sequence[Event] | None:
     """Events located by the engine for an element (:class:`proofroll.core.engine_abilities.LocatesEvents`), or None.
 

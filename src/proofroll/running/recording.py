@@ -19,7 +19,7 @@ from proofroll.core.engine import Sample
 from proofroll.core.engine_abilities import TellsRemarks
 from proofroll.core.errors import Diverged, lack_behind
 from proofroll.core.events import Event, wrong_bracket
-from proofroll.core.multi_element import AnySample, arrays, events_of_engine, sample_of
+from proofroll.core.multi_element import AnySample, arrays, copied, events_of_engine, sample_of
 from proofroll.core.scene import Scene
 
 if TYPE_CHECKING:
@@ -160,7 +160,7 @@ def _finite(sample: AnySample, t: float, scene: Scene) -> AnySample:
             raise Diverged(f"{name} {_NOT_FINITE} at {t:g} s")
         if name == "q_WB" and any(abs(math.hypot(*flat[i : i + 4]) - 1) > _UNIT for i in range(0, len(flat), 4)):
             require_unit(values, f"at {t:g} s")
-    return sample
+    return copied(sample)
 
 
 def _require_state(scene: Scene, first: AnySample, sample: AnySample, t: float) -> None:
