@@ -256,7 +256,7 @@ def _make(made: Report, part: Part, runner: Runner, out: Path, stage: str) -> No
 
 
 def _exit_code(content: ReportContent, compared: int, unmade: Collection[str]) -> int:
-    """Exit code of the report, from those of its comparisons and of its further studies but those left ``unmade``."""
+    """Exit code of a report whose comparisons give ``compared``; further studies in ``unmade`` do not count."""
     entries = content.further
     lost = any((entry.missing and entry.name not in unmade) or entry.lost for entry in entries)
     if compared == options.ENGINE or lost:

@@ -183,7 +183,9 @@ def _elements(tables: Mapping[str, Any], gravity: Gravity, numbers: Parameters, 
 
 
 def _of_each(known: Sequence[Sequence[str]], tables: Mapping[str, Any], where: str) -> list[dict[str, Any]]:
-    """Tables of each kind of element. A row of a table that several kinds read goes to the kind whose things it names.
+    """Tables of each kind of element; ``known``: names of the tables that each kind reads.
+
+    A table that several kinds read is divided: each row goes to the kind whose things it names.
 
     Raises:
         InputError: a table is no list of rows, or a row does not name things of exactly one kind.

@@ -35,7 +35,7 @@ def drawn_file(
     settings: Mapping[str, Any],
     drawn: Callable[[], Figure],
     dpi: float = 100,
-    said: Mapping[str, str] = MappingProxyType({}),
+    metadata: Mapping[str, str] = MappingProxyType({}),
 ) -> bytes:
     """Content of a file with a figure.
 
@@ -44,14 +44,14 @@ def drawn_file(
         settings: of matplotlib, by name.
         drawn: function that returns the figure.
         dpi: dots per inch of parts that are no vectors.
-        said: metadata of the file, by the names of its format.
+        metadata: entries of the file, by the names of its format.
 
     Raises:
         Missing: matplotlib is not installed.
     """
     out = io.BytesIO()
     with styled(settings):
-        drawn().savefig(out, format=form, dpi=dpi, metadata={**said, **_NO_DATE.get(form, {})})
+        drawn().savefig(out, format=form, dpi=dpi, metadata={**metadata, **_NO_DATE.get(form, {})})
     return out.getvalue()
 
 

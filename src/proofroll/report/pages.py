@@ -51,9 +51,9 @@ def environment(*folders: Path) -> jinja2.Environment:
     )
 
 
-def rendered(templates: jinja2.Environment, name: str, **said: Any) -> str:
+def rendered(templates: jinja2.Environment, name: str, **values: Any) -> str:
     """Rendered page with addressed rows and unbroken numbers; a lone surrogate of a message becomes a question mark."""
-    text = templates.get_template(name).render(**said).encode("utf-8", "replace").decode("utf-8")
+    text = templates.get_template(name).render(**values).encode("utf-8", "replace").decode("utf-8")
     return unbroken(addressed(text))
 
 

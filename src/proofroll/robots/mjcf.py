@@ -158,7 +158,7 @@ def _merge_defaults(root: Element) -> None:
 
 
 def _merge_worlds(root: Element) -> None:
-    """Merges the <worldbody> elements of included files with that of the file into the last, which keeps their meaning.
+    """Merges all <worldbody> elements, those of included files too, into the last one; their meaning stays the same.
 
     Pinocchio reads a tree twice if there are two worlds, and refuses a class that is defined after its use.
     """

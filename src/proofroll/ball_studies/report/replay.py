@@ -18,7 +18,7 @@ from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.stretches import carried
 from proofroll.files.json_data import plain
 from proofroll.report.labels import symbol, unit
-from proofroll.report.replay.records import PackedNumbers, Replayed, some
+from proofroll.report.replay.records import PackedNumbers, Replayed, present
 from proofroll.report.replay.replay import frame_times, in_sight
 
 # Variables of a trajectory by name, "time" included.
@@ -145,10 +145,10 @@ def draw_ball(replayed: Replayed) -> tuple[dict[str, Any], list[int], PackedNumb
     """Drawing of a ball in the replay: see :data:`proofroll.report.replay.records.Drawer`."""
     body = rolling_ball(replayed.scene)
     coordinates = body.surface.coordinates
-    sampled = some(replayed.true, [*NEEDED, *coordinates])
+    sampled = present(replayed.true, [*NEEDED, *coordinates])
     times = frame_times(float(sampled["time"][-1]), float(np.linalg.norm(sampled["w_WB"], axis=1).max()))
     true = poses(body, sampled, times)
-    ghosts = [_reachable(poses(body, some(ghost.motion, NEEDED), times), true, body) for ghost in replayed.ghosts]
+    ghosts = [_reachable(poses(body, present(ghost.motion, NEEDED), times), true, body) for ghost in replayed.ghosts]
     u = np.stack([np.interp(times, sampled["time"], sampled[name]) for name in coordinates], axis=1)
     built = wall(body, u)
     numbers = PackedNumbers()

@@ -6,9 +6,9 @@ from proofroll.elements.mechanism.model import Mechanism
 
 
 def natural_sizes(mechanism: Mechanism, length: float, speed: float) -> dict[str, float]:
-    """Natural size of a quantity, by its unit, of a mechanism of a length [m] and a speed [m/s].
+    """Unit -> natural size, for a mechanism of this length [m] and speed [m/s].
 
-    A force is its weight, or if larger the centripetal force of its mass.
+    Force: the mechanism's weight or, if larger, the centripetal force on its mass.
     """
     force = mechanism.mass * max(float(np.linalg.norm(mechanism.gravity)), speed**2 / length)
     momentum, energy = mechanism.mass * speed, force * length

@@ -114,9 +114,10 @@ class Generic(BallRun):
         return np.array(self.system.GetObject(self.rolling)["scalingMarker1"])
 
     def sample(self) -> BallSample:
-        """See :class:`proofroll.core.engine.Engine`. The spin is a quasi-velocity, the rate of no orientation.
+        """See :class:`proofroll.core.engine.Engine`.
 
-        While the ball slips, N is the wall's multiplier, and the friction what Exudyn was given for this state.
+        The spin is a quasi-velocity, so there is no orientation. While the ball slips, N is the wall's multiplier and
+        the friction is the force that Exudyn was given for this state.
         """
         data = self.system.systemData
         q, q_t, multipliers = data.GetODE2Coordinates(), data.GetODE2Coordinates_t(), data.GetAECoordinates()

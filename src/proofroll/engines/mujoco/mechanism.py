@@ -310,7 +310,7 @@ class MujocoMechanism(SteppedModel):
 
 
 def _signals(model: Any, mechanism: Mechanism) -> list[tuple[Signal, str, int]]:
-    """Signals with the field of MjData and the index in it at which they act: targets, and drives that change."""
+    """Signals (targets of actuators, drives that vary), each with the field of MjData that it sets and its index."""
     signals = [(item.target, "ctrl", number) for number, item in enumerate(mechanism.actuators)]
     for joint in mechanism.joints:
         if varies(joint.torque):

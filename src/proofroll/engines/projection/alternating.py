@@ -140,8 +140,8 @@ class AlternatingMotion(ABC, Generic[ModeT]):
             if stepper.t in self._breaks:
                 self._enter(stepper.t, stepper.x, self.mode)
 
-    def _same(self, end: Excess, y: Array) -> Excess:
-        """Excess over the same end in another state."""
+    def _excess_over(self, end: Excess, y: Array) -> Excess:
+        """Excess of a state over one end of the mode."""
         return next(other for other in self._excess(y) if other[:2] == end[:2])
 
     def _beyond(self, end: Excess) -> float | None:
@@ -152,7 +152,7 @@ class AlternatingMotion(ABC, Generic[ModeT]):
         from scipy.optimize import brentq
 
         def at(t: float) -> Excess:
-            return self._same(end, self._stepper.inside(t))
+            return self._excess_over(end, self._stepper.inside(t))
 
         now, before = self._stepper.t, self._stepper.t_before
         if end.closing > 0:
@@ -166,7 +166,7 @@ class AlternatingMotion(ABC, Generic[ModeT]):
         """Time just after a mode ended within the last step, before the time ``high`` [s]."""
 
         def margin(y: Array) -> float:
-            return -self._same(end, y).size
+            return -self._excess_over(end, y).size
 
         return self._stepper.crossing(margin, high, _ULPS * float(np.spacing(self._stepper.t)))[1]
 

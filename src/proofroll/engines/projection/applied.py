@@ -133,9 +133,9 @@ class Applied:
         ]
 
     def _actuator_law(self, k: int, actuator: Actuator, number: int, joint: Joint) -> _Law:
-        """Force law of an actuator at its joint: linear spring, damper and drive.
+        """Force law of an actuator at its joint: a function of t, q and v if it is limited or varies with time.
 
-        A function of t, q and v if the actuator is limited or varies with time.
+        Otherwise a linear spring, a damper and a constant drive.
         """
         n, target = actuator.gear, actuator.target
         axis = "slide" if joint.kind == "prismatic" else "z"

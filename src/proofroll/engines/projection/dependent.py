@@ -329,7 +329,10 @@ def _joined(*parts: Array) -> Array:
 
 
 def _rotation(p: Array, q: Array) -> Array:
-    """Bilinear form of two lists of quaternions (w, x, y, z); for equal lists, |q|² times the rotation, and |q|²."""
+    """Ten numbers for each pair of quaternions (w, x, y, z), bilinear in the two; shape (pairs, 10).
+
+    For p = q: the rotation matrix times |q|², row by row, then |q|².
+    """
     (a, b, c, d), (w, x, y, z) = p.T, q.T
     rows = (
         (a * w + b * x - c * y - d * z, 2 * (b * y - a * z), 2 * (b * z + a * y)),

@@ -96,10 +96,11 @@ class Setting:
 
 @dataclass(frozen=True, kw_only=True)
 class WorstJudgement(Judgement):
-    """Judgement with the worst verdict over all points (of equal ones the one furthest beyond its tolerance).
+    """Judgement with the worst verdict over all points; of equal verdicts the one furthest beyond its tolerance.
 
-    ``point`` is where it was judged. ``largest`` is the largest error of all points, which may be another, for
-    tolerances may differ.
+    Attributes:
+        point: the point at which it was judged.
+        largest: largest error of all points; as tolerances may differ, it may belong to another point.
     """
 
     point: str

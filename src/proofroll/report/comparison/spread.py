@@ -1,4 +1,4 @@
-"""Spread of the settings where no motion is unique: end of each run and their range, without a ranking."""
+"""Spread of the results where no motion is unique: the end of each run and the range of all, without a ranking."""
 
 from __future__ import annotations
 

@@ -40,9 +40,12 @@ class Cell:
 
 @dataclass(frozen=True)
 class MatrixLine:
-    """A row or a run: cells by observable, link to its evidence, message of a failure.
+    """Line of the matrix: a row or a run, with its cells by observable.
 
-    ``before`` is its longest time before the first step [s].
+    Attributes:
+        href: link to its evidence.
+        message: of a failure.
+        before: longest time before its first step [s].
     """
 
     of: ReportedRow | ReportedRun

@@ -59,7 +59,7 @@ class WorkPrecision:
 
     @property
     def entries(self) -> list[int]:
-        """Numbers of curves of the engines that have the first quantity, which decide the height of its picture."""
+        """Number of curves of each engine in the picture of the first quantity; they decide its height."""
         drawn = (x.engine for x in self.curves if any(p.cost > 0 and p.errors[0] is not None for p in x.points))
         return list(Counter(drawn).values())
 

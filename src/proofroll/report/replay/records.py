@@ -78,8 +78,8 @@ class Replayed:
     solid: str = "truth"
 
 
-def some(motion: xr.Dataset, names: Collection[str]) -> dict[str, npt.NDArray[Any]]:
-    """Values of those of the named variables that a motion has."""
+def present(motion: xr.Dataset, names: Collection[str]) -> dict[str, npt.NDArray[Any]]:
+    """Values of the named variables; those that the motion lacks are left out."""
     return {name: motion[name].to_numpy() for name in names if name in motion.variables}
 
 

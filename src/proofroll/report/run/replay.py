@@ -54,7 +54,7 @@ def replay_page(path: Path, run: xr.Dataset, scene_of_run: str | None = None) ->
     true = truth(scene, run["time"].to_numpy())
     cases: list[ReplayCase] = []
     packed: list[str] = []
-    said: list[str] = []
+    captions: list[str] = []
     group = scene.title if len(parts) == 1 or not label else f"{scene.title}, {label}"
     for (element, alone), drawer in zip(parts, drawers, strict=True):
         true_part, run_part = (part(scene, element, whole) for whole in (true, run))
@@ -67,13 +67,13 @@ def replay_page(path: Path, run: xr.Dataset, scene_of_run: str | None = None) ->
         case, numbers = case_content(replayed, drawer)
         cases.append(case)
         packed.append(numbers)
-        said.append(_caption(run, known))
+        captions.append(_caption(run, known))
     return rendered(
         templates(),
         "run_replay.html",
         scene=scene,
         replay=Replay(three(), 0, cases, packed),
-        said=" ".join(dict.fromkeys(said)),
+        caption=" ".join(dict.fromkeys(captions)),
         replay_scripts=[other.replay_script for other in report_kinds().values() if other.replay_script],
     )
 

@@ -98,7 +98,7 @@ class RobotEvidence:
 
 
 def with_weightless(robot: Robot) -> Robot:
-    """Robot in which bodies of the mass ``LEAST``, with which they were compiled, have none again."""
+    """Robot without the mass ``LEAST`` that bodies were given so that an engine compiles them."""
     none = np.zeros((3, 3))
     light = (name for name, body in robot.bodies.items() if 0 < body.mass <= LEAST)
     return robot.with_bodies(RobotBody(name, 0.0, np.zeros(3), none) for name in light)

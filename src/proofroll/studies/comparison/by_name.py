@@ -1,4 +1,4 @@
-"""Comparison of a name, which is that of a comparison file or of a scene."""
+"""Comparisons by name: of a comparison file, or the default comparison of a scene."""
 
 import math
 from collections.abc import Mapping, Sequence

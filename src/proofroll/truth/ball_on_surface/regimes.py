@@ -45,11 +45,18 @@ def _carries(body: RollingBall, p_WB: FloatArray, v_WB: FloatArray) -> bool:
 
 
 def analytic_boundaries(body: RollingBall, speeds: FloatArray) -> tuple[FloatArray, FloatArray] | None:
-    """Bounds on μ: with less than the first the ball falls, with more than the second it never slips.
+    """Bounds on μ for each initial speed: below the first the ball falls, above the second it never slips.
 
-    Each has the shape (n,) of the initial ``speeds`` [m/s]. None: there is no closed form, which needs a vertical
-    cylinder, a level start and no spin about the normal; it leaves out rolling resistance. The friction needed is m g
-    (1 - cos νt / (1 + κ)) with κ = J/ma²: at most 12/7 of the weight of a homogeneous ball.
+    The closed form holds for a vertical cylinder, a level start and no spin about the normal; it leaves out rolling
+    resistance. The friction needed is m g (1 - cos νt / (1 + κ)) with κ = J/ma²: at most 12/7 of the weight of a
+    homogeneous ball.
+
+    Args:
+        body: the ball.
+        speeds: initial speeds [m/s], shape (n,).
+
+    Returns:
+        Two arrays of shape (n,); None: there is no closed form.
     """
     surface = body.surface
     if not isinstance(surface, Cylinder):

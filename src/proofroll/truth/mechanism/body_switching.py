@@ -103,7 +103,7 @@ class SwitchedBodies(JointStretches):
         return self.equations.along(state[:-1], self._numbers)
 
     def _wanted(self, state: Array) -> list[float]:
-        """Efforts that the actuators with a limit would apply without it, N or N m."""
+        """Efforts of the actuators that have a limit, before it is applied, N or N m."""
         q, v = self.equations.along(self.equations.normalised(state[:-1]), self._driven)
         return [float(m.wanted(state[-1], *at)) for m, *at in zip(self.limited, q, v, strict=True)]
 

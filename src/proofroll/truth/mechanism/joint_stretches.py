@@ -184,8 +184,8 @@ def noise_of(
 
 
 def near_stops(joints: tuple[SwitchedJoint, ...], mode: Mode) -> FloatArray:
-    """Height of a crest of each guard at which it is uncertain whether a joint reaches its stop; 0 of other guards.
+    """Height of each guard's crest below which round-off decides if the joint reaches its stop.
 
-    Whether an effort reaches its limit for a moment changes nothing, for it has no impact.
+    0 for other guards: an effort that reaches its limit for a moment has no impact, and changes nothing.
     """
     return np.array([CLOSE * (kind in {"low", "high"}) for _, kind in guards_of(joints, mode)])

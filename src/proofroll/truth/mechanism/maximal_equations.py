@@ -214,7 +214,7 @@ class MaximalEquations:
         return ConstraintRows(self.bodies, self.u_slices, self.connections, views)
 
     def _coupled(self, made: ConstraintRows, coupling: Coupling) -> ConstraintRow:
-        """Row of a coupling, on rates; between the coordinates it holds because it does at the start."""
+        """Row of a coupling between rates; the start satisfies it between coordinates, so the motion does, too."""
         a, b = (self.mechanism.joint_index[name] for name in (coupling.joint_a, coupling.joint_b))
         one, two = (made.of_rate(number, self.mechanism.joints[number].kind) for number in (a, b))
         return two.less(coupling.ratio, one)

@@ -22,7 +22,7 @@ from proofroll.elements.mechanism.placed import Placed
 from proofroll.elements.mechanism.report.drawing import direction
 from proofroll.files.json_data import plain
 from proofroll.report.labels import symbol, unit
-from proofroll.report.replay.records import SPEEDS, PackedNumbers, Replayed, some
+from proofroll.report.replay.records import SPEEDS, PackedNumbers, Replayed, present
 from proofroll.report.replay.replay import frame_times, in_sight
 
 # Thickness of lines, and largest invisible error, relative to the mechanism's length.
@@ -64,14 +64,14 @@ def draw_mechanism(replayed: Replayed) -> tuple[dict[str, Any], list[int], Packe
     names = [f"force.{name}.{axis}" for name, *_ in joints for axis in "xyz"]
     readings = _readings(element)
     slips = [f"slip.{contact.name}" for contact in mechanism.contacts]
-    true = some(replayed.true, [*_MOTION, *names, *slips, *(name for name, _ in readings)])
+    true = present(replayed.true, [*_MOTION, *names, *slips, *(name for name, _ in readings)])
     if not np.isfinite(true["p_WB"]).all():
         raise Refused("no true motion is known, so there is none to draw")
     fastest = float(np.linalg.norm(true["w_WB"], axis=-1).max())
     times = frame_times(float(true["time"][-1]), fastest)
     placed = _placed(element, true, times)
     ghosts = [
-        _reachable(_placed(element, some(ghost.motion, _MOTION), times), placed, length) for ghost in replayed.ghosts
+        _reachable(_placed(element, present(ghost.motion, _MOTION), times), placed, length) for ghost in replayed.ghosts
     ]
     least = 2.0 ** math.floor(math.log2(length * _ROUNDED))
     numbers = PackedNumbers()
