@@ -184,17 +184,17 @@ def summary(study: OnsetStudy) -> str:
     truth = study.truth
     if truth.time is None:
         return f"In the truth the ball does not slip within {study.until:g} s."
-    said = "In the truth the ball slips from the start. "
+    text = "In the truth the ball slips from the start. "
     if truth.time > 0:
-        said = f"In the truth the ball first slips at {truth.time:.9g} s; "
-        said += f"d ln t / d ln mu = {_number(truth.by_mu)}, d ln t / d ln f = {_number(truth.by_f)}. "
+        text = f"In the truth the ball first slips at {truth.time:.9g} s; "
+        text += f"d ln t / d ln mu = {_number(truth.by_mu)}, d ln t / d ln f = {_number(truth.by_f)}. "
     edges = [f"{edge:.6g}" for edge in (truth.edge_below, truth.edge_above) if edge is not None]
     if edges:
-        said += f"The time jumps at mu = {' and '.join(edges)}, the nearest {100 * truth.distance:.3g} % away; "
-    said += (
+        text += f"The time jumps at mu = {' and '.join(edges)}, the nearest {100 * truth.distance:.3g} % away; "
+    text += (
         f"{'for' if edges else 'For'} mu and f known to {100 * truth.uncertainty:g} % the question is {truth.verdict}."
     )
-    return said
+    return text
 
 
 def first_slip_texts(first: Event | None) -> tuple[str, str]:

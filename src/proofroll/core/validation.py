@@ -135,9 +135,9 @@ def _first_problem(
     return InputError(f"{where}: {location}", problem["input"], advice(problem["type"], problem["msg"]))
 
 
-def advice(kind: str, said: str) -> str:
+def advice(kind: str, message: str) -> str:
     """Advice for an error of pydantic, from its type and its message."""
-    words = said.removeprefix("Value error, ").replace("Input should", "it must").replace(" after validation", "")
+    words = message.removeprefix("Value error, ").replace("Input should", "it must").replace(" after validation", "")
     words = words.replace("Tuple ", "the list ").replace("List ", "the list ")
     return _WORDS.get(kind.partition("_")[0], words[0].lower() + words[1:])
 

@@ -136,8 +136,8 @@ class _Checked:
         try:
             importer = importer_row(self.file, self.truth, self.bar, spec, answer, self.workers, ask)
         except Exception as error:  # one engine's odd answer must not end the rows of the others
-            said = f"its answer could not be judged; please report this: {type(error).__name__}: {error}"
-            return ImporterRow(engine=str(spec), status="crashed", version=answer.version, message=said)
+            message = f"its answer could not be judged; please report this: {type(error).__name__}: {error}"
+            return ImporterRow(engine=str(spec), status="crashed", version=answer.version, message=message)
         # The engine that defines the format, in another version than the one that gave the meaning.
         compiler = self.compiler
         if compiler and plain_name(spec.name) == compiler.engine and answer.version != compiler.version:

@@ -100,8 +100,8 @@ def row_with_copy(given: reading.AsWritten, row: ImporterRow) -> str:
     (velocities, mass), (own, weight) = (dataclasses.astuple(item) for item in (given.whole, row.held))
     if velocities == own and abs(mass - weight) <= _SAME_MASS * max(abs(mass), abs(weight)):
         return "read"
-    said = f"held with {counted(velocities, 'velocities')} and {mass:.6g} kg"
-    return f"{said}, the copy that is compared with {own} and {weight:.6g} kg"
+    copy = f"held with {counted(velocities, 'velocities')} and {mass:.6g} kg"
+    return f"{copy}, the copy that is compared with {own} and {weight:.6g} kg"
 
 
 _Made = TypeVar("_Made")

@@ -40,8 +40,8 @@ def compile_robot(path: str, original: str | None) -> dict[str, Any]:
             if original is None:
                 raise
             reader.compiled(Path(original))  # its error says more of the file than that of the copy
-            said = f"it is read, but not its copy without looks and contacts; please report this: {words_of(error)}"
-            raise Refused(said) from None
+            message = f"it is read, but not its copy without looks and contacts; please report this: {words_of(error)}"
+            raise Refused(message) from None
 
     return _defined(Path(path), answer)
 

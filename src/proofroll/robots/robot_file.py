@@ -149,10 +149,10 @@ def required_file(folder: Path, element: Element, inside: Path) -> Path:
     """Path of the file that an element names. Raises InputError if it lies outside the folder ``inside``."""
     target = file_inside(folder, element.get("file", ""), inside)
     if target is None:
-        said = (
+        message = (
             "it is outside its folder, the only one that files are read from; `proofroll check` takes another by --root"
         )
-        raise InputError(f"<{element.tag} file>", element.get("file", ""), said)
+        raise InputError(f"<{element.tag} file>", element.get("file", ""), message)
     return target
 
 

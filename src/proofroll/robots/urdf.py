@@ -185,10 +185,10 @@ def _ordered(joints: list[RobotJoint], links: dict[str, Element], base: str) -> 
             raise InputError("<child link>", name, f"{times} joints carry this link; a URDF is a tree")
     roots = [name for name in links if name not in carried]
     if len(roots) != 1:
-        said = (
+        message = (
             "its links form a loop" if not roots else f"it has {len(roots)} roots, {roots[0]} and {roots[1]} among them"
         )
-        raise InputError("<robot>", roots[0] if roots else "", f"{said}; a URDF is a tree with one root")
+        raise InputError("<robot>", roots[0] if roots else "", f"{message}; a URDF is a tree with one root")
     below: dict[str, list[RobotJoint]] = {}
     for joint in joints:
         below.setdefault(joint.parent, []).append(joint)

@@ -58,7 +58,7 @@ def _torque(truth: RobotTruth, reading: Reading, given: Array, true: Array) -> s
         if columns is not None and columns.stop - columns.start == dofs:
             one, other = given[:, start : start + dofs], true[:, columns]
             state, index = np.unravel_index(int(np.argmax(np.abs(one - other))), one.shape)
-            said = f"joint {name}: {one[state, index]:.6g} at state {state}, true {other[state, index]:.6g}"
-            worst = max(worst, (float(np.abs(one - other).max()), said))
+            sentence = f"joint {name}: {one[state, index]:.6g} at state {state}, true {other[state, index]:.6g}"
+            worst = max(worst, (float(np.abs(one - other).max()), sentence))
         start += dofs
     return worst[1] or None

@@ -155,13 +155,13 @@ class Program:
 
     def sample(self) -> Sample:
         """Sample that came with the last answer. Raises ProofrollError if it is incomplete."""
-        said = self._last.get("sample")
+        sample = self._last.get("sample")
         names = [item.name for item in dataclasses.fields(self._sample_type)]
-        if not isinstance(said, dict) or not set(REQUIRED) <= said.keys() <= set(names):
+        if not isinstance(sample, dict) or not set(REQUIRED) <= sample.keys() <= set(names):
             raise ProofrollError(
                 f"{self.path.name} gave no sample with p_WB, v_WB, w_WB, and of {', '.join(names)} only"
             )
-        return self._sample_type(**_in_arrays(said))
+        return self._sample_type(**_in_arrays(sample))
 
     def built(self) -> _Built:
         """Report of the program on the model it built."""
@@ -217,8 +217,10 @@ def engine(name: str) -> type[Program]:
             },
         )
     except (KeyError, TypeError, AttributeError, StopIteration) as error:
-        said = f"{path.name} does not describe itself as docs/worker_protocol.md says ({type(error).__name__}: {error})"
-        raise ProofrollError(said) from None
+        wrong = f"{type(error).__name__}: {error}"
+        raise ProofrollError(
+            f"{path.name} does not describe itself as docs/worker_protocol.md says ({wrong})"
+        ) from None
 
 
 def _require_values(where: str, values: Mapping[str, Any]) -> None:

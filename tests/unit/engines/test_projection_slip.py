@@ -11,7 +11,7 @@ from proofroll.core.events import events_of
 from proofroll.elements.ball_on_surface.element import rolling_ball, scene_with
 from proofroll.elements.ball_on_surface.mechanics import slip_velocity
 from proofroll.elements.ball_on_surface.surfaces import Cylinder
-from proofroll.engines.projection import modes
+from proofroll.engines.projection import ball_modes
 from proofroll.engines.projection.friction import Friction
 from proofroll.engines.projection.geometry import geometry_of
 from proofroll.engines.projection.method import ProjectedBall
@@ -90,7 +90,7 @@ def test_size_of_the_start_does_not_matter(monkeypatch, mu_kinetic):
     """Handing a slip's direction over a decade earlier or later moves events and path by round-off only."""
     found = []
     for start in (1e-2, 1e-3, 1e-4):
-        monkeypatch.setattr(modes, "START", start)
+        monkeypatch.setattr(ball_modes, "START", start)
         engine = run(cylinder(speed=4, mu_static=0.15, mu_kinetic=mu_kinetic), FRAME, 0.5)
         assert kinds(engine) == ["slip", "stick"]
         found.append([*times(engine), *engine.sample().p_WB])
@@ -101,10 +101,10 @@ def test_slaved_direction_is_the_one_that_is_reached(monkeypatch):
     """A slip started early, and integrated from there, reaches the direction that a slaved one has from the start."""
     scene, directions = cylinder(speed=4, mu_static=0.15), []
     for start in (1e-5, 1e-2):
-        monkeypatch.setattr(modes, "START", start)
+        monkeypatch.setattr(ball_modes, "START", start)
         engine = run(scene, FRAME, 0.1787)  # 2 ms of slip: one is free by now, the other slaved
         directions.append(np.arctan2(*local(scene, engine.sample())[2][::-1]))
-        assert isinstance(engine._motion.mode, modes.FreeSlip if start < 1e-3 else modes.SlavedSlip)
+        assert isinstance(engine._motion.mode, ball_modes.FreeSlip if start < 1e-3 else ball_modes.SlavedSlip)
     assert directions[0] == pytest.approx(directions[1], abs=1e-7)
 
 

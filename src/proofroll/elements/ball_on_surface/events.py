@@ -92,8 +92,8 @@ def contradicted(times: Sequence[float], sticking: Sequence[bool | None], events
         if any(event.time_low <= t <= event.time_high for event in switches):
             continue
         before, after = [e for e in switches if e.time_high < t], [e for e in switches if e.time_low > t]
-        said = before[-1].kind == "stick" if before else after[0].kind == "slip" if after else sticking[0]
-        if t < until and bool(sticks) != said:
+        expected = before[-1].kind == "stick" if before else after[0].kind == "slip" if after else sticking[0]
+        if t < until and bool(sticks) != expected:
             return True
     return False
 

@@ -21,20 +21,20 @@ _MOST = 8
 def start_facts(element: MechanismElement) -> Sequence[str]:
     """Sentences on degrees of freedom, redundant constraints, a singular pose, places of bodies, and gaps of pairs."""
     found, mechanism = element.analysis, element.mechanism
-    said = [f"degrees of freedom: {found.mobility}"]
+    clauses = [f"degrees of freedom: {found.mobility}"]
     if found.rows:
         repeated = f", of which {found.redundant} follow from the others" if found.redundant else ""
-        said[0] += f"; loops add {found.rows} constraints{repeated}"
+        clauses[0] += f"; loops add {found.rows} constraints{repeated}"
     if found.singular_start:
-        said.append("the start is a singular pose: constraints lose rank there, and the motion may go several ways")
+        clauses.append("the start is a singular pose: constraints lose rank there, and the motion may go several ways")
     moving = element.start
     for body in mechanism.bodies[:_MOST]:
         centre = moving.point(body.name, body.com)[0]
         speed = float(np.linalg.norm(moving.velocity(body.name, body.com)[0]))
-        said.append(f"{body.name}: centre of mass at {vector(centre)} m, speed {speed:.4g} m/s")
+        clauses.append(f"{body.name}: centre of mass at {vector(centre)} m, speed {speed:.4g} m/s")
     if more := len(mechanism.bodies) - _MOST:
-        said += [f"and {more} more bodies"] if more > 0 else []
+        clauses += [f"and {more} more bodies"] if more > 0 else []
     touching = touches(mechanism, Tree(mechanism).at(*mechanism.start()))
     gaps = [f"{pair.name} {each.gap:.4g} m" for pair, each in zip(mechanism.contacts, touching, strict=True)]
-    said += [f"gaps of pairs: {', '.join(gaps)}"] if gaps else []
-    return said
+    clauses += [f"gaps of pairs: {', '.join(gaps)}"] if gaps else []
+    return clauses

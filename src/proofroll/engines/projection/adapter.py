@@ -19,12 +19,12 @@ from proofroll.elements.ball_on_surface.model import ALL_OF_A_BALL, BallCapabili
 from proofroll.elements.ball_on_surface.sampling import BallBuilt, BallSample, terms_held
 from proofroll.elements.mechanism.contacts.family import Family, of_contact
 from proofroll.engines.projection import mechanism
+from proofroll.engines.projection.ball_switching import Switching
 from proofroll.engines.projection.geometry import geometry_of, matrix
 from proofroll.engines.projection.mechanism import ProjectionMechanism
 from proofroll.engines.projection.method import ProjectedBall, start_and_scales
 from proofroll.engines.projection.orientation import EulerAngles, FollowedFrame, Orientation, RotatingFrame
 from proofroll.engines.projection.settings import PRESETS, ProjectionSettings
-from proofroll.engines.projection.switching import Switching
 from proofroll.engines.projection.taylor import TaylorSeries
 
 # Components of the state without the ball's orientation: two coordinates and five velocities.

@@ -189,7 +189,7 @@ def one_scheme(content: ReportedComparison) -> list[str]:
     alike = [
         rows for rows in groups if len(rows) > 1 and not any(rows.keys() <= all_.keys() for all_ in declared.values())
     ]
-    said = (
+    sentences = (
         (
             "Of one integration scheme, so no evidence for one another where they agree",
             [f"{', '.join(rows)} ({scheme})" for scheme, rows in declared.items()],
@@ -199,7 +199,7 @@ def one_scheme(content: ReportedComparison) -> list[str]:
             [", ".join(rows) for rows in alike],
         ),
     )
-    return [f"{words}: {'; '.join(found)}." for words, found in said if found]
+    return [f"{words}: {'; '.join(found)}." for words, found in sentences if found]
 
 
 def _same_digits(one: ReportedRow, other: ReportedRow) -> bool:

@@ -219,13 +219,13 @@ def _conclusions(content: LadderContent) -> Iterator[str]:
         yield f"Not on the ladder, for they tell no levels: {', '.join(content.unplaced)}."
 
 
-def _cheapest(useful: list[tuple[RungFound, float, float]], tolerance: float, said: str) -> str:
-    """Sentence on the cheapest rung within a tolerance; ``said`` is the tolerance with its unit."""
+def _cheapest(useful: list[tuple[RungFound, float, float]], tolerance: float, bound: str) -> str:
+    """Sentence on the cheapest rung within a tolerance; ``bound`` is the tolerance with its unit."""
     within = [entry for entry in useful if entry[2] <= tolerance]
     if not within:
-        return f"No rung is within {said} at its own step."
+        return f"No rung is within {bound} at its own step."
     best, _, error = min(within, key=lambda entry: entry[1])
-    return f"The cheapest within {said} is {label(best)} ({best.level}), off by {number(error)}."
+    return f"The cheapest within {bound} is {label(best)} ({best.level}), off by {number(error)}."
 
 
 def _of_terms(content: LadderContent) -> Iterator[str]:

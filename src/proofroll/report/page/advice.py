@@ -61,8 +61,8 @@ def words(matrix: ChoiceMatrix) -> str:
                     for engine, (name, cell) in found.items()
                 ]
             )
-        said = [item.sentence for item in advice(matrix, tolerance, forces)]
-        answers.append({"said": said, "heads": heads, "engines": engines})
+        sentences = [item.sentence for item in advice(matrix, tolerance, forces)]
+        answers.append({"said": sentences, "heads": heads, "engines": engines})
     return json.dumps(answers, ensure_ascii=False, separators=(",", ":"))
 
 

@@ -41,16 +41,16 @@ class Report:
     parts: list[Part] = field(default_factory=list)
     pictures: dict[str, str] = field(default_factory=dict)
     earlier: EarlierReport | None = None
-    _said: dict[int, PartEntry] = field(default_factory=dict)
+    _entries: dict[int, PartEntry] = field(default_factory=dict)
     _lines: dict[int, Sequence[TableLine]] = field(default_factory=dict)
 
     @cached_property
     def content(self) -> ReportContent:
         """Content of the report, with the further studies that have an entry so far; made anew after each."""
-        said = [(part.key, self._said[id(part)]) for part in self.parts if id(part) in self._said]
-        entries = {key: [entry for other, entry in said if other == key] for key in self.compared.entries}
+        keyed = [(part.key, self._entries[id(part)]) for part in self.parts if id(part) in self._entries]
+        entries = {key: [entry for other, entry in keyed if other == key] for key in self.compared.entries}
         environment = self.compared.environment
-        for _, entry in said:
+        for _, entry in keyed:
             if isinstance(entry.study, dict):  # a stored study was made with the present versions
                 environment = replace(environment, versions=environment.versions | entry.study.get("versions", {}))
         further = [line for part in self.parts for line in self._lines.get(id(part), ())]
@@ -69,19 +69,19 @@ class Report:
         self.parts = sorted(parts, key=lambda part: part.order)
         missing = []
         for part in self.parts:
-            said = attempt(part, partial(part.keeps, out)) if not fresh else None
-            if said is None:
+            entry = attempt(part, partial(part.keeps, out)) if not fresh else None
+            if entry is None:
                 missing.append(part)
-                said = absent(part, "It has not been made yet")
-            self._put(part, said)
+                entry = absent(part, "It has not been made yet")
+            self._put(part, entry)
         return missing
 
     def make(self, part: Part, how: Callable[[], None]) -> PartEntry:
         """Makes a further study and returns its entry, which tells of a failure, too."""
-        said = attempt(part, how)
-        assert said is not None  # only ``keeps`` returns False
-        self._put(part, said)
-        return said
+        entry = attempt(part, how)
+        assert entry is not None  # only ``keeps`` returns False
+        self._put(part, entry)
+        return entry
 
     def leave_out(self, part: Part, reason: str) -> None:
         """Gives a further study that is not made the reason as its entry."""
@@ -105,10 +105,10 @@ class Report:
         write_text(out / "report.csv", whole.csv)
         write_text(out / "report.html", page(content, self.curves, self.pictures, self.replay))
 
-    def _put(self, part: Part, said: PartEntry) -> None:
-        self._said[id(part)] = said
+    def _put(self, part: Part, entry: PartEntry) -> None:
+        self._entries[id(part)] = entry
         self.__dict__.pop("content", None)
-        if said.study is not None:
+        if entry.study is not None:
             self._lines[id(part)] = part.lines()
             alike = [id(other) for other in self.parts if other.key == part.key]
             prefix = f"{part.key}{alike.index(id(part))}-"

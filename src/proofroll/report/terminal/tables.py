@@ -144,8 +144,8 @@ def closing_lines(content: ReportedComparison) -> list[str]:
     lines += [f"* {name}: {remark}" for name, remark in remarks(content)]
     if content.contradictions:
         count = len(content.contradictions)
-        said = "1 result contradicts" if count == 1 else f"{count} results contradict"
-        lines.append(f"{said} what {content.name} expects (!! above){'; first' if count > 5 else ''}:")
+        contradict = "1 result contradicts" if count == 1 else f"{count} results contradict"
+        lines.append(f"{contradict} what {content.name} expects (!! above){'; first' if count > 5 else ''}:")
         lines += [f"  {sentence}" for sentence in content.contradictions[:5]]
     elif content.claims:
         left = unjudged(content)
@@ -167,9 +167,9 @@ def budget_lines(content: ReportedComparison) -> list[str]:
     if content.budget is None:
         return [f"Left out for lack of processor time: {left[0]}{more}."]
     seconds = f"{content.budget:g} s of processor time, building and compiling included,"
-    said = f"Left out, for {seconds} did not suffice: {left[0]}{more}."
+    left_out = f"Left out, for {seconds} did not suffice: {left[0]}{more}."
     again = "" if left[0].startswith("the truth") else "The same command goes on with what is left; "
-    return [f"{said} {again}--budget {10 * content.budget:g} gives it more time."]
+    return [f"{left_out} {again}--budget {10 * content.budget:g} gives it more time."]
 
 
 def part_lines(content: ReportContent) -> list[str]:

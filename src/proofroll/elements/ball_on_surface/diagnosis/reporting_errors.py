@@ -88,10 +88,10 @@ def reported_force(evidence: Evidence) -> Iterator[Cause]:
         return
     run, truth = pair
     time, axes = truth["time"].to_numpy(), frames(body, truth)
-    said, true = forces(body, run), forces(body, truth)
-    known = np.all(np.isfinite(said) & np.isfinite(true), axis=-1)
+    reported, true = forces(body, run), forces(body, truth)
+    known = np.all(np.isfinite(reported) & np.isfinite(true), axis=-1)
     own = {name: frame[known] for name, frame in axes.items()}
-    vector = ReportedVector("force", _FORCE, "N", said[known], true[known], time[known], own).after_start()
+    vector = ReportedVector("force", _FORCE, "N", reported[known], true[known], time[known], own).after_start()
     if forced_otherwise(evidence, vector):
         return
     yield _friction_reversed(vector, own[SURFACE][-len(vector.true) :, :, 0])
@@ -142,10 +142,10 @@ def at_the_contact(evidence: Evidence) -> Iterator[Cause]:
         ("w_WB", "w_WB is the spin about the surface's normal alone", spin),
         ("w_WB", "w_WB has the spin about the surface's normal with the wrong sign", w - 2 * spin),
     ):
-        said, true = run[name].to_numpy(), truth[name].to_numpy()
-        if said.shape == true.shape and len(said) > 1:
-            said, true = said[1:], true[1:]
-            before = known_difference(said, true)
+        reported, true = run[name].to_numpy(), truth[name].to_numpy()
+        if reported.shape == true.shape and len(reported) > 1:
+            reported, true = reported[1:], true[1:]
+            before = known_difference(reported, true)
             remedy = f"give {name} of the ball's centre, along the axes of the world"
             yield Cause(
                 "contact point",
@@ -153,7 +153,7 @@ def at_the_contact(evidence: Evidence) -> Iterator[Cause]:
                 name,
                 _UNITS[name][1],
                 before,
-                known_difference(said, changed[1:]),
+                known_difference(reported, changed[1:]),
                 remedy,
             )
 
@@ -164,12 +164,12 @@ def stale_normal(evidence: Evidence) -> Iterator[Cause]:
     run, truth, body = evidence.run, evidence.truth, evidence.element.rolling
     if run is None or truth is None or "N" not in run or "N" not in truth or run.sizes["time"] < 3:
         return
-    said, true = forces(body, run)[1:], forces(body, truth)[1:]
+    reported, true = forces(body, run)[1:], forces(body, truth)[1:]
     p, v = (truth[name].to_numpy()[1:] for name in ("p_WB", "v_WB"))
     if (
-        said.shape != true.shape
-        or not np.all(np.isfinite(said))
-        or not above_round_off(known_difference(said, true), float(np.max(abs(true))))
+        reported.shape != true.shape
+        or not np.all(np.isfinite(reported))
+        or not above_round_off(known_difference(reported, true), float(np.max(abs(true))))
     ):
         return
     local = components_along(body.surface.frame(body.surface.locate(p)), true)
@@ -177,17 +177,17 @@ def stale_normal(evidence: Evidence) -> Iterator[Cause]:
     def turned(delay: float) -> FloatArray:
         return np.asarray(np.einsum("tij,tj->ti", body.surface.frame(body.surface.locate(p - delay * v)), local))
 
-    delay = least_squares_parameter(lambda x: np.ravel(turned(x) - said), 0.0, evidence.step or 1e-3)
+    delay = least_squares_parameter(lambda x: np.ravel(turned(x) - reported), 0.0, evidence.step or 1e-3)
     if 2 * known_difference(run["p_WB"].to_numpy()[1:], p) > float(np.max(np.abs(delay * v))):
         return  # the ball itself is as far off, which explains its force
     moment = delay_text(delay, evidence.step).removesuffix(" late")
     says = f"the force is along the axes of the normal of {moment} before"
     after, remedy = (
-        known_difference(said, turned(delay)),
+        known_difference(reported, turned(delay)),
         "take the normal where the ball is when the force is read",
     )
     change = in_steps(delay, evidence.step)
-    yield Cause("stale normal", says, "force", "N", known_difference(said, true), after, remedy, 1, change=change)
+    yield Cause("stale normal", says, "force", "N", known_difference(reported, true), after, remedy, 1, change=change)
 
 
 @hypothesis("force at time 0", "the scene's own force with another sign, unit or axes is the one of the certificate")
@@ -198,11 +198,11 @@ def force_at_start(evidence: Evidence) -> Iterator[Cause]:
     if not wrong or not wrong <= set(parts) or not all(lines[name]["found"] for name in parts):
         return
     frame = body.surface.frame(body.u0)
-    said, true = (
+    reported, true = (
         frame @ np.array([-lines["N"][key][0], lines["F2"][key][0], lines["F3"][key][0]])
         for key in ("found", "expected")
     )
-    vector = ReportedVector("force", _FORCE, "N", said[None], true[None], np.zeros(1), {SURFACE: frame[None]})
+    vector = ReportedVector("force", _FORCE, "N", reported[None], true[None], np.zeros(1), {SURFACE: frame[None]})
     yield _friction_reversed(vector, frame[None, :, 0])
     yield from vector.causes(evidence.step)
 

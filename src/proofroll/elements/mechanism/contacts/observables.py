@@ -144,14 +144,14 @@ def residuals(
         speed: natural speed, which scales slip against weight in the natural map [m/s].
     """
     n, u_n = found.normal, np.sum(found.normal * found.slide, axis=-1)
-    said, given = np.all(np.isfinite(pressed), axis=-1), np.any(np.isfinite(pressed), axis=-1)
+    complete, given = np.all(np.isfinite(pressed), axis=-1), np.any(np.isfinite(pressed), axis=-1)
     N = normal_forces(found, pressed)
     u = found.slide - n * u_n[..., None]
-    T = np.where(said[..., None], pressed - N[..., None] * n, 0.0)
+    T = np.where(complete[..., None], pressed - N[..., None] * n, 0.0)
     presses = np.asarray(PRESSES * weight < N)
     t = np.linalg.norm(T, axis=-1)
     bound = friction * np.where(presses, N, 0.0)
-    slides = np.asarray(presses & said & (found.slip > SLIDES * speed) & (friction > 0))
+    slides = np.asarray(presses & complete & (found.slip > SLIDES * speed) & (friction > 0))
     against = np.sum(T * u, axis=-1) / np.where(slides, bound * found.slip, 1.0)
     # De Saxcé's correction makes the law a projection onto the cone: λ = P(λ − r (u + μ|u_t| n))
     r = weight / speed
@@ -166,7 +166,7 @@ def residuals(
         "cone_excess": np.maximum(t - bound, 0.0),
         "friction_direction": np.where(slides, 1.0 + against, 0.0),
         "hop_speed": np.where(presses, np.abs(u_n), 0.0),
-        "natural_map": np.where(presses, np.where(said, off, 0.0), t),
+        "natural_map": np.where(presses, np.where(complete, off, 0.0), t),
     }
     after = np.arange(len(N))[:, None]
     values["unpressed"] = np.cumsum(np.where(after > 0, np.logical_not(presses), 0), axis=0) / np.maximum(after, 1)

@@ -91,13 +91,13 @@ class Reactions:
 def _reactions(
     evidence: Evidence,
     placed: Placed,
-    said: Mapping[str, FloatArray],
+    reported: Mapping[str, FloatArray],
     true: Mapping[str, FloatArray],
     bars: Mapping[str, float],
 ) -> Iterator[Reactions]:
     """Reported and true forces, then moments, of the connections with known values.
 
-    ``said`` and ``true``: by kind, shape (time, connections, 3); ``bars``: error bar of the truth, by kind.
+    ``reported`` and ``true``: by kind, shape (time, connections, 3); ``bars``: error bar of the truth, by kind.
     """
     element = evidence.element
     ends = element.mechanism.connections
@@ -105,7 +105,7 @@ def _reactions(
     force = element.mechanism.mass * element.first_motion.scale
     for kind, unit, what in _KINDS:
         known = np.isfinite(true[kind])
-        heard = np.all(np.isfinite(said[kind]) | ~known, axis=(0, 2)) & np.any(known, axis=(0, 2))
+        heard = np.all(np.isfinite(reported[kind]) | ~known, axis=(0, 2)) & np.any(known, axis=(0, 2))
         which = np.flatnonzero(heard).tolist()
         if not which or f"{kind}s" in evidence.settled:
             continue
@@ -113,10 +113,10 @@ def _reactions(
             name: np.stack([placed.R_WB[:, bodies[ends[k].b if name == BODY else ends[k].a]] for k in which], axis=1)
             for name in (BODY, PARENT)
         }
-        own = np.where(known, said[kind], np.nan)[:, which], true[kind][:, which]
+        own = np.where(known, reported[kind], np.nan)[:, which], true[kind][:, which]
         least = force if kind == "force" else force * element.length
-        reported = ReportedVector(kind, what, unit, *own, placed.time, frames, least, bars.get(kind, 0.0))
-        yield Reactions(reported, which, placed, true["force"][:, which])
+        vector = ReportedVector(kind, what, unit, *own, placed.time, frames, least, bars.get(kind, 0.0))
+        yield Reactions(vector, which, placed, true["force"][:, which])
 
 
 @hypothesis(
@@ -130,9 +130,9 @@ def reactions(evidence: Evidence) -> Iterator[Cause]:
         return
     run, truth = (data.isel(time=slice(1, None)) for data in found)
     names = [each.name for each in evidence.element.mechanism.connections]
-    said, true = ({kind: _stacked(data, kind, names) for kind, _, _ in _KINDS} for data in (run, truth))
+    reported, true = ({kind: _stacked(data, kind, names) for kind, _, _ in _KINDS} for data in (run, truth))
     bars = {kind: _bar(truth, f"{kind}s") for kind, _, _ in _KINDS}
-    for each in _reactions(evidence, placed_of(evidence.element.mechanism, truth), said, true, bars):
+    for each in _reactions(evidence, placed_of(evidence.element.mechanism, truth), reported, true, bars):
         if not forced_otherwise(evidence, each.reported):
             yield from each.causes(evidence.step)
 
@@ -146,16 +146,16 @@ def reactions_at_start(evidence: Evidence) -> Iterator[Cause]:
     lines = {str(line["quantity"]): line for line in evidence.lines}
     if {name for name, line in lines.items() if not line["holds"]} - {"forces", "torques"}:
         return
-    shape, said, true = (1, len(evidence.element.mechanism.connections), 3), {}, {}
+    shape, reported, true = (1, len(evidence.element.mechanism.connections), 3), {}, {}
     for kind, _, _ in _KINDS:
         line = lines.get(f"{kind}s")
         empty = np.full(shape, np.nan)
         whole = line is not None and np.size(line["found"]) == empty.size
-        said[kind] = np.reshape(line["found"], shape) if line is not None and whole else empty
+        reported[kind] = np.reshape(line["found"], shape) if line is not None and whole else empty
         true[kind] = np.reshape(line["expected"], shape) if line is not None else empty
         if line is not None and line["holds"]:
-            said[kind] = np.full(shape, np.nan)
-    for each in _reactions(evidence, evidence.element.start, said, true, {}):
+            reported[kind] = np.full(shape, np.nan)
+    for each in _reactions(evidence, evidence.element.start, reported, true, {}):
         yield from each.causes(evidence.step)
 
 

@@ -67,14 +67,14 @@ def centres_at_start(evidence: Evidence) -> Iterator[Cause]:
     acceleration = np.cross(turning, arm) + np.cross(w, np.cross(w, arm))
     shifts = {"position": arm, "velocity": np.cross(w, arm), "acceleration": acceleration}
     shifts[f"acceleration{OF_FIRST_STEPS}"] = acceleration
-    said = {"position": "p_WB is the position", "velocity": "v_WB is the velocity"}
-    said |= {"acceleration": "the acceleration is that", f"acceleration{OF_FIRST_STEPS}": said["velocity"]}
+    meant = {"position": "p_WB is the position", "velocity": "v_WB is the velocity"}
+    meant |= {"acceleration": "the acceleration is that", f"acceleration{OF_FIRST_STEPS}": meant["velocity"]}
     if set(wrong) - shifts.keys():
         return
     for name, line in wrong.items():
         off = np.reshape(line["found"], (-1, 3)) - np.reshape(line["expected"], (-1, 3))
         if off.shape == arm.shape:
-            says = f"{said[name]} of the centres of mass, not of the origins of the bodies' frames"
+            says = f"{meant[name]} of the centres of mass, not of the origins of the bodies' frames"
             proof = (
                 f"{name} at time 0",
                 str(line["unit"]),

@@ -13,9 +13,9 @@ from proofroll.elements.ball_on_surface.events import EventKind
 from proofroll.elements.ball_on_surface.mechanics import natural_speed
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.engines.projection.alternating import WITHOUT_PROGRESS
+from proofroll.engines.projection.ball_modes import BallMode, Exit, FreeSlip, Pace, Rest, SlavedSlip, Stick, Survey
 from proofroll.engines.projection.friction import Friction
 from proofroll.engines.projection.method import ProjectedBall
-from proofroll.engines.projection.modes import BallMode, Exit, FreeSlip, Pace, Rest, SlavedSlip, Stick, Survey
 
 # Accuracy of located times, relative to the time scale of the motion; at least the round-off of the time.
 _LOCATED = 1e-12
