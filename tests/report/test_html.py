@@ -203,10 +203,14 @@ def test_curves_are_the_difference_from_the_truth(made: tuple[Outcome, Store]) -
         (0.25, "0.25"),
         (-3e-12, "-3e-12"),
         (4e12, "4e12"),
+        (0.01, "0.01"),
+        (0.01 * (1 - 1e-15), "0.01"),
+        (9.96e-3, "0.01"),
+        (9.94e-3, "9.9e-3"),
     ],
 )
 def test_numbers_are_short(value: float | None, shown: str) -> None:
-    """Small numbers all have one form."""
+    """Small numbers all have one form, and what is written alike has the same."""
     assert number(value) == shown
 
 

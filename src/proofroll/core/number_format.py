@@ -17,6 +17,7 @@ def number(value: float | None, digits: int = 2, none: str = "–") -> str:
     """A number in few characters, e.g. ``3.4e-7``; ``none`` if it is missing or not finite."""
     if value is None or not math.isfinite(value):
         return none
+    value = float(f"{value:.{digits - 1}e}")  # its form is that of what is written: 0.01 and a hair less are one text
     if 0 < abs(value) < 0.01:  # one form for all small numbers, which makes columns comparable at a glance
         mantissa, _, power = f"{value:.{digits - 1}e}".partition("e")
         return f"{mantissa.rstrip('0').rstrip('.') if '.' in mantissa else mantissa}e{int(power)}"
