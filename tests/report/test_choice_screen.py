@@ -255,6 +255,42 @@ def test_nothing_moves_while_the_page_loads(report_page: Path, visit: Visiting, 
     assert shifts < 1e-3
 
 
+@pytest.mark.parametrize(("width", "columns"), [(400, ["kept", "again"]), (1400, [])])
+def test_scenes_are_columns_where_the_screen_has_room(
+    everything: Any, tmp_path: Path, visit: Visiting, width: int, columns: list[str]
+) -> None:
+    """A group of two is unfolded from the start on a wide screen, and folded on one too narrow for its columns."""
+    content = everything.content
+    first = replace(content.comparisons[0], name="kept")
+    named = [replace(x, study=name) for name in ("kept", "again") for x in content.table.lines if x.study == "invented"]
+    both = replace(
+        content, comparisons=[first, replace(first, name="again")], table=replace(content.table, lines=named)
+    )
+    page = replace(everything, content=both, curves=2 * everything.curves).write(tmp_path / "report.html")
+    with visit(page, before=UNDRAWN, viewport={"width": width, "height": 800}) as seen:
+        hidden = seen.page.locator("#choice thead th[data-of][hidden]")
+        assert [text.strip() for text in hidden.all_text_contents()] == columns
+
+
+def test_the_matrix_appears_once_all_its_rows_are_there(report_page: Path, tmp_path: Path, visit: Visiting) -> None:
+    """While a page is still read, later rows would widen its columns, and cells would move."""
+    text = report_page.read_text(encoding="utf-8")
+    part = tmp_path / "report.html"
+    part.write_text(text[: text.index("</tr>", text.index("<tbody", text.index('id="choice"')))], encoding="utf-8")
+    with visit(part) as seen:
+        assert seen.page.locator("#answer").is_visible()
+        assert not seen.page.locator("#choice").is_visible()
+
+
+def test_little_stands_between_the_answer_and_the_matrix(report_page: Path, visit: Visiting) -> None:
+    """On a narrow screen the legend and the choices leave room for the matrix: less than 300 px are theirs."""
+    with visit(report_page, viewport={"width": 400, "height": 800}) as seen:
+        seen.wait("document.querySelector('#choose .tools button')")
+        tops = "['.key', '.scroll.choice'].map((name) => document.querySelector(name).getBoundingClientRect().top)"
+        above, below = seen.page.evaluate(tops)
+    assert below - above < 300
+
+
 def test_without_scripts_there_is_no_form(report_page: Path, visit: Visiting) -> None:
     """What only a script can answer is not shown where there are none; the matrix is."""
     with visit(report_page, java_script_enabled=False) as seen:

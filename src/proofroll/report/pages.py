@@ -29,7 +29,7 @@ _KEY = re.compile(r"<td\b[^>]* data-key\b[^>]*>(.*?)</td>", re.DOTALL)
 # What is no running text, and what is: between two tags. A browser breaks a line at the hyphen of ``1e-3``.
 _NO_TEXT = re.compile(r"(<(script|style|svg|option|title)\b.*?</\2>)", re.DOTALL)
 _TEXT = re.compile(r"(?:^|>)([^<]*\de-\d[^<]*)(?=<)")
-_EXPONENT = re.compile(r"\d[\d.]*e-\d+")
+_EXPONENT = re.compile(r"\d[\d.]*e-\d+(?: (?:s|m|N|J|rad)\b(?:/s)?)?")
 _WORDS = 12  # of a label or a name in an address
 
 
@@ -58,7 +58,7 @@ def rendered(templates: jinja2.Environment, name: str, **values: Any) -> str:
 
 
 def unbroken(html: str) -> str:
-    """Page without line breaks inside numbers as ``1e-3`` that are part of a longer text."""
+    """Page without line breaks inside numbers as ``1e-3 s`` that are part of a longer text."""
     pieces = _NO_TEXT.split(html)
     del pieces[2::3]  # names of elements
     pieces[::2] = (_TEXT.sub(_kept_whole, piece) for piece in pieces[::2])

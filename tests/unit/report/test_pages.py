@@ -64,11 +64,13 @@ def test_words_are_escaped(tmp_path: Path) -> None:
 
 
 def test_numbers_in_running_text_are_kept_whole() -> None:
-    """In sentences, lists of numbers and labels; one alone in a cell, attributes, scripts and pictures stay."""
+    """In sentences, lists and labels, with their unit; one alone in a cell, attributes, scripts and pictures stay."""
     whole = '<span class="whole">1e-4</span>'
     assert unbroken("<td>0, 1e-4, 0</td>") == f"<td>0, {whole}, 0</td>"
     assert unbroken("<b>to 1e-4</b> and 1e-4.<i></i>") == f"<b>to {whole}</b> and {whole}.<i></i>"
-    assert unbroken("<i><svg></svg>dt 1e-4 s</i>") == f"<i><svg></svg>dt {whole} s</i>"
+    assert unbroken("<i><svg></svg>to 1e-4 so</i>") == f"<i><svg></svg>to {whole} so</i>"
+    for unit in ("s", "s/s", "m", "N"):
+        assert unbroken(f"<p>at 1e-4 {unit} for</p>") == f'<p>at <span class="whole">1e-4 {unit}</span> for</p>'
     for same in (
         "<td>1e-4</td>",
         '<td title="to 1e-4 m">to</td>',

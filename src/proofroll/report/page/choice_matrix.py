@@ -280,7 +280,7 @@ class ChoiceMatrix:
 
 
 def choice_matrix(lines: Iterable[TableLine], studies: Mapping[str, ChoiceStudy]) -> ChoiceMatrix:
-    """Matrix of the lines of some studies, in their order; formulations that are cheapest somewhere come first."""
+    """Matrix of the lines of some studies, in their order; cheapest formulations first, by column."""
     order = {name: number for number, name in enumerate(studies)}
     chosen = sorted((line for line in lines if line.study in order), key=lambda x: (order[x.study], x.row, x.engine))
     rows: dict[tuple[str, str, str], ChoiceRow] = {}
@@ -303,9 +303,10 @@ def choice_matrix(lines: Iterable[TableLine], studies: Mapping[str, ChoiceStudy]
     keys = sorted(rows, key=lambda key: [known.index(key[: end + 1]) for end, known in enumerate(orders)])
     titles = {name: item.title for name, item in studies.items()}
     matrix = ChoiceMatrix(columns, [rows[key] for key in keys], titles)
-    best = {at for forces in (False, True) for at in matrix.best(FIRST_TOLERANCE, forces) if at is not None}
-    useful = {matrix.rows[at].name for at in best}
-    return ChoiceMatrix(columns, sorted(matrix.rows, key=lambda row: row.name not in useful), titles)
+    best = zip(*(matrix.best(FIRST_TOLERANCE, forces) for forces in (False, True)), strict=True)
+    useful = dict.fromkeys(matrix.rows[at].name for pair in best for at in pair if at is not None)
+    ranks = {name: rank for rank, name in enumerate(useful)}
+    return ChoiceMatrix(columns, sorted(matrix.rows, key=lambda row: ranks.get(row.name, len(ranks))), titles)
 
 
 def _cell(steps: Sequence[Candidate], tolerance: float, forces: bool) -> ChoiceCell:

@@ -61,7 +61,7 @@
     }), `This is of ${chosen(true).join(", ") || "no engine"} alone. What serves all scenes, and what forces change, is said of all engines together.`];
   }
   // A text whose numbers as 1e-3 are not broken, as `unbroken`.
-  const put = (place, text) => place.replaceChildren(...text.split(/(\d[\d.]*e-\d+)/).map(
+  const put = (place, text) => place.replaceChildren(...text.split(/(\d[\d.]*e-\d+(?: (?:s|m|N|J|rad)\b(?:\/s)?)?)/).map(
     (part, at) => at % 2 ? Object.assign(document.createElement("span"), { className: "whole", textContent: part }) : part));
   // The chosen scene, or group of scenes, alone: its column, the rows that ran there, and the sentences.
   function narrow() {

@@ -42,6 +42,17 @@ def test_a_cell_has_the_cheapest_run_that_holds_the_tolerance() -> None:
     assert at(ARM, 6, setting="default").state == Verdict.CONVERGES, "what unfolds is that setting alone"
 
 
+def test_rows_that_are_cheapest_somewhere_come_first_by_column() -> None:
+    """The cheapest of the first group is the first row, wherever the comparison has it."""
+    rivals = [
+        line(engine=name, row=row, error=1e-6, cost=cost) for row, name, cost in [(0, "slow", 9.0), (1, "a", 1.0)]
+    ]
+    lone = [replace(item, study="ball", group="balls", cost=1 / item.cost) for item in rivals]
+    found = choice_matrix([*rivals, *lone], STUDIES)
+    assert [row.engine for row in found.models] == ["a", "slow"]
+    assert found.best(1e-4, False) == [0, 2], "numbers of rows, settings among them"
+
+
 def lucky(*errors: float, **changes: Any) -> list[TableLine]:
     """Lines of a ladder with these errors at 1e-3 s and ever half of it; only the first has a verdict and a limit."""
     rungs = [line(error=error, step=1e-3 / 2**place, cost=0.1 * 2**place) for place, error in enumerate(errors)]
