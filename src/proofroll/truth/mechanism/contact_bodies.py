@@ -15,7 +15,6 @@ from proofroll.truth.mechanism.body_switching import SLACK
 from proofroll.truth.mechanism.contact_equations import BodiesSolution, BodiesState, ContactEquations
 from proofroll.truth.mechanism.contact_guards import AT_REST, SLIP_ENDED
 from proofroll.truth.mechanism.contact_stretches import ContactStretches, SolvedContacts, modes_of
-from proofroll.truth.mechanism.maximal_coordinates import RANK
 
 _MOST = 6  # largest number of contacts closed at the same time: each has up to four candidate modes
 _SAME = 1e-6  # velocity difference, relative to the largest speed, below which two outcomes of an impact are the same
@@ -107,14 +106,9 @@ class ContactBodies(ContactStretches):
     def _own(self, bodies: BodiesState, closed: Sequence[bool]) -> list[Acting]:
         """Provisional mode of each contact: open, or stick, with its line if it can slide along a line only."""
         modes = []
-        root = np.linalg.cholesky(bodies.mass)
-        joints = np.linalg.solve(root, bodies.C.T)
-        for each, J, shut in zip(bodies.touching, bodies.J, closed, strict=True):
+        for each, G, shut in zip(bodies.touching, self.equations.responses(bodies), closed, strict=True):
             frame = frame_of_axis(each.normal)[:, [2, 0, 1]]
-            ways = np.linalg.solve(root, J.T @ frame)
-            if joints.size:
-                ways = ways - joints @ np.linalg.lstsq(joints, ways, rcond=RANK)[0]
-            modes.append(first_mode("stick", frame, np.zeros(2), ways.T @ ways) if shut else OPEN)
+            modes.append(first_mode("stick", frame, np.zeros(2), frame.T @ G @ frame) if shut else OPEN)
         return modes
 
     def _tried(
@@ -243,7 +237,13 @@ class ContactBodies(ContactStretches):
         bodies = self.equations.at(self.equations.equations.normalised(state))
         solution = self.equations.accelerated(bodies, mode)
         return SolvedContacts(
-            bodies.touching, bodies.u, solution.moved, solution.slide, solution.force, solution.response
+            bodies.touching,
+            solution.mode,
+            bodies.u,
+            solution.moved,
+            solution.slide,
+            solution.force,
+            solution.response,
         )
 
 

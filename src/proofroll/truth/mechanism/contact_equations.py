@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from proofroll.elements.mechanism.contacts.acting import ContactMode, heading_of, held_directions
+from proofroll.elements.mechanism.contacts.acting import ContactMode, heading_of, held_directions, turned
 from proofroll.elements.mechanism.contacts.geometry import BodyContact
 from proofroll.elements.mechanism.contacts.joint_laws import JointContact, joint_contacts, mode_of_joints
 from proofroll.elements.mechanism.contacts.touching import Moving, Touching, touch
@@ -48,6 +48,7 @@ class BodiesSolution:
     """Accelerations and contact forces in a mode; or velocities and impulses after an impact.
 
     Attributes:
+        mode: the mode, with lines of contacts as they lie now.
         moved: u̇, or u after an impact.
         force: contact force or impulse on body a of each contact, (contacts, 3).
         slide: rate of each sliding velocity, or the velocity after an impact, (contacts, 3).
@@ -56,6 +57,7 @@ class BodiesSolution:
         loose: True if the forces are not unique.
     """
 
+    mode: ContactMode
     moved: Array
     force: Array
     slide: Array
@@ -117,6 +119,8 @@ class ContactEquations:
 
     def accelerated(self, state: BodiesState, mode: ContactMode) -> BodiesSolution:
         """Accelerations and forces while each contact keeps its mode."""
+        if any(own.along for own in mode):
+            mode = tuple(map(turned, mode, state.touching, self.responses(state)))
         wanted = [
             -held @ bias - (each.normal_rate @ each.slide if own.kind == "slip" else 0.0)
             for held, own, each, bias in zip(self._held(state, mode), mode, state.touching, state.bias, strict=True)
@@ -126,6 +130,16 @@ class ContactEquations:
                     for own, each, rub in zip(mode, state.touching, rubs, strict=True)]  # fmt: skip
         turning = np.array([each.normal_rate @ each.slide for each in state.touching])
         return self._solved(state, mode, headings, wanted, state.force, -state.of_joints, state.bias, turning)
+
+    def responses(self, state: BodiesState) -> Array:
+        """Rates of each contact's slide by unit forces on it, other contacts open, (contacts, 3, 3)."""
+        root = np.linalg.cholesky(state.mass)
+        ways = np.linalg.solve(root, state.J.reshape(-1, len(state.u)).T)
+        if len(state.C):
+            joints = np.linalg.solve(root, state.C.T)
+            ways = ways - joints @ np.linalg.lstsq(joints, ways, rcond=RANK)[0]
+        each = ways.T.reshape(*state.J.shape)
+        return np.asarray(each @ each.swapaxes(1, 2))
 
     def _held(self, state: BodiesState, mode: ContactMode) -> list[Array]:
         """Directions in which each contact constrains the sliding velocity."""
@@ -187,7 +201,7 @@ class ContactEquations:
             force[k] += size * direction
         slide = state.J @ x + bias
         parting = np.array([each.normal @ rate for each, rate in zip(state.touching, slide, strict=True)]) + beyond
-        return BodiesSolution(x, force, slide, parting, response, loose)
+        return BodiesSolution(mode, x, force, slide, parting, response, loose)
 
     def applied(self, state: BodiesState, force: Array) -> tuple[Array, Array]:
         """Forces of contacts between bodies, and wrenches on the bodies about their centres of mass, (bodies, 6)."""

@@ -20,6 +20,7 @@ AT_REST, STANDS = 1e-13, 1e-9
 SLIP_ENDED = 1e-11  # slip speed that remains when a slip below FAINT is extrapolated to rest
 # Value of Painlevé's measure (1 without friction) that counts as zero.
 _LEAST_RESPONSE = 1e-3
+_TURNED = 0.5  # cosine of the angle by which a line may turn in a stretch
 _DIGITS = 1e-14  # relative to the mechanism's size: round-off of a gap that has just opened
 
 
@@ -32,11 +33,12 @@ class ContactGuard(NamedTuple):
     Attributes:
         contact: index of the contact; -1: all contacts.
         kind: ``close``: a gap closes; ``lift``: a normal force reaches zero; ``still``: a slip stops; ``break``: the
-            friction of a sticking contact reaches its bound; ``tear``: Painlevé's measure reaches zero.
+            friction of a sticking contact reaches its bound; ``turn``: its line has turned so far that its sense has
+            to be taken anew; ``tear``: Painlevé's measure reaches zero.
     """
 
     contact: int
-    kind: Literal["close", "lift", "still", "break", "tear"]
+    kind: Literal["close", "lift", "still", "break", "turn", "tear"]
 
 
 def guards_of(contacts: Sequence[Touchable], mode: ContactMode) -> list[ContactGuard]:
@@ -50,6 +52,8 @@ def guards_of(contacts: Sequence[Touchable], mode: ContactMode) -> list[ContactG
             guards.append(ContactGuard(k, "lift"))
         if contact.friction or contact.bound:
             guards.append(ContactGuard(k, "still" if own.kind == "slip" else "break"))
+        if own.along is not None and contact.friction:  # a joint that rubs has none, and its line never turns
+            guards.append(ContactGuard(k, "turn"))
     if any(own.kind == "slip" and contact.friction for contact, own in zip(contacts, mode, strict=True)):
         guards.append(ContactGuard(-1, "tear"))
     return guards
@@ -58,18 +62,31 @@ def guards_of(contacts: Sequence[Touchable], mode: ContactMode) -> list[ContactG
 def guard_value(
     guard: ContactGuard,
     mode: ContactMode,
+    now: ContactMode,
     contacts: Sequence[Touchable],
     touching: Sequence[Touching],
     force: Array,
     response: float,
 ) -> float:
-    """Value of a guard; ``force``: on body a of each contact [N]; ``response``: Painlevé's measure."""
+    """Value of a guard.
+
+    Args:
+        guard: the guard.
+        mode: as it began.
+        now: with lines of contacts as they lie now.
+        contacts: all of them.
+        touching: their geometry.
+        force: on body a of each [N].
+        response: Painlevé's measure.
+    """
     if guard.kind == "tear":
         return _LEAST_RESPONSE - response
-    own, touch = mode[guard.contact], touching[guard.contact]
+    own, touch = now[guard.contact], touching[guard.contact]
     normal = float(touch.normal @ force[guard.contact])
     if guard.kind == "close":
         return -float(touch.gap)
+    if guard.kind == "turn":
+        return _TURNED - float(np.dot(mode[guard.contact].along or 0.0, own.along or 0.0))
     if guard.kind == "lift":
         return -normal
     if guard.kind == "still":
@@ -111,14 +128,15 @@ def faint_time(touch: Touching, slide_rate: Array) -> float:
     return max(0.0, -float(u @ slide_rate) / float(slide_rate @ slide_rate))
 
 
-def refuse_turning_onset(contact: Touchable, own: Acting) -> None:
-    """Refuses a slip in the plane that starts from rest at the bound of friction.
+def refuse_turning_onset(contact: Touchable, own: Acting, time: float) -> None:
+    """Refuses a slip in the plane that starts from rest at the bound of friction, at a ``time`` [s].
 
     Raises:
-        Refused: its initial direction is unknown, and its equations get stiffer the slower it is.
+        Refused: its equations get stiffer the slower it is.
     """
     if own.along is None:
         raise Refused(
-            f"{contact.name} begins to slip at a point of its surface: the forces do not determine "
-            "the direction of its first motion"
+            f"{contact.name} begins to slip from rest at t = {time:.6g} s, in whatever direction of its surface: the "
+            "slower such a slip is, the faster friction turns it, and no route of the truth follows that; end before, "
+            "or take more friction"
         )

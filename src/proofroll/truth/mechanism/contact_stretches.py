@@ -46,6 +46,7 @@ class SolvedContacts(NamedTuple):
 
     Attributes:
         touching: geometry and sliding velocity of each contact.
+        mode: the mode, with lines of contacts as they lie now.
         velocity, acceleration: in the route's own coordinates.
         slide_rate: rate of each sliding velocity, (contacts, 3).
         force: on body a of each contact, (contacts, 3).
@@ -53,6 +54,7 @@ class SolvedContacts(NamedTuple):
     """
 
     touching: Sequence[Touching]
+    mode: ContactMode
     velocity: Array
     acceleration: Array
     slide_rate: Array
@@ -124,7 +126,10 @@ class ContactStretches(Stretches[ContactMode]):
     def _guards(self, state: Array, mode: ContactMode, guards: Sequence[ContactGuard]) -> FloatArray:
         solved, contacts = self._solved(state, mode), self.contacts
         return np.array(
-            [guard_value(guard, mode, contacts, solved.touching, solved.force, solved.response) for guard in guards]
+            [
+                guard_value(guard, mode, solved.mode, contacts, solved.touching, solved.force, solved.response)
+                for guard in guards
+            ]
         )
 
     def walk(self, time: float, state: Array, mode: ContactMode, until: float) -> Stretch[ContactMode]:
@@ -183,11 +188,13 @@ class ContactStretches(Stretches[ContactMode]):
         mode, name = list(stretch.mode), self.contacts[k].name
         if kind == "tear":
             raise self._torn(stretch)
+        if kind == "turn":
+            return Transition(stretch.last, self._solved(stretch.last, stretch.mode).mode, ())
         if kind == "lift":
             mode[k] = OPEN
             return Transition(stretch.last, tuple(mode), (("lift_off", name),))
         if kind == "break":
-            refuse_turning_onset(self.contacts[k], mode[k])
+            refuse_turning_onset(self.contacts[k], mode[k], stretch.end)
             mode[k] = self._leaving(stretch.last, stretch.mode, k)
             return Transition(stretch.last, tuple(mode), (("slip", name),))
         return self._stopped(stretch) if kind == "still" else self._impact(stretch, k)
@@ -199,9 +206,10 @@ class ContactStretches(Stretches[ContactMode]):
 
     def _leaving(self, state: Array, mode: ContactMode, k: int) -> Acting:
         """Slip that starts at the bound of friction, opposite to the friction that held."""
-        line = mode[k].along
+        solved = self._solved(state, mode)
+        line = solved.mode[k].along
         assert line is not None  # other contacts are refused before
-        sign = -1.0 if np.dot(line, self._solved(state, mode).force[k]) > 0 else 1.0
+        sign = -1.0 if np.dot(line, solved.force[k]) > 0 else 1.0
         x, y, z = (sign * component for component in line)
         return Acting("slip", (x, y, z), (x, y, z))
 

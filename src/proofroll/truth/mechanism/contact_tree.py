@@ -50,7 +50,13 @@ class ContactTree(ContactStretches):
     def _solved(self, state: Array, mode: ContactMode) -> SolvedContacts:
         solution, v = self._forces(state, mode), self.dynamics.parts(state)[1]
         return SolvedContacts(
-            solution.state.touching, v, solution.acceleration, solution.slide_rate, solution.force, solution.response
+            solution.state.touching,
+            solution.mode,
+            v,
+            solution.acceleration,
+            solution.slide_rate,
+            solution.force,
+            solution.response,
         )
 
     def _decided(self, state: Array, closed: Sequence[bool], still: Sequence[bool]) -> tuple[ContactMode, float]:

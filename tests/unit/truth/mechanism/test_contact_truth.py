@@ -274,6 +274,64 @@ def test_a_ball_in_a_bore_moves_as_in_its_cylinder(flies: bool) -> None:
 
 
 @pytest.mark.drill
+@pytest.mark.parametrize(("kind", "room", "mu"), [("free", 1e-6, 0.3), ("planar", 0.25, 0.1)])
+def test_a_ball_that_slides_round_a_bore_rolls_when_its_path_says(kind: str, room: float, mu: float) -> None:
+    """Friction stops a slip after ln(7/5)/mu of a turn at 5/7 of the speed, however little room and however far."""
+    radius, speed = 0.05, 0.1
+    ball = Body("ball", 0.3, inertia=(0.4 * 0.3 * radius**2,) * 3)
+    if kind == "free":
+        joint = Joint("joint", "free", "world", "ball", q0=(room, 0, 0, 1, 0, 0, 0), v0=(0, speed, 0, 0, 0, 0))
+    else:
+        joint = Joint("joint", "planar", "world", "ball", q0=(room, 0, 0), v0=(0, speed, 0))
+    shapes = (
+        Geometry("sphere", "ball", "sphere", radius=radius),
+        Geometry("wall", "world", "bore", radius=radius + room),
+    )
+    pair = Pair("contact", ("sphere", "wall"), mu)
+    bore = Mechanism((ball,), (joint,), geometries=shapes, pairs=(pair,), gravity=(0.0, 0.0, 0.0))
+    rolls = 0.4 * room / (mu * speed)
+    found = truth_of(bore, rolls * np.array([0.0, 1.5]))
+    assert happened(found) == [("stick", "contact")]
+    assert found.events[0].time == pytest.approx(rolls, rel=1e-9)
+    assert np.linalg.norm(found.record.v_WB[1, 0]) == pytest.approx(5 / 7 * speed, rel=1e-12)
+    way = np.log(7 / 5) / mu + 5 / 7 * speed * 0.5 * rolls / room
+    there = room * np.array([np.cos(way), np.sin(way)])
+    assert found.record.p_WB[1, 0, :2] == pytest.approx(there, abs=1e-10 * room)
+
+
+@pytest.mark.drill
+@pytest.mark.parametrize("other", [0.0, 0.3])
+def test_a_tip_on_a_turning_arm_rubs_against_its_own_motion(other: float) -> None:
+    """It stops its arm on a floor, or takes a disc along for half a turn more: the line of its slip turns with it."""
+    load, reach, inertia, mu, spin, torque = 1.01, 0.5, 0.1, 0.2, 4.0, 0.5
+    bodies = [Body("slider", 0.01, inertia=(1e-4,) * 3), Body("arm", 1.0, inertia=(inertia,) * 3)]
+    joints = [
+        Joint("guide", "prismatic", "world", "slider", q0=0.1),  # type: ignore[arg-type]
+        Joint("hinge", "revolute", "slider", "arm", v0=spin, torque=torque if other else 0.0),  # type: ignore[arg-type]
+    ]
+    if other:
+        bodies.append(Body("disc", 1.0, inertia=(other,) * 3))
+        joints.append(Joint("axle", "revolute", "world", "disc"))
+    shapes = (
+        Geometry("tip", "arm", "sphere", (reach, 0, -0.1), radius=0.0),
+        Geometry("top", "disc" if other else "world", "plane"),
+    )
+    arm = Mechanism(bodies, joints, geometries=shapes, pairs=(Pair("rubs", ("tip", "top"), mu),))  # type: ignore[arg-type]
+    rubs = mu * load * 9.81 * reach
+    slows = (rubs - (torque if other else 0.0)) / inertia
+    sped = rubs / other if other else 0.0
+    stops = spin / (slows + sped)
+    found = truth_of(arm, np.array([0.0, stops / 2, stops + 1.0]))
+    assert happened(found) == [("stick" if other else "rest", "rubs")]
+    times_of(found, stops)
+    pushed = torque / (inertia + other) if other else 0.0
+    turned = spin * stops - slows * stops**2 / 2 + sped * stops + pushed / 2
+    assert found.record.q[2, 1] == pytest.approx(turned, abs=DIGITS)
+    assert turned > (np.pi if other else 0.8)
+    assert max(float(bar[-1]) for bar in found.bars.values()) < BARS
+
+
+@pytest.mark.drill
 def test_infinitely_many_impacts_end_when_their_sum_says() -> None:
     """A ball that bounces to a fifth of its speed settles after one and a half times the time of its fall."""
     mechanism, _ = as_bodies("bouncing_ball", 0.1, 0.0, height=0.05, restitution=0.2)

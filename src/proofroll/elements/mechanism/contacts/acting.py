@@ -5,7 +5,6 @@ from typing import Literal, NamedTuple, Protocol
 
 import numpy as np
 
-from proofroll.core.errors import Refused
 from proofroll.elements.mechanism.contacts.touching import Touching
 from proofroll.elements.mechanism.rotations import Array
 
@@ -14,7 +13,7 @@ Direction = tuple[float, float, float]
 # straight line [m/s; in the truth in natural units].
 FAINT = 1e-8
 _LINE = 1e-9  # response across over response along, below which a contact can slide along a line only
-_TURNED = 0.5  # least length of the line of a slip after projection on the surface
+_TURNED = 0.5  # least length of the first direction of a slip after projection on a surface that has turned since
 
 
 class Acting(NamedTuple):
@@ -22,7 +21,8 @@ class Acting(NamedTuple):
 
     Attributes:
         kind: ``open``, ``slip`` or ``stick``.
-        along: direction of the only line along which it can slide, if there is one; in a slip, its sense too.
+        along: direction of the only line along which it can slide, if there is one, where the mode began; in a slip,
+            its sense too.
         heading: initial direction of a slip that begins from rest.
     """
 
@@ -48,8 +48,7 @@ def slip_velocity(found: Touching) -> Array:
 def heading_of(own: Acting, found: Touching) -> Array:
     """Unit direction of a slip, shape (3,); friction acts against it.
 
-    Raises:
-        Refused: the line of a slip has turned too far to be known.
+    Of a slip in the plane below FAINT it is the first one, unless the surface has turned since.
     """
     slip = slip_velocity(found)
     speed = float(np.linalg.norm(slip))
@@ -58,9 +57,24 @@ def heading_of(own: Acting, found: Touching) -> Array:
     given = np.array(own.heading if own.along is None else own.along)
     given = given - found.normal * (found.normal @ given)
     length = float(np.linalg.norm(given))
-    if length < _TURNED:
-        raise Refused("the line along which a contact slides turns by more than half a right angle while it slides")
-    return np.asarray(given / length)
+    if own.along is None and length < _TURNED and speed:
+        return np.asarray(slip / speed)
+    return np.asarray(given / (length or 1.0))
+
+
+def turned(own: Acting, found: Touching, G: Array) -> Acting:
+    """Mode of a contact with its line as it lies now; ``G``: rates of its slide by unit forces, (3, 3).
+
+    A tip on a turning arm, and a ball in a pipe that rolls in a plane, carry their lines with them.
+    """
+    if own.along is None:
+        return own
+    across = np.eye(3) - np.outer(found.normal, found.normal)
+    values, vectors = np.linalg.eigh(across @ G @ across)
+    if values[-1] <= _LINE * np.trace(G):  # it slides along no line at all
+        return own
+    line = _direction(vectors[:, -1] if vectors[:, -1] @ own.along >= 0 else -vectors[:, -1])
+    return own._replace(along=line, heading=own.heading and line)
 
 
 def held_directions(own: Acting, found: Touching, presses: bool) -> Array:

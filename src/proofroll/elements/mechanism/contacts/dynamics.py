@@ -20,6 +20,7 @@ from proofroll.elements.mechanism.contacts.acting import (
     first_mode,
     heading_of,
     held_directions,
+    turned,
 )
 from proofroll.elements.mechanism.contacts.coulomb import robust_forces
 from proofroll.elements.mechanism.contacts.geometry import BodyContact
@@ -61,6 +62,7 @@ class ContactSolution:
 
     Attributes:
         state: state of the contacts that they belong to.
+        mode: the mode, with lines of contacts as they lie now.
         acceleration: v̇, (nv).
         force: on body a of each contact [N], (contacts, 3); the smallest where they are not determinate.
         determinate: True for each determinate component of ``force``, (contacts, 3).
@@ -70,6 +72,7 @@ class ContactSolution:
     """
 
     state: ContactsNow
+    mode: ContactMode
     acceleration: Array
     force: Array
     determinate: Any
@@ -129,13 +132,16 @@ class ContactDynamics:
         """Accelerations and forces while each contact keeps the given mode, at a time [s].
 
         Raises:
-            Refused: the line of a slip is not known.
             Diverged: a velocity moves nothing with inertia in this pose.
         """
         return self.solved(self.at(q, v, time), mode)
 
     def solved(self, state: ContactsNow, mode: ContactMode) -> ContactSolution:
         """Accelerations and forces at a state while each contact keeps the given mode; see :meth:`solve`."""
+        mode = tuple(
+            turned(own, found, J @ state.W @ J.T) if own.along else own
+            for own, found, J in zip(mode, state.touching, state.J, strict=True)
+        )
         rows, bias, along, owner = [np.zeros((0, state.W.shape[0]))], [np.zeros(0)], list[Array](), list[int]()
         force, known = np.zeros((len(mode), 3)), np.ones((len(mode), 3), dtype=bool)
         for k, (own, found) in enumerate(zip(mode, state.touching, strict=True)):
@@ -152,7 +158,7 @@ class ContactDynamics:
         K, free = np.concatenate(rows), state.solution.acceleration
         free = free + state.W @ np.einsum("kin,ki->n", state.J, force)
         if not owner:
-            return self._solution(state, free, force, known, 1.0)
+            return self._solution(state, mode, free, force, known, 1.0)
         D = np.array([direction @ state.J[k] for direction, k in zip(along, owner, strict=True)])
         S, wanted = K @ state.W @ D.T, -(K @ free + np.concatenate(bias))
         smooth = K @ state.W @ K.T
@@ -166,7 +172,7 @@ class ContactDynamics:
             if own.kind == "stick" and own.along is not None:  # across its line the joints hold it, too
                 known[k] &= np.abs(cross(found.normal, np.array(own.along))) <= RANK
         response = 1.0 if weak.any() else float(np.linalg.det(S) / np.linalg.det(smooth))
-        return self._solution(state, free + state.W @ D.T @ z, force, known, response)
+        return self._solution(state, mode, free + state.W @ D.T @ z, force, known, response)
 
     @staticmethod
     def heading(own: Acting, found: Touching) -> Array:
@@ -175,10 +181,10 @@ class ContactDynamics:
 
     @staticmethod
     def _solution(
-        state: ContactsNow, acceleration: Array, force: Array, known: Any, response: float
+        state: ContactsNow, mode: ContactMode, acceleration: Array, force: Array, known: Any, response: float
     ) -> ContactSolution:
         slide_rate = state.J @ acceleration + state.bias
-        return ContactSolution(state, acceleration, force, known, slide_rate, response)
+        return ContactSolution(state, mode, acceleration, force, known, slide_rate, response)
 
     def rate(self, y: Array, mode: ContactMode) -> Array:
         """Right-hand side for the state (q, v, time)."""
