@@ -50,6 +50,12 @@ def test_round_off_is_that_of_the_largest_number() -> None:
     assert reference().magnitude("event_order") == 0.0
 
 
+def test_a_gap_has_the_round_off_of_the_places_that_it_is_between() -> None:
+    """The small difference of two large places is as uncertain as these."""
+    places = xr.Dataset({"p_WB": (("time", "xyz"), np.array([[3.0, -40.0, 0.2]]))})
+    assert Reference(load_scene("sphere_in_cylinder"), places, {"gap": np.zeros(1)}, {}).magnitude("gap") == 40.0
+
+
 def test_nothing_is_held_against_what_the_truth_does_not_tell() -> None:
     """Forces that are not determinate all the time are no curve of the truth: engines that tell them are not judged."""
     held, told = Reference(load_scene("falling_rod"), xr.Dataset(), {}, {}), np.ones((3, 2, 3))
