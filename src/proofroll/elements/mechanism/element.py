@@ -31,12 +31,11 @@ from proofroll.elements.mechanism.joint import TURNING
 from proofroll.elements.mechanism.joint_coordinates import JointCoordinates, Solution
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.named_forces import named_forces
-from proofroll.elements.mechanism.natural_sizes import natural_sizes
 from proofroll.elements.mechanism.optional_terms import optional_terms
 from proofroll.elements.mechanism.placed import Placed
 from proofroll.elements.mechanism.sampling import MechanismSample
-from proofroll.elements.mechanism.start_words import start_facts
 from proofroll.elements.mechanism.switches import first_change
+from proofroll.elements.mechanism.words import start_facts
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -194,7 +193,7 @@ class MechanismElement:
 
     @cached_property
     def _sizes(self) -> dict[str, float]:
-        return natural_sizes(self.mechanism, self.length, self.speed)
+        return self.mechanism.natural_sizes(self.length, self.speed)
 
     @property
     def force(self) -> float:
@@ -343,7 +342,7 @@ class MechanismElement:
         known = truth.variables
         reach, speed = (float(np.max(np.ptp(known[name].values, axis=0))) for name in ("positions", "v_WB"))
         by_motion = not self._own_length and reach and speed
-        own = natural_sizes(self.mechanism, reach, speed) if by_motion else self._sizes
+        own = self.mechanism.natural_sizes(reach, speed) if by_motion else self._sizes
         natural = {"attitudes": 1.0, "energy_error": own["J"], "drift": own["m"]}
         natural |= {name: own[unit] for name, unit, _ in (*RESIDUALS, *LAWS)} | {"unpressed": 1.0}
         sizes = {}

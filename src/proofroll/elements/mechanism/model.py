@@ -145,6 +145,16 @@ class Mechanism:
         """Mass of all bodies [kg]."""
         return sum(body.mass for body in self.bodies)
 
+    def natural_sizes(self, length: float, speed: float) -> dict[str, float]:
+        """Unit -> natural size, for this length [m] and speed [m/s].
+
+        Force: the mechanism's weight or, if larger, the centripetal force on its mass.
+        """
+        force = self.mass * max(float(np.linalg.norm(self.gravity)), speed**2 / length)
+        momentum, energy = self.mass * speed, force * length
+        sizes = {"m": length, "m/s": speed, "N": force, "J": energy, "N m": energy}
+        return sizes | {"N s": momentum, "N m s": momentum * length, "1": 1.0}
+
     @cached_property
     def nq(self) -> int:
         """Number of coordinates of the tree."""

@@ -9,9 +9,9 @@ from proofroll.core.errors import Diverged
 from proofroll.core.integrators import INTEGRATORS
 from proofroll.core.stalling import Stalled
 from proofroll.elements.mechanism import Mechanism
-from proofroll.elements.mechanism.pose_words import pose
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.elements.mechanism.sampling import MechanismBuilt, MechanismSample, row_rank, unsaid
+from proofroll.elements.mechanism.words import pose
 from proofroll.engines.pinocchio.constraint_dynamics import ConstraintDynamics
 from proofroll.engines.pinocchio.integrators import require_tangent_map
 from proofroll.engines.pinocchio.joint_tree import AXIS_COLUMN, JointTree

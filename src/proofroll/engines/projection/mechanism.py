@@ -12,7 +12,6 @@ from proofroll.core.events import Event
 from proofroll.core.integrators import INTEGRATORS, Integrator
 from proofroll.core.stalling import Stalled
 from proofroll.elements.mechanism.capabilities import ALL_JOINTS, ALL_LOOPS, FORCES, MechanismCapability, require
-from proofroll.elements.mechanism.pose_words import pose
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.elements.mechanism.sampling import (
     WITH_AXIS,
@@ -24,6 +23,7 @@ from proofroll.elements.mechanism.sampling import (
 )
 from proofroll.elements.mechanism.signal import breaks, varies
 from proofroll.elements.mechanism.switches import switched_joints
+from proofroll.elements.mechanism.words import pose
 from proofroll.engines.projection.contact_modes import ContactMotion
 from proofroll.engines.projection.dependent import DependentCoordinates, SolvedState
 from proofroll.engines.projection.joint_modes import SwitchedMotion

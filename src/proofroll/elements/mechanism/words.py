@@ -1,4 +1,4 @@
-"""Start of a mechanism in sentences for the author of the scene."""
+"""Sentences about a mechanism for a person: its start, and its pose in a message."""
 
 from __future__ import annotations
 
@@ -10,12 +10,15 @@ import numpy as np
 from proofroll.core.number_format import vector
 from proofroll.elements.mechanism.contacts.start import touches
 from proofroll.elements.mechanism.kinematics import Tree
+from proofroll.elements.mechanism.placed import Placed
 
 if TYPE_CHECKING:
     from proofroll.elements.mechanism.element import MechanismElement
+    from proofroll.elements.mechanism.model import Mechanism
+    from proofroll.elements.mechanism.sampling import MechanismSample
 
-# Largest number of bodies whose places are listed.
-_MOST = 8
+# Largest number of bodies whose places are listed, and of joints whose coordinates a message lists.
+_BODIES, _JOINTS = 8, 6
 
 
 def start_facts(element: MechanismElement) -> Sequence[str]:
@@ -28,13 +31,23 @@ def start_facts(element: MechanismElement) -> Sequence[str]:
     if found.singular_start:
         clauses.append("the start is a singular pose: constraints lose rank there, and the motion may go several ways")
     moving = element.start
-    for body in mechanism.bodies[:_MOST]:
+    for body in mechanism.bodies[:_BODIES]:
         centre = moving.point(body.name, body.com)[0]
         speed = float(np.linalg.norm(moving.velocity(body.name, body.com)[0]))
         clauses.append(f"{body.name}: centre of mass at {vector(centre)} m, speed {speed:.4g} m/s")
-    if more := len(mechanism.bodies) - _MOST:
+    if more := len(mechanism.bodies) - _BODIES:
         clauses += [f"and {more} more bodies"] if more > 0 else []
     touching = touches(mechanism, Tree(mechanism).at(*mechanism.start()))
     gaps = [f"{pair.name} {each.gap:.4g} m" for pair, each in zip(mechanism.contacts, touching, strict=True)]
     clauses += [f"gaps of pairs: {', '.join(gaps)}"] if gaps else []
     return clauses
+
+
+def pose(mechanism: Mechanism, sample: MechanismSample) -> str:
+    """Coordinates of the first joints with one coordinate each; empty without such joints."""
+    arrays = (sample.p_WB, sample.v_WB, sample.w_WB, sample.q_WB)
+    placed = Placed(mechanism, np.zeros(1), *(np.asarray(item)[None] for item in arrays))
+    found = placed.coordinates()
+    units = {joint.name: "rad" if joint.kind == "revolute" else "m" for joint in mechanism.joints}
+    words = [f"q.{name} = {float(q[0]):.4g} {units[name]}" for name, (q, _) in list(found.items())[:_JOINTS]]
+    return ", ".join(words) + (", …" if len(found) > _JOINTS else "")
