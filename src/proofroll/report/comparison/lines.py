@@ -1,7 +1,7 @@
 """Lines of the long table for the runs of a comparison and of its ladders of steps."""
 
 from collections.abc import Iterator
-from dataclasses import replace
+from dataclasses import fields, replace
 from typing import Any
 
 from proofroll.core.engine_abilities import by_hand
@@ -9,11 +9,13 @@ from proofroll.core.verdict import Judgement, Verdict
 from proofroll.report.comparison.records import Cost, rough_cost
 from proofroll.report.comparison.summary import facts_of
 from proofroll.report.kinds import group_of
-from proofroll.report.long_table import TableLine, setting_columns
+from proofroll.report.long_table import COLUMNS, TableLine, setting_columns
 from proofroll.running.case import Result, Status
 from proofroll.studies.comparison.outcome import LadderRun, Outcome, Run
 from proofroll.studies.comparison.planning import point_name
 
+# Columns that are fields of a judgement.
+_OF_JUDGEMENTS = [item.name for item in fields(Judgement) if item.name in COLUMNS]
 # Fields of a line about a ladder of steps, which only the step at which a comparison judges has.
 _NO_LIMIT: dict[str, Any] = dict.fromkeys(("order", "limit_error", "limit_error_bar", "limit_doubt"))
 _NO_LIMIT |= {"limit": "", "floor": ""}
@@ -64,24 +66,8 @@ def _ended(outcome: Outcome, result: Result) -> dict[str, Any]:
 def _judged(outcome: Outcome, run: Run, plain: TableLine, item: Judgement) -> TableLine:
     scene = outcome.points[point_name(run.parameters)].scene
     known = scene.observables[item.observable]
-    return replace(
-        plain,
-        verdict=item.verdict,
-        limit=item.limit,
-        limit_error=item.limit_error,
-        limit_error_bar=item.limit_error_bar,
-        limit_doubt=item.limit_doubt,
-        floor=item.floor,
-        quantity=item.observable,
-        unit=item.unit,
-        role=known.role,
-        headline=known.headline,
-        error=item.error,
-        truth_error_bar=item.truth_error_bar,
-        tolerance=item.tolerance,
-        scale=item.scale,
-        order=item.order,
-    )
+    own = {name: getattr(item, name) for name in _OF_JUDGEMENTS}
+    return replace(plain, **own, quantity=item.observable, role=known.role, headline=known.headline)
 
 
 def _of_rung(outcome: Outcome, run: Run, plain: TableLine, rung: LadderRun) -> Iterator[TableLine]:
