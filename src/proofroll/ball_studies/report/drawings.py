@@ -48,16 +48,16 @@ def _frame(drawn: Drawing, at: View) -> None:
         drawn.vector(at([0 * axis, 1.7 * axis]), "frame", f"e_{index + 1}")
         one, other = np.roll(E1, index + 1), np.roll(E1, index + 2)
         drawn.arrow(at(circle(1.33 * axis, 0.17 * one, 0.17 * other, turn(-2.4, 2.4))), "motion")
-        drawn.text(_aside(at, 1.33 * axis, axis, 27.0), f"ω_{index + 1}", "motion-letter")
+        drawn.text(_aside(at, 1.33 * axis, axis), f"ω_{index + 1}", "motion-letter")
 
 
-def _aside(at: View, place: FloatArray, axis: FloatArray, by: float) -> FloatArray:
+def _aside(at: View, place: FloatArray, axis: FloatArray) -> FloatArray:
     """Place of a letter beside an axis: right of an upright axis, above any other."""
     a, b = at([0 * axis, axis])
     along, side = b - a, across(b - a)
     upright = abs(along[1]) > abs(along[0])
     side = side * (1 if (side[0] > 0 if upright else side[1] < 0) else -1)
-    return np.asarray(at(place) + by * side + [0.0, 4.5])
+    return np.asarray(at(place) + 27.0 * side + [0.0, 4.5])
 
 
 def _drawn_radius(drawn: Drawing, at: View) -> None:
