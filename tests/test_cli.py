@@ -46,7 +46,7 @@ def rk4(dt: str) -> list[str]:
 
 
 BAD = {
-    "unknown scene": ([*RUN[:1], "sphere_in_cone", *RUN[2:]], 2, ["scene = 'sphere_in_cone'", "inclined_plane"]),
+    "unknown scene": ([*RUN[:1], "sphere_in_cone", *RUN[2:]], 2, ["scene = 'sphere_in_cone'", "sphere_in_cylinder"]),
     "unknown engine": (with_option("--engine", "adams"), 2, ["engine = 'adams'", "projection", "truth"]),
     "engine of another form": (with_option("--engine", "oracle[dt"), 2, ["engine = 'oracle[dt'", "name[key=value"]),
     "unknown parameter": (with_option("--set", "wheels=4"), 2, ["wheels = '4'", "choose from radius"]),

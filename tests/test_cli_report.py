@@ -339,7 +339,8 @@ def test_a_planted_change_of_one_per_cent_is_found_and_nothing_else(
     old = tmp_path / "old" / "report.json"
     code, out, _ = command_line(*arguments, str(tmp_path / "same"), "--against", str(old))
     assert code == 0
-    assert "Of 6 runs in both reports, changed: nothing." in " ".join(out.split()), "two with their ladders"
+    # Without what a busy machine adds on the scatter of costs.
+    assert "Of 6 runs in both reports, changed: nothing" in " ".join(out.split()), "two with their ladders"
     monkeypatch.setenv("PROOFROLL_TEST_OFF", "0.01")
     code, out, _ = command_line(*arguments, str(tmp_path / "new"), "--against", str(old))
     assert code == 1

@@ -22,8 +22,8 @@ TRACES = f"{PICTURE}.data.filter((trace) => trace.name && trace.name !== 'choice
 def seen(report_page: Path, visit: Visiting) -> Iterator[Visit]:
     """The page with the pictures of its comparison drawn."""
     with visit(report_page, viewport={"width": 1280, "height": 900}) as opened:
-        opened.page.locator(PART).scroll_into_view_if_needed()
-        opened.wait(f"({PICTURE}.data ?? []).length > 0")
+        # Again, as the sections above have their heights only once they have been near.
+        opened.wait(f"({PICTURE}.data ?? []).length > 0", opened.page.locator(PART).scroll_into_view_if_needed)
         yield opened
 
 
@@ -123,8 +123,8 @@ def test_an_error_beyond_all_size_is_cut_and_marked(everything: Any, tmp_path: P
     content = replace(everything.content, table=replace(table, lines=wild))
     page = replace(everything, content=content).write(tmp_path / "report.html")
     with visit(page, viewport={"width": 1280, "height": 900}) as opened:
-        opened.page.locator(PART).scroll_into_view_if_needed()
-        opened.wait(f"({PICTURE}.data ?? []).length > 0")
+        # Again, as the sections above have their heights only once they have been near.
+        opened.wait(f"({PICTURE}.data ?? []).length > 0", opened.page.locator(PART).scroll_into_view_if_needed)
         trace = opened.page.evaluate(f"{TRACES}.find(({{ name }}) => name === 'fine default')")
         assert trace["y"] == [1]
         assert trace["marker"]["symbol"] == ["triangle-up"]

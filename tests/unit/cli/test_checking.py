@@ -185,10 +185,10 @@ def test_the_path_of_a_scene_file(proofroll: Proofroll) -> None:
 
 
 def test_neither_scene_nor_file(proofroll: Proofroll) -> None:
-    """A name of nothing is told what there is."""
+    """A name of nothing is told what resembles it."""
     code, out, err = proofroll("check", "sphere_in_cone")
     assert (code, out, err.count("\n")) == (2, "", 1)
-    assert "andrews_squeezer" in err
+    assert "sphere_in_cylinder" in err
 
 
 @pytest.mark.parametrize("what", ["inclined_plane", str(COMPARISONS / "paper.toml")])
