@@ -247,7 +247,7 @@ def answer_lines(advice: Recommendation) -> Iterator[str]:
             yield f"That costs more than the {number(advice.max_cost)} s per simulated second of --max-cost."
     if answer.ties:
         tie = min(answer.ties, key=lambda t: t.point.envelope_of(answer.quantity))
-        many = f"{len(answer.ties)} others tie in cost, as far as the intervals tell; the most accurate"
+        many = f"{len(answer.ties)} others tie in cost, as far as the intervals tell; the most accurate of them"
         words = many if len(answer.ties) > 1 else "A tie in cost, as far as the intervals tell"
         yield f"{words}: {_line(tie, answer.unit)}"
     for choice, words in (

@@ -6,6 +6,7 @@ from typing import Any
 
 from proofroll.core.engine_abilities import by_hand
 from proofroll.core.errors import InputError
+from proofroll.core.number_format import number
 from proofroll.core.plugins import parse_engine
 from proofroll.files.json_data import MERGED, OPTIONAL
 from proofroll.studies.study_store import Measured
@@ -17,6 +18,8 @@ from proofroll.studies.tradeoff.requirements import MARGIN, Requirements, absolu
 _OF_A_POINT = (
     "engine", "settings", "resolution", "step", "level", "seconds_per_second", "interval", "confidence", "measurements",
 )  # fmt: skip
+# Ratio of the largest error of the next finer steps to a point's own above which the text gives both.
+_UNEVEN = 2.0
 _CLOSEST = "the most accurate that was measured, nothing beyond is guessed"
 
 
@@ -207,6 +210,9 @@ def _holds(study: TradeoffStudy, point: MeasuredPoint, required: Requirements, a
         return "no error is seen"
     # An error below the truth's error bar is known only to be below it.
     text = f"{_times(absolute / max(envelope, bar), at_least=envelope < bar)} better than asked"
+    if envelope > _UNEVEN * (point.error.get(required.quantity) or 0.0) and envelope > bar:
+        unit = study.quantities[required.quantity].unit
+        text = f"up to {number(envelope)} {unit} at the next finer steps, {text}"
     if point.corners:
         worst = max(corner.off(required.tolerance.relative)[required.quantity] for corner in point.corners)
         there = required.tolerance.value if required.tolerance.relative else absolute

@@ -108,13 +108,20 @@ def test_many_ties_are_one_line() -> None:
     measured = study(FAST, replace(MIDDLE, interval=[9.9e-3, 1.01e-2]), *near)
     (line,) = [line for line in answer_lines(recommended(measured, required(1e-3))) if "tie" in line]
     assert line.startswith("3 others tie in cost")
-    assert "the most accurate: near1 only" in line
+    assert "the most accurate of them: near1 only" in line
 
 
 def test_a_factor_is_a_number_as_a_person_writes_it() -> None:
     """What holds a tolerance thousands of times over is said without powers of ten."""
     reason = recommend(study(point(1, "fine", 1e-3, 2.5e-7)), required(1e-3))["choice"]["reason"]
     assert reason.startswith("more than 1000 times better than asked, and more than 1000 times at the worst of ")
+
+
+def test_an_error_that_finer_steps_exceed_is_given_with_theirs() -> None:
+    """Where the next finer steps are worse than the choice, the text says by how much, for that decides the margin."""
+    lucky = replace(point(1, "lucky", 1e-3, 1e-5), envelope={"z": 1e-4})
+    reason = recommend(study(lucky), required(1e-3))["choice"]["reason"]
+    assert reason.startswith("up to 1e-4 m at the next finer steps, 10 times better than asked")
 
 
 def test_the_range_is_shown_with_its_digits() -> None:
