@@ -21,7 +21,7 @@ from proofroll.core.plugins import load_element_kinds
 from proofroll.core.truth import truth
 from proofroll.files.scene_file import load_scene
 from proofroll.running.simulation import simulate
-from proofroll_drill.mutants import ball_models, contact_models, joint_laws
+from proofroll_drill.mutants import ball_models, contact_models, joint_laws, mechanism_samples
 from proofroll_drill.mutants.base import Mutant
 from proofroll_drill.mutants.drilling import ENOUGH, judged_without_fault, mutants, tried, without_fault
 
@@ -77,6 +77,13 @@ def test_a_law_of_joints_that_is_another_is_named(fault: str) -> None:
     found = tried(getattr(joint_laws, fault))
     assert found.detected
     assert found.named, found.said
+
+
+@pytest.mark.parametrize("scene", [pytest.param("gyroscope_cart", marks=pytest.mark.drill), "heavy_top"])
+def test_late_reactions_of_a_fast_rotor_are_named(scene: str) -> None:
+    """Reactions of the step before are named where they change little, beside errors of the step that change less."""
+    found = tried(type("LateReactionOfRotor", (mechanism_samples.LateReaction,), {"scene": (scene, {})}))
+    assert found.named, found.by
 
 
 @pytest.mark.parametrize(

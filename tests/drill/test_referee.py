@@ -6,7 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
+from proofroll.cli import app
 from proofroll.core.truth import truth
 from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.elements.mechanism import Mechanism
@@ -66,6 +68,25 @@ def test_no_error_of_a_truth_lies_beyond_its_bar(seed: int, monkeypatch: pytest.
     held = hold(seed, until=0.02)
     assert held.sound, held.text
     assert set(held.worst) == {"p_WB", "q_WB", "v_WB", "w_WB", "q", "energy", "wrench"}
+
+
+@pytest.mark.parametrize("options", [(), ("--json",)])
+def test_an_interrupted_referee_has_told_what_it_held(
+    options: tuple[str, ...], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Each row is printed as soon as it is held; beside JSON on standard error."""
+
+    def held(seed: int) -> holding.Held:
+        if seed == 7:
+            raise KeyboardInterrupt
+        return holding.Held(seed, "tree", "revolute", "", {"q": 0.5}, 3)
+
+    monkeypatch.setattr(holding, "hold", held)
+    done = CliRunner().invoke(app, ["drill", "referee", "--first", "5", "--count", "3", *options])
+    lines = (done.stderr if options else done.stdout).splitlines()
+    assert [line.removeprefix("proofroll: ") for line in lines] == [
+        f"{seed} tree (revolute): largest error 0.5 of its bar, q" for seed in (5, 6)
+    ]
 
 
 def test_the_referee_notices_what_is_wrong() -> None:

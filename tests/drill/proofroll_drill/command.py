@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from proofroll.cli.options import CONTRADICTED, OK, Json, Scheduler, new_cluster, progress_bar, show
+from proofroll.cli.options import CONTRADICTED, OK, Json, Scheduler, complain, new_cluster, progress_bar, show
 
 drill = typer.Typer(help="Do on purpose what must not break anything.", rich_markup_mode=None)
 
@@ -60,21 +60,23 @@ def referee(
     contacts: Annotated[bool, typer.Option("--contacts", help="Bodies that touch instead of mechanisms.")] = False,
     as_json: Json = False,
 ) -> None:
-    """Hold truths of random mechanisms, balls or contacts against other solvers; exit 1 on an error beyond its bar."""
+    """Hold truths of random mechanisms, balls or contacts against other solvers; exit 1 on an error beyond its bar.
+
+    Each has its line as soon as it is held; with --json on standard error.
+    """
     from proofroll.core.errors import InputError
     from proofroll_drill.referee.holding import hold, hold_ball, hold_contacts
 
     if balls and contacts:
         raise InputError("--contacts", "with --balls", "give one of them")
     kind, held = ("contacts", hold_contacts) if contacts else ("balls", hold_ball) if balls else ("mechanisms", hold)
-    rows = []
-    with progress_bar(kind, total=count) as advance:
-        for seed in range(first, first + count):
-            rows.append(held(seed))
-            advance(str(seed))
+    rows, say = [], complain if as_json else typer.echo
+    for seed in range(first, first + count):
+        rows.append(held(seed))
+        say(rows[-1].text)
     sound = sum(row.sound for row in rows)
     content = {"tried": len(rows), "sound": sound, kind: rows}
-    show(content, as_json, lambda: [*(row.text for row in rows), f"{len(rows)} {kind} tried, {sound} sound."])
+    show(content, as_json, lambda: [f"{len(rows)} {kind} tried, {sound} sound."])
     raise typer.Exit(OK if sound == len(rows) else CONTRADICTED)
 
 

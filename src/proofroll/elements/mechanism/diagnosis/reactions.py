@@ -10,15 +10,18 @@ from typing import Any
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
-from proofroll.core.arrays import FloatArray
-from proofroll.core.diagnosis import Cause, Evidence, hypothesis
+from proofroll.core.arrays import FloatArray, known_difference
+from proofroll.core.diagnosis import CLOSES, Cause, Evidence, hypothesis
 from proofroll.core.diagnosis.samples import forced_otherwise, run_and_truth
 from proofroll.core.diagnosis.vectors import ReportedVector, product
-from proofroll.elements.mechanism.diagnosis.equations import placed_of
+from proofroll.core.errors import Diverged
+from proofroll.elements.mechanism.diagnosis.equations import is_motion, placed_of
 from proofroll.elements.mechanism.diagnosis.reporting_errors import BODY
+from proofroll.elements.mechanism.joint_coordinates import JointCoordinates
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.placed import Placed
 from proofroll.elements.mechanism.rotations import skews
+from proofroll.elements.mechanism.switches import switched_joints
 
 # Distance of joints without any comparable components, in sizes of the forces: they are matched last.
 _FAR = 1e3
@@ -133,8 +136,27 @@ def reactions(evidence: Evidence) -> Iterator[Cause]:
     reported, true = ({kind: _stacked(data, kind, names) for kind, _, _ in _KINDS} for data in (run, truth))
     bars = {kind: _bar(truth, f"{kind}s") for kind, _, _ in _KINDS}
     for each in _reactions(evidence, placed_of(evidence.element.mechanism, truth), reported, true, bars):
-        if not forced_otherwise(evidence, each.reported):
-            yield from each.causes(evidence.step)
+        causes = [cause for cause in each.causes(evidence.step) if cause.proven]
+        if causes and not (forced_otherwise(evidence, each.reported) and _may_be_motion(run, each)):
+            yield from causes
+
+
+def _may_be_motion(run: Any, found: Reactions) -> bool:
+    """False if reactions at the run's own states are the true ones: then its motion does not explain what it reports.
+
+    Of contacts, friction and stops the state alone does not tell the forces.
+    """
+    mechanism, true = found.mechanism, found.reported.true
+    if mechanism.contacts or switched_joints(mechanism) or not is_motion(run):
+        return True
+    equations, placed = JointCoordinates(mechanism), placed_of(mechanism, run)
+    try:
+        samples = [equations.sample(q, v, time=t) for q, v, t in zip(*placed.of_tree(), placed.time, strict=True)]
+    except Diverged:  # at a singular pose
+        return True
+    forces, moments = np.split(np.array([sample["wrench"] for sample in samples])[:, found.which], 2, axis=-1)
+    own = forces if found.reported.name == "force" else moments
+    return known_difference(np.where(np.isnan(true), np.nan, own), true) > CLOSES * found.reported.before
 
 
 @hypothesis(
