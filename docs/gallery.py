@@ -29,6 +29,7 @@ from proofroll.report.comparison.summary import outcome_content
 from proofroll.report.page.choice_matrix import ChoiceStudy, choice_matrix
 from proofroll.report.page.html import templates
 from proofroll.report.page.scene_sheet import scene_sheet
+from proofroll.running.idle_workers import Workers
 from proofroll.running.runner import Runner
 from proofroll.running.store import Store
 from proofroll.studies.comparison.compare import compare
@@ -158,19 +159,33 @@ def section(scene: str, comparison: Comparison | None, runner: Runner) -> str:
     return "\n".join(part for part in parts if part)
 
 
+def sections(text: str) -> dict[str, str]:
+    """Sections of the gallery by scene."""
+    return {part.partition("\n")[0]: f"## {part}".rstrip() + "\n" for part in text.split("\n## ")[1:]}
+
+
+def stale(
+    kept: dict[str, str], known: dict[str, tuple[str, Comparison]], workers: Workers | None = None
+) -> dict[str, str]:
+    """Scenes whose section is lacking or made from something else, each with the line that a new section ends with."""
+    made = {}
+    for scene in scene_names():
+        name = known[scene][0] if scene in known else ""
+        made[scene] = MADE.format(stamp(name, facts(name, workers))) if name else ""
+    return {scene: line for scene, line in made.items() if scene not in kept or line not in kept[scene]}
+
+
 def main(names: list[str]) -> None:
     """Writes all sections; those that are asked for, or out of date, are made anew."""
     PICTURES.mkdir(exist_ok=True)
     runner = Runner(Store(DOCS.parent / "out" / "cases"))
     target, known = DOCS / "gallery.md", comparisons()
-    before = target.read_text(encoding="utf-8") if target.exists() else ""
-    kept = {part.partition("\n")[0]: f"## {part}".rstrip() + "\n" for part in before.split("\n## ")[1:]}
-    for scene in scene_names():
-        name, comparison = known.get(scene, ("", None))
-        made = MADE.format(stamp(name, facts(name, runner.workers))) if comparison else ""
-        if scene not in names if names else scene in kept and made in kept[scene]:
+    kept = sections(target.read_text(encoding="utf-8") if target.exists() else "")
+    fresh = {scene: text for scene, text in kept.items() if scene not in names}
+    for scene, made in stale(fresh, known, runner.workers).items():
+        if names and scene not in names:
             continue
-        kept[scene] = section(scene, comparison, runner) + made
+        kept[scene] = section(scene, known.get(scene, ("", None))[1], runner) + made
         text = "\n".join([HEAD, *(kept[name] for name in scene_names() if name in kept)])
         target.write_text(text, encoding="utf-8")
         write_matrix(text)

@@ -19,8 +19,8 @@ from proofroll.running.idle_workers import Workers
 ROOT = Path(__file__).resolve().parents[1]
 # Extras without which nothing is simulated otherwise.
 _NO_NUMBERS = {"report", "robots", "all", "dev", "cluster", "docs"}
-# Of a comparison these are for a person, or for a report without names.
-_WORDS = ("title", "question", "order", "brief")
+# Of a comparison these are for a person.
+_WORDS = ("title", "question", "order")
 
 
 def facts(name: str, workers: Workers | None = None) -> list[EngineFacts]:
@@ -48,13 +48,18 @@ def pinned(root: Path = ROOT) -> dict[str, str]:
 
 
 def stamp(name: str, settings: list[EngineFacts], root: Path = ROOT) -> str:
-    """The hash: of the comparison and its scene as their files have them, the settings of its rows, and the pins."""
+    """The hash: of the comparison and its scene as their files have them, the settings of its rows, and the pins.
+
+    Code of adapters and truths is left out, for it changes too often.
+    """
     content: dict[str, Any] = tomllib.loads((data_folder("comparisons") / f"{name}.toml").read_text(encoding="utf-8"))
-    scene = (data_folder("models") / content["scene"] / "scene.toml").read_text(encoding="utf-8")
+    folder = data_folder("models") / content["scene"]
+    scene = tomllib.loads((folder / "scene.toml").read_text(encoding="utf-8"))
     chosen = [[item.name, item.settings, item.resolution, item.order] for item in settings]
     made = [
         {key: value for key, value in content.items() if key not in _WORDS},
-        tomllib.loads(scene),
+        scene,
+        [(folder / file).read_text(encoding="utf-8") for file in scene.get("files", [])],
         chosen,
         pinned(root),
     ]

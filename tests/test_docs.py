@@ -20,6 +20,7 @@ from proofroll.elements.ball_on_surface.sampling import BallBuilt, BallSample
 from proofroll.elements.mechanism import Body, Joint, Loop, Mechanism, Point, Spring
 from proofroll.elements.mechanism.sampling import MechanismBuilt, MechanismSample
 from proofroll.files.comparison_file import comparison_names, further_comparison_names
+from proofroll.running.idle_workers import Workers
 
 ROOT = Path(__file__).resolve().parents[1]
 # README.md and the pages whose snippets have tests of their own.
@@ -150,6 +151,20 @@ def test_the_gallery_makes_what_is_lacking_or_changed(monkeypatch: pytest.Monkey
     made.clear()
     gallery.main([])
     assert made == ["a"]
+
+
+@pytest.mark.drill
+def test_no_section_of_the_gallery_is_stale(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each section was made from today's comparison, scene, settings and pinned libraries; a changed one is noticed."""
+    monkeypatch.syspath_prepend(str(ROOT / "docs"))
+    gallery = importlib.import_module("gallery")
+    known = gallery.comparisons()
+    kept = gallery.sections((ROOT / "docs" / "gallery.md").read_text(encoding="utf-8"))
+    assert kept.keys() == set(gallery.scene_names())
+    with_one_changed = kept | {"four_bar": kept["four_bar"].replace("made from ", "made from 0")}
+    stale = gallery.stale(with_one_changed, known, Workers())
+    assert list(stale) == ["four_bar"], "make gallery"
+    assert stale["four_bar"] in kept["four_bar"], "make gallery"
 
 
 def test_the_first_page_shows_the_matrix_of_the_gallery(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

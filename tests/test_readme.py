@@ -179,9 +179,9 @@ def test_the_verdict_table_is_of_today() -> None:
 def test_the_stamp_of_the_verdict_table_follows_what_it_is_made_from(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Another setting, another pin of an engine, or another claim changes it; a tool's pin and a title do not."""
-    names = ("comparisons/paper.toml", "models/sphere_in_cylinder/scene.toml", "pyproject.toml", "constraints.txt")
-    for name in names:
+    """A setting, an engine's pin, a claim, what a brief report runs, an engine's model change it; a title does not."""
+    files = sorted(str(path.relative_to(ROOT)) for path in (ROOT / "models" / "sphere_in_cylinder").iterdir())
+    for name in ["comparisons/paper.toml", *files, "pyproject.toml", "constraints.txt"]:
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / name).write_bytes((ROOT / name).read_bytes())
     monkeypatch.setattr(made_from, "data_folder", lambda name: tmp_path / name)
@@ -202,7 +202,9 @@ def test_the_stamp_of_the_verdict_table_follows_what_it_is_made_from(
     assert now() == first
     for name, old, new in (
         ("comparisons/paper.toml", "speed = [2, 4, 6]", "speed = [2, 4, 7]"),
+        ("comparisons/paper.toml", "speed = [4]", "speed = [6]"),
         ("models/sphere_in_cylinder/scene.toml", "0.517", "0.518"),
+        ("models/sphere_in_cylinder/mujoco_free.xml", "timestep", "otherstep"),
         ("constraints.txt", "exudyn==", "exudyn==9"),
     ):
         before = now()
