@@ -26,7 +26,7 @@ from proofroll.elements.mechanism.contacts.acting import (
     held_directions,
     slip_velocity,
 )
-from proofroll.elements.mechanism.contacts.coulomb import PAINLEVE, contact_forces
+from proofroll.elements.mechanism.contacts.coulomb import contact_forces, torn
 from proofroll.elements.mechanism.contacts.geometry import BodyContact
 from proofroll.elements.mechanism.contacts.joint_laws import JointContact, joint_contacts
 from proofroll.elements.mechanism.contacts.start import closed_and_still, natural_scale
@@ -182,7 +182,7 @@ class ContactMotion(AlternatingMotion[ContactMode]):
             if mode[k].kind == "slip":
                 wanted[i] -= now.touching[k].normal_rate @ now.touching[k].slide
                 if row @ now.J[k] @ D[i] <= 0:
-                    raise Diverged(f"at t = {self.t:.6g} s " + PAINLEVE.format(name=self.contacts[k].name))
+                    raise Diverged(str(torn(self.contacts[k].name, self.t)))
         sizes = np.linalg.lstsq(K @ D.T, np.array(wanted), rcond=_RANK)[0]
         for size, (k, _), direction in zip(sizes, rows, along, strict=True):
             force[k] += size * direction
@@ -365,11 +365,12 @@ class ContactMotion(AlternatingMotion[ContactMode]):
         return frames, J, response
 
     def _law(self, G: Array, c: Array, which: Sequence[int], sliding: Sequence[Array | None]) -> tuple[Array, Any]:
+        time = self.t if hasattr(self._stepper, "t") else 0.0
         try:
             at, names = list(which), [self.contacts[k].name for k in which]
-            return contact_forces(G, c, self.friction[at], sliding, names, self._bounds[at])
+            return contact_forces(G, c, self.friction[at], sliding, names, self._bounds[at], time)
         except Refused as error:
-            raise Diverged(f"at t = {self.t if hasattr(self._stepper, 't') else 0.0:.6g} s: {error}") from None
+            raise Diverged(str(error)) from None
 
     def _decided(self, now: ContactsThere, closed: Sequence[bool], still: Sequence[bool]) -> ContactMode:
         """Mode that follows from the forces, for contacts that are closed, and at rest where ``still``."""

@@ -10,7 +10,7 @@ from proofroll.core.errors import Refused
 from proofroll.elements.mechanism.contacts.acting import FAINT, Acting, ContactMode, heading_of, slip_velocity
 from proofroll.elements.mechanism.contacts.geometry import BodyContact
 from proofroll.elements.mechanism.contacts.joint_laws import JointContact
-from proofroll.elements.mechanism.contacts.touching import Touching
+from proofroll.elements.mechanism.contacts.touching import FLAT, Touching
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.truth.mechanism.followed_paths import time_accuracy
 
@@ -34,11 +34,11 @@ class ContactGuard(NamedTuple):
         contact: index of the contact; -1: all contacts.
         kind: ``close``: a gap closes; ``lift``: a normal force reaches zero; ``still``: a slip stops; ``break``: the
             friction of a sticking contact reaches its bound; ``turn``: its line has turned so far that its sense has
-            to be taken anew; ``tear``: Painlevé's measure reaches zero.
+            to be taken anew; ``flat``: a disc lies flat; ``tear``: Painlevé's measure reaches zero.
     """
 
     contact: int
-    kind: Literal["close", "lift", "still", "break", "turn", "tear"]
+    kind: Literal["close", "lift", "still", "break", "turn", "flat", "tear"]
 
 
 def guards_of(contacts: Sequence[Touchable], mode: ContactMode) -> list[ContactGuard]:
@@ -54,6 +54,8 @@ def guards_of(contacts: Sequence[Touchable], mode: ContactMode) -> list[ContactG
             guards.append(ContactGuard(k, "still" if own.kind == "slip" else "break"))
         if own.along is not None and contact.friction:  # a joint that rubs has none, and its line never turns
             guards.append(ContactGuard(k, "turn"))
+        if isinstance(contact, BodyContact) and contact.of_disc:
+            guards.append(ContactGuard(k, "flat"))
     if any(own.kind == "slip" and contact.friction for contact, own in zip(contacts, mode, strict=True)):
         guards.append(ContactGuard(-1, "tear"))
     return guards
@@ -83,10 +85,13 @@ def guard_value(
         return _LEAST_RESPONSE - response
     own, touch = now[guard.contact], touching[guard.contact]
     normal = float(touch.normal @ force[guard.contact])
-    if guard.kind == "close":
-        return -float(touch.gap)
+    if guard.kind in {"close", "flat"}:
+        return -float(touch.gap) if guard.kind == "close" else FLAT - touch.tilt
     if guard.kind == "turn":
-        return _TURNED - float(np.dot(mode[guard.contact].along or 0.0, own.along or 0.0))
+        began = mode[guard.contact].along
+        assert began is not None  # a contact without a line
+        assert own.along is not None  # has no such guard
+        return _TURNED - float(np.dot(began, own.along))
     if guard.kind == "lift":
         return -normal
     if guard.kind == "still":

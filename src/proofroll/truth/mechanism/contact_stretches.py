@@ -11,10 +11,9 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
-from proofroll.core.errors import NotUnique
 from proofroll.elements.mechanism.contacts.acting import FAINT, OPEN, Acting, ContactMode, changes, slip_velocity
-from proofroll.elements.mechanism.contacts.coulomb import PAINLEVE
-from proofroll.elements.mechanism.contacts.touching import Touching
+from proofroll.elements.mechanism.contacts.coulomb import torn
+from proofroll.elements.mechanism.contacts.touching import Touching, lying
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.elements.mechanism.signal import varies
@@ -187,7 +186,10 @@ class ContactStretches(Stretches[ContactMode]):
         k, kind = guards[stretch.guard]
         mode, name = list(stretch.mode), self.contacts[k].name
         if kind == "tear":
-            raise self._torn(stretch)
+            slipping = zip(self.contacts, stretch.mode, strict=True)
+            raise torn(next(c.name for c, own in slipping if own.kind == "slip" and c.friction), stretch.end)
+        if kind == "flat":
+            raise lying(name, stretch.end)
         if kind == "turn":
             return Transition(stretch.last, self._solved(stretch.last, stretch.mode).mode, ())
         if kind == "lift":
@@ -198,11 +200,6 @@ class ContactStretches(Stretches[ContactMode]):
             mode[k] = self._leaving(stretch.last, stretch.mode, k)
             return Transition(stretch.last, tuple(mode), (("slip", name),))
         return self._stopped(stretch) if kind == "still" else self._impact(stretch, k)
-
-    def _torn(self, stretch: Stretch[ContactMode]) -> NotUnique:
-        """Error of a motion that is not unique after the end of a stretch."""
-        slipping = next(c.name for c, own in zip(self.contacts, stretch.mode, strict=True) if own.kind == "slip")
-        return NotUnique(f"from t = {stretch.end:.6g} s on " + PAINLEVE.format(name=slipping))
 
     def _leaving(self, state: Array, mode: ContactMode, k: int) -> Acting:
         """Slip that starts at the bound of friction, opposite to the friction that held."""

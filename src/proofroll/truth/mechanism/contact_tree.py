@@ -33,7 +33,7 @@ class ContactTree(ContactStretches):
         self, state: Array, mode: ContactMode, closed: Sequence[bool], laws: Sequence[float]
     ) -> tuple[Array, list[bool], float]:
         (q, v, time), which = self.dynamics.parts(state), np.flatnonzero(closed).tolist()
-        after, impulse, margin = self.dynamics.struck(q, v, which, np.array([laws[k] for k in which]))
+        after, impulse, margin = self.dynamics.struck(q, v, which, np.array([laws[k] for k in which]), time)
         stays, touching = list(closed), self.dynamics.at(q, after).touching
         for pressed, k in zip(impulse[:, 0] > 0, which, strict=True):
             leaves = mode[k].kind == "open" or float(touching[k].normal @ touching[k].slide) > SLIP_ENDED

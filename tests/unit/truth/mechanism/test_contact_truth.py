@@ -10,8 +10,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.integrate import quad
 
-from proofroll.core.errors import Refused
+from proofroll.core.errors import NotUnique, Refused
 from proofroll.core.events import events_of
 from proofroll.core.observable import Role
 from proofroll.core.plugins import load_engine
@@ -379,8 +380,27 @@ def test_a_disc_that_lands_flat_is_refused(restitution: float) -> None:
     disc = mechanism_of("tilted_disc")
     flat = replace(disc.joints[0], q0=(0, 0, 0.05, 1, 0, 0, 0), v0=(1, 0, 0, 0, 0, 5))
     pairs = tuple(replace(pair, restitution=restitution) for pair in disc.pairs)
-    with pytest.raises(Refused, match=r"the disc of .* lies flat: what its whole edge does at once is not determinate"):
+    with pytest.raises(NotUnique, match=r"^the disc of contact lies flat at t = 0\.10096\d* s: what its whole edge"):
         truth_of(replace(disc, joints=(flat,), pairs=pairs), np.array([0.0, 0.2]))
+
+
+@pytest.mark.parametrize("friction", [0.0, 2.0])
+def test_a_disc_that_tips_until_it_lies_flat_is_refused_with_the_time(friction: float) -> None:
+    """A disc let go on its edge falls on its face, on a smooth floor and on one that holds it; it is told when."""
+    disc, tilt, radius = mechanism_of("tilted_disc", friction=friction), 0.1, 0.25
+    start = (0.0, 0.0, radius * np.sin(tilt), np.cos(tilt / 2), np.sin(tilt / 2), 0.0, 0.0)
+    tips = replace(disc.joints[0], q0=tuple(map(float, start)), v0=(0.0,) * 6)
+
+    def slowness(s: float) -> float:
+        """Time by the root s of the angle fallen [s]: its energy, with its centre moving down alone if it is smooth."""
+        angle = tilt - s**2
+        moved = 1.0 if friction else np.cos(angle) ** 2
+        return float(2 * s * np.sqrt(radius * (0.25 + moved) / (2 * 9.81 * (np.sin(tilt) - np.sin(angle)))))
+
+    falls = quad(slowness, 1e-12, np.sqrt(tilt))[0]
+    with pytest.raises(NotUnique, match=r"^the disc of contact lies flat at t = \S+ s: what its whole edge") as told:
+        truth_of(replace(disc, joints=(tips,)), np.array([0.0, 0.2]))
+    assert float(str(told.value).split("t = ")[1].split()[0]) == pytest.approx(falls, rel=1e-5)  # it has six digits
 
 
 def test_a_smooth_plank_that_falls_flat_rests() -> None:
@@ -559,7 +579,7 @@ def test_a_row_of_balls_is_ill_posed_and_keeps_momentum_and_energy() -> None:
 
 def test_a_rod_that_leans_against_its_slip_has_no_truth() -> None:
     """Where a normal force would tear, the scene is refused with the reason, and below that friction it is not."""
-    with pytest.raises(Refused, match="not unique or not possible \\(Painlevé\\)"):
+    with pytest.raises(NotUnique, match=r"^contact would not press but tear from t = 0 s on: .* \(Painlevé\)$"):
         truth_of(mechanism_of("painleve_rod"), np.array([0.0, 0.01]))
     motion("painleve_rod", [0.0, 0.01], friction=0.5)
 

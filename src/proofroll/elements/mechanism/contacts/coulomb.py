@@ -27,10 +27,14 @@ _AT_BOUND = 1e-9
 _NUDGE, _APART = 1e-6, 0.382
 # Angles between which the direction of slip is searched; the offset keeps the axes inside an interval.
 _DIRECTIONS = np.linspace(-np.pi, np.pi, 73) + 0.01
-PAINLEVE = (
-    "its normal force would not press but tear: friction at {name} makes what follows not unique or not possible "
-    "(Painlevé)"
-)
+
+
+def torn(name: str, time: float) -> NotUnique:
+    """Error of Painlevé's paradox at a contact, from a time on [s]."""
+    return NotUnique(
+        f"{name} would not press but tear from t = {time:.6g} s on: its friction makes what follows not unique or not "
+        "possible (Painlevé)"
+    )
 
 
 def contact_forces(
@@ -40,6 +44,7 @@ def contact_forces(
     sliding: Sequence[Array | None],
     names: Sequence[str],
     bounds: Array | None = None,
+    time: float = 0.0,
 ) -> tuple[Array, list[Outcome]]:
     """Forces of all contacts, shape (contacts, 3), and outcome of each contact.
 
@@ -51,6 +56,7 @@ def contact_forces(
             friction acts against it.
         names: for messages.
         bounds: largest friction of each contact without a normal force; 0, or None: a contact with one.
+        time: for messages [s].
 
     Raises:
         NotUnique: the force of a contact is not unique.
@@ -67,7 +73,7 @@ def contact_forces(
             if bounds[k]:
                 f[own], done[k] = _rubbing(G[own, own], free, bounds[k], sliding[k])
             else:
-                f[own], done[k] = _one(G[own, own], free, mu, sliding[k], names[k], least)
+                f[own], done[k] = _one(G[own, own], free, mu, sliding[k], (names[k], time), least)
         if np.abs(f - before).max() <= _SETTLED * np.abs(f).max():
             w = (c + G @ f).reshape(-1, 3)
             for k, along in enumerate(sliding):
@@ -75,7 +81,7 @@ def contact_forces(
                 if done[k] == "slip" and along is None and rubs and np.linalg.norm(w[k, 1:]) <= least:
                     done[k] = "stick"  # one of several holding contacts may reach its bound while nothing moves
             return f.reshape(-1, 3), done
-    raise Refused(f"the forces of the contacts {', '.join(names)} are not found in {_SWEEPS} sweeps")
+    raise Refused(f"forces of the contacts {', '.join(names)} at t = {time:.6g} s are not found in {_SWEEPS} sweeps")
 
 
 def robust_forces(
@@ -85,6 +91,7 @@ def robust_forces(
     sliding: Sequence[Array | None],
     names: Sequence[str],
     bounds: Array | None = None,
+    time: float = 0.0,
     least: float = 0.0,
 ) -> tuple[Array, list[Outcome], bool]:
     """Solution as of :func:`contact_forces`, and True if slightly changed pressure and friction give the same outcomes.
@@ -92,7 +99,7 @@ def robust_forces(
     A contact whose force is at most a ``least`` part of the largest force counts as open.
     """
     bounds = np.zeros(len(friction)) if bounds is None else bounds
-    force, done = contact_forces(G, c, friction, sliding, names, bounds)
+    force, done = contact_forces(G, c, friction, sliding, names, bounds, time)
     own = np.diag(G)[::3]
     # as a force at each contact, which the holds of the other contacts balance
     lift = np.where(own > 0, (1 + _APART * np.arange(len(own))) / np.where(own > 0, own, 1), 0.0)
@@ -104,7 +111,7 @@ def robust_forces(
 
     nominal = outcome(force, done)
     same = all(
-        outcome(*contact_forces(G, c + side * nudge, friction * part, sliding, names, bounds * part)) == nominal
+        outcome(*contact_forces(G, c + side * nudge, friction * part, sliding, names, bounds * part, time)) == nominal
         for side, part in ((1.0, 1 - _NUDGE), (-1.0, 1 + _NUDGE))
     )
     return force, done, same
@@ -119,12 +126,17 @@ def _rubbing(G: Array, c: Array, bound: float, sliding: Array | None) -> tuple[A
     return (held, "stick") if size <= bound * (1 + _AT_BOUND) else (held * (bound / size), "slip")
 
 
-def _one(G: Array, c: Array, mu: float, sliding: Array | None, name: str, least: float) -> tuple[Array, Outcome]:
-    """Force and outcome of one contact while the other forces stay; a motion up to ``least`` counts as none."""
+def _one(
+    G: Array, c: Array, mu: float, sliding: Array | None, where: tuple[str, float], least: float
+) -> tuple[Array, Outcome]:
+    """Force and outcome of one contact while the other forces stay; a motion up to ``least`` counts as none.
+
+    ``where``: its name and the time [s], for messages.
+    """
     if c[0] >= 0:
         return np.zeros(3), "open"
     if sliding is not None or not mu:
-        return _pressing(G, c, mu, np.zeros(2) if sliding is None else sliding, name), "slip"
+        return _pressing(G, c, mu, np.zeros(2) if sliding is None else sliding, where), "slip"
     from scipy.optimize import brentq  # half a second, which most uses of a mechanism do not need
 
     held = -np.linalg.pinv(G, 1e-12, hermitian=True) @ c
@@ -135,7 +147,7 @@ def _one(G: Array, c: Array, mu: float, sliding: Array | None, name: str, least:
     def across(angle: float) -> float:
         """Component of the slip perpendicular to the direction that friction opposes; zero at the solution."""
         t = np.array([np.cos(angle), np.sin(angle)])
-        w = c + G @ _pressing(G, c, mu, t, name)
+        w = c + G @ _pressing(G, c, mu, t, where)
         return float(w[2] * t[0] - w[1] * t[1])
 
     values = [across(angle) for angle in _DIRECTIONS]
@@ -145,16 +157,16 @@ def _one(G: Array, c: Array, mu: float, sliding: Array | None, name: str, least:
             continue
         angle = low if at_low == 0 else brentq(across, low, high, xtol=1e-15, rtol=1e-15)
         t = np.array([np.cos(angle), np.sin(angle)])
-        f = _pressing(G, c, mu, t, name)
+        f = _pressing(G, c, mu, t, where)
         if (c + G @ f)[1:] @ t > 0:
             return f, "slip"
-    raise Refused(f"no direction of slip at {name} is against its friction")
+    raise Refused("no direction of slip at {} at t = {:.6g} s is against its friction".format(*where))
 
 
-def _pressing(G: Array, c: Array, mu: float, t: Array, name: str) -> Array:
+def _pressing(G: Array, c: Array, mu: float, t: Array, where: tuple[str, float]) -> Array:
     """Force of a contact that slides along t with its gap kept closed. Raises NotUnique in Painlevé's paradox."""
     along = np.array([1.0, *(-mu * t)])
     response = float(G[0] @ along)
     if response <= 0:
-        raise NotUnique(PAINLEVE.format(name=name))
+        raise torn(*where)
     return np.asarray(-c[0] / response * along)

@@ -25,8 +25,8 @@ from proofroll.elements.mechanism.contacts.acting import (
 from proofroll.elements.mechanism.contacts.coulomb import robust_forces
 from proofroll.elements.mechanism.contacts.geometry import BodyContact
 from proofroll.elements.mechanism.contacts.joint_laws import JointContact, joint_contacts, mode_of_joints
-from proofroll.elements.mechanism.contacts.start import STILL, closed_and_still, flat_discs, natural_scale, touches
-from proofroll.elements.mechanism.contacts.touching import Touching
+from proofroll.elements.mechanism.contacts.start import STILL, closed_and_still, natural_scale, touches
+from proofroll.elements.mechanism.contacts.touching import Touching, lying
 from proofroll.elements.mechanism.joint_coordinates import JointCoordinates, Solution
 from proofroll.elements.mechanism.kinematics import BodyMotion
 from proofroll.elements.mechanism.model import Mechanism
@@ -254,7 +254,7 @@ class ContactDynamics:
         """
         state = self.at(q, v, time)
         which = [k for k, shut in enumerate(closed) if shut]
-        self._refuse_flat(state, which)
+        self._refuse_flat(state, which, time)
         if not which:
             return tuple(OPEN for _ in closed), np.inf
         frames = {k: frame_of_axis(state.touching[k].normal)[:, [2, 0, 1]] for k in which}
@@ -267,7 +267,7 @@ class ContactDynamics:
             across = frames[k][:, 1:].T @ found.slide
             sliding.append(None if still[k] else across / np.linalg.norm(across))
         G, names = J @ state.W @ J.T, [self.contacts[k].name for k in which]
-        force, done, same = robust_forces(G, c, self.friction[which], sliding, names, self._bounds[which])
+        force, done, same = robust_forces(G, c, self.friction[which], sliding, names, self._bounds[which], time)
         mode = [OPEN for _ in closed]
         for place, k in enumerate(which):
             own = slice(3 * place, 3 * place + 3)
@@ -275,7 +275,9 @@ class ContactDynamics:
             mode[k] = first_mode(done[place], frames[k], -force[place, 1:] if slides is None else slides, G[own, own])
         return tuple(mode), np.inf if same else 0.0
 
-    def struck(self, q: Array, v: Array, closed: Sequence[int], restitution: Array) -> tuple[Array, Array, float]:
+    def struck(
+        self, q: Array, v: Array, closed: Sequence[int], restitution: Array, time: float = 0.0
+    ) -> tuple[Array, Array, float]:
         """Velocities after an impact, by Newton's law of restitution and Coulomb's law with the slip after the impact.
 
         Args:
@@ -283,6 +285,7 @@ class ContactDynamics:
             v: velocities before it.
             closed: contacts whose gaps are closed.
             restitution: of each of them.
+            time: of the impact, for messages [s].
 
         Returns:
             The velocities, the impulses (closed, 3), and the margin to another outcome: inf, or 0 if it is not unique.
@@ -291,28 +294,31 @@ class ContactDynamics:
             NotUnique: several contacts press each other, so that the outcome depends on an order; or a disc lies flat.
         """
         state = self.at(q, v)
-        self._refuse_flat(state, closed)
+        self._refuse_flat(state, closed, time)
         frames = [frame_of_axis(state.touching[k].normal)[:, [2, 0, 1]] for k in closed]
         J = np.concatenate([frame.T @ state.J[k] for frame, k in zip(frames, closed, strict=True)])
         c = J @ v
         c[::3] += restitution * np.minimum(c[::3], 0.0)
         G, names = J @ state.W @ J.T, [self.contacts[k].name for k in closed]
         sliding = [None] * len(closed)
-        impulse, _, same = robust_forces(G, c, self.friction[list(closed)], sliding, names, least=_NO_IMPULSE)
+        impulse, _, same = robust_forces(
+            G, c, self.friction[list(closed)], sliding, names, time=time, least=_NO_IMPULSE
+        )
         speeds, scale = (J @ v)[::3], float(np.abs(J @ v).max())
         hit = (speeds < -STILL * scale) | (impulse[:, 0] > STILL * impulse[:, 0].max())
         lossy = np.array([bool(self.contacts[k].friction or self.contacts[k].restitution) for k in closed])
         if pair := _ordered(G, lossy, hit):
             a, b = (names[k] for k in pair)
-            raise NotUnique(f"an impact presses {a} and {b} at once: its outcome depends on their order")
+            raise NotUnique(
+                f"an impact at t = {time:.6g} s presses {a} and {b} at once: its outcome depends on their order"
+            )
         return v + state.W @ J.T @ impulse.ravel(), impulse, np.inf if same else 0.0
 
-    def _refuse_flat(self, state: ContactsNow, closed: Sequence[int]) -> None:
-        """Raises NotUnique if one of these contacts is of a disc that lies flat."""
-        for k, flat in enumerate(flat_discs(self.mechanism, state.solution.motion)):
-            if flat and k in closed:
-                name = self.contacts[k].name
-                raise NotUnique(f"the disc of {name} lies flat: what its whole edge does at once is not determinate")
+    def _refuse_flat(self, state: ContactsNow, closed: Sequence[int], time: float) -> None:
+        """Raises NotUnique if one of these contacts is of a disc that lies flat at a time [s]."""
+        for k in closed:
+            if state.touching[k].flat:
+                raise lying(self.contacts[k].name, time)
 
     def sample(self, q: Array, v: Array, mode: ContactMode, time: float = 0.0) -> tuple[dict[str, Any], Array]:
         """Fields of a record at one time [s], and contact forces between bodies [N], (contacts, 3).

@@ -176,6 +176,11 @@ class BodyContact:
     friction: float
     restitution: float
 
+    @property
+    def of_disc(self) -> bool:
+        """True if one of the shapes is a circle."""
+        return isinstance(self.shape_a, CircleShape) or isinstance(self.shape_b, CircleShape)
+
 
 def contacts_of(geometries: Sequence[Geometry], pairs: Sequence[Pair]) -> tuple[BodyContact, ...]:
     """Contacts of all pairs, in their order. Raises InputError if a pair cannot touch or is listed twice."""

@@ -8,8 +8,7 @@ from numpy.typing import ArrayLike
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import InputError
-from proofroll.elements.mechanism.contacts.geometry import BodyContact
-from proofroll.elements.mechanism.contacts.touching import Moving, Touching, lies_flat, touch
+from proofroll.elements.mechanism.contacts.touching import Moving, Touching, touch
 from proofroll.elements.mechanism.joint_coordinates import JointCoordinates, Solution
 from proofroll.elements.mechanism.kinematics import BodyMotion, Tree
 from proofroll.elements.mechanism.model import Mechanism
@@ -25,19 +24,9 @@ _STANDS = 1e-12
 
 def touches(mechanism: Mechanism, motion: BodyMotion) -> tuple[Touching, ...]:
     """Gap, normal and slide of all contacts at one instant."""
-    return tuple(touch(contact, *_moving(mechanism, motion, contact)) for contact in mechanism.contacts)
-
-
-def flat_discs(mechanism: Mechanism, motion: BodyMotion) -> list[bool]:
-    """True for each contact of a disc that lies flat at one instant."""
-    return [lies_flat(contact, *_moving(mechanism, motion, contact)) for contact in mechanism.contacts]
-
-
-def _moving(mechanism: Mechanism, motion: BodyMotion, contact: BodyContact) -> tuple[Moving, Moving]:
-    """Motions of the two bodies of a contact."""
-    of = [mechanism.body_index[body] for body in (contact.body_a, contact.body_b)]
-    a, b = (Moving(motion.p_WB[k], motion.R_WB[k], motion.v_WB[k], motion.w_WB[k]) for k in of)
-    return a, b
+    index = mechanism.body_index
+    bodies = [Moving(*each) for each in zip(motion.p_WB, motion.R_WB, motion.v_WB, motion.w_WB, strict=True)]
+    return tuple(touch(c, bodies[index[c.body_a]], bodies[index[c.body_b]]) for c in mechanism.contacts)
 
 
 def extent(mechanism: Mechanism, motion: BodyMotion) -> float:
@@ -151,13 +140,12 @@ def check_contacts(mechanism: Mechanism) -> None:
         if (q <= low + digits and v < -still) or (q >= high - digits and v > still):
             advice = "the joint starts on its stop and moves into it, an impact at time 0; correct v0 or start it apart"
             raise InputError(f"joints.{joint.name}.v0", v, advice)
-    touching, flat = touches(mechanism, motion), flat_discs(mechanism, motion)
-    for contact, each, lies in zip(mechanism.contacts, touching, flat, strict=True):
+    for contact, each in zip(mechanism.contacts, touches(mechanism, motion), strict=True):
         between = f"{contact.body_a} and {contact.body_b}"
         if each.gap < -scale.gap:
             advice = f"they overlap by {-each.gap:.3g} m at the start; move one"
             raise InputError(f"pairs.{contact.name}", between, advice)
-        if lies and each.gap <= scale.gap:
+        if each.flat and each.gap <= scale.gap:
             advice = "the disc lies flat and touches along its whole edge, not at one point; give it three spheres"
             raise InputError(f"pairs.{contact.name}", between, advice)
         closing = -float(each.normal @ each.slide)

@@ -4,12 +4,13 @@ from typing import NamedTuple
 
 import numpy as np
 
+from proofroll.core.errors import NotUnique
 from proofroll.elements.mechanism.contacts.geometry import BodyContact
 from proofroll.elements.mechanism.contacts.shapes import Bore, CircleShape, ConvexShape, HalfSpace, SphereShape, Wall
 from proofroll.elements.mechanism.rotations import Array, cross
 
 # Sine of the angle between a disc and its plane up to which it lies flat: digits of a file.
-_FLAT = 1e-9
+FLAT = 1e-9
 
 
 class Moving(NamedTuple):
@@ -39,6 +40,7 @@ class Touching(NamedTuple):
             spheres on a [m].
         place_rate: velocity of that point in the world, as it moves over both bodies [m/s].
         slide: velocity of a's material relative to b's at that point [m/s]; along the normal it is the gap's rate.
+        tilt: sine of the angle between a disc and its plane; 1 for other shapes.
     """
 
     gap: float
@@ -47,6 +49,20 @@ class Touching(NamedTuple):
     place: Array
     place_rate: Array
     slide: Array
+    tilt: float = 1.0
+
+    @property
+    def flat(self) -> bool:
+        """True for a disc that lies on its plane, so that it touches along its whole edge and not at one point."""
+        return self.tilt <= FLAT
+
+
+def lying(name: str, time: float) -> NotUnique:
+    """Error of a disc that lies flat from a time on [s]."""
+    return NotUnique(
+        f"the disc of {name} lies flat at t = {time:.6g} s: what its whole edge does at once is not determinate; end "
+        "before, or give it three spheres"
+    )
 
 
 def touch(contact: BodyContact, a: Moving, b: Moving) -> Touching:
@@ -61,17 +77,9 @@ def touch(contact: BodyContact, a: Moving, b: Moving) -> Touching:
         assert isinstance(contact.shape_a, SphereShape)
         assert isinstance(contact.shape_b, SphereShape)
         gap, n, n_rate, place, rate = _two_spheres(contact.shape_a, a, contact.shape_b, b)
-    return Touching(gap, n, n_rate, place, rate, a.velocity(place) - b.velocity(place))
-
-
-def lies_flat(contact: BodyContact, a: Moving, b: Moving) -> bool:
-    """True if a disc is parallel to its plane, so that it touches along its whole edge and not at one point."""
-    normals = [
-        of.R @ shape.normal
-        for shape, of in ((contact.shape_a, a), (contact.shape_b, b))
-        if isinstance(shape, CircleShape | HalfSpace)
-    ]
-    return len(normals) == 2 and float(np.linalg.norm(cross(*normals))) <= _FLAT
+    discs = ((contact.shape_a, a), (contact.shape_b, b))
+    tilts = (float(np.linalg.norm(cross(of.R @ disc.normal, n))) for disc, of in discs if isinstance(disc, CircleShape))
+    return Touching(gap, n, n_rate, place, rate, a.velocity(place) - b.velocity(place), next(tilts, 1.0))
 
 
 _Lying = tuple[float, Array, Array, Array, Array]
