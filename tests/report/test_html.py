@@ -207,6 +207,9 @@ def test_curves_are_the_difference_from_the_truth(made: tuple[Outcome, Store]) -
         (0.01 * (1 - 1e-15), "0.01"),
         (9.96e-3, "0.01"),
         (9.94e-3, "9.9e-3"),
+        (9.96, "10"),
+        (5936, "5900"),
+        (1e4, "1e4"),
     ],
 )
 def test_numbers_are_short(value: float | None, shown: str) -> None:

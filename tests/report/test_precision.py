@@ -11,6 +11,7 @@ from typing import Any
 
 import pytest
 from browsing import Visit
+from folded import whole
 
 Visiting = Callable[..., AbstractContextManager[Visit]]
 PART = "[data-precision=evidence-invented]"
@@ -25,6 +26,22 @@ def seen(report_page: Path, visit: Visiting) -> Iterator[Visit]:
         # Again, as the sections above have their heights only once they have been near.
         opened.wait(f"({PICTURE}.data ?? []).length > 0", opened.page.locator(PART).scroll_into_view_if_needed)
         yield opened
+
+
+@pytest.mark.drill
+def test_what_panels_show_is_said_once(everything: Any, tmp_path: Path) -> None:
+    """The page's first picture says how to read it, with the id to which all others lead."""
+    first = everything.content.comparisons[0]
+    again = replace(first, name="again", title="Again")
+    table = everything.content.table
+    more = [replace(line, study="again") for line in table.lines if line.study == first.name]
+    content = replace(everything.content, comparisons=[first, again], table=replace(table, lines=[*table.lines, *more]))
+    page = replace(everything, content=content, curves=2 * everything.curves)
+    assert len(content.precision) == 3
+    text = whole(page.write(tmp_path / "report.html").read_text(encoding="utf-8"))
+    assert text.count("The broad line is the front") == text.count('id="panels"') == 1
+    assert text.count('href="#panels"') == 2
+    assert text.index('id="panels"') < text.index('href="#panels"')
 
 
 @pytest.mark.drill

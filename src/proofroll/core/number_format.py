@@ -21,7 +21,7 @@ def number(value: float | None, digits: int = 2, none: str = "–") -> str:
     if 0 < abs(value) < 0.01:  # one form for all small numbers, which makes columns comparable at a glance
         mantissa, _, power = f"{value:.{digits - 1}e}".partition("e")
         return f"{mantissa.rstrip('0').rstrip('.') if '.' in mantissa else mantissa}e{int(power)}"
-    mantissa, exponent, power = f"{value:.{digits}g}".partition("e")
+    mantissa, exponent, power = f"{value:.{max(digits, 4)}g}".partition("e")  # 10 and 1200, not 1e1 and 1.2e3
     return f"{mantissa}e{int(power)}" if exponent else mantissa
 
 

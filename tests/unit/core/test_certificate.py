@@ -19,7 +19,7 @@ def test_a_difference_names_its_scale() -> None:
     """Where a difference is not relative to the numbers beside it, what it is relative to is told."""
     for scale, told in (
         (67.0, "(relative difference 0.1, allowed"),
-        (2800.0, "(relative difference 2.4e-3 of 2.8e3 rad"),
+        (2800.0, "(relative difference 2.4e-3 of 2800 rad"),
     ):
         said = first_difference([Line("spin", "rad/s^2", (67.0,), (60.3,), 6.7 / scale, 1e-9)])
         assert told in str(said)

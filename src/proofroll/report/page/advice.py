@@ -44,7 +44,7 @@ def words(matrix: ChoiceMatrix) -> str:
     """JSON of the sentences for every tolerance in :data:`ASKED`, and of parts for sentences on some engines.
 
     The parts are the heads of the sentences, and for each column its engines, the cheapest first: engine, cost (null:
-    the tolerance is not held), name, and cost as text or the reason why the tolerance is not held.
+    the tolerance is not held), name or the clause why the tolerance is not held, and what the cost is said to be.
     """
     answers = []
     for forces, tolerance in ASKED:
@@ -55,7 +55,7 @@ def words(matrix: ChoiceMatrix) -> str:
             heads.append(head)
             engines.append(
                 [
-                    (engine, cell.cost, _told(name, cell), cell.text)
+                    (engine, cell.cost, _told(name, cell), _spent(name, cell))
                     if math.isfinite(cell.cost)
                     else (engine, None, _other(name, cell, cell), "")
                     for engine, (name, cell) in found.items()
@@ -83,7 +83,7 @@ def of_column(matrix: ChoiceMatrix, column: ChoiceColumn, tolerance: float, forc
     clauses = [_other(name, cell, first[1]) for name, cell in others]
     held = math.isfinite(first[1].cost)
     if held:
-        clauses.insert(0, f"take {_told(*first)} ({first[1].text} s/s)")
+        clauses.insert(0, f"take {_told(*first)} ({_spent(*first)})")
     else:
         clauses = [NOTHING, _other(*first, first[1]), *clauses]
     changed = "" if forces else _with_forces(matrix, column, tolerance, first[1])
@@ -180,6 +180,12 @@ def _told(name: str, cell: ChoiceCell) -> str:
     return f"{_named(name, cell)}{cell.share}"
 
 
+def _spent(name: str, cell: ChoiceCell, more: str = "") -> str:
+    """Cost, and the scene that it is of with its setting, where scenes need different ones."""
+    study, setting = cell.slowest
+    return f"{cell.text} s/s{more}{f'; {study} needs most: {setting.removeprefix(name).strip()}' if study else ''}"
+
+
 def _other(name: str, cell: ChoiceCell, first: ChoiceCell) -> str:
     """Clause on another engine: its cost relative to the cheapest, or the reason why it does not hold the tolerance."""
     if math.isfinite(cell.cost):
@@ -196,15 +202,14 @@ def _with_forces(matrix: ChoiceMatrix, column: ChoiceColumn, tolerance: float, w
     name, cell = next(iter(_engines(matrix, column, tolerance, True).values()))
     judged = [study for study in column.studies if study not in matrix.unjudged[True]]
     if len(judged) < len(column.studies) and math.isfinite(cell.cost):
-        return (
-            f" In {', '.join(judged)}, where forces are judged, take {_named(name, cell)} ({cell.text} s/s) for both."
-        )
+        taken = f"{_named(name, cell)} ({_spent(name, cell)})"
+        return f" In {', '.join(judged)}, where forces are judged, take {taken} for both."
     if not math.isfinite(cell.cost):
         return " If forces count, too, nothing that was run and timed holds it."
     if cell.cost == without.cost:
         return " It holds the forces, too."
     more = f", {_times(cell.cost, without.cost)}" if math.isfinite(without.cost) else ""
-    return f" If forces count, too, take {_named(name, cell)} ({cell.text} s/s{more})."
+    return f" If forces count, too, take {_named(name, cell)} ({_spent(name, cell, more)})."
 
 
 def _times(cost: float, of: float) -> str:

@@ -51,6 +51,7 @@ class ChoiceCell(NamedTuple):
         href: HTML id of the evidence; empty: there is none.
         cost: of the slowest scene; infinite unless the tolerance is held in all and costs were measured.
         name: setting and step; for several scenes the ones that they share, or empty.
+        slowest: the scene whose cost it is and its setting and step, where scenes need different ones; else empty.
         why: short reason why the tolerance is not held; empty: it is.
         scenes, lacking: numbers of the column's scenes in which it was judged, and of those in which only others were.
         absent: number of the latter without a run of it, as it may be unable to represent them; others were left out.
@@ -62,6 +63,7 @@ class ChoiceCell(NamedTuple):
     href: str = ""
     cost: float = math.inf
     name: str = ""
+    slowest: tuple[str, str] = ("", "")
     why: str = ""
     scenes: int = 1
     lacking: int = 0
@@ -146,11 +148,13 @@ class ChoiceMatrix:
             return ChoiceCell(Verdict.NOT_JUDGED, what, f"{what} judged here", why=f"{what} judged")
         # A study without any judgement, say for lack of time, does not count against the studies that ran.
         known = [name for name in judged if any(item.blame != Verdict.NOT_JUDGED for item in row.found[name])]
-        cells = [(self.titles[name], _cell(row.found[name], tolerance, forces)) for name in known or judged]
+        cells = {name: _cell(row.found[name], tolerance, forces) for name in known or judged}
         if not cells:
             return ChoiceCell(NO_RUN, "", "not run")
         lacking = self.judged[forces].intersection(column.studies).difference(known)
-        return _joined(cells)._replace(scenes=len(cells), lacking=len(lacking), absent=len(lacking - row.found.keys()))
+        return _joined(cells, self.titles)._replace(
+            scenes=len(cells), lacking=len(lacking), absent=len(lacking - row.found.keys())
+        )
 
     @cached_property
     def judged(self) -> tuple[set[str], set[str]]:
@@ -350,15 +354,16 @@ def _beyond(size: float, tolerance: float, digits: int = 1) -> str:
     )
 
 
-def _joined(cells: Sequence[tuple[str, ChoiceCell]]) -> ChoiceCell:
+def _joined(cells: Mapping[str, ChoiceCell], titles: Mapping[str, str]) -> ChoiceCell:
     """One cell for several studies: the worst; its cost is that of the slowest if all hold the tolerance."""
+    study, worst = max(cells.items(), key=lambda item: (SEVERITY.index(item[1].state), item[1].cost))
     if len(cells) == 1:
-        return cells[0][1]
-    title = "; ".join(f"{name}: {cell.title}" for name, cell in cells)
-    worst = max((cell for _, cell in cells), key=lambda cell: (SEVERITY.index(cell.state), cell.cost))
-    held = sum(cell.state == Verdict.AGREES for _, cell in cells)
-    name = worst.name if len({cell.name for _, cell in cells}) == 1 else ""
+        return worst
+    title = "; ".join(f"{titles[name]}: {cell.title}" for name, cell in cells.items())
+    held = sum(cell.state == Verdict.AGREES for cell in cells.values())
+    shared = len({cell.name for cell in cells.values()}) == 1
+    worst = worst._replace(title=title, name=worst.name if shared else "")
     if held == len(cells):
-        return worst._replace(title=title, name=name)
+        return worst if shared else worst._replace(slowest=(study, cells[study].name))
     why = f"{worst.why}; holds {held} of {len(cells)}"
-    return worst._replace(text=f"{held} of {len(cells)}", title=title, cost=math.inf, name=name, why=why)
+    return worst._replace(text=f"{held} of {len(cells)}", cost=math.inf, why=why)

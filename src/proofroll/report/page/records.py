@@ -92,6 +92,11 @@ class Sentences:
 
     sentences: list[str]
 
+    @property
+    def on_engines(self) -> list[str]:
+        """The sentences before the last, which is advice: the page gives that above its matrix."""
+        return self.sentences[:-1]
+
 
 @dataclass(frozen=True)
 class ReportContent:
@@ -168,9 +173,10 @@ class ReportContent:
 
     @cached_property
     def precision(self) -> dict[str, WorkPrecision]:
-        """Work–precision pictures by the id of their section, for studies with enough timed runs."""
-        sections = {item.name: item.section for item in self.comparisons}
-        sections |= {item.name: item.section for item in self.entries.get("tradeoffs", ())}
+        """Work–precision pictures by the id of their section, in the page's order, where enough runs are timed."""
+        tradeoffs = {item.name: item.section for item in self.entries.get("tradeoffs", ())}
+        others = {item.name: item.section for item in self.comparisons if item.name not in tradeoffs}
+        sections = tradeoffs | others
         lines: dict[str, list[TableLine]] = {name: [] for name in sections}
         for line in self.table.lines:
             lines.get(line.study, []).append(line)

@@ -57,7 +57,7 @@
       if (!own.length) return engines[j].length ? `${head} none of the chosen engines was run.` : said[j];
       const [[, least, name, text]] = own;
       const others = own.slice(least === null ? 0 : 1).map(([, cost, other]) => cost === null ? other : `${other} costs ${times(Number((cost / least).toPrecision(2)))}`);
-      return `${head} ${[least === null ? unheld : `take ${name} (${text} s/s)`, ...others].join("; ")}.`;
+      return `${head} ${[least === null ? unheld : `take ${name} (${text})`, ...others].join("; ")}.`;
     }), `This is of ${chosen(true).join(", ") || "no engine"} alone. What serves all scenes, and what forces change, is said of all engines together.`];
   }
   // A text whose numbers as 1e-3 are not broken, as `unbroken`.

@@ -33,6 +33,20 @@ def test_each_engine_is_told_beside_the_cheapest() -> None:
     )
 
 
+def test_of_a_group_the_scene_that_costs_most_is_told_with_its_setting() -> None:
+    """Where scenes need different settings, the cost is that of a named one; one that serves all is told."""
+    exact = replace(FORCE, error=1e-9)
+    fine = {"study": "chain", "scene": "chain", "setting": "tuned", "preset": "tuned", "step": 5e-4, "cost": 0.04}
+    group = said([LINE, exact, replace(LINE, **fine), replace(exact, **fine), BETA], 1e-3)[0]
+    assert group.startswith(
+        "For trees to 1e-3 take alpha joints (0.04 s/s; chain needs most: tuned at dt 5e-4 s); beta"
+    )
+    chain = replace(LINE, study="chain", scene="chain", cost=0.04)
+    assert said([LINE, chain], 1e-3)[0].startswith(
+        "For trees to 1e-3 take alpha joints default at dt 1e-3 s (0.04 s/s)."
+    )
+
+
 def test_the_choice_is_told_apart_from_its_sentence() -> None:
     """Name and cost are there for a program; where nothing holds it there are none."""
     found = advice(choice_matrix([LINE], STUDIES), 1e-3, False)[0]
