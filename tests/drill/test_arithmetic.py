@@ -257,7 +257,7 @@ def test_numbers_beyond_their_bars_are_told() -> None:
 @pytest.mark.drill
 def test_kinds_compute_otherwise(tmp_path: Path) -> None:
     """Each kind that this machine has takes effect in its processes, or says why it cannot be tried."""
-    for name in ("haswell", "prescott", "no-avx2", "no-heyoka"):
+    for name in ("haswell", "prescott", "no-avx2", "avx2-machine", "sse-machine", "no-heyoka"):
         kind = BY_NAME[name]
         assert isinstance(kind.untried or took_effect(kind, tmp_path / name), str)
     hidden = BY_NAME["no-heyoka"].variables(tmp_path / "site")

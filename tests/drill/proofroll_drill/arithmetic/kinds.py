@@ -8,7 +8,6 @@ import shutil
 import signal
 import subprocess
 import sys
-from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import cache
 from importlib import import_module
@@ -69,6 +68,8 @@ def kinds() -> list[Arithmetic]:
         *(Arithmetic(core.lower(), f"OpenBLAS for {core}", {"OPENBLAS_CORETYPE": core}) for core in CORES),
         _without_features("no-avx512", "numpy without AVX-512", _AVX512, {}),
         _without_features("no-avx2", "numpy and the C library without AVX-512, AVX2 and FMA", _AVX2, _PLAIN_LIBM),
+        _machine("avx2-machine", "processor with AVX2 alone", "Haswell", _AVX512, {}),
+        _machine("sse-machine", "processor with SSE alone", "Prescott", _AVX2, _PLAIN_LIBM),
         Arithmetic("two-threads", "two threads of linear algebra", threads=2, untried=_lacks_a_second_core()),
         Arithmetic("no-heyoka", "without heyoka", without=("heyoka",), untried=_lacks_heyoka()),
         *(_interpreter(version) for version in PYTHONS if version != _version(sys.executable)),
@@ -113,16 +114,23 @@ def make_ready(kind: Arithmetic) -> None:
 
 def _without_features(name: str, says: str, wanted: tuple[str, ...], more: dict[str, str]) -> Arithmetic:
     """A kind that switches off numpy's vector instructions, of those that this machine has."""
-    features = " ".join(item for item in _dispatched() if item.startswith(wanted))
+    features = _dispatched(wanted)
     untried = "" if features else "numpy dispatches to no such instructions on this processor"
     return Arithmetic(name, says, {"NPY_DISABLE_CPU_FEATURES": features} | more, untried=untried)
 
 
-def _dispatched() -> Iterator[str]:
+def _machine(name: str, says: str, core: str, lacks: tuple[str, ...], more: dict[str, str]) -> Arithmetic:
+    """A kind that changes linear algebra, numpy and threads at once: one run where each alone would take its own."""
+    variables = {"OPENBLAS_CORETYPE": core, "NPY_DISABLE_CPU_FEATURES": _dispatched(lacks)} | more
+    return Arithmetic(name, f"{says}, and two threads", variables, threads=2)
+
+
+def _dispatched(wanted: tuple[str, ...]) -> str:
     """Features that numpy chooses at run time and this processor has; a baseline cannot be switched off."""
     umath = import_module("numpy._core._multiarray_umath")  # numpy has no public name for it
 
-    return (name for name in umath.__cpu_dispatch__ if umath.__cpu_features__.get(name))
+    features = (name for name in umath.__cpu_dispatch__ if umath.__cpu_features__.get(name))
+    return " ".join(name for name in features if name.startswith(wanted))
 
 
 def _lacks_a_second_core() -> str:
