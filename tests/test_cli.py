@@ -596,6 +596,31 @@ def test_a_run_is_light(code: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Pa
     assert {"xarray", "pandas", "scipy.io"} & fresh(code) == set()
 
 
+MISTYPED = """
+import sys
+from proofroll.cli import main
+sys.argv = "proofroll {}".split()
+try:
+    main()
+except SystemExit as end:
+    assert end.code == 2
+"""
+
+
+@pytest.mark.parametrize(
+    ("words", "heavy"),
+    [
+        ("judge nofile.nc", {"proofroll.files.scene_file"}),
+        ("judge nosuch nofile.csv", {"proofroll.files.scene_file"}),
+        ("run nosuch --engine mujoco --set length=1", {"proofroll.report.run.run", "scipy"}),
+        ("run pendulum --engine mujoco --set lenth=1", {"proofroll.report.run.run"}),
+    ],
+)
+def test_a_wrong_name_is_answered_before_more_is_imported(words: str, heavy: set[str]) -> None:
+    """A file, scene or parameter that there is not costs a light start, not the libraries of runs and datasets."""
+    assert ({"xarray", "pandas", "rich.console"} | heavy) & fresh(MISTYPED.format(words)) == set()
+
+
 @pytest.mark.own_workers
 def test_a_run_takes_one_process(proofroll: Proofroll, monkeypatch: pytest.MonkeyPatch) -> None:
     """The process that tells the engine's settings also makes the run: starting another costs as much as both."""

@@ -27,8 +27,13 @@ def judge(
 ) -> None:
     """Hold a trajectory from anywhere against the truth of a scene; exit 1 if it differs."""
     from proofroll.core.errors import InputError
-    from proofroll.files.scene_file import load_scene
     from proofroll.files.trajectory_file import CSV, NETCDF, STORED
+
+    if named is not None and run.suffix not in (NETCDF, CSV, STORED) and Path(named).suffix in (NETCDF, CSV, STORED):
+        run, named = Path(named), str(run)
+    if not run.exists():  # answered before more is imported
+        raise InputError("run", run, "there is no such file")
+    from proofroll.files.scene_file import load_scene
     from proofroll.studies.judging import judge as judging
 
     written: Mapping[str, object] = {}
@@ -36,8 +41,6 @@ def judge(
         scene, written = _scene_of_run(run)
     if (named is None) == (not scene):
         raise InputError("scene", scene or "", "name it once: proofroll judge FILE --scene SCENE")
-    if named is not None and run.suffix not in (NETCDF, CSV, STORED) and Path(named).suffix in (NETCDF, CSV, STORED):
-        run, named = Path(named), str(run)
     loaded = load_scene(scene or str(named), **{**written, **options.assignments(settings)})  # type: ignore[arg-type]  # text is checked there
     bounds = options.assignments(tolerance, "--tolerance") if tolerance else None
     with options.spinner(f"the truth of {loaded.name}"):

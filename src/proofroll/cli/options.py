@@ -202,7 +202,7 @@ def spinner(text: str) -> Iterator[Callable[[str], None]]:
 def json_text(content: object) -> str:
     """Text of a JSON document."""
     from proofroll.files.json_data import plain
-    from proofroll.report.terminal.screen import escaped
+    from proofroll.report.terminal.printable import escaped
 
     return escaped(json.dumps(plain(content), indent=1, ensure_ascii=False)) + "\n"
 
@@ -262,6 +262,6 @@ def require_pages() -> None:
 
 def complain(text: str) -> None:
     """Prints one line on standard error."""
-    from proofroll.report.terminal.screen import printable
+    from proofroll.report.terminal.printable import printable
 
     sys.stderr.write(f"proofroll: {printable(' '.join(text.split()))}\n")

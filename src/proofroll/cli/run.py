@@ -52,14 +52,18 @@ def run(
     preparing = threading.Thread(target=prepare, args=(engine, workers), daemon=True)
     preparing.start()
 
+    from proofroll.studies.cases import scene_of_run, single_case
+
+    chosen, asks = options.assignments(settings), tuple(dict.fromkeys(ask or []))
+    scene_of_run(scene, chosen, asks)  # a mistyped name is answered before more is imported
+
     from proofroll.core.errors import InputError
     from proofroll.core.time_grid import EVERY, time_grid
     from proofroll.files.scene_file import scene_names
     from proofroll.files.trajectory_file import CSV, NETCDF, STORED, import_xarray, read, write
-    from proofroll.report.run.plot import require_ending
+    from proofroll.report.run.plot import draw_run, require_ending
     from proofroll.report.run.run import run_content, run_lines
     from proofroll.running.runner import run_one
-    from proofroll.studies.cases import single_case
 
     if until is not None:
         time_grid(until, EVERY if every is None else every)
@@ -74,12 +78,12 @@ def run(
         preparing.join()
         case = single_case(
             scene,
-            options.assignments(settings),
+            chosen,
             engine,
             until=until,
             every=every,
             time_limit=time_limit,
-            asks=tuple(dict.fromkeys(ask or [])),
+            asks=asks,
             workers=workers,
         )
     with tempfile.TemporaryDirectory() as folder:
@@ -90,8 +94,6 @@ def run(
         if (plot or out) is not None and result.trajectory is not None:
             import_xarray()
         if plot is not None and result.trajectory is not None:
-            from proofroll.report.run.plot import draw_run
-
             draw_run(read(target), plot)
             content = replace(content, plot=str(plot))
         if out is not None and result.trajectory is not None:

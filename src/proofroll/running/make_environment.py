@@ -13,13 +13,14 @@ import sys
 import tempfile
 import zipfile
 from collections.abc import Callable, Sequence
+from difflib import get_close_matches
 from importlib import metadata
 from importlib.util import find_spec
 from pathlib import Path
 
 from proofroll.core.announced import announced
 from proofroll.core.errors import InputError, ProofrollError
-from proofroll.core.plugins import GROUP, distribution_of, release
+from proofroll.core.plugins import GROUP, distribution_of, engine_names, release
 from proofroll.running import environments
 from proofroll.running.engine_questions import describe
 from proofroll.running.environments import Environment
@@ -71,6 +72,7 @@ def add(
     for text in requirements:
         if text.lstrip().startswith("-"):
             raise InputError("--requirement", text, "give a requirement, e.g. mujoco==3.8.1, not an option of pip")
+    _require_plausible(name, requirements)
     pinned = label_of(requirements) if requirements else ""
     label = label or pinned
     if not label:
@@ -93,6 +95,23 @@ def add(
             environments.delete(folder)
             raise
     return made
+
+
+def _require_plausible(name: str, requirements: Sequence[str]) -> None:
+    """Raises InputError if a name is a known engine's, mistyped, so that no requirement will announce it.
+
+    An engine that nothing here announces may come with a requirement; not with the package of a known engine.
+    """
+    known = engine_names()
+    packages = {package_of(item) or item for item in known}
+    if name in known or not (
+        get_close_matches(name, known) or all(distribution_of(text.strip()) in packages for text in requirements)
+    ):
+        return
+    advice = (
+        f"there is no such engine; choose one of {', '.join(known)}, or install the package that announces it here, too"
+    )
+    raise InputError("engine", name, advice)
 
 
 def package_of(engine: str) -> str:

@@ -46,6 +46,20 @@ def case_of(
     return Case(name, parameters, scene.digest, engine, until, every, asks=scene.asks, **others)
 
 
+def scene_of_run(scene: str, parameters: Mapping[str, object], asks: Sequence[str] = ()) -> Scene:
+    """Scene of one run on the command line; arguments as of :func:`single_case`.
+
+    Raises:
+        InputError: there is no such scene or parameter, or one has a value that makes no sense.
+    """
+    if "asks" in parameters:
+        raise InputError("asks", parameters["asks"], "this is no parameter; ask for it with --ask")
+    try:
+        return load_scene(scene, asks=asks, **parameters)  # type: ignore[arg-type]  # text is checked there
+    except InputError as error:
+        raise InputError("--ask", error.value, error.advice) if error.field == "asks" else error from None
+
+
 def single_case(
     scene: str,
     parameters: Mapping[str, object],
@@ -74,13 +88,8 @@ def single_case(
     """
     if not 0 < time_limit <= threading.TIMEOUT_MAX:
         raise InputError("time_limit", time_limit, "give a positive, finite time in s")
-    if "asks" in parameters:
-        raise InputError("asks", parameters["asks"], "this is no parameter; ask for it with --ask")
     spec = parse_engine(engine)
-    try:
-        loaded = load_scene(scene, asks=asks, **parameters)  # type: ignore[arg-type]  # text is checked there
-    except InputError as error:
-        raise InputError("--ask", error.value, error.advice) if error.field == "asks" else error from None
+    loaded = scene_of_run(scene, parameters, asks)
     facts = resolve([(spec.name, spec.options)], workers, loaded.requires)[0]
     if isinstance(facts, ProofrollError):
         raise facts

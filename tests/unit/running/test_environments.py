@@ -103,6 +103,30 @@ def test_what_makes_no_environment_says_why(
     assert not list(wheels.parent.glob("engines/*"))
 
 
+@pytest.mark.parametrize(
+    ("name", "requirement", "known"),
+    [
+        ("mujco", "mujoco==3.8.1", False),
+        ("mujco", "mujco==3.8.1", False),
+        ("dart", " exudyn ==1.10", False),
+        ("mujoco", "mujoco==3.8.1", True),
+        ("dart", "dart-engine==1.0", True),
+        ("pinocchio", "pin==3.7", True),
+    ],
+)
+def test_a_mistyped_engine_is_not_installed(
+    name: str, requirement: str, known: bool, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """One line names the engines before anything is made; an engine that a requirement may announce is let through."""
+    monkeypatch.setenv(environments.VARIABLE, str(tmp_path))
+    monkeypatch.setattr(make_environment, "_require_supported", lambda *_: None)
+    monkeypatch.setattr(make_environment, "_made", lambda *_: pytest.fail("made"))
+    expected = pytest.raises(pytest.fail.Exception, match="made")
+    told = pytest.raises(InputError, match=f"engine = '{name}': there is no such engine; choose one of exudyn, mujoco")
+    with expected if known else told:
+        make_environment.add(name, [requirement])
+
+
 @pytest.mark.drill
 def test_an_interrupted_environment_leaves_nothing(wheels: Path, tmp_path: Path) -> None:
     """Ctrl-C ends what was started, exits 130, and no half is taken for a whole."""

@@ -2,7 +2,6 @@
 
 import copy
 import dataclasses
-import re
 from collections.abc import Iterable
 from typing import Any
 
@@ -12,18 +11,7 @@ from rich.segment import Segment
 from rich.table import Column, Table
 from rich.text import Text
 
-# Control characters but line feed, and Unicode characters that reverse or end a line.
-_COMMANDS = re.compile("[\x00-\x09\x0b-\x1f\x7f-\x9f\u2028\u2029\u202a-\u202e\u2066-\u2069]")
-
-
-def printable(text: str) -> str:
-    """Text without characters that control a terminal."""
-    return _COMMANDS.sub("", text)
-
-
-def escaped(text: str) -> str:
-    """JSON with control characters as escapes, so that nothing is lost."""
-    return _COMMANDS.sub(lambda found: f"\\u{ord(found[0]):04x}", text)
+from proofroll.report.terminal.printable import printable
 
 
 class Screen(Console):

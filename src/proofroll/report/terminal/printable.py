@@ -1,0 +1,16 @@
+"""Text of engines and files without what would control a terminal."""
+
+import re
+
+# Control characters but line feed, and Unicode characters that reverse or end a line.
+_COMMANDS = re.compile("[\x00-\x09\x0b-\x1f\x7f-\x9f\u2028\u2029\u202a-\u202e\u2066-\u2069]")
+
+
+def printable(text: str) -> str:
+    """Text without characters that control a terminal."""
+    return _COMMANDS.sub("", text)
+
+
+def escaped(text: str) -> str:
+    """JSON with control characters as escapes, so that nothing is lost."""
+    return _COMMANDS.sub(lambda found: f"\\u{ord(found[0]):04x}", text)
