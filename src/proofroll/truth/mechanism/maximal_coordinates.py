@@ -75,7 +75,9 @@ class NumericEquations:
     def _rank(self, state: Array) -> int:
         C = self._matrix(self.equations.at(state.tolist(), switched=self._switched).rows)
         values = np.linalg.svd(C @ self._inverse_root, compute_uv=False) if C.size else np.zeros(0)
-        return int((values > RANK * values.max(initial=0.0)).sum())
+        # rows that hold a planar body in its plane are none at all, but for round-off of a turned frame
+        unit = float(np.linalg.svd(self._inverse_root, compute_uv=False)[-1])
+        return int((values > RANK * values.max(initial=unit)).sum())
 
     def independent_rows(self) -> list[int]:
         """Indices of linearly independent rows, as many as the rank, chosen by pivoting at the start."""

@@ -282,6 +282,18 @@ def test_a_hinge_whose_child_is_turned_has_a_truth(orientation, axis, monkeypatc
     agreed(mechanism)
 
 
+def test_a_body_whose_plane_is_turned_is_held_by_no_row():
+    """Rows that hold a planar body in its plane are round-off, however its frames are turned, and count as none."""
+    random = np.random.default_rng(0)
+    for _ in range(50):
+        orientation, axis, across = random.normal(size=(3, 3))
+        joint = Joint("j", "planar", "world", "rod", (0.1, 0.2, 0.3), tuple(orientation), tuple(axis),
+                      second_axis=tuple(np.cross(axis, across)), q0=(0.3, -0.4, 0.7), v0=(1.0, 0.0, 2.0))  # fmt: skip
+        lean = MaximalCoordinates(Mechanism((Body("rod", **SOLID),), (joint,))).lean
+        assert [type(body) for body in lean.equations.bodies] == [Planar]
+        assert lean.rank == 0
+
+
 def test_routes_that_start_apart_are_an_error_of_ours(scene, monkeypatch):
     """A route that places a body wrongly at t = 0 is said to be wrong, and no singular pose is named."""
     monkeypatch.setattr(maximal_taylor, "heyoka", None)

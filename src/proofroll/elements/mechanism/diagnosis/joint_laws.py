@@ -152,8 +152,8 @@ def _off_at_start(mechanism: Mechanism, number: int, ratio: float, rates: FloatA
 
 @hypothesis(
     "stops",
-    "the engine's joint rests at one other place than at the true stop, or turns back at one each time; if it turns "
-    "back once, place and rate after that are those of the stop's restitution there",
+    "the engine's joint rests at one other place than at the true stop, or turns back at one each time, further off "
+    "than a step reaches; if it turns back once, place and rate after that are those of the stop's restitution there",
 )
 def of_stops(evidence: Evidence) -> Iterator[Cause]:
     """Hypothesis: a stop is misplaced.
@@ -187,9 +187,12 @@ def of_stops(evidence: Evidence) -> Iterator[Cause]:
                 continue
             shift = float(np.median(off))
             before, after, count = float(np.max(np.abs(off))), float(np.max(np.abs(off - shift))), len(off)
+            fastest = max((each.speed for each in own), default=float(np.max(np.abs(speeds[:, rated]))))
+            # A method turns back, or comes to rest, where a step ends; one that chooses its steps ends them at samples.
+            # Several rebounds tell no more: with e = 1, flights after a fall from rest last whole numbers of steps.
+            if abs(shift) <= _REACHES * (evidence.step or float(np.max(np.diff(times)))) * fastest:
+                continue
             if count == 1:
-                if abs(shift) <= _REACHES * (evidence.step or 0.0) * own[0].speed:
-                    continue  # it turned back at the end of a step
                 before, after = (own[0].missed(x, joint.restitution) for x in (limit, limit + shift))
                 count = 2  # place and rate
             says = f"the joint {joint.name} {does} at {limit + shift:.6g}, not at its stop at {limit:.6g}"
