@@ -357,7 +357,18 @@ def test_what_is_not_judged_is_named() -> None:
     state = {name: run[name].to_numpy() for name in ("time", "p_WB", "v_WB", "w_WB", "q_WB", "energy")}
     assert proofroll.judge(state, "pendulum").unjudged == {"energy": "it follows from the state, which is judged"}
     of_places = proofroll.judge(state, "pendulum", {"positions": "1 %"}).unjudged
-    assert {name for name, why in of_places.items() if why == "no tolerance is given for it"} == {"v_WB", "w_WB"}
+    assert of_places == dict.fromkeys(("p_WB", "v_WB", "w_WB", "q_WB", "energy"), "no tolerance is given for it")
+
+
+def test_bodies_beside_the_tracked_points_are_named_where_no_tolerance_judges_them() -> None:
+    """A crank that is a metre off agrees in the places of tracked points; that its own place is not judged is said."""
+    run = proofroll.simulate("slider_crank", "projection", until=0.05)
+    state = {name: run[name].to_numpy() for name in ("time", "p_WB", "v_WB", "w_WB", "q_WB")}
+    state["p_WB"] = state["p_WB"] + np.array([1.0, 0.0, 0.0]) * (np.arange(3) == 0)[:, None]
+    found = proofroll.judge(state, "slider_crank", {"positions": "1 mm"})
+    assert found.agrees
+    assert str(found).endswith("not judged: p_WB, v_WB, w_WB, q_WB; no tolerance is given for it")
+    assert not proofroll.judge(state, "slider_crank").agrees
 
 
 def test_a_notebook_shows_a_verdict() -> None:

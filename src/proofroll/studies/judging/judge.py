@@ -13,6 +13,7 @@ from proofroll.core.columns import UNCERTAIN
 from proofroll.core.comparison import Tolerance
 from proofroll.core.dataset import BETWEEN, off_impacts
 from proofroll.core.errors import InputError, require_known
+from proofroll.core.multi_element import REQUIRED
 from proofroll.core.number_format import number, spaced
 from proofroll.core.observable import Observable, Role
 from proofroll.core.scene import Scene
@@ -191,7 +192,7 @@ def _unjudged(given: GivenRun, reference: Reference, judged: Mapping[str, Tolera
         if not _comparable(reference, name):
             reasons[name] = "the truth has nothing of that name"
         elif why or name not in judged:
-            reasons[name] = why or _NO_TOLERANCE
+            reasons[name] = why if why and REQUIRED[0] in judged else _NO_TOLERANCE
     return reasons
 
 

@@ -42,8 +42,8 @@ class GivenRun:
         dataset: with ``time``, and with all variables that follow from the state if that is given.
         units: variable -> its unit, if it has one.
         labels: dimension -> its labels (names of bodies) in order.
-        besides: variable that is not part of the state, or a velocity -> reason why it is not judged, or None if that
-            is not known yet; empty for a run of proofroll's own.
+        besides: given variable -> reason why it is not judged, or None if that is not known yet; empty for a run of
+            proofroll's own.
         reactions: columns that do not follow from the state: forces and moments.
     """
 
@@ -116,7 +116,7 @@ def read_run(run: RunInput, scene: Scene) -> GivenRun:
     # Reactions do not follow from the state: they are judged as they are given.
     kept = [name for name in names if name not in state and not _has_values(completed, name)]
     besides: dict[str, str | None] = dict.fromkeys([name for name in names if name not in (*state, *kept)], FROM_STATE)
-    besides |= dict.fromkeys((*REQUIRED[1:], *kept))  # velocities: the judged observables may need positions only
+    besides |= dict.fromkeys((*state, *kept))  # the judged observables may be of some bodies' places alone
     return GivenRun(completed.assign({name: dataset[name] for name in kept}), units, labels, besides, kept)
 
 
