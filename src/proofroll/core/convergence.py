@@ -53,6 +53,7 @@ class Limit:
         saturated: True if two tolerances gave the same run: something else (samples at which steps end) limits the
             steps, so that no limit of small steps follows.
         beside: effect on the finest curve of events that are one step late (:mod:`proofroll.core.beside_events`).
+        chance: further doubt in a limit whose order is above the scheme's: its last change may be small by chance.
         rounded: True if the differences are so near to the round-off of single precision that no order shows.
         floor: clause about the error floor of single precision that ends the refinement; empty: there is none.
     """
@@ -63,6 +64,7 @@ class Limit:
     shown: bool = True
     saturated: bool = False
     beside: float = 0.0
+    chance: float = 0.0
     rounded: bool = False
     floor: str = ""
 
@@ -78,7 +80,8 @@ def richardson(
     twice the last change, or the change from removing a term h^(p-1) instead, which h^p may hide, if that is larger;
     where the order was rounded to a whole one, the bar includes the effect of rounding it. In any other ladder
     extrapolation would spread the error of the coarse curves: the limit is the finest curve, with twice the change of
-    the last refinement (more if the order is below one) as its bar.
+    the last refinement (more if the order is below one) as its bar. An order above the scheme's may be chance in that
+    change, which then may have been as large as the change before it, shrunk by the scheme's order.
 
     In single precision each step rounds the state, so that shorter steps may be worse. Unless the differences are far
     above that scatter, an order counts only if the ladder is asymptotic with differences of one shape; otherwise, and
@@ -110,7 +113,8 @@ def richardson(
         power = max(1, round(order))
         of_one_shape = largest_magnitude((fine - middle) - (middle - coarse) * last / first) <= _ASYMPTOTIC * last
         if abs(order - power) > _ASYMPTOTIC or not of_one_shape:
-            return Limit(fine, 2 * last * max(1.0, 1 / (h[1] ** order - 1)), order)
+            chance = max(0.0, first / _shrinkage(declared or order, h) - last)
+            return Limit(fine, 2 * last * max(1.0, 1 / (h[1] ** order - 1)), order, chance=2 * chance)
         rounding = last * abs(1 / (h[1] ** order - 1) - 1 / (h[1] ** power - 1))
     before = middle + (middle - coarse) / ((h[0] / h[1]) ** power - 1)
     after = fine + (fine - middle) / (h[1] ** power - 1)
@@ -153,10 +157,15 @@ def observed_order(first: float, last: float, steps: Sequence[float] | FloatArra
     h1, h2, h3 = (float(step) / float(steps[-1]) for step in steps)
 
     def excess(p: float) -> float:
-        return float(np.log((h1**p - h2**p) / (h2**p - h3**p)) - np.log(first / last))
+        return float(np.log(_shrinkage(p, (h1, h2, h3)) * last / first))
 
     low, high = _ORDERS
     return float(brentq(excess, low, high)) if excess(low) < 0 < excess(high) else float("nan")
+
+
+def _shrinkage(order: float, h: Sequence[float] | FloatArray) -> float:
+    """Ratio of the first change to the last one of three steps, by a power law of this order."""
+    return float((h[0] ** order - h[1] ** order) / (h[1] ** order - h[2] ** order))
 
 
 def _removes(term: int, h: FloatArray, power: int) -> float:

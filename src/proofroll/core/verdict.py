@@ -71,7 +71,7 @@ class Judgement:
         order: observed order, or None.
         limit_error: distance of the limit of small steps from the truth, or None without a ladder.
         limit_error_bar: uncertainty of that distance.
-        limit_doubt: the same with round-off and with what one step beside an event does; a limit that is beyond a
+        limit_doubt: the same with round-off, one step beside an event and chance in the order; a limit that is beyond a
             tolerance by more than this does not hold it.
         limit: result of the ladder of steps, see :class:`LimitResult`.
         reason: ground of the verdict, as a clause with numbers.
@@ -230,7 +230,7 @@ class _Ladder:
     Attributes:
         finding: result for the limit of small steps.
         error, bar, order: of the limit; None without one.
-        doubt: the bar with round-off and with what one step beside an event does; None without a limit.
+        doubt: the bar with round-off, with what one step beside an event does, and with chance; None without a limit.
         leaves: True if finer steps leave the tolerance, with or without an order.
         wrong_within: True if the limit is within tolerance, but proven not to be the truth.
         text: the numbers, for a person.
@@ -254,7 +254,7 @@ def _read(limit: Limit, allowance: Allowance, true: TrueCurve, round_off: float)
     bar, order = limit.error_bar + true.error_bar, limit.order if np.isfinite(limit.order) else None
     settled = limit.shown or limit.error_bar <= _FLAT * tolerance
     far_inside = error + _SEVERAL * bar <= tolerance
-    doubted = bar + limit.beside + round_off
+    doubted = bar + limit.beside + limit.chance + round_off
     drifted = doubted - limit.error_bar + limit.error_bar / _FLAT  # if twenty further halvings each change as much
     finding, leaves = LimitResult.NOT_SHOWN, error - doubted > tolerance
     if far_inside or (settled and error <= tolerance and bar <= tolerance):
@@ -262,7 +262,8 @@ def _read(limit: Limit, allowance: Allowance, true: TrueCurve, round_off: float)
     elif leaves and not limit.saturated and (limit.shown or error - drifted > tolerance):
         finding = LimitResult.ANOTHER
     shown = limit.shown or limit.error_bar <= _SHOWN_WRONG * round_off
-    wrong = shown and finding == LimitResult.WITHIN and error > _SHOWN_WRONG * (bar + round_off) + limit.beside
+    beyond = _SHOWN_WRONG * (bar + round_off) + limit.beside + limit.chance
+    wrong = shown and finding == LimitResult.WITHIN and error > beyond
     shown_order = (
         f"no order{' shows in single precision' if limit.rounded else ''}" if order is None else f"order {order:.3g}"
     )

@@ -37,7 +37,7 @@ class TableLine:
         limit: result of a ladder of steps for the quantity.
         limit_error: distance of the limit of small steps from the truth; None: there is none.
         limit_error_bar: of that distance, from the scatter of the ladder.
-        limit_doubt: uncertainty of that distance, of round-off and of steps beside events included.
+        limit_doubt: uncertainty of that distance; round-off, steps beside events and chance in the order included.
         floor: clause about the error floor of single precision that ends the refinement; empty: there is none.
         quantity, unit, role: the measured quantity and its role (:class:`proofroll.core.observable.Role`).
         headline: summaries show it.

@@ -62,6 +62,14 @@ def test_an_integer_order_in_disguise(declared: int | None) -> None:
     assert np.max(np.abs(found.values - LIMIT)) <= found.error_bar
 
 
+def test_an_order_above_the_schemes_is_chance_in_the_last_change() -> None:
+    """A last change that happens to be small leaves a limit of which as much is in doubt as by the scheme's order."""
+    coarse, middle = (LIMIT + h * np.sin(5 * T) for h in (0.4, -0.4))
+    found = richardson([coarse, middle, middle + 0.1 * np.cos(7 * T)], (4, 2, 1), 1)
+    assert found.order > 2.5
+    assert found.error_bar + found.chance >= 0.4
+
+
 def test_an_order_that_was_not_declared() -> None:
     """Curves of the first order are extrapolated by it, whatever was declared; where they scatter they are not."""
     curves = [curve(h, 1) for h in (0.04, 0.02, 0.01)]
