@@ -13,8 +13,8 @@ from proofroll.elements.mechanism.rotations import Array, cross, frame_of_axis
 from proofroll.truth.hybrid import Transition
 from proofroll.truth.mechanism.body_switching import SLACK
 from proofroll.truth.mechanism.contact_equations import BodiesSolution, BodiesState, ContactEquations
-from proofroll.truth.mechanism.contact_guards import AT_REST, SLIP_ENDED
-from proofroll.truth.mechanism.contact_stretches import ContactStretches, SolvedContacts, modes_of
+from proofroll.truth.mechanism.contact_guards import AT_REST, SLIP_ENDED, SolvedContacts, pressing
+from proofroll.truth.mechanism.contact_stretches import ContactStretches, modes_of
 
 _MOST = 6  # largest number of contacts closed at the same time: each has up to four candidate modes
 _SAME = 1e-6  # velocity difference, relative to the largest speed, below which two outcomes of an impact are the same
@@ -55,7 +55,8 @@ class ContactBodies(ContactStretches):
             return tuple(
                 each if rub or each.kind == "open" else each._replace(kind="slip") for each, rub in own
             ), np.inf
-        kept, _, mode = self._tried(bodies, closed, still, trial)[0]
+        free = float(np.abs(bodies.J @ np.linalg.solve(bodies.mass, bodies.force)).max())
+        kept, _, mode = self._tried(bodies, closed, still, trial, free)[0]
         return mode, kept
 
     def _balanced(self, bodies: BodiesState, closed: Sequence[bool]) -> bool:
@@ -94,7 +95,8 @@ class ContactBodies(ContactStretches):
         def trial(mode: ContactMode, headings: Sequence[Array | None]) -> BodiesSolution:
             return self.equations.struck(bodies, mode, headings, after.tolist())
 
-        (_, solution, _), *others = self._tried(bodies, closed, [True] * len(closed), trial)
+        comes = float(np.abs(bodies.J @ bodies.u).max())
+        (_, solution, _), *others = self._tried(bodies, closed, [True] * len(closed), trial, comes, impact=True)
         e = self.equations.equations.equations
         state = state.copy()
         state[e.nx : e.nx + e.nu] = solution.moved
@@ -112,11 +114,19 @@ class ContactBodies(ContactStretches):
         return modes
 
     def _tried(
-        self, bodies: BodiesState, closed: Sequence[bool], still: Sequence[bool], trial: Trial
+        self,
+        bodies: BodiesState,
+        closed: Sequence[bool],
+        still: Sequence[bool],
+        trial: Trial,
+        free: float,
+        *,
+        impact: bool = False,
     ) -> list[tuple[float, BodiesSolution, ContactMode]]:
         """Candidate modes that violate no inequality, best first: relative margin, solution, mode.
 
-        Where none of them has unique forces, those count whose motion is unique all the same: nothing that closes rubs.
+        ``free``: largest slide, or rate of a slide, without forces, to which margins are relative if those with forces
+        are less. Of an ``impact`` those with shared loads count only where none has unique impulses.
 
         Raises:
             Refused: there is none, or too many contacts are closed.
@@ -127,14 +137,19 @@ class ContactBodies(ContactStretches):
         choices = [list(self._candidates(k, own, still[k], bodies)) for k, own in enumerate(self._own(bodies, closed))]
         unique, shared = (list[tuple[float, BodiesSolution, ContactMode]]() for _ in range(2))
         for mode in itertools.product(*choices):
-            attempt = self._headed(bodies, mode, trial)
+            attempt = self._headed(bodies, mode, still, trial)
             if attempt is None:
                 continue
             solution, headed = attempt
-            apart = (self._kept(k, headed[k], still[k], bodies, solution) for k in range(len(mode)) if closed[k])
+            normals = pressing(headed, bodies.touching, solution.force, solution.splits)
+            apart = (
+                self._kept(k, headed[k], still[k], bodies, solution, float(normals[k]), free)
+                for k in range(len(mode))
+                if closed[k]
+            )
             if (least := min(apart, default=np.inf)) >= -SLACK:
                 (shared if solution.loose else unique).insert(0, (max(least, 0.0), solution, headed))
-        kept = unique or shared
+        kept = unique or shared if impact else shared + unique
         if not kept:
             raise Refused("nothing that the contacts can do keeps all inequalities of contact")
         return sorted(kept, key=lambda one: -one[0])
@@ -160,11 +175,11 @@ class ContactBodies(ContactStretches):
             yield Acting("slip", (-x, -y, -z), (-x, -y, -z))
 
     def _headed(
-        self, bodies: BodiesState, mode: ContactMode, trial: Trial
+        self, bodies: BodiesState, mode: ContactMode, still: Sequence[bool], trial: Trial
     ) -> tuple[BodiesSolution, ContactMode] | None:
         """Solution and mode of a candidate, with unknown slip directions solved for.
 
-        None: none is consistent, or contacts that rub share forces, which leaves more than one motion.
+        None: none is consistent, or contacts that begin to rub share forces.
         """
         from scipy.optimize import root
 
@@ -191,7 +206,8 @@ class ContactBodies(ContactStretches):
             return np.array([float(cross(way, slides[k]) @ bodies.touching[k].normal) for k, way in across_slide])
 
         first = tried(np.zeros(len(unknown)))
-        if first.loose and any(own.kind == "slip" and rub for own, rub in zip(mode, self._rubs, strict=True)):
+        begins = (own.kind == "slip" and rub and rests for own, rub, rests in zip(mode, self._rubs, still, strict=True))
+        if first.loose and any(begins):
             return None  # whatever the directions are
         if not unknown:
             return first, mode
@@ -207,13 +223,22 @@ class ContactBodies(ContactStretches):
                 return solution, tuple(headed)
         return None
 
-    def _kept(self, k: int, own: Acting, still: bool, bodies: BodiesState, solution: BodiesSolution) -> float:
+    def _kept(
+        self,
+        k: int,
+        own: Acting,
+        still: bool,
+        bodies: BodiesState,
+        solution: BodiesSolution,
+        normal: float,
+        free: float,
+    ) -> float:
         """Margin of a contact's inequalities, relative to forces or speeds; negative: one is violated."""
         each, mu, bound = bodies.touching[k], float(self.equations.friction[k]), float(self.equations.bounds[k])
-        size_f, size_s = float(np.abs(solution.force).max()), float(np.abs(solution.slide).max()) or 1.0
+        size_f, size_s = float(np.abs(solution.force).max()), max(float(np.abs(solution.slide).max()), free) or 1.0
         if own.kind == "open":
             return float(solution.parting[k]) / size_s
-        normal = np.inf if bound else float(each.normal @ solution.force[k])
+        normal = np.inf if bound else normal
         if not size_f:
             return np.inf
         if own.kind == "stick":
@@ -244,6 +269,8 @@ class ContactBodies(ContactStretches):
             solution.slide,
             solution.force,
             solution.response,
+            solution.splits,
+            solution.spread,
         )
 
 

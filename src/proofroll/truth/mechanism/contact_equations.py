@@ -55,6 +55,8 @@ class BodiesSolution:
         parting: second rate of each gap; or after an impact its rate minus that of the restitution law, (contacts).
         response: Painlevé's measure, 1 without friction.
         loose: True if the forces are not unique.
+        splits: ways to split a load that contacts share: changes of the normal forces, (contacts, ways).
+        spread: change of ``moved`` with these, the whole of unit length.
     """
 
     mode: ContactMode
@@ -64,6 +66,8 @@ class BodiesSolution:
     parting: Array
     response: float
     loose: bool
+    splits: Array
+    spread: float
 
 
 class ContactEquations:
@@ -195,13 +199,23 @@ class ContactEquations:
         answer = units * np.linalg.lstsq(system, units * np.concatenate([right, *aims]), rcond=1e-13)[0]
         x, z = answer[:nu], answer[nu + len(state.C) :]
         plain = np.block([[state.mass, -K.T], [K, none]]) * units * units[:, None]
-        loose = bool(np.linalg.matrix_rank(plain[nu:, :nu], RANK) < count)
-        response = 1.0 if loose else float(np.linalg.det(system) / np.linalg.det(plain))
-        for (k, direction), size in zip(owner, z, strict=True):
+        sides, sizes, _ = np.linalg.svd(plain[nu:, :nu])
+        rank = int((sizes > RANK).sum())
+        # without what the split of a shared load changes
+        whole = np.block([[np.eye(nu), np.zeros((nu, rank))], [np.zeros((count, nu)), sides[:, :rank]]])
+        response = float(np.linalg.det(whole.T @ system @ whole) / np.linalg.det(whole.T @ plain @ whole))
+        ways = np.zeros((len(system), 0))
+        if rank < count:
+            ways = units[:, None] * np.linalg.svd(system)[2][nu + rank :].T
+            ways /= np.linalg.norm(ways[nu:], axis=0)
+        splits = np.zeros((len(mode), ways.shape[1]))
+        for (k, direction), size, way in zip(owner, z, ways[nu + len(state.C) :], strict=True):
             force[k] += size * direction
+            splits[k] += float(direction @ state.touching[k].normal) * way
         slide = state.J @ x + bias
         parting = np.array([each.normal @ rate for each, rate in zip(state.touching, slide, strict=True)]) + beyond
-        return BodiesSolution(mode, x, force, slide, parting, response, loose)
+        spread = float(np.linalg.norm(ways[:nu]))
+        return BodiesSolution(mode, x, force, slide, parting, response, rank < count, splits, spread)
 
     def applied(self, state: BodiesState, force: Array) -> tuple[Array, Array]:
         """Forces of contacts between bodies, and wrenches on the bodies about their centres of mass, (bodies, 6)."""

@@ -1,5 +1,6 @@
 """Guards that end a stretch with contacts, for both routes: values that are negative while a mode lasts."""
 
+import itertools
 from collections.abc import Sequence
 from typing import Literal, NamedTuple
 
@@ -7,6 +8,7 @@ import numpy as np
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Refused
+from proofroll.elements.mechanism.analysis import RANK
 from proofroll.elements.mechanism.contacts.acting import FAINT, Acting, ContactMode, heading_of, slip_velocity
 from proofroll.elements.mechanism.contacts.geometry import BodyContact
 from proofroll.elements.mechanism.contacts.joint_laws import JointContact
@@ -21,6 +23,8 @@ SLIP_ENDED = 1e-11  # slip speed that remains when a slip below FAINT is extrapo
 # Value of Painlevé's measure (1 without friction) that counts as zero.
 _LEAST_RESPONSE = 1e-3
 _TURNED = 0.5  # cosine of the angle by which a line may turn in a stretch
+# Speed, in natural units, by which slips may differ that share a load: round-off leaves 4e-15 of parallel ones.
+_SHARED = 1e-11
 _DIGITS = 1e-14  # relative to the mechanism's size: round-off of a gap that has just opened
 
 
@@ -34,11 +38,37 @@ class ContactGuard(NamedTuple):
         contact: index of the contact; -1: all contacts.
         kind: ``close``: a gap closes; ``lift``: a normal force reaches zero; ``still``: a slip stops; ``break``: the
             friction of a sticking contact reaches its bound; ``turn``: its line has turned so far that its sense has
-            to be taken anew; ``flat``: a disc lies flat; ``tear``: Painlevé's measure reaches zero.
+            to be taken anew; ``flat``: a disc lies flat; ``tear``: Painlevé's measure reaches zero; ``share``: the
+            motion begins to depend on how contacts share a load.
     """
 
     contact: int
-    kind: Literal["close", "lift", "still", "break", "turn", "flat", "tear"]
+    kind: Literal["close", "lift", "still", "break", "turn", "flat", "tear", "share"]
+
+
+class SolvedContacts(NamedTuple):
+    """Motion and forces at a state in a mode.
+
+    Attributes:
+        touching: geometry and sliding velocity of each contact.
+        mode: the mode, with lines of contacts as they lie now.
+        velocity, acceleration: in the route's own coordinates.
+        slide_rate: rate of each sliding velocity, (contacts, 3).
+        force: on body a of each contact, (contacts, 3).
+        response: Painlevé's measure, 1 without friction.
+        splits: ways to split a load that contacts share: changes of the normal forces, (contacts, ways).
+        spread: change of the acceleration with these, the whole of unit length.
+    """
+
+    touching: Sequence[Touching]
+    mode: ContactMode
+    velocity: Array
+    acceleration: Array
+    slide_rate: Array
+    force: Array
+    response: float
+    splits: Array
+    spread: float
 
 
 def guards_of(contacts: Sequence[Touchable], mode: ContactMode) -> list[ContactGuard]:
@@ -58,33 +88,26 @@ def guards_of(contacts: Sequence[Touchable], mode: ContactMode) -> list[ContactG
             guards.append(ContactGuard(k, "flat"))
     if any(own.kind == "slip" and contact.friction for contact, own in zip(contacts, mode, strict=True)):
         guards.append(ContactGuard(-1, "tear"))
+        if sum(own.kind != "open" for own in mode) > 1:
+            guards.append(ContactGuard(-1, "share"))
     return guards
 
 
 def guard_value(
-    guard: ContactGuard,
-    mode: ContactMode,
-    now: ContactMode,
-    contacts: Sequence[Touchable],
-    touching: Sequence[Touching],
-    force: Array,
-    response: float,
+    guard: ContactGuard, mode: ContactMode, contacts: Sequence[Touchable], solved: SolvedContacts, normals: Array
 ) -> float:
     """Value of a guard.
 
     Args:
         guard: the guard.
         mode: as it began.
-        now: with lines of contacts as they lie now.
         contacts: all of them.
-        touching: their geometry.
-        force: on body a of each [N].
-        response: Painlevé's measure.
+        solved: motion and forces.
+        normals: as by :func:`pressing`.
     """
-    if guard.kind == "tear":
-        return _LEAST_RESPONSE - response
-    own, touch = now[guard.contact], touching[guard.contact]
-    normal = float(touch.normal @ force[guard.contact])
+    if guard.contact < 0:
+        return _LEAST_RESPONSE - solved.response if guard.kind == "tear" else _undecided(contacts, solved)
+    own, touch = solved.mode[guard.contact], solved.touching[guard.contact]
     if guard.kind in {"close", "flat"}:
         return -float(touch.gap) if guard.kind == "close" else FLAT - touch.tilt
     if guard.kind == "turn":
@@ -92,13 +115,50 @@ def guard_value(
         assert began is not None  # a contact without a line
         assert own.along is not None  # has no such guard
         return _TURNED - float(np.dot(began, own.along))
-    if guard.kind == "lift":
-        return -normal
     if guard.kind == "still":
         return _stopping(own, touch)
-    held = float(np.linalg.norm(force[guard.contact] - normal * touch.normal))
-    contact = contacts[guard.contact]
-    return held - (contact.bound or contact.friction * normal)
+    if guard.kind == "lift":
+        return -float(normals[guard.contact])
+    force, contact = solved.force[guard.contact], contacts[guard.contact]
+    normal = float(touch.normal @ force)
+    return float(np.linalg.norm(force - normal * touch.normal)) - (contact.bound or contact.friction * normal)
+
+
+def _undecided(contacts: Sequence[Touchable], solved: SolvedContacts) -> float:
+    """Guard of a motion that hangs on how contacts share a load.
+
+    Each split of it has its own friction where slips are not parallel. The slower these are, the less time it has to
+    act: the spread of the accelerations counts by their speed.
+    """
+    rubbing = zip(solved.mode, contacts, solved.touching, strict=True)
+    speeds = (slip_velocity(each) for own, contact, each in rubbing if own.kind == "slip" and contact.friction)
+    return solved.spread * max(float(np.linalg.norm(speed)) for speed in speeds) - _SHARED
+
+
+def sharing(splits: Array) -> list[int]:
+    """Indices of the contacts that share a load."""
+    return np.flatnonzero(np.linalg.norm(splits, axis=1) > RANK).tolist()
+
+
+def pressing(mode: ContactMode, touching: Sequence[Touching], force: Array, splits: Array) -> Array:
+    """Normal force of each contact; where contacts share a load and none sticks, the least in its most even split.
+
+    By duality that is the least mean load of groups of contacts, weighted so that no split changes it: of a box on its
+    four corners, half the load of an edge.
+    """
+    normals = np.array([each.normal @ own for each, own in zip(touching, force, strict=True)])
+    shares = sharing(splits)
+    if any(own.kind == "stick" for own in mode):
+        return normals  # friction that holds may be split, too, within its own bounds
+    loads, sums = [np.inf], np.column_stack([splits, np.ones(len(splits))]).T
+    aim = np.eye(len(sums))[-1]
+    for size in range(1, len(sums) + 1):
+        for group in map(list, itertools.combinations(shares, size)):
+            weights = np.linalg.lstsq(sums[:, group], aim, rcond=RANK)[0]
+            if weights.min() >= -RANK and np.abs(sums[:, group] @ weights - aim).max() <= RANK:
+                loads.append(float(weights @ normals[group]))
+    normals[shares] = min(loads)
+    return normals
 
 
 def _stopping(own: Acting, touch: Touching) -> float:

@@ -6,7 +6,7 @@ Each route adds its own equations and its own decisions on the next mode.
 from abc import abstractmethod
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import NamedTuple, Protocol
+from typing import Protocol
 
 import numpy as np
 
@@ -23,12 +23,15 @@ from proofroll.truth.mechanism.contact_guards import (
     SLIP_ENDED,
     STANDS,
     ContactGuard,
+    SolvedContacts,
     Touchable,
     faint_time,
     guard_value,
     guards_of,
     noise_of,
+    pressing,
     refuse_turning_onset,
+    sharing,
     striking,
 )
 from proofroll.truth.mechanism.followed_paths import CLOSE
@@ -38,27 +41,6 @@ _AHEAD = 1e-9  # time step, relative to the natural time, after which an effort 
 _CLAMPED = 1e-9  # difference of an effort from its limit, relative to the limit, up to which it starts at the limit
 # Integration of a slip to rest: decrease of its logarithm per step, steps at most, and slip speed at the end.
 _DECAY, _MOST_DECAYS, _NOTHING = 0.25, 120, 1e-12
-
-
-class SolvedContacts(NamedTuple):
-    """Motion and forces at a state in a mode.
-
-    Attributes:
-        touching: geometry and sliding velocity of each contact.
-        mode: the mode, with lines of contacts as they lie now.
-        velocity, acceleration: in the route's own coordinates.
-        slide_rate: rate of each sliding velocity, (contacts, 3).
-        force: on body a of each contact, (contacts, 3).
-        response: Painlevé's measure, 1 without friction.
-    """
-
-    touching: Sequence[Touching]
-    mode: ContactMode
-    velocity: Array
-    acceleration: Array
-    slide_rate: Array
-    force: Array
-    response: float
 
 
 class _Equations(Protocol):
@@ -124,21 +106,20 @@ class ContactStretches(Stretches[ContactMode]):
 
     def _guards(self, state: Array, mode: ContactMode, guards: Sequence[ContactGuard]) -> FloatArray:
         solved, contacts = self._solved(state, mode), self.contacts
-        return np.array(
-            [
-                guard_value(guard, mode, solved.mode, contacts, solved.touching, solved.force, solved.response)
-                for guard in guards
-            ]
-        )
+        normals = pressing(solved.mode, solved.touching, solved.force, solved.splits)
+        return np.array([guard_value(guard, mode, contacts, solved, normals) for guard in guards])
 
     def walk(self, time: float, state: Array, mode: ContactMode, until: float) -> Stretch[ContactMode]:
         """See the protocol."""
         if self._stands(state, mode):
             return Stretch(time, until, mode, state, state, None)
+        guards = guards_of(self.contacts, mode)
+        share = next((number for number, guard in enumerate(guards) if guard.kind == "share"), None)
+        if share is not None and self._guards(state, mode, [guards[share]])[0] > 0:
+            return Stretch(time, time, mode, state, state, share)
         start, begun = self._kicked(time, state, mode)
         stretch = super().walk(begun, start, mode, until)
         end, last = stretch.end, stretch.last
-        guards = guards_of(self.contacts, mode)
         if stretch.guard is not None and stretch.guard < len(guards):
             k, kind = guards[stretch.guard]
             if kind == "still":
@@ -192,6 +173,10 @@ class ContactStretches(Stretches[ContactMode]):
             raise lying(name, stretch.end)
         if kind == "turn":
             return Transition(stretch.last, self._solved(stretch.last, stretch.mode).mode, ())
+        if kind == "share" or (kind == "lift" and k in sharing(self._solved(stretch.last, stretch.mode).splits)):
+            return Transition(
+                stretch.last, None, (), margin=0.0
+            )  # no split of the load is left, or each moves another way
         if kind == "lift":
             mode[k] = OPEN
             return Transition(stretch.last, tuple(mode), (("lift_off", name),))

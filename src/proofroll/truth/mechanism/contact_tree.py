@@ -9,8 +9,8 @@ from proofroll.elements.mechanism.contacts.dynamics import ContactDynamics, Cont
 from proofroll.elements.mechanism.contacts.touching import Touching
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.truth.hybrid import Transition
-from proofroll.truth.mechanism.contact_guards import SLIP_ENDED
-from proofroll.truth.mechanism.contact_stretches import ContactStretches, SolvedContacts
+from proofroll.truth.mechanism.contact_guards import SLIP_ENDED, SolvedContacts
+from proofroll.truth.mechanism.contact_stretches import ContactStretches
 
 
 class ContactTree(ContactStretches):
@@ -57,6 +57,8 @@ class ContactTree(ContactStretches):
             solution.slide_rate,
             solution.force,
             solution.response,
+            solution.splits,
+            solution.spread,
         )
 
     def _decided(self, state: Array, closed: Sequence[bool], still: Sequence[bool]) -> tuple[ContactMode, float]:

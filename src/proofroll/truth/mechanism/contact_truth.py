@@ -3,13 +3,13 @@
 import numpy as np
 
 from proofroll.elements.mechanism.analysis import RANK
-from proofroll.elements.mechanism.contacts.acting import kinds
+from proofroll.elements.mechanism.contacts.acting import ContactMode, kinds
 from proofroll.elements.mechanism.contacts.dynamics import ContactDynamics
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.record import record_of
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.elements.mechanism.signal import breaks
-from proofroll.truth.hybrid import first_close, states_of
+from proofroll.truth.hybrid import HybridPath, Stretch, first_close, states_of
 from proofroll.truth.mechanism.contact_bodies import ContactBodies
 from proofroll.truth.mechanism.contact_equations import ContactEquations
 from proofroll.truth.mechanism.contact_tree import ContactTree
@@ -68,23 +68,29 @@ def _in_units(mechanism: Mechanism, units: Units, times: Array) -> TwoRouteMotio
         "joint coordinates, DOP853, contacts by Coulomb's law at all of them at once",
         "bodies alone, DOP853, contacts by trial of what they can do",
     )
-    reason = _shared_load(dynamics) if first_close(paths, CLOSE) == 0 else ""
+    ended = first_close(paths, CLOSE)
+    reason = _shared_load(dynamics, paths[0], ended) if ended == 0 or not paths[0].known else ""
     reason = reason or "a change of the parameters within their accuracy changes which contacts stick, slide or open"
     forces = pressed * units.force, np.array([force for force, _ in applied]) * units.force
     one, two = units.record(mechanism, one), units.record(mechanism, two)
     return two_route_motion(mechanism, paths, one, two, routes, reason, units, kinds=kinds, pressed=forces)
 
 
-def _shared_load(dynamics: ContactDynamics) -> str:
-    """Reason why a start is not unique, naming the contacts whose normal forces are not determinate; empty: all are."""
-    found = dynamics.solve(*dynamics.mechanism.start(), dynamics.begin()[0])
+def _shared_load(dynamics: ContactDynamics, path: HybridPath[Stretch[ContactMode]], time: float) -> str:
+    """Reason why a motion is not unique from a time on [s], naming contacts whose normal forces are not determinate.
+
+    Empty: all are.
+    """
+    stretch = path.stretches[path.stretch_at(np.array([time]))[0]]
+    q, v, begun = dynamics.parts(stretch.first)
+    found = dynamics.solve(q, v, stretch.mode, begun)
     pairs = zip(dynamics.contacts, found.determinate, found.state.touching, strict=True)
     names = [contact.name for contact, known, each in pairs if not known[np.abs(each.normal) > RANK].all()]
     if not names:
         return ""
     return (
         f"{', '.join(names)} carry the load together in more ways than one, so that friction at each is not "
-        "determinate (a body on three points, or on a line of two in the plane, has a truth)"
+        "determinate (a body on three points, or one that slides without turning, has a truth)"
     )
 
 

@@ -26,7 +26,7 @@ from proofroll.elements.mechanism.drives import Actuator
 from proofroll.elements.mechanism.element import MechanismElement
 from proofroll.elements.mechanism.joint import Joint
 from proofroll.elements.mechanism.model import Mechanism
-from proofroll.elements.mechanism.parts import Body
+from proofroll.elements.mechanism.parts import Body, Spring
 from proofroll.elements.mechanism.signal import Formula
 from proofroll.files.scene_file import load_scene
 from proofroll.running.simulation import simulate
@@ -546,22 +546,72 @@ def test_a_disc_rolls_on_its_edge_without_loss() -> None:
     assert (found.pressed[:, 0, 2] > 0).all()
 
 
-@pytest.mark.drill
-def test_a_box_that_slides_on_four_corners_is_ill_posed_by_its_shared_load_and_certified() -> None:
-    """Four corners share a load in many ways, as the reason says; round-off of their forces fails no certificate."""
-    box = Body("box", 2.0, inertia=(0.02, 0.02, 0.02))
-    free = Joint("free", "free", "world", "box", q0=(0, 0, 0.1, 1, 0, 0, 0))
+def sliding_box(
+    v: tuple[float, float],
+    *,
+    spin: float = 0.0,
+    mu: float = 0.3,
+    tilt: float = 0.0,
+    com: tuple[float, float] = (0.0, 0.0),
+) -> Mechanism:
+    """A cube on its four corners that slides with a velocity [m/s], on a plane that falls towards +x."""
+    box = Body("box", 2.0, (*com, 0.0), inertia=(0.02, 0.02, 0.02))
+    free = Joint("free", "free", "world", "box", q0=(0, 0, 0.1, 1, 0, 0, 0), v0=(*v, 0, 0, 0, spin))
     corners = [(x, y, -0.1) for x in (-0.1, 0.1) for y in (-0.1, 0.1)]
     feet = [Geometry(f"foot{k}", "box", "sphere", corner, radius=0.0) for k, corner in enumerate(corners)]
-    pairs = tuple(Pair(f"touch{k}", (f"foot{k}", "floor"), friction=0.3) for k in range(4))
-    gravity = (9.81 * np.sin(0.5), 0.0, -9.81 * np.cos(0.5))
+    pairs = tuple(Pair(f"touch{k}", (f"foot{k}", "floor"), friction=mu) for k in range(4))
+    gravity = (9.81 * np.sin(tilt), 0.0, -9.81 * np.cos(tilt))
     shapes = (Geometry("floor", "world", "plane"), *feet)
-    mechanism = Mechanism((box,), (free,), gravity=gravity, geometries=shapes, pairs=pairs)
+    return Mechanism((box,), (free,), gravity=gravity, geometries=shapes, pairs=pairs)
+
+
+@pytest.mark.drill
+def test_a_box_that_slides_straight_on_four_corners_stops_where_coulomb_says() -> None:
+    """Friction brakes it by mu g however its corners share the load; what each of them carries is not told."""
+    found = truth_of(sliding_box((0.8, 0.6)), np.array([0.0, 0.1, 0.5]))
+    stops = 1 / (0.3 * 9.81)
+    assert happened(found) == [("rest", f"touch{k}") for k in range(4)]
+    times_of(found, *[stops] * 4)
+    assert np.isinf(found.horizon)
+    way = 0.1 - 0.3 * 9.81 * 0.1**2 / 2
+    assert found.record.p_WB[1:, 0] == pytest.approx(
+        np.array([[0.8 * way, 0.6 * way, 0.1], [0.4 * stops, 0.3 * stops, 0.1]]), abs=DIGITS
+    )
+    assert max(float(bar[-1]) for bar in found.bars.values()) < BARS
+    assert found.pressed is not None
+    assert np.isnan(found.pressed).all()
+
+
+@pytest.mark.parametrize(("mu", "tilt"), [(0.0, 0.0), (0.0, 0.3), (0.1, 0.3)])
+def test_a_box_slides_straight_down_a_slope(mu: float, tilt: float) -> None:
+    """A box that is heavier at one corner moves as a point does, though the smallest forces would pull at the other."""
+    found = truth_of(sliding_box((1.0, 0.0), mu=mu, tilt=tilt, com=(0.06, 0.06)), np.array([0.0, 0.1]))
+    pull = 9.81 * (np.sin(tilt) - mu * np.cos(tilt))
+    assert np.isinf(found.horizon)
+    assert found.record.p_WB[1, 0] == pytest.approx([0.1 + pull * 0.1**2 / 2, 0.0, 0.1], abs=DIGITS)
+    assert happened(found) == []
+    assert max(float(bar[-1]) for bar in found.bars.values()) < BARS
+
+
+@pytest.mark.drill
+def test_a_box_that_turns_as_it_slides_on_four_corners_is_ill_posed_and_certified() -> None:
+    """Each split of its load brakes its turn otherwise, the reason says; round-off fails no certificate."""
+    mechanism = sliding_box((0.8, 0.6), spin=1.0)
     found = truth_of(mechanism, np.array([0.0, 1e-4]))
     assert found.horizon == 0
     assert "touch0, touch1, touch2, touch3 carry the load together" in found.reason
     run = simulate(Scene("box", "", (MechanismElement(mechanism),)), "projection", until=1e-4, every=1e-4)
     assert run.attrs["status"] == "done", run.attrs["message"]
+
+
+def test_a_box_that_begins_to_turn_as_it_slides_is_ill_posed_from_there_on() -> None:
+    """A spring off its middle turns a box that slid straight: its truth ends where the split first counts."""
+    pull = Spring("pull", "world", "box", (0.0, 3.0, 0.1), (0.1, 0.0, 0.0), stiffness=0.5, length=2.9)
+    box = replace(sliding_box((1.0, 0.0)), springs=(pull,))
+    found = truth_of(box, np.array([0.0, 1e-5, 0.1]))
+    assert 1e-5 < found.horizon < 1e-2
+    assert "touch0, touch1, touch2, touch3 carry the load together" in found.reason
+    assert found.bars["p_WB"][1] < DIGITS
 
 
 def test_a_row_of_balls_is_ill_posed_and_keeps_momentum_and_energy() -> None:

@@ -69,6 +69,8 @@ class ContactSolution:
         slide_rate: rate of each slide [m/s²], (contacts, 3).
         response: Painlevé's measure, above 0 in a possible motion: response to normal forces with friction over the
             response without.
+        splits: ways to split a load that contacts share: changes of the normal forces, (contacts, ways).
+        spread: change of v̇ with these, the whole of unit length.
     """
 
     state: ContactsNow
@@ -78,6 +80,8 @@ class ContactSolution:
     determinate: Any
     slide_rate: Array
     response: float
+    splits: Array
+    spread: float
 
     def lasts(self, mode: ContactMode) -> float:
         """Time until an open contact closes at constant acceleration [s]; infinite: never."""
@@ -158,21 +162,26 @@ class ContactDynamics:
         K, free = np.concatenate(rows), state.solution.acceleration
         free = free + state.W @ np.einsum("kin,ki->n", state.J, force)
         if not owner:
-            return self._solution(state, mode, free, force, known, 1.0)
+            return self._solution(state, mode, free, force, known, 1.0, np.zeros((len(mode), 0)), 0.0)
         D = np.array([direction @ state.J[k] for direction, k in zip(along, owner, strict=True)])
         S, wanted = K @ state.W @ D.T, -(K @ free + np.concatenate(bias))
         smooth = K @ state.W @ K.T
         values, vectors = np.linalg.eigh(smooth)
         weak = values < RANK * values[-1]
         z = np.linalg.lstsq(S, wanted, rcond=RANK)[0] if weak.any() else np.linalg.solve(S, wanted)
-        for k, direction, size, loose in zip(owner, along, z, vectors[:, weak], strict=True):
+        ways = np.linalg.svd(S)[2][len(S) - weak.sum() :].T if weak.any() else np.zeros((len(S), 0))
+        splits = np.zeros((len(mode), ways.shape[1]))
+        for k, direction, size, loose in zip(owner, along, z, ways, strict=True):
             force[k] += size * direction
+            splits[k] += float(direction @ state.touching[k].normal) * loose
             known[k] &= np.abs(direction) * np.linalg.norm(loose) <= RANK
         for k, (own, found) in enumerate(zip(mode, state.touching, strict=True)):
             if own.kind == "stick" and own.along is not None:  # across its line the joints hold it, too
                 known[k] &= np.abs(cross(found.normal, np.array(own.along))) <= RANK
-        response = 1.0 if weak.any() else float(np.linalg.det(S) / np.linalg.det(smooth))
-        return self._solution(state, mode, free + state.W @ D.T @ z, force, known, response)
+        whole = vectors[:, ~weak]  # without what the split of a shared load changes
+        response = float(np.linalg.det(whole.T @ S @ whole) / np.linalg.det(whole.T @ smooth @ whole))
+        spread = float(np.linalg.norm(state.W @ (D.T @ ways)))
+        return self._solution(state, mode, free + state.W @ D.T @ z, force, known, response, splits, spread)
 
     @staticmethod
     def heading(own: Acting, found: Touching) -> Array:
@@ -181,10 +190,17 @@ class ContactDynamics:
 
     @staticmethod
     def _solution(
-        state: ContactsNow, mode: ContactMode, acceleration: Array, force: Array, known: Any, response: float
+        state: ContactsNow,
+        mode: ContactMode,
+        acceleration: Array,
+        force: Array,
+        known: Any,
+        response: float,
+        splits: Array,
+        spread: float,
     ) -> ContactSolution:
         slide_rate = state.J @ acceleration + state.bias
-        return ContactSolution(state, mode, acceleration, force, known, slide_rate, response)
+        return ContactSolution(state, mode, acceleration, force, known, slide_rate, response, splits, spread)
 
     def rate(self, y: Array, mode: ContactMode) -> Array:
         """Right-hand side for the state (q, v, time)."""
