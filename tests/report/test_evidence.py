@@ -132,6 +132,15 @@ def test_no_two_rows_of_an_engine_look_alike_and_none_by_colour_alone() -> None:
     assert {symbol.removesuffix("-open") for _, symbol in looks} == set(OUTLINES)
 
 
+def test_an_engine_has_one_colour_on_a_page() -> None:
+    """Whatever engine comes first in a comparison, colours follow the order of the page."""
+    rows: Any = [
+        SimpleNamespace(name=name, formulation="one", preset="", verdict="agrees") for name in ("beta", "new", "alpha")
+    ]
+    assert [style.colour for style in styles(rows, ["alpha", "beta"])] == [1, 2, 0]
+    assert [style.colour for style in styles(rows)] == [0, 1, 2]
+
+
 def test_cost_has_an_interval_where_there_is_one() -> None:
     """Six runs or more: 95 % or more; three: their range, which holds the median in three cases of four; one: none."""
     assert Cost.of([]) is None

@@ -29,6 +29,21 @@ def seen(report_page: Path, visit: Visiting) -> Iterator[Visit]:
 
 
 @pytest.mark.drill
+def test_an_engine_has_one_colour_in_all_pictures(everything: Any, tmp_path: Path, visit: Visiting) -> None:
+    """A panel has the colour that its engine has in the curves, also where another engine comes first."""
+    table = everything.content.table
+    content = replace(everything.content, table=replace(table, lines=table.lines[::-1]))
+    page = replace(everything, content=content).write(tmp_path / "report.html")
+    assert content.engines[:2] == ["alpha", "beta"]
+    with visit(page, viewport={"width": 1280, "height": 900}) as opened:
+        opened.wait(f"({PICTURE}.data ?? []).length > 0", opened.page.locator(PART).scroll_into_view_if_needed)
+        drawn = opened.page.evaluate(f"{TRACES}.map((trace) => [trace.name, trace.line.color])")
+        colours = [opened.page.evaluate(f"plots.paint('--e{at}')") for at in (0, 1)]
+    assert [name for name, _ in drawn] == ["only", "fine default", "fine matched"]
+    assert [colour for _, colour in drawn] == [colours[1], colours[0], colours[0]]
+
+
+@pytest.mark.drill
 def test_what_panels_show_is_said_once(everything: Any, tmp_path: Path) -> None:
     """The page's first picture says how to read it, with the id to which all others lead."""
     first = everything.content.comparisons[0]

@@ -35,9 +35,14 @@ class Style:
     opacity: float
 
 
-def styles(rows: Sequence[ReportedRow]) -> list[Style]:
-    """Style of each row: colour by engine, dashes by formulation, width by preset, symbol by number in the engine."""
-    engines = list(dict.fromkeys(row.name for row in rows))
+def styles(rows: Sequence[ReportedRow], page_engines: Sequence[str] = ()) -> list[Style]:
+    """Style of each row: colour by engine, dashes by formulation, width by preset, symbol by number in the engine.
+
+    Args:
+        rows: of a comparison.
+        page_engines: engines of the page in its order, so that each has one colour in all comparisons.
+    """
+    engines = list(dict.fromkeys([*page_engines, *(row.name for row in rows)]))
     formulations = {name: list(dict.fromkeys(r.formulation for r in rows if r.name == name)) for name in engines}
     widths = {"default": 1.1, "tuned": 2.4}
     names = list(OUTLINES)

@@ -124,20 +124,19 @@ def begun(outcomes: list[Outcome], command: str, awaited: Sequence[str] = (), le
         awaited: titles of comparisons that are still being run.
         left_out: names of comparisons that the report leaves out.
     """
-    replay = _replay(outcomes)
-    described = [case.described for case in replay.cases] if replay else []
     content = report_content(outcomes, command)
+    replay = _replay(outcomes, content.engines)
+    described = [case.described for case in replay.cases] if replay else []
     content = replace(content, replay=described, awaited=list(awaited), left_out=list(left_out))
     return Report(content, [point_curves(outcome) for outcome in outcomes], replay)
 
 
-def _replay(outcomes: list[Outcome]) -> Replay | None:
+def _replay(outcomes: list[Outcome], engines: Sequence[str]) -> Replay | None:
     """Replay of the comparisons, kind by kind; None if nothing can be drawn."""
     kinds = {id(item): kind_of(item.scene) for item in outcomes}
     drawn_by = dict.fromkeys(kind for kind in kinds.values() if kind is not None)
-    return joined(
-        [replay_content([item for item in outcomes if kinds[id(item)] is kind], kind.replay()) for kind in drawn_by]
-    )
+    drawn = {kind: [item for item in outcomes if kinds[id(item)] is kind] for kind in drawn_by}
+    return joined([replay_content(own, kind.replay(), engines) for kind, own in drawn.items()])
 
 
 def _drawn(prefix: str, draw: Callable[[], dict[str, str]]) -> dict[str, str]:

@@ -45,7 +45,8 @@ def page(
     """HTML page from content, curves of each comparison, markup of further pictures by name, and the replay if any."""
     drawn = {
         "precision": content.precision,
-        "rows": [_drawn_rows(comparison) for comparison in content.comparisons],
+        "engines": content.engines,
+        "rows": [_drawn_rows(comparison, content.engines) for comparison in content.comparisons],
         "points": [_marked(*pair) for pair in zip(content.comparisons, curves, strict=True)],
     }
     whole = rendered(
@@ -57,7 +58,7 @@ def page(
         choice=content.choice,
         words=[item.sentence for item in advice(content.choice, FIRST_TOLERANCE, False)],
         all_words=packed(words(content.choice).encode("utf-8", "replace")),
-        styles=[styles(comparison.rows) for comparison in content.comparisons],
+        styles=[styles(comparison.rows, content.engines) for comparison in content.comparisons],
         replay=replay,
         replay_scripts=[kind.replay_script for kind in report_kinds().values() if kind.replay_script],
         data=packed(json.dumps(plain(drawn), allow_nan=False, separators=(",", ":")).encode()),
@@ -87,9 +88,10 @@ def _datatables() -> str:
     return packed((resources.files("itables") / "html" / "dt_bundle.js").read_bytes())
 
 
-def _drawn_rows(comparison: ReportedComparison) -> list[dict[str, object]]:
+def _drawn_rows(comparison: ReportedComparison, engines: Sequence[str]) -> list[dict[str, object]]:
     rows = comparison.rows
-    return [{"name": name, **vars(style)} for name, style in zip(labels.names(rows), styles(rows), strict=True)]
+    looks = zip(labels.names(rows), styles(rows, engines), strict=True)
+    return [{"name": name, **vars(style)} for name, style in looks]
 
 
 def templates() -> jinja2.Environment:

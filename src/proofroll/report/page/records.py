@@ -129,6 +129,11 @@ class ReportContent:
     against: Against | None = field(default=None, metadata=OPTIONAL)
 
     @property
+    def engines(self) -> list[str]:
+        """Names of the engines that are compared, in the page's order."""
+        return list(dict.fromkeys(row.name for comparison in self.comparisons for row in comparison.rows))
+
+    @property
     def further(self) -> list[PartEntry]:
         """Entries of all further studies."""
         return [item for kind in part_kinds() for item in self.entries.get(kind.key, ())]

@@ -1,5 +1,6 @@
 """Replay: choice of the cases and runs to show, and their packed numbers for the page."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -25,12 +26,12 @@ LEAST_PER_SECOND, LEAST_FRAMES, MOST_FRAMES = 60, 120, 600
 SMOOTH_TURN, WIDEST_TURN = 1.2, 2.5
 
 
-def replay_content(outcomes: list[Outcome], kind: ReplayKind) -> Replay:
+def replay_content(outcomes: list[Outcome], kind: ReplayKind, page_engines: Sequence[str] = ()) -> Replay:
     """Replay of comparisons, all of scenes of one kind.
 
     There is one case for each truth with a known motion. Its ghosts are two kinds of runs: all with ``default``
     settings, and for each engine the worst run with other settings, if its error is visible. At first the page shows
-    each engine's worst run with ``default`` settings.
+    each engine's worst run with ``default`` settings. Colours are those of the page, whose engines are in its order.
     """
     shown_in: dict[str, tuple[ComparedPoint, list[tuple[Outcome, str]]]] = {}
     for outcome in outcomes:
@@ -38,7 +39,7 @@ def replay_content(outcomes: list[Outcome], kind: ReplayKind) -> Replay:
         for name, point in known.items():
             if point.reference is not None and np.isfinite(point.reference.dataset["p_WB"]).all():
                 shown_in.setdefault(point.case.key, (point, []))[1].append((outcome, name))
-    looks = {id(outcome): _looks(outcome) for outcome in outcomes}
+    looks = {id(outcome): _looks(outcome, page_engines) for outcome in outcomes}
     cases, numbers = [], []
     for point, shared in shown_in.values():
         assert point.reference is not None  # only points with a truth are listed
@@ -110,10 +111,10 @@ def distance(path: FloatArray, true: FloatArray) -> float:
     return float(np.linalg.norm(path[:count] - true[:count], axis=-1).max())
 
 
-def _looks(outcome: Outcome) -> list[tuple[str, int]]:
+def _looks(outcome: Outcome, page_engines: Sequence[str]) -> list[tuple[str, int]]:
     """Name and colour of each row, as in the comparison's figures."""
     rows = reported_rows(outcome)
-    return [(name, style.colour) for name, style in zip(names(rows), styles(rows), strict=True)]
+    return [(name, style.colour) for name, style in zip(names(rows), styles(rows, page_engines), strict=True)]
 
 
 def _ghosts(

@@ -41,6 +41,7 @@
   }
   function content(study, quantity, width) {
     const all = curves(study, quantity), engines = [...new Set(study.curves.map(({ engine }) => engine))];
+    const coloured = [...new Set([...parts.data.engines, ...engines])];  // each has one colour on the page
     const shown = engines.filter((engine) => all.some((curve) => curve.engine === engine));
     const { columns, blocks, total } = sized(shown.map((engine) => all.filter((curve) => curve.engine === engine).length), width);
     const points = all.flatMap(({ points }) => points), costs = points.map(({ cost }) => cost);
@@ -73,7 +74,7 @@
         line: { color: paint("--truth"), width: 5, shape: "hv" }, hoverinfo: "skip", showlegend: false,
       });
       const formulations = [...new Set(all.filter((curve) => curve.engine === engine).map(({ formulation }) => formulation))];
-      const color = paint(`--e${engines.indexOf(engine) % 8}`);
+      const color = paint(`--e${coloured.indexOf(engine) % 8}`);
       all.filter((curve) => curve.engine === engine).forEach((curve, place) => {
         const symbol = SYMBOLS[place % SYMBOLS.length];
         traces.push({
