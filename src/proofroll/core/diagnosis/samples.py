@@ -158,17 +158,17 @@ def reported_vectors(
 
 def moves_otherwise(evidence: Evidence, name: str, *others: str) -> bool:
     """True if other variables of the state are wrong, too: the motion itself differs, not only one report."""
-    least = CLOSES * _departure(evidence, name)
-    return any(_departure(evidence, other) > least for other in others or _WITH[name])
+    least = CLOSES * departure(evidence, name)
+    return any(departure(evidence, other) > least for other in others or _WITH[name])
 
 
 def forced_otherwise(evidence: Evidence, vector: ReportedVector) -> bool:
     """True if velocities are as wrong as a force: the force belongs to a different motion."""
     least = CLOSES * vector.before / (vector.size or 1.0)
-    return any(_departure(evidence, name) > least for name in ("v_WB", "w_WB"))
+    return any(departure(evidence, name) > least for name in ("v_WB", "w_WB"))
 
 
-def _departure(evidence: Evidence, name: str) -> float:
+def departure(evidence: Evidence, name: str) -> float:
     """Largest error of a variable, relative to its change in the truth since the start; 0 if a run lacks it."""
     run, truth, element = evidence.run, evidence.truth, evidence.element
     if run is None or truth is None or name not in run or name not in truth or run[name].shape != truth[name].shape:

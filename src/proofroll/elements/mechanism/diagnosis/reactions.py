@@ -12,7 +12,7 @@ from scipy.optimize import linear_sum_assignment
 
 from proofroll.core.arrays import FloatArray, known_difference
 from proofroll.core.diagnosis import CLOSES, Cause, Evidence, hypothesis
-from proofroll.core.diagnosis.samples import forced_otherwise, run_and_truth
+from proofroll.core.diagnosis.samples import departure, forced_otherwise, run_and_truth
 from proofroll.core.diagnosis.vectors import ReportedVector, product
 from proofroll.core.errors import Diverged
 from proofroll.elements.mechanism.diagnosis.equations import is_motion, placed_of
@@ -21,12 +21,15 @@ from proofroll.elements.mechanism.joint_coordinates import JointCoordinates
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.placed import Placed
 from proofroll.elements.mechanism.rotations import skews
+from proofroll.elements.mechanism.signal import Formula, Table
 from proofroll.elements.mechanism.switches import switched_joints
 
 # Distance of joints without any comparable components, in sizes of the forces: they are matched last.
 _FAR = 1e3
 # Largest difference of equal reactions, relative to the difference to be explained.
 _SAME = 1e-2
+# Largest error of velocities, in parts of their changes, of a motion that is nearly right.
+_RIGHT = 1e-3
 PARENT = "the axes of the parent body"
 _KINDS = (
     ("force", "N", "the force on the child at the joint"),
@@ -137,17 +140,20 @@ def reactions(evidence: Evidence) -> Iterator[Cause]:
     bars = {kind: _bar(truth, f"{kind}s") for kind, _, _ in _KINDS}
     for each in _reactions(evidence, placed_of(evidence.element.mechanism, truth), reported, true, bars):
         causes = [cause for cause in each.causes(evidence.step) if cause.proven]
-        if causes and not (forced_otherwise(evidence, each.reported) and _may_be_motion(run, each)):
+        if causes and not (forced_otherwise(evidence, each.reported) and _may_be_motion(evidence, run, each)):
             yield from causes
 
 
-def _may_be_motion(run: Any, found: Reactions) -> bool:
-    """False if reactions at the run's own states are the true ones: then its motion does not explain what it reports.
+def _may_be_motion(evidence: Evidence, run: Any, found: Reactions) -> bool:
+    """False if the motion is nearly right, and reactions at the run's own states are the true ones.
 
-    Of contacts, friction and stops the state alone does not tell the forces.
+    Of contacts, friction, stops and what is given over time the state alone does not tell the forces.
     """
     mechanism, true = found.mechanism, found.reported.true
-    if mechanism.contacts or switched_joints(mechanism) or not is_motion(run):
+    driven = any(isinstance(signal, Formula | Table) for signal in mechanism.signals)
+    if driven or mechanism.contacts or switched_joints(mechanism) or not is_motion(run):
+        return True
+    if any(departure(evidence, name) > _RIGHT for name in ("v_WB", "w_WB")):
         return True
     equations, placed = JointCoordinates(mechanism), placed_of(mechanism, run)
     try:
