@@ -1,8 +1,9 @@
-"""Random bodies that touch: spheres, sleds, rods, discs, ellipsoids and arms, on planes, in bores and on each other."""
+"""Random bodies that touch: spheres, sleds, rods, discs, ellipsoids, arms and pins, on planes, in bores, each other."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -22,12 +23,12 @@ Made = tuple[tuple[Body, ...], tuple[Joint, ...], tuple[Geometry, ...], tuple[Pa
 def random_contacts(seed: int) -> tuple[str, Mechanism, float]:
     """A style, a mechanism of it that is the same for the same number, and how long to follow it [s]."""
     rng = np.random.default_rng([290, seed])
-    style = [*STYLES][seed % len(STYLES)]
+    style = TURNS[seed % len(TURNS)]
     friction = float(rng.uniform(0.05, 0.6)) if rng.random() < 0.9 else 0.0
     make, until = STYLES[style]
     bodies, joints, geometries, pairs = make(rng, friction, style)
     gravity = _floats(rng.normal(size=3) * 3) if style == "spheres" else _G
-    motors = (_motor(rng, joints[0]),) if style in {"plate", "arm"} and rng.random() < 0.5 else ()
+    motors = (_motor(rng, joints[0]),) if style in {"plate", "arm", "pin"} and rng.random() < 0.5 else ()
     mechanism = Mechanism(bodies, joints, geometries=geometries, pairs=pairs, gravity=gravity, actuators=motors)
     return style, mechanism, until
 
@@ -186,6 +187,34 @@ def _arm(rng: np.random.Generator, friction: float, _: str) -> Made:
     )
 
 
+def _pin(rng: np.random.Generator, friction: float, _: str) -> Made:
+    """A tip that rubs on a disc that turns: of an arm on a hinge, or of a second disc beside, pressed on the first."""
+    clutch, spin, height = rng.random() < 0.5, float(rng.normal() * 6), float(rng.uniform(0.02, 0.1))
+    upright = np.array([0.0, 0.0, 1.0])
+    axis = upright if clutch else _tilted(rng, 0.1)
+    disc, other = _body(rng, "d", mass=1, size=0.2), _body(rng, "a", size=0.1)
+    hinge = Joint("h", "revolute", "world", "d", axis=_floats(axis), v0=(spin,), damping=float(rng.choice([0, 0.02])))
+    place = np.array([*rng.uniform(-0.15, 0.15, 2), height])
+    bodies: tuple[Body, ...]
+    joints: tuple[Joint, ...]
+    if clutch:
+        tip = np.array([*rng.uniform(0.05, 0.2, 2), -height])
+        hub = _body(rng, "hub", size=0.05)
+        press = float(rng.uniform(2, 20))
+        guide = Joint("g", "prismatic", "world", "hub", _floats(place), axis=(0, 0, 1), torque=-press)
+        shaft = Joint("s", "revolute", "hub", "a", axis=(0, 0, 1), v0=(float(rng.normal() * 6),))
+        bodies, joints = (disc, hub, other), (hinge, guide, shaft)
+    else:
+        across = np.cross(upright, _unit(rng))
+        across /= np.linalg.norm(across)
+        tip = 0.25 * np.cross(upright, across) - height * upright + 0.05 * across
+        rate = spin * float(upright @ np.cross(axis, place + tip)) / 0.25  # the tip stays on the disc
+        arm = Joint("s", "revolute", "world", "a", _floats(place), axis=_floats(across), v0=(rate,))
+        bodies, joints = (disc, replace(other, com=_floats(tip / 2))), (hinge, arm)
+    geometries = Geometry("s", "a", "sphere", position=_floats(tip), radius=0.0), Geometry("f", "d", "plane")
+    return bodies, joints, geometries, (Pair("c", ("s", "f"), friction),)
+
+
 def _bore(rng: np.random.Generator, friction: float, _: str) -> Made:
     """A sphere in a bore of the world or of a free body."""
     body, k, radius = _body(rng, "b", size=0.03, off_centre=0.002), _unit(rng), 0.03
@@ -226,7 +255,11 @@ STYLES: dict[str, tuple[Callable[[np.random.Generator, float, str], Made], float
     "block": (_rod, 0.15),
     "disc": (_rounded, 0.04),
     "vertex": (_sphere, 0.08),
+    "pin": (_pin, 0.1),
 }
+_OTHERS = tuple(style for style in STYLES if style != "pin")
+# Every second arm is a pin, so that all other numbers have the scenes that they had before there were any.
+TURNS = (*_OTHERS, *("pin" if style == "arm" else style for style in _OTHERS))
 
 
 def _floats(values: Any) -> Any:
