@@ -116,6 +116,7 @@ def test_the_whole_without_engines(monkeypatch: pytest.MonkeyPatch) -> None:
     assert content["ratios"].keys() == bench.GOALS.keys()
     assert content["first_slip"]["error"] < 1e-12
     rows = {row["name"]: row for row in content["models"]}
+    # near their bounds by construction: the loosest tolerance that holds one is taken
     assert rows["reduced, compiled"]["error"] <= 1e-12
     assert max(rows[f"{name}, compiled"]["error"] for name in ("euler", "rotating_frame")) <= 1e-9
     assert content["onsets_per_second"]["low"] <= content["onsets_per_second"]["value"]

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from proofroll.core.diagnosis import Cause, Evidence, Hypothesis, diagnose
-from proofroll.core.diagnosis.fitting import possible
+from proofroll.core.diagnosis import CLOSES, Cause, Evidence, Hypothesis, diagnose
+from proofroll.core.diagnosis.fitting import Residuals, possible
 from proofroll.core.diagnosis.vectors import ReportedVector, product
 from proofroll.core.errors import NotUnique
 
@@ -90,3 +90,13 @@ def test_a_component_that_is_not_determined_spoils_those_in_which_it_has_a_share
     turn = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
     np.testing.assert_array_equal(product(turn[None], unknown), [[-2.0, 1.0, np.nan]])
     assert np.all(np.isnan(product(np.ones((1, 3, 3)), unknown)))
+
+
+def test_a_model_that_contradicts_a_right_report_proves_nothing() -> None:
+    """A model that closes the difference is a cause, unless it contradicts what the engine reports rightly."""
+    for contradicts in (True, False):
+        residuals = Residuals(
+            lambda size: np.array([1.0 - (size or 0.0)]), "motion", "m/s^2", 1.0, CLOSES, (), 0.0, list,
+            lambda _, contradicts=contradicts: contradicts,
+        )  # fmt: skip
+        assert residuals.cause("mass", "it moves so", 1.0, "look", 0).proven is not contradicts
