@@ -7,13 +7,16 @@ from typing import Any
 
 import pytest
 
+from proofroll.core.diagnosis import Evidence
 from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.element import scene_with
+from proofroll.elements.mechanism.diagnosis.residuals import residuals_of
+from proofroll.files.scene_file import load_scene
 from proofroll_drill.mutants import mechanism_models as models
 from proofroll_drill.mutants import mechanism_numbers as numbers
 from proofroll_drill.mutants import mechanism_samples as samples
 from proofroll_drill.mutants.base import Mutant
-from proofroll_drill.mutants.drilling import tried
+from proofroll_drill.mutants.drilling import _built, tried
 
 TOPS = (
     numbers.StandardGravity, numbers.HeavierTop, numbers.StifferTop, numbers.AxialTop, numbers.TransverseTop,
@@ -73,3 +76,13 @@ def test_three_free_numbers_do_not_explain_two() -> None:
     found = tried(SilentBall)
     assert found.detected
     assert not found.said
+
+
+def test_a_number_that_was_built_wrongly_leaves_no_equations_to_fit() -> None:
+    """Where the certificate names a mass that is another, its accelerations are no evidence of a second cause."""
+    kind = numbers.HeavierTop
+    scene = load_scene(kind.scene[0], **kind.scene[1])
+    lines = {line.quantity: {**line.as_dict(), "holds": False} for line in _built(kind, scene)[1]}
+    element, moved = scene.elements[0], [line for name, line in lines.items() if "acceleration" in name]
+    assert residuals_of(Evidence(element, moved))
+    assert not residuals_of(Evidence(element, [*moved, lines["mass"]]))
