@@ -244,7 +244,13 @@ class ContactStretches(Stretches[ContactMode]):
         still = [shut and slip <= stopped for shut, slip in zip(closed, slips, strict=True)]
         state = self._equations.eliminated(state, modes_of(closed, still))
         mode, sure = self._decided(state, closed, still)
-        changed = changes(self.contacts, stretch.mode, mode, self._stands(state, mode))
+        # A slip in the plane may have turned since it began: its sense is that of the last step.
+        sliding = self._touching(stretch.visited[-1][1] if stretch.visited else stretch.first)
+        was = tuple(
+            own._replace(along=own.along or _headed(own, each).heading)
+            for own, each in zip(stretch.mode, sliding, strict=True)
+        )
+        changed = changes(self.contacts, was, mode, self._stands(state, mode))
         struck = {name for _, name in happened}
         happenings = (*happened, *(item for item in changed if item[1] not in struck))
         return Transition(state, mode, happenings, np.inf if delay else min(margin, sure), delay)

@@ -593,6 +593,28 @@ def test_a_box_slides_straight_down_a_slope(mu: float, tilt: float) -> None:
     assert max(float(bar[-1]) for bar in found.bars.values()) < BARS
 
 
+def test_a_bead_that_slides_straight_up_a_slope_turns_and_slides_down() -> None:
+    """Where friction does not hold it, its slip turns at the top, though its surface lets it slide anywhere."""
+    tilt, mu = 0.5, 0.2
+    free = Joint("free", "free", "world", "bead", q0=(0, 0, 0, 1, 0, 0, 0), v0=(-0.6, 0, 0, 0, 0, 0))
+    shapes = (Geometry("floor", "world", "plane"), Geometry("tip", "bead", "sphere", radius=0.0))
+    found = truth_of(
+        Mechanism(
+            (Body("bead", 2.0, inertia=(0.02, 0.02, 0.02)),),
+            (free,),
+            gravity=(9.81 * np.sin(tilt), 0.0, -9.81 * np.cos(tilt)),
+            geometries=shapes,
+            pairs=(Pair("touch", ("tip", "floor"), friction=mu),),
+        ),
+        np.array([0.0, 0.3]),
+    )
+    top = 0.6 / (9.81 * (np.sin(tilt) + mu * np.cos(tilt)))
+    pull = 9.81 * (np.sin(tilt) - mu * np.cos(tilt))
+    assert happened(found) == [("turn", "touch")]
+    times_of(found, top)
+    assert found.record.p_WB[1, 0, 0] == pytest.approx(-0.3 * top + pull * (0.3 - top) ** 2 / 2, abs=DIGITS)
+
+
 @pytest.mark.drill
 def test_a_box_that_turns_as_it_slides_on_four_corners_is_ill_posed_and_certified() -> None:
     """Each split of its load brakes its turn otherwise, the reason says; round-off fails no certificate."""

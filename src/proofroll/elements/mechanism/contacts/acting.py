@@ -143,7 +143,7 @@ def changes(
 
 
 def _opposite(was: Acting, now: Acting) -> bool:
-    return was.along is not None and now.along is not None and float(np.dot(was.along, now.along)) < 0
+    return was.along is not None and now.heading is not None and float(np.dot(was.along, now.heading)) < 0
 
 
 def _direction(vector: Array) -> Direction:
