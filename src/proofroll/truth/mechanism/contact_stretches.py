@@ -174,9 +174,8 @@ class ContactStretches(Stretches[ContactMode]):
         if kind == "turn":
             return Transition(stretch.last, self._solved(stretch.last, stretch.mode).mode, ())
         if kind == "share" or (kind == "lift" and k in sharing(self._solved(stretch.last, stretch.mode).splits)):
-            return Transition(
-                stretch.last, None, (), margin=0.0
-            )  # no split of the load is left, or each moves another way
+            # No split of the load is left, or each moves another way.
+            return Transition(stretch.last, None, (), margin=0.0)
         if kind == "lift":
             mode[k] = OPEN
             return Transition(stretch.last, tuple(mode), (("lift_off", name),))
