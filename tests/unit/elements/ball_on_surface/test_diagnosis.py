@@ -1,0 +1,70 @@
+"""Causes that a ball's certificate and run prove, and those that its first steps contradict."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from proofroll.core.certificate import Line
+from proofroll.core.diagnosis import Evidence, diagnose, hypotheses_of
+from proofroll.core.first_steps import OF_FIRST_STEPS
+from proofroll.core.truth import truth
+from proofroll.elements.ball_on_surface.diagnosis.equations import Law, at_start
+from proofroll.elements.ball_on_surface.diagnosis.numbers import _resisting
+from proofroll.elements.ball_on_surface.element import scene_with
+from proofroll.elements.ball_on_surface.model import RollingBall
+from proofroll.files.scene_file import load_scene
+
+DYNAMICS = ("acceleration", "angular acceleration")
+
+
+def lines(body: RollingBall, told: RollingBall, names: tuple[str, ...], when: str = "") -> list[dict[str, Any]]:
+    """Lines of a certificate of a ball about these quantities, which an engine tells of another one."""
+    expected, found = at_start(body, Law(body)), at_start(told, Law(told))
+    made = []
+    for name in names:
+        one, other = (np.asarray(numbers[name], dtype=float) for numbers in (expected, found))
+        apart = float(np.max(np.abs(other - one))) / float(np.max(np.abs(one)))
+        tolerance = 1e-5 if when else 1e-12
+        made.append(Line(name + when, "1", tuple(one.tolist()), tuple(other.tolist()), apart, tolerance).as_dict())
+    return made
+
+
+def test_a_number_that_was_built_otherwise_is_the_only_cause() -> None:
+    """A ball whose certificate names twice the inertia is told so, and its accelerations accuse nothing else."""
+    (element,) = load_scene("inclined_plane").elements
+    body = element.rolling  # type: ignore[attr-defined]  # a ball
+    stiffer = replace(body, ball=replace(body.ball, inertia_ratio=0.8))
+    evidence = Evidence(element, lines(body, stiffer, ("inertia", *DYNAMICS)))
+    (said,) = [cause.says for cause in diagnose(evidence, hypotheses_of(element))]
+    assert said.startswith("the engine's model has inertia counted twice (")
+
+
+@pytest.mark.parametrize("what", ["report", "run"])
+def test_a_law_that_the_first_steps_contradict_is_no_cause(what: str) -> None:
+    """Accelerations of another inertia, reported or along the run, accuse it only where the first steps show them."""
+    scene, times = load_scene("inclined_plane"), np.linspace(0.0, 0.4, 21)
+    (element,) = scene.elements
+    body = element.rolling  # type: ignore[attr-defined]  # a ball
+    shell = scene_with(scene, ball=replace(body.ball, inertia_ratio=2 / 3))
+    moved = shell.elements[0].rolling  # type: ignore[attr-defined]  # a ball
+    runs = (truth(shell, times), truth(scene, times)) if what == "run" else ()
+    for first, named in ((moved, True), (body, False)):
+        told = lines(body, moved if what == "report" else first, DYNAMICS) if what == "report" else []
+        evidence = Evidence(element, told + lines(body, first, DYNAMICS, OF_FIRST_STEPS), *runs)
+        (inertia,) = (item for item in hypotheses_of(element) if item.id == "inertia")
+        assert inertia.proven(evidence) is named
+
+
+@pytest.mark.parametrize(("factor", "named"), [(-1.0, True), (-0.3, False)])
+def test_a_resistance_that_drives_is_a_cause_by_its_sign_alone(factor: float, named: bool) -> None:
+    """Rolling resistance may have the wrong sign, and no other negative factor on it is anybody's mistake."""
+    (element,) = load_scene("inclined_plane", rolling_resistance=5e-4).elements
+    body = element.rolling  # type: ignore[attr-defined]  # a ball
+    driven = _resisting(body, factor * body.contact.rolling_resistance)
+    evidence = Evidence(element, lines(body, driven, DYNAMICS))
+    proven = [cause.says for item in hypotheses_of(element) for cause in item.test(evidence) if cause.proven]
+    assert any("rolling resistance" in said for said in proven) is named, proven
