@@ -1,0 +1,131 @@
+"""Factors on numbers of a mechanism that fit an engine's motion: which of them are causes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from proofroll.core.arrays import FloatArray
+from proofroll.core.certificate import Line
+from proofroll.core.diagnosis import Evidence, hypotheses_of
+from proofroll.core.scene import Scene
+from proofroll.elements.mechanism.diagnosis.equations import Change, MechanismStates
+from proofroll.elements.mechanism.diagnosis.joint_laws import _effort
+from proofroll.elements.mechanism.drives import Actuator
+from proofroll.elements.mechanism.element import MechanismElement
+from proofroll.elements.mechanism.model import Mechanism
+from proofroll.files.scene_file import load_scene
+from proofroll.running.simulation import simulate
+
+ROUGH_ARM = Path(__file__).parents[4] / "drill/proofroll_drill/mutants/rough_arm"
+
+
+def proven(evidence: Evidence) -> list[str]:
+    """What is proven, before several causes are compared."""
+    hypotheses = hypotheses_of(evidence.element)
+    return [cause.says for item in hypotheses for cause in item.test(evidence) if cause.proven]
+
+
+def accelerations(element: MechanismElement, change: Change) -> FloatArray:
+    """Accelerations and turning of the bodies at time 0 with other numbers, shape (bodies, 6)."""
+    mechanism = element.mechanism
+
+    def of(rates: Any) -> tuple[FloatArray, MechanismStates]:
+        start, which = np.zeros((1, len(mechanism.bodies), 6)), np.zeros(1, dtype=int)
+        motion = MechanismStates(mechanism, element.start, start, which).each[0].motion
+        found = motion.J[:-1] @ rates + motion.bias[:-1]
+        return found, MechanismStates(mechanism, element.start, found[None], which)
+
+    def unbalanced(rates: Any) -> FloatArray:
+        inertial, applied, _ = change.balance(of(rates)[1], 0)
+        return np.asarray(inertial - applied)
+
+    at = unbalanced(np.zeros(mechanism.nv))
+    slopes = np.stack([unbalanced(one) - at for one in np.eye(mechanism.nv)], axis=-1)
+    return of(-np.linalg.solve(slopes, at))[0]
+
+
+def at_start(element: MechanismElement, change: Change) -> Evidence:
+    """Certificate of an engine whose first accelerations are those with other numbers."""
+    lines, (own, found) = [], (accelerations(element, model) for model in (Change(element.mechanism), change))
+    for name, part in (("acceleration", slice(0, 3)), ("angular acceleration", slice(3, 6))):
+        one, other = own[:, part].ravel(), found[:, part].ravel()
+        apart = float(np.max(np.abs(other - one)) / (np.max(np.abs(one)) or 1.0))
+        lines.append(Line(name, "1", tuple(one.tolist()), tuple(other.tolist()), apart, 1e-12).as_dict())
+    return Evidence(element, lines)
+
+
+def all_masses(mechanism: Mechanism, factor: float) -> Change:
+    """A factor on the mass of each body."""
+    return Change(mechanism, mass=factor * np.array([body.mass for body in mechanism.bodies]))
+
+
+def last_mass(mechanism: Mechanism, factor: float) -> Change:
+    """A factor on the mass of the last body."""
+    mass = np.array([body.mass for body in mechanism.bodies])
+    return Change(mechanism, mass=mass * [*np.ones(len(mass) - 1), factor])
+
+
+def limits(mechanism: Mechanism, factor: float) -> Change:
+    """A factor on the limits of the actuators."""
+    return Change(mechanism, effort=_effort(limit=factor))
+
+
+@pytest.mark.parametrize(("factor", "named"), [(2.0, True), (-1.0, False)])
+@pytest.mark.parametrize(
+    ("name", "change", "words"),
+    [
+        ("double_pendulum", all_masses, "all masses"),
+        ("double_pendulum", last_mass, "the body lower with its mass"),
+        ("saturated_servo", limits, "the limits of the actuators"),
+    ],
+)
+def test_masses_and_limits_have_no_wrong_sign(
+    name: str, change: Callable[[Mechanism, float], Change], words: str, factor: float, named: bool
+) -> None:
+    """Twice a mass or a limit is told by the first accelerations; minus it, which no engine has, is not."""
+    (element,) = load_scene(name).elements
+    assert isinstance(element, MechanismElement)
+    said = proven(at_start(element, change(element.mechanism, factor)))
+    assert any(f"{words} {'counted twice' if named else 'with'}" in each for each in said) is named, said
+
+
+def arm(friction: float = 0.7, torque: float = 0.0, motor: float = 1.0) -> Scene:
+    """Two rods with dry friction in each joint and a motor at the shoulder."""
+    scene = load_scene(str(ROUGH_ARM))
+    mechanism = scene.elements[0].mechanism  # type: ignore[attr-defined]  # it has one
+    shoulder, elbow = (replace(joint, v0=(4.0,)) for joint in mechanism.joints)
+    joints = shoulder, replace(elbow, friction=friction, torque=torque)
+    driven = replace(mechanism, joints=joints, actuators=(Actuator("motor", "shoulder", "torque", target=motor),))
+    return replace(scene, elements=(MechanismElement(driven),))
+
+
+@cache
+def run(**numbers: float) -> Any:
+    """A run of the arm while it turns one way, so that a torque may stand for friction."""
+    return simulate(arm(**numbers), "projection", until=0.06, every=0.004)
+
+
+@pytest.mark.parametrize(
+    ("numbers", "words", "named"),
+    [
+        ({"friction": 0.0, "torque": 0.7}, "friction of the joint elbow with the wrong sign", True),
+        ({"friction": 0.0, "torque": 0.21}, "friction of the joint elbow", False),
+        ({"motor": -1.0}, "the torques of the actuators with the wrong sign", True),
+        ({"motor": -0.3}, "the torques of the actuators", False),
+    ],
+    ids=["friction -1", "friction -0.3", "motor -1", "motor -0.3"],
+)
+def test_a_negative_factor_along_a_run_is_a_wrong_sign_alone(
+    numbers: dict[str, float], words: str, named: bool
+) -> None:
+    """Friction or a torque with the wrong sign is a cause; another negative factor, which nobody makes, is none."""
+    (element,) = arm().elements
+    said = proven(Evidence(element, [], run(**numbers), run()))
+    assert any(words in each for each in said) is named, said
