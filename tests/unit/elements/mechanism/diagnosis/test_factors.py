@@ -14,6 +14,7 @@ import pytest
 from proofroll.core.arrays import FloatArray
 from proofroll.core.certificate import Line
 from proofroll.core.diagnosis import Evidence, hypotheses_of
+from proofroll.core.first_steps import OF_FIRST_STEPS
 from proofroll.core.scene import Scene
 from proofroll.elements.mechanism.diagnosis.equations import Change, MechanismStates
 from proofroll.elements.mechanism.diagnosis.joint_laws import _effort
@@ -51,14 +52,15 @@ def accelerations(element: MechanismElement, change: Change) -> FloatArray:
     return of(-np.linalg.solve(slopes, at))[0]
 
 
-def at_start(element: MechanismElement, change: Change) -> Evidence:
-    """Certificate of an engine whose first accelerations are those with other numbers."""
+def certified(element: MechanismElement, change: Change, when: str = "", tolerance: float = 1e-12) -> list[Any]:
+    """Lines of a certificate whose first accelerations are those with other numbers."""
     lines, (own, found) = [], (accelerations(element, model) for model in (Change(element.mechanism), change))
     for name, part in (("acceleration", slice(0, 3)), ("angular acceleration", slice(3, 6))):
         one, other = own[:, part].ravel(), found[:, part].ravel()
         apart = float(np.max(np.abs(other - one)) / (np.max(np.abs(one)) or 1.0))
-        lines.append(Line(name, "1", tuple(one.tolist()), tuple(other.tolist()), apart, 1e-12).as_dict())
-    return Evidence(element, lines)
+        told = Line(name + when, "1", tuple(one.tolist()), tuple(other.tolist()), apart, tolerance)
+        lines.append(told.as_dict())
+    return lines
 
 
 def all_masses(mechanism: Mechanism, factor: float) -> Change:
@@ -92,7 +94,7 @@ def test_masses_and_limits_have_no_wrong_sign(
     """Twice a mass or a limit is told by the first accelerations; minus it, which no engine has, is not."""
     (element,) = load_scene(name).elements
     assert isinstance(element, MechanismElement)
-    said = proven(at_start(element, change(element.mechanism, factor)))
+    said = proven(Evidence(element, certified(element, change(element.mechanism, factor))))
     assert any(f"{words} {'counted twice' if named else 'with'}" in each for each in said) is named, said
 
 
@@ -129,3 +131,16 @@ def test_a_negative_factor_along_a_run_is_a_wrong_sign_alone(
     (element,) = arm().elements
     said = proven(Evidence(element, [], run(**numbers), run()))
     assert any(words in each for each in said) is named, said
+
+
+@pytest.mark.parametrize(
+    ("factor", "tolerance", "named"), [(0.5, 1e-5, True), (0.9, 1e-5, True), (1.0, 1e-5, False), (1.0, 3e-2, True)]
+)
+def test_first_steps_of_the_scene_contradict_a_cause_of_the_run(factor: float, tolerance: float, named: bool) -> None:
+    """Half the friction of a joint, as a run shows it, is named unless the first steps show exactly the scene's."""
+    (element,) = arm().elements
+    assert isinstance(element, MechanismElement)
+    first = Change(element.mechanism, friction=np.array([1.0, factor]))
+    lines = certified(element, first, OF_FIRST_STEPS, tolerance)
+    said = proven(Evidence(element, lines, run(friction=0.35), run()))
+    assert any("friction of the joint elbow halved" in each for each in said) is named, said
