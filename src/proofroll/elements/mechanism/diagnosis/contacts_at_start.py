@@ -14,7 +14,6 @@ from proofroll.core.diagnosis.fitting import (
     factor_text,
     least_squares_parameter,
     least_squares_parameters,
-    possible,
 )
 from proofroll.core.errors import Refused
 from proofroll.core.first_steps import OF_FIRST_STEPS
@@ -110,9 +109,10 @@ def _other_friction(first: _FirstAccelerations) -> Iterator[Cause]:
         def changed(factor: float, pair: Any = pair) -> FloatArray:
             return first.apart(first.scaled(factor, (pair,)))
 
-        groups.append((pair.name, (pair,), least_squares_parameter(changed, 1.0, 1.0)))
+        # below 0, where the fit may end, friction is off
+        groups.append((pair.name, (pair,), max(least_squares_parameter(changed, 1.0, 1.0), 0.0)))
     for name, which, factor in groups:
-        after = first.off(first.scaled(factor, which)) if possible(factor, signed=False) else np.inf
+        after = first.off(first.scaled(factor, which))
         yield first.cause(f"friction of {name} is {factor_text(factor)}", after, _OWN, 1, change_by(factor))
 
 

@@ -16,6 +16,7 @@ from proofroll.core.certificate import Line
 from proofroll.core.diagnosis import Evidence, hypotheses_of
 from proofroll.core.first_steps import OF_FIRST_STEPS
 from proofroll.core.scene import Scene
+from proofroll.elements.mechanism.diagnosis.contacts_at_start import _FirstAccelerations, _other_friction
 from proofroll.elements.mechanism.diagnosis.equations import Change, MechanismStates
 from proofroll.elements.mechanism.diagnosis.joint_laws import _effort
 from proofroll.elements.mechanism.drives import Actuator
@@ -144,3 +145,22 @@ def test_first_steps_of_the_scene_contradict_a_cause_of_the_run(factor: float, t
     lines = certified(element, first, OF_FIRST_STEPS, tolerance)
     said = proven(Evidence(element, lines, run(friction=0.35), run()))
     assert any("friction of the joint elbow halved" in each for each in said) is named, said
+
+
+@pytest.mark.parametrize(
+    ("foot", "factor", "words"),
+    [("left", 0.5, "halved"), ("right", 0.0, "left out"), ("back", 0.0, "left out"), ("left", -0.02, "left out")],
+)
+def test_a_foot_without_friction_is_told_and_none_with_a_negative_one(foot: str, factor: float, words: str) -> None:
+    """First accelerations without a foot's friction, or a little beyond, are told as none and as no negative one."""
+    (element,) = load_scene("sled").elements
+    assert isinstance(element, MechanismElement)
+
+    def first(part: float) -> FloatArray:
+        pairs = (replace(p, friction=(part if p.name == foot else 1.0) * p.friction) for p in element.mechanism.pairs)
+        motion = MechanismElement(replace(element.mechanism, pairs=tuple(pairs))).first_motion
+        return np.concatenate([motion.acceleration, motion.angular_acceleration], axis=-1)
+
+    found = first(max(factor, 0.0)) + min(factor, 0.0) * (first(1.0) - first(0.0))
+    causes = _other_friction(_FirstAccelerations(Evidence(element, []), found))
+    assert [cause.says for cause in causes if cause.proven] == [f"friction of {foot} is {words}"]
