@@ -18,7 +18,6 @@ from proofroll.core.diagnosis.fitting import (
     change_by,
     factor_text,
     least_squares_parameters,
-    possible,
 )
 from proofroll.core.errors import InputError, NotUnique
 from proofroll.elements.mechanism.contacts.dynamics import ContactDynamics
@@ -174,9 +173,8 @@ def laws_of_impacts(evidence: Evidence) -> Iterator[Cause]:
         yield contact_cause("convex cone", says, residuals.quantity, residuals.unit, before, after, remedy)
         for law in ("friction", "restitution"):
             factor = residuals.fit(functools.partial(_scaled, mechanism, law), 1.0)
-            if possible(factor, signed=False):
-                model, says = _scaled(mechanism, law, factor), f"{law} of impacts is {factor_text(factor)}"
-                yield residuals.cause(f"{law} of impacts", says, model, _REMEDY, 1, change_by(factor))
+            model, says = _scaled(mechanism, law, factor), f"{law} of impacts is {factor_text(factor)}"
+            yield residuals.cause(f"{law} of impacts", says, model, _REMEDY, 1, change_by(factor))
         for plane in (geometry for geometry in mechanism.geometries if geometry.kind == "plane"):
 
             def missed(by: FloatArray, plane: Geometry = plane, own: Residuals[Mechanism] = residuals) -> FloatArray:

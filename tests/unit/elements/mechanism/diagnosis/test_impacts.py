@@ -152,3 +152,10 @@ def test_a_model_that_leaves_an_impact_open_fits_none() -> None:
     struck = [impacts._Struck(0, np.array(joint.q0), np.array([-10.0, 1.0, 0.0]), np.zeros(3), np.eye(3))]
     assert np.all(np.isfinite(impacts._missed(mechanism, struck)))
     assert np.all(np.isinf(impacts._missed(impacts._scaled(mechanism, "friction", 10.0), struck)))
+
+
+@pytest.mark.parametrize(("law", "factor"), [("friction", -0.3), ("restitution", -0.3), ("restitution", 2.0)])
+def test_no_fit_of_impacts_ends_at_a_coefficient_that_nobody_can_give(law: str, factor: float) -> None:
+    """A negative coefficient, and a restitution above 1, leave all of the velocities unexplained."""
+    (element,) = load_scene("two_spheres").elements
+    assert impacts._missed(impacts._scaled(element.mechanism, law, factor), []).tolist() == [np.inf]
