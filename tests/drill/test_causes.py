@@ -79,7 +79,7 @@ def test_three_free_numbers_do_not_explain_two() -> None:
 
 
 def test_a_number_that_was_built_wrongly_leaves_no_equations_to_fit() -> None:
-    """Where the certificate names a mass that is another, its accelerations are no evidence of a second cause."""
+    """Accelerations beside a mass that the certificate names as another are no evidence of a second cause."""
     kind = numbers.HeavierTop
     scene = load_scene(kind.scene[0], **kind.scene[1])
     lines = {line.quantity: {**line.as_dict(), "holds": False} for line in _built(kind, scene)[1]}
