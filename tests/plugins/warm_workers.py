@@ -101,9 +101,15 @@ class WarmWorkers:
         if place is None or place[0] != _loaded(engine) or worker._ended():
             worker.close()
             return
-        with self._lock:
+        # A finalizer may run while its own thread holds the lock: to wait for it would be for ever.
+        if not self._lock.acquire(blocking=False):
+            worker.close()
+            return
+        try:
             self._idle.append((place, worker))
             surplus = [self._idle.pop(0)[1]] if len(self._idle) > _MOST else []
+        finally:
+            self._lock.release()
         for old in surplus:
             old.close()
 
