@@ -78,7 +78,7 @@ class PushingJoint(OfJoint):
 
 
 class MovedStop(MechanismMutant):
-    """The stop lies below.
+    """The stop lies farther below than two steps reach: nearer ones are where a step may end.
 
     Attributes:
         by: shift [m].
@@ -89,7 +89,7 @@ class MovedStop(MechanismMutant):
     until: ClassVar[float] = 0.6
     every: ClassVar[float] = 0.02
     named = ("rests at",)
-    by: ClassVar[float] = 0.01
+    by: ClassVar[float] = 0.03
 
     def other(self, mechanism: Mechanism) -> Mechanism:
         """Both limits lower."""
@@ -104,16 +104,14 @@ class MovedStopWithRebounds(MovedStop):
     fault = "stop at another place, with rebounds"
     scene: ClassVar[Any] = ("stop", {"restitution": 0.5})
     until = 1.0
-    named = ("turns back at -0.01,",)
+    named = ("turns back at -0.03,",)
 
 
 class MovedStopWithOneRebound(MovedStopWithRebounds):
-    """Rebounds from there once, farther below than two steps reach."""
+    """Rebounds from there once."""
 
     fault = "stop at another place, with one rebound"
     until = 0.8
-    by = 0.03
-    named = ("turns back at -0.03,",)
 
 
 class Driven(MechanismMutant):
