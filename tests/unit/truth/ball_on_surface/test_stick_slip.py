@@ -310,7 +310,10 @@ def test_friction_that_just_suffices_on_an_incline_is_ill_posed(part: float, mon
 @pytest.mark.parametrize(
     "beside",
     # All of them take three minutes, so that other kinds of arithmetic try some.
-    [pytest.param(range(-20, 21), id="all"), pytest.param((-20, -1, 0, 1, 20), id="some", marks=pytest.mark.arithmetic)],
+    [
+        pytest.param(range(-20, 21), id="all"),
+        pytest.param((-20, -1, 0, 1, 20), id="some", marks=pytest.mark.arithmetic),
+    ],
 )
 @pytest.mark.parametrize(("factor", "known"), [(1.0, ["slip"]), (12 / 7, [])])
 def test_between_two_regimes_the_answer_is_ill_posed(factor: float, known: list[str], beside: Iterable[int]) -> None:
