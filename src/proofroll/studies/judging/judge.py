@@ -192,6 +192,7 @@ def _unjudged(given: GivenRun, reference: Reference, judged: Mapping[str, Tolera
         if not _comparable(reference, name):
             reasons[name] = "the truth has nothing of that name"
         elif why or name not in judged:
+            # What follows from the state is judged with it only where places of all bodies are.
             reasons[name] = why if why and REQUIRED[0] in judged else _NO_TOLERANCE
     return reasons
 

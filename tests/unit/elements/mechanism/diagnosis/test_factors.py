@@ -29,7 +29,7 @@ ROUGH_ARM = Path(__file__).parents[4] / "drill/proofroll_drill/mutants/rough_arm
 
 
 def proven(evidence: Evidence) -> list[str]:
-    """What is proven, before several causes are compared."""
+    """Proven causes, before several are compared."""
     hypotheses = hypotheses_of(evidence.element)
     return [cause.says for item in hypotheses for cause in item.test(evidence) if cause.proven]
 
