@@ -29,6 +29,10 @@ _States = NDArray[np.bool_]
 _CREEPS = 1e-3
 # Gap at the start that counts as closed, relative to the mechanism's size.
 _CLOSED = 1e-6
+# Room of a time in which a gap closes, relative: digits of its samples.
+_ROUNDED = 1.01
+# Cosine between the slips of two samples below which one line of slip has turned: the line may turn with its bodies.
+_REVERSED = -0.9
 # Kinds of events that samples cannot distinguish from others: a resting contact may still begin to move, and a settling
 # one may go on rebounding.
 _ALIKE = {"rest": "stick", "settle": "impact"}
@@ -39,7 +43,8 @@ class ContactWatch:
 
     A state that lasts for one sample only does not count: a contact that presses at a single sample between two open
     ones rebounds, and one that does not slip at a single sample changes its direction of slip. Two impacts between
-    samples count as one.
+    samples count as one. A contact whose gap stays closed has not lifted off, though another may bear its load, and one
+    whose gap cannot close between two samples has no impact there, though its speed changes sign.
     """
 
     def __init__(self, element: MechanismElement) -> None:
@@ -86,16 +91,20 @@ class ContactWatch:
         presses = normal_forces(found, pressed) > PRESSES * self._element.force
         # Several engines have forces only after a first step, and a slip from rest is slow at first
         presses[0] |= presses[1] & (found.gap[0] <= _CLOSED * self._element.length)
-        presses = _without_lone(presses)
+        forces, presses = presses, _without_lone(presses)
+        u_n = np.sum(found.normal * found.slide, axis=-1)
+        for c in range(presses.shape[1]):
+            room, moves = _CLOSED * self._element.length, _CREEPS * self._element.speed
+            presses[:, c] |= _stays_closed(presses[:, c], found.gap[:, c], u_n[:, c], room, moves)
         slips = presses & (found.slip > _CREEPS * self._element.speed)
         slips[0] |= presses[0] & slips[1]
         slips = presses & _without_lone(slips)
         stands = (speeds <= _CREEPS * self._element.speed) & ~slips.any(axis=1)
         events = []
         for c, contact in enumerate(self._element.mechanism.contacts):
-            u_n = np.sum(found.normal[:, c] * found.slide[:, c], axis=-1)
+            states = forces[:, c], presses[:, c], slips[:, c]
             for k in range(len(times) - 1):
-                kind, at = _change(times, found, u_n, presses[:, c], slips[:, c], k, c)
+                kind, at = _change(times, found, u_n[:, c], states, k, c)
                 if kind == "stick" and stands[k + 1]:
                     kind = "rest"
                 if kind:
@@ -117,14 +126,69 @@ def _without_lone(states: _States) -> _States:
     return np.concatenate([states[:1], np.where(lone, states[2:], states[1:-1]), states[-1:]])
 
 
+def _stays_closed(presses: _States, gap: FloatArray, u_n: FloatArray, room: float, moves: float) -> _States:
+    """Samples without force at which one contact is closed nevertheless, shape (time,).
+
+    These are whole stretches without force in which the gap does not open, and at the end of the run is not opening.
+
+    Args:
+        presses: whether it presses, shape (time,).
+        gap: [m], shape (time,).
+        u_n: rate of the gap [m/s], shape (time,).
+        room: gap that counts as closed [m].
+        moves: speed that does not count as rest [m/s].
+    """
+    closed = np.zeros_like(presses)
+    edges = np.flatnonzero(np.diff(presses)) + 1
+    for low, high in zip([0, *edges.tolist()], [*edges.tolist(), len(presses)], strict=True):
+        opens = high == len(presses) and u_n[-1] > moves
+        closed[low:high] = not presses[low] and bool(np.any(presses)) and not opens and gap[low:high].max() <= room
+    return closed
+
+
+def _strikes(times: FloatArray, gap: FloatArray, u_n: FloatArray, pressed: _States, k: int) -> bool:
+    """True if an open contact touches between samples k and k + 1, where its gap begins to grow.
+
+    It does if it presses at one of them. Otherwise its gap must be able to close within the interval and to open again
+    to what it is afterwards. Nor does its speed change as it does in the intervals beside it, as that of a body which
+    swings past without a touch.
+    """
+    if pressed[k] or pressed[k + 1]:
+        return True
+    h = float(times[k + 1] - times[k])
+    beside = [j for j in (k - 1, k + 1) if 0 <= j < len(times) - 1]
+    rates = [float((u_n[j + 1] - u_n[j]) / (times[j + 1] - times[j])) for j in beside]
+    falls = max([-rate for rate in rates if rate < 0], default=0.0)
+    there, back = (
+        _fall_time(max(float(g), 0.0), abs(float(u)), falls) for g, u in ((gap[k], u_n[k]), (gap[k + 1], u_n[k + 1]))
+    )
+    smooth = len(rates) == 2 and min(rates) > 0 and float(u_n[k + 1] - u_n[k]) <= sum(rates) * h
+    return there <= _ROUNDED * h and there + back <= 2 * h and not smooth
+
+
+def _fall_time(gap: float, speed: float, acceleration: float) -> float:
+    """Time [s] in which a gap [m] closes at a speed [m/s] that grows [m/s²]."""
+    return 2 * gap / (speed + float(np.sqrt(speed**2 + 2 * acceleration * gap))) if gap else 0.0
+
+
 def _change(
-    times: FloatArray, found: Followed, u_n: FloatArray, presses: _States, slips: _States, k: int, c: int
+    times: FloatArray, found: Followed, u_n: FloatArray, states: tuple[_States, _States, _States], k: int, c: int
 ) -> tuple[str, float]:
-    """Kind and time [s] of the event of contact c between samples k and k + 1; the kind is empty without an event."""
+    """Kind and time [s] of the event of contact c between samples k and k + 1; the kind is empty without an event.
+
+    Args:
+        times: of the samples [s].
+        found: the contacts along the motion.
+        u_n: rate of its gap [m/s], shape (time,).
+        states: whether its force presses at a sample, whether it touches, and whether it slips, each of shape (time,).
+        k: number of the sample before.
+        c: number of the contact.
+    """
+    pressed, presses, slips = states
     start, middle = float(times[k]), float(times[k] + times[k + 1]) / 2
     if not presses[k]:
         closing = float(u_n[k])
-        if presses[k + 1] or closing < 0 < u_n[k + 1]:
+        if presses[k + 1] or (closing < 0 < u_n[k + 1] and _strikes(times, found.gap[:, c], u_n, pressed, k)):
             return "impact", start + float(found.gap[k, c]) / -closing if closing < 0 else middle
         return "", start
     if not presses[k + 1]:
@@ -136,5 +200,6 @@ def _change(
         return "stick", whole
     if slips[k + 1] and not slips[k]:
         return "slip", middle
-    turned = slips[k] and float(found.slide[k, c] @ found.slide[k + 1, c]) < 0
+    along = float(found.slide[k, c] @ found.slide[k + 1, c])
+    turned = slips[k] and along < _REVERSED * float(found.slip[k, c] * found.slip[k + 1, c])
     return ("turn", middle) if turned else ("", start)

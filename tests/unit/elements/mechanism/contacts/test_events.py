@@ -83,6 +83,41 @@ def test_an_impact_is_found_with_and_without_a_rebound() -> None:
     assert [kind for kind, _ in told(during)] == ["impact"]
 
 
+@pytest.mark.parametrize("gap", [0.45, 0.02, 1e-3])
+def test_what_swings_past_the_floor_does_not_strike_it(gap: float) -> None:
+    """A normal speed that changes its sign without a touch is no impact, however near the floor is."""
+    t, acceleration = EVERY * np.arange(-4.5, 5.0), 40.0
+    heights, speeds = gap + acceleration * t**2 / 2, [[0.3, 0.0, u] for u in acceleration * t]
+    assert seen(heights.tolist(), speeds, [0.0] * len(t), ball()) == []
+    trembles = [[0.0, 0.0, sign * 1e-12] for sign in (-1.0, 1.0, -1.0, 1.0)]
+    assert seen([gap] * 4, trembles, [0.0] * 4, ball()) == []
+
+
+@pytest.mark.parametrize("phase", [0.1, 0.5, 0.9])
+@pytest.mark.parametrize("speed", [0.15, 1.0])
+def test_what_rebounds_between_samples_has_struck(phase: float, speed: float) -> None:
+    """A touch is found wherever it lies between its samples, and however slow it is against gravity."""
+    t, g, e = EVERY * (np.arange(-2.0, 2.0) + phase), 9.81, 0.8
+    heights = np.where(t < 0, -speed * t, e * speed * t) - g * t**2 / 2
+    up = np.where(t < 0, -speed, e * speed) - g * t
+    events = seen(heights.tolist(), [[0.0, 0.0, u] for u in up], [0.0] * 4, ball(e))
+    assert [event.kind for event in events] == ["impact"]
+
+
+@pytest.mark.parametrize("N", [[1.0, 1.0, 0, 0, 0, 1.0, 1.0], [0, 0, 0, 0, 1.0, 1.0, 1.0], [1.0] * 3 + [0] * 4])
+def test_a_load_that_others_bear_is_no_lift_off(N: list[float]) -> None:
+    """A contact that loses its force while its gap stays closed has neither left nor struck."""
+    assert seen([0] * 7, [[0, 0, 0]] * 7, N, ball()) == []
+
+
+def test_a_slip_in_the_plane_that_bends_has_not_turned() -> None:
+    """Only a slip that goes back along its line turns; one whose direction changes sideways does not."""
+    bent = [[0.1, 0.1, 0], [0.1, 0.05, 0], [-0.02, -0.08, 0], [-0.05, -0.1, 0]]
+    sideways = [[0.1, 0.1, 0], [0.1, 0.02, 0], [-0.04, 0.12, 0], [-0.05, 0.2, 0]]
+    assert [event.kind for event in seen([0] * 4, sideways, [1.0] * 4, ball())] == []
+    assert told(seen([0] * 4, bent[:1] * 2 + [[-x for x in bent[0]]] * 2, [1.0] * 4, ball())) == [("turn", 1)]
+
+
 def test_what_no_longer_presses_has_lifted_off() -> None:
     """A force that ends is a lift-off between the samples."""
     events = seen([0, 0, 0.01, 0.02], [[0, 0, 0], [0, 0, 0.5], [0, 0, 1.0], [0, 0, 1.0]], [1.0, 1.0, 0, 0], ball())
