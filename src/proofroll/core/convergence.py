@@ -53,7 +53,8 @@ class Limit:
         saturated: True if two tolerances gave the same run: something else (samples at which steps end) limits the
             steps, so that no limit of small steps follows.
         beside: effect on the finest curve of events that are one step late (:mod:`proofroll.core.beside_events`).
-        chance: further doubt in a limit whose order is above the scheme's: its last change may be small by chance.
+        chance: further doubt in a limit whose order is not the scheme's: its last change may be small by chance, or the
+            next order may yet show.
         rounded: True if the differences are so near to the round-off of single precision that no order shows.
         floor: clause about the error floor of single precision that ends the refinement; empty: there is none.
     """
@@ -81,7 +82,9 @@ def richardson(
     where the order was rounded to a whole one, the bar includes the effect of rounding it. In any other ladder
     extrapolation would spread the error of the coarse curves: the limit is the finest curve, with twice the change of
     the last refinement (more if the order is below one) as its bar. An order above the scheme's may be chance in that
-    change, which then may have been as large as the change before it, shrunk by the scheme's order.
+    change, which then may have been as large as the change before it, shrunk by the scheme's order. An extrapolation
+    with another order than the scheme's proves nothing that the finest curve with its bar does not: three steps that
+    are not yet asymptotic show such orders, and so do switches that the scheme steps over.
 
     In single precision each step rounds the state, so that shorter steps may be worse. Unless the differences are far
     above that scatter, an order counts only if the ladder is asymptotic with differences of one shape; otherwise, and
@@ -108,13 +111,15 @@ def richardson(
         # The finest curve, as uncertain as the largest change seen; from one that vanishes at once no order follows.
         shown = last < first * (h[1] / h[0]) ** _NO_CONVERGENCE
         return Limit(fine, max(first, last, _walked(middle - coarse, fine - middle)), float("nan"), shown)
-    power, rounding = declared or max(1, round(order)), 0.0
+    power, rounding, chance = declared or max(1, round(order)), 0.0, 0.0
+    unextrapolated = 2 * last * max(1.0, 1 / (h[1] ** order - 1))
     if abs(order - power) > _ASYMPTOTIC:
         power = max(1, round(order))
         of_one_shape = largest_magnitude((fine - middle) - (middle - coarse) * last / first) <= _ASYMPTOTIC * last
         if abs(order - power) > _ASYMPTOTIC or not of_one_shape:
             chance = max(0.0, first / _shrinkage(declared or order, h) - last)
-            return Limit(fine, 2 * last * max(1.0, 1 / (h[1] ** order - 1)), order, chance=2 * chance)
+            return Limit(fine, unextrapolated, order, chance=2 * chance)
+        chance = unextrapolated if declared else 0.0
         rounding = last * abs(1 / (h[1] ** order - 1) - 1 / (h[1] ** power - 1))
     before = middle + (middle - coarse) / ((h[0] / h[1]) ** power - 1)
     after = fine + (fine - middle) / (h[1] ** power - 1)
@@ -122,7 +127,24 @@ def richardson(
     hidden = _removes(power - 1, h, power) if power > 1 else 0.0
     change = largest_magnitude(after - before)
     bar = max(2 * abs(finer) * change, abs(hidden - finer) * change, 2 * rounding)
-    return Limit(after + (after - before) * finer, bar, order)
+    return Limit(after + (after - before) * finer, bar, order, chance=chance)
+
+
+def falls_faster(errors: Sequence[float], steps: Sequence[float]) -> bool:
+    """True if errors fall at every step of a ladder, and with a clearly higher order at each.
+
+    So fall the errors of steps that are not yet asymptotic, whatever order their differences show; a shorter step tells
+    whether they reach zero or pass it.
+
+    Args:
+        errors: coarse first.
+        steps: falling; only the ratios matter.
+    """
+    if len(errors) < LADDER_RUNGS or not all(np.isfinite(errors)) or min(errors) <= 0:
+        return False
+    rungs = itertools.pairwise(zip(errors, steps, strict=True))
+    orders = [float(np.log(large / small) / np.log(long / short)) for (large, long), (small, short) in rungs]
+    return min(orders) > 0 and all(later > earlier + _ASYMPTOTIC for earlier, later in itertools.pairwise(orders))
 
 
 def _one_law(order: float, declared: int | None, before: FloatArray, after: FloatArray) -> bool:

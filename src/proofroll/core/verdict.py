@@ -157,11 +157,14 @@ class Refinement:
         limit: of small steps, or None if there is none.
         ladder: True if several steps were run; without a limit they then confirm nothing.
         lost: the first of these steps that has no curve, and why, as a clause; empty if each has one.
+        faster: True if the errors of these steps fall ever faster, see :func:`.falls_faster`: three steps do not tell
+            then whether they pass the truth.
     """
 
     limit: Limit | None = None
     ladder: bool = False
     lost: str = ""
+    faster: bool = False
 
     @property
     def unknown(self) -> LimitResult:
@@ -184,7 +187,7 @@ def judge_curve(
     rungs = _Ladder(refinement.unknown, lost=refinement.lost)
     if limit is not None:
         round_off = round_off_of(run.precision, max(allowance.scale, run.magnitude))
-        rungs = _read(limit, allowance, true, round_off)
+        rungs = _read(limit, allowance, true, round_off, refinement.faster)
     if hidden:
         rungs = replace(rungs, finding=refinement.unknown)
     error = max(on_grid, off_grid)
@@ -248,22 +251,25 @@ class _Ladder:
     lost: str = ""
 
 
-def _read(limit: Limit, allowance: Allowance, true: TrueCurve, round_off: float) -> _Ladder:
-    """Summary of a ladder with this limit of small steps; ``round_off``: of the curve."""
+def _read(limit: Limit, allowance: Allowance, true: TrueCurve, round_off: float, faster: bool) -> _Ladder:
+    """Summary of a ladder with this limit of small steps.
+
+    ``round_off`` is that of the curve; ``faster``: see :class:`Refinement`.
+    """
     tolerance, unit, error = allowance.tolerance, allowance.shown_unit, largest_difference(limit.values, true.values)
     bar, order = limit.error_bar + true.error_bar, limit.order if np.isfinite(limit.order) else None
     settled = limit.shown or limit.error_bar <= _FLAT * tolerance
     far_inside = error + _SEVERAL * bar <= tolerance
     doubted = bar + limit.beside + limit.chance + round_off
     drifted = doubted - limit.error_bar + limit.error_bar / _FLAT  # if twenty further halvings each change as much
-    finding, leaves = LimitResult.NOT_SHOWN, error - doubted > tolerance
+    finding, leaves = LimitResult.NOT_SHOWN, error - doubted > tolerance and not faster
     if far_inside or (settled and error <= tolerance and bar <= tolerance):
         finding = LimitResult.WITHIN
     elif leaves and not limit.saturated and (limit.shown or error - drifted > tolerance):
         finding = LimitResult.ANOTHER
     shown = limit.shown or limit.error_bar <= _SHOWN_WRONG * round_off
     beyond = _SHOWN_WRONG * (bar + round_off) + limit.beside + limit.chance
-    wrong = shown and finding == LimitResult.WITHIN and error > beyond
+    wrong = shown and not faster and finding == LimitResult.WITHIN and error > beyond
     shown_order = (
         f"no order{' shows in single precision' if limit.rounded else ''}" if order is None else f"order {order:.3g}"
     )
@@ -272,6 +278,8 @@ def _read(limit: Limit, allowance: Allowance, true: TrueCurve, round_off: float)
         text = "it has not as many values as the truth"
     elif limit.beside > bar:
         text += f"; one step beside an event does {number(limit.beside, 1)}{unit}"
+    if faster and finding == LimitResult.NOT_SHOWN:
+        text += "; the errors of these steps fall ever faster, so a shorter step has to tell"
     if limit.floor:
         text += f"; {limit.floor}"
     if limit.saturated:

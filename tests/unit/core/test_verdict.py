@@ -7,8 +7,18 @@ import numpy as np
 import pytest
 from flat_judging import judged_curve
 
-from proofroll.core.convergence import Limit, richardson, tightest
-from proofroll.core.verdict import Doubt, Judgement, LimitResult, Verdict
+from proofroll.core.convergence import Limit, falls_faster, richardson, tightest
+from proofroll.core.verdict import (
+    Allowance,
+    Doubt,
+    Judgement,
+    LimitResult,
+    Refinement,
+    RunCurve,
+    TrueCurve,
+    Verdict,
+    judge_curve,
+)
 
 T = np.linspace(0, 2, 21)
 TRUE = np.sin(3 * T)
@@ -80,13 +90,39 @@ def test_an_error_that_vanishes_by_luck_at_one_step_is_no_agreement(declared: in
     assert "another limit: off by" in found.reason
 
 
-def test_a_clean_ladder_of_another_order_than_declared_shows_its_limit() -> None:
-    """Off by 1.5 mm (1 - h/1 ms) where 1 mm is allowed, declared of order 2: order 1 is seen, and the limit differs."""
+def test_a_limit_by_another_order_than_the_schemes_is_in_doubt() -> None:
+    """Three steps of order 1 of a scheme of order 2 may be chance: their limit beyond the tolerance is not shown."""
     off = [1.5e-3 * (1 - h) for h in (1.0, 0.5, 0.25)]
     found = verdict_of(off[0], errors(*off, declared=2))
-    assert (found.verdict, found.limit) == (Verdict.DIFFERS, LimitResult.ANOTHER)
+    assert (found.verdict, found.limit) == (Verdict.UNCONFIRMED, LimitResult.NOT_SHOWN)
     assert found.limit_error == pytest.approx(1.5e-3)
     assert found.order == pytest.approx(1)
+    beyond = verdict_of(20e-3 + off[0], errors(*(20e-3 + value for value in off), declared=2))
+    assert (beyond.verdict, beyond.limit) == (Verdict.DIFFERS, LimitResult.ANOTHER)
+
+
+def test_steps_whose_errors_fall_ever_faster_show_no_other_limit() -> None:
+    """Errors of 6.39, 2.67 and 0.766 that fall on to 0.0003 show order 1 by chance: they do not pass the truth."""
+    wave, steps = np.cos(9 * T), (4, 2, 1)
+    curves = [TRUE + error * wave for error in (6.39, 2.67, 0.766)]
+    limit = richardson(curves, steps, 1)
+    allowance, true = Allowance("w", "rad/s", 0.28, 28.0), TrueCurve(TRUE, 1e-12)
+    assert falls_faster([6.39, 2.67, 0.766], steps)
+    blind, found = (
+        judge_curve(allowance, RunCurve(curves[-1]), true, Refinement(limit, ladder=True, faster=faster))
+        for faster in (False, True)
+    )
+    assert (blind.limit, found.limit) == (LimitResult.ANOTHER, LimitResult.NOT_SHOWN)
+    assert "a shorter step has to tell" in found.reason
+    assert found.verdict is Verdict.DIFFERS
+
+
+@pytest.mark.parametrize(
+    "errors_of", [(4.0, 2.0, 1.0), (1.0, 2.0, 4.0), (5.0, 3.0, 2.0), (0.0, 0.0, 0.0), (6.4, 2.7, np.nan)]
+)
+def test_errors_of_one_order_or_of_another_limit_do_not_fall_faster(errors_of: tuple[float, float, float]) -> None:
+    """Errors in proportion to the step, towards another limit, away from the truth or unknown tell as they did."""
+    assert not falls_faster(errors_of, (4, 2, 1))
 
 
 def test_a_ladder_that_does_not_tell_the_limit_confirms_nothing() -> None:

@@ -10,7 +10,7 @@ import numpy as np
 
 from proofroll.core.arrays import FloatArray, largest_difference
 from proofroll.core.comparison import Band, Comparison
-from proofroll.core.convergence import Limit, floor_of, richardson, scatter_of, tightest
+from proofroll.core.convergence import Limit, falls_faster, floor_of, richardson, scatter_of, tightest
 from proofroll.core.diagnosis.scene_diagnosis import diagnose_scene
 from proofroll.core.errors import ProofrollError
 from proofroll.core.verdict import Allowance, Judgement, Refinement, Verdict, judge_curve
@@ -195,7 +195,8 @@ def _judgements(
             limit = replace(limit, beside=beside, floor=_floor(facts, name, limit, curves, true.values, reference))
         ladder = facts.resolution is not None and len(run.row.ladder) > 1 and curve.size > 0
         allowance = Allowance(name, reference.scene.observables[name].unit, tolerance.absolute(scale), scale)
-        judgement = judge_curve(allowance, own, true, Refinement(limit, ladder, lost))
+        faster = limit is not None and _falls_faster(run, name, curves, true.values)
+        judgement = judge_curve(allowance, own, true, Refinement(limit, ladder, lost, faster))
         if name not in given and judgement.verdict is not Verdict.DIFFERS:
             continue
         judgements.append(judgement)
@@ -233,6 +234,12 @@ def _limit(
     finest = run.ladder[factors[-1]]
     steps = finest.until / (finest.engine.step or finest.until)
     return richardson(values, run.row.ladder, facts.order, scatter_of(facts.precision, magnitude, steps))
+
+
+def _falls_faster(run: Planned, name: str, curves: dict[float, dict[str, FloatArray]], true: FloatArray) -> bool:
+    """True if the errors of a row's steps fall ever faster; see :func:`proofroll.core.convergence.falls_faster`."""
+    factors = [factor for factor in run.row.ladder if factor in curves]
+    return falls_faster([largest_difference(curves[factor][name], true) for factor in factors], factors)
 
 
 def _floor(
