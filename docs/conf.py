@@ -11,6 +11,9 @@ import proofroll
 
 sys.path.insert(0, str(Path(__file__).parent))
 
+import module_map
+import vocabulary
+
 project = "proofroll"
 author = "the proofroll authors"
 copyright = author  # noqa: A001 -- the name is Sphinx's
@@ -41,5 +44,7 @@ def _links(_: Any, __: str, source: list[str]) -> None:
 
 
 def setup(app: Any) -> None:
-    """Called by Sphinx."""
+    """Called by Sphinx: writes the pages that are made from the source, and names links of other pages."""
+    for page in (vocabulary, module_map):
+        page.FILE.write_text(page.document(), encoding="utf-8")
     app.connect("source-read", _links)

@@ -1,22 +1,27 @@
-"""CONTRIBUTING.md leads to files that are there, and to commands that exist."""
+"""CONTRIBUTING.md and the pages for maintainers are short, and lead to files that exist."""
 
 from __future__ import annotations
 
 import re
+import runpy
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
 SOURCE = ROOT / "src" / "proofroll"
 TEXT = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
+WORKED_CHANGES = (ROOT / "docs" / "maintain" / "worked_changes.md").read_text(encoding="utf-8")
+DECISIONS = sorted((ROOT / "docs" / "maintain" / "decisions").glob("*.md"))
+MAP: dict[str, Any] = runpy.run_path(str(ROOT / "docs" / "module_map.py"))
 # Parts of every kind of element or study: "the element's `kind.py`".
 _OF_EACH = ("elements/*", "studies/*")
 
 
 def rows() -> list[str]:
     """The lines of tables with at least one path in code."""
-    return [line for line in TEXT.splitlines() if line.startswith("|") and paths(line)]
+    return [line for line in (TEXT + WORKED_CHANGES).splitlines() if line.startswith("|") and paths(line)]
 
 
 def paths(line: str) -> list[str]:
@@ -86,9 +91,53 @@ def test_a_test_lies_where_its_module_does() -> None:
 
 def test_every_path_in_the_text_is_there() -> None:
     """A file or folder that a sentence names by a path is in the repository."""
-    text = re.sub(r"^ *```.*?^ *```$", "", TEXT, flags=re.DOTALL | re.MULTILINE)
+    pages = [TEXT, WORKED_CHANGES, *(path.read_text(encoding="utf-8") for path in DECISIONS)]
+    text = re.sub(r"^ *```.*?^ *```$", "", "\n".join(pages), flags=re.DOTALL | re.MULTILINE)
     named = {name.rstrip("/") for name in re.findall(r"`([\w./-]+(?:\.py|\.md|\.toml|/))`", text)}
-    tops = ("findings", "src", "models", "comparisons", "docs", "examples", "papers", "benchmarks", "tests")
+    tops = ("findings", "changes", "src", "models", "comparisons", "docs", "examples", "papers", "benchmarks", "tests")
     there = [f"/{path.relative_to(ROOT)}" for top in tops for path in (ROOT / top, *(ROOT / top).rglob("*"))]
     there += [f"/{path.name}" for path in ROOT.iterdir()]
     assert [name for name in sorted(named) if not any(path.endswith(f"/{name}") for path in there)] == []
+
+
+def test_documents_for_maintainers_are_short() -> None:
+    """CONTRIBUTING.md has at most 10 kB, the changelog at most 80 lines of at most 200 characters."""
+    assert len(TEXT.encode()) <= 10_000
+    lines = (ROOT / "CHANGELOG.md").read_text(encoding="utf-8").splitlines()
+    assert len(lines) <= 80
+    assert [line for line in lines if len(line) > 200] == []
+
+
+def test_a_change_is_a_sentence() -> None:
+    """Each line of a file in changes/ is one sentence of at most 200 characters."""
+    files = sorted(path for path in (ROOT / "changes").iterdir() if path.name != "README.md")
+    assert {path.suffix for path in files} <= {".md"}
+    lines = [(path.name, line) for path in files for line in path.read_text(encoding="utf-8").splitlines() if line]
+    assert [(name, line) for name, line in lines if len(line) > 200 or not line.endswith(".")] == []
+
+
+@pytest.mark.parametrize("path", DECISIONS, ids=lambda path: path.stem)
+def test_a_decision_is_dated(path: Path) -> None:
+    """A decision is a file named by its date, with a title, the date and its reason."""
+    date = re.match(r"\d{4}-\d\d-\d\d", path.name)
+    assert date
+    title, _, day, _, *reason = path.read_text(encoding="utf-8").splitlines()
+    assert title.startswith("# ")
+    assert day == f"*{date[0]}*"
+    assert any(reason)
+
+
+def test_the_map_has_every_module() -> None:
+    """The map has a line with content for each module of the package."""
+    lines = MAP["modules"]()
+    assert lines.keys() == {path.relative_to(SOURCE).as_posix() for path in SOURCE.rglob("*.py")}
+    assert [path for path, line in lines.items() if not line] == []
+    assert "| `verdict.py` | " in MAP["document"]()
+
+
+def test_the_map_prints_modules_by_word(capsys: pytest.CaptureFixture[str]) -> None:
+    """Words choose the modules that the map prints, by path or content."""
+    MAP["main"](["verdict", "core/"])
+    printed = capsys.readouterr().out.splitlines()
+    assert any(line.startswith("core/verdict.py: ") for line in printed)
+    assert all("core/" in line and "verdict" in line.lower() for line in printed)

@@ -1,7 +1,7 @@
 """List of bounds by ``approx``, ``assert_allclose`` and ``<`` within a factor of ten of the observed difference.
 
 ``python -m pytest -p near_bounds tests/unit/truth`` prints them at the end, the nearest first: on another processor a
-bound near round-off may be crossed (see "Drill" in CONTRIBUTING.md). Bounds by ``<`` need
+bound near round-off may be crossed (see tests/drill/README.md). Bounds by ``<`` need
 ``-o enable_assertion_pass_hook=true`` and tests that are compiled anew.
 """
 

@@ -1,4 +1,4 @@
-"""Protocol between proofroll and an engine; an adapter takes some 60 lines, see CONTRIBUTING.md.
+"""Protocol between proofroll and an engine; an adapter takes some 60 lines, see docs/write_an_engine.md.
 
 An adapter contains no clock, no file and no plot: the runner owns the time grid, the stopwatch, the detection of
 NaN, timeouts and files. An adapter knows surfaces, contact laws, joints, never a scene by name.

@@ -1,0 +1,48 @@
+"""Prints or writes the map of modules: the first docstring line of each module, by folder."""
+
+from __future__ import annotations
+
+import ast
+import sys
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[1]
+SOURCE = ROOT / "src" / "proofroll"
+FILE = ROOT / "docs" / "maintain" / "map.md"
+_INTRODUCTION = """# Map of modules
+
+Each module of `src/proofroll/` with the first line of its docstring; `docs/module_map.py WORD` prints those with a word.
+"""
+
+
+def modules(source: Path = SOURCE) -> dict[str, str]:
+    """First docstring line of each module, by its path below ``source``; empty for a module without a docstring."""
+    paths = sorted(source.rglob("*.py"), key=lambda path: (path.parent.parts, path.name))
+    lines = {}
+    for path in paths:
+        docstring = ast.get_docstring(ast.parse(path.read_text(encoding="utf-8"))) or ""
+        lines[path.relative_to(source).as_posix()] = docstring.partition("\n")[0]
+    return lines
+
+
+def document(source: Path = SOURCE) -> str:
+    """The map as a page: a section for each folder, a row for each module."""
+    parts, section = [_INTRODUCTION], None
+    for path, line in modules(source).items():
+        folder, _, name = path.rpartition("/")
+        if folder != section:
+            parts.append(f"\n## `{folder or '.'}/`\n\n| module | content |\n|---|---|\n")
+            section = folder
+        parts.append(f"| `{name}` | {line.replace('|', '/')} |\n")
+    return "".join(parts)
+
+
+def main(words: list[str]) -> None:
+    """Prints the modules whose path or first line holds every word; without words, all."""
+    for path, line in modules().items():
+        if all(word.lower() in f"{path} {line}".lower() for word in words):
+            sys.stdout.write(f"{path}: {line}\n")
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])
