@@ -11,7 +11,7 @@ SOURCE = ROOT / "src" / "proofroll"
 FILE = ROOT / "docs" / "maintain" / "map.md"
 _INTRODUCTION = """# Map of modules
 
-Each module of `src/proofroll/` with the first line of its docstring; `docs/module_map.py WORD` prints those with a word.
+Each module of `src/proofroll/` and the first line of its docstring. `docs/module_map.py WORD` prints some of them.
 """
 
 
