@@ -107,7 +107,7 @@ BAD = {
     "number of another kind": (["check", "arm.urdf", "--states", "1e9"], 2, ["--states = '1e9': give a whole number"]),
     "steps without number": (rk4("1e-300"), 2, ["dt = 1e-300", "steps from 0 s", "take a longer one"]),
     "numbers too large for numbers": (
-        ["run", "pendulum", "--engine", "truth", "--set", "speed=1e300", "--until", "0.1"], 2, ["too large to be"]
+        ["run", "pendulum", "--engine", "truth", "--set", "speed=1e300", "--until", "0.1"], 2, ["its square overflows"]
     ),
     "a version in a name": (["engines", "add", "mujoco==99"], 2, ["add mujoco --requirement mujoco==VERSION"]),
     "no version": (["engines", "add", "mujoco"], 2, ["--requirement = 'nothing'", "mujoco==VERSION"]),
@@ -313,6 +313,24 @@ def test_compare(proofroll: Proofroll, tmp_path: Path, engine: str, code: int, a
         assert document["as_expected"] is as_expected
         assert bool(document["contradictions"]) is not as_expected
     assert "Traceback" not in err
+
+
+@pytest.mark.drill
+def test_compare_on_a_full_disk(tmp_path: Path) -> None:
+    """A result that cannot be written ends the comparison with one line and exit 2, and blames no engine."""
+    (tmp_path / "claim.toml").write_text(COMPARISON.replace("ENGINE", "projection"))
+    program = (
+        "import resource; resource.setrlimit(resource.RLIMIT_FSIZE, (1024, resource.RLIM_INFINITY)); "
+        "from proofroll.__main__ import main; main()"
+    )
+    arguments = ["compare", str(tmp_path / "claim.toml"), "--out", str(tmp_path / "out")]
+    done = subprocess.run(
+        [sys.executable, "-c", program, *arguments], check=False, capture_output=True, text=True, timeout=100
+    )
+    assert done.returncode == 2, done.stderr
+    assert "cannot be written (File too large); choose another folder with --out" in done.stderr
+    assert "Traceback" not in done.stderr
+    assert not done.stdout
 
 
 def test_compare_reuses_what_is_there(proofroll: Proofroll, tmp_path: Path) -> None:

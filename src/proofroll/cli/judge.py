@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from proofroll.cli import options
+from proofroll.core.limits import RUN_TIME_LIMIT
 
 
 def judge(
@@ -23,6 +24,7 @@ def judge(
         list[str] | None, typer.Option(help="variable='1 %' of its scale, or variable='1e-3 m'; repeat.")
     ] = None,
     because: Annotated[str, typer.Option(help="Why that is close enough.")] = "",
+    time_limit: Annotated[float, typer.Option(help="Wall seconds after which the truth is given up.")] = RUN_TIME_LIMIT,
     as_json: options.Json = False,
 ) -> None:
     """Hold a trajectory from anywhere against the truth of a scene; exit 1 if it differs."""
@@ -43,7 +45,7 @@ def judge(
         raise InputError("scene", scene or "", "name it once: proofroll judge FILE --scene SCENE")
     loaded = load_scene(scene or str(named), **{**written, **options.assignments(settings)})  # type: ignore[arg-type]  # text is checked there
     bounds = options.assignments(tolerance, "--tolerance") if tolerance else None
-    with options.spinner(f"the truth of {loaded.name}"):
+    with options.spinner(f"the truth of {loaded.name}"), options.wall_limit(time_limit, f"the truth of {loaded.name}"):
         judged = judging.judge(run, loaded, bounds, because=because)
     if as_json:
         options.write_json(judged.content())

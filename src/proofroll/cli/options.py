@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+import math
 import os
+import signal
 import sys
 import textwrap
 import threading
@@ -197,6 +199,32 @@ def spinner(text: str) -> Iterator[Callable[[str], None]]:
     texts = [text]
     with console.status(text) if moves else _now_and_then(lambda: texts[-1]) as sign:
         yield texts.append if sign is None else sign.update
+
+
+@contextmanager
+def wall_limit(seconds: float, what: str) -> Iterator[None]:
+    """Context manager whose body is ended after ``seconds`` of wall time; without effect where there are no alarms.
+
+    Raises:
+        InputError: the limit is not positive, or the body took longer.
+    """
+    if not 0 < seconds < math.inf:
+        raise InputError("--time-limit", seconds, "give a positive, finite number of seconds")
+
+    def ended(*_: object) -> None:
+        advice = f"{what} took longer; end the trajectory sooner, or allow more"
+        raise InputError("--time-limit", f"{seconds:g} s", advice)
+
+    if not hasattr(signal, "setitimer"):
+        yield
+        return
+    previous = signal.signal(signal.SIGALRM, ended)
+    signal.setitimer(signal.ITIMER_REAL, seconds, 1.0)  # once more each second: a library may drop an exception
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0)
+        signal.signal(signal.SIGALRM, previous)
 
 
 def json_text(content: object) -> str:

@@ -5,6 +5,15 @@ from collections.abc import Sequence
 
 from proofroll.core.errors import InputError
 
+# Larger numbers have squares near the end of the range of doubles, 1.8e308.
+LARGEST = 1e150
+
+
+def require_usable(field: str, value: object) -> None:
+    """Raises InputError for a finite number whose square would overflow; other values pass."""
+    if isinstance(value, (int, float)) and LARGEST < abs(value) < math.inf:
+        raise InputError(field, value, f"its size is beyond {LARGEST:g}, so its square overflows; give a smaller one")
+
 
 class OutOfBounds(InputError, ValueError):  # noqa: N818 -- says what is wrong, as the other errors do
     """A number outside the bounds of a model; a ValueError too, so that pydantic adds its location in the file."""

@@ -54,6 +54,10 @@ class Missing(ProofrollError):  # noqa: N818 -- a state of the machine: the engi
     """The engine cannot be loaded here; the text says why and how to get it."""
 
 
+class Unwritable(ProofrollError):  # noqa: N818 -- a state of the machine, as a full disk
+    """A file cannot be written; the text says which and why."""
+
+
 class Diverged(ProofrollError):  # noqa: N818 -- a finding about the engine
     """The engine gave up or produced a state that is not finite; the text says when."""
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
+from proofroll.core.bounds import require_usable
 from proofroll.core.errors import InputError, require_known
 from proofroll.core.expressions import evaluated
 from proofroll.core.quantity import OR, Quantity, powers_of
@@ -55,6 +56,7 @@ class Parameters:
         if own and (plain or isinstance(content, bool)):
             raise InputError(where, content, "this is not a number; give one" + (f" in {own}" if own != "1" else ""))
         if not isinstance(content, str):
+            require_usable(where, content)
             return content
         if content.startswith("$"):
             require_known(where, content[1:], self.values, "there is no such parameter; choose from", content)
@@ -63,7 +65,9 @@ class Parameters:
                 raise InputError(where, content, f"this number is in {own}, that parameter in {given}")
             return self.values[content[1:]]
         if content.startswith("="):
-            return evaluated(where, content[1:], self.quantities, own)
+            value = evaluated(where, content[1:], self.quantities, own)
+            require_usable(where, value)
+            return value
         return _NUMBERED.sub(lambda index: f"{evaluated(where, index[1], self.quantities):g}", content)
 
     def beside(self, name: str, value: float) -> Parameters:

@@ -11,6 +11,8 @@ from proofroll.core.errors import InputError
 
 # Default sampling interval [s].
 EVERY = 0.01
+# Latest time of a sample [s], 31 years: no motion can be followed so far.
+LATEST = 1e9
 # Multiples of it modulo 1 spread most evenly over an interval, and are far from simple fractions.
 _GOLDEN = (5**0.5 - 1) / 2
 # Most samples off the grid, and fewest intervals for each: few, as an adaptive step ends at each.
@@ -35,8 +37,8 @@ def time_grid(until: float, every: float) -> FloatArray:
     for name, value in (("until", until), ("every", every)):
         if not isinstance(value, Real):
             raise InputError(name, value, "give a number in s")
-    if not np.isfinite(until) or until < 0:
-        raise InputError("until", until, "give a finite time in s that is not negative")
+    if not 0 <= until <= LATEST:
+        raise InputError("until", until, f"give a finite time in s that is not negative, at most {LATEST:g} s")
     if not np.isfinite(every) or every <= 0:
         raise InputError("every", every, "give a positive, finite interval in s")
     if until / every > 1e7:

@@ -7,7 +7,7 @@ import uuid
 from collections.abc import Iterator
 from pathlib import Path
 
-from proofroll.core.errors import ProofrollError
+from proofroll.core.errors import Unwritable
 
 
 @contextlib.contextmanager
@@ -15,7 +15,7 @@ def replacing(path: Path) -> Iterator[Path]:
     """Context manager with a temporary path; its file replaces ``path`` at the end, or is removed after an error.
 
     Raises:
-        ProofrollError: the file cannot be written.
+        Unwritable: the file cannot be written.
     """
     temporary = path.with_name(f".{path.name}.{uuid.uuid4().hex[:12]}")
     try:
@@ -23,7 +23,7 @@ def replacing(path: Path) -> Iterator[Path]:
         yield temporary
         temporary.replace(path)
     except OSError as error:
-        raise ProofrollError(f"{path} cannot be written ({error.strerror or error}); choose another path") from None
+        raise Unwritable(f"{path} cannot be written ({error.strerror or error}); choose another path") from None
     finally:
         with contextlib.suppress(OSError):
             temporary.unlink(missing_ok=True)

@@ -107,6 +107,8 @@ def _numbers(header: list[str], rows: list[list[str]]) -> Any:
 
 def _number(field: str, line: int) -> float:
     try:
+        if "_" in field:  # which Python would ignore
+            raise ValueError
         return float(field)
     except ValueError:
         raise ValueError(f"line {line}: {field[:60]!r} is no number") from None

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache
@@ -20,6 +19,7 @@ from proofroll.core.gravity import Gravity
 from proofroll.core.parameters import Parameters
 from proofroll.core.plugins import load_element_kinds
 from proofroll.core.scene import Scene
+from proofroll.core.time_grid import LATEST
 from proofroll.core.validation import strict, units_of, validated
 from proofroll.files.data_folders import data_folder
 from proofroll.files.scene_parameters import Parameter, check_parameters, values_of
@@ -221,6 +221,16 @@ def _names(asks: object) -> list[str]:
     return [str(name) for name in asks]
 
 
+def _check_names(tables: Mapping[str, Any], path: Path) -> None:
+    """Raises InputError for a name that cannot be part of the name of an observable, or of a column of a file."""
+    for table, rows in tables.items():
+        for index, row in enumerate(_rows(rows)):
+            name = row.get("name", "")
+            if isinstance(name, str) and any(mark in name for mark in "./\\"):
+                advice = "a name has no dot and no slash, which names of observables and files have between their parts"
+                raise InputError(f"{path}: {table}.{index}.name", name, advice)
+
+
 def _checked(content: Mapping[str, Any], path: Path) -> SceneFile:
     """Content of a file, with all checks that do not need values of parameters."""
     own = {key: value for key, value in content.items() if key in _OWN}
@@ -232,8 +242,9 @@ def _checked(content: Mapping[str, Any], path: Path) -> SceneFile:
     file = validated(SceneFile, own, str(path), tables=tables)
     for name in ("duration", "dt"):
         value = getattr(file, name)
-        if value is not None and not 0 < value < math.inf:
-            raise InputError(f"{path}: {name}", value, "give a positive, finite time in s")
+        if value is not None and not 0 < value <= LATEST:
+            raise InputError(f"{path}: {name}", value, f"give a positive, finite time in s, at most {LATEST:g} s")
+    _check_names(tables, path)
     for own_file in file.files:
         if Path(own_file).name != own_file or not (path.parent / own_file).is_file():
             advice = "there is no such file in the folder of the scene; copy it there, or take out its name"

@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+from proofroll.core.bounds import require_usable
 from proofroll.core.errors import InputError, choices, require_known
 from proofroll.core.number_format import spaced
 
@@ -107,11 +108,14 @@ def _number(name: str, value: object, parameter: Parameter) -> float:
     if isinstance(value, bool) or not isinstance(value, (int, float, str)):
         raise InputError(name, value, f"this is not a number; give one in {parameter.unit}")
     try:
+        if isinstance(value, str) and "_" in value:  # which Python would ignore
+            raise ValueError
         number = float(value)
     except (ValueError, OverflowError):
         raise InputError(name, value, f"this is not a number; give one in {parameter.unit}") from None
     if math.isnan(number) or (math.isinf(number) and not (parameter.unbounded and number > 0)):
         raise InputError(name, value, f"the value must be finite; give a number in {parameter.unit}")
+    require_usable(name, number)
     if parameter.integer and number != round(number):
         raise InputError(name, value, f"{parameter.meaning} must be a whole number")
     if parameter.nonzero is not None and number == 0:

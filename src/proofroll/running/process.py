@@ -15,7 +15,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Self
 
-from proofroll.core.errors import InputError, Missing, ProofrollError
+from proofroll.core.errors import InputError, Missing, ProofrollError, Unwritable
 from proofroll.running.case import Status
 from proofroll.running.memory import VARIABLE, descendants, memory_limit, resident_gb
 
@@ -175,7 +175,7 @@ class Worker:
         """Answer to one request as by :meth:`ask`, with the worker's errors raised.
 
         Raises:
-            InputError, Missing, WorkerDied: the worker answers so, or it ended.
+            InputError, Missing, Unwritable, WorkerDied: the worker answers so, or it ended.
         """
         answer = self.ask(request, time_limit)
         match answer.get("error"):
@@ -183,6 +183,8 @@ class Worker:
                 raise InputError(answer["field"], answer["value"], answer["advice"])
             case "missing":
                 raise Missing(answer["message"])
+            case "unwritable":
+                raise Unwritable(answer["message"])
             case "crashed":
                 raise WorkerDied(Status.CRASHED, answer["message"])
         return answer

@@ -14,7 +14,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
-from proofroll.core.errors import InputError, Missing, ProofrollError
+from proofroll.core.errors import InputError, Missing, ProofrollError, Unwritable
 from proofroll.core.plugins import plain_name
 from proofroll.running.case import Case, Result, Status
 from proofroll.running.engine_questions import lent_workers
@@ -240,7 +240,10 @@ class Runner:
             if self._stopping.is_set():
                 return False
             result, lives = result_without_answer(case, error), False
-        except ProofrollError as error:  # affects this case only, for example a full disk
+        except Unwritable as error:  # a full disk affects every case, so it ends the run
+            arrived.put(error)
+            return True
+        except ProofrollError as error:  # affects this case only
             result, lives = result_without_answer(case, error), True
         arrived.put((case, result))
         return lives
@@ -255,6 +258,9 @@ class Runner:
             except WorkerDied as error:  # show the final name of the file, not the temporary one
                 shown = str(error).replace(str(written.absolute()), str(self.store.trajectory(case)))
                 raise WorkerDied(error.status, shown) from None
+            except Unwritable as error:
+                shown = str(error).replace(str(written.absolute()), str(self.store.trajectory(case)))
+                raise Unwritable(shown.replace("another path", "another folder with --out")) from None
             return self.store.put(case, result, written)
 
     def _drop(self, worker: Worker) -> None:

@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from weakref import WeakValueDictionary
 
-from proofroll.core.errors import ProofrollError
+from proofroll.core.errors import ProofrollError, Unwritable
 from proofroll.files.atomic import ordinary_content, replacing
 from proofroll.files.trajectory_file import STORED, StoredTrajectory
 from proofroll.running.case import LASTING, Case, Result
@@ -83,7 +83,7 @@ class Store:
                     with contextlib.suppress(OSError):  # the file system cannot lock
                         stack.enter_context(_holding(Path(incoming), fcntl.LOCK_SH))
             except OSError as error:
-                raise ProofrollError(f"{self.folder} cannot be written ({error.strerror or error})") from None
+                raise Unwritable(f"{self.folder} cannot be written ({error.strerror or error})") from None
             yield Path(incoming) / self.trajectory(case).name
 
     def has(self, case: Case) -> bool:

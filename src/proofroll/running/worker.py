@@ -13,7 +13,16 @@ import sys
 from collections.abc import Callable
 from typing import Any
 
-from proofroll.core.errors import Diverged, InputError, Missing, ProofrollError, Refused, raised_at, require_known
+from proofroll.core.errors import (
+    Diverged,
+    InputError,
+    Missing,
+    ProofrollError,
+    Refused,
+    Unwritable,
+    raised_at,
+    require_known,
+)
 from proofroll.running.case import Case
 from proofroll.running.handshake import identify_and_settle
 from proofroll.running.identity import describe, resolve
@@ -70,7 +79,9 @@ def _answer(request: dict[str, Any]) -> dict[str, Any]:
         return {"error": "input", "field": error.field, "value": value, "advice": error.advice}
     except Missing as error:
         return {"error": "missing", "message": str(error)}
-    except ProofrollError as error:  # for example a full disk
+    except Unwritable as error:
+        return {"error": "unwritable", "message": str(error)}
+    except ProofrollError as error:
         return {"error": "crashed", "message": str(error)}
     except Exception as error:
         return {"error": "crashed", "message": one_line(error)}

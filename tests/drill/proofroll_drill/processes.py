@@ -31,6 +31,7 @@ main()
 _CASES = """
 import json, resource, signal, sys
 from pathlib import Path
+from proofroll.core.errors import Unwritable
 from proofroll.running.case import Case
 from proofroll.running.process import Worker
 from proofroll.running.runner import Runner
@@ -43,7 +44,11 @@ if alone:
     signal.signal(signal.SIGXFSZ, signal.SIG_DFL)
 if room:
     resource.setrlimit(resource.RLIMIT_FSIZE, (room, resource.RLIM_INFINITY))
-results = runner.run([Case.from_dict(case) for case in cases])
+try:
+    results = runner.run([Case.from_dict(case) for case in cases])
+except Unwritable as error:
+    print(json.dumps({"all": ["unwritable", str(error)]}))
+    sys.exit()
 print(json.dumps({key: [result.status, result.message] for key, result in results.items()}))
 """
 

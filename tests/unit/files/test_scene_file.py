@@ -109,6 +109,8 @@ def _changed(name: str, key: str, value: float, needed: dict[str, float]) -> Sce
         ({"speed": True}, "speed", "not a number"),
         ({"speed": [4]}, "speed", "not a number"),
         ({"speed": 10**400}, "speed", "not a number"),
+        ({"speed": "1_0"}, "speed", "not a number"),
+        ({"speed": 1e151}, "speed", "its square overflows"),
         ({"mu_kinetic": "mu_static"}, "mu_kinetic", "not a number"),
         ({"speed": 0}, "speed", "nothing to roll on"),
         ({"speed": "-0.0"}, "speed", "nothing to roll on"),
@@ -124,7 +126,7 @@ def test_bad_parameters(parameters: dict[str, Any], field: str, advice: str) -> 
 
 def test_a_number_whose_square_overflows_is_refused() -> None:
     """A radius whose square is beyond double precision is wrong input, not a traceback."""
-    with pytest.raises(InputError, match="too large; give smaller ones"):
+    with pytest.raises(InputError, match="its square overflows; give a smaller one"):
         load_scene("cone", radius=1e300)
 
 
@@ -178,6 +180,12 @@ def test_a_scene_outside_models(edited: Callable[[str, str], str]) -> None:
         ('mass = "$mass"', "mass = -1", ["balls.0.mass = -1", "above 0"]),
         ('mass = "$mass"', "mass = inf", ["balls.0.mass = inf", "finite"]),
         ('mass = "$mass"', "mass = nan", ["balls.0.mass = nan", "finite"]),
+        ('mass = "$mass"', "mass = 1e151", ["balls.0.mass = 1e+151", "its square overflows"]),
+        ('mass = "$mass"', 'mass = "= mass*1e151"', ["balls.0.mass", "its square overflows"]),
+        ("direction = [0, 0, -1]", "direction = [1e308, 0, -1]", ["gravity.direction.0 = 1e+308", "overflows"]),
+        ('name = "ball"', 'name = "the.ball"', ["balls.0.name = 'the.ball'", "no dot and no slash"]),
+        ('name = "ball"', 'name = "../../x"', ["balls.0.name = '../../x'", "no dot and no slash"]),
+        ('title = "', 'duration = 1e308\ntitle = "', ["duration = 1e+308", "at most 1e+09 s"]),
         ('mass = "$mass"', "mass = true", ["balls.0.mass = True", "give one in kg"]),
         ('radius = "$radius"', "radius = 0", ["balls.0.radius = 0", "above 0"]),
         ('radius = "$radius"', "radius = 0.3", ["radius = 0.3", "smaller than wall with 0.225 m"]),

@@ -32,6 +32,7 @@ METRES, RADIANS, RATIO = ({"unit": unit} for unit in ("m", "rad", "1"))
 WORLD = "world"
 ZERO: Vector = (0.0, 0.0, 0.0)
 Z: Vector = (0.0, 0.0, 1.0)
+_LONGEST_NAME = 200  # characters
 _SQUARED = 1e-150  # sizes above it, and below its inverse, have squares within the range of numbers
 
 
@@ -51,9 +52,13 @@ def read(item: object, where: str, reader: Callable[..., Any], *keys: str, **opt
 
 
 def name(value: Any, kind: str) -> str:
-    """The value as a name. Raises InputError if it is empty or not printable."""
-    if not isinstance(value, str) or not value.isprintable() or not value.strip():
+    """The value as a name. Raises InputError if it is empty, not printable, or too long."""
+    if not isinstance(value, str) or not value.strip():
         raise InputError(f"{kind}.name", value, "give a name")
+    if not value.isprintable():
+        raise InputError(f"{kind}.name", value, "a name is one line of printable characters")
+    if len(value) > _LONGEST_NAME:
+        raise InputError(f"{kind}.name", value, f"it has {len(value)} characters; a name may have {_LONGEST_NAME}")
     return value
 
 

@@ -267,7 +267,7 @@ class JointCoordinates:
         for time in times:
             steps = int(np.ceil((time - now) / step - 1e-9))
             h = (time - now) / max(steps, 1)
-            for t in now + h * np.arange(steps):
+            for t in (now + h * number for number in range(steps)):
                 k1 = self.rate(t, y)
                 k2 = self.rate(t + h / 2, y + h / 2 * k1)
                 k3 = self.rate(t + h / 2, y + h / 2 * k2)

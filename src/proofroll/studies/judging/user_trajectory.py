@@ -17,6 +17,7 @@ from proofroll.core.events import events_of, wrong_bracket
 from proofroll.core.multi_element import REQUIRED
 from proofroll.core.observable import Role
 from proofroll.core.scene import Scene
+from proofroll.core.time_grid import LATEST
 from proofroll.files.trajectory_file import CSV, STORED
 from proofroll.running.recording import require_unit
 
@@ -54,10 +55,10 @@ class GivenRun:
     reactions: Collection[str] = ()
 
     def require_units(self, truth: xr.Dataset) -> None:
-        """Checks that variables with a unit have that of the truth, and that bodies have its order.
+        """Checks that variables are numbers, those with a unit in that of the truth, and bodies in its order.
 
         Raises:
-            InputError: a variable has another unit, or the bodies another order.
+            InputError: a variable has no numbers or another unit, or the bodies another order.
         """
         for dim, given in self.labels.items():
             wanted = truth.variables[dim].values.tolist() if dim in truth.coords else given
@@ -68,6 +69,17 @@ class GivenRun:
         for name, unit in self.units.items():
             if name in known and "units" in known[name].attrs:
                 _require_unit(name, unit, str(known[name].attrs["units"]))
+        for column, item in self.dataset.variables.items():
+            if column in known and known[column].dtype.kind in "iuf":
+                _require_numbers(str(column), item)
+
+
+def _require_numbers(name: str, item: xr.Variable) -> None:
+    """Raises InputError unless a variable holds real numbers."""
+    if item.dtype.kind not in "iuf":
+        kinds = {"c": "complex numbers", "b": "truth values", "U": "text", "S": "text"}
+        held = kinds.get(item.dtype.kind, f"values of type {item.dtype}")
+        raise InputError("run", name, f"it holds {held}; give real numbers")
 
 
 def _require_unit(name: str, unit: str, wanted: str) -> None:
@@ -97,6 +109,8 @@ def read_run(run: RunInput, scene: Scene) -> GivenRun:
     number = np.issubdtype(times.dtype, np.number)
     if not (times.size and number and np.all(np.isfinite(times)) and times[0] >= 0 and np.all(np.diff(times) > 0)):
         raise InputError("run", "time", "give times in s that rise from 0 or later")
+    if times[-1] > LATEST:
+        raise InputError("run", f"time up to {times[-1]:.4g} s", f"no motion is followed beyond {LATEST:g} s")
     if times[-1] == 0:
         raise InputError("run", "time", "it has only the start, t = 0 s, where nothing has moved; add samples after it")
     _require_finite_state(dataset, scene)
@@ -141,8 +155,9 @@ def _require_finite_state(run: xr.Dataset, scene: Scene) -> None:
         for own in element.sample_type.widths:
             name = scene.label(element, own)
             item = run.variables.get(name)
-            if item is None or not np.issubdtype(item.dtype, np.number) or item.dims[:1] != ("time",):
+            if item is None or item.dims[:1] != ("time",):
                 continue
+            _require_numbers(name, item)
             values = item.values.reshape(len(item), -1)
             bad = ~np.all(np.isfinite(values), axis=1)
             if np.any(bad):

@@ -169,11 +169,11 @@ BAD = {
     "joint without its body": (SLIDER_CRANK + joint("crank", "ghost"), "joints.extra.child = 'ghost'.*no such body"),
     "kind of no kind": (SLIDER_CRANK.replace('kind = "revolute"', "kind = [[1]]", 1), r"joints.1.kind = \[\[1\]\]"),
     "moments beyond numbers": (
-        SLIDER_CRANK + ROD.replace("[1, 1, 1]", "[1, 1e308, 1]"),
+        SLIDER_CRANK + ROD.replace("[1, 1, 1]", "[1, 1e149, 1]"),
         "inertia.*triangle inequality",
     ),
     "mass beyond numbers": (
-        SLIDER_CRANK + ROD.replace("mass = 1", "mass = 1e308\ncom = [1e9, 0, 0]") + joint("rod", "extra"),
+        SLIDER_CRANK + ROD.replace("mass = 1", "mass = 1e149\ncom = [1e149, 0, 0]") + joint("rod", "extra"),
         "mass matrix = 'infinite': masses, moments or lengths are too large",
     ),
     "body without a joint": (SLIDER_CRANK + ROD, "bodies.extra.*no joint"),
@@ -258,7 +258,7 @@ BAD = {
     "hostile expression": (SLIDER_CRANK.replace("= crank/2", "= __import__('os').getcwd()"), "bodies.0.com.0"),
     "attribute": (SLIDER_CRANK.replace("= crank/2", "= crank.real"), "bodies.0.com.0.*crank.real.*is no arithmetic"),
     "huge power": (SLIDER_CRANK.replace("= crank/2", "= 9^9^9^9^9"), "bodies.0.com.0"),
-    "velocity beyond numbers": (SLIDER_CRANK.replace("v0 = 10", "v0 = 1e200", 1), "loops = 'infinite'"),
+    "velocity beyond numbers": (SLIDER_CRANK.replace("v0 = 10", "v0 = 1e200", 1), "v0 = 1e.200: its size is beyond"),
     "assignment": (SLIDER_CRANK.replace("= crank/2", "= m = crank/2"), "no finite real number"),
     "complex": (SLIDER_CRANK.replace("= crank/2", "= (0-1)^0.5"), "no finite real number"),
     "text": (
@@ -270,7 +270,10 @@ BAD = {
         "joints.0.torque = .*: give a number, a formula that begins with =, or a table",
     ),
     "ragged list": (SLIDER_CRANK.replace("q0 = 0.5", "q0 = [1, [2], 3]"), r"joints.0.q0.1 = \[2\]: give a number"),
-    "number beyond all bounds": (SLIDER_CRANK.replace("[1e-3,", f"[{10**400},"), "bodies.2.inertia.0.*give a number"),
+    "number beyond all bounds": (
+        SLIDER_CRANK.replace("[1e-3,", f"[{10**400},"),
+        "bodies.2.inertia.0.*its square overflows",
+    ),
     "nan": (SLIDER_CRANK.replace("mass = 0.6", "mass = nan"), "bodies.slider.mass.*finite"),
     "bool": (
         SLIDER_CRANK.replace("mass = 0.6", "mass = true"),
