@@ -16,6 +16,8 @@ from proofroll.elements.mechanism.rotations import Array
 # Relative singular value below which a constraint row of an engine depends on the others. It does not follow
 # analysis.RANK: an engine's rows have other units and weights.
 DEPENDENT = 1e-9
+# Length of a constraint row relative to the longest, below which the row is round-off.
+ROUND_OFF = 1e-12
 WITH_AXIS = joint.WITH_AXIS
 
 
@@ -108,11 +110,16 @@ def mechanism_of(scene: Any) -> Mechanism:
 
 
 def row_rank(rows: Array) -> int:
-    """Rank of constraint rows, each first scaled to length 1, shape (rows, velocities)."""
+    """Rank of constraint rows, each first scaled to length 1, shape (rows, velocities).
+
+    Rows shorter than ``ROUND_OFF`` of the longest are what cancellation leaves of rows that are zero: scaled to length
+    1 they would count as constraints, in a frame that is turned and not in one that is not.
+    """
+    sizes = np.linalg.norm(rows, axis=1, keepdims=True)
+    rows = rows[sizes[:, 0] > ROUND_OFF * sizes.max(initial=0.0)]
     if not rows.size:
         return 0
-    sizes = np.linalg.norm(rows, axis=1, keepdims=True)
-    values = np.linalg.svd(rows / np.where(sizes > 0, sizes, 1.0), compute_uv=False)
+    values = np.linalg.svd(rows / np.linalg.norm(rows, axis=1, keepdims=True), compute_uv=False)
     return int((values > DEPENDENT * values[0]).sum())
 
 
