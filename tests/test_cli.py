@@ -360,43 +360,71 @@ def test_compare_says_what_was_damaged(proofroll: Proofroll, tmp_path: Path) -> 
 
 
 def test_compare_restricted_to_an_engine(proofroll: Proofroll, tmp_path: Path) -> None:
-    """An engine that the comparison does not know is a usage error that names those it does."""
+    """An engine that does not exist is a usage error that names those that do."""
     (tmp_path / "claim.toml").write_text(COMPARISON.replace("ENGINE", "oracle"))
-    code, out, err = proofroll("compare", str(tmp_path / "claim.toml"), "--engine", "mujoco", "--out", str(tmp_path))
+    code, out, err = proofroll("compare", str(tmp_path / "claim.toml"), "--engine", "adams", "--out", str(tmp_path))
     assert (code, out, err.count("\n")) == (2, "", 1)
-    assert "claim compares oracle" in err
+    assert "there is no such engine; choose one of" in err
 
 
-@pytest.mark.parametrize("command", ["compare", "report"])
-def test_an_engine_of_which_there_is_no_row(proofroll: Proofroll, tmp_path: Path, command: str) -> None:
-    """Beside an engine that has rows, one that has none is named once; what was asked for is run."""
+def test_an_engine_that_is_asked_for_has_a_row(proofroll: Proofroll, tmp_path: Path) -> None:
+    """An engine without a row in the file, also one with settings, has a verdict or a reason; nothing is dropped."""
+    (tmp_path / "claim.toml").write_text(COMPARISON.replace("ENGINE", "oracle"))
+    engines = ["--engine", "oracle[dt=0.005]", "--engine", "projection[formulation=dependent]"]
+    code, out, err = proofroll("compare", str(tmp_path / "claim.toml"), *engines, "--out", str(tmp_path), "--json")
+    assert (code, err) == (0, "")
+    rows = json.loads(out)["rows"]
+    assert [row["name"] for row in rows] == ["oracle", "projection"]
+    assert all(row["verdict"] in {"agrees", "refused", "unconfirmed"} for row in rows)
+    assert rows[0]["resolution_value"] == 0.005
+
+
+def test_an_engine_of_a_report_without_a_row(proofroll: Proofroll, tmp_path: Path) -> None:
+    """Beside an engine that has rows in a report, one that has none is named once; what was asked for is run."""
     (tmp_path / "claim.toml").write_text(COMPARISON.replace("ENGINE", "oracle"))
     engines = ["--engine", "mujoco", "--engine", "oracle"]
-    code, out, err = proofroll(command, str(tmp_path / "claim.toml"), *engines, "--out", str(tmp_path))
+    code, out, err = proofroll("report", str(tmp_path / "claim.toml"), *engines, "--out", str(tmp_path))
     assert code == 0
     assert "oracle" in out
-    assert (
-        err.count(
-            "proofroll: mujoco is left out of claim: no row is of it; proofroll new comparison writes a file with one\n"
-        )
-        == 1
+    said = "proofroll: mujoco is left out of claim: no row is of it; proofroll new comparison writes a file with one\n"
+    assert err.count(said) == 1
+
+
+@pytest.mark.parametrize("engine", ["absent", "exits"])
+def test_an_engine_that_fails_in_a_first_look(proofroll: Proofroll, tmp_path: Path, engine: str) -> None:
+    """An engine that is missing or crashes ends a comparison without claims with exit 3, and has a row that says so."""
+    code, out, err = proofroll(
+        "compare", "inclined_plane", "--budget", "60", "--engine", engine, "--out", str(tmp_path)
     )
+    assert code == 3, err
+    assert f"{engine}" in out
+    assert "failed" in out
+
+
+def test_times_of_a_first_look(proofroll: Proofroll, tmp_path: Path) -> None:
+    """``--until`` and ``--every`` are those of a scene's comparison; a comparison file has its own."""
+    command = ["compare", "inclined_plane", "--engine", "oracle", "--out", str(tmp_path), "--json"]
+    code, out, err = proofroll(*command, "--until", "0.2", "--every", "0.05")
+    assert code == 0, err
+    document = json.loads(out)
+    assert (document["until"], document["every"]) == (0.2, 0.05)
+    code, out, err = proofroll("compare", "stick_slip", "--until", "1")
+    assert (code, out) == (2, "")
+    assert "until = 1.0: a comparison file has its own times; name a scene instead" in err
 
 
 @pytest.mark.drill
 def test_a_name_that_a_scene_and_a_comparison_share(proofroll: Proofroll, tmp_path: Path) -> None:
-    """It means the comparison, and a line names engines without a row; with a budget or parameters, the scene."""
-    given = ["compare", "heavy_top", "--out", str(tmp_path)]
-    code, _, err = proofroll(*given, "--engine", "oracle")
-    assert code == 2
-    assert "heavy_top is the comparison of that name, which has no row of " in err
-    assert "the scene alone, with every engine: proofroll compare heavy_top --budget 60" in err
-    assert "proofroll new comparison writes a file with others" in err
-    for scene in (["--budget", "1"], ["--set", "mass=2"]):
-        code, _, err = proofroll(*given, "--engine", "oracle", *scene)
-        assert code == 2
-        assert "heavy_top compares " in err
-        assert "is the comparison" not in err
+    """It means the comparison, with a row of what is asked for; with a budget, times or parameters, the scene."""
+    given = ["compare", "heavy_top", "--out", str(tmp_path), "--engine", "oracle", "--json"]
+    code, out, err = proofroll(*given)
+    assert (code, err) == (0, "")
+    rows = json.loads(out)["rows"]
+    assert [(row["name"], row["verdict"]) for row in rows] == [("oracle", "refused")]
+    for scene in (["--budget", "1"], ["--set", "mass=2"], ["--until", "0.1"]):
+        code, out, err = proofroll(*given, *scene)
+        assert (code, err) == (0, "")
+        assert json.loads(out)["budget"] is not None
 
 
 # The paper's case, and one that slips early, in an engine that locates its events.

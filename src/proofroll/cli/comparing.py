@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from itertools import chain
 from pathlib import Path
@@ -44,12 +44,17 @@ def compare(
     jobs: options.Jobs = None,
     scheduler: options.Scheduler = None,
     budget: options.Budget = None,
+    until: options.Until = None,
+    every: Annotated[
+        float | None, typer.Option(help="Interval between samples [s]; by default about a fiftieth of --until.")
+    ] = None,
     as_json: options.Json = False,
 ) -> None:
     """Hold the engines of a comparison file against the truth; exit 1 if a verdict contradicts the file.
 
-    Of a scene or a robot file every formulation that can represent it is run, and nothing is claimed. --set and
-    --budget are for these: what 60 s of processor time do not suffice for is left out and named.
+    Of a scene or a robot file every formulation that can represent it is run, and nothing is claimed. --set, --until,
+    --every and --budget are for these: what 60 s of processor time do not suffice for is left out and named. An engine
+    of --engine that has no row in the file gets one that claims nothing.
     """
     from proofroll.report.comparison.summary import outcome_content
     from proofroll.report.terminal.tables import verdict_parts
@@ -58,9 +63,12 @@ def compare(
 
     workers = Workers()
     with options.spinner(comparison):
-        loaded = comparison_named(comparison, options.assignments(settings), workers, budget, scheduler)
-    mention_scene(comparison, loaded)
-    list_omitted_engines([loaded], engine or [])
+        loaded = comparison_named(
+            comparison, options.assignments(settings), workers, budget, scheduler, engine or [], until, every
+        )
+    if not engine:
+        mention_scene(comparison, loaded)
+    mention_absent(loaded.absent)
     outcomes = outcomes_of([loaded], engine or [], options.new_runner(out, fresh, jobs, scheduler, workers))
     content = outcome_content(outcomes[0])
     options.show(content, as_json, lambda: verdict_parts(content))
@@ -76,6 +84,20 @@ def mention_scene(name: str, comparison: Comparison) -> None:
     if lacking and is_scene(name) and comparison.budget is None:
         rows = f"{name} is the comparison of that name, which has no row of {', '.join(lacking)}"
         options.complain(f"{rows}; the scene alone, with every engine: proofroll compare {name} --budget 60")
+
+
+def mention_absent(absent: Mapping[str, str]) -> None:
+    """Prints on standard error which engines are not installed, and how to get them; those of proofroll in one line.
+
+    ``absent``: engine -> why it cannot be loaded.
+    """
+    ours = [name for name, why in absent.items() if why.endswith(f"pip install 'proofroll[{name}]'")]
+    if ours:
+        line = f"not installed here, so not compared: {', '.join(ours)}"
+        options.complain(f"{line}; pip install 'proofroll[{','.join(ours)}]'")
+    for name, why in absent.items():
+        if name not in ours:
+            options.complain(why)
 
 
 def list_omitted_engines(comparisons: Sequence[Comparison], engines: Sequence[str]) -> None:

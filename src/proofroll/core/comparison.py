@@ -160,6 +160,7 @@ class Comparison:
         left_out: number of combinations left out of a report without names.
         budget: processor time that all cases may take together [s]; cases beyond it are left out; None: no limit.
         spent: part of the budget that was spent on asking the engines [s].
+        absent: engine that is not installed, so has no row in a comparison of all engines -> why, and how to get it.
     """
 
     name: str
@@ -179,6 +180,7 @@ class Comparison:
     left_out: int = 0
     budget: float | None = None
     spent: float = 0.0
+    absent: dict[str, str] = field(default_factory=dict)
 
     def briefly(self) -> Comparison:
         """The comparison reduced to its ``brief`` combinations."""

@@ -76,7 +76,8 @@ def _checked(path: Path, content: dict[str, Any]) -> Comparison:
         shown = "nothing" if given is None else given
         raise InputError(f"{where}: rows", shown, "give at least one engine; write [[rows]] before each")
     content["rows"] = [_prepared(f"{where}: rows.{index}", row) for index, row in enumerate(given)]
-    comparison = validated(Comparison, content, where, name=path.stem, bands=bands, left_out=0, budget=None, spent=0.0)
+    program: dict[str, object] = {"left_out": 0, "budget": None, "spent": 0.0, "absent": {}}  # no file may have these
+    comparison = validated(Comparison, content, where, name=path.stem, bands=bands, **program)
     if math.prod(map(len, comparison.vary.values())) + len(comparison.points) > _MOST_POINTS:
         raise InputError(f"{where}: vary", list(comparison.vary), f"that is more than {_MOST_POINTS} points; vary less")
     for index, point in enumerate(comparison.points):

@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 from mixed_scene import BALL_AND_PENDULUM
 
-from proofroll.cli.comparing import _Comparing
+from proofroll.cli.comparing import _Comparing, mention_absent
 from proofroll.files.comparison_file import load_comparison
 from proofroll.running.time_budget import TimeBudget
 
@@ -29,6 +29,27 @@ def test_each_engine_is_started_once(
     monkeypatch.setattr("proofroll.studies.comparison.default_comparison._UNTIL", 0.1)
     assert command_line("compare", "sphere_in_cylinder", "--out", str(tmp_path))[0] == 0
     assert sorted(started_workers) == ["reduced", "truth"]
+
+
+@pytest.mark.drill
+def test_engines_that_are_not_asked_for_are_not_started(
+    tmp_path: Path, command_line: Callable[..., tuple[int, str, str]], started_workers: list[str]
+) -> None:
+    """A first look at one engine starts no other."""
+    code, _, err = command_line(
+        "compare", "pendulum", "--engine", "projection", "--until", "0.1", "--out", str(tmp_path)
+    )
+    assert (code, err) == (0, "")
+    assert set(started_workers) == {"projection", "truth"}
+
+
+def test_engines_that_are_not_installed_are_named(capsys: pytest.CaptureFixture[str]) -> None:
+    """A line names the engines of this package that are not installed, with the line of pip; others say why."""
+    lack = "{0} is not installed here ({0} is missing): pip install 'proofroll[{0}]'"
+    mention_absent({name: lack.format(name) for name in ("exudyn", "mujoco")} | {"rapier": "rapier needs rust"})
+    said = capsys.readouterr().err.splitlines()
+    first = "proofroll: not installed here, so not compared: exudyn, mujoco; pip install 'proofroll[exudyn,mujoco]'"
+    assert said == [first, "proofroll: rapier needs rust"]
 
 
 @pytest.fixture
@@ -69,7 +90,7 @@ def test_why_nobody_can_is_said_engine_by_engine(
     assert "no installed engine has revolute joints" in err
     provided = {"jointed": {"rods": ["revolute joints"]}, "rolling": {"ball": ["rolling without slip"]}}
     engines = [SimpleNamespace(name=name, provides=provides, made_for={}) for name, provides in provided.items()]
-    monkeypatch.setattr("proofroll.studies.comparison.default_comparison._installed", lambda _: engines)
+    monkeypatch.setattr("proofroll.studies.comparison.default_comparison._installed", lambda *_: engines)
     code, _, err = command_line("compare", str(mixed))
     assert code == 2
     said = "jointed has no formulation for ball (rolling without slip); rolling has no formulation for mechanism"

@@ -2,19 +2,22 @@
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from proofroll.core.comparison import Comparison
 from proofroll.core.errors import InputError
+from proofroll.core.plugins import parse_engine
 from proofroll.files.comparison_file import load_comparison
-from proofroll.files.scene_file import means_scene
+from proofroll.files.scene_file import load_scene, means_scene, read_scene_file
 from proofroll.running.idle_workers import Workers
 from proofroll.running.runner import Runner
 from proofroll.running.store import Store
 from proofroll.studies.comparison import compare as comparing
-from proofroll.studies.comparison.default_comparison import BUDGET, default_comparison
+from proofroll.studies.comparison.default_comparison import BUDGET, asked_rows, default_comparison
 from proofroll.studies.comparison.outcome import Outcome
+from proofroll.studies.comparison.planning import asked_for
 
 
 def compare(
@@ -24,16 +27,21 @@ def compare(
     out: str | Path = "out",
     jobs: int | None = None,
     budget: float | None = None,
+    until: float | None = None,
+    every: float | None = None,
     **parameters: float,
 ) -> Outcome:
     """Compares engines with the truth, as ``proofroll compare`` does; a notebook shows the outcome as a table.
 
     Args:
         name: of a comparison, or the path of its file; or of a scene, the path of its folder or of a robot file.
-        engines: to be run; by default all of the comparison, or all that can represent the scene.
+        engines: to be run, each as ``name`` or ``name[key=value,…]``; by default all of the comparison, or all that
+            can represent the scene. An engine without a row gets rows that claim nothing.
         out: folder for results; stored results are reused.
         jobs: workers at once; by default one for each core.
         budget: processor time of all runs of a scene [s]; by default 60.
+        until: last time of a scene [s]; by default its duration, at most 2 s.
+        every: sampling interval of a scene [s]; by default about a fiftieth of that.
         **parameters: of a scene, in SI units.
 
     Raises:
@@ -41,11 +49,19 @@ def compare(
     """
     workers = Workers()
     runner = Runner(Store(Path(out) / "cases"), jobs=jobs, workers=workers)
-    return comparing.compare(comparison_named(name, parameters, workers, budget), runner, engines)
+    loaded = comparison_named(name, parameters, workers, budget, engines=engines, until=until, every=every)
+    return comparing.compare(loaded, runner, engines)
 
 
 def comparison_named(
-    name: str, parameters: Mapping[str, Any], workers: Workers, budget: float | None, scheduler: str | None = None
+    name: str,
+    parameters: Mapping[str, Any],
+    workers: Workers,
+    budget: float | None,
+    scheduler: str | None = None,
+    engines: Sequence[str] = (),
+    until: float | None = None,
+    every: float | None = None,
 ) -> Comparison:
     """Comparison of this name, or the default comparison of a scene, within a budget.
 
@@ -55,18 +71,35 @@ def comparison_named(
         workers: pool for the questions to engines.
         budget: processor time of all runs of a scene [s]; None: the default, or no limit on a cluster.
         scheduler: of the cluster, or None.
+        engines: that are asked for; those without a row in the comparison's file get rows that claim nothing.
+        until: last time of a scene [s]; None: the default.
+        every: sampling interval of a scene [s]; None: the default.
 
     Raises:
-        InputError: there is neither, or a budget or parameters were given for a comparison, which has its own.
+        InputError: there is neither, or a budget, times or parameters were given for a comparison, which has its own.
     """
     if budget is not None and not 1 <= budget < math.inf:
         raise InputError("budget", budget, "give the processor time of all runs in seconds, at least 1")
-    if means_scene(name, alone=bool(budget or parameters)):
+    times = {key: value for key, value in (("until", until), ("every", every)) if value is not None}
+    if means_scene(name, alone=bool(budget or parameters or times)):
         if budget and scheduler:
             raise InputError("budget", budget, "what runs on a cluster has none; drop --scheduler")
-        return default_comparison(name, parameters, workers, None if scheduler else budget or BUDGET)
+        seconds = None if scheduler else budget or BUDGET
+        return default_comparison(name, parameters, workers, seconds, engines, until, every)
     if budget:
         raise InputError("budget", budget, "a comparison file runs all that it asks for; name a scene, or use report")
     for key, value in parameters.items():
         raise InputError(key, value, "a comparison file has its own points; name a scene instead")
-    return load_comparison(name)
+    for key, value in times.items():
+        raise InputError(key, value, "a comparison file has its own times; name a scene instead")
+    return _with_rows_of(load_comparison(name), engines, workers)
+
+
+def _with_rows_of(comparison: Comparison, engines: Sequence[str], workers: Workers) -> Comparison:
+    """The comparison with rows of the engines that are asked for and have none; they claim nothing."""
+    absent = [text for text in engines if not any(asked_for(row, parse_engine(text)) for row in comparison.rows)]
+    if not absent:
+        return comparison
+    scene, file = load_scene(comparison.scene), read_scene_file(comparison.scene)
+    rows = asked_rows(scene, file, workers, absent, comparison.rows[0].tolerance)
+    return replace(comparison, rows=[*comparison.rows, *rows])

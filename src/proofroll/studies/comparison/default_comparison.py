@@ -6,11 +6,12 @@ from typing import Any
 
 from proofroll.core.comparison import Band, Comparison, Row, Tolerance
 from proofroll.core.engine_abilities import offered
-from proofroll.core.errors import InputError
+from proofroll.core.errors import InputError, Missing
 from proofroll.core.multi_element import each_alone, represents
 from proofroll.core.observable import Role
-from proofroll.core.plugins import engine_names, parse_engine
+from proofroll.core.plugins import engine_names, parse_engine, require_engine
 from proofroll.core.scene import Scene
+from proofroll.core.time_grid import time_grid
 from proofroll.core.verdict import Verdict
 from proofroll.files.scene_file import SceneFile, load_scene, read_scene_file
 from proofroll.running.case import EngineDescription, EngineFacts
@@ -26,7 +27,13 @@ _BECAUSE = "no file says what to expect of this scene"
 
 
 def default_comparison(
-    name: str, parameters: Mapping[str, Any], workers: Workers | None = None, budget: float | None = BUDGET
+    name: str,
+    parameters: Mapping[str, Any],
+    workers: Workers | None = None,
+    budget: float | None = BUDGET,
+    engines: Sequence[str] = (),
+    until: float | None = None,
+    every: float | None = None,
 ) -> Comparison:
     """Comparison of every able formulation of every installed engine with the truth of a scene; it makes no claims.
 
@@ -37,18 +44,23 @@ def default_comparison(
         parameters: of the scene, if not its defaults.
         workers: pool for the questions to engines; None: new workers.
         budget: processor time of all runs [s]; None: no limit.
+        engines: as :func:`asked_rows` has them; empty: all. No other is imported.
+        until: last time [s]; None: the scene's duration, at most 2 s.
+        every: sampling interval [s]; None: about a fiftieth of that.
 
     Raises:
-        InputError: there is no such scene, a parameter makes no sense, or no installed engine can represent it.
+        InputError: there is no such scene or engine, a value makes no sense, or no engine can represent the scene.
     """
     before = processor_seconds()
     file, scene = read_scene_file(name), load_scene(name, **parameters)
-    until, every = times_of(replace(file, duration=min(file.duration or _UNTIL, _FIRST)))
+    usual = times_of(replace(file, duration=min(file.duration or _UNTIL, _FIRST) if until is None else until))
+    until, every = usual[0] if until is None else until, usual[1] if every is None else every
+    time_grid(until, every)
     rest = f" (the first {until:g} s of {file.duration:g})" if file.duration and until < file.duration - every else ""
-    engines = _stepped(able(scene, workers), file.dt, workers)
-    rows = [Row(engine, _CLOSE, list(Verdict), because=_BECAUSE) for engine in engines]
+    rows = asked_rows(scene, file, workers, engines, _CLOSE)
     if not rows:
         raise InputError("scene", name, _reason_for_none(scene, workers))
+    described = {} if engines else describe_each(engine_names(), workers)
     return Comparison(
         name=scene.name,
         title=file.title + rest,
@@ -61,7 +73,39 @@ def default_comparison(
         rows=rows,
         budget=budget,
         spent=processor_seconds() - before,
+        absent={name: str(answer) for name, answer in described.items() if isinstance(answer, Missing)},
     )
+
+
+def asked_rows(
+    scene: Scene, file: SceneFile, workers: Workers | None, engines: Sequence[str], tolerance: str
+) -> list[Row]:
+    """Rows without claims of engines that a user asks for by name or ``name[key=value,…]``.
+
+    An engine without settings has a row for each formulation that can represent the scene. If none can, or the engine
+    is not installed, it has one row, whose run says why.
+
+    Args:
+        scene: that is to be represented.
+        file: of the scene.
+        workers: pool for the questions to engines; None: new workers.
+        engines: that are asked for; empty: all that are installed and can represent the scene.
+        tolerance: name of the rows' band.
+
+    Raises:
+        InputError: there is no such engine.
+    """
+    texts: list[str] = []
+    specs = [parse_engine(text) for text in dict.fromkeys(engines)]
+    for spec in specs:
+        require_engine(spec.name)
+    for facts in resolve([(spec.name, spec.options) for spec in specs if spec.options], workers):
+        if isinstance(facts, InputError):  # a setting that does not exist
+            raise facts
+    for spec in specs:
+        texts += [str(spec)] if spec.options else able(scene, workers, names=[spec.name]) or [spec.name]
+    texts = texts if engines else able(scene, workers)
+    return [Row(text, tolerance, list(Verdict), because=_BECAUSE) for text in _stepped(texts, file.dt, workers)]
 
 
 def times_of(file: SceneFile) -> tuple[float, float]:
@@ -102,16 +146,19 @@ def bounds(scene: Scene, every: float) -> dict[str, Tolerance]:
     return tolerances | dict.fromkeys(events, Tolerance(every, False, "s"))
 
 
-def able(scene: Scene, workers: Workers | None = None, *, first: bool = False) -> list[str]:
+def able(
+    scene: Scene, workers: Workers | None = None, *, first: bool = False, names: Sequence[str] | None = None
+) -> list[str]:
     """Formulations of installed engines that can represent the scene, as files write them.
 
     Args:
         scene: the scene.
         workers: pool for the questions to engines; None: new workers.
         first: True for one formulation per engine.
+        names: of the engines that are asked; None: all.
     """
     formulations = []
-    for engine in _installed(workers):
+    for engine in _installed(workers, names):
         fitting = [
             name
             for name in engine.provides
@@ -121,9 +168,10 @@ def able(scene: Scene, workers: Workers | None = None, *, first: bool = False) -
     return formulations
 
 
-def _installed(workers: Workers | None) -> list[EngineDescription]:
-    """Descriptions of the installed engines."""
-    return [item for item in describe_each(engine_names(), workers).values() if isinstance(item, EngineDescription)]
+def _installed(workers: Workers | None, names: Sequence[str] | None = None) -> list[EngineDescription]:
+    """Descriptions of the installed engines, or of those among ``names``."""
+    described = describe_each(engine_names() if names is None else names, workers)
+    return [item for item in described.values() if isinstance(item, EngineDescription)]
 
 
 def _reason_for_none(scene: Scene, workers: Workers | None) -> str:

@@ -160,10 +160,15 @@ class Outcome:
 
     @property
     def lost(self) -> list[Run]:
-        """Runs whose engine is missing, crashed or hung, unless the comparison expects a failure."""
+        """Runs whose engine is missing, crashed or hung, unless the comparison claims that it fails."""
         broken = {Status.MISSING, Status.CRASHED, Status.TIMEOUT}
         lost = [run for run in self.runs if run.result.status in broken]
-        return [run for run in lost if Verdict.FAILED not in run.row.expected(run.parameters)]
+        expected = [set(run.row.expected(run.parameters)) for run in lost]
+        return [
+            run
+            for run, verdicts in zip(lost, expected, strict=True)
+            if Verdict.FAILED not in verdicts or verdicts == set(Verdict)
+        ]
 
     def _repr_html_(self) -> str:
         """HTML table for a notebook: a row for each run, with the observable that is furthest beyond its tolerance."""

@@ -13,7 +13,7 @@ from proofroll.core.comparison import Comparison, Edge, Row
 from proofroll.core.engine import whole_steps
 from proofroll.core.errors import InputError, ProofrollError, error_location
 from proofroll.core.multi_element import represents
-from proofroll.core.plugins import parse_engine, place_of, plain_name
+from proofroll.core.plugins import EngineSpec, parse_engine, place_of, plain_name
 from proofroll.core.scene import Scene
 from proofroll.core.time_grid import off_grids, time_grid
 from proofroll.core.truth import edge_between
@@ -125,18 +125,20 @@ def plan(comparison: Comparison, engines: Iterable[str] = (), workers: Workers |
         InputError: an engine or setting that does not exist.
     """
     before = processor_seconds()
-    chosen = list(dict.fromkeys(engines))
+    chosen = [parse_engine(text) for text in dict.fromkeys(engines)]
     numbered = [
-        (i, row) for i, row in enumerate(comparison.rows) if not chosen or parse_engine(row.engine).name in chosen
+        (i, row)
+        for i, row in enumerate(comparison.rows)
+        if not chosen or any(asked_for(row, spec) and not _moved(row, spec) for spec in chosen)
     ]
-    for name in filter(place_of, chosen):
-        numbered += [(i, moved) for i, row in enumerate(comparison.rows) if (moved := _moved(row, name))]
+    for spec in chosen:
+        numbered += [(i, moved) for i, row in enumerate(comparison.rows) if (moved := _moved(row, spec))]
     rows = [row for _, row in numbered]
     if not rows:
         known = ", ".join(dict.fromkeys(parse_engine(row.engine).name for row in comparison.rows))
         raise InputError(
             "engine",
-            ", ".join(chosen),
+            ", ".join(map(str, chosen)),
             f"{comparison.name} compares {known}; proofroll new comparison writes a file with others",
         )
     asked = scene_at(comparison, next(iter(comparison.variations(rows[0])), {}))
@@ -183,12 +185,20 @@ def scene_at(comparison: Comparison, point: Mapping[str, float]) -> Scene:
         return load_scene(comparison.scene, **point)
 
 
-def _moved(row: Row, name: str) -> Row | None:
-    """A row moved to its engine in another interpreter, ``mujoco@3.8.1``; None: the row has another engine."""
-    spec = parse_engine(row.engine)
-    if spec.name != plain_name(name):
+def asked_for(row: Row, spec: EngineSpec) -> bool:
+    """True if a user who asks for an engine, perhaps with settings or at another place, asks for this row."""
+    engine = parse_engine(row.engine)
+    if spec.options:
+        return engine.name == spec.name and dict(engine.options) == dict(spec.options)
+    return engine.name in {spec.name, plain_name(spec.name)}
+
+
+def _moved(row: Row, spec: EngineSpec) -> Row | None:
+    """A row moved to its engine in another interpreter, ``mujoco@3.8.1``; None: it stays, or has another engine."""
+    engine = parse_engine(row.engine)
+    if spec.options or not place_of(spec.name) or engine.name != plain_name(spec.name):
         return None
-    return replace(row, engine=str(replace(spec, name=name)))
+    return replace(row, engine=str(replace(engine, name=spec.name)))
 
 
 def row_facts(
