@@ -7,7 +7,7 @@ OUT ?= out
 # A worker process that finds no bytecode compiles the package anew, which is a quarter of its start.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: install report tradeoff test drills check format readme docs gallery engines clean
+.PHONY: install report tradeoff test drills nightly check format readme docs gallery engines clean
 
 install: $(VENV)/.installed
 
@@ -27,11 +27,16 @@ report: install
 tradeoff: install
 	$(BIN)/proofroll tradeoff sphere_in_cylinder --out $(OUT)
 
-# Every test but drills, those that take more than 1.5 s of processor; `make test MARK=` runs all, as .ci/run does.
+# Every test but drills, those that take more than 1.5 s of processor; `make test MARK=` runs all.
 MARK ?= not drill
 drills: MARK = drill
 test drills: install
 	$(BIN)/python -m pytest -n 2 -m "$(MARK)"
+
+# What .ci/run leaves out: the longest drills, and tests near round-off as two other kinds of processors compute.
+nightly: install
+	$(BIN)/python -m pytest -n 2 -m nightly
+	$(BIN)/proofroll drill arithmetic --no-comparisons --tests sensitive --kind haswell --kind prescott --jobs 2
 
 check: install
 	$(BIN)/ruff check .

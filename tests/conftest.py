@@ -91,7 +91,7 @@ class _TogetherWhatShares(LoadScopeScheduling):
         rows = nodeid.partition("-")[0].replace("[accuracy", "[paper")
         # Where a mark chooses, tests of a unit share little beside what each of them takes, but with those that differ
         # in their last parameter; in one file they would keep one process busy.
-        chosen = self.config.option.markexpr not in {"", "not drill"}
+        chosen = self.config.option.markexpr not in {"", "not drill", "not nightly"}
         unit = nodeid.rpartition("-")[0] or nodeid if chosen else path
         return {"report": folder, "agreement": rows, "conformance": check, "unit": unit}.get(folder, path)
 

@@ -42,4 +42,5 @@ def test_the_python_of_a_page_runs(
 def test_links_of_a_page_lead_somewhere(name: str) -> None:
     """Every relative link leads to a file of the repository."""
     targets = [target for target in re.findall(r"\]\(([^)#]+)\)", PAGES[name]) if "://" not in target]
-    assert [target for target in targets if not (DOCS / target).exists()] == []
+    built = {"vocabulary.md"}  # by `make docs`
+    assert [target for target in targets if target not in built and not (DOCS / target).exists()] == []

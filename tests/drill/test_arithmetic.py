@@ -57,6 +57,7 @@ def truths(kind: Arithmetic, folder: Path) -> Path:
 
 
 @pytest.mark.drill
+@pytest.mark.nightly
 @pytest.mark.slow
 def test_numbers_of_the_truth_hang_on_no_processor(tmp_path: Path) -> None:
     """Numbers of the truth differ under other kernels and instructions by round-off, within their error bars."""
@@ -189,6 +190,7 @@ def test_what_a_map_of_regimes_decides_is_recorded(tmp_path: Path) -> None:
 
 
 @pytest.mark.drill
+@pytest.mark.nightly
 def test_what_a_ladder_of_models_decides_is_recorded(tmp_path: Path) -> None:
     """Models that reach their end, and terms that are needed, which hang on no clock."""
     found = decided_by("ladder:double_pendulum", Runner(Store(tmp_path), jobs=1))
@@ -200,6 +202,7 @@ def test_what_a_ladder_of_models_decides_is_recorded(tmp_path: Path) -> None:
 
 
 @pytest.mark.drill
+@pytest.mark.nightly
 def test_what_a_map_of_stability_decides_is_recorded(tmp_path: Path) -> None:
     """Largest steps and failures beyond, at each place; the claims that they contradict."""
     axis = '[[axes]]\nname = "speed"\nunit = "1/s"\nmeaning = "of the hinge"\nvalues = [0, 1]\nparameters.speed = {}\n'

@@ -33,6 +33,7 @@ def held_out(name: str, seed: int) -> dict[str, float]:
 
 
 @pytest.mark.drill
+@pytest.mark.nightly
 @pytest.mark.timeout(900)  # 30 s of processor time, on a machine that may have much else to do
 def test_a_rattleback_reverses_its_spin() -> None:
     """Two routes of a stone that rolls agree until its spin has turned round, and it keeps its energy."""

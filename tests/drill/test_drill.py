@@ -42,6 +42,7 @@ TRIED = {
 
 
 @pytest.mark.drill
+@pytest.mark.nightly
 @pytest.mark.slow
 @pytest.mark.timeout(900)  # 20 s of processor time, on a machine that may have much else to do
 def test_every_fault_is_contained() -> None:

@@ -311,7 +311,7 @@ def test_friction_that_just_suffices_on_an_incline_is_ill_posed(part: float, mon
     "beside",
     # All of them take three minutes, so that other kinds of arithmetic try some.
     [
-        pytest.param(range(-20, 21), id="all"),
+        pytest.param(range(-20, 21), id="all", marks=pytest.mark.nightly),
         pytest.param((-20, -1, 0, 1, 20), id="some", marks=pytest.mark.arithmetic),
     ],
 )

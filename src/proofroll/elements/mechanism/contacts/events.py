@@ -132,8 +132,8 @@ def _stays_closed(presses: _States, gap: FloatArray, u_n: FloatArray, room: floa
     These are whole stretches without force in which the gap does not open, and at the end of the run is not opening.
 
     Args:
-        presses: whether it presses, shape (time,).
-        gap: [m], shape (time,).
+        presses: True where the contact has a force, shape (time,).
+        gap: distance [m], shape (time,).
         u_n: rate of the gap [m/s], shape (time,).
         room: gap that counts as closed [m].
         moves: speed that does not count as rest [m/s].
