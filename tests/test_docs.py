@@ -129,7 +129,7 @@ def test_the_workflow_runs_the_two_commands() -> None:
     made = [line for line in within if line.startswith("make ")]
     assert {word for line in made for word in line.split()} >= {"check", "docs", "test"}
     for line in [*commands[1:], *made]:
-        subprocess.run(["make", "--dry-run", *line.split()[1:]], cwd=ROOT, check=True, capture_output=True)
+        subprocess.run(["make", "--dry-run", *shlex.split(line)[1:]], cwd=ROOT, check=True, capture_output=True)
 
 
 def test_the_gallery_makes_what_is_lacking_or_changed(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

@@ -180,7 +180,7 @@ def _change(
         times: of the samples [s].
         found: the contacts along the motion.
         u_n: rate of its gap [m/s], shape (time,).
-        states: whether its force presses at a sample, whether it touches, and whether it slips, each of shape (time,).
+        states: truth values (pressed, touching, slipping) at each sample, each of shape (time,).
         k: number of the sample before.
         c: number of the contact.
     """
