@@ -689,7 +689,11 @@ def test_help_and_version(proofroll: Proofroll) -> None:
     assert code == 0
     for command in ("scenes", "engines", "run", "compare", "report", "onset", "regimes", "stability"):
         assert command in out
-    assert "..." not in out.partition("Commands:")[2]  # no summary is cut
+    assert "..." not in out.partition("Ask:")[2]  # no summary is cut
+    heads = [line for line in out.splitlines() if line.endswith(":") and not line.startswith(" ")]
+    assert [head.partition(" ")[0].strip(":") for head in heads[:6]] == [
+        "Options", "Ask", "Bring", "Robots", "Study", "Maintain",
+    ]  # fmt: skip
     assert proofroll("--version") == (0, "proofroll 0.1.0\n", "")
     assert proofroll()[0] == 2
     code, out, err = proofroll("new")

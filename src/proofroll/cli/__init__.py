@@ -14,6 +14,7 @@ import typer
 
 import proofroll
 from proofroll.cli.cite import cite
+from proofroll.cli.command_groups import GroupedCommands, origin
 from proofroll.cli.comparing import compare
 from proofroll.cli.engines import engines
 from proofroll.cli.export import export
@@ -35,6 +36,7 @@ from proofroll.core.errors import InputError, Missing, ProofrollError, choices
 from proofroll.running.process_end import INTERRUPTS, end_at_once
 
 app = typer.Typer(
+    cls=GroupedCommands,
     help="Which multibody engine, formulation and time step can you trust for a scene?",
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
@@ -94,6 +96,8 @@ def _usage_message(error: typer.TyperException) -> str:
     if message.startswith("Missing ") and getattr(error, "param", None) is not None:
         names = [item.value for item in lacking.param.shell_complete(lacking.ctx, "")]
         return f"{message} Choose one of {choices(names)}." if names else message
+    if unknown := re.match(r"No such command '([^']+)'", message):
+        return origin(unknown[1]) or message
     problems: list[dict[str, Any]] = getattr(error.__cause__, "errors", list)()
     option = re.search(r"'([^']+)'", message)
     if not problems or option is None:

@@ -33,7 +33,7 @@ def compare(
     comparison: Annotated[
         str,
         typer.Argument(
-            help="A comparison file, e.g. comparisons/paper.toml, or its name; or a scene, a robot file.",
+            help="A comparison file or its name, e.g. stick_slip; or a scene, a robot file.",
             autocompletion=options.compared_like,
         ),
     ],

@@ -10,7 +10,7 @@ from proofroll.cli import options
 
 def stability(
     scene: Annotated[
-        str, typer.Argument(help="A scene, or a file that asks for a map of it, e.g. comparisons/stability.toml.")
+        str, typer.Argument(help="A scene, or the file, or its name, that asks for a map of it, e.g. stability.")
     ],
     engine: options.Engines = None,
     axis: Annotated[list[str] | None, typer.Option(help="Axis of the map, e.g. V0; repeat. All by default.")] = None,

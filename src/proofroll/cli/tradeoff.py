@@ -18,9 +18,7 @@ if TYPE_CHECKING:
     from proofroll.studies.tradeoff.records import TradeoffStudy
     from proofroll.studies.tradeoff.tradeoff import Extent
 
-SceneOrFile = Annotated[
-    str, typer.Argument(help="A scene, or a comparison file for it, e.g. comparisons/tradeoff.toml.")
-]
+SceneOrFile = Annotated[str, typer.Argument(help="A scene, or the file, or its name, of a trade-off, e.g. tradeoff.")]
 Over = Annotated[
     list[str] | None, typer.Option(help="parameter=low:high over which the best points are checked; repeat.")
 ]
