@@ -19,11 +19,13 @@ _OPERATORS = {
     ast.USub: operator.neg,
     ast.UAdd: operator.pos,
 }
+# Names of constants that a formula may have.
+CONSTANTS = {"pi": Quantity(math.pi), "deg": Quantity(math.pi / 180)}
 LONGEST = 500  # characters: far more than a person writes, and few enough that nesting cannot overflow the parser
 
 
 def evaluator(
-    names: Mapping[str, Any], functions: Mapping[str, Callable[[Any], Any]], power: Callable[[Any, Any], Any]
+    names: Mapping[str, Any], functions: Mapping[str, Callable[..., Any]], power: Callable[[Any, Any], Any]
 ) -> SimpleEval:
     """Evaluator of formulas with + - * / ^ ** ( ) and the given names and functions; attributes are not allowed."""
     made = SimpleEval(operators={**_OPERATORS, ast.Pow: power}, functions=dict(functions), names=dict(names))
@@ -42,7 +44,7 @@ def evaluated(
     unit: str = "",
     functions: Mapping[str, Callable[[float], float]] | None = None,
 ) -> float:
-    """The number of an expression of parameters with + - * / ^ ** ( ) and ``pi``.
+    """The number of an expression of parameters with + - * / ^ ** ( ), ``pi``, ``deg`` = π/180, and functions.
 
     Args:
         field: location in the file, for the message.
@@ -50,7 +52,7 @@ def evaluated(
         names: the parameters, with their units.
         unit: required unit of the result, as scene files write it, or several joined by OR; "": not checked. A formula
             of plain numbers is accepted for any unit, as a plain number is.
-        functions: functions of a dimensionless number that the expression may call.
+        functions: functions of a dimensionless number that the expression may call; None: :data:`FUNCTIONS`.
 
     Raises:
         InputError: the expression cannot be read, has an unknown name or function, divides by zero, overflows, adds
@@ -58,8 +60,8 @@ def evaluated(
     """
     if len(text) > LONGEST:
         raise InputError(field, text, f"an expression may have at most {LONGEST} characters")
-    known = {"pi": Quantity(math.pi), **names}
-    called = {name: _of_ratio(name, function) for name, function in (functions or {}).items()}
+    known = {**CONSTANTS, **names}
+    called = FUNCTIONS if functions is None else {name: _of_ratio(name, item) for name, item in functions.items()}
     try:
         source = text.replace("^", "**").strip()
         value = evaluator(known, called, _power).eval(source, ast.parse(source, mode="eval").body)
@@ -73,7 +75,7 @@ def evaluated(
         raise InputError(field, text, f"is no arithmetic; use numbers, + - * / ^ and {_list(known)}") from None
     except InvalidExpression as error:
         problem = str(error).splitlines()[0].rstrip(".")
-        raise InputError(field, text, f"{problem}; use + - * / ^ and {_list(known)}") from None
+        raise InputError(field, text, f"{problem}; use + - * / ^, {', '.join(called)} and {_list(known)}") from None
     except (SyntaxError, TypeError, ValueError, OverflowError, RecursionError, MemoryError, KeyError):
         raise InputError(field, text, f"is no finite real number; use + - * / ^ and {_list(known)}") from None
     if not math.isfinite(number):
@@ -94,6 +96,39 @@ def _of_ratio(name: str, function: Callable[[float], float]) -> Callable[[Quanti
         return Quantity(float(function(given.value)))
 
     return called
+
+
+def _root(argument: Quantity | float) -> Quantity:
+    return (Quantity(0.0) + argument) ** 0.5
+
+
+def _hypotenuse(one: Quantity | float, two: Quantity | float) -> Quantity:
+    total = Quantity(0.0) + one + two  # raises if their units differ
+    return Quantity(math.hypot(_plain(one), _plain(two)), total.powers)
+
+
+def _angle(y: Quantity | float, x: Quantity | float) -> Quantity:
+    _hypotenuse(y, x)
+    return Quantity(math.atan2(_plain(y), _plain(x)))
+
+
+def _size(argument: Quantity | float) -> Quantity:
+    quantity = Quantity(0.0) + argument
+    return Quantity(abs(quantity.value), quantity.powers)
+
+
+def _plain(argument: Quantity | float) -> float:
+    return float((Quantity(0.0) + argument).value)
+
+
+# Functions of formulas that do not depend on time; their units are checked.
+FUNCTIONS: Mapping[str, Callable[..., Quantity]] = {
+    **{name: _of_ratio(name, getattr(math, name)) for name in ("sin", "cos", "tan", "asin", "acos", "atan")},
+    "atan2": _angle,
+    "sqrt": _root,
+    "hypot": _hypotenuse,
+    "abs": _size,
+}
 
 
 def _list(names: Mapping[str, Quantity]) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -15,6 +16,7 @@ from proofroll.core.quantity import OR, Quantity, powers_of
 
 # Unit of a number, or of each number of a list; "": not checked. Several that are allowed are joined by OR.
 Unit = str | tuple[str, ...]
+_DEGREES = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*deg(/s(?:\^2)?)?\s*")
 _NUMBERED = re.compile(r"\{([^{}]*)\}")
 
 
@@ -34,7 +36,8 @@ class Parameters:
         """Content of a table with its parameters and formulas replaced by numbers, each checked for its unit.
 
         Args:
-            content: of a file: ``"$name"`` is a parameter, ``"= ..."`` a formula, ``{i}`` in a text a number.
+            content: of a file: ``"$name"`` is a parameter, ``"= ..."`` a formula, ``"30 deg"`` an angle, and ``{i}`` in
+                a text a number.
             where: location in the file, for messages.
             units: key -> unit of its number.
             unit: of the content itself, if it is a number or a list of numbers.
@@ -52,23 +55,31 @@ class Parameters:
                 for index, value in enumerate(content)
             ]
         own = unit_at(unit, 0)
-        plain = isinstance(content, str) and not content.startswith(("$", "="))
-        if own and (plain or isinstance(content, bool)):
-            raise InputError(where, content, "this is not a number; give one" + (f" in {own}" if own != "1" else ""))
-        if not isinstance(content, str):
-            require_usable(where, content)
-            return content
-        if content.startswith("$"):
-            require_known(where, content[1:], self.values, "there is no such parameter; choose from", content)
-            given = self.units.get(content[1:], "")
-            if own and given and given not in own.split(OR):
-                raise InputError(where, content, f"this number is in {own}, that parameter in {given}")
-            return self.values[content[1:]]
-        if content.startswith("="):
-            value = evaluated(where, content[1:], self.quantities, own)
+        if isinstance(content, str):
+            return self._of_text(content, where, own)
+        if own and isinstance(content, bool):
+            raise _no_number(where, content, own)
+        require_usable(where, content)
+        return content
+
+    def _of_text(self, text: str, where: str, unit: str) -> Any:
+        """Number of a parameter, a formula or an angle in degrees; otherwise the text with its numbers filled in."""
+        if text.startswith("$"):
+            require_known(where, text[1:], self.values, "there is no such parameter; choose from", text)
+            given = self.units.get(text[1:], "")
+            if unit and given and given not in unit.split(OR):
+                raise InputError(where, text, f"this number is in {unit}, that parameter in {given}")
+            return self.values[text[1:]]
+        if text.startswith("="):
+            value = evaluated(where, text[1:], self.quantities, unit)
             require_usable(where, value)
             return value
-        return _NUMBERED.sub(lambda index: f"{evaluated(where, index[1], self.quantities):g}", content)
+        if unit:
+            radians = in_radians(where, text, unit)
+            if radians is None:
+                raise _no_number(where, text, unit)
+            return radians
+        return _NUMBERED.sub(lambda index: f"{evaluated(where, index[1], self.quantities):g}", text)
 
     def beside(self, name: str, value: float) -> Parameters:
         """Parameters extended by one plain number of this name."""
@@ -82,6 +93,24 @@ class Parameters:
             name: Quantity(float(value), None if units[name] == "1" else powers_of(units[name]))
             for name, value in self.values.items()
         }
+
+
+def _no_number(where: str, content: object, unit: str) -> InputError:
+    return InputError(where, content, "this is not a number; give one" + (f" in {unit}" if unit != "1" else ""))
+
+
+def in_radians(field: str, text: str, unit: str) -> float | None:
+    """Number in radians of a text in degrees, ``30 deg`` or ``30 deg/s``; None for other texts.
+
+    Raises:
+        InputError: a number of this place is no angle, or not of this unit.
+    """
+    match = _DEGREES.fullmatch(text)
+    if match is None:
+        return None
+    if f"rad{match[2] or ''}" not in unit.split(OR):
+        raise InputError(field, text, f"this number is in {unit}, and not in deg{match[2] or ''}")
+    return math.radians(float(match[1]))
 
 
 def unit_at(unit: Unit, index: int) -> str:

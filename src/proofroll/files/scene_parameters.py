@@ -11,6 +11,7 @@ from pathlib import Path
 from proofroll.core.bounds import require_usable
 from proofroll.core.errors import InputError, choices, require_known
 from proofroll.core.number_format import spaced
+from proofroll.core.parameters import in_radians
 
 
 @dataclass(frozen=True)
@@ -18,7 +19,7 @@ class Parameter:
     """A number that a user may set by name.
 
     Attributes:
-        value: default, or the name of the parameter whose value is the default.
+        value: default, ``"30 deg"`` for one in rad, or the name of the parameter whose value is the default.
         unit: of the value; nothing is converted.
         symbol: as equations write it.
         meaning: description in one line, used in messages.
@@ -56,7 +57,7 @@ def check_parameters(parameters: Mapping[str, Parameter], units: Iterable[str], 
         require_known(f"{where}.unit", parameter.unit, known_units, advice)
         for key in ("value", "above", "at_least", "below", "at_most"):
             other = getattr(parameter, key)
-            if not isinstance(other, str):
+            if not isinstance(other, str) or in_radians(f"{where}.{key}", other, parameter.unit) is not None:
                 continue
             if other == name or other not in parameters:
                 known = choices(item for item in parameters if item != name)
@@ -94,7 +95,7 @@ def values_of(parameters: Mapping[str, Parameter], given: Mapping[str, object]) 
     values: dict[str, float] = {}
     for name, parameter in parameters.items():
         source = name
-        while source not in given and isinstance(following := parameters[source].value, str):
+        while source not in given and (following := str(parameters[source].value)) in parameters:
             source = following
         values[name] = _number(name, given.get(source, parameters[source].value), parameter)
     # Bounds that are numbers come first, so that a parameter is not blamed for the bad value of another.
@@ -110,7 +111,8 @@ def _number(name: str, value: object, parameter: Parameter) -> float:
     try:
         if isinstance(value, str) and "_" in value:  # which Python would ignore
             raise ValueError
-        number = float(value)
+        radians = in_radians(name, value, parameter.unit) if isinstance(value, str) else None
+        number = float(value) if radians is None else radians
     except (ValueError, OverflowError):
         raise InputError(name, value, f"this is not a number; give one in {parameter.unit}") from None
     if math.isnan(number) or (math.isinf(number) and not (parameter.unbounded and number > 0)):
@@ -137,7 +139,7 @@ def _check_bounds(name: str, parameter: Parameter, values: Mapping[str, float], 
     for words, bound, holds in bounds:
         if bound is None or not isinstance(bound, kind):
             continue
-        limit = values[bound] if isinstance(bound, str) else bound
+        limit = values.get(bound, in_radians(name, bound, parameter.unit) or 0.0) if isinstance(bound, str) else bound
         if not holds(value, limit):
             shown = f"{bound} = {limit:g}" if isinstance(bound, str) else f"{limit:g}"
             raise InputError(name, value, f"{parameter.meaning} must be {words} {shown}{spaced(parameter.unit)}")

@@ -36,6 +36,16 @@ def test_a_unit_that_nobody_knows_is_a_base() -> None:
         ("= 2*pi/8", "rad", 0.7853981633974483),
         ("= count/8", "m", 0.5),
         ("= (mass*length*mass*length)^0.5/time", "N s", 12.0),
+        ("= length*sin(pi/6)", "m", 1.5),
+        ("= length*cos(angle)", "m", 1.6209069176044193),
+        ("= sqrt(length/(mass/mass))*sqrt(length)", "m", 3.0),
+        ("= hypot(length, 4)", "m", 5.0),
+        ("= atan2(length, length)", "rad", 0.7853981633974483),
+        ("= asin(1) + acos(1) + atan(tan(angle)) - abs(-angle)", "rad", 1.5707963267948966),
+        ("= 30*deg", "rad", 0.5235987755982988),
+        ("30 deg", "rad", 0.5235987755982988),
+        ("-90deg", "rad or m", -1.5707963267948966),
+        ("180 deg/s", "rad/s", 3.141592653589793),
     ],
 )
 def test_a_formula_has_the_unit_of_its_place(formula: str, unit: str, value: float) -> None:
@@ -52,6 +62,11 @@ def test_a_formula_has_the_unit_of_its_place(formula: str, unit: str, value: flo
         ("= angle", "m", "the formula gives 1"),
         ("= length^mass", "m", "a power must be a plain number, this one is in kg"),
         ("heavy", "kg", "this is not a number; give one in kg"),
+        ("= sin(length)", "1", "sin is of a ratio, and this is in m"),
+        ("= hypot(length, time)", "m", "m and s cannot be added"),
+        ("= sqrt(length)", "m", "the formula gives m.0.5"),
+        ("30 deg", "m", "this number is in m, and not in deg"),
+        ("30 deg", "rad/s", "this number is in rad/s, and not in deg"),
         ("$mass", "m", "this number is in m, that parameter in kg"),
     ],
 )

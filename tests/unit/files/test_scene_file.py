@@ -142,6 +142,16 @@ def test_text_that_is_a_number_is_a_number() -> None:
     assert load_scene(CYLINDER, speed="3.3", mu_static="inf").digest == load_scene(CYLINDER, speed=3.3).digest  # type: ignore[arg-type]
 
 
+def test_angles_in_degrees(edited: Callable[[str, str], str]) -> None:
+    """A parameter in rad, its bounds and its value on the command line may be in degrees with their unit."""
+    text = '[parameters.lean]\nvalue = "30 deg"\nat_most = "45 deg"\nunit = "rad"\nmeaning = "lean"\nsource = "test"\n'
+    folder = edited("[gravity]", text + "[gravity]")
+    assert load_scene(folder).parameters["lean"] == pytest.approx(math.pi / 6)
+    assert load_scene(folder, lean=cast("Any", "40 deg")).parameters["lean"] == pytest.approx(math.pi * 2 / 9)
+    assert "must be at most" in problem(folder, lean="50 deg").advice
+    assert "in m, and not in deg" in problem(folder, radius="1 deg").advice
+
+
 def test_kinetic_friction_follows_static_friction() -> None:
     """mu_kinetic is mu_static unless it is given."""
     assert rolling_ball(load_scene(CYLINDER, mu_static=0.35)).contact.mu_kinetic == 0.35

@@ -11,8 +11,9 @@ import numpy as np
 from simpleeval import InvalidExpression, SimpleEval
 
 from proofroll.core.errors import InputError, no_such_key, require_known
-from proofroll.core.expressions import LONGEST, evaluated, evaluator
-from proofroll.core.parameters import Parameters
+from proofroll.core.expressions import CONSTANTS, LONGEST, evaluated, evaluator
+from proofroll.core.expressions import FUNCTIONS as OF_PARAMETERS
+from proofroll.core.parameters import Parameters, in_radians
 from proofroll.core.quantity import Quantity
 from proofroll.elements.mechanism import checks
 
@@ -128,7 +129,7 @@ def read_signal(field: str, given: Any, numbers: Parameters, unit: str = "") -> 
     try:
         if isinstance(given, str) and given.startswith("=") and TIME not in numbers.values:
             used = _names(given[1:])
-            if used & {TIME, *FUNCTIONS}:
+            if TIME in used or used - {*CONSTANTS, *OF_PARAMETERS, *numbers.values}:
                 for name in sorted(used - {TIME, "pi", *FUNCTIONS}):
                     require_known(
                         field, name, [TIME, *sorted(numbers.values)], "there is no such parameter; choose from"
@@ -144,7 +145,7 @@ def read_signal(field: str, given: Any, numbers: Parameters, unit: str = "") -> 
             axes = {"times": "s", "values": unit}
             filled = {key: numbers.filled(given.get(key, []), key, {}, axes[key]) for key in axes}
             return Table(**filled)
-        if isinstance(given, str) and not given.startswith(("=", "$")):
+        if isinstance(given, str) and not given.startswith(("=", "$")) and in_radians(field, given, unit) is None:
             raise InputError(
                 field, given, "give a number, a formula that begins with =, or a table of times and values"
             )

@@ -71,7 +71,7 @@ def comparison_named(
         workers: pool for the questions to engines.
         budget: processor time of all runs of a scene [s]; None: the default, or no limit on a cluster.
         scheduler: of the cluster, or None.
-        engines: that are asked for; those without a row in the comparison's file get rows that claim nothing.
+        engines: engines of the user; those without a row in the comparison's file get rows that claim nothing.
         until: last time of a scene [s]; None: the default.
         every: sampling interval of a scene [s]; None: the default.
 

@@ -86,10 +86,10 @@ def asked_rows(
     is not installed, it has one row, whose run says why.
 
     Args:
-        scene: that is to be represented.
+        scene: the scene.
         file: of the scene.
         workers: pool for the questions to engines; None: new workers.
-        engines: that are asked for; empty: all that are installed and can represent the scene.
+        engines: engines of the user; empty: all that are installed and can represent the scene.
         tolerance: name of the rows' band.
 
     Raises:

@@ -254,7 +254,7 @@ BAD = {
     "sum of different units": (SLIDER_CRANK.replace("= crank/2", "= crank + rod_mass"), "m and kg cannot be added"),
     "power with a unit": (SLIDER_CRANK.replace("= crank/2", "= rod^crank"), "a power must be a plain number"),
     "division by zero": (SLIDER_CRANK.replace("= crank/2", "= crank/0"), "bodies.0.com.0 = .* divides by zero"),
-    "function call": (SLIDER_CRANK.replace("= crank/2", "= sin(crank)"), "Function 'sin' not defined"),
+    "function call": (SLIDER_CRANK.replace("= crank/2", "= eval(crank)"), "Function 'eval' not defined"),
     "hostile expression": (SLIDER_CRANK.replace("= crank/2", "= __import__('os').getcwd()"), "bodies.0.com.0"),
     "attribute": (SLIDER_CRANK.replace("= crank/2", "= crank.real"), "bodies.0.com.0.*crank.real.*is no arithmetic"),
     "huge power": (SLIDER_CRANK.replace("= crank/2", "= 9^9^9^9^9"), "bodies.0.com.0"),
