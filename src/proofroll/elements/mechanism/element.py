@@ -200,15 +200,10 @@ class MechanismElement:
         """Weight, or if larger the centripetal force of its mass at its speed and length [N]."""
         return self._sizes["N"]
 
-    @cached_property
+    @property
     def conservative(self) -> bool:
         """True if nothing in it drives or dissipates."""
-        if self.mechanism.actuators:
-            return False
-        laws = [(j.damping, j.friction, j.torque, j.limits and j.restitution < 1) for j in self.mechanism.joints]
-        lossy = any(pair.friction or pair.restitution < 1 for pair in self.mechanism.pairs)
-        damped = any(spring.damping for spring in self.mechanism.springs)
-        return not lossy and not damped and not any(any(law) for law in laws)
+        return self.mechanism.conservative
 
     @cached_property
     def observables(self) -> tuple[Observable, ...]:

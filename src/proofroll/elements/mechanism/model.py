@@ -116,6 +116,16 @@ class Mechanism:
         of_joints = any(joint.friction or joint.limits for joint in self.joints)
         return bool(self.contacts) or of_joints or any(item.limit is not None for item in self.actuators)
 
+    @cached_property
+    def conservative(self) -> bool:
+        """True if nothing drives or dissipates."""
+        if self.actuators:
+            return False
+        laws = [(j.damping, j.friction, j.torque, j.limits and j.restitution < 1) for j in self.joints]
+        lossy = any(pair.friction or pair.restitution < 1 for pair in self.pairs)
+        damped = any(spring.damping for spring in self.springs)
+        return not lossy and not damped and not any(any(law) for law in laws)
+
     @property
     def fastened(self) -> dict[str, list[Vector]]:
         """Points of each body, and of the world, to which joints, loops, springs or tracked points are attached [m].

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from copy import copy
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -30,6 +31,9 @@ from proofroll.truth.mechanism.maximal_taylor import MaximalTaylor
 # Initial displacement for growth, m, rad and relative to velocities: far above round-off, small if grown by 1e7.
 BESIDE = 1e-9
 RANK = 1e-8  # see analysis.RANK; this route determines its own rank
+# Least singular value of chosen rows relative to that of all rows, below which other rows are chosen. Each factor of
+# ten costs a digit of the accelerations; a choice by pivoting begins above 0.1, and is compiled anew, in seconds.
+WEAKEST = 0.02
 
 
 @dataclass(frozen=True)
@@ -79,12 +83,27 @@ class NumericEquations:
         unit = float(np.linalg.svd(self._inverse_root, compute_uv=False)[-1])
         return int((values > RANK * values.max(initial=unit)).sum())
 
-    def independent_rows(self) -> list[int]:
-        """Indices of linearly independent rows, as many as the rank, chosen by pivoting at the start."""
-        C = self._matrix(self.equations.at(self.equations.start().tolist()).rows) @ self._inverse_root
+    def independent_rows(self, state: Array | None = None) -> tuple[int, ...]:
+        """Indices of linearly independent rows, as many as the rank, chosen by pivoting at a state, or at the start."""
+        C = self._weighted(self.equations.start() if state is None else state)
         if not C.size:
-            return []
-        return sorted(qr(C.T, mode="r", pivoting=True)[1][: self.rank].tolist())
+            return ()
+        return tuple(sorted(qr(C.T, mode="r", pivoting=True)[1][: self.rank].tolist()))
+
+    @property
+    def redundant(self) -> bool:
+        """True if some rows follow from the others."""
+        return len(self._weighted(self.equations.start())) > self.rank
+
+    def independence(self, rows: Sequence[int], state: Array) -> float:
+        """Least singular value of some rows at a state, relative to that of all rows without the redundant ones."""
+        C = self._weighted(state)
+        whole, chosen = (np.linalg.svd(matrix, compute_uv=False) for matrix in (C, C[list(rows)]))
+        return float(chosen[-1] / whole[self.rank - 1])
+
+    def _weighted(self, state: Array) -> Array:
+        """Rows at a state, with velocities weighted by inertia."""
+        return self._matrix(self.equations.at(state.tolist()).rows) @ self._inverse_root
 
     def solve(self, state: Array, time: float = 0.0, applied: Array | None = None) -> Solved:
         """Accelerations and multipliers at a time [s]; of dependent rows, the multipliers of least norm.
@@ -219,17 +238,45 @@ class MaximalCoordinates:
         self.mechanism = mechanism
         self.lean = NumericEquations(equations(mechanism, allow_planar=True))
         self._whole = NumericEquations(equations(mechanism, allow_planar=False))
-        self._compiled: dict[bool, MaximalTaylor] = {}
+        self._compiled: dict[tuple[bool, tuple[int, ...]], MaximalTaylor] = {}
 
-    def taylor(self, long_double: bool = False) -> MaximalTaylor:
-        """Compiled integrator; the first call compiles it, which takes seconds.
+    def taylor(self, long_double: bool = False, rows: tuple[int, ...] | None = None) -> MaximalTaylor:
+        """Compiled integrator with some rows, or with those chosen at the start; a first call compiles, in seconds.
 
         Raises:
             Missing: heyoka is not installed.
         """
-        if long_double not in self._compiled:
-            self._compiled[long_double] = MaximalTaylor(self.lean.equations, self.lean.independent_rows(), long_double)
-        return self._compiled[long_double]
+        rows = self.lean.independent_rows() if rows is None else rows
+        if (long_double, rows) not in self._compiled:
+            self._compiled[long_double, rows] = MaximalTaylor(self.lean.equations, rows, long_double)
+        return self._compiled[long_double, rows]
+
+    def taylor_states(self, times: Array, long_double: bool = False, start: Array | None = None) -> Array:
+        """States at the given times, s, (times, state), by Taylor series, from the mechanism's own start or another.
+
+        Of redundant rows others are chosen where the present ones come near to dependence.
+
+        Raises:
+            Missing: heyoka is not installed.
+            Diverged: the integration stops before the last time.
+        """
+        taylor = self.taylor(long_double)
+        if not self.lean.redundant:
+            return taylor.run(times, start)
+        time: Any = 0.0
+        state = taylor.start() if start is None else start
+        states: list[Array] = []
+        rows = self.lean.independent_rows()
+        while len(states) < len(times):
+            sound = partial(self._sound, rows)
+            left = times[len(states) :].tolist()
+            time, state, passed = self.taylor(long_double, rows).run_while(sound, time, state, left)
+            states += passed
+            rows = self.lean.independent_rows(np.asarray(state, dtype=float))
+        return np.array(states)
+
+    def _sound(self, rows: Sequence[int], state: Array) -> bool:
+        return self.lean.independence(rows, state) > WEAKEST
 
     def run_taylor(self, times: Array, long_double: bool = False) -> Record:
         """Motion at the given times, s, by Taylor series.
@@ -240,7 +287,7 @@ class MaximalCoordinates:
             Diverged: the integration stops.
         """
         refuse_switching(self.mechanism)
-        return self.recorded(times, np.asarray(self.taylor(long_double).run(times), dtype=float))
+        return self.recorded(times, np.asarray(self.taylor_states(times, long_double), dtype=float))
 
     def run_dop853(self, times: Array, tolerance: float = 1e-14) -> Record:
         """Motion at the given times, s, by DOP853 with projection.
@@ -264,7 +311,7 @@ class MaximalCoordinates:
         start = lean.equations.start()
         starts = (start, lean.beside(start, BESIDE))
         try:
-            one, other = (self.taylor().run(times, each) for each in starts)
+            one, other = (self.taylor_states(times, start=each) for each in starts)
         except Missing:
             one, other = (self._dop853(each, times, BESIDE * 1e-4) for each in starts)
         apart: Array = np.abs(other - one)[:, : lean.equations.nx].max(axis=1) / BESIDE

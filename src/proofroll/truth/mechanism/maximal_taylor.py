@@ -1,7 +1,7 @@
 """Equations of route 2 as symbols, integrated by Taylor series (heyoka, an extra).
 
 The multipliers are eliminated symbolically: C M⁻¹ Cᵀ = L D Lᵀ, sparse, in an order of little fill. That needs linearly
-independent rows; they are chosen once, at the start.
+independent rows. Of redundant rows some are chosen, and others as soon as these come near to dependence.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -47,15 +47,18 @@ class MaximalTaylor:
             opt_level=0,  # optimised code takes two to ten times as long to compile, which no run earns back
         )
 
+    def start(self) -> Array:
+        """State at the start, in this integrator's numbers."""
+        return self._start.copy()
+
     def run(self, times: Array, start: Array | None = None) -> Array:
         """States at the given times, s, (times, state), from the mechanism's own start or another.
 
         Raises:
             Diverged: the integration stops before the last time.
         """
+        self._begin(self._number(0), self._start if start is None else start)
         integrator = self._integrator
-        integrator.state[:] = self._start if start is None else start
-        integrator.time = self._number(0)
         grid = np.array([self._number(time) for time in [0.0, *times]])  # heyoka's grid starts at its present time
         grid, first = (grid[1:], 0) if times[0] == 0 else (grid, 1)
         outcome, *_, states = integrator.propagate_grid(grid)
@@ -63,6 +66,36 @@ class MaximalTaylor:
         if len(states) < len(times) or not np.isfinite(np.asarray(states, dtype=float)).all():
             raise Diverged(f"Taylor series stopped at t = {float(integrator.time):.6g} s ({outcome})")
         return np.asarray(states)
+
+    def run_while(
+        self, sound: Callable[[Array], bool], time: Scalar, state: Array, times: Sequence[float]
+    ) -> tuple[Scalar, Array, list[Array]]:
+        """Steps from a time [s] and a state to the last of ``times``, or to the end of the first unsound step.
+
+        Returns:
+            Time and state at the end, and states at those of ``times`` that are not after it.
+
+        Raises:
+            Diverged: the integration stops before the last time.
+        """
+        integrator = self._integrator
+        self._begin(time, state)
+        states: list[Array] = []
+        while len(states) < len(times):
+            left = self._number(times[-1]) - integrator.time
+            outcome, step = integrator.step(max_delta_t=left, write_tc=True)
+            if not np.isfinite(np.asarray(integrator.state, dtype=float)).all() or (step == 0 and left > 0):
+                raise Diverged(f"Taylor series stopped at t = {float(integrator.time):.6g} s ({outcome})")
+            last = step == left
+            while len(states) < len(times) and (last or self._number(times[len(states)]) <= integrator.time):
+                states.append(integrator.update_d_output(self._number(times[len(states)])).copy())
+            if not last and not sound(np.asarray(integrator.state, dtype=float)):
+                break
+        return integrator.time, integrator.state.copy(), states
+
+    def _begin(self, time: Scalar, state: Array) -> None:
+        self._integrator.state[:] = state
+        self._integrator.time = self._number(time)
 
 
 def compiled_rates(equations: MaximalEquations, rows: Sequence[int]) -> Callable[[Array], Array]:

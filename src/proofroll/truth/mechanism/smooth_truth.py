@@ -2,8 +2,9 @@
 
 Routes: joint coordinates (DOP853 with projection), maximal coordinates (Taylor series in doubles and in long doubles;
 DOP853 without heyoka), both by implicit collocation if dampers are stiff, and closed forms if known. The best of them
-is the truth, the others give its error bar. If a start displaced by :data:`NUDGE` leads farther away than
-:data:`CHAOS`, the question is ill-posed; the time of that is the horizon.
+is the truth, the others give its error bar. If in both routes a start displaced by :data:`NUDGE` leads farther away
+than :data:`CHAOS`, the question is ill-posed; the time of that is the horizon. A route that changes the energy of a
+conservative mechanism has failed, and shows no chaos.
 """
 
 from dataclasses import replace
@@ -11,6 +12,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from proofroll.core.dop853 import integrate
 from proofroll.core.errors import Diverged, Missing, Refused
 from proofroll.elements.mechanism.analysis import analyse
 from proofroll.elements.mechanism.complementarity import refuse_switching
@@ -30,12 +32,13 @@ from proofroll.truth.mechanism.error_bars import (
     on_same_turns,
     round_off,
 )
-from proofroll.truth.mechanism.maximal_coordinates import MaximalCoordinates
+from proofroll.truth.mechanism.maximal_coordinates import BESIDE, MaximalCoordinates
 from proofroll.truth.mechanism.singular_poses import branching, singular_poses, singular_poses_of
 from proofroll.truth.mechanism.stiff_routes import run_stiff, stiff
 
 CHAOS = 1e-9  # m, 1 (quaternions): a larger distance between motions with indistinguishable starts is chaos
 BRANCH = 1e-3  # m, 1: distance between routes that chaos causes only long after the horizon
+ENERGY = 1e-8  # change of energy relative to its parts, a thousand times that of routes through chaos, 1e-11
 AT_LIMIT = 1e-9  # rad, m: a joint that swings exactly to its limit exceeds it by round-off, 1e-14
 
 
@@ -57,7 +60,11 @@ def find_truth(mechanism: Mechanism, times: Array, tolerance: float = 1e-15) -> 
         second = MaximalCoordinates(mechanism)
         check_start(first, second)
         one, two, precise, growth, routes = _runs(first, second, times, tolerance)
+        for record, name in ((one, routes[1]), (precise, routes[0])):
+            _check_energy(mechanism, record, name)
         chaotic = growth * NUDGE > CHAOS
+        if chaotic.any():
+            chaotic &= _first_growth(first, one) * NUDGE > CHAOS
         _check_branch(one, precise, chaotic)
         best = precise if exact is None else on_same_turns(mechanism, one, exact)
     except Diverged as stopped:
@@ -132,6 +139,39 @@ def _check_branch(one: Record, precise: Record, chaotic: NDArray[np.bool_]) -> N
     parted = np.flatnonzero((_apart(one, precise) > BRANCH) & ~chaotic)
     if len(parted):
         raise Diverged(f"the two routes part before t = {one.time[parted[0]]:.6g} s, as at a singular pose")
+
+
+def _check_energy(mechanism: Mechanism, record: Record, route: str) -> None:
+    """Checks that a route keeps the energy of a conservative mechanism.
+
+    Raises:
+        Diverged: it does not, so that the route has failed.
+    """
+    if not mechanism.conservative:
+        return
+    parts = record.placed(mechanism).energies()
+    change = np.abs(parts.sum(axis=1) - parts[0].sum())
+    lost = np.flatnonzero(change > ENERGY * np.abs(parts).sum(axis=1).max())
+    if len(lost):
+        time = record.time[lost[0]]
+        raise Diverged(f"the route in {route} changes the energy by {change[lost[0]]:.2g} J before t = {time:.6g} s")
+
+
+def _first_growth(first: JointCoordinates, record: Record) -> Array:
+    """Growth of the distance to a neighbouring motion in joint coordinates, as a multiple of the initial distance.
+
+    Raises:
+        Diverged: the integration stops.
+    """
+    mechanism, nq = first.mechanism, first.mechanism.nq
+    q, v = mechanism.start()
+    ways = BESIDE * (1.0 + np.modf(np.arange(1, mechanism.nv + 1) * 0.6180339887498949)[0])
+    start = np.concatenate([first.tree.moved(q, ways), v * (1.0 + ways)])
+    for _ in range(3):  # Newton's method doubles the number of digits
+        start = first.eliminated(start)
+    states = integrate(first.rate, start, record.time, BESIDE * 1e-4, first.followed())
+    samples = [first.sample(y[:nq], y[nq:], None, t) for t, y in zip(record.time, states, strict=True)]
+    return _apart(record_of(record.time, samples), record) / BESIDE
 
 
 def _check_limits(mechanism: Mechanism, record: Record) -> None:

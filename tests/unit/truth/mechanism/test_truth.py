@@ -72,6 +72,40 @@ def test_error_bar_covers_a_closed_form_that_had_no_part_in_it(scene):
 
 
 @pytest.mark.drill
+def test_chosen_rows_that_become_dependent_are_exchanged(scene):
+    """A ring whose rows chosen at the start become dependent at a regular pose has a truth beyond, by two routes."""
+    pytest.importorskip("heyoka")
+    truth = find_truth(scene("bricard", axial_inertia=1 / 600), np.linspace(0, 10, 51))
+    assert truth.horizon == np.inf
+    assert truth.bars["points"][-1] < 1e-6
+    # An integration of one coordinate, apart from this project, good to 5e-9 m.
+    apart = [-0.96934034, -1.2212469, 0.75427801]
+    assert truth.record.placed(scene("bricard")).points[10, -1] == pytest.approx(apart, abs=1e-8)
+
+
+def test_a_route_that_loses_energy_shows_no_chaos(scene, monkeypatch):
+    """A conservative mechanism whose route changes the energy has no truth, however fast small differences grow."""
+    run = MaximalCoordinates.run_taylor
+
+    def braked(route, times, long_double=False):
+        record = run(route, times, long_double)
+        return replace(record, v_WB=record.v_WB * np.exp(-1e-3 * times)[:, None, None])
+
+    pytest.importorskip("heyoka")
+    monkeypatch.setattr(MaximalCoordinates, "run_taylor", braked)
+    monkeypatch.setattr(MaximalCoordinates, "growth", lambda _, times: np.full(len(times), 1e12))
+    with pytest.raises(Refused, match="changes the energy by"):
+        find_truth(scene("double_pendulum"), np.array([0.0, 0.1, 0.2]))
+
+
+def test_chaos_is_shown_by_both_routes(scene, monkeypatch):
+    """A growth of small differences that one route alone has makes no question ill-posed."""
+    pytest.importorskip("heyoka")
+    monkeypatch.setattr(MaximalCoordinates, "growth", lambda _, times: np.full(len(times), 1e12))
+    assert find_truth(scene("double_pendulum"), np.array([0.0, 0.1])).horizon == np.inf
+
+
+@pytest.mark.drill
 def test_chaos_has_a_horizon(scene):
     """Doubles and long doubles part near 9 s; from then on the error bar says so."""
     pytest.importorskip("heyoka")
