@@ -38,6 +38,7 @@ def run(
     plot: Annotated[
         Path | None, typer.Option(help="Draw the run to this file, by its ending: html, svg, png or pdf.")
     ] = None,
+    forces: Annotated[bool, typer.Option("--forces", help="Show all forces and moments, too.")] = False,
     as_json: options.Json = False,
 ) -> None:
     """Run one scene in one engine."""
@@ -104,7 +105,7 @@ def run(
     if not done:
         options.complain(f"{content.engine} {content.status}: {content.message}{_shorter_step(scene, engine, case)}")
     if as_json or done or content.final:
-        options.show(content, as_json, lambda: run_lines(content))
+        options.show(content, as_json, lambda: run_lines(content, forces=forces))
     if not done:
         raise typer.Exit(options.ENGINE)
 

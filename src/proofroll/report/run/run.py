@@ -1,5 +1,7 @@
 """Content of ``proofroll run``, and its lines on the terminal."""
 
+import math
+from collections.abc import Collection
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -8,12 +10,17 @@ from proofroll.core.columns import SMALLEST, UNCERTAIN
 from proofroll.core.diagnosis.scene_diagnosis import Diagnosis, diagnose_scene
 from proofroll.core.events import Event, events_of
 from proofroll.core.number_format import number
+from proofroll.core.quantity import powers_of
 from proofroll.files.json_data import OPTIONAL
 from proofroll.files.scene_file import load_scene
 from proofroll.files.trajectory_file import read_columns
 from proofroll.report.labels import precision_words, settings_text
 from proofroll.running.case import Case, Result
 
+_FORCES = ("N", "N m")
+_FEW = 3  # most forces and moments that are shown without being asked for
+_DIGITS = 12
+_ROUND_OFF = 1e-14  # of the largest value of a dimension
 _EVENTS = 8  # most events on the terminal; the JSON document has all
 
 
@@ -111,9 +118,64 @@ def _event_text(event: Event) -> str:
     return f"{event.kind.replace('_', '-')}{name} at {event.time:.9g} ± {bar} s"
 
 
-def run_lines(content: RunContent) -> list[Any]:
-    """Lines and tables about a run for the terminal, printed by rich."""
+def value_text(value: float, bar: float | None, size: float) -> str:
+    """Text of a value with at most twelve digits: no digit below its error bar, and 0 for round-off.
+
+    Args:
+        value: to be written.
+        bar: error bar; None: it is not known.
+        size: largest value of the same dimension.
+    """
+    if not math.isfinite(value):
+        return "–"
+    if abs(value) <= max(bar or 0.0, _ROUND_OFF * size):
+        return "0"
+    digits = _DIGITS
+    if bar:
+        digits = min(_DIGITS, math.floor(math.log10(abs(value))) - math.ceil(math.log10(bar)) + 1)
+    return f"{value:.{max(digits, 1)}g}"
+
+
+def _dimension(unit: str) -> frozenset[tuple[str, float]]:
+    """Powers of base units; equal for a moment and an energy."""
+    return frozenset(powers_of(unit).items())
+
+
+def _place(unit: str) -> int:
+    """Place of a variable in the table by its unit: places and angles, velocities, the rest, forces and moments."""
+    order = {"s": 0, "m": 1, "rad": 1, "m/s": 2, "rad/s": 2}
+    return 4 if unit in _FORCES else order.get(unit, 3)
+
+
+def _hidden_forces(content: RunContent) -> list[str]:
+    """Forces and moments, which are shown on request if they are more than a few."""
+    forces = [name for name, unit in content.units.items() if unit in _FORCES]
+    return forces if len(forces) > _FEW else []
+
+
+def _value_table(content: RunContent, hidden: Collection[str]) -> Any:
+    """Table of the last values: positions first, then velocities, energies and residuals, then forces."""
     from rich.table import Column, Table
+
+    bars = content.error_bars or {}
+    of_bars = [Column("error bar", justify="right")] if bars else []
+    table = Table("at the end", Column("value", justify="right"), "unit", *of_bars, box=None, pad_edge=False)
+    sizes: dict[frozenset[tuple[str, float]], float] = {}
+    for name, value in content.final.items():
+        if math.isfinite(value):
+            dimension = _dimension(content.units[name])
+            sizes[dimension] = max(sizes.get(dimension, 0.0 if dimension else 1.0), abs(value))
+    shown = [name for name in content.final if name not in content.absent and name not in hidden]
+    for name in sorted(shown, key=lambda item: _place(content.units[item])):
+        value, unit = content.final[name], content.units[name]
+        bar = bars.get(name) if math.isfinite(value) else None
+        texts = [f"{bar:.1e}" if bar is not None else ""] if bars else []
+        table.add_row(name, value_text(value, bar, sizes.get(_dimension(unit), 0.0)), unit, *texts)
+    return table
+
+
+def run_lines(content: RunContent, *, forces: bool = True) -> list[Any]:
+    """Lines and tables about a run for the terminal, printed by rich; ``forces``: more than a few are shown, too."""
     from rich.text import Text
 
     settings = ", ".join(filter(None, (settings_text(content.settings), *precision_words(content.precision))))
@@ -122,17 +184,14 @@ def run_lines(content: RunContent) -> list[Any]:
     lines += [Text(f"  {cause.sentence}") for cause in content.diagnosis]
     if not content.final:
         return lines
-    bars = content.error_bars or {}
-    of_bars = [Column("error bar", justify="right")] if bars else []
-    table = Table("at the end", Column("value", justify="right"), "unit", *of_bars, box=None, pad_edge=False)
-    shown = {name: value for name, value in content.final.items() if name not in content.absent}
-    for name, value in shown.items():
-        bar = [f"{bars[name]:.1e}" if name in bars else ""] if bars else []
-        table.add_row(name, f"{value:.12g}", content.units[name], *bar)
-    lines.append(table)
+    hidden = [] if forces else _hidden_forces(content)
+    lines.append(_value_table(content, hidden))
+    if hidden:
+        lines.append(Text(f"{len(hidden)} forces and moments are not shown; --forces shows them"))
     for told in (content.absent, content.uncertain or {}):
-        for reason in dict.fromkeys(told.values()):
-            lines.append(Text(f"{reason}: {', '.join(name for name, why in told.items() if why == reason)}"))
+        for reason in dict.fromkeys(why for name, why in told.items() if name not in hidden):
+            names = [name for name, why in told.items() if why == reason and name not in hidden]
+            lines.append(Text(f"{reason}: {', '.join(names)}"))
     for name, value in (content.smallest or {}).items():
         lines.append(Text(f"smallest {name} on the way: {value:.6g} {content.units.get(name, '')}".rstrip()))
     if content.events:

@@ -16,7 +16,7 @@ from rich.console import Console
 from proofroll.core.events import Event
 from proofroll.files.scene_file import load_scene
 from proofroll.files.trajectory_file import write
-from proofroll.report.run.run import run_content, run_lines
+from proofroll.report.run.run import run_content, run_lines, value_text
 from proofroll.running.case import Result, Status
 
 
@@ -79,3 +79,40 @@ def test_an_event_says_to_what_it_happens(tmp_path: Path) -> None:
     lines = run_lines(dataclasses.replace(content, final={"time": 1.0}, units={"time": "s"}, events=events))
     (said,) = [str(line) for line in lines if str(line).startswith("events: ")]
     assert said.startswith("events: lift-off of left at 0.5 ± 0.1 s, slip at 0.7")
+
+
+@pytest.mark.parametrize(
+    ("value", "bar", "size", "text"),
+    [
+        (1.23456789012345, None, 2.0, "1.23456789012"),
+        (1.23456789012345, 2e-5, 2.0, "1.2346"),
+        (1234.5678, 0.3, 2000.0, "1235"),
+        (-6.6e-16, None, 1.0, "0"),
+        (-6.6e-16, None, 1e-3, "-6.6e-16"),
+        (-1.7e-15, 7.7e-14, 0.0, "0"),
+        (float("nan"), 1e-9, 1.0, "–"),
+    ],
+)
+def test_digits_end_at_the_error_bar(value: float, bar: float | None, size: float, text: str) -> None:
+    """No digit below the bar is written, round-off of the largest value of a dimension is 0, and no value a dash."""
+    assert value_text(value, bar, size) == text
+
+
+def test_positions_come_first_and_forces_on_request(tmp_path: Path) -> None:
+    """Positions stand before velocities, energies and forces; many forces are counted only, unless asked for."""
+    result = Result(Status.DONE, "reached 1 s", wall_seconds=1.0)
+    units = {"time": "s", "E": "J", "v": "m/s", "x": "m", "q": "rad"} | {f"force.{axis}": "N" for axis in "abcd"}
+    final = dict.fromkeys(units, 1.0)
+    content = run_content(_case("pendulum"), result, tmp_path / "none.npz")
+    content = dataclasses.replace(content, final=final, units=units)
+    texts = []
+    for forces in (False, True):
+        shown = Console(file=io.StringIO(), width=80)
+        for line in run_lines(content, forces=forces):
+            shown.print(line)
+        texts.append(shown.file.getvalue())
+    names = [line.split()[0] for line in texts[0].splitlines()[3:8]]
+    assert names == ["time", "x", "q", "v", "E"]
+    assert "force.a" not in texts[0]
+    assert "4 forces and moments are not shown; --forces shows them" in texts[0]
+    assert "force.a" in texts[1]
