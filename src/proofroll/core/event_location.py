@@ -100,6 +100,76 @@ def graze(function: Callable[[FloatArray], FloatArray], start: float, end: float
     return None
 
 
+def lowest(function: Callable[[FloatArray], FloatArray], start: float, end: float) -> float | None:
+    """First time in [start, end] at which a smooth function of times has a minimum, or None."""
+    half, middle = (end - start) / 2, (end + start) / 2
+    slope = chebyshev.chebder(_TO_CHEBYSHEV @ function(middle + half * _X))
+    turns = chebyshev.chebroots(np.trim_zeros(slope, "b")) if np.any(slope) else np.empty(0)
+    bend = chebyshev.chebder(slope)
+    found = np.sort(np.real(turns[np.abs(np.imag(turns)) < 1e-6]))
+    low = [x for x in found.tolist() if abs(x) <= 1 and chebyshev.chebval(x, bend) > 0]
+    return middle + half * low[0] if low else None
+
+
+def locate_rise_within(
+    guards: Callable[[FloatArray], FloatArray],
+    start: float,
+    end: float,
+    noise: FloatArray | float = 0.0,
+    leaving: bool = False,
+    near: FloatArray | float = 0.0,
+    grazes: list[float] | None = None,
+) -> tuple[float, int] | None:
+    """Time [s] and index of the first rise of a guard in a step whose dense output is as accurate as the step.
+
+    Args:
+        guards: of times, shape (times, guards); accurate within the whole step.
+        start: of the step [s].
+        end: of the step [s].
+        noise: see :func:`locate_rise`, as for the arguments that follow.
+        leaving: see there.
+        near: see there.
+        grazes: see there.
+    """
+
+    def values(times: FloatArray) -> FloatArray:
+        found = guards(times) - noise
+        return np.where((times <= start)[:, None], np.minimum(found, 0.0), found) if leaving else found
+
+    at_points = values((end + start) / 2 + (end - start) / 2 * _X)
+    sizes = np.abs(_TO_CHEBYSHEV @ (at_points + near))
+    middle = _TO_CHEBYSHEV[0] @ (at_points + near)
+    below = middle + sizes[1:].sum(axis=0) + 10 * sizes[-2:].sum(axis=0) < 0
+    nearly = np.broadcast_to(near, below.shape)
+    rises, crests = list[tuple[float, int]](), list[float]()
+    for number in np.flatnonzero(np.logical_not(below)).tolist():
+
+        def alone(times: FloatArray, number: int = number) -> FloatArray:
+            return values(times)[:, number]
+
+        rise = first_rise(alone, start, end)
+        if rise is not None:
+            rises.append((rise, number))
+        if grazes is not None and nearly[number] and (crest := graze(alone, start, end, nearly[number])) is not None:
+            crests.append(crest if rise is None else min(rise, crest))
+    span = 1e-4 * (end - start)
+    if grazes is not None:  # after a rise the motion is another; a joint that rubs turns at its crest
+        grazes += [crest for crest in crests if not rises or crest <= min(rises)[0] + span]
+    if not rises:
+        return None
+    time, number = min(rises)
+    for _ in range(4):
+        low, value, high = guards(np.array([time - span, time, time + span]))[:, number]
+        slope = float(high - low) / (2 * span)
+        better = time - float(value) / slope if slope > 0 else time
+        if not start - span <= better <= end + span or abs(better - time) > 0.1 * (end - start):
+            break  # a crest that only touches zero has no slope to go by
+        moved, time = abs(better - time), better
+        if moved <= 2 * np.spacing(time):
+            break
+    return time, number
+
+
 def _one(values: Callable[[float], FloatArray], number: int, times: FloatArray) -> FloatArray:
     """Values of one function at some times."""
     return np.array([values(float(t))[number] for t in times])

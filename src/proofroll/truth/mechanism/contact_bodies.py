@@ -12,9 +12,11 @@ from proofroll.elements.mechanism.contacts.touching import Touching
 from proofroll.elements.mechanism.rotations import Array, cross, frame_of_axis
 from proofroll.truth.hybrid import Transition
 from proofroll.truth.mechanism.body_switching import SLACK
+from proofroll.truth.mechanism.contact_body_symbols import BodySymbols
 from proofroll.truth.mechanism.contact_equations import BodiesSolution, BodiesState, ContactEquations
 from proofroll.truth.mechanism.contact_guards import AT_REST, SLIP_ENDED, SolvedContacts, pressing
 from proofroll.truth.mechanism.contact_stretches import ContactStretches, modes_of
+from proofroll.truth.mechanism.contact_taylor import ModeSymbols
 
 _MOST = 6  # largest number of contacts closed at the same time: each has up to four candidate modes
 _SAME = 1e-6  # velocity difference, relative to the largest speed, below which two outcomes of an impact are the same
@@ -29,8 +31,12 @@ class ContactBodies(ContactStretches):
     """
 
     def __init__(self, equations: ContactEquations, tolerance: float, size: float) -> None:
-        super().__init__(equations, len(equations.equations.equations.start()), tolerance, size)
         self.equations, self._rubs = equations, equations.friction + equations.bounds > 0
+        super().__init__(equations, len(equations.equations.equations.start()), tolerance, size)
+        self._after_velocities = len(equations.equations.equations.angles)
+
+    def _symbols(self) -> ModeSymbols:
+        return BodySymbols(self.equations)
 
     def begin(self) -> Transition[ContactMode]:
         """See the protocol."""

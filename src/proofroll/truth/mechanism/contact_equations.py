@@ -80,7 +80,7 @@ class ContactEquations:
         self.friction = np.array([contact.friction for contact in self.contacts])
         self.bounds = np.array([contact.bound for contact in self.contacts])
         index = mechanism.body_index
-        self._pairs = [(index[contact.body_a], index[contact.body_b]) for contact in mechanism.contacts]
+        self.pairs = [(index[contact.body_a], index[contact.body_b]) for contact in mechanism.contacts]
         self._com = [np.array(body.com) for body in mechanism.bodies] + [np.zeros(3)]
         self._limited = {k: actuator for k, actuator in enumerate(mechanism.actuators) if actuator.limit is not None}
         self._driven = [mechanism.joint_index[actuator.joint] for actuator in self._limited.values()]
@@ -94,10 +94,10 @@ class ContactEquations:
             R, v, w = (np.array(part, dtype=float) for part in (view.R, view.v, view.w))
             arm = R @ com
             bodies.append(Moving(np.array(view.r) - arm, R, v - cross(w, arm), w))
-        pairs = zip(self.mechanism.contacts, self._pairs, strict=True)
+        pairs = zip(self.mechanism.contacts, self.pairs, strict=True)
         touching = tuple(touch(c, bodies[a], bodies[b]) for c, (a, b) in pairs)
         J, rates = np.zeros((len(self.contacts), 3, e.nu)), np.zeros((len(self.contacts), 3))
-        for k, (pair, each) in enumerate(zip(self._pairs, touching, strict=True)):
+        for k, (pair, each) in enumerate(zip(self.pairs, touching, strict=True)):
             for body, sign in zip(pair, (1.0, -1.0), strict=True):
                 if body < 0:
                     continue
@@ -219,8 +219,8 @@ class ContactEquations:
 
     def applied(self, state: BodiesState, force: Array) -> tuple[Array, Array]:
         """Forces of contacts between bodies, and wrenches on the bodies about their centres of mass, (bodies, 6)."""
-        wrenches, force = np.zeros((len(self.mechanism.bodies) + 1, 6)), force[: len(self._pairs)]
-        for pair, each, push in zip(self._pairs, state.touching, force, strict=False):
+        wrenches, force = np.zeros((len(self.mechanism.bodies) + 1, 6)), force[: len(self.pairs)]
+        for pair, each, push in zip(self.pairs, state.touching, force, strict=False):
             for body, sign in zip(pair, (1.0, -1.0), strict=True):
                 wrenches[body] += sign * np.concatenate([push, cross(each.place - state.centres[body], push)])
         return force, wrenches[:-1]

@@ -21,10 +21,10 @@ from proofroll.truth.mechanism.followed_paths import time_accuracy
 AT_REST, STANDS = 1e-13, 1e-9
 SLIP_ENDED = 1e-11  # slip speed that remains when a slip below FAINT is extrapolated to rest
 # Value of Painlevé's measure (1 without friction) that counts as zero.
-_LEAST_RESPONSE = 1e-3
-_TURNED = 0.5  # cosine of the angle by which a line may turn in a stretch
+LEAST_RESPONSE = 1e-3
+TURNED = 0.5  # cosine of the angle by which a line may turn in a stretch
 # Speed, in natural units, by which slips may differ that share a load: round-off leaves 4e-15 of parallel ones.
-_SHARED = 1e-11
+SHARED = 1e-11
 _DIGITS = 1e-14  # relative to the mechanism's size: round-off of a gap that has just opened
 
 
@@ -106,7 +106,7 @@ def guard_value(
         normals: as by :func:`pressing`.
     """
     if guard.contact < 0:
-        return _LEAST_RESPONSE - solved.response if guard.kind == "tear" else _undecided(contacts, solved)
+        return LEAST_RESPONSE - solved.response if guard.kind == "tear" else _undecided(contacts, solved)
     own, touch = solved.mode[guard.contact], solved.touching[guard.contact]
     if guard.kind in {"close", "flat"}:
         return -float(touch.gap) if guard.kind == "close" else FLAT - touch.tilt
@@ -114,7 +114,7 @@ def guard_value(
         began = mode[guard.contact].along
         assert began is not None  # a contact without a line
         assert own.along is not None  # has no such guard
-        return _TURNED - float(np.dot(began, own.along))
+        return TURNED - float(np.dot(began, own.along))
     if guard.kind == "still":
         return _stopping(own, touch)
     if guard.kind == "lift":
@@ -132,7 +132,7 @@ def _undecided(contacts: Sequence[Touchable], solved: SolvedContacts) -> float:
     """
     rubbing = zip(solved.mode, contacts, solved.touching, strict=True)
     speeds = (slip_velocity(each) for own, contact, each in rubbing if own.kind == "slip" and contact.friction)
-    return solved.spread * max(float(np.linalg.norm(speed)) for speed in speeds) - _SHARED
+    return solved.spread * max(float(np.linalg.norm(speed)) for speed in speeds) - SHARED
 
 
 def sharing(splits: Array) -> list[int]:

@@ -5,12 +5,14 @@ Each route adds its own equations and its own decisions on the next mode.
 
 from abc import abstractmethod
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import replace
 from typing import Protocol
 
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
+from proofroll.core.errors import Diverged
 from proofroll.elements.mechanism.contacts.acting import FAINT, OPEN, Acting, ContactMode, changes, slip_velocity
 from proofroll.elements.mechanism.contacts.coulomb import torn
 from proofroll.elements.mechanism.contacts.touching import Touching, lying
@@ -34,11 +36,15 @@ from proofroll.truth.mechanism.contact_guards import (
     sharing,
     striking,
 )
+from proofroll.truth.mechanism.contact_taylor import CompiledMode, CompiledModes, CompiledStretch, ModeSymbols
 from proofroll.truth.mechanism.followed_paths import CLOSE
 from proofroll.truth.mechanism.stretches import Stretches
 
 _AHEAD = 1e-9  # time step, relative to the natural time, after which an effort is compared with its limit
 _CLAMPED = 1e-9  # difference of an effort from its limit, relative to the limit, up to which it starts at the limit
+# Difference of compiled accelerations from others, relative to the largest, up to which they are the same: the
+# direction of a slip of 2e-8 is known to 1e-8.
+_SAME_RATES = 1e-6
 # Integration of a slip to rest: decrease of its logarithm per step, steps at most, and slip speed at the end.
 _DECAY, _MOST_DECAYS, _NOTHING = 0.25, 120, 1e-12
 
@@ -60,11 +66,28 @@ class ContactStretches(Stretches[ContactMode]):
     Implements :class:`proofroll.truth.hybrid.HybridRoute`.
     """
 
+    _after_velocities = 0  # components of a state after the velocities, without the time
+    _by_collocation = False  # integrator of compiled modes: collocation, or Taylor series
+
     def __init__(self, equations: _Equations, length: int, tolerance: float, size: float) -> None:
         """Takes the length of a state without time, the tolerance of each step, the mechanism's size."""
         super().__init__(length + 1, tolerance)
         self._equations, self.contacts, self._size = equations, equations.contacts, size
         self._timed = any(map(varies, equations.mechanism.signals))
+        self._used: dict[str, None] = {}
+        symbols = self._symbols()
+        self._compiled = (
+            None if symbols is None else CompiledModes(symbols, self.contacts, length + 1, self._by_collocation)
+        )
+
+    @property
+    def integrators(self) -> str:
+        """Names of the integrators that this route has used."""
+        return " and ".join(self._used) or "DOP853"
+
+    def _symbols(self) -> ModeSymbols | None:
+        """Equations in symbols; None: the route has none."""
+        return None
 
     @abstractmethod
     def _solved(self, state: Array, mode: ContactMode) -> SolvedContacts:
@@ -118,7 +141,7 @@ class ContactStretches(Stretches[ContactMode]):
         if share is not None and self._guards(state, mode, [guards[share]])[0] > 0:
             return Stretch(time, time, mode, state, state, share)
         start, begun = self._kicked(time, state, mode)
-        stretch = super().walk(begun, start, mode, until)
+        stretch = self._walked(begun, start, mode, until)
         end, last = stretch.end, stretch.last
         if stretch.guard is not None and stretch.guard < len(guards):
             k, kind = guards[stretch.guard]
@@ -126,6 +149,35 @@ class ContactStretches(Stretches[ContactMode]):
                 last = self._spent(last, mode, k)
                 end += float(last[-1] - stretch.last[-1])
         return replace(stretch, start=time, first=state, end=end, last=last)
+
+    def _walked(self, time: float, state: Array, mode: ContactMode, until: float) -> Stretch[ContactMode]:
+        """Stretch by a compiled mode, or by DOP853 where there is none, and near singular poses, where it fails."""
+        compiled = self._by_symbols(state, mode)
+        if compiled is not None:
+            with suppress(Diverged):
+                stretch = compiled.walk(self._law(state, mode), mode, time, state, until)
+                self._used.setdefault("collocation" if self._by_collocation else "Taylor series")
+                return stretch
+        self._used.setdefault("DOP853")
+        return super().walk(time, state, mode, until)
+
+    def _by_symbols(self, state: Array, mode: ContactMode) -> CompiledMode | None:
+        """Compiled mode, if all parts of the mechanism have a rule in symbols and no load is shared."""
+        compiled = None if self._compiled is None else self._compiled.of(mode)
+        if compiled is None:
+            return None
+        solved = self._solved(state, mode)
+        rates = compiled.values(state[None], mode)[2][0]
+        place = len(state) - 1 - len(solved.acceleration) - self._after_velocities
+        apart = np.abs(rates[place : place + len(solved.acceleration)] - solved.acceleration).max()
+        agrees = apart <= _SAME_RATES * max(1.0, float(np.abs(solved.acceleration).max()))
+        return compiled if agrees and not solved.splits.shape[1] else None
+
+    def within(self, stretch: Stretch[ContactMode], times: Array) -> Array:
+        """See the protocol."""
+        if isinstance(stretch, CompiledStretch) and stretch.by is not None:
+            return stretch.by.within(self._law(stretch.first, stretch.mode), stretch, times)
+        return super().within(stretch, times)
 
     def _spent(self, state: Array, mode: ContactMode, k: int) -> Array:
         """State at the end of a slip below FAINT, by a Runge-Kutta method in the logarithm of the slip speed.

@@ -11,6 +11,8 @@ from proofroll.elements.mechanism.rotations import Array
 from proofroll.truth.hybrid import Transition
 from proofroll.truth.mechanism.contact_guards import SLIP_ENDED, SolvedContacts
 from proofroll.truth.mechanism.contact_stretches import ContactStretches
+from proofroll.truth.mechanism.contact_taylor import ModeSymbols
+from proofroll.truth.mechanism.contact_tree_symbols import TreeSymbols
 
 
 class ContactTree(ContactStretches):
@@ -19,9 +21,14 @@ class ContactTree(ContactStretches):
     Implements :class:`proofroll.truth.hybrid.HybridRoute`.
     """
 
+    _by_collocation = True
+
     def __init__(self, dynamics: ContactDynamics, tolerance: float, size: float) -> None:
         self.dynamics = dynamics
         super().__init__(dynamics, dynamics.mechanism.nq + dynamics.mechanism.nv, tolerance, size)
+
+    def _symbols(self) -> ModeSymbols:
+        return TreeSymbols(self.dynamics)
 
     def begin(self) -> Transition[ContactMode]:
         """See the protocol."""

@@ -65,8 +65,8 @@ def _in_units(mechanism: Mechanism, units: Units, times: Array) -> TwoRouteMotio
     switched = [equations.switched(state, mode) for state, mode in zip(states, modes, strict=True)]
     two = on_same_turns(own, one, second.recorded(times, states[:, :-1], switched, wrenches))
     routes = (
-        "joint coordinates, DOP853, contacts by Coulomb's law at all of them at once",
-        "bodies alone, DOP853, contacts by trial of what they can do",
+        f"joint coordinates, {tree.integrators}, contacts by Coulomb's law at all of them at once",
+        f"bodies alone, {bodies.integrators}, contacts by trial of what they can do",
     )
     ended = first_close(paths, CLOSE)
     reason = _shared_load(dynamics, paths[0], ended) if ended == 0 or not paths[0].known else ""

@@ -1,0 +1,159 @@
+"""Gap, normal, point of contact and rates of two shapes, in any scalars: the geometry of contacts as symbols.
+
+It repeats :mod:`proofroll.elements.mechanism.contacts.touching` for symbols, from which right-hand sides are compiled.
+"""
+
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
+
+from proofroll.elements.mechanism.contacts.geometry import BodyContact
+from proofroll.elements.mechanism.contacts.shapes import (
+    Bore,
+    CircleShape,
+    ConvexShape,
+    EllipsoidShape,
+    HalfSpace,
+    SphereShape,
+    Wall,
+)
+from proofroll.elements.mechanism.rotations import Array
+from proofroll.truth.scalars import Scalar, add, cross, dot, minus, plus, scaled, sub, turned, turned_back
+
+Vector = Sequence[Scalar]
+Root = Callable[[Scalar], Scalar]
+
+
+class ScalarMotion(NamedTuple):
+    """Motion of a body: place of its frame, rotation by rows, velocity of the origin, angular velocity; world axes."""
+
+    p: Vector
+    R: Sequence[Vector]
+    v: Vector
+    w: Vector
+
+    def velocity(self, place: Vector) -> list[Scalar]:
+        """Velocity of the body's material at a place in the world [m/s]."""
+        return plus(self.v, cross(self.w, minus(place, self.p)))
+
+
+class ScalarTouch(NamedTuple):
+    """A contact at one instant; see :class:`proofroll.elements.mechanism.contacts.touching.Touching`."""
+
+    gap: Scalar
+    normal: Vector
+    normal_rate: Vector
+    place: Vector
+    place_rate: Vector
+    slide: Vector
+    tilt: Scalar = 1.0
+
+    def across(self, vector: Vector) -> list[Scalar]:
+        """Part of a vector along the surfaces."""
+        return minus(vector, scaled(dot(self.normal, vector), self.normal))
+
+
+def touch_in_scalars(contact: BodyContact, a: ScalarMotion, b: ScalarMotion, root: Root) -> ScalarTouch:
+    """Contact at given motions of its bodies; ``root``: square root for the scalars."""
+    one, two = contact.shape_a, contact.shape_b
+    if isinstance(two, Wall):
+        assert not isinstance(one, Wall)  # two walls are no contact
+        gap, n, n_rate, place, rate = _on_wall(one, a, two, b, root)
+    elif isinstance(one, Wall):
+        gap, n, n_rate, place, rate = _on_wall(two, b, one, a, root)
+        n, n_rate = scaled(-1.0, n), scaled(-1.0, n_rate)
+    else:
+        assert isinstance(one, SphereShape)
+        assert isinstance(two, SphereShape)
+        gap, n, n_rate, place, rate = _two_spheres(one, a, two, b, root)
+    tilt: Scalar = 1.0
+    for disc, of in ((one, a), (two, b)):
+        if isinstance(disc, CircleShape):
+            leaning = cross(turned(of.R, floats(disc.normal)), n)
+            tilt = root(dot(leaning, leaning))
+    return ScalarTouch(gap, n, n_rate, place, rate, minus(a.velocity(place), b.velocity(place)), tilt)
+
+
+def floats(vector: Array) -> list[float]:
+    """Components as plain floats, so that zeros and ones fold."""
+    return [float(x) for x in vector]
+
+
+_Lying = tuple[Scalar, Vector, Vector, Vector, Vector]
+
+
+def _on_wall(shape: ConvexShape, body: ScalarMotion, wall: Wall, other: ScalarMotion, root: Root) -> _Lying:
+    """Gap, normal, its rate, point of contact and its rate of a convex shape on a wall."""
+    if isinstance(wall, HalfSpace):
+        return _on_plane(shape, body, wall, other, root)
+    assert isinstance(shape, SphereShape)  # alone has a rule
+    return _in_bore(shape, body, wall, other, root)
+
+
+def _in_bore(sphere: SphereShape, body: ScalarMotion, bore: Bore, other: ScalarMotion, root: Root) -> _Lying:
+    centre = plus(body.p, turned(body.R, floats(sphere.centre)))
+    foot = plus(other.p, turned(other.R, floats(bore.point)))
+    axis = turned(other.R, floats(bore.axis))
+    axis_rate = cross(other.w, axis)
+    d, d_rate = minus(centre, foot), minus(body.velocity(centre), other.velocity(foot))
+    along = dot(axis, d)
+    out = minus(d, scaled(along, axis))
+    turning = add(dot(axis_rate, d), dot(axis, d_rate))
+    out_rate = minus(minus(d_rate, scaled(along, axis_rate)), scaled(turning, axis))
+    distance = root(dot(out, out))
+    n = scaled(-1.0 / distance, out)
+    n_rate = scaled(-1.0 / distance, minus(out_rate, scaled(dot(n, out_rate), n)))
+    place = minus(centre, scaled(sphere.radius, n))
+    rate = minus(body.velocity(centre), scaled(sphere.radius, n_rate))
+    return sub(bore.radius - sphere.radius, distance), n, n_rate, place, rate
+
+
+def _on_plane(shape: ConvexShape, body: ScalarMotion, plane: HalfSpace, other: ScalarMotion, root: Root) -> _Lying:
+    n = turned(other.R, floats(plane.normal))
+    n_rate = cross(other.w, n)
+    turning = minus(cross(body.w, n), n_rate)  # minus the rate of the direction, as the body's axes turn with it
+    arm, moved = _support(shape, body.R, n, turning, root)
+    place = plus(body.p, arm)
+    rate = plus(plus(body.v, cross(body.w, arm)), moved)
+    gap = dot(n, minus(place, plus(other.p, turned(other.R, floats(plane.point)))))
+    return gap, n, n_rate, place, rate
+
+
+def _support(
+    shape: ConvexShape, R: Sequence[Vector], n: Vector, turning: Vector, root: Root
+) -> tuple[list[Scalar], list[Scalar]]:
+    """Farthest point against n from the body's origin, and its rate over the body where −n turns; world axes."""
+    centre = turned(R, floats(shape.centre))
+    if isinstance(shape, SphereShape):
+        return minus(centre, scaled(shape.radius, n)), scaled(shape.radius, turning)
+    if isinstance(shape, CircleShape):
+        axis = turned(R, floats(shape.normal))
+        beside = plus(scaled(-1.0, n), scaled(dot(n, axis), axis))
+        length = root(dot(beside, beside))
+        e = scaled(1.0 / length, beside)
+        flat = minus(minus(turning, scaled(dot(axis, turning), axis)), scaled(dot(e, turning), e))
+        return plus(centre, scaled(shape.radius, e)), scaled(shape.radius / length, flat)
+    assert isinstance(shape, EllipsoidShape)
+    Q = [floats(row) for row in (shape.frame * shape.axes**2) @ shape.frame.T]
+    d, way = scaled(-1.0, turned_back(R, n)), turned_back(R, turning)
+    along, other = turned(Q, d), turned(Q, way)
+    h = root(dot(d, along))
+    moved = minus(scaled(1.0 / h, other), scaled(dot(along, way) / (h * h * h), along))
+    return plus(centre, turned(R, scaled(1.0 / h, along))), turned(R, moved)
+
+
+def _two_spheres(one: SphereShape, a: ScalarMotion, two: SphereShape, b: ScalarMotion, root: Root) -> _Lying:
+    centre_a = plus(a.p, turned(a.R, floats(one.centre)))
+    centre_b = plus(b.p, turned(b.R, floats(two.centre)))
+    d, d_rate = minus(centre_a, centre_b), minus(a.velocity(centre_a), b.velocity(centre_b))
+    distance = root(dot(d, d))
+    n = scaled(1.0 / distance, d)
+    n_rate = scaled(1.0 / distance, minus(d_rate, scaled(dot(n, d_rate), n)))
+    place = minus(centre_a, scaled(one.radius, n))
+    rate = minus(a.velocity(centre_a), scaled(one.radius, n_rate))
+    return sub(distance, one.radius + two.radius), n, n_rate, place, rate
+
+
+def known_shapes(contact: BodyContact) -> bool:
+    """True if both shapes have a rule here."""
+    rules = SphereShape | EllipsoidShape | CircleShape | HalfSpace | Bore
+    return isinstance(contact.shape_a, rules) and isinstance(contact.shape_b, rules)

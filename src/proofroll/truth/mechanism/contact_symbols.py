@@ -1,0 +1,143 @@
+"""Right-hand side and guards of bodies that touch, of one mode, as symbols: what both routes compile.
+
+A route gives its own kinematics and linear system (:class:`ModeSymbols`); guards follow from its solution.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import NamedTuple
+
+from proofroll.elements.mechanism.contacts.acting import FAINT, ContactMode
+from proofroll.elements.mechanism.contacts.touching import FLAT
+from proofroll.truth.mechanism.contact_guards import (
+    LEAST_RESPONSE,
+    SHARED,
+    TURNED,
+    ContactGuard,
+    Touchable,
+)
+from proofroll.truth.mechanism.contact_scalars import ScalarTouch
+from proofroll.truth.scalars import Scalar, dot, is_zero, minus, mul, scaled, sub
+
+Vector = Sequence[Scalar]
+Row = dict[int, Scalar]
+
+
+class SolvedSymbols(NamedTuple):
+    """Rates and forces of a mode.
+
+    Attributes:
+        rates: of the state without the time.
+        touching: geometry of each contact.
+        lines: present direction of the line of each contact that has one, else None.
+        forces: on body a of each contact, (3,); None: open.
+        response: Painlevé's measure.
+    """
+
+    rates: Sequence[Scalar]
+    touching: Sequence[ScalarTouch]
+    lines: Sequence[Vector | None]
+    forces: Sequence[Vector | None]
+    response: Scalar
+
+
+class HeldRows(NamedTuple):
+    """What a contact holds, and what pushes it: directions of rows and of their forces, (rows, 3) each."""
+
+    directions: Sequence[Vector]
+    along: Sequence[Vector]
+
+
+def held_rows(
+    kind: str, touch: ScalarTouch, line: Vector | None, friction: Scalar, root: Callable[[Scalar], Scalar]
+) -> HeldRows:
+    """Rows of a closed contact; friction of a slip is a load that its normal force brings."""
+    if kind == "stick":
+        if line is None:
+            axes: list[Vector] = [(1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)]
+            return HeldRows(axes, axes)
+        return HeldRows([touch.normal, line], [touch.normal, line])
+    if is_zero(friction):
+        return HeldRows([touch.normal], [touch.normal])
+    if line is None:
+        slip = touch.across(touch.slide)
+        line = scaled(1.0 / root(dot(slip, slip)), slip)
+    return HeldRows([touch.normal], [minus(touch.normal, scaled(friction, line))])
+
+
+def guard_symbols(
+    guards: Sequence[ContactGuard],
+    contacts: Sequence[Touchable],
+    solved: SolvedSymbols,
+    began: Sequence[Vector | None],
+    functions: Mapping[str, Callable[..., Scalar]],
+) -> list[Scalar]:
+    """Values of guards, as by :func:`proofroll.truth.mechanism.contact_guards.guard_value` where no load is shared."""
+
+    def size(vector: Vector) -> Scalar:
+        return functions["sqrt"](dot(vector, vector))
+
+    def value(guard: ContactGuard) -> Scalar:
+        k = guard.contact
+        touch, line, force = solved.touching[k], solved.lines[k], solved.forces[k]
+        if guard.kind == "turn":
+            start = began[k]
+            assert line is not None
+            assert start is not None
+            return sub(TURNED, dot(start, line))
+        if guard.kind == "still":
+            return sub(FAINT, size(touch.across(touch.slide))) if line is None else sub(0.0, dot(line, touch.slide))
+        if guard.kind in {"lift", "break"}:
+            assert force is not None  # the contact is closed
+            normal = dot(touch.normal, force)
+            held = size(touch.across(force)) if guard.kind == "break" else 0.0
+            return sub(held, mul(float(contacts[k].friction) if guard.kind == "break" else 1.0, normal))
+        plain = {
+            "close": sub(0.0, touch.gap),
+            "flat": sub(FLAT, touch.tilt),
+            "tear": sub(LEAST_RESPONSE, solved.response),
+            "share": -SHARED,
+        }
+        return plain[guard.kind]
+
+    return [value(guard) for guard in guards]
+
+
+def slip_symbols(mode: ContactMode, contacts: Sequence[Touchable], touching: Sequence[ScalarTouch]) -> list[Scalar]:
+    """Squared speed of each slip in the plane with friction: smooth, also where the slip stops."""
+    slips = (
+        touch.across(touch.slide)
+        for own, contact, touch in zip(mode, contacts, touching, strict=True)
+        if own.kind == "slip" and own.along is None and contact.friction
+    )
+    return [dot(slip, slip) for slip in slips]
+
+
+def eliminated(rows: list[Row], rights: Sequence[Sequence[Scalar]]) -> tuple[list[list[Scalar]], list[Scalar]]:
+    """Solutions x of A x = b for each right side b, and the pivots of A, sparse, in the given order, without exchanges.
+
+    Args:
+        rows: of A, column -> value.
+        rights: right sides.
+    """
+    rows, sides, count = [dict(row) for row in rows], [list(side) for side in rights], len(rows)
+    for p in range(count):
+        pivot = rows[p][p]
+        for i in range(p + 1, count):
+            value = rows[i].pop(p, 0.0)
+            if is_zero(value):
+                continue
+            factor = value / pivot
+            for j, entry in rows[p].items():
+                if j > p:
+                    rows[i][j] = sub(rows[i].get(j, 0.0), mul(factor, entry))
+            for side in sides:
+                side[i] = sub(side[i], mul(factor, side[p]))
+    for side in sides:
+        for p in reversed(range(count)):
+            for j, entry in rows[p].items():
+                if j > p:
+                    side[p] = sub(side[p], mul(entry, side[j]))
+            side[p] = 0.0 if is_zero(side[p]) else side[p] / rows[p][p]
+    return sides, [rows[p][p] for p in range(count)]

@@ -1,0 +1,235 @@
+"""Stretches of bodies that touch by compiled Taylor series (heyoka, an extra): one integrator and its guards per mode.
+
+A stretch that has no rule in symbols, as where contacts share a load, takes the path without compilation.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+
+from proofroll.core.arrays import FloatArray
+from proofroll.core.errors import Diverged
+from proofroll.core.event_location import locate_rise_within, lowest
+from proofroll.core.stalling import StepCount, StepWatch
+from proofroll.elements.mechanism.contacts.acting import ContactMode
+from proofroll.elements.mechanism.rotations import Array
+from proofroll.truth.hybrid import Stretch, StretchLaw
+from proofroll.truth.mechanism.contact_guards import Touchable, guards_of
+from proofroll.truth.mechanism.contact_symbols import SolvedSymbols, Vector, guard_symbols, slip_symbols
+from proofroll.truth.mechanism.maximal_equations import FUNCTIONS
+from proofroll.truth.picard import Inside, PicardSteps
+from proofroll.truth.scalars import Scalar
+
+try:
+    import heyoka
+except ImportError:  # no wheel for this platform
+    heyoka = None
+
+# Least slip speed over that at the start of a step, below which it stops in the step; and part of the way to the stop
+# after which the next step begins.
+_STOPS, _BEFORE_STOP = 1e-3, 0.9
+_TakeStep = Callable[[float, Array, float], tuple[float, Array, Inside]]
+
+
+class ModeSymbols(Protocol):
+    """Equations of a route in symbols."""
+
+    @property
+    def covers(self) -> bool:
+        """True if all parts of the mechanism have a rule."""
+
+    def solved(
+        self, state: Sequence[Scalar], mode: ContactMode, began: Sequence[Vector | None], functions: Any
+    ) -> SolvedSymbols:
+        """Rates and forces at a state in a mode whose lines began as given."""
+
+
+@dataclass(frozen=True)
+class CompiledStretch(Stretch[ContactMode]):
+    """A stretch that a compiled mode integrated; its states come from the same mode."""
+
+    by: CompiledMode | None = None
+
+
+class _Step(NamedTuple):
+    """A step: start and end [s], first and last state, and states at times within, (times) -> (times, state)."""
+
+    start: float
+    end: float
+    first: Array
+    last: Array
+    inside: Inside
+
+
+class CompiledModes:
+    """Compiled modes of one route; each is compiled when it first occurs."""
+
+    def __init__(self, symbols: ModeSymbols, contacts: Sequence[Touchable], length: int, by_collocation: bool) -> None:
+        self._symbols, self._contacts, self._length = symbols, contacts, length
+        self._by_collocation = by_collocation
+        self._covers = heyoka is not None and symbols.covers
+        self._modes: dict[tuple[tuple[str, bool], ...], CompiledMode] = {}
+
+    def of(self, mode: ContactMode) -> CompiledMode | None:
+        """Compiled mode; None: heyoka is missing, or a part of the mechanism has no rule in symbols."""
+        if not self._covers:
+            return None
+        key = tuple((own.kind, own.along is not None) for own in mode)
+        if key not in self._modes:
+            self._modes[key] = CompiledMode(self._symbols, self._contacts, mode, self._length, self._by_collocation)
+        return self._modes[key]
+
+
+class CompiledMode:
+    """Integrator and guards of a mode, compiled."""
+
+    def __init__(
+        self,
+        symbols: ModeSymbols,
+        contacts: Sequence[Touchable],
+        mode: ContactMode,
+        length: int,
+        by_collocation: bool,
+    ) -> None:
+        state = [heyoka.make_vars(f"s{index}") for index in range(length)]
+        functions = {name: getattr(heyoka, name) for name in FUNCTIONS}
+        lined = [k for k, own in enumerate(mode) if own.along is not None]
+        began: list[Vector | None] = [None] * len(mode)
+        for place, k in enumerate(lined):
+            began[k] = [heyoka.par[3 * place + axis] for axis in range(3)]
+        solved, guards = symbols.solved(state, mode, began, functions), guards_of(contacts, mode)
+        slips = slip_symbols(mode, contacts, solved.touching)
+        values = [*guard_symbols(guards, contacts, solved, began, functions), *slips, *solved.rates, 1.0]
+        expressions = [v if isinstance(v, heyoka.expression) else heyoka.expression(float(v)) for v in values]
+        self._by_collocation = by_collocation
+        self._count, self._slips, self._lined = len(guards), len(slips), lined
+        # Optimised code takes two to ten times as long to compile, which no run earns back.
+        self._values = heyoka.cfunc(expressions, state, compact_mode=True, opt_level=0)
+        if not by_collocation:
+            self._integrator = heyoka.taylor_adaptive(
+                list(zip(state, expressions[len(guards) + len(slips) :], strict=True)),
+                np.zeros(length),
+                compact_mode=True,
+                opt_level=0,
+            )
+
+    def _guards(self, mode: ContactMode, inside: Inside, times: Array) -> Array:
+        guards = self.values(inside(times), mode)[0]
+        if not np.isfinite(guards).all():
+            raise Diverged(f"a guard is not finite near t = {times[0]:.6g} s")
+        return guards
+
+    def _lines(self, mode: ContactMode) -> Array:
+        """Run-time parameters of a mode: directions of the lines at its start."""
+        return np.array([x for k in self._lined for x in mode[k].along or ()])
+
+    def values(self, states: Array, mode: ContactMode) -> tuple[Array, Array, Array]:
+        """Guards, squared slips and rates of states (times, state), each (times, …)."""
+        lines = self._lines(mode)[: self._values.nparams]
+        pars = {"pars": np.repeat(lines[:, None], len(states), axis=1)} if len(lines) else {}
+        found = self._values(np.ascontiguousarray(states.T), **pars).T
+        guards, slips, rates = np.split(found, [self._count, self._count + self._slips], axis=1)
+        return guards, slips, rates
+
+    def walk(self, law: StretchLaw, mode: ContactMode, time: float, state: Array, until: float) -> Stretch[ContactMode]:
+        """Stretch from a time and state to the first rise of a guard, or to ``until`` [s].
+
+        Raises:
+            Diverged: the steps become too small or too many.
+        """
+        if not until > time:
+            return Stretch(time, time, mode, state, state, None)
+        count, watch = StepCount(time, until), StepWatch()
+        visited, grazes = list[tuple[float, Array]](), list[float]()
+        last = state
+        for step in self._steps(mode, time, state, until):
+            visited.append((step.start, step.first))
+            count.took(step.end)
+            watch.took(step.end, step.end - step.start, landing=step.end == until)
+            guards = partial(self._guards, mode, step.inside)
+            noise = law.noise, step.start == time, law.near
+            rise = locate_rise_within(guards, step.start, step.end, *noise, grazes)
+            if rise is not None:
+                last = law.corrected(step.inside(np.array([rise[0]]))[0])
+                return CompiledStretch(time, rise[0], mode, state, last, rise[1], visited, grazes, self)
+            last = step.last
+        last = law.corrected(last)
+        return CompiledStretch(time, until, mode, state, last, None, visited, grazes, self)
+
+    def _steps(self, mode: ContactMode, time: float, state: Array, until: float) -> Iterator[_Step]:
+        """Steps of the integrator; one that a slip would stop in ends before.
+
+        Raises:
+            Diverged: a step fails.
+        """
+        step = self._collocation(mode) if self._by_collocation else self._series(mode)
+        while time < until:
+            end, last, inside = step(time, state, until)
+            if self._slips and (stop := self._stop(mode, inside, time, end)) is not None:
+                end = time + _BEFORE_STOP * (stop - time)
+                last = inside(np.array([end]))[0]
+            yield _Step(time, end, state, last, inside)
+            time, state = end, last
+
+    def _collocation(self, mode: ContactMode) -> _TakeStep:
+        return PicardSteps(lambda states: self.values(states, mode)[2]).step
+
+    def _series(self, mode: ContactMode) -> _TakeStep:
+        integrator = self._integrator
+        powers = np.arange(integrator.order + 1)[:, None]
+        if len(integrator.pars):
+            integrator.pars[:] = self._lines(mode)[: len(integrator.pars)]
+
+        def step(time: float, state: Array, until: float) -> tuple[float, Array, Inside]:
+            integrator.state[:], integrator.time = state, time
+            integrator.step(max_delta_t=until - time, write_tc=True)
+            end = float(integrator.time)
+            if not np.isfinite(integrator.state).all() or not end > time:
+                raise Diverged(f"Taylor series stop at t = {time:.6g} s")
+            series = np.array(integrator.tc)
+
+            def inside(times: Array) -> Array:
+                return np.asarray((series @ (times - time) ** powers).T)
+
+            return until if until - end < np.spacing(until) else end, np.array(integrator.state), inside
+
+        return step
+
+    def _stop(self, mode: ContactMode, inside: Callable[[Array], Array], start: float, end: float) -> float | None:
+        """Time within a step at which a slip in the plane stops [s], beyond which its series mean another friction.
+
+        A slip that stops nearly straight reverses in its series, without any sign of it but its speed.
+        """
+
+        def slips(times: Array) -> Array:
+            return self.values(inside(times), mode)[1]
+
+        first, stops = slips(np.array([start]))[0], list[float]()
+        for number in range(self._slips):
+
+            def speed(times: Array, number: int = number) -> Array:
+                return np.asarray(slips(times)[:, number] / first[number])
+
+            if (stop := lowest(speed, start, end)) is not None and speed(np.array([stop]))[0] < _STOPS**2:
+                stops.append(stop)
+        return min(stops, default=None)
+
+    def within(self, law: StretchLaw, stretch: Stretch[ContactMode], times: FloatArray) -> FloatArray:
+        """States at increasing times [s] within a stretch that this mode integrated, shape (times, state)."""
+        begun, first = stretch.visited[0]
+        states = np.empty((len(times), len(first)))
+        early = times <= begun
+        states[early] = first + (times[early] - begun)[:, None] * self.values(first[None], stretch.mode)[2]
+        at = int(early.sum())
+        if at < len(times):
+            for step in self._steps(stretch.mode, begun, first, float(times[-1])):
+                stop = int(np.searchsorted(times, step.end, side="right"))
+                if stop > at:
+                    states[at:stop] = step.inside(times[at:stop])
+                    at = stop
+        return np.array([law.corrected(state) for state in states])

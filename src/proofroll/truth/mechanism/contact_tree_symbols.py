@@ -1,0 +1,310 @@
+"""Route 1 of bodies that touch as symbols: joint coordinates, contact forces from their responses alone.
+
+Velocities of bodies are in their own axes, where those of a free body are the coordinates' rates themselves.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from proofroll.elements.mechanism.contacts.acting import ContactMode
+from proofroll.elements.mechanism.contacts.dynamics import ContactDynamics
+from proofroll.elements.mechanism.contacts.geometry import BodyContact
+from proofroll.elements.mechanism.joint import AXES
+from proofroll.elements.mechanism.model import Mechanism
+from proofroll.elements.mechanism.signal import varies
+from proofroll.truth.mechanism.contact_scalars import ScalarMotion, ScalarTouch, floats, known_shapes, touch_in_scalars
+from proofroll.truth.mechanism.contact_symbols import Row, SolvedSymbols, Vector, eliminated, held_rows
+from proofroll.truth.mechanism.maximal_bodies import clean
+from proofroll.truth.scalars import (
+    Scalar,
+    add,
+    cross,
+    dot,
+    is_zero,
+    minus,
+    mul,
+    plus,
+    product,
+    scaled,
+    sub,
+    turned,
+    turned_back,
+)
+
+_NONE = (0.0, 0.0, 0.0)
+_AXES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+_Matrix = Sequence[Vector]
+
+
+@dataclass
+class _Moving:
+    """A body: place of its frame and rotation in the world; the rest in its own axes, of its frame's origin.
+
+    Attributes:
+        p, R: place and rotation by rows.
+        v, w: velocity and angular velocity.
+        a, turning: their rates where v̇ = 0, without gravity.
+        move, turn: derivative of velocity and angular velocity by each velocity of the tree that moves the body.
+    """
+
+    p: Vector
+    R: _Matrix
+    v: Vector
+    w: Vector
+    a: Vector
+    turning: Vector
+    move: dict[int, Vector]
+    turn: dict[int, Vector]
+
+    def at(self, arm: Vector) -> tuple[dict[int, Vector], Vector]:
+        """Derivative of the velocity, and acceleration at v̇ = 0, of the material at an arm, in the body's axes."""
+        move: dict[int, Vector] = {
+            n: plus(self.move.get(n, _NONE), cross(self.turn.get(n, _NONE), arm)) for n in self.move | self.turn
+        }
+        return move, plus(self.a, cross(self.turning, arm), cross(self.w, cross(self.w, arm)))
+
+
+class TreeSymbols:
+    """Equations of one mechanism in the coordinates of its tree, in symbols, for any mode.
+
+    Implements :class:`proofroll.truth.mechanism.contact_taylor.ModeSymbols`.
+    """
+
+    def __init__(self, dynamics: ContactDynamics) -> None:
+        self._dynamics, self._mechanism = dynamics, dynamics.mechanism
+        index = self._mechanism.body_index
+        self._pairs = [(index[each.body_a], index[each.body_b]) for each in self._mechanism.contacts]
+
+    @property
+    def covers(self) -> bool:
+        """True if all parts of the mechanism have a rule here."""
+        m = self._mechanism
+        shapes = all(isinstance(each, BodyContact) and known_shapes(each) for each in self._dynamics.contacts)
+        return shapes and not (m.loops or m.springs or m.couplings or m.actuators or any(map(varies, m.signals)))
+
+    def solved(
+        self, state: Sequence[Scalar], mode: ContactMode, began: Sequence[Vector | None], functions: Any
+    ) -> SolvedSymbols:
+        """Rates and forces for a state that ends with the time; ``began``: line of each contact at the start."""
+        m = self._mechanism
+        q, v = state[: m.nq], state[m.nq : -1]
+        bodies, rates = _tree(m, q, v, functions)
+        mass, load = self._inertial(bodies, q, v)
+        motions = [ScalarMotion(body.p, body.R, turned(body.R, body.v), turned(body.R, body.w)) for body in bodies]
+        touching = [
+            touch_in_scalars(contact, motions[a], motions[b], functions["sqrt"])
+            for contact, (a, b) in zip(m.contacts, self._pairs, strict=True)
+        ]
+        slides = [
+            _slide(touch, [(bodies[a], motions[a], 1.0), (bodies[b], motions[b], -1.0)])
+            for touch, (a, b) in zip(touching, self._pairs, strict=True)
+        ]
+        lines: list[Vector | None] = [None] * len(mode)
+        # Responses by one elimination of the mass matrix: the load, then what pushes in each row, and in each line.
+        rights: list[list[Scalar]] = [load]
+        rows: list[Row] = []
+        aims: list[Scalar] = []
+        for k, start in enumerate(began):
+            if start is not None:
+                rights.append(_dense(_along(slides[k][0], touching[k].across(start)), m.nv))
+        answers, _ = eliminated(mass, rights)
+        free, ways = answers[0], iter(answers[1:])
+        for k, start in enumerate(began):
+            if start is not None:
+                answer = next(ways)
+                moved = [add(*(mul(value[axis], answer[n]) for n, value in slides[k][0].items())) for axis in range(3)]
+                way = touching[k].across(moved)
+                lines[k] = scaled(1.0 / functions["sqrt"](dot(way, way)), way)
+        pushes: list[Row] = []
+        owner: list[tuple[int, Vector]] = []
+        for k, (own, touch, line) in enumerate(zip(mode, touching, lines, strict=True)):
+            if own.kind == "open":
+                continue
+            part = held_rows(own.kind, touch, line, float(self._dynamics.friction[k]), functions["sqrt"])
+            turning = dot(touch.normal_rate, touch.slide) if own.kind == "slip" else 0.0
+            for direction, along in zip(part.directions, part.along, strict=True):
+                rows.append(_along(slides[k][0], direction))
+                pushes.append(_along(slides[k][0], along))
+                aims.append(sub(sub(0.0, dot(direction, slides[k][1])), turning))
+                owner.append((k, along))
+        responses, _ = eliminated(mass, [_dense(push, m.nv) for push in pushes])
+        acting = [_applied(rows, response) for response in responses]
+        system: list[Row] = [{j: each[i] for j, each in enumerate(acting)} for i in range(len(rows))]
+        right = [sub(aim, value) for aim, value in zip(aims, _applied(rows, free), strict=True)]
+        (sizes,), pivots = eliminated(system, [right])
+        response: Scalar = 1.0
+        if any(own.kind == "slip" and mu for own, mu in zip(mode, self._dynamics.friction, strict=True)):
+            plain, _ = eliminated(mass, [_dense(row, m.nv) for row in rows])
+            smooth = [_applied(rows, each) for each in plain]
+            _, others = eliminated([{j: each[i] for j, each in enumerate(smooth)} for i in range(len(rows))], [])
+            for one, other in zip(pivots, others, strict=True):
+                response = mul(response, one / other)
+        forces: list[Vector | None] = [None if own.kind == "open" else [0.0, 0.0, 0.0] for own in mode]
+        moved = list(free)
+        for (k, along), size, each in zip(owner, sizes, responses, strict=True):
+            force = forces[k]
+            assert force is not None  # its owner is closed
+            forces[k] = plus(force, scaled(size, along))
+            moved = plus(moved, scaled(size, each))
+        return SolvedSymbols([*rates, *moved], touching, lines, forces, response)
+
+    def _inertial(
+        self, bodies: Sequence[_Moving], q: Sequence[Scalar], v: Sequence[Scalar]
+    ) -> tuple[list[Row], list[Scalar]]:
+        """Mass matrix and loads along the velocities."""
+        m = self._mechanism
+        mass: list[Row] = [{} for _ in range(m.nv)]
+        load: list[Scalar] = [0.0] * m.nv
+        gravity = floats(m.gravity)  # type: ignore[arg-type]
+        for data, body in zip(m.bodies, bodies, strict=False):
+            inertia = [floats(row) for row in data.inertia]  # type: ignore[arg-type]
+            move, a = body.at(floats(data.com))  # type: ignore[arg-type]
+            pull = scaled(float(data.mass), minus(turned_back(body.R, gravity), a))
+            spin = turned(inertia, body.w)
+            moment = scaled(-1.0, plus(turned(inertia, body.turning), cross(body.w, spin)))
+            for i, way in move.items():
+                turn = body.turn.get(i, _NONE)
+                load[i] = add(load[i], dot(way, pull), dot(turn, moment))
+                carried, turned_by = scaled(float(data.mass), way), turned(inertia, turn)
+                for j, other in move.items():
+                    value = add(dot(carried, other), dot(turned_by, body.turn.get(j, _NONE)))
+                    if not is_zero(value):
+                        mass[i][j] = add(mass[i].get(j, 0.0), value)
+        for joint, at_q, at_v in zip(m.joints, m.q_slices, m.v_slices, strict=True):
+            for place, n in enumerate(range(at_v.start, at_v.stop)):
+                mass[n][n] = add(mass[n].get(n, 0.0), float(joint.armature or 0.0))
+                load[n] = sub(load[n], mul(float(joint.damping or 0.0), v[n]))
+                if joint.stiffness:
+                    load[n] = sub(load[n], mul(float(joint.stiffness), sub(q[at_q.start + place], float(joint.rest))))
+                load[n] = add(load[n], float(joint.constant_drive))
+        return mass, load
+
+
+def _tree(m: Mechanism, q: Sequence[Scalar], v: Sequence[Scalar], functions: Any) -> tuple[list[_Moving], list[Scalar]]:
+    """Bodies, the world last, and rates of the coordinates."""
+    ground = _Moving(_NONE, _AXES, _NONE, _NONE, _NONE, _NONE, {}, {})
+    bodies: list[_Moving] = [ground] * (len(m.bodies) + 1)
+    rates: list[Scalar] = []
+    index = m.body_index
+    for joint, at_q, at_v in zip(m.joints, m.q_slices, m.v_slices, strict=True):
+        parent, own = bodies[index[joint.parent]], q[at_q]
+        d, S = _pose(joint.kind, own, functions)
+        frame = [clean(row) for row in joint.parent_frame]
+        back = [clean(row) for row in joint.child_frame.T]
+        across = product(product(frame, S), back)  # child's axes in the parent's, by rows
+        to_joint = plus(clean(joint.position), turned(frame, d))
+        from_joint = scaled(-1.0, clean(joint.child_position))
+        in_child = {True: [clean(column) for column in joint.child_frame.T]}  # axes of B, then of A, in the child's
+        in_child[False] = [turned_back(back, turned_back(S, axis)) for axis in _AXES]
+        before, a = parent.at(to_joint)
+        w_parent, turning = turned_back(across, parent.w), turned_back(across, parent.turning)
+        move: dict[int, Vector] = {n: turned_back(across, way) for n, way in before.items()}
+        turn: dict[int, Vector] = {n: turned_back(across, way) for n, way in parent.turn.items()}
+        a = turned_back(across, a)
+        velocity = turned_back(across, plus(parent.v, cross(parent.w, to_joint)))
+        w, slide = list(w_parent), [0.0, 0.0, 0.0]
+        axes = []
+        for n, (of_child, axis, turns, by_child) in enumerate(AXES[joint.kind], at_v.start):
+            way = in_child[of_child][axis]
+            axes.append((n, way, turns, by_child))
+            if turns:
+                turn[n] = way
+                w = plus(w, scaled(v[n], way))
+            else:
+                move[n] = way
+                slide = plus(slide, scaled(v[n], way))
+        a = plus(a, cross(w_parent, slide))
+        for n, way, turns, by_child in axes:
+            carried = scaled(v[n], cross(w if by_child else w_parent, way))
+            if turns:
+                turning = plus(turning, carried)
+            else:
+                a = plus(a, carried)
+        velocity = plus(velocity, slide)
+        place = plus(parent.p, turned(parent.R, to_joint))
+        R = product(parent.R, across)
+        at_joint = _Moving(place, R, velocity, w, a, turning, move, turn)
+        moved, a_origin = at_joint.at(from_joint)
+        bodies[index[joint.child]] = _Moving(
+            plus(place, turned(R, from_joint)),
+            R,
+            plus(velocity, cross(w, from_joint)),
+            w,
+            a_origin,
+            turning,
+            moved,
+            turn,
+        )
+        rates += _coordinate_rates(joint.kind, own, v[at_v], S)
+    return bodies, rates
+
+
+def _pose(kind: str, q: Sequence[Scalar], functions: Any) -> tuple[Vector, _Matrix]:
+    """Pose of frame B in frame A: origin, and rotation by rows."""
+    if kind == "revolute":
+        return _NONE, _about_z(q[0], functions)
+    if kind == "prismatic":
+        return (0.0, 0.0, q[0]), _AXES
+    if kind == "universal":
+        c, s = functions["cos"](q[1]), functions["sin"](q[1])
+        return _NONE, product(_about_z(q[0], functions), ((1.0, 0.0, 0.0), (0.0, c, -s), (0.0, s, c)))
+    if kind == "planar":
+        return (q[0], q[1], 0.0), _about_z(q[2], functions)
+    if kind == "fixed":
+        return _NONE, _AXES
+    a, b, c, d = q[-4:]
+    R = (
+        (1.0 - 2.0 * (c * c + d * d), 2.0 * (b * c - a * d), 2.0 * (b * d + a * c)),
+        (2.0 * (b * c + a * d), 1.0 - 2.0 * (b * b + d * d), 2.0 * (c * d - a * b)),
+        (2.0 * (b * d - a * c), 2.0 * (c * d + a * b), 1.0 - 2.0 * (b * b + c * c)),
+    )
+    return (q[:3] if kind == "free" else _NONE), R
+
+
+def _about_z(angle: Scalar, functions: Any) -> _Matrix:
+    c, s = functions["cos"](angle), functions["sin"](angle)
+    return (c, -s, 0.0), (s, c, 0.0), (0.0, 0.0, 1.0)
+
+
+def _coordinate_rates(kind: str, q: Sequence[Scalar], v: Sequence[Scalar], S: _Matrix) -> list[Scalar]:
+    if kind not in {"spherical", "free"}:
+        return list(v)
+    (a, b, c, d), (x, y, z) = q[-4:], v[-3:]
+    turning = [
+        -0.5 * (b * x + c * y + d * z),
+        0.5 * (a * x + c * z - d * y),
+        0.5 * (a * y + d * x - b * z),
+        0.5 * (a * z + b * y - c * x),
+    ]
+    return [*turned(S, v[:3]), *turning] if kind == "free" else turning
+
+
+def _slide(touch: ScalarTouch, pair: Sequence[tuple[_Moving, ScalarMotion, float]]) -> tuple[dict[int, Vector], Vector]:
+    """Derivative of a contact's slide by the velocities, and its rate at v̇ = 0, in world axes."""
+    J: dict[int, Vector] = {}
+    rate: Vector = _NONE
+    for body, motion, sign in pair:
+        arm = minus(touch.place, motion.p)
+        move, _ = body.at(turned_back(body.R, arm))
+        for n, way in move.items():
+            J[n] = plus(J.get(n, _NONE), scaled(sign, turned(body.R, way)))
+        turning = plus(turned(body.R, body.a), cross(turned(body.R, body.turning), arm))
+        drift = cross(motion.w, minus(touch.place_rate, motion.v))
+        rate = plus(rate, scaled(sign, plus(turning, drift)))
+    return J, rate
+
+
+def _along(J: dict[int, Vector], direction: Vector) -> Row:
+    values = {n: dot(way, direction) for n, way in J.items()}
+    return {n: value for n, value in values.items() if not is_zero(value)}
+
+
+def _dense(row: Row, count: int) -> list[Scalar]:
+    return [row.get(n, 0.0) for n in range(count)]
+
+
+def _applied(rows: Sequence[Row], vector: Sequence[Scalar]) -> list[Scalar]:
+    return [add(*(mul(value, vector[n]) for n, value in row.items())) for row in rows]

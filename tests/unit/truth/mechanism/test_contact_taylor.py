@@ -1,0 +1,64 @@
+"""Compiled modes of bodies that touch: their equations against those without compilation, and what falls back."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from proofroll.elements.mechanism.contacts.dynamics import ContactDynamics
+from proofroll.files.scene_file import load_scene
+from proofroll.truth.mechanism import contact_taylor
+from proofroll.truth.mechanism.contact_bodies import ContactBodies
+from proofroll.truth.mechanism.contact_equations import ContactEquations
+from proofroll.truth.mechanism.contact_guards import guards_of
+from proofroll.truth.mechanism.contact_stretches import ContactStretches
+from proofroll.truth.mechanism.contact_tree import ContactTree
+from proofroll.truth.mechanism.maximal_coordinates import MaximalCoordinates
+from proofroll.truth.mechanism.natural_units import natural_units
+from proofroll.truth.mechanism.switched_truth import truth_of
+
+SCENES = ("sled", "eccentric_sphere", "falling_rod", "rattleback", "tilted_disc", "free_turntable", "ladder",
+          "two_spheres", "rocking_block", "sled_on_slope")  # fmt: skip
+
+
+def routes(scene: str) -> list[ContactStretches]:
+    """Both routes of a scene, in natural units."""
+    si = load_scene(scene).elements[0].mechanism  # type: ignore[attr-defined]
+    own = natural_units(si).mechanism(si)
+    second = MaximalCoordinates(own)
+    return [
+        ContactTree(ContactDynamics(own), 1e-14, 1.0),
+        ContactBodies(ContactEquations(own, second.lean), 1e-14, 1.0),
+    ]
+
+
+@pytest.mark.parametrize("scene", SCENES)
+def test_compiled_equations_are_those_of_the_route(scene: str) -> None:
+    """Shortly after the start, rates and guards of each route's compiled mode are those that it solves for."""
+    pytest.importorskip("heyoka")
+    for route in routes(scene):
+        begun = route.begin()
+        assert begun.mode is not None
+        compiled = route._by_symbols(begun.state, begun.mode)
+        assert compiled is not None
+        law, guards = route._law(begun.state, begun.mode), guards_of(route.contacts, begun.mode)
+        state = law.corrected(begun.state + 0.01 * law.rates(begun.state))
+        values, _, rates = compiled.values(state[None], begun.mode)
+        assert values[0] == pytest.approx(route._guards(state, begun.mode, guards), abs=1e-12)
+        assert rates[0] == pytest.approx(law.rates(state), abs=1e-12)
+
+
+def test_a_falling_rod_slips_when_it_does_without_compilation(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A rod slips at the same time and place either way, and each route names the integrator that it used."""
+    pytest.importorskip("heyoka")
+    mechanism = load_scene("falling_rod").elements[0].mechanism  # type: ignore[attr-defined]
+    compiled = truth_of(mechanism, np.array([0.0, 0.3, 0.6]))
+    assert [route.split(", ")[1] for route in compiled.routes] == ["collocation", "Taylor series"]
+    monkeypatch.setattr(contact_taylor, "heyoka", None)
+    plain = truth_of(mechanism, np.array([0.0, 0.3, 0.6]))
+    assert [route.split(", ")[1] for route in plain.routes] == ["DOP853", "DOP853"]
+    (one,), (two,) = compiled.events, plain.events
+    assert (one.kind, one.name) == (two.kind, two.name) == ("slip", "contact")
+    assert one.time_low <= two.time_high
+    assert two.time_low <= one.time_high
+    assert compiled.record.p_WB == pytest.approx(plain.record.p_WB, abs=1e-12)
