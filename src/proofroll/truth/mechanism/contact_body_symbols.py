@@ -10,7 +10,7 @@ from proofroll.elements.mechanism.contacts.geometry import BodyContact
 from proofroll.truth.mechanism.contact_equations import ContactEquations
 from proofroll.truth.mechanism.contact_scalars import ScalarMotion, ScalarTouch, floats, known_shapes, touch_in_scalars
 from proofroll.truth.mechanism.contact_symbols import Row, SolvedSymbols, Vector, eliminated, held_rows
-from proofroll.truth.mechanism.maximal_bodies import BodyInScalars
+from proofroll.truth.mechanism.maximal_bodies import AXES, BodyInScalars
 from proofroll.truth.mechanism.maximal_equations import ConstrainedEquations
 from proofroll.truth.scalars import Scalar, add, cross, dot, is_zero, minus, mul, plus, scaled, sub, turned
 
@@ -72,7 +72,11 @@ class BodySymbols:
             force = forces[k]
             assert force is not None  # its owner is closed
             forces[k] = plus(force, scaled(size, along))
-        return SolvedSymbols([*now.rate, *answer[: e.nu], *now.angle_rate], touching, lines, forces, response)
+        moved = [
+            plus(self._moved(k, touch, answer, now.views), self._bias(k, touch, now.views))
+            for k, touch in enumerate(touching)
+        ]
+        return SolvedSymbols([*now.rate, *answer[: e.nu], *now.angle_rate], touching, lines, forces, response, moved)
 
     def _touching(self, views: Sequence[BodyInScalars], functions: Any) -> list[ScalarTouch]:
         bodies = []
@@ -94,6 +98,11 @@ class BodySymbols:
                 row[at] = add(row.get(at, 0.0), entry)
         return {at: entry for at, entry in row.items() if not is_zero(entry)}
 
+    def _moved(self, k: int, touch: ScalarTouch, u: Sequence[Scalar], views: Sequence[BodyInScalars]) -> list[Scalar]:
+        """Slide of a contact by velocities u, or its rate by accelerations."""
+        rows = [self._row(k, touch, axis, views) for axis in AXES]
+        return [add(*(mul(value, u[at]) for at, value in row.items())) for row in rows]
+
     def _bias(self, k: int, touch: ScalarTouch, views: Sequence[BodyInScalars]) -> Vector:
         """Rate of a contact's slide while the velocities stay."""
         a, b = (views[body] for body in self._equations.pairs[k])
@@ -113,12 +122,7 @@ class BodySymbols:
         right = [push.get(at, 0.0) for at in range(self._bodies.nu)] + [0.0] * len(held)
         joints = [row for row, _ in held]
         (answer,), _ = self._eliminated(joints, joints, [right])
-        axes = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
-        slide = []
-        for axis in axes:
-            row = self._row(k, touch, axis, now.views)
-            slide.append(add(*(mul(value, answer[at]) for at, value in row.items())))
-        way = touch.across(slide)
+        way = touch.across(self._moved(k, touch, answer, now.views))
         return scaled(1.0 / functions["sqrt"](dot(way, way)), way)
 
     def _eliminated(

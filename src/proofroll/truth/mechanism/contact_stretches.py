@@ -117,7 +117,9 @@ class ContactStretches(Stretches[ContactMode]):
     def _law(self, state: Array, mode: ContactMode) -> StretchLaw:
         guards, equations = guards_of(self.contacts, mode), self._equations
         # sign of the guard of an effort: it reaches its limit, or comes back from it
-        side = np.where(equations.excess(state + _AHEAD * equations.rate(state, mode)) > 0, 1.0, -1.0)
+        side = np.zeros(0)
+        if len(equations.excess(state)):
+            side = np.where(equations.excess(state + _AHEAD * equations.rate(state, mode)) > 0, 1.0, -1.0)
         noise = np.where(np.abs(excess := equations.excess(state)) < _CLAMPED, 2 * np.abs(excess), 0.0)
         return StretchLaw(
             lambda y: equations.rate(y, mode),
@@ -146,7 +148,7 @@ class ContactStretches(Stretches[ContactMode]):
         if stretch.guard is not None and stretch.guard < len(guards):
             k, kind = guards[stretch.guard]
             if kind == "still":
-                last = self._spent(last, mode, k)
+                last = self._spent(last, mode, k, stretch)
                 end += float(last[-1] - stretch.last[-1])
         return replace(stretch, start=time, first=state, end=end, last=last)
 
@@ -179,28 +181,32 @@ class ContactStretches(Stretches[ContactMode]):
             return stretch.by.within(self._law(stretch.first, stretch.mode), stretch, times)
         return super().within(stretch, times)
 
-    def _spent(self, state: Array, mode: ContactMode, k: int) -> Array:
+    def _spent(self, state: Array, mode: ContactMode, k: int, stretch: Stretch[ContactMode]) -> Array:
         """State at the end of a slip below FAINT, by a Runge-Kutta method in the logarithm of the slip speed.
 
         The slower a slip, the faster it turns: its equations are stiff in time, and smooth in that logarithm.
         """
         if mode[k].along is not None:
             return state
+        compiled = stretch.by if isinstance(stretch, CompiledStretch) else None
 
-        def decay(y: Array) -> Array:
-            """Change of the state until the slip would stop at its present rate."""
+        def decay(y: Array) -> tuple[float, Array]:
+            """Slip speed, and change of the state until the slip would stop at its present rate."""
+            if compiled is not None:
+                return compiled.decay(y, mode, k)
             touching = self._touching(y)
             now = tuple(_headed(own, each) for own, each in zip(mode, touching, strict=True))
-            return faint_time(touching[k], self._solved(y, now).slide_rate[k]) * self._equations.rate(y, now)
+            change = faint_time(touching[k], self._solved(y, now).slide_rate[k]) * self._equations.rate(y, now)
+            return float(np.linalg.norm(slip_velocity(touching[k]))), change
 
         for _ in range(_MOST_DECAYS):
-            if np.linalg.norm(slip_velocity(self._touching(state)[k])) < _NOTHING:
+            speed, one = decay(state)
+            if speed < _NOTHING:
                 break
-            one = decay(state)
-            two = decay(state + _DECAY / 2 * one)
-            three = decay(state + _DECAY / 2 * two)
-            state = state + _DECAY / 6 * (one + 2 * two + 2 * three + decay(state + _DECAY * three))
-        return np.asarray(state + decay(state))
+            two = decay(state + _DECAY / 2 * one)[1]
+            three = decay(state + _DECAY / 2 * two)[1]
+            state = state + _DECAY / 6 * (one + 2 * two + 2 * three + decay(state + _DECAY * three)[1])
+        return np.asarray(state + decay(state)[1])
 
     def _kicked(self, time: float, state: Array, mode: ContactMode) -> tuple[Array, float]:
         """State and time shortly after a slip in the plane starts from rest, when it has a direction."""

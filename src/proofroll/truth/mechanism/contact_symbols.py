@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
-from proofroll.elements.mechanism.contacts.acting import FAINT, ContactMode
+from proofroll.elements.mechanism.contacts.acting import FAINT, Acting, ContactMode
 from proofroll.elements.mechanism.contacts.touching import FLAT
 from proofroll.truth.mechanism.contact_guards import (
     LEAST_RESPONSE,
@@ -33,6 +33,7 @@ class SolvedSymbols(NamedTuple):
         lines: present direction of the line of each contact that has one, else None.
         forces: on body a of each contact, (3,); None: open.
         response: Painlevé's measure.
+        slide_rates: rate of each sliding velocity, (3,).
     """
 
     rates: Sequence[Scalar]
@@ -40,6 +41,7 @@ class SolvedSymbols(NamedTuple):
     lines: Sequence[Vector | None]
     forces: Sequence[Vector | None]
     response: Scalar
+    slide_rates: Sequence[Vector]
 
 
 class HeldRows(NamedTuple):
@@ -104,14 +106,19 @@ def guard_symbols(
     return [value(guard) for guard in guards]
 
 
-def slip_symbols(mode: ContactMode, contacts: Sequence[Touchable], touching: Sequence[ScalarTouch]) -> list[Scalar]:
-    """Squared speed of each slip in the plane with friction: smooth, also where the slip stops."""
-    slips = (
-        touch.across(touch.slide)
-        for own, contact, touch in zip(mode, contacts, touching, strict=True)
-        if own.kind == "slip" and own.along is None and contact.friction
-    )
-    return [dot(slip, slip) for slip in slips]
+def slip_symbols(mode: ContactMode, contacts: Sequence[Touchable], solved: SolvedSymbols) -> list[Scalar]:
+    """Of each slip u in the plane with friction: u², u·u̇ and u̇²; u² is smooth, also where the slip stops."""
+    found: list[Scalar] = []
+    for own, contact, touch, rate in zip(mode, contacts, solved.touching, solved.slide_rates, strict=True):
+        if turning_slip(own, contact):
+            slip = touch.across(touch.slide)
+            found += [dot(slip, slip), dot(slip, rate), dot(rate, rate)]
+    return found
+
+
+def turning_slip(own: Acting, contact: Touchable) -> bool:
+    """True for a slip in the plane with friction, whose direction may turn."""
+    return bool(own.kind == "slip" and own.along is None and contact.friction)
 
 
 def eliminated(rows: list[Row], rights: Sequence[Sequence[Scalar]]) -> tuple[list[list[Scalar]], list[Scalar]]:

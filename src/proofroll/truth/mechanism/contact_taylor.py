@@ -20,7 +20,7 @@ from proofroll.elements.mechanism.contacts.acting import ContactMode
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.truth.hybrid import Stretch, StretchLaw
 from proofroll.truth.mechanism.contact_guards import Touchable, guards_of
-from proofroll.truth.mechanism.contact_symbols import SolvedSymbols, Vector, guard_symbols, slip_symbols
+from proofroll.truth.mechanism.contact_symbols import SolvedSymbols, Vector, guard_symbols, slip_symbols, turning_slip
 from proofroll.truth.mechanism.maximal_equations import FUNCTIONS
 from proofroll.truth.picard import Inside, PicardSteps
 from proofroll.truth.scalars import Scalar
@@ -103,10 +103,11 @@ class CompiledMode:
         for place, k in enumerate(lined):
             began[k] = [heyoka.par[3 * place + axis] for axis in range(3)]
         solved, guards = symbols.solved(state, mode, began, functions), guards_of(contacts, mode)
-        slips = slip_symbols(mode, contacts, solved.touching)
+        slips = slip_symbols(mode, contacts, solved)
         values = [*guard_symbols(guards, contacts, solved, began, functions), *slips, *solved.rates, 1.0]
         expressions = [v if isinstance(v, heyoka.expression) else heyoka.expression(float(v)) for v in values]
         self._by_collocation = by_collocation
+        self._turning = [k for k, pair in enumerate(zip(mode, contacts, strict=True)) if turning_slip(*pair)]
         self._count, self._slips, self._lined = len(guards), len(slips), lined
         # Optimised code takes two to ten times as long to compile, which no run earns back.
         self._values = heyoka.cfunc(expressions, state, compact_mode=True, opt_level=0)
@@ -129,7 +130,7 @@ class CompiledMode:
         return np.array([x for k in self._lined for x in mode[k].along or ()])
 
     def values(self, states: Array, mode: ContactMode) -> tuple[Array, Array, Array]:
-        """Guards, squared slips and rates of states (times, state), each (times, …)."""
+        """Guards, numbers of slips and rates of states (times, state), each (times, …)."""
         lines = self._lines(mode)[: self._values.nparams]
         pars = {"pars": np.repeat(lines[:, None], len(states), axis=1)} if len(lines) else {}
         found = self._values(np.ascontiguousarray(states.T), **pars).T
@@ -210,7 +211,7 @@ class CompiledMode:
             return self.values(inside(times), mode)[1]
 
         first, stops = slips(np.array([start]))[0], list[float]()
-        for number in range(self._slips):
+        for number in range(0, self._slips, 3):
 
             def speed(times: Array, number: int = number) -> Array:
                 return np.asarray(slips(times)[:, number] / first[number])
@@ -218,6 +219,12 @@ class CompiledMode:
             if (stop := lowest(speed, start, end)) is not None and speed(np.array([stop]))[0] < _STOPS**2:
                 stops.append(stop)
         return min(stops, default=None)
+
+    def decay(self, state: Array, mode: ContactMode, k: int) -> tuple[float, Array]:
+        """Slip speed of a contact, and change of the state until that slip would stop at its present rate."""
+        _, slips, rates = self.values(state[None], mode)
+        square, along, rate = slips[0, (place := 3 * self._turning.index(k)) : place + 3]
+        return float(np.sqrt(square)), max(0.0, -along / rate) * rates[0]
 
     def within(self, law: StretchLaw, stretch: Stretch[ContactMode], times: FloatArray) -> FloatArray:
         """States at increasing times [s] within a stretch that this mode integrated, shape (times, state)."""

@@ -115,8 +115,7 @@ class TreeSymbols:
         for k, start in enumerate(began):
             if start is not None:
                 answer = next(ways)
-                moved = [add(*(mul(value[axis], answer[n]) for n, value in slides[k][0].items())) for axis in range(3)]
-                way = touching[k].across(moved)
+                way = touching[k].across(_moved(slides[k][0], answer))
                 lines[k] = scaled(1.0 / functions["sqrt"](dot(way, way)), way)
         pushes: list[Row] = []
         owner: list[tuple[int, Vector]] = []
@@ -149,7 +148,8 @@ class TreeSymbols:
             assert force is not None  # its owner is closed
             forces[k] = plus(force, scaled(size, along))
             moved = plus(moved, scaled(size, each))
-        return SolvedSymbols([*rates, *moved], touching, lines, forces, response)
+        slide_rates = [plus(_moved(J, moved), bias) for J, bias in slides]
+        return SolvedSymbols([*rates, *moved], touching, lines, forces, response, slide_rates)
 
     def _inertial(
         self, bodies: Sequence[_Moving], q: Sequence[Scalar], v: Sequence[Scalar]
@@ -295,6 +295,10 @@ def _slide(touch: ScalarTouch, pair: Sequence[tuple[_Moving, ScalarMotion, float
         drift = cross(motion.w, minus(touch.place_rate, motion.v))
         rate = plus(rate, scaled(sign, plus(turning, drift)))
     return J, rate
+
+
+def _moved(J: dict[int, Vector], v: Sequence[Scalar]) -> list[Scalar]:
+    return [add(*(mul(value[axis], v[n]) for n, value in J.items())) for axis in range(3)]
 
 
 def _along(J: dict[int, Vector], direction: Vector) -> Row:
