@@ -38,8 +38,12 @@ def check_text(name: str, as_json: bool, plot: Path | None = None) -> None:
     needs = f"; engines must provide: {', '.join(sound.requires)}" if sound.requires else ""
     about = f"{sound.scene}, " if sound.kind != "scene" and sound.scene else ""
     head = f"{sound.name} is sound: {sound.kind}, {about}{counts}{needs}"
+    doubts = [f"  warning: {line}" for line in sound.warnings]
     drawn = [] if plot is None else [f"The plot is in {plot}."]
-    options.show(sound, as_json, lambda: [head, *(f"  {line}" for line in sound.start), *drawn])
+    if as_json:
+        options.write_json(sound)
+        return
+    options.show_lines([head, *(f"  {line}" for line in sound.start), *doubts, *drawn])
 
 
 def _draw(file: SoundFile, plot: Path) -> None:
@@ -58,7 +62,7 @@ def _draw(file: SoundFile, plot: Path) -> None:
 
 @dataclasses.dataclass(frozen=True)
 class SoundFile:
-    """Counts of the parts of a scene or file, requirements of a scene, and its start."""
+    """Counts of the parts of a scene or file, requirements of a scene, its start, and numbers in a wrong unit."""
 
     kind: str
     name: str
@@ -67,6 +71,7 @@ class SoundFile:
     counts: dict[str, int]
     requires: list[str] = dataclasses.field(default_factory=list)
     start: list[str] = dataclasses.field(default_factory=list)
+    warnings: list[str] = dataclasses.field(default_factory=list)
 
 
 def checked_file(name: str) -> SoundFile:
@@ -96,15 +101,16 @@ def checked_file(name: str) -> SoundFile:
 
 
 def _scene(name: str) -> SoundFile:
-    from proofroll.core.element_abilities import TellsStart
+    from proofroll.core.element_abilities import DoubtsNumbers, TellsStart
     from proofroll.files.scene_file import load_scene, read_scene_file
 
     file, scene = read_scene_file(name), load_scene(name)
     tables = {f"[[{key}]]": len(value) for key, value in file.tables.items() if isinstance(value, list)}
     counts = {"parameters": len(file.parameters)} | tables
     start = [line for element in scene.elements if isinstance(element, TellsStart) for line in element.start_facts]
+    doubts = [line for element in scene.elements if isinstance(element, DoubtsNumbers) for line in element.implausible]
     path = str(scene.folder / "scene.toml")
-    return SoundFile("scene", scene.name, path, scene.name, counts, sorted(scene.requires), start)
+    return SoundFile("scene", scene.name, path, scene.name, counts, sorted(scene.requires), start, doubts)
 
 
 def _comparison(path: Path) -> SoundFile:

@@ -38,6 +38,15 @@ class TellsStart(Protocol):
         """Short sentences: its bodies' positions and velocities, what holds them, its degrees of freedom."""
 
 
+@runtime_checkable
+class DoubtsNumbers(Protocol):
+    """Ability of an element that recognises numbers in a wrong unit, for the author of a scene."""
+
+    @property
+    def implausible(self) -> Sequence[str]:
+        """Sentences on implausible numbers, each with the name of its part and the likely mistake."""
+
+
 class RunWatch(Protocol):
     """Watches one run for events and for its end."""
 

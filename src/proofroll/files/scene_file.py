@@ -22,7 +22,7 @@ from proofroll.core.scene import Scene
 from proofroll.core.time_grid import LATEST
 from proofroll.core.validation import strict, units_of, validated
 from proofroll.files.data_folders import data_folder
-from proofroll.files.scene_parameters import Parameter, check_parameters, values_of
+from proofroll.files.scene_parameters import Parameter, angles_read, check_parameters, values_of
 from proofroll.files.scene_sources import source_of
 from proofroll.files.toml import named_file, read_toml
 
@@ -249,5 +249,6 @@ def _checked(content: Mapping[str, Any], path: Path) -> SceneFile:
         if Path(own_file).name != own_file or not (path.parent / own_file).is_file():
             advice = "there is no such file in the folder of the scene; copy it there, or take out its name"
             raise InputError(f"{path}: files", own_file, advice)
+    file = dataclasses.replace(file, parameters=angles_read(file.parameters, str(path)))
     check_parameters(file.parameters, _units(), path)
     return file

@@ -5,8 +5,9 @@ from __future__ import annotations
 import math
 import operator
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 from proofroll.core.bounds import require_usable
 from proofroll.core.errors import InputError, choices, require_known
@@ -44,6 +45,30 @@ class Parameter:
     integer: bool = False
 
 
+def angles_read(parameters: Mapping[str, Parameter], where: str) -> dict[str, Parameter]:
+    """Parameters whose values and bounds in degrees, ``"30 deg"``, are in radians.
+
+    Args:
+        parameters: as a file declares them.
+        where: name of the file, for messages.
+
+    Raises:
+        InputError: a number in degrees is not in rad.
+    """
+    read = {}
+    for name, parameter in parameters.items():
+        changes: dict[str, Any] = {}
+        for key in ("value", "above", "at_least", "below", "at_most"):
+            text = getattr(parameter, key)
+            radians = (
+                in_radians(f"{where}: parameters.{name}.{key}", text, parameter.unit) if isinstance(text, str) else None
+            )
+            if radians is not None:
+                changes[key] = radians
+        read[name] = replace(parameter, **changes)
+    return read
+
+
 def check_parameters(parameters: Mapping[str, Parameter], units: Iterable[str], path: Path) -> None:
     """Checks the declarations of a scene's parameters, and their defaults.
 
@@ -57,7 +82,7 @@ def check_parameters(parameters: Mapping[str, Parameter], units: Iterable[str], 
         require_known(f"{where}.unit", parameter.unit, known_units, advice)
         for key in ("value", "above", "at_least", "below", "at_most"):
             other = getattr(parameter, key)
-            if not isinstance(other, str) or in_radians(f"{where}.{key}", other, parameter.unit) is not None:
+            if not isinstance(other, str):
                 continue
             if other == name or other not in parameters:
                 known = choices(item for item in parameters if item != name)
@@ -139,7 +164,7 @@ def _check_bounds(name: str, parameter: Parameter, values: Mapping[str, float], 
     for words, bound, holds in bounds:
         if bound is None or not isinstance(bound, kind):
             continue
-        limit = values.get(bound, in_radians(name, bound, parameter.unit) or 0.0) if isinstance(bound, str) else bound
+        limit = values[bound] if isinstance(bound, str) else bound
         if not holds(value, limit):
             shown = f"{bound} = {limit:g}" if isinstance(bound, str) else f"{limit:g}"
             raise InputError(name, value, f"{parameter.meaning} must be {words} {shown}{spaced(parameter.unit)}")

@@ -5,17 +5,11 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from proofroll.elements.mechanism.plausibility import DENSEST, FAR, LARGE, TIMES
 from proofroll.robots.mjcf_classes import with_classes
 from proofroll.robots.model import Robot, RobotBody
 from proofroll.robots.robot_file import RobotFile, floats
 
-# Length above which a wrong unit is likelier than a machine of that size [m].
-_LARGE = 10.0
-# Largest plausible distance of a centre of mass from its origin: the larger of this [m] and this many times the sum of
-# the distances between joints.
-_FAR, _TIMES = 1.0, 10.0
-# Density of osmium, the densest material [kg/m³].
-_DENSEST = 22600.0
 # Limits of an angle between these are probably degrees [rad]: joints turn twice at most, and larger numbers mean none.
 _TURNS = 4 * math.pi, 720.0
 # Attributes with which a free joint is damped, loaded or held like any other joint.
@@ -33,7 +27,7 @@ def implausible(file: RobotFile, robot: Robot) -> Iterator[tuple[str, str, str]]
             yield "warning", f"{noun} {name}", what
     for joint in robot.joints:
         away = float(np.linalg.norm(joint.position))
-        if away > _LARGE and joint.kind != "free":
+        if away > LARGE and joint.kind != "free":
             yield "warning", f"joint {joint.name}", f"it lies {away:.4g} m from its parent's origin; lengths are metres"
     yield from (_urdf_angles(file, robot) if file.kind == "urdf" else _mjcf_joints(file))
 
@@ -42,15 +36,15 @@ def _body(body: RobotBody, between: float) -> Iterator[str]:
     if not body.mass > 0:
         return
     away = float(np.linalg.norm(body.com))
-    if away > _LARGE or (between and away > max(_FAR, _TIMES * between)):
+    if away > LARGE or (between and away > max(FAR, TIMES * between)):
         yield f"its centre of mass lies {away:.4g} m from its origin; lengths are metres"
     largest = float(body.moments[-1])
     if not np.any(body.inertia):
         yield f"it has a mass of {body.mass:.4g} kg but no inertia: some engines refuse it, others invent one"
     elif largest > 0:
         gyration = math.sqrt(largest / body.mass)
-        smallest = math.sqrt(0.4) * (3 * body.mass / (4 * math.pi * _DENSEST)) ** (1 / 3)
-        if gyration > _LARGE:
+        smallest = math.sqrt(0.4) * (3 * body.mass / (4 * math.pi * DENSEST)) ** (1 / 3)
+        if gyration > LARGE:
             yield f"its radius of gyration is {gyration:.4g} m; inertias are kg m²: 1 g mm² is 1e-9, 1 kg mm² is 1e-6"
         elif gyration < smallest:
             words = (

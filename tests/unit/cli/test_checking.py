@@ -9,8 +9,11 @@ from pathlib import Path
 
 import pytest
 
+from proofroll.elements.mechanism.element import the_mechanism
+from proofroll.elements.mechanism.report.drawing import mechanism_drawing
 from proofroll.files.data_folders import data_folder
-from proofroll.files.scene_file import scene_names
+from proofroll.files.scene_file import load_scene, scene_names
+from proofroll.report.pen import Polyline
 from proofroll.running import runner
 from proofroll.running.runner import Runner
 
@@ -36,7 +39,8 @@ def test_every_scene_is_sound(proofroll: Proofroll, name: str) -> None:
     assert (code, err) == (0, "")
     assert out.startswith(f"{name} is sound: scene, ")
     assert " parameters, " in out.splitlines()[0]
-    assert 1 < out.count("\n") <= 12
+    assert 1 < out.count("\n") <= 18
+    assert "warning" not in out
 
 
 def test_what_is_sound_fits_the_terminal(proofroll: Proofroll, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -77,6 +81,39 @@ def test_how_a_scene_starts(
         assert word in out
 
 
+@pytest.mark.parametrize(
+    ("name", "change", "words"),
+    [
+        ("pendulum", ("value = 2.8", "value = 45"), "joint pivot: an angle of 45 rad is 7.2 turns; angles are radians"),
+        ("double_pendulum", ("[[points]]", "[[points]]"), ""),
+        ("free_body", ('name = "body"', 'name = "body"\ncom = [351, 0, 0]'), "lies 351 m from its origin; lengths are"),
+        ("free_body", ('kind = "free"', 'kind = "free"\norientation = [0, 0, 90]'), "an angle of 90 rad is 14.3 turns"),
+        ("slide_to_roll", ("", ""), ""),
+    ],
+)
+def test_numbers_in_another_unit(
+    proofroll: Proofroll, tmp_path: Path, name: str, change: tuple[str, str], words: str
+) -> None:
+    """Degrees, millimetres and impossible densities of a scene are told as warnings; sound numbers are not."""
+    shutil.copytree(data_folder("models") / name, tmp_path, dirs_exist_ok=True)
+    text = (tmp_path / "scene.toml").read_text(encoding="utf-8")
+    assert change[0] in text
+    (tmp_path / "scene.toml").write_text(text.replace(*change, 1), encoding="utf-8")
+    code, out, _ = proofroll("check", str(tmp_path))
+    said = " ".join(out.split())
+    assert code == 0
+    assert ("warning: " in said) == bool(words)
+    assert words in said
+
+
+def test_axes_of_the_start_are_told(proofroll: Proofroll) -> None:
+    """The velocity of a free joint stands along the child's axes and the world's, with the axes of all vectors."""
+    _, out, _ = proofroll("check", "heavy_top")
+    said = " ".join(out.split())
+    assert "tip: v0 is angular velocity (0, 1, 60) rad/s along the axes of top; along the world's: (0, -27.89" in said
+    assert "velocities and forces of a run along the world's" in said
+
+
 @pytest.mark.drill
 def test_a_scene_is_drawn(proofroll: Proofroll, tmp_path: Path) -> None:
     """With --plot the scene at its start, its parameters and how it starts are a page; a study or robot has none."""
@@ -92,6 +129,35 @@ def test_a_scene_is_drawn(proofroll: Proofroll, tmp_path: Path) -> None:
         code, _, err = proofroll("check", name.partition(".")[0], "--plot", plot)
         assert (code, err.count("\n")) == (2, 1)
         assert words in err
+
+
+def test_a_box_is_drawn_with_its_edges(tmp_path: Path) -> None:
+    """The twelve edges of a box that may touch are lines of the drawing."""
+    text = (data_folder("models") / "free_body" / "scene.toml").read_text(encoding="utf-8")
+    more = """
+[[geometries]]
+name = "case"
+body = "body"
+kind = "box"
+size = [0.4, 0.3, 0.2]
+
+[[geometries]]
+name = "floor"
+body = "world"
+kind = "plane"
+position = [0, 0, -2]
+
+[[pairs]]
+name = "touch"
+geometries = ["case", "floor"]
+friction = 0.3
+"""
+    (tmp_path / "scene.toml").write_text(text + more, encoding="utf-8")
+    lines = [
+        sum(isinstance(mark, Polyline) for mark in mechanism_drawing(the_mechanism(load_scene(scene))).marks)
+        for scene in (str(tmp_path), "free_body")
+    ]
+    assert lines[0] - lines[1] >= 12
 
 
 @pytest.mark.parametrize("path", sorted(COMPARISONS.glob("*.toml")), ids=lambda path: path.stem)

@@ -33,6 +33,7 @@ from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.named_forces import named_forces
 from proofroll.elements.mechanism.optional_terms import optional_terms
 from proofroll.elements.mechanism.placed import Placed
+from proofroll.elements.mechanism.plausibility import implausible
 from proofroll.elements.mechanism.sampling import MechanismSample
 from proofroll.elements.mechanism.switches import first_change
 from proofroll.elements.mechanism.words import start_facts
@@ -110,6 +111,11 @@ class MechanismElement:
     def start_facts(self) -> Sequence[str]:
         """See :class:`proofroll.core.element_abilities.TellsStart`."""
         return start_facts(self)
+
+    @property
+    def implausible(self) -> Sequence[str]:
+        """See :class:`proofroll.core.element_abilities.DoubtsNumbers`."""
+        return implausible(self.mechanism)
 
     @cached_property
     def _equations(self) -> JointCoordinates:

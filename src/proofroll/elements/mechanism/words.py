@@ -19,6 +19,10 @@ if TYPE_CHECKING:
 
 # Largest number of bodies whose places are listed, and of joints whose coordinates a message lists.
 _BODIES, _JOINTS = 8, 6
+FRAMES = (
+    "axes: com, inertia and positions are along those of their body, v0 of free and spherical joints along the "
+    "child's; velocities and forces of a run along the world's"
+)
 
 
 def start_facts(element: MechanismElement) -> Sequence[str]:
@@ -37,10 +41,27 @@ def start_facts(element: MechanismElement) -> Sequence[str]:
         clauses.append(f"{body.name}: centre of mass at {vector(centre)} m, speed {speed:.4g} m/s")
     if more := len(mechanism.bodies) - _BODIES:
         clauses += [f"and {more} more bodies"] if more > 0 else []
+    clauses += _start_velocities(element)
     touching = touches(mechanism, Tree(mechanism).at(*mechanism.start()))
     gaps = [f"{pair.name} {each.gap:.4g} m" for pair, each in zip(mechanism.contacts, touching, strict=True)]
     clauses += [f"gaps of pairs: {', '.join(gaps)}"] if gaps else []
-    return clauses
+    return [*clauses, FRAMES]
+
+
+def _start_velocities(element: MechanismElement) -> list[str]:
+    """Sentences on v0 of free and spherical joints, which is along the child's axes, with the world's beside it."""
+    sentences = []
+    for joint in element.mechanism.joints:
+        if joint.kind not in {"free", "spherical"} or not any(joint.v0):
+            continue
+        linear = f"velocity {vector(joint.v0[:3])} m/s, " if joint.kind == "free" else ""
+        given = f"{linear}angular velocity {vector(joint.v0[-3:])} rad/s along the axes of {joint.child}"
+        number = element.mechanism.body_index[joint.child]
+        moving = [f"{vector(element.start.w_WB[0, number])} rad/s"]
+        if linear:
+            moving.insert(0, f"{vector(element.start.v_WB[0, number])} m/s")
+        sentences.append(f"{joint.name}: v0 is {given}; along the world's: {' and '.join(moving)}")
+    return sentences[:_BODIES]
 
 
 def pose(mechanism: Mechanism, sample: MechanismSample) -> str:

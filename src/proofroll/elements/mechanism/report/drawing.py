@@ -1,5 +1,7 @@
 """Drawing of a mechanism at its start: bodies, joints with their laws, loops, springs, tracked points."""
 
+import itertools
+
 import numpy as np
 from scipy.spatial import ConvexHull
 from scipy.spatial.transform import Rotation
@@ -22,6 +24,10 @@ _STROKE = 10.0  # half of the stroke that marks a stop [px]
 _FARTHEST = 10.0  # farthest stop that is drawn, relative to the mechanism's length, or its angle [rad]
 _TEETH = 8  # of the zigzag of a spring
 _OUTLINE, _PATCH = 97, 0.6  # points of a shape's outline; half of a plane's patch, over the mechanism's length
+
+# Pairs of corners of a box whose edges are 2 long.
+_CORNERS = list(itertools.product((-1.0, 1.0), repeat=3))
+_BOX_EDGES = [pair for pair in itertools.combinations(_CORNERS, 2) if np.abs(np.subtract(*pair)).sum() == 2.0]
 
 
 def mechanism_drawing(element: MechanismElement) -> Drawing:
@@ -109,11 +115,27 @@ def _shapes(picture: Drawing, at: View, element: MechanismElement) -> None:
                     outlines.setdefault(body, []).append(path)
         if each.gap <= TOUCHING * element.length and len(touching) <= _MOST_NAMES:
             _name(picture, np.asarray(at(each.place)), contact.name, "letter", (0.0, 14.0))
+    _boxes(picture, at, element)
     for body, paths in outlines.items():
         com = at(motion.p_WB[index[body]] + motion.R_WB[index[body]] @ mechanism.bodies[index[body]].com)
         hull = _hull(np.array([com, *np.concatenate(paths)]))
         if len(paths) > 1 or np.any(np.all(hull == com, axis=1)):  # else the body is drawn by its only shape
             picture.path(hull, "line")
+
+
+def _boxes(picture: Drawing, at: View, element: MechanismElement) -> None:
+    """Draws the edges of boxes that may touch."""
+    mechanism = element.mechanism
+    motion = Tree(mechanism).at(*mechanism.start())
+    in_pairs = {name for pair in mechanism.pairs for name in pair.geometries}
+    for box in mechanism.geometries:
+        if box.kind != "box" or box.size is None or box.name not in in_pairs:
+            continue
+        number = mechanism.body_index[box.body]
+        for one, other in _BOX_EDGES:
+            ends = np.array([one, other]) * np.array(box.size) / 2
+            places = motion.p_WB[number] + (np.array(box.position) + ends @ box.frame.T) @ motion.R_WB[number].T
+            picture.path(np.asarray(at(places)), "line")
 
 
 def _hull(places: FloatArray) -> FloatArray:
