@@ -100,15 +100,29 @@ def graze(function: Callable[[FloatArray], FloatArray], start: float, end: float
     return None
 
 
-def lowest(function: Callable[[FloatArray], FloatArray], start: float, end: float) -> float | None:
-    """First time in [start, end] at which a smooth function of times has a minimum, or None."""
-    half, middle = (end - start) / 2, (end + start) / 2
-    slope = chebyshev.chebder(_TO_CHEBYSHEV @ function(middle + half * _X))
+def points_within(start: float, end: float) -> FloatArray:
+    """Times in [start, end] through which functions are interpolated [s]: 20 Chebyshev points, both ends included."""
+    return (end + start) / 2 + (end - start) / 2 * _X
+
+
+def lowest(values: FloatArray, start: float, end: float) -> tuple[float, float] | None:
+    """First time inside (start, end) at which a smooth function has a minimum, and its value; None: it has none.
+
+    ``values``: at :func:`points_within`.
+    """
+    if np.argmin(values) == _POINTS - 1 and np.all(np.diff(values) <= 0):
+        return None
+    coefficients = _TO_CHEBYSHEV @ values
+    slope = chebyshev.chebder(coefficients)
     turns = chebyshev.chebroots(np.trim_zeros(slope, "b")) if np.any(slope) else np.empty(0)
     bend = chebyshev.chebder(slope)
     found = np.sort(np.real(turns[np.abs(np.imag(turns)) < 1e-6]))
     low = [x for x in found.tolist() if abs(x) <= 1 and chebyshev.chebval(x, bend) > 0]
-    return middle + half * low[0] if low else None
+    return (
+        ((end + start) / 2 + (end - start) / 2 * low[0], float(chebyshev.chebval(low[0], coefficients)))
+        if low
+        else None
+    )
 
 
 def locate_rise_within(
@@ -119,6 +133,7 @@ def locate_rise_within(
     leaving: bool = False,
     near: FloatArray | float = 0.0,
     grazes: list[float] | None = None,
+    known: FloatArray | None = None,
 ) -> tuple[float, int] | None:
     """Time [s] and index of the first rise of a guard in a step whose dense output is as accurate as the step.
 
@@ -130,13 +145,14 @@ def locate_rise_within(
         leaving: see there.
         near: see there.
         grazes: see there.
+        known: values of the guards at :func:`points_within`; None: they are evaluated.
     """
 
-    def values(times: FloatArray) -> FloatArray:
-        found = guards(times) - noise
+    def values(times: FloatArray, found: FloatArray | None = None) -> FloatArray:
+        found = (guards(times) if found is None else found) - noise
         return np.where((times <= start)[:, None], np.minimum(found, 0.0), found) if leaving else found
 
-    at_points = values((end + start) / 2 + (end - start) / 2 * _X)
+    at_points = values(points_within(start, end), known)
     sizes = np.abs(_TO_CHEBYSHEV @ (at_points + near))
     middle = _TO_CHEBYSHEV[0] @ (at_points + near)
     below = middle + sizes[1:].sum(axis=0) + 10 * sizes[-2:].sum(axis=0) < 0

@@ -7,14 +7,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from functools import partial
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Diverged
-from proofroll.core.event_location import locate_rise_within, lowest
+from proofroll.core.event_location import locate_rise_within, lowest, points_within
 from proofroll.core.stalling import StepCount, StepWatch
 from proofroll.elements.mechanism.contacts.acting import ContactMode
 from proofroll.elements.mechanism.rotations import Array
@@ -57,13 +56,14 @@ class CompiledStretch(Stretch[ContactMode]):
 
 
 class _Step(NamedTuple):
-    """A step: start and end [s], first and last state, and states at times within, (times) -> (times, state)."""
+    """A step: start and end [s], first and last state, states at times within, and guards at points of it."""
 
     start: float
     end: float
     first: Array
     last: Array
     inside: Inside
+    guards: Array
 
 
 class CompiledModes:
@@ -119,11 +119,16 @@ class CompiledMode:
                 opt_level=0,
             )
 
-    def _guards(self, mode: ContactMode, inside: Inside, times: Array) -> Array:
-        guards = self.values(inside(times), mode)[0]
+    def _at_points(self, mode: ContactMode, inside: Inside, start: float, end: float) -> tuple[Array, Array]:
+        """Guards and numbers of slips at the points of a step, (points, …).
+
+        Raises:
+            Diverged: one is not finite.
+        """
+        guards, slips, _ = self.values(inside(points_within(start, end)), mode)
         if not np.isfinite(guards).all():
-            raise Diverged(f"a guard is not finite near t = {times[0]:.6g} s")
-        return guards
+            raise Diverged(f"a guard is not finite near t = {start:.6g} s")
+        return guards, slips
 
     def _lines(self, mode: ContactMode) -> Array:
         """Run-time parameters of a mode: directions of the lines at its start."""
@@ -131,11 +136,17 @@ class CompiledMode:
 
     def values(self, states: Array, mode: ContactMode) -> tuple[Array, Array, Array]:
         """Guards, numbers of slips and rates of states (times, state), each (times, …)."""
+        found = self._called(states, mode)
+        first = self._count + self._slips
+        return found[: self._count].T, found[self._count : first].T, found[first:].T
+
+    def _called(self, states: Array, mode: ContactMode) -> Array:
+        """Guards, numbers of slips and rates in rows, of states (times, state)."""
+        inputs = np.ascontiguousarray(states.T)
+        if not self._values.nparams:
+            return np.asarray(self._values(inputs))
         lines = self._lines(mode)[: self._values.nparams]
-        pars = {"pars": np.repeat(lines[:, None], len(states), axis=1)} if len(lines) else {}
-        found = self._values(np.ascontiguousarray(states.T), **pars).T
-        guards, slips, rates = np.split(found, [self._count, self._count + self._slips], axis=1)
-        return guards, slips, rates
+        return np.asarray(self._values(inputs, pars=np.repeat(lines[:, None], len(states), axis=1)))
 
     def walk(self, law: StretchLaw, mode: ContactMode, time: float, state: Array, until: float) -> Stretch[ContactMode]:
         """Stretch from a time and state to the first rise of a guard, or to ``until`` [s].
@@ -152,9 +163,16 @@ class CompiledMode:
             visited.append((step.start, step.first))
             count.took(step.end)
             watch.took(step.end, step.end - step.start, landing=step.end == until)
-            guards = partial(self._guards, mode, step.inside)
-            noise = law.noise, step.start == time, law.near
-            rise = locate_rise_within(guards, step.start, step.end, *noise, grazes)
+            rise = locate_rise_within(
+                lambda times, step=step: self.values(step.inside(times), mode)[0],  # type: ignore[misc]
+                step.start,
+                step.end,
+                law.noise,
+                step.start == time,
+                law.near,
+                grazes,
+                step.guards,
+            )
             if rise is not None:
                 last = law.corrected(step.inside(np.array([rise[0]]))[0])
                 return CompiledStretch(time, rise[0], mode, state, last, rise[1], visited, grazes, self)
@@ -171,10 +189,12 @@ class CompiledMode:
         step = self._collocation(mode) if self._by_collocation else self._series(mode)
         while time < until:
             end, last, inside = step(time, state, until)
-            if self._slips and (stop := self._stop(mode, inside, time, end)) is not None:
+            guards, slips = self._at_points(mode, inside, time, end)
+            if self._slips and (stop := self._stop(slips, time, end)) is not None:
                 end = time + _BEFORE_STOP * (stop - time)
                 last = inside(np.array([end]))[0]
-            yield _Step(time, end, state, last, inside)
+                guards, _ = self._at_points(mode, inside, time, end)
+            yield _Step(time, end, state, last, inside, guards)
             time, state = end, last
 
     def _collocation(self, mode: ContactMode) -> _TakeStep:
@@ -201,24 +221,14 @@ class CompiledMode:
 
         return step
 
-    def _stop(self, mode: ContactMode, inside: Callable[[Array], Array], start: float, end: float) -> float | None:
+    def _stop(self, slips: Array, start: float, end: float) -> float | None:
         """Time within a step at which a slip in the plane stops [s], beyond which its series mean another friction.
 
-        A slip that stops nearly straight reverses in its series, without any sign of it but its speed.
+        A slip that stops nearly straight reverses in its series, without any sign of it but its speed. ``slips``: their
+        numbers at the points of the step.
         """
-
-        def slips(times: Array) -> Array:
-            return self.values(inside(times), mode)[1]
-
-        first, stops = slips(np.array([start]))[0], list[float]()
-        for number in range(0, self._slips, 3):
-
-            def speed(times: Array, number: int = number) -> Array:
-                return np.asarray(slips(times)[:, number] / first[number])
-
-            if (stop := lowest(speed, start, end)) is not None and speed(np.array([stop]))[0] < _STOPS**2:
-                stops.append(stop)
-        return min(stops, default=None)
+        found = (lowest(slips[:, number] / slips[0, number], start, end) for number in range(0, self._slips, 3))
+        return min((stop[0] for stop in found if stop is not None and stop[1] < _STOPS**2), default=None)
 
     def decay(self, state: Array, mode: ContactMode, k: int) -> tuple[float, Array]:
         """Slip speed of a contact, and change of the state until that slip would stop at its present rate."""

@@ -27,6 +27,7 @@ _AT_BOUND = 1e-9
 _NUDGE, _APART = 1e-6, 0.382
 # Angles between which the direction of slip is searched; the offset keeps the axes inside an interval.
 _DIRECTIONS = np.linspace(-np.pi, np.pi, 73) + 0.01
+_WAYS = np.array([np.cos(_DIRECTIONS), np.sin(_DIRECTIONS)])
 
 
 def torn(name: str, time: float) -> NotUnique:
@@ -150,7 +151,7 @@ def _one(
         w = c + G @ _pressing(G, c, mu, t, where)
         return float(w[2] * t[0] - w[1] * t[1])
 
-    values = [across(angle) for angle in _DIRECTIONS]
+    values = _across(G, c, mu, where)
     pairs = zip(_DIRECTIONS[:-1], _DIRECTIONS[1:], values[:-1], values[1:], strict=True)
     for low, high, at_low, at_high in pairs:
         if at_low * at_high > 0:
@@ -161,6 +162,16 @@ def _one(
         if (c + G @ f)[1:] @ t > 0:
             return f, "slip"
     raise Refused("no direction of slip at {} at t = {:.6g} s is against its friction".format(*where))
+
+
+def _across(G: Array, c: Array, mu: float, where: tuple[str, float]) -> Array:
+    """Component of the slip perpendicular to what friction opposes, for each of the searched directions."""
+    along = np.vstack([np.ones(len(_DIRECTIONS)), -mu * _WAYS])
+    response = G[0] @ along
+    if response.min() <= 0:
+        raise torn(*where)
+    w = c[1:, None] + G[1:] @ (along * (-c[0] / response))
+    return np.asarray(w[1] * _WAYS[0] - w[0] * _WAYS[1])
 
 
 def _pressing(G: Array, c: Array, mu: float, t: Array, where: tuple[str, float]) -> Array:
