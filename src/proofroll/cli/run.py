@@ -106,7 +106,7 @@ def run(
         options.complain(f"{content.engine} {content.status}: {content.message}{_shorter_step(scene, engine, case)}")
     if as_json or done or content.final:
         options.show(content, as_json, lambda: run_lines(content, forces=forces))
-    if not done:
+    if not done or content.ends is not None:
         raise typer.Exit(options.ENGINE)
 
 

@@ -26,6 +26,8 @@ Key = TypeVar("Key", bound=Hashable)
 _SHARED = frozenset({"time", "xyz", "wxyz", "between"})
 # Dimension of the samples off the grid of times, and prefix of the names of their variables.
 BETWEEN = "between"
+# Attributes of a truth that ends early: from when on it is not known [s], and why, as a clause.
+ENDS, ENDED = "ends", "ended"
 # Attribute: widest bracket [s] of the events at the end that are left out of a comparison.
 LEFT_OUT = "widest_bracket_left_out"
 # A sample that is nearer to an impact than this part of the sampling interval lies on it.
@@ -53,6 +55,23 @@ def columns_of(scene: Scene, times: FloatArray, samples: Sequence[AnySample]) ->
         for element in scene.elements
     }
     return joined(scene, parts)
+
+
+def ended_early(dataset: xr.Dataset | Columns) -> tuple[float, str] | None:
+    """Time [s] at which a truth ends early, and why, as a clause; None: it has all samples that were asked for."""
+    return (float(dataset.attrs[ENDS]), str(dataset.attrs[ENDED])) if ENDS in dataset.attrs else None
+
+
+def truth_message(dataset: xr.Dataset | Columns) -> str:
+    """Sentence about a truth: when and why it ends early, why it is ill-posed; else the routes that agree."""
+    notes, end = [str(dataset.attrs.get("ill_posed", ""))], ended_early(dataset)
+    if end is not None:
+        times = dataset["time"].values
+        notes = [note for note in notes if note != end[1]]
+        notes.append(f"the truth ends at t = {end[0]:.6g} s, behind its {len(times)} samples: {end[1]}")
+    if any(notes):
+        return "; ".join(filter(None, notes))
+    return f"{dataset.attrs['route']}, checked by {dataset.attrs['second_route']}"
 
 
 def joined(scene: Scene, parts: Mapping[str, Columns]) -> Columns:
@@ -148,13 +167,38 @@ def scales(scene: Scene, truth: xr.Dataset) -> dict[str, float]:
     return {name: max(size, floors[name]) if np.isfinite(size) else floors[name] for name, size in sizes.items()}
 
 
+def until_end(scene: Scene, truth: xr.Dataset, runs: Mapping[Key, xr.Dataset]) -> dict[Key, xr.Dataset]:
+    """Runs without their samples and events behind the last sample of a truth that ends early; others unchanged."""
+    if ended_early(truth) is None:
+        return dict(runs)
+    last = float(truth.variables["time"].values[-1])
+    return {key: _up_to(scene, run, last) for key, run in runs.items()}
+
+
+def _up_to(scene: Scene, dataset: xr.Dataset, last: float) -> xr.Dataset:
+    """A run without what is later than its sample at the time ``last`` [s]."""
+    count = int(np.sum(dataset.variables["time"].values <= last))
+    cut = dataset.isel(time=slice(count))
+    for element in scene.elements:
+        own = part(scene, element, cut)
+        if "event_time" in own:
+            cut = with_part(scene, element, cut, own.isel(event=own["event_time"].to_numpy() <= last))
+    return cut
+
+
+def before_end(scene: Scene, truth: xr.Dataset) -> xr.Dataset:
+    """A truth that ends early, without the events behind its last sample; any other unchanged."""
+    return until_end(scene, truth, {0: truth})[0]
+
+
 def off_impacts(scene: Scene, truth: xr.Dataset, runs: Mapping[Key, xr.Dataset]) -> dict[Key, xr.Dataset]:
-    """Runs with the truth's values where a sample lies on a true impact, of all that has two values there.
+    """Runs up to the end of the truth, with its values where a sample lies on an impact, of all that has two there.
 
     Which of them a run has hangs on its last digits. Places and orientations have one, and are the run's own, as is a
     velocity or energy far from what the truth has at that sample and beside it. The first sample stays, and all
     do where most lie on impacts, as of a ball that bounces in time with the samples: else nothing would be judged.
     """
+    runs = until_end(scene, truth, runs)
     times = truth.variables["time"].values
     happened = [event for element in scene.elements for event in events_of(part(scene, element, truth))]
     hits = np.array([event.time for event in happened if event.kind in JUMPS])

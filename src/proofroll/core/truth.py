@@ -11,7 +11,7 @@ import numpy as np
 from proofroll.core.announced import loaded
 from proofroll.core.arrays import FloatArray, read_only
 from proofroll.core.columns import Columns
-from proofroll.core.dataset import joined, off_grid_apart
+from proofroll.core.dataset import ENDED, ENDS, ended_early, joined, off_grid_apart
 from proofroll.core.element import Element
 from proofroll.core.errors import InputError, Refused
 from proofroll.core.scene import Scene
@@ -34,7 +34,9 @@ class ElementTruth(Protocol):
         """True run of an element: its variables, each with the attribute ``error_bar`` in its own unit.
 
         The attributes ``route`` and ``second_route`` name the two methods; ``ill_posed``, if present, says in a
-        sentence why the motion depends on less than the accuracy of the parameters.
+        sentence why the motion depends on less than the accuracy of the parameters. A truth that is not known to the
+        last time has the samples before its end alone, and says when and why it ends in the attributes
+        :data:`proofroll.core.dataset.ENDS` [s] and :data:`proofroll.core.dataset.ENDED`.
 
         Args:
             element: one that it covers.
@@ -93,7 +95,7 @@ def truth(scene: Scene, asked: FloatArray, counting: FloatArray = _NONE, between
     """
     times = np.union1d(asked, np.concatenate([counting, between])) if len(counting) or len(between) else asked
     parts = {element.name: _of_element(element, times, scene.asks) for element in scene.elements}
-    columns = joined(scene, {name: Columns.of(part) for name, part in parts.items()})
+    columns = joined(scene, _to_common_end({name: Columns.of(part) for name, part in parts.items()}))
     whole = (columns if times is asked else off_grid_apart(scene, columns, asked, between)).dataset()
     for name in ("route", "second_route", "ill_posed"):
         texts = dict.fromkeys(str(part.attrs[name]) for part in parts.values() if part.attrs.get(name))
@@ -101,6 +103,22 @@ def truth(scene: Scene, asked: FloatArray, counting: FloatArray = _NONE, between
             whole.attrs[name] = "; ".join(texts)
     read_only([variable.values for variable in whole.variables.values()])
     return whole
+
+
+def _to_common_end(parts: dict[str, Columns]) -> dict[str, Columns]:
+    """Parts cut to the end of the one that ends first, with when and why it ends."""
+    early = [part for part in parts.values() if ended_early(part)]
+    if not early or len(parts) == 1:
+        return parts
+    first = min(early, key=lambda part: float(part.attrs[ENDS]))
+    end = {name: first.attrs[name] for name in (ENDS, ENDED)}
+    cut = {}
+    for name, part in parts.items():
+        within = part.at("time", part["time"].values <= first["time"].values[-1]).assign(**end)
+        if "event_time" in within:
+            within = within.at("event", within["event_time"].values < float(first.attrs[ENDS]))
+        cut[name] = within
+    return cut
 
 
 def edge_between(scene: Scene, parameter: str, low: float, high: float, until: float) -> float | None:

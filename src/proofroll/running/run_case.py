@@ -117,6 +117,7 @@ def _answer(error: Refused | Diverged, versions: dict[str, str]) -> Result:
 def _run_truth(
     scene: Any, times: Any, besides: tuple[Any, Any], out: Path, versions: dict[str, str], spent: _TimeAccounts
 ) -> Result:
+    from proofroll.core.dataset import truth_message
     from proofroll.core.truth import truth
     from proofroll.files.trajectory_file import import_xarray, write
 
@@ -130,7 +131,7 @@ def _run_truth(
     finally:
         spent.on("truth")
     wall = time.perf_counter() - start
-    message = dataset.attrs.get("ill_posed") or f"{dataset.attrs['route']}, checked by {dataset.attrs['second_route']}"
+    message = truth_message(dataset)
     attrs = {"status": "done", "message": message, "wall_seconds": wall}
     write(dataset.assign_attrs(attrs | manifest("truth", {}, scene, versions)), out)
     spent.on("writing")

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from proofroll.core import multi_element
 from proofroll.core.certificate import first_difference
+from proofroll.core.dataset import truth_message
 from proofroll.core.engine import fixed_step
 from proofroll.core.errors import InputError, Refused
 from proofroll.core.first_steps import certificate
@@ -93,8 +94,7 @@ def simulate(
 
         times = time_grid(until, EVERY if every is None else every)
         dataset = truth(scene, times, samples_between(scene, times))
-        message = dataset.attrs.get("ill_posed", "two independent routes agree")
-        dataset = dataset.assign_attrs(status="done", message=message)
+        dataset = dataset.assign_attrs(status="done", message=truth_message(dataset))
         return dataset.assign_attrs(manifest("truth", {}, scene, versions("truth", truth_version())))
     kind, resolved = _resolved(scene, engine, settings)
     times = time_grid(until, sampling_interval(fixed_step(resolved)) if every is None else every)

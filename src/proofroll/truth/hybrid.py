@@ -158,12 +158,14 @@ class HybridPath(Generic[SpanT]):
         happenings: changes of mode, in order of time.
         margins: time [s] and relative distance from another outcome, of each decision.
         known: True if the last stretch reaches the end time; otherwise its continuation is unknown.
+        ended: error that ended the path early, as a clause; empty: none did.
     """
 
     stretches: tuple[SpanT, ...]
     happenings: tuple[Happening, ...]
     margins: tuple[tuple[float, float], ...]
     known: bool = True
+    ended: str = ""
 
     def stretch_at(self, times: FloatArray) -> list[int]:
         """Index of the stretch at each time [s]; the time of a change belongs to the later stretch."""
@@ -180,12 +182,12 @@ def follow(
 ) -> HybridPath[SpanT]:
     """Path from time 0 to ``until`` [s]; stretches also end at ``breaks`` [s], rising, where the rates are not smooth.
 
-    After a decision with a margin below ``close``, where round-off decides, or from the time ``edge`` [s] on, at which
-    another route came to such a decision, a refusal ends the path instead of being raised.
+    A refusal or failure at a later time than 0 ends the path; its text is kept, unless the path had come to a decision
+    with a margin below ``close``, where round-off decides, or another route had by then, at the time ``edge`` [s].
 
     Raises:
-        Diverged: the route fails, or makes no progress.
-        Refused: by the route.
+        Diverged: the route fails, or makes no progress, at the start.
+        Refused: by the route, at the start.
     """
     time, over, change, still = 0.0, 0.0, route.begin(), 0
     short, longest, since = 0, 0.0, 0
@@ -200,7 +202,12 @@ def follow(
         if change.mode is None or since > _BEYOND:
             return HybridPath(tuple(stretches), tuple(happenings), tuple(margins), known=False)
         end = next((at for at in breaks if time < at < until), until)
-        stretch = route.walk(time, change.state, change.mode, end)
+        try:
+            stretch = route.walk(time, change.state, change.mode, end)
+        except (Diverged, Refused) as error:
+            if not stretches:
+                raise
+            return HybridPath(tuple(stretches), tuple(happenings), tuple(margins), known=False, ended=str(error))
         stretches.append(stretch)
         if stretch.guard is None and end == until:
             return HybridPath(tuple(stretches), tuple(happenings), tuple(margins))
@@ -219,10 +226,12 @@ def follow(
             if short == 1:
                 _refuse_many(stretches, until)
             time, change = stretch.end, route.change(stretch)
-        except (Diverged, Refused):
-            if stretch.end >= edge or min(margin for _, margin in margins) < close:
-                return HybridPath(tuple(stretches), tuple(happenings), tuple(margins), known=False)
-            raise
+        except (Diverged, Refused) as error:
+            undecided = stretch.end >= edge or min(margin for _, margin in margins) < close
+            if not undecided and stretch.end <= 0:
+                raise
+            ended = "" if undecided else str(error)
+            return HybridPath(tuple(stretches), tuple(happenings), tuple(margins), known=False, ended=ended)
 
 
 def _latest(happenings: Sequence[Happening]) -> str:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Sequence
 
 import numpy as np
 import pytest
 
 from proofroll.core.arrays import FloatArray
-from proofroll.core.errors import Diverged, Refused
+from proofroll.core.errors import Refused
 from proofroll.truth.hybrid import Stretch, StretchLaw, Transition, follow, integrate_to_guard, states_at, states_of
 
 TOLERANCE = np.full(2, 1e-13)
@@ -58,8 +59,9 @@ def test_a_route_that_alternates_without_progress_is_told(length: float) -> None
             other, kind = ("right", "impact") if stretch.mode == "left" else ("left", "release")
             return Transition(stretch.last, other, ((kind, stretch.mode),), np.inf)
 
-    with pytest.raises(Diverged, match=r"no progress at t = 0\.1 s, where impact of left and release of right follow"):
-        follow(Alternating(), 1.0)
+    path = follow(Alternating(), 1.0)
+    assert not path.known
+    assert "no progress at t = 0.1 s, where impact of left and release of right follow" in path.ended
 
 
 def test_thousands_of_rebounds_are_refused_as_soon_as_they_are_seen() -> None:
@@ -80,8 +82,7 @@ def test_thousands_of_rebounds_are_refused_as_soon_as_they_are_seen() -> None:
 
     route = Lossless()
     said = r"100 changes; at this pace 1e4 more follow until t = 1 s, and the truth follows 1000; ask for a shorter"
-    with pytest.raises(Diverged, match=said):
-        follow(route, 1.0)
+    assert re.search(said, follow(route, 1.0).ended)
     assert route.count == 100
 
 
@@ -128,8 +129,8 @@ def test_a_burst_at_the_start_is_followed_as_far_as_its_pace_allows() -> None:
     """Quick changes from the start on have a truth where at their pace there are fewer than 1000, else a reason."""
     burst = [1e-3] * 250
     assert follow(Swinging(burst, [1.0]), 0.9).known
-    with pytest.raises(Diverged, match=r"at this pace 1e5 more follow until t = 100 s.*; ask for a shorter time$"):
-        follow(Swinging(burst, [1.0]), 100.0)
+    told = follow(Swinging(burst, [1.0]), 100.0).ended
+    assert re.search(r"at this pace 1e5 more follow until t = 100 s.*; ask for a shorter time$", told)
 
 
 def test_rebounds_that_shrink_by_a_hundredth_make_progress() -> None:
@@ -178,12 +179,10 @@ class Stopping:
 
 @pytest.mark.parametrize("edge", [0.5, np.inf])
 def test_a_refusal_after_another_routes_close_decision_ends_the_path(edge: float) -> None:
-    """Where the question is ill-posed by one route, the other may find no outcome; before, its refusal is raised."""
-    if edge == np.inf:
-        with pytest.raises(Refused, match="no outcome"):
-            follow(Stopping(), 1.0, (), 1e-9, edge)
-    else:
-        assert not follow(Stopping(), 1.0, (), 1e-9, edge).known
+    """A refusal ends a path with its reason, unless another route has come to a close decision by then."""
+    path = follow(Stopping(), 1.0, (), 1e-9, edge)
+    assert not path.known
+    assert ("no outcome" in path.ended) == (edge == np.inf)
 
 
 def test_a_path_that_ends_is_not_followed_further() -> None:

@@ -218,6 +218,7 @@ class ReportedComparison:
     hosts: dict[str, int]
     budget: float | None = None
     beyond_budget: list[str] = field(default_factory=list)
+    truth_ends: list[str] = field(default_factory=list)
     spread: list[Spread] = field(default_factory=list)
     evidence: ComparisonEvidence | None = field(default=None, metadata=MERGED)
 

@@ -72,7 +72,7 @@ def spread_of(name: str, point: ComparedPoint, runs: Mapping[int, xr.Dataset], r
 
     assert point.reference is not None  # points without a truth have no judged laws
     truth, lines = point.reference.dataset, list[SpreadLine]()
-    end = float(truth["time"].to_numpy()[-1])
+    end = max((float(run["time"].to_numpy()[-1]) for run in runs.values()), default=0.0)
     whole = {row: run for row, run in runs.items() if run["time"].to_numpy()[-1] == end}
     for key, item in point.scene.observables.items():
         if item.role is not Role.MOTION or not (item.headline or item.watched) or key not in truth:
@@ -86,4 +86,4 @@ def spread_of(name: str, point: ComparedPoint, runs: Mapping[int, xr.Dataset], r
             if high - low > ALIKE * size:
                 shown = [values.get(row) for row in range(rows)]
                 lines.append(SpreadLine(column, item.unit, shown, low, high, (high - low) / size))
-    return Spread(name, str(truth.attrs["ill_posed"]), end, lines)
+    return Spread(name, point.reference.ill_posed or point.reference.ended, end, lines)

@@ -72,7 +72,18 @@ def outcome_content(outcome: Outcome) -> ReportedComparison:
         ],
         budget=comparison.budget,
         beyond_budget=outcome.beyond_budget,
+        truth_ends=_truth_ends(outcome),
     )
+
+
+def _truth_ends(outcome: Outcome) -> list[str]:
+    """Sentences about truths that end early, one for each point of the parameters with such a truth."""
+    known = {name: point.reference for name, point in outcome.points.items() if point.reference is not None}
+    return [
+        f"Not judged behind the end of the truth{at_point(outcome.points[name].case.parameters)}: {reference.ended}."
+        for name, reference in known.items()
+        if reference.ended
+    ]
 
 
 def runs_at(outcome: Outcome, point: str) -> list[tuple[int, Run, StoredTrajectory]]:

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from proofroll.core.columns import SMALLEST, UNCERTAIN
+from proofroll.core.dataset import ended_early
 from proofroll.core.diagnosis.scene_diagnosis import Diagnosis, diagnose_scene
 from proofroll.core.events import Event, events_of
 from proofroll.core.number_format import number
@@ -41,6 +42,7 @@ class RunContent:
         smallest: variable -> least value of the run, for variables where it matters, like a normal force.
         error_bars: of the truth, by variable.
         trajectory, plot: files that were written.
+        ends: time from which the truth is not known [s]; samples from there on are missing; None: none is.
     """
 
     scene: str
@@ -67,6 +69,7 @@ class RunContent:
     uncertain: dict[str, str] | None = field(default=None, metadata=OPTIONAL)
     trajectory: str | None = field(default=None, metadata=OPTIONAL)
     plot: str | None = field(default=None, metadata=OPTIONAL)
+    ends: float | None = field(default=None, metadata=OPTIONAL)
 
 
 def run_content(case: Case, result: Result, trajectory: Path) -> RunContent:
@@ -97,6 +100,7 @@ def run_content(case: Case, result: Result, trajectory: Path) -> RunContent:
     turned = {key: item for key, item in columns.variables.items() if case.asks and item.dims == ("time", "wxyz")}
     for key, item in turned.items():
         curves |= {f"{key}.{part}": item._replace(values=item.values[:, i]) for i, part in enumerate("wxyz")}
+    end = ended_early(columns)
     least = {key: value for key, value in columns.attrs.items() if key.startswith(SMALLEST)}
     smallest = {key.removeprefix(SMALLEST): float(value) for key, value in least.items()}
     return replace(
@@ -108,6 +112,7 @@ def run_content(case: Case, result: Result, trajectory: Path) -> RunContent:
         events=events_of(columns),
         smallest=smallest or None,
         error_bars={name: float(c.attrs["error_bar"]) for name, c in curves.items() if "error_bar" in c.attrs} or None,
+        ends=end[0] if end else None,
     )
 
 

@@ -137,6 +137,7 @@ def closing_lines(content: ReportedComparison) -> list[str]:
     counts = {verdict: sum(row.verdict == verdict for row in rows) for verdict in SYMBOLS}
     totals = ", ".join(f"{count} {verdict}" for verdict, count in counts.items() if count)
     lines = [f"{counted(len(rows), 'engine settings')}, {counted(len(content.runs), 'runs')} in all: {totals}."]
+    lines += content.truth_ends
     for name, row, _ in content.lines():
         if row.reason and not row.reason.startswith(Status.LEFT_OUT):
             lines.append(f"{SYMBOLS[row.verdict]} {name}: {row.reason}")

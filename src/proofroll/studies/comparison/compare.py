@@ -29,6 +29,9 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
+_LEAST = 2  # samples of a truth with which a motion is judged: at the first one nothing has moved yet
+
+
 def evaluate(planned: Plan, results: dict[str, Result], runner: Runner) -> Outcome:
     """Judges the results of a plan's cases."""
     comparison = planned.comparison
@@ -65,6 +68,10 @@ def evaluate(planned: Plan, results: dict[str, Result], runner: Runner) -> Outco
         if reference.ill_posed and not reference.curves.keys() & {*band.bounds, *run.row.bound}:
             reason = f"no motion is unique here, and no law has a tolerance: {reference.ill_posed}"
             judged.append(_run(run, replace(result, status=Status.NO_TRUTH, message=reason)))
+            continue
+        laws = {name for name, item in reference.scene.observables.items() if not item.hangs_on_events}
+        if reference.ended and reference.dataset.sizes["time"] < _LEAST and not laws & {*band.bounds, *run.row.bound}:
+            judged.append(_run(run, replace(result, status=Status.NO_TRUTH, message=reference.ended)))
             continue
         judgements, errors = _judgements(run, band, reference, trajectories, _lost(run, results))
         missing = sorted({*band.bounds, *run.row.bound} - {judgement.observable for judgement in judgements})
@@ -175,8 +182,11 @@ def _judgements(
     """Judgements of a run, and factor of each other rung of its ladder -> observable -> error."""
     facts = run.facts
     assert isinstance(facts, EngineFacts)  # there are trajectories
+    laws = {factor: run_values.laws_behind_the_end(reference, dataset) for factor, dataset in trajectories.items()}
     reference, trajectories = reference.common_span(trajectories)
-    curves = {factor: run_values.observables_of(reference, dataset) for factor, dataset in trajectories.items()}
+    curves = {
+        factor: run_values.observables_of(reference, dataset) | laws[factor] for factor, dataset in trajectories.items()
+    }
     main = curves[1.0]
     judgements: list[Judgement] = []
     errors: dict[float, dict[str, float]] = {factor: {} for factor in curves if factor != 1}

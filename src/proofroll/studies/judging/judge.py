@@ -80,12 +80,14 @@ class Judged:
         compared: each judged quantity, the one farthest beyond its tolerance first.
         because: reason of the tolerances; empty if not given.
         unjudged: given variable that is not judged -> reason.
+        ended: time and reason of an early end of the truth, behind which nothing is judged; empty: there is none.
     """
 
     scene: str
     compared: tuple[Compared, ...]
     because: str = ""
     unjudged: Mapping[str, str] = field(default_factory=dict)
+    ended: str = ""
 
     @property
     def agrees(self) -> bool:
@@ -99,6 +101,8 @@ class Judged:
         lines = [f"  {'ok' if item.agrees else '!!'} {item}" for item in self.compared]
         for why in dict.fromkeys(self.unjudged.values()):
             lines.append(f"  not judged: {', '.join(name for name, its in self.unjudged.items() if its == why)}; {why}")
+        if self.ended:
+            lines.append(f"  not judged: what lies behind, for {self.ended}")
         return "\n".join([head, *lines])
 
     def _repr_html_(self) -> str:
@@ -126,7 +130,7 @@ class Judged:
             for item in self.compared
         ]
         head = {"scene": self.scene, "agrees": self.agrees, "because": self.because}
-        return head | {"compared": rows, "unjudged": dict(self.unjudged)}
+        return head | {"compared": rows, "unjudged": dict(self.unjudged), "ended": self.ended}
 
 
 def judge(
@@ -159,8 +163,9 @@ def judge(
     given.require_units(reference.dataset)
     observed: dict[str, FloatArray] = {}
     if "scene_digest" in dataset.attrs:  # all variables of a run
+        laws = run_values.laws_behind_the_end(reference, dataset)
         reference, cut = reference.common_span({0: dataset})
-        observed = run_values.observables_of(reference, cut[0])
+        observed = run_values.observables_of(reference, cut[0]) | laws
         dataset = cut[0]
     else:
         dataset = off_impacts(scene, reference.dataset, {0: dataset})[0]
@@ -182,7 +187,7 @@ def judge(
         unjudged |= dict.fromkeys((name for name in observed if _unknown(reference, name)), _UNDETERMINED)
     for item in compared:  # judged observables, though perhaps derived from other given variables
         unjudged.pop(item.judgement.observable, None)
-    return Judged(scene.name, tuple(compared), because, unjudged)
+    return Judged(scene.name, tuple(compared), because, unjudged, reference.ended)
 
 
 def _unjudged(given: GivenRun, reference: Reference, judged: Mapping[str, Tolerance]) -> dict[str, str]:

@@ -12,7 +12,7 @@ import numpy as np
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.beside_events import beside_events
-from proofroll.core.dataset import LEFT_OUT, Key, common_span, observe, part, scales
+from proofroll.core.dataset import LEFT_OUT, Key, before_end, common_span, ended_early, observe, part, scales
 from proofroll.core.element_abilities import KnowsAnotherScene
 from proofroll.core.events import EVENT_ORDER, Event, events_of
 from proofroll.core.observable import Role
@@ -42,6 +42,7 @@ class Reference:
     @classmethod
     def of(cls, scene: Scene, dataset: xr.Dataset) -> Self:
         """Reference from a true trajectory."""
+        dataset = before_end(scene, dataset)
         return cls(scene, dataset, observe(scene, dataset), scales(scene, dataset))
 
     def common_span(self, trajectories: Mapping[Key, xr.Dataset]) -> tuple[Reference, dict[Key, xr.Dataset]]:
@@ -64,6 +65,12 @@ class Reference:
     def ill_posed(self) -> str:
         """Reason why changes of the parameters below their accuracy change the motion; empty: they do not."""
         return str(self.dataset.attrs.get("ill_posed", ""))
+
+    @property
+    def ended(self) -> str:
+        """When and why the truth ends early, as a clause; empty: it does not. What lies behind is not judged."""
+        end = ended_early(self.dataset)
+        return f"the truth ends at t = {end[0]:.6g} s: {end[1]}" if end else ""
 
     def shared(self, routes: Collection[str]) -> str:
         """Sentence about a route of the truth that is among ``routes``, and its check; empty if none is."""
@@ -105,7 +112,7 @@ class Reference:
         if known is None:  # for example a force that the equations do not determine all the time
             return np.full_like(values, np.nan), np.inf
         if item.role != Role.RESIDUAL:
-            return known, float(self.dataset.variables[name].attrs["error_bar"])
+            return known, float(self.dataset.variables[name].attrs.get("error_bar", np.inf))
         # Zero for a perfect run; the residual of the truth is the resolution of the measurement.
         return np.zeros_like(values), float(np.max(np.abs(known), initial=0.0))
 

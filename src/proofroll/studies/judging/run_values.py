@@ -45,6 +45,15 @@ def observables_of(reference: Reference, dataset: xr.Dataset) -> dict[str, Float
     return {name: values for name, values in turned.items() if values is not None}
 
 
+def laws_behind_the_end(reference: Reference, dataset: xr.Dataset) -> dict[str, FloatArray]:
+    """Residuals of laws that hold for any motion, of a whole run whose truth ends early; else nothing."""
+    if not reference.ended:
+        return {}
+    known = reference.scene.observables
+    laws = {name for name, item in known.items() if item.role is Role.RESIDUAL and not item.hangs_on_events}
+    return {name: values for name, values in observe(reference.scene, dataset).items() if name in laws}
+
+
 def on_true_turns(reference: Reference, name: str, values: FloatArray, dataset: xr.Dataset) -> FloatArray | None:
     """Values of a variable with the truth's whole turns, where they are uncertain; None: no comparison is possible.
 

@@ -20,6 +20,7 @@ from proofroll.truth.mechanism.followed_paths import (
     counterparts,
     followed,
     refuse_uncovered,
+    times_known,
     two_route_motion,
 )
 from proofroll.truth.mechanism.maximal_coordinates import MaximalCoordinates
@@ -51,6 +52,7 @@ def _in_units(mechanism: Mechanism, units: Units, times: Array) -> TwoRouteMotio
     bodies = ContactBodies(equations, TOLERANCES[1], size)
     until, kinks = float(times[-1]), breaks(own.signals)
     paths = followed(tree, bodies, until, kinks)
+    times = times_known(paths, times)
     stretches = paths[0].stretch_at(times)
     others = counterparts(paths, stretches, kinds)
     samples = [
@@ -73,7 +75,9 @@ def _in_units(mechanism: Mechanism, units: Units, times: Array) -> TwoRouteMotio
     reason = reason or "a change of the parameters within their accuracy changes which contacts stick, slide or open"
     forces = pressed * units.force, np.array([force for force, _ in applied]) * units.force
     one, two = units.record(mechanism, one), units.record(mechanism, two)
-    return two_route_motion(mechanism, paths, one, two, routes, reason, units, kinds=kinds, pressed=forces)
+    return two_route_motion(
+        mechanism, paths, one, two, routes, reason, units, kinds=kinds, pressed=forces, until=until * units.time
+    )
 
 
 def _shared_load(dynamics: ContactDynamics, path: HybridPath[Stretch[ContactMode]], time: float) -> str:

@@ -37,6 +37,8 @@ class TwoRouteMotion:
         checked_by: title of a closed form for a part of the motion, and its largest difference from the record.
         events: switches along the motion.
         reason: cause why the question is ill-posed from the horizon on.
+        end: time from which the motion is not known, s; the record ends before it; inf: it reaches all times asked for.
+        ended: reason why it ends there, as a clause.
         pressed: contact forces on the first bodies [N], (times, contacts, 3), NaN where not determinate; None: no
             contacts.
     """
@@ -52,6 +54,8 @@ class TwoRouteMotion:
     events: Sequence[Event] = ()
     reason: str = f"a start moved by {NUDGE:.1g} leads elsewhere: the motion is chaotic"
     pressed: Array | None = None
+    end: float = np.inf
+    ended: str = ""
 
 
 def fields_with_bars(mechanism: Mechanism, record: Record) -> dict[str, Array]:

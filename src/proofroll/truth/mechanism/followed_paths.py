@@ -47,6 +47,26 @@ def followed(
     return one, follow(second, until, kinks, CLOSE, first_close([one], CLOSE))
 
 
+def end_of(paths: tuple[FollowedPath, FollowedPath]) -> tuple[float, str]:
+    """Time in natural units at which the first of two paths ends early, and the error that ended it.
+
+    Infinite: both reach the last time. The text is empty where a decision is too close to be known.
+    """
+    early = [path for path in paths if not path.known]
+    if not early:
+        return np.inf, ""
+    first = min(early, key=lambda path: path.stretches[-1].end)
+    return first.stretches[-1].end, first.ended
+
+
+def times_known(paths: tuple[FollowedPath, FollowedPath], times: Array) -> Array:
+    """Those of rising times, in natural units, at which both paths are known; the first time always is."""
+    end = end_of(paths)[0]
+    known = times < end - time_accuracy(end) if np.isfinite(end) else np.ones(len(times), dtype=bool)
+    known[0] = True
+    return np.asarray(times[known])
+
+
 def two_route_motion(
     mechanism: Mechanism,
     paths: tuple[FollowedPath, FollowedPath],
@@ -58,6 +78,7 @@ def two_route_motion(
     *,
     kinds: Callable[[Any], Any] = lambda mode: mode,
     pressed: tuple[Array, Array] | None = None,
+    until: float = np.inf,
 ) -> TwoRouteMotion:
     """Motion with error bars, from the paths and records of two routes.
 
@@ -71,6 +92,7 @@ def two_route_motion(
         units: natural units of the paths.
         kinds: part of a mode in which both routes must agree.
         pressed: contact forces by both routes [N], (times, contacts, 3).
+        until: last time asked for [s].
     """
     parted, determinate = _parted(*paths, kinds) * units.time, analyse(mechanism).determinate
     masked = replace(one, wrench=np.where(determinate, one.wrench, np.nan))
@@ -88,11 +110,28 @@ def two_route_motion(
     horizon = min(parted, first_close(paths, CLOSE) * units.time)
     # A change at the horizon is what the question hangs on, and may lie before it by the accuracy of times; of one at
     # the end the last digits would say whether it is in.
-    last = min(horizon, float(one.time[-1]))
+    end, ended = end_of(paths)
+    last = min(horizon, units.time * end, until)
     certain = last - units.time * time_accuracy(last / units.time)
     happened = tuple(event for event in _events(*paths, units.time) if event.time < certain)
     force = None if pressed is None else pressed[0]
-    return TwoRouteMotion(masked, bars, differences, horizon, [], determinate, routes, None, happened, reason, force)
+    if np.isfinite(end):
+        ended = units.text_in_seconds(ended) or f"from t = {units.time * end:.6g} s on {reason}"
+    return TwoRouteMotion(
+        record=masked,
+        bars=bars,
+        differences=differences,
+        horizon=horizon,
+        branches=[],
+        determinate=determinate,
+        routes=routes,
+        checked_by=None,
+        events=happened,
+        reason=reason,
+        pressed=force,
+        end=end * units.time,
+        ended=ended,
+    )
 
 
 def _of_a_step(mechanism: Mechanism, record: Record, units: Units) -> dict[str, float]:

@@ -128,8 +128,11 @@ class Units(NamedTuple):
         try:
             yield
         except (Refused, Diverged) as error:
-            message = _TIME.sub(lambda match: f"{float(match[0]) * self.time:.6g}", str(error))
-            raise type(error)(message) from None
+            raise type(error)(self.text_in_seconds(str(error))) from None
+
+    def text_in_seconds(self, text: str) -> str:
+        """A message with its times in seconds instead of these units."""
+        return _TIME.sub(lambda match: f"{float(match[0]) * self.time:.6g}", text)
 
     def _along(self, mechanism: Mechanism, name: str) -> list[float]:
         """Units of all coordinates (``q0``) or velocities (``v0``) of a mechanism's tree."""

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
+from proofroll.core.dataset import ENDED, ENDS
 from proofroll.core.element import Element
 from proofroll.core.errors import NotUnique
 from proofroll.core.events import with_events
@@ -93,7 +94,10 @@ class MechanismTruth:
         notes = [branching(motion.branches)]
         if np.isfinite(motion.horizon):
             dataset.attrs["horizon"] = motion.horizon
-            notes.append(f"from {motion.horizon:.4g} s on {motion.reason}")
+            if not motion.ended or motion.horizon < record.time[-1]:
+                notes.append(f"from {motion.horizon:.4g} s on {motion.reason}")
+        if motion.ended:
+            dataset.attrs |= {ENDS: motion.end, ENDED: motion.ended}
         if any(notes):
             dataset.attrs["ill_posed"] = "; ".join(filter(None, notes))
         return with_events(dataset, motion.events) if element.mechanism.has_events else dataset
@@ -107,10 +111,12 @@ def _laws_alone(element: MechanismElement, times: FloatArray, reason: str) -> xr
     dataset = columns(element, resting, wrench, pressed, np.zeros((count, len(named_forces(mechanism))))).dataset()
     laws = {item.name for item in element.observables if item.role is Role.RESIDUAL and not item.hangs_on_events}
     for name, variable in list(dataset.data_vars.items()):
-        if np.issubdtype(variable.dtype, np.floating):
-            dataset[name] = variable.copy(data=np.full(variable.shape, 0.0 if name in laws else np.nan))
-            dataset[name].attrs["error_bar"] = 0.0
-    dataset.attrs |= {"route": "laws of contact alone", "second_route": "", "ill_posed": reason}
+        if not np.issubdtype(variable.dtype, np.floating):
+            continue
+        dataset[name] = variable.copy(data=np.full(variable.shape, 0.0 if name in laws else np.nan))
+        dataset[name].attrs |= {"error_bar": 0.0} if name in laws else {"absent": "no truth"}
+    dataset.attrs |= {"route": "laws of contact alone", "second_route": "", "ill_posed": reason, ENDS: 0.0}
+    dataset.attrs[ENDED] = reason
     return with_events(dataset, ())
 
 

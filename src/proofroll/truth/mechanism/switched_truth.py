@@ -21,6 +21,7 @@ from proofroll.truth.mechanism.followed_paths import (
     counterparts,
     followed,
     refuse_uncovered,
+    times_known,
     two_route_motion,
 )
 from proofroll.truth.mechanism.joint_switching import SwitchedTree
@@ -114,6 +115,7 @@ def _switched(mechanism: Mechanism, units: Units, own: Mechanism, times: Array) 
     )
     until, kinks = float(times[-1]), breaks(own.signals)
     paths = followed(tree, bodies, until, kinks)
+    times = times_known(paths, times)
     stretches = paths[0].stretch_at(times)
     others = counterparts(paths, stretches)
     q_and_v = states_of(tree, paths[0], times, stretches)
@@ -130,4 +132,4 @@ def _switched(mechanism: Mechanism, units: Units, own: Mechanism, times: Array) 
     routes = ("joint coordinates, DOP853, modes by complementarity", "maximal coordinates, DOP853, modes by trial")
     reason = "a change of the parameters within their accuracy changes which joints hold or hit a stop"
     one, two = units.record(mechanism, one), units.record(mechanism, two)
-    return two_route_motion(mechanism, paths, one, two, routes, reason, units)
+    return two_route_motion(mechanism, paths, one, two, routes, reason, units, until=until * units.time)
