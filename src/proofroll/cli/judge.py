@@ -23,6 +23,10 @@ def judge(
     tolerance: Annotated[
         list[str] | None, typer.Option(help="variable='1 %' of its scale, or variable='1e-3 m'; repeat.")
     ] = None,
+    columns: Annotated[
+        list[str] | None,
+        typer.Option("--map", help="Your columns: t=time,theta=q.pivot[deg],x=tip.x[cm]; units are converted."),
+    ] = None,
     because: Annotated[str, typer.Option(help="Why that is close enough.")] = "",
     time_limit: Annotated[float, typer.Option(help="Wall seconds after which the truth is given up.")] = RUN_TIME_LIMIT,
     as_json: options.Json = False,
@@ -46,7 +50,8 @@ def judge(
     loaded = load_scene(scene or str(named), **{**written, **options.assignments(settings)})  # type: ignore[arg-type]  # text is checked there
     bounds = options.assignments(tolerance, "--tolerance") if tolerance else None
     with options.spinner(f"the truth of {loaded.name}"), options.wall_limit(time_limit, f"the truth of {loaded.name}"):
-        judged = judging.judge(run, loaded, bounds, because=because)
+        names = options.assignments([part for text in columns or () for part in text.split(",")], "--map")
+        judged = judging.judge(run, loaded, bounds, because=because, columns=names)
     if as_json:
         options.write_json(judged.content())
     else:

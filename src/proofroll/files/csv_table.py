@@ -7,14 +7,15 @@ follow its name: ``p_WB/rod/x [m]``. Attributes, and variables without the dimen
 import csv
 import io
 import itertools
-import re
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
-_HEADER = re.compile(r"(?P<name>.*?)\s*(?:\[(?P<unit>[^\[\]]*)\])?")
+from proofroll.core.unit_conversion import name_and_unit
+
+_LONGEST = 300  # characters of names that a message lists
 _AXES = ("xyz", "wxyz")
 
 
@@ -41,25 +42,36 @@ def column_names(item: xr.DataArray) -> list[str]:
     return ["/".join(map(str, (item.name, *at))) for at in itertools.product(*labels)]
 
 
-def read_csv(text: str) -> xr.Dataset:
-    """Trajectory in a CSV file.
+def read_csv(text: str, new_names: Mapping[str, str] | None = None) -> xr.Dataset:
+    """Trajectory in a CSV file, whose columns are separated by commas, or by semicolons or tabs if its header has some.
+
+    Beside semicolons and tabs, numbers may have decimal commas.
+
+    Args:
+        text: of the file.
+        new_names: column -> its name here, perhaps with a unit, ``q.pivot[deg]``.
 
     Raises:
-        ValueError: the text is no table of numbers with a header, or lacks the column time.
+        ValueError: the text is no table of numbers with a header, lacks a column of ``new_names`` or the column time.
     """
-    reader = csv.reader(io.StringIO(text.removeprefix("\ufeff")), strict=True)
+    text = text.removeprefix("\ufeff").removeprefix("#")
+    first = text.partition("\n")[0]
+    separator = next((mark for mark in ";\t" if mark in first), ",")
+    reader = csv.reader(io.StringIO(text), strict=True, delimiter=separator)
     try:
         rows = list(reader)
     except csv.Error as error:  # for example an unclosed quote
         raise ValueError(f"line {reader.line_num}: {error}") from None
     header = [field.strip() for field in rows[0]] if rows else []
-    numbers = _numbers(header, rows[1:])
+    found = ", ".join(header)[:_LONGEST]
+    header = _renamed(header, new_names or {})
+    numbers = _numbers(header, rows[1:], decimal_comma=separator != ",")
     columns: dict[str, dict[tuple[str, ...], Any]] = {}
     units: dict[str, set[str]] = {}
     for index, field in enumerate(header):
-        match = _HEADER.fullmatch(field)
-        name, *labels = (match["name"] if match else "").split("/")
-        if not name or match is None:
+        whole, unit = name_and_unit(field)
+        name, *labels = whole.split("/")
+        if not name:
             raise ValueError(
                 f"column {index + 1} is called {field!r}; the header has names with units, as q.pivot [rad]"
             )
@@ -67,10 +79,13 @@ def read_csv(text: str) -> xr.Dataset:
         if tuple(labels) in own:
             raise ValueError(f"two columns are called {'/'.join((name, *labels))}")
         own[tuple(labels)] = numbers[:, index]
-        if match["unit"] is not None:
-            units.setdefault(name, set()).add(match["unit"].strip() or "1")
+        if unit is not None:
+            units.setdefault(name, set()).add(unit)
     if "time" not in columns:
-        raise ValueError("it has no column time [s]; its first line has the names")
+        raise ValueError(
+            f"it has no column time [s]; its first line has the names, here {found}; "
+            "--map t=time,theta=q.pivot[deg] says which column is what"
+        )
     variables: dict[str, Any] = {}
     coordinates: dict[str, list[str]] = {}
     for name, own in columns.items():
@@ -86,6 +101,20 @@ def read_csv(text: str) -> xr.Dataset:
     return xr.Dataset(variables, coordinates)
 
 
+def _renamed(header: list[str], names: Mapping[str, str]) -> list[str]:
+    """Header with columns renamed. Raises ValueError if one is not there."""
+    plain = [name_and_unit(field) for field in header]
+    for name in names:
+        if name not in [known for known, _ in plain]:
+            raise ValueError(f"it has no column {name}; it has {', '.join(known for known, _ in plain)[:_LONGEST]}")
+    renamed = []
+    for field, (name, unit) in zip(header, plain, strict=True):
+        new, new_unit = name_and_unit(names[name]) if name in names else (name, None)
+        kept = unit if new_unit is None else new_unit
+        renamed.append(field if name not in names else new if kept is None else f"{new} [{kept}]")
+    return renamed
+
+
 def _dimension(name: str, level: int, labels: Sequence[str]) -> str:
     """Name of a dimension of an array: ``xyz``, ``wxyz``, ``body``, or one of its own."""
     axes = "".join(labels)
@@ -94,14 +123,14 @@ def _dimension(name: str, level: int, labels: Sequence[str]) -> str:
     return "body" if level == 0 and not labels[0].isdigit() else f"{name}_{level + 1}"
 
 
-def _numbers(header: list[str], rows: list[list[str]]) -> Any:
+def _numbers(header: list[str], rows: list[list[str]], *, decimal_comma: bool) -> Any:
     numbers = []
     for line, row in enumerate(rows, start=2):
         if not row:
             continue
         if len(row) != len(header):
             raise ValueError(f"line {line} has {len(row)} fields, the header {len(header)}")
-        numbers.append([_number(field, line) for field in row])
+        numbers.append([_number(field.replace(",", ".") if decimal_comma else field, line) for field in row])
     return np.array(numbers).reshape(len(numbers), len(header))
 
 

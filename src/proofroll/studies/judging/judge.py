@@ -134,7 +134,12 @@ class Judged:
 
 
 def judge(
-    run: RunInput, scene: str | Scene, tolerance: Mapping[str, object] | str | float | None = None, *, because: str = ""
+    run: RunInput,
+    scene: str | Scene,
+    tolerance: Mapping[str, object] | str | float | None = None,
+    *,
+    because: str = "",
+    columns: Mapping[str, str] | None = None,
 ) -> Judged:
     """Compares a trajectory with the truth of a scene at the trajectory's own times.
 
@@ -149,13 +154,15 @@ def judge(
             every force and moment, and of given positions, velocities, angular velocities and orientations; for the
             time of the first slip the sampling interval. A run that reports sticking while it slips never agrees.
         because: reason for these tolerances.
+        columns: name in the trajectory -> name of a variable of the truth, perhaps with a unit that is converted:
+            ``{"theta": "q.pivot[deg]"}``.
 
     Raises:
         InputError: an argument names something unknown or makes no sense.
         Refused, Diverged: there is no truth of this scene.
     """
     scene = load_scene(scene) if isinstance(scene, str) else scene
-    given = read_run(run, scene)
+    given = read_run(run, scene, columns)
     dataset = given.dataset
     between = dataset[BETWEEN].to_numpy() if BETWEEN in dataset else np.zeros(0)
     asked = scene.fully_asked if "q_WB" in {str(name).partition(".")[0] for name in dataset.data_vars} else scene
@@ -241,7 +248,8 @@ def _bounds(
     able = list(dict.fromkeys([*observed, *(name for name in variables if _comparable(reference, name))]))
     if not able:
         known = ", ".join(str(name) for name in reference.dataset.data_vars if _comparable(reference, str(name)))
-        raise InputError("run", ", ".join(variables), f"the truth has none of these; it has {known}")
+        advice = f"the truth has none of these; say which is which, as --map theta=q.pivot[deg]; it has {known}"
+        raise InputError("run", ", ".join(variables), advice)
     if given is None:
         main = [name for name in observed if _is_main(scene.observables[name]) and not _unknown(reference, name)]
         events = [name for name in observed if (item := scene.observables[name]).watched and item.role is Role.EVENT]

@@ -12,12 +12,14 @@ import numpy as np
 from proofroll.core.arrays import FloatArray
 from proofroll.core.dataset import BETWEEN, add_events, columns_of, observe
 from proofroll.core.element_abilities import WatchesRuns
-from proofroll.core.errors import Diverged, InputError
+from proofroll.core.errors import Diverged, InputError, require_known
 from proofroll.core.events import events_of, wrong_bracket
 from proofroll.core.multi_element import REQUIRED
 from proofroll.core.observable import Role
 from proofroll.core.scene import Scene
 from proofroll.core.time_grid import LATEST
+from proofroll.core.unit_conversion import in_si, name_and_unit
+from proofroll.files.atomic import ordinary_content
 from proofroll.files.trajectory_file import CSV, STORED
 from proofroll.running.recording import require_unit
 
@@ -26,11 +28,6 @@ if TYPE_CHECKING:
 
 RunInput = Any
 """An ``xarray.Dataset``, the path of a file (netCDF, CSV, ``.npz``), or arrays by name, ``time`` [s] among them."""
-# Other spellings of units, as in files of other programs.
-_SPELT = {
-    "sec": "s", "second": "s", "seconds": "s", "radian": "rad", "radians": "rad", "m s-1": "m/s", "rad s-1": "rad/s",
-    "meter": "m", "meters": "m", "metre": "m", "metres": "m",
-}  # fmt: skip
 _WRITE_NETCDF = "; xarray writes it by to_netcdf(path, format='NETCDF3_64BIT')"
 FROM_STATE = "it follows from the state, which is judged"
 
@@ -83,14 +80,23 @@ def _require_numbers(name: str, item: xr.Variable) -> None:
 
 
 def _require_unit(name: str, unit: str, wanted: str) -> None:
-    if _SPELT.get(unit, unit) != wanted:
+    if in_si(unit)[0] != wanted:
         advice = f"convert {name} to {wanted}, the unit of the truth, or correct its attribute units"
         raise InputError("run", f"{name} in {unit}", advice)
 
 
-def read_run(run: RunInput, scene: Scene) -> GivenRun:
-    """Reads a trajectory. Raises InputError if it is none, or belongs to another scene."""
-    dataset = _dataset(run)
+def read_run(run: RunInput, scene: Scene, columns: Mapping[str, str] | None = None) -> GivenRun:
+    """Reads a trajectory; numbers in degrees, centimetres, milliseconds … are converted to SI units.
+
+    Args:
+        run: the trajectory.
+        scene: the scene.
+        columns: name in the trajectory -> name of a variable of the truth, perhaps with its unit: ``q.pivot[deg]``.
+
+    Raises:
+        InputError: the run is no trajectory, or belongs to another scene.
+    """
+    dataset = _converted(_dataset(run, columns or {}))
     made_of = dataset.attrs.get("scene_digest")
     if made_of is not None and made_of != scene.digest:
         made = str(dataset.attrs.get("scene"))
@@ -170,13 +176,38 @@ def _require_finite_state(run: xr.Dataset, scene: Scene) -> None:
                     raise InputError("run", name, str(error)) from None
 
 
-def _dataset(run: RunInput) -> xr.Dataset:
+def _converted(run: xr.Dataset) -> xr.Dataset:
+    """The trajectory with numbers in SI units where their units are known."""
+    changes: dict[Any, Any] = {}
+    for name, item in run.variables.items():
+        given = str(item.attrs.get("units", "")).strip()
+        unit, factor = in_si(given)
+        if factor != 1.0 and item.dtype.kind in "iuf":
+            changes[name] = (item.dims, item.values * factor, {**item.attrs, "units": unit})
+    times = {"time": changes.pop("time")} if "time" in changes else {}
+    converted: xr.Dataset = run.assign_coords(times).assign(changes)
+    return converted
+
+
+def _renamed(run: xr.Dataset, columns: Mapping[str, str]) -> xr.Dataset:
+    """The trajectory with its variables renamed, and units given to them. Raises InputError for an unknown name."""
+    for name, text in columns.items():
+        require_known("columns", name, map(str, run.variables), "the trajectory has")
+        new, unit = name_and_unit(text)
+        run = run.assign({name: run[name].assign_attrs({"units": unit})}) if unit else run
+        run = run.rename({name: new})
+    return run.set_coords("time") if "time" in run else run
+
+
+def _dataset(run: RunInput, columns: Mapping[str, str]) -> xr.Dataset:
     """The trajectory as a dataset with ``time``."""
     import xarray as xr
 
     if isinstance(run, str | Path):
         try:
-            run = _from_file(Path(run))
+            path = Path(run)
+            run = _from_file(path, columns)
+            columns = {} if path.suffix == CSV else columns  # whose header is renamed as it is read
         except FileNotFoundError:
             raise InputError("run", Path(run), "there is no such file") from None
         except (OSError, ValueError, LookupError) as error:  # a truncated file may raise any of them
@@ -184,9 +215,16 @@ def _dataset(run: RunInput) -> xr.Dataset:
             advice = f"it cannot be read ({error}){how}"
             raise InputError("run", Path(run), advice) from None
     if isinstance(run, xr.Dataset):
-        if "time" not in run.variables:
-            raise InputError("run", ", ".join(map(str, run.variables)), "it has no time; add the times in s as time")
-        return run
+        dataset = _renamed(run, columns)
+        if "time" not in dataset.variables:
+            names = ", ".join(map(str, dataset.variables))
+            raise InputError("run", names, "it has no time; add the times in s as time")
+        return dataset
+    for name, text in columns.items():
+        require_known("columns", name, run, "the trajectory has")
+        new, unit = name_and_unit(text)
+        values = xr.DataArray(np.asarray(run[name]), attrs={"units": unit} if unit else {})
+        run = {key: item for key, item in run.items() if key != name} | {new: values}
     given = {str(name): np.asarray(run[name]) for name in run}
     if "time" not in given:
         raise InputError("run", ", ".join(given), "it has no time; add the times in s as time")
@@ -197,10 +235,14 @@ def _dataset(run: RunInput) -> xr.Dataset:
     return xr.Dataset({name: item for name, item in variables.items() if name != "time"}, {"time": variables["time"]})
 
 
-def _from_file(path: Path) -> RunInput:
+def _from_file(path: Path, columns: Mapping[str, str]) -> RunInput:
     """Content of a file: a dataset, or arrays by name for numpy's own formats."""
     from proofroll.files.trajectory_file import read, read_arrays
 
+    if path.suffix == CSV and columns:
+        from proofroll.files.csv_table import read_csv
+
+        return read_csv(ordinary_content(path).decode(), columns)
     try:
         return read(path)
     except ValueError:

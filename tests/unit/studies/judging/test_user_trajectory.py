@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import xarray as xr
 
 import proofroll
 from proofroll.core.errors import InputError
@@ -34,3 +35,45 @@ def test_judge_has_a_limit_of_time(command_line: Callable[..., tuple[int, str, s
     code, out, err = command_line("judge", str(tmp_path / "run.npz"), "--scene", "pendulum", "--time-limit", "0.2")
     assert (code, out) == (2, "")
     assert "--time-limit = '0.2 s': the truth of pendulum took longer; end the trajectory sooner" in err
+
+
+@pytest.fixture(scope="module")
+def pendulum() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Times [s], angle [rad] and place [m] of the pendulum."""
+    run = proofroll.simulate("pendulum", "projection", until=0.2, every=0.01)
+    return run["time"].to_numpy(), run["q.pivot"].to_numpy(), run["tip.x"].to_numpy()
+
+
+def test_columns_of_any_name_and_unit(
+    pendulum: tuple[np.ndarray, np.ndarray, np.ndarray],
+    command_line: Callable[..., tuple[int, str, str]],
+    tmp_path: Path,
+) -> None:
+    """A table with semicolons, decimal commas, own names, ms, degrees and cm is judged as the same run in SI units."""
+    times, angles, places = pendulum
+    rows = zip(1e3 * times, np.degrees(angles), 100 * places, strict=True)
+    lines = ["t (ms);theta;x", *(";".join(f"{value:.15g}".replace(".", ",") for value in row) for row in rows)]
+    (tmp_path / "own.csv").write_text("\n".join(lines), encoding="utf-8")
+    given = ("judge", str(tmp_path / "own.csv"), "pendulum")
+    code, out, err = command_line(*given, "--map", "t=time,theta=q.pivot[deg],x=tip.x[cm]")
+    assert (code, err) == (0, "")
+    assert "ok q.pivot" in out
+    assert "ok tip.x" in out
+    code, out, err = command_line(*given)
+    assert (code, out) == (2, "")
+    assert "its first line has the names, here t (ms), theta, x; --map t=time" in err
+    code, _, err = command_line(*given, "--map", "tt=time")
+    assert code == 2
+    assert "it has no column tt; it has t, theta, x" in err
+
+
+def test_arrays_are_renamed_and_converted(pendulum: tuple[np.ndarray, np.ndarray, np.ndarray]) -> None:
+    """``columns`` does the same for arrays, and for a dataset whose attributes have the units."""
+    times, angles, _ = pendulum
+    names = {"t": "time[ms]", "theta": "q.pivot[deg]"}
+    arrays = {"t": 1e3 * times, "theta": np.degrees(angles)}
+    assert proofroll.judge(arrays, "pendulum", columns=names).agrees
+    dataset = xr.Dataset({"q.pivot": ("time", np.degrees(angles), {"units": "deg"})}, {"time": times})
+    assert proofroll.judge(dataset, "pendulum").agrees
+    with pytest.raises(InputError, match="columns = 'phi': the trajectory has t, theta"):
+        proofroll.judge(arrays, "pendulum", columns={"phi": "q.pivot"})
