@@ -3,12 +3,13 @@
 from dataclasses import replace
 
 import numpy as np
+from scipy.linalg import null_space
 
 from proofroll.core.errors import InputError
-from proofroll.elements.mechanism.analysis import analyse, least_norm_solution
+from proofroll.elements.mechanism.analysis import RANK, analyse, least_norm_solution
 from proofroll.elements.mechanism.contacts.start import extent
 from proofroll.elements.mechanism.joint import FACTS
-from proofroll.elements.mechanism.joint_coordinates import JointCoordinates
+from proofroll.elements.mechanism.joint_coordinates import SINGULAR, JointCoordinates
 from proofroll.elements.mechanism.kinematics import Rows, Tree
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.rotations import Array
@@ -16,7 +17,6 @@ from proofroll.elements.mechanism.rotations import Array
 CLOSED = 1e-12  # largest gap of a closed loop, by round-off: relative to the mechanism's size or speeds, or rad
 _AWAY = 8 * np.finfo(float).eps  # round-off of positions, relative to their distance from the world's origin
 _ROUNDS = 50  # Newton's steps; from a fair guess it needs five
-_STILL = 1e-12  # least eigenvalue of a mass matrix scaled to a diagonal of ones; below, it counts as singular
 _PART = 1e-6  # velocities below this, relative to the largest in a motion, are round-off
 _LARGEST = 0.5  # rad or m in one step: beyond it, the linearisation does not hold
 IMMOBILE = "it cannot move; free a joint or a loop"
@@ -61,14 +61,16 @@ def _finite(rows: Rows) -> Rows:
     return rows
 
 
-def _check_inertia(mechanism: Mechanism, M: Array) -> None:
-    """Raises InputError if some velocity moves nothing that has inertia."""
+def _check_inertia(mechanism: Mechanism, M: Array, C: Array) -> None:
+    """Raises InputError if some velocity that loops and couplings (rows C) allow moves nothing that has inertia."""
     if not np.isfinite(M).all():
         raise InputError("mass matrix", "infinite", "masses, moments or lengths are too large to be computed with")
     size = np.sqrt(np.where(np.diag(M) > 0, np.diag(M), 1.0))
-    values, vectors = np.linalg.eigh(M / np.outer(size, size))
-    if len(values) and values[0] < _STILL:
-        still = np.abs(vectors[:, 0] / size) > _PART * np.abs(vectors[:, 0] / size).max()
+    allowed = null_space(C / size, RANK) if C.size else np.eye(len(M))
+    values, vectors = np.linalg.eigh(allowed.T @ (M / np.outer(size, size)) @ allowed)
+    if len(values) and values[0] < SINGULAR:
+        way = allowed @ vectors[:, 0] / size
+        still = np.abs(way) > _PART * np.abs(way).max()
         joints = zip(mechanism.joints, mechanism.v_slices, strict=True)
         names = ", ".join(joint.name for joint, at in joints if still[at].any())
         advice = "can move so that nothing with inertia does; give a body that they move mass and moments, or fix one"
@@ -115,16 +117,16 @@ def check_start(mechanism: Mechanism) -> None:
             advice = f"v0 opens the loop at {rate:.3g} m/s (or rad/s); {ADVICE.replace('q0', 'v0', 1)}"
             raise InputError(field, between, advice)
     for number, coupling in enumerate(mechanism.couplings, len(mechanism.loops)):
-        field, between = f"couplings.{coupling.name}", f"{coupling.joint_a} to {coupling.joint_b}"
-        apart, sizes = rows.residual[rows.loop == number], np.abs([coupling.offset, *q])
+        field, between = f"couplings.{coupling.name}", coupling.between
+        apart, sizes = rows.residual[rows.loop == number], np.abs([coupling.place, *q])
         if abs(apart[0]) > CLOSED * max(1.0, sizes.max()):
-            raise InputError(field, between, f"q0 of {coupling.joint_b} is {apart[0]:.3g} rad (or m) off; {ADVICE}")
+            raise InputError(field, between, f"q0 of {coupling.terms[0][0]} is {apart[0]:.3g} rad (or m) off; {ADVICE}")
         rate, least_rate = _opening(rows.C[rows.loop == number], v, 0.0)
         if rate > least_rate:
             advice = f"v0 opens the coupling at {rate:.3g} rad/s (or m/s); {ADVICE.replace('q0', 'v0', 1)}"
             raise InputError(field, between, advice)
     equations = JointCoordinates(mechanism)
-    _check_inertia(mechanism, equations.inertial(motion)[1])
+    _check_inertia(mechanism, equations.inertial(motion)[1], rows.C)
     if analyse(mechanism).mobility == 0:
         raise InputError("mechanism", f"{len(mechanism.joints)} joints", IMMOBILE)
     with np.errstate(all="ignore"):  # the line below says it

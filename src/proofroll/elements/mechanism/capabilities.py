@@ -5,6 +5,7 @@ from enum import StrEnum
 
 from proofroll.core.errors import Refused
 from proofroll.elements.mechanism.joint import FACTS
+from proofroll.elements.mechanism.joint_coordinates import lacks_inertia
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.signal import varies
 
@@ -38,6 +39,8 @@ class MechanismCapability(StrEnum):
     ACTUATORS = "actuators of joints"
     SATURATION = "limits of efforts"
     COUPLINGS = "couplings of joints"
+    COUPLINGS_OF_MANY = "couplings of three or more joints"
+    MASSLESS = "joints that move a mass through loops or couplings alone"
     SIGNALS = "drives and targets that change in time"
 
 
@@ -66,6 +69,8 @@ def required(mechanism: Mechanism) -> frozenset[str]:
         capability.ACTUATORS: bool(actuators),
         capability.SATURATION: any(actuator.limit is not None for actuator in actuators),
         capability.COUPLINGS: bool(mechanism.couplings),
+        capability.COUPLINGS_OF_MANY: any(len(coupling.terms) > 2 for coupling in mechanism.couplings),
+        capability.MASSLESS: lacks_inertia(mechanism),
         capability.SIGNALS: any(map(varies, mechanism.signals)),
     }
     needs |= {need for need, applies in asked.items() if applies}

@@ -1,4 +1,4 @@
-"""Actuators of joints, and couplings of two joints."""
+"""Actuators of joints, and couplings of joints."""
 
 from __future__ import annotations
 
@@ -6,6 +6,8 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal
+
+import numpy as np
 
 from proofroll.core.errors import InputError, require_known
 from proofroll.elements.mechanism import checks
@@ -19,6 +21,9 @@ _GAINS: Mapping[str, tuple[str, ...]] = {"torque": (), "velocity": ("kd",), "pos
 _EFFORT, _PLACE = {"unit": "N m or N"}, {"unit": "rad or m"}
 _TARGET = {"unit": {"torque": _EFFORT["unit"], "velocity": "rad/s or m/s", "position": _PLACE["unit"]}}
 MODES = ("least", "linear", "greatest")  # of an effort with a limit: at its lower limit, between, at its upper limit
+
+
+_DEPENDENT = 1e-9  # singular value of rows of length 1 below which one follows from the others
 
 
 @dataclass(frozen=True)
@@ -111,30 +116,73 @@ class Actuator:
 
 @dataclass(frozen=True)
 class Coupling:
-    """Two joints that move together, as by gears, a belt, a rack: q_b = ratio q_a + offset.
+    """Joints that move together, as by gears, a belt, a rope, a differential.
+
+    Two joints: q_b = ratio q_a + offset. Any number: coefficients[0] q_0 + coefficients[1] q_1 + … = offset.
 
     Attributes:
         name: unique among couplings.
         joint_a, joint_b: revolute or prismatic joints.
         ratio: of the rate of joint_b to that of joint_a.
-        offset: coordinate of joint_b where that of joint_a is zero.
+        offset: coordinate of joint_b where that of joint_a is zero; with ``joints`` the sum of their coordinates, each
+            times its coefficient.
+        joints: two or more revolute or prismatic joints, in place of joint_a, joint_b and ratio.
+        coefficients: one for each of ``joints``, none of them zero.
     """
 
     name: str
-    joint_a: str
-    joint_b: str
-    ratio: float = field(metadata={"unit": "1 or rad/m or m/rad"})
+    joint_a: str = ""
+    joint_b: str = ""
+    ratio: float = field(default=0.0, metadata={"unit": "1 or rad/m or m/rad"})
     offset: float = field(default=0.0, metadata=_PLACE)
+    joints: tuple[str, ...] = ()
+    coefficients: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
         where = f"couplings.{checks.name(self.name, 'couplings')}"
         checks.read(self, where, checks.number, "ratio", "offset")
+        if self.joints or self.coefficients:
+            self._check_many(where)
+            return
+        for key in ("joint_a", "joint_b"):
+            if not getattr(self, key):
+                raise InputError(f"{where}.{key}", "nothing", "name it; or give joints and coefficients")
         if not self.ratio:
             raise InputError(
                 f"{where}.ratio", 0.0, "it would hold joint_b and leave joint_a free; fix the joint instead"
             )
         if self.joint_a == self.joint_b:
             raise InputError(f"{where}.joint_b", self.joint_b, "a coupling connects two joints; these are the same")
+
+    def _check_many(self, where: str) -> None:
+        names = tuple(checks.name(name, f"{where}.joints") for name in self.joints)
+        factors = checks.numbers(f"{where}.coefficients", self.coefficients, len(names))
+        checks.assign(self, joints=names, coefficients=factors)
+        if self.joint_a or self.joint_b or self.ratio:
+            raise InputError(f"{where}.joints", list(names), "give these, or joint_a, joint_b and ratio; not both")
+        if len(names) < 2 or len(set(names)) < len(names):
+            raise InputError(f"{where}.joints", list(names), "name two or more joints, each once")
+        if not all(factors):
+            raise InputError(f"{where}.coefficients", list(factors), "none may be zero; leave out that joint")
+
+    @property
+    def terms(self) -> tuple[tuple[str, float], ...]:
+        """Joints with their coefficients in a sum that equals :attr:`place`; the first coefficient is 1."""
+        if not self.joints:
+            return (self.joint_b, 1.0), (self.joint_a, -self.ratio)
+        return tuple(
+            (name, factor / self.coefficients[0]) for name, factor in zip(self.joints, self.coefficients, strict=True)
+        )
+
+    @property
+    def place(self) -> float:
+        """Sum of the coordinates, each times its coefficient in :attr:`terms` [rad or m]."""
+        return self.offset / self.coefficients[0] if self.joints else self.offset
+
+    @property
+    def between(self) -> str:
+        """Names of its joints, as a clause."""
+        return " to ".join((self.joint_a, self.joint_b)) if not self.joints else ", ".join(self.joints)
 
 
 def check_drives(joints: Sequence[Joint], actuators: Sequence[Actuator], couplings: Sequence[Coupling]) -> None:
@@ -145,7 +193,13 @@ def check_drives(joints: Sequence[Joint], actuators: Sequence[Actuator], couplin
     """
     kinds = {joint.name: joint.kind for joint in joints}
     named = [(f"actuators.{item.name}.joint", item.joint) for item in actuators]
-    named += [(f"couplings.{c.name}.{key}", getattr(c, key)) for c in couplings for key in ("joint_a", "joint_b")]
+    named += [
+        (f"couplings.{c.name}.{key}", getattr(c, key))
+        for c in couplings
+        for key in ("joint_a", "joint_b")
+        if not c.joints
+    ]
+    named += [(f"couplings.{c.name}.joints", name) for c in couplings for name in c.joints]
     for field_name, name in named:
         require_known(field_name, name, sorted(kinds), "there is no such joint; choose from")
         if kinds[name] not in LAWS["torque"]:
@@ -162,10 +216,12 @@ def check_drives(joints: Sequence[Joint], actuators: Sequence[Actuator], couplin
             )
             raise InputError(f"actuators.{item.name}.joint", item.joint, advice)
         servos[item.joint] = item.name
-    group = {name: name for name in kinds}
-    for coupling in couplings:
-        a, b = group[coupling.joint_a], group[coupling.joint_b]
-        if a == b:
+    columns = {name: number for number, name in enumerate(kinds)}
+    rows = np.zeros((len(couplings), len(kinds)))
+    for number, coupling in enumerate(couplings):
+        for name, factor in coupling.terms:
+            rows[number, columns[name]] = factor
+        some = rows[: number + 1] / np.linalg.norm(rows[: number + 1], axis=1, keepdims=True)
+        if np.linalg.matrix_rank(some, tol=_DEPENDENT) <= number:
             advice = "the couplings form a ring, so that one follows from the others; remove it"
-            raise InputError(f"couplings.{coupling.name}", f"{coupling.joint_a} to {coupling.joint_b}", advice)
-        group = {name: a if own == b else own for name, own in group.items()}
+            raise InputError(f"couplings.{coupling.name}", coupling.between, advice)

@@ -26,6 +26,7 @@ from proofroll.elements.mechanism.rotations import Array, skews, to_quaternion
 from proofroll.elements.mechanism.signal import value_at, varies
 from proofroll.elements.mechanism.switches import REDUNDANT, STOPPED, Mode, held_joints, switched_joints
 
+SINGULAR = 1e-12  # least eigenvalue of a mass matrix scaled to a diagonal of ones; below, it counts as singular
 _NEAR = 1e-7  # displacement of coordinates for finite differences of accelerations [m, 1]
 _EQUAL_STEP = 2e-3  # s
 _STEP = 0.05  # of DOP853, in times in which the fastest mode turns by 1 rad; chains of 5 to 80 links need no less
@@ -54,6 +55,17 @@ class Solution:
     holding: Array
 
 
+def lacks_inertia(mechanism: Mechanism) -> bool:
+    """True if the mass matrix at the start is singular, so that only loops or couplings give some joints inertia."""
+    light = any(not body.mass or not np.any(body.inertia) for body in mechanism.bodies)
+    if not light or not (mechanism.loops or mechanism.couplings):
+        return False
+    equations = JointCoordinates(mechanism, 0)
+    M = equations.inertial(equations.tree.at(*mechanism.start()))[1]
+    size = np.sqrt(np.where(np.diag(M) > 0, np.diag(M), 1.0))
+    return bool(np.linalg.eigvalsh(M / np.outer(size, size)).min(initial=1.0) < SINGULAR)
+
+
 class JointCoordinates:
     """Equations of motion of a mechanism in the coordinates of its tree.
 
@@ -76,6 +88,7 @@ class JointCoordinates:
         self.limited = [place for place in self.actuators if place[0].limit is not None]
         self._clamped = [actuator.limit is not None for actuator in mechanism.actuators]
         self.switches = bool(self.switched or self.limited)
+        self._light = self.rank > 0 and lacks_inertia(mechanism)
         self._armature = np.diag([joint.armature for joint in by_velocity])
         laws = zip(mechanism.joints, mechanism.q_slices, mechanism.v_slices, strict=True)
         self._springs = [(joint.stiffness, joint.rest, at_q, at_v) for joint, at_q, at_v in laws if joint.stiffness]
@@ -114,6 +127,7 @@ class JointCoordinates:
         C, bias, rank = rows.C, rows.bias, self.rank
         if held := [self.switched[number].velocity for number in held_joints(mode)]:
             C, bias, rank = np.vstack([C, np.eye(len(v))[held]]), np.append(bias, np.zeros(len(held))), rank + len(held)
+        M, b = self._weighted(M, b, C, bias)
         try:
             into = np.linalg.inv(np.linalg.cholesky(M)).T  # M⁻¹ = into intoᵀ
         except np.linalg.LinAlgError:
@@ -138,6 +152,16 @@ class JointCoordinates:
             C,
             multipliers[loops:],
         )
+
+    def _weighted(self, M: Array, b: Array, C: Array, bias: Array) -> tuple[Array, Array]:
+        """Mass matrix and forces with a weight on the rows, if the mass matrix is singular without them.
+
+        Accelerations meet C v̇ = −bias, so the weight changes neither them nor the multipliers.
+        """
+        if not self._light:
+            return M, b
+        weight = float(M.max()) / float(np.abs(C.T @ C).max())
+        return M + weight * C.T @ C, b - weight * bias @ C
 
     def rows(self, q: Array) -> Rows:
         """Constraints of loops and couplings for coordinates (nq), at rest."""

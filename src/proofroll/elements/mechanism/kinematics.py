@@ -171,10 +171,11 @@ class Tree:
         return Rows(residual, C, bias, force, torque, loop)
 
     def _coupled(self, motion: BodyMotion, coupling: Coupling) -> tuple[Array, Array, Array, Array, Array]:
-        (q_a, v_a), (q_b, v_b) = (self.mechanism.place_of(name) for name in (coupling.joint_a, coupling.joint_b))
-        C = np.zeros((1, self.mechanism.nv))
-        C[0, v_b], C[0, v_a] = 1.0, -coupling.ratio
-        apart = motion.q[q_b] - coupling.ratio * motion.q[q_a] - coupling.offset
+        C, apart = np.zeros((1, self.mechanism.nv)), -coupling.place
+        for name, factor in coupling.terms:
+            at_q, at_v = self.mechanism.place_of(name)
+            C[0, at_v] = factor
+            apart += factor * motion.q[at_q]
         return np.array([apart]), C, np.zeros(1), np.zeros((1, 3)), np.zeros((1, 3))
 
     def _rows_of(self, motion: BodyMotion, loop: Loop) -> tuple[Array, Array, Array, Array, Array]:

@@ -6,7 +6,7 @@ body ``world``. Each object checks itself and raises :class:`~proofroll.core.err
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -81,7 +81,7 @@ class Mechanism:
         checks.assign(self, joints=_depth_first(self.bodies, self.joints))
         check_drives(self.joints, self.actuators, self.couplings)
         checks.assign(self, gravity=checks.vector("gravity", self.gravity))
-        _check_masses(self.bodies, self.joints)
+        _check_masses(self.bodies, self.joints, {name for item in self.couplings for name, _ in item.terms})
         _check_unique("pairs", (*self.joints, *self.loops, *self.contacts))  # their forces are named alike
 
     @cached_property
@@ -247,12 +247,12 @@ def _depth_first(bodies: Sequence[Body], joints: Sequence[Joint]) -> tuple[Joint
     return tuple(found)
 
 
-def _check_masses(bodies: Sequence[Body], joints: Sequence[Joint]) -> None:
-    """Raises InputError unless everything that a joint moves has a mass: the child itself or a body that it carries."""
+def _check_masses(bodies: Sequence[Body], joints: Sequence[Joint], coupled: Collection[str]) -> None:
+    """Raises InputError unless a joint moves a mass: its child, a body that this carries, or one through a coupling."""
     carried = {body.name: body.mass for body in bodies} | {WORLD: 0.0}
     for joint in reversed(joints):  # sorted: the children come last
         carried[joint.parent] += carried[joint.child]
-        if not carried[joint.child] and joint.nv and not joint.armature:
+        if not carried[joint.child] and joint.nv and not joint.armature and joint.name not in coupled:
             raise InputError(
                 f"bodies.{joint.child}.mass", 0.0, "a body without mass can move here; give it one or fix it"
             )

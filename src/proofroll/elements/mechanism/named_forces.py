@@ -41,7 +41,11 @@ def named_forces(mechanism: Mechanism) -> tuple[NamedForce, ...]:
     ]
     found += [
         NamedForce(
-            f"coupling.{item.name}", "coupling", k, unit[item.joint_b], f"force of {item.name} on {item.joint_b}"
+            f"coupling.{item.name}",
+            "coupling",
+            k,
+            unit[item.terms[0][0]],
+            f"force of {item.name} on {item.terms[0][0]}",
         )
         for k, item in enumerate(mechanism.couplings)
     ]

@@ -58,10 +58,10 @@ class JointLaws:
         for entry, actuator in enumerate(mechanism.actuators):
             self._add(self._acting(actuator), actuator.joint, field="effort", entry=entry)
         for entry, coupling in enumerate(mechanism.couplings):
-            markers = [self._coordinate(name) for name in (coupling.joint_b, coupling.joint_a)]
-            item = self._coupled(markers, coupling.ratio, coupling.offset)
-            self._add(item, coupling.joint_b, factor=1.0, field="coupling", entry=entry)
-            self._add(item, coupling.joint_a, factor=-coupling.ratio)
+            (first, _), (second, factor) = coupling.terms
+            item = self._coupled([self._coordinate(first), self._coordinate(second)], -factor, coupling.place)
+            self._add(item, first, factor=1.0, field="coupling", entry=entry)
+            self._add(item, second, factor=factor)
 
     def _add(self, item: Any, joint: str, **others: Any) -> None:
         self._laws.append(JointLaw(item, self._mechanism.joint_index[joint], **others))

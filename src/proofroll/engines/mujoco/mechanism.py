@@ -38,13 +38,20 @@ PROVIDES = (
     | FORCES
     | {_CAPABILITY.FIXED_LOOP, _CAPABILITY.REVOLUTE_LOOP, _CAPABILITY.SPHERICAL_LOOP, _CAPABILITY.REDUNDANT}
     | {_CAPABILITY.JOINT_FRICTION, _CAPABILITY.ARMATURE, _CAPABILITY.STOPS}
-    | {_CAPABILITY.ACTUATORS, _CAPABILITY.SATURATION, _CAPABILITY.COUPLINGS, _CAPABILITY.SIGNALS}
+    | {
+        _CAPABILITY.ACTUATORS,
+        _CAPABILITY.SATURATION,
+        _CAPABILITY.COUPLINGS,
+        _CAPABILITY.COUPLINGS_OF_MANY,
+        _CAPABILITY.SIGNALS,
+    }
 )
 _NO_ROWS = "MuJoCo's equality constraints hold points or whole frames together, and no single angle or direction"
 LACKING: Mapping[str, str] = {
     _CAPABILITY.PRISMATIC_LOOP: _NO_ROWS,
     _CAPABILITY.UNIVERSAL_LOOP: _NO_ROWS,
     _CAPABILITY.PLANAR_LOOP: _NO_ROWS,
+    _CAPABILITY.MASSLESS: "MuJoCo needs a positive definite mass matrix of the tree alone",
     _CAPABILITY.REBOUNDS: "MuJoCo's limits have no restitution but that of a spring of their own",
 }
 

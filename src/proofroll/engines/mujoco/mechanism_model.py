@@ -76,15 +76,27 @@ def write(mechanism: Mechanism, settings: MujocoSettings) -> Any:
     for actuator in mechanism.actuators:
         _add_actuator(spec, actuator)
     for coupling in mechanism.couplings:
-        added = spec.add_equality(
-            name=coupling_name(coupling), type=mujoco.mjtEq.mjEQ_JOINT, objtype=mujoco.mjtObj.mjOBJ_JOINT
-        )
-        added.name1, added.name2 = coupling.joint_b, coupling.joint_a
-        added.data[:2] = coupling.offset, coupling.ratio
-        settings.soften(added)
+        settings.soften(_add_coupling(spec, coupling))
     if mechanism.contacts:
         write_contacts(spec, bodies, mechanism, settings)
     return spec
+
+
+def _add_coupling(spec: Any, coupling: Coupling) -> Any:
+    """An equality of two joints, or of more joints through a fixed tendon whose length is held."""
+    name = coupling_name(coupling)
+    if len(coupling.terms) == 2:
+        (joint, _), (other, factor) = coupling.terms
+        added = spec.add_equality(name=name, type=mujoco.mjtEq.mjEQ_JOINT, objtype=mujoco.mjtObj.mjOBJ_JOINT)
+        added.name1, added.name2 = joint, other
+        added.data[:2] = coupling.place, -factor
+        return added
+    tendon = spec.add_tendon(name=name)
+    for joint, factor in coupling.terms:
+        tendon.wrap_joint(joint, factor)
+    added = spec.add_equality(name=name, type=mujoco.mjtEq.mjEQ_TENDON, objtype=mujoco.mjtObj.mjOBJ_TENDON)
+    added.name1 = name
+    return added
 
 
 def _add_body(spec: Any, parent: Any, number: int, joint: Joint, body: Body, settings: MujocoSettings) -> Any:

@@ -19,10 +19,11 @@ from proofroll.engines.pinocchio.joint_tree import JointTree
 
 _POINTS = {MechanismCapability.SPHERICAL_LOOP, MechanismCapability.REVOLUTE_LOOP}
 _NO_ROWS = "Pinocchio's rigid constraints hold points or whole frames together, and no single angle or direction"
-PROVIDES = (joint_tree.PROVIDES - ALL_LOOPS | _POINTS) - {MechanismCapability.COUPLINGS}
+_COUPLINGS = {MechanismCapability[name] for name in ("COUPLINGS", "COUPLINGS_OF_MANY", "MASSLESS")}
+PROVIDES = (joint_tree.PROVIDES - ALL_LOOPS | _POINTS) - _COUPLINGS
 LACKING: Mapping[str, str] = {
     **joint_tree.LACKING,
-    **dict.fromkeys((ALL_LOOPS - _POINTS) | {MechanismCapability.COUPLINGS}, _NO_ROWS),
+    **dict.fromkeys((ALL_LOOPS - _POINTS) | _COUPLINGS, _NO_ROWS),
 }
 _ITERATIONS = 50
 _ACCURACY = 1e-14

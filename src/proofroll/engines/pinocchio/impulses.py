@@ -31,7 +31,9 @@ PROVIDES: frozenset[str] = (
     | {_CAPABILITY.JOINT_FRICTION, _CAPABILITY.STOPS, _CAPABILITY.REBOUNDS}
 )
 _OF_A_TREE = "its steps are those of a tree with contacts"
-LACKING: Mapping[str, str] = dict.fromkeys(ALL_LOOPS | {_CAPABILITY.COUPLINGS}, _OF_A_TREE)
+LACKING: Mapping[str, str] = dict.fromkeys(
+    ALL_LOOPS | {_CAPABILITY.COUPLINGS, _CAPABILITY.COUPLINGS_OF_MANY, _CAPABILITY.MASSLESS}, _OF_A_TREE
+)
 # Approach speed, in steps of gravity, below which nothing rebounds.
 _SOFT = 5.0
 # Fraction of a gap that a step by the midpoint rule closes; closing all of it would eject what has penetrated.

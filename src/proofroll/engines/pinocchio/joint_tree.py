@@ -13,11 +13,22 @@ import pinocchio as pin
 
 from proofroll.elements.mechanism import WORLD, Joint, Loop, Mechanism, Spring
 from proofroll.elements.mechanism.capabilities import ALL_JOINTS, ALL_LOOPS, FORCES, MechanismCapability
+from proofroll.elements.mechanism.joint_coordinates import lacks_inertia
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.elements.mechanism.signal import value_at, varies
 
 _OF_JOINTS = {
-    MechanismCapability[name] for name in ("REDUNDANT", "ARMATURE", "ACTUATORS", "SATURATION", "SIGNALS", "COUPLINGS")
+    MechanismCapability[name]
+    for name in (
+        "REDUNDANT",
+        "ARMATURE",
+        "ACTUATORS",
+        "SATURATION",
+        "SIGNALS",
+        "COUPLINGS",
+        "COUPLINGS_OF_MANY",
+        "MASSLESS",
+    )
 }
 PROVIDES: frozenset[str] = ALL_JOINTS | ALL_LOOPS | FORCES | _OF_JOINTS
 LACKING: Mapping[str, str] = {
@@ -44,6 +55,7 @@ class JointTree:
         varies: True if a drive or a target changes in time.
         now: time at which drives and targets are evaluated [s].
         closed: True if there are loops or couplings.
+        light: True if only loops or couplings give some joints inertia.
         geared: Jacobian of the couplings for joint velocities, (couplings, nv).
     """
 
@@ -136,16 +148,17 @@ class JointTree:
         self._constant = not (self.sprung or self.damping.any() or self._timed or self._actuators)
         couplings = self.mechanism.couplings
         self.closed = bool(self.mechanism.loops or couplings)
+        self.light = lacks_inertia(self.mechanism)
         self.geared = np.zeros((len(couplings), self.model.nv))
         self._geared_q = np.zeros((len(couplings), self.model.nq))
         for number, coupling in enumerate(couplings):
-            for joint, factor in ((coupling.joint_a, -coupling.ratio), (coupling.joint_b, 1.0)):
+            for joint, factor in coupling.terms:
                 at_q, at_v = self.mechanism.place_of(joint)
                 self._geared_q[number, at_q] = self.geared[number, at_v] = factor
-        self._offsets = np.array([coupling.offset for coupling in couplings])
+        self._offsets = np.array([coupling.place for coupling in couplings])
 
     def apart(self, q: Array) -> Array:
-        """Residual of each coupling: distance of joint_b from its place, rad or m."""
+        """Residual of each coupling: distance of its first joint from its place, rad or m."""
         return np.asarray(self._geared_q @ q - self._offsets)
 
     def drives(self, q: Array, v: Array) -> Array:

@@ -135,6 +135,8 @@ class LoopRows:
         Raises:
             LinAlgError: the mass matrix is not positive definite, or the singular values are not found.
         """
+        if self._tree.light:
+            M = M + self.weight(M, C) * C.T @ C
         upper, failed = dpotrf(M, lower=0)
         if failed:
             raise np.linalg.LinAlgError("the mass matrix is not positive definite")
@@ -144,6 +146,10 @@ class LoopRows:
             raise np.linalg.LinAlgError("the singular values were not found")
         r = self.rank
         return Split(into, into @ Vt[:r].T, U[:, :r].T / S[:r, None])
+
+    def weight(self, M: Array, C: Array) -> float:
+        """Factor on CᵀC that makes a singular mass matrix definite and leaves motions that the rows allow alone."""
+        return float(np.abs(M).max() / np.abs(C.T @ C).max()) if self._tree.light else 0.0
 
     def eliminated(self, data: Any, q: Array, v: Array) -> tuple[Array, Array]:
         """State without violations of the loops, moved along the locked directions (Blajer 2002)."""
@@ -162,7 +168,7 @@ class NullSpace:
     """Accelerations and reactions of a tree with loops and couplings.
 
     Attributes:
-        on_couplings: force of each coupling on its joint_b at the last call of :meth:`reactions`.
+        on_couplings: force of each coupling on its first joint at the last call of :meth:`reactions`.
     """
 
     def __init__(self, tree: JointTree, rows: LoopRows) -> None:
@@ -193,7 +199,8 @@ class NullSpace:
         split = self._rows.split(M, rows.C)
         free = split.into @ (split.into.T @ (tau - bias))
         normal = -split.back @ (rows.drift + rows.C @ free)
-        return free + split.locked @ normal, rows, split.back.T @ normal
+        multipliers = split.back.T @ normal + self._rows.weight(M, rows.C) * rows.drift
+        return free + split.locked @ normal, rows, multipliers
 
     def reactions(self, data: Any, q: Array, v: Array) -> tuple[Array, Any, Array]:
         """Joint acceleration; spring and loop forces on Pinocchio's joints; force and moment on body_b of each loop."""

@@ -105,6 +105,7 @@ def mechanism_source(run: MechanismRun, settings: PinocchioSettings) -> str:
     never = "ConstraintDynamics" if settings.proximal is None else "NullSpace"
     instead = {
         "checks": "class checks:\n    RATIO = {}",
+        "lacks_inertia": f"def lacks_inertia(_):\n    return {run.tree.light}",
         "varies": "def varies(signal):\n    return False",
         "value_at": "def value_at(signal, *_):\n    return signal",
     }

@@ -65,7 +65,7 @@ class Applied:
         self.laws = bool(self._laws or self._balls)
         # coordinates to evaluate, without a force law
         watched = {joint.number for joint in switched_joints(mechanism)}
-        watched |= {number[name] for item in mechanism.couplings for name in (item.joint_a, item.joint_b)}
+        watched |= {number[name] for item in mechanism.couplings for name, _ in item.terms}
         axes = {k: "slide" if mechanism.joints[k].kind == "prismatic" else "z" for k in sorted(watched)}
         self._watched = {k: _Law(k, axis, 0.0, 0.0, 0.0, 0.0) for k, axis in axes.items()}
         turning = [law for law in self._watched.values() if law.axis != "slide"]

@@ -81,10 +81,14 @@ class DependentCoordinates:
         self._loop_a, self._loop_b = ends[:, self._loop_rows.owner]
         self._between = self.tree.moves[self._loop_b] - self.tree.moves[self._loop_a]
         number = mechanism.joint_index
-        self._couplings = [(number[c.joint_a], number[c.joint_b], c.ratio, c.offset) for c in mechanism.couplings]
+        self._couplings = [
+            (np.array([number[name] for name, _ in c.terms]), np.array([factor for _, factor in c.terms]), c.place)
+            for c in mechanism.couplings
+        ]
         self._geared = np.zeros((len(self._couplings), self.nv))
-        for row, (a, b, ratio, _) in zip(self._geared, self._couplings, strict=True):
-            row[mechanism.v_slices[a]], row[mechanism.v_slices[b]] = -ratio, 1.0
+        for row, (joints, factors, _) in zip(self._geared, self._couplings, strict=True):
+            for joint, factor in zip(joints, factors, strict=True):
+                row[mechanism.v_slices[joint]] = factor
         self.loop_rows = len(self._loop_rows.owner)
         self.coupled = self.loop_rows + len(self._geared)
         # the axes of other joints are fixed in one of the two bodies
@@ -221,7 +225,8 @@ class DependentCoordinates:
         """Violations of couplings in coordinates and in velocities, (2, couplings)."""
         at = self.applied.watched(self.connections.ends(bodies, slice(0, self._joints)))
         violations = [
-            np.subtract(at[b], ratio * np.array(at[a])) - (offset, 0.0) for a, b, ratio, offset in self._couplings
+            factors @ np.array([at[joint] for joint in joints]) - (place, 0.0)
+            for joints, factors, place in self._couplings
         ]
         return np.transpose(violations)
 
@@ -293,10 +298,9 @@ class DependentCoordinates:
         ends, every = self.connections.ends(bodies), self.connections.constraints()
         rows, on_bodies = every.at(ends), partial(self.connections.on_bodies, bodies, ends)
         blocks = [on_bodies(every.owner, rows.force, rows.torque)]
-        for a, b, ratio, _ in self._couplings:
-            push, turn = self.applied.along([a, b], ends)
-            of_a, of_b = on_bodies(np.array([a, b]), push, turn)
-            blocks.append((of_b - ratio * of_a)[None])
+        for joints, factors, _ in self._couplings:
+            push, turn = self.applied.along(joints.tolist(), ends)
+            blocks.append(factors @ on_bodies(joints, push, turn)[None])
         return np.concatenate(blocks)
 
     def accept(self, x: Array) -> None:

@@ -37,6 +37,7 @@ PROVIDES = frozenset(
     | {
         MechanismCapability.REDUNDANT,
         MechanismCapability.COUPLINGS,
+        MechanismCapability.COUPLINGS_OF_MANY,
         MechanismCapability.ACTUATORS,
         MechanismCapability.SATURATION,
         MechanismCapability.SIGNALS,

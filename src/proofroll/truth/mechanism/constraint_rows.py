@@ -37,7 +37,7 @@ class ConstraintRow:
         bias: velocity terms of Φ̈.
         connection: index of the joint or loop.
         force, torque: applied to body b at the joint by a unit multiplier, in world axes.
-        besides: the other joint of a coupling: index, force, torque; None: no coupling.
+        besides: the other joints of a coupling: index, force, torque of each.
     """
 
     residual: Scalar
@@ -46,7 +46,7 @@ class ConstraintRow:
     connection: int
     force: Sequence[Scalar]
     torque: Sequence[Scalar]
-    besides: tuple[int, Sequence[Scalar], Sequence[Scalar]] | None = None
+    besides: tuple[tuple[int, Sequence[Scalar], Sequence[Scalar]], ...] = ()
 
     def less(self, ratio: float, other: ConstraintRow) -> ConstraintRow:
         """Row of a coupling: this row minus ``ratio`` times another; on rates only, without a residual."""
@@ -54,7 +54,8 @@ class ConstraintRow:
         for index, value in other.coefficients.items():
             coefficients[index] = sub(coefficients.get(index, 0.0), mul(ratio, value))
         bias = sub(self.bias, mul(ratio, other.bias))
-        besides = (other.connection, scaled(-ratio, other.force), scaled(-ratio, other.torque))
+        share = (other.connection, scaled(-ratio, other.force), scaled(-ratio, other.torque))
+        besides = (*self.besides, share)
         return ConstraintRow(0.0, coefficients, bias, self.connection, self.force, self.torque, besides)
 
 

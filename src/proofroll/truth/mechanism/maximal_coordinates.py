@@ -379,8 +379,8 @@ class MaximalCoordinates:
         wrenches = np.zeros((len(self._whole.equations.connections), 6))
         for row, multiplier in zip(solved.equations.rows, solved.multipliers, strict=True):
             wrenches[row.connection] += multiplier * np.array([*row.force, *row.torque])
-            if row.besides is not None:
-                wrenches[row.besides[0]] += multiplier * np.array([*row.besides[1], *row.besides[2]])
+            for connection, force, torque in row.besides:
+                wrenches[connection] += multiplier * np.array([*force, *torque])
         for row, inertia in solved.equations.drives:
             rate = sum(value * solved.acceleration[k] for k, value in row.coefficients.items()) + row.bias
             wrenches[row.connection] -= inertia * rate * np.array([*row.force, *row.torque])

@@ -215,9 +215,11 @@ class MaximalEquations:
 
     def _coupled(self, made: ConstraintRows, coupling: Coupling) -> ConstraintRow:
         """Row of a coupling between rates; the start satisfies it between coordinates, so the motion does, too."""
-        a, b = (self.mechanism.joint_index[name] for name in (coupling.joint_a, coupling.joint_b))
-        one, two = (made.of_rate(number, self.mechanism.joints[number].kind) for number in (a, b))
-        return two.less(coupling.ratio, one)
+        numbers = [self.mechanism.joint_index[name] for name, _ in coupling.terms]
+        row, *others = (made.of_rate(number, self.mechanism.joints[number].kind) for number in numbers)
+        for other, (_, factor) in zip(others, coupling.terms[1:], strict=True):
+            row = row.less(-factor, other)
+        return row
 
     def _views(self, state: Sequence[Scalar], functions: Mapping[str, Any]) -> list[BodyInScalars]:
         """Poses and velocities of all bodies, the ground last."""

@@ -65,9 +65,15 @@ class Units(NamedTuple):
 
         couplings = []
         for coupling in si.couplings:
-            a, b = slides[coupling.joint_a], slides[coupling.joint_b]
-            ratio = coupling.ratio * self.length ** (a - b)
-            couplings.append(replace(self._own(coupling, b), ratio=ratio))
+            first, *others = (slides[name] for name, _ in coupling.terms)
+            if coupling.joints:
+                scales = [self.length ** (other - first) for other in (first, *others)]
+                sizes = tuple(factor * scale for (_, factor), scale in zip(coupling.terms, scales, strict=True))
+                scaled = self._own(replace(coupling, offset=coupling.place, coefficients=sizes), first)
+            else:
+                ratio = coupling.ratio * self.length ** (others[0] - first)
+                scaled = replace(self._own(coupling, first), ratio=ratio)
+            couplings.append(scaled)
         return replace(
             si,
             bodies=each(si.bodies),

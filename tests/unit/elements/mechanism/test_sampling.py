@@ -29,7 +29,7 @@ def test_a_mechanism_requires_what_it_holds_and_no_more():
     assert required(wheel(**stops)) == {MechanismCapability.REVOLUTE, MechanismCapability.STOPS}
     assert MechanismCapability.REBOUNDS in required(wheel(**stops, restitution=0.5))
     of_contact = {"CONTACT", "CONTACT_FRICTION", "CONTACT_REBOUNDS"}
-    of_drives = {"ACTUATORS", "SATURATION", "COUPLINGS", "SIGNALS"}
+    of_drives = {"ACTUATORS", "SATURATION", "COUPLINGS", "COUPLINGS_OF_MANY", "MASSLESS", "SIGNALS"}
     assert of_contact | of_drives | {
         "JOINT_SPRINGS",
         "JOINT_FRICTION",

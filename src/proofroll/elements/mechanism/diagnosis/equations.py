@@ -100,8 +100,8 @@ class MechanismStates:
         """Rows of the couplings on the velocities, (couplings, nv)."""
         found = np.zeros((len(self.mechanism.couplings), self.mechanism.nv))
         for row, coupling in zip(found, self.mechanism.couplings, strict=True):
-            row[self.mechanism.place_of(coupling.joint_b)[1]] = 1.0
-            row[self.mechanism.place_of(coupling.joint_a)[1]] = -coupling.ratio
+            for name, factor in coupling.terms:
+                row[self.mechanism.place_of(name)[1]] = factor
         return found
 
     @cached_property

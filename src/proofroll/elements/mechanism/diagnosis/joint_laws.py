@@ -123,6 +123,8 @@ def of_couplings(evidence: Evidence) -> Iterator[Cause]:
     if moving is None:
         return
     for k, coupling in enumerate(mechanism.couplings):
+        if coupling.joints:
+            continue
         a, b = (moving[:, mechanism.place_of(joint)[1]] for joint in (coupling.joint_a, coupling.joint_b))
         own, alone = coupling.ratio, len(a) < 2
         square = float(a @ a)

@@ -161,7 +161,7 @@ def _laws(picture: Drawing, at: View, element: MechanismElement) -> None:
         picture.disc(here.tolist(), 2.0 * _JOINT, "force")
         _name(picture, here, actuator.name, "force-letter", (0.0, 2.0 * _JOINT + 12.0))
     for coupling in mechanism.couplings:
-        ends = at(np.stack([place(coupling.joint_a), place(coupling.joint_b)]))
+        ends = at(np.stack([place(name) for name, _ in coupling.terms]))
         picture.path(ends, "hidden")
         apart = np.linalg.norm(ends[1] - ends[0]) > _NEAR  # else below the names of joint and actuator
         _name(picture, ends.mean(axis=0), coupling.name, "letter", (0.0, -6.0 if apart else 36.0))
