@@ -30,7 +30,9 @@ def report(tmp_path: Path) -> Path:
 
 def test_several_scenes_are_advised_from_a_report(proofroll: Proofroll, report: Path) -> None:
     """By study, scene or group: a choice for each and over all, in the folder of results or where it is named."""
-    code, out, err = proofroll("recommend", "arm", "rolling", "--tolerance", "1e-3", "--report", str(report), "--json")
+    code, out, err = proofroll(
+        "recommend", "arm", "rolling", "--tolerance", "1e-3 of path", "--report", str(report), "--json"
+    )
     assert (code, err) == (0, "")
     content = json.loads(out)
     assert content["tolerance"] == 1e-3
@@ -47,7 +49,7 @@ def test_several_scenes_are_advised_from_a_report(proofroll: Proofroll, report: 
 
 def test_forces_and_engines_of_several_scenes(proofroll: Proofroll, report: Path) -> None:
     """Forces count where they are asked for; among some engines nothing may hold it, which is exit code 1."""
-    given = ("--report", str(report), "--tolerance", "1e-3")
+    given = ("--report", str(report), "--tolerance", "0.1 %")
     code, out, _ = proofroll("recommend", "arm", "--forces", *given)
     assert code == 0
     assert "with forces take alpha joints tuned" in " ".join(out.split())
@@ -58,7 +60,7 @@ def test_forces_and_engines_of_several_scenes(proofroll: Proofroll, report: Path
 
 def test_names_of_a_list_and_names_that_a_report_lacks(proofroll: Proofroll, report: Path) -> None:
     """Names may be joined by commas, as in ``report --only``; a name without runs gets a command that works."""
-    given = ("--tolerance", "1e-3", "--report", str(report))
+    given = ("--tolerance", "1e-3 of path", "--report", str(report))
     code, out, _ = proofroll("recommend", "trees,rolling", *given)
     assert (code, out.count("For ")) == (0, 2)
     for name, advice in {
@@ -70,7 +72,7 @@ def test_names_of_a_list_and_names_that_a_report_lacks(proofroll: Proofroll, rep
 
 def test_forces_that_are_not_judged_are_no_failure(proofroll: Proofroll, report: Path) -> None:
     """Where some of the scenes have no judged forces the advice for them is by the motion, says so, and exits 0."""
-    given = ("--forces", "--tolerance", "1e-3", "--json", "--report", str(report))
+    given = ("--forces", "--tolerance", "0.1 %", "--json", "--report", str(report))
     code, out, _ = proofroll("recommend", "arm", "ball", *given)
     assert code == 0
     ball = json.loads(out)["advice"][1]
@@ -104,7 +106,8 @@ def test_without_a_report_no_option_is_blamed_that_was_not_given(proofroll: Proo
         (["arm", "cart"], "has no such scene, comparison or group; the groups there are trees"),
         (["arm", "ball", "--measure"], "--measure"),
         (["arm", "ball", "--engine", "nobody"], "nobody"),
-        (["arm", "ball", "--tolerance", "1 mm"], "1 mm"),
+        (["arm", "ball", "--tolerance", "1 kg"], "its unit is m"),
+        (["arm", "ball", "--forces"], "motion and forces have different units; give a part"),
         (["arm", "--report", "nowhere.json"], "proofroll report writes one"),
     ],
 )
@@ -123,3 +126,36 @@ def test_one_group_is_advised_from_the_report_of_the_folder(proofroll: Proofroll
     code, out, err = proofroll("recommend", "rolling", "--out", str(report.parent), "--json")
     assert (code, err) == (0, "")
     assert json.loads(out)["advice"][0]["of"] == "ball rolling"
+
+
+def test_one_scene_is_answered_from_the_report_of_the_folder(proofroll: Proofroll, tmp_path: Path) -> None:
+    """A scene that OUT/report.json has is answered from it, with every engine and its cost; another from curves."""
+    lines = [
+        line(study="pendulum", scene="pendulum", group="trees", engine=engine, error=error, cost=cost)
+        for engine, error, cost in (("alpha", 1e-6, 0.2), ("beta", 1e-7, 0.7), ("gamma", 0.5, 0.1))
+    ]
+    made = {"environment": {"machine": "m", "versions": {}}, "date": "2026-01-01"}
+    (tmp_path / "report.json").write_text(json.dumps(made | {"table": plain(LongTable(lines))}))
+    code, out, err = proofroll("recommend", "pendulum", "--out", str(tmp_path), "--json")
+    assert (code, err) == (0, "")
+    content = json.loads(out)
+    assert {item["engine"]: (item["holds"], item["cost"]) for item in content["engines"]} == {
+        "alpha joints": (True, 0.2), "beta joints": (True, 0.7), "gamma joints": (False, None),
+    }  # fmt: skip
+    text = proofroll("recommend", "pendulum", "--out", str(tmp_path))[1]
+    assert text.startswith("Tolerance: 1e-4 of the path.")
+    assert [row.split()[0] for row in text.splitlines() if " joints " in row and not row.startswith("For")][-3:] == [
+        "alpha", "beta", "gamma",
+    ]  # fmt: skip
+    code, _, err = proofroll("recommend", "heavy_top", "--tolerance", "1e-3", "--out", str(tmp_path))
+    assert code == 2
+    assert "no curves are stored" in err
+
+
+def test_a_tolerance_means_the_same_everywhere(proofroll: Proofroll, report: Path) -> None:
+    """With a percent sign or as a part of the path it is relative; otherwise it is in the unit of the motion."""
+    given = ("recommend", "ball", "--report", str(report), "--json", "--tolerance")
+    parts = [json.loads(proofroll(*given, text)[1]) for text in ("1e-3 of path", "0.1 %", "1e-3 of the path")]
+    assert {(item["tolerance"], item["unit"]) for item in parts} == {(1e-3, "part of the path")}
+    lengths = [json.loads(proofroll(*given, text)[1]) for text in ("1e-3", "1 mm", "1e-3 m")]
+    assert {(item["tolerance"], item["unit"]) for item in lengths} == {(1e-3, "m")}

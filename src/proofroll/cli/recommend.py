@@ -2,23 +2,34 @@
 
 from __future__ import annotations
 
+import math
+import re
 import sys
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, NoReturn
+from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 
 import typer
 
 from proofroll.cli import options
 from proofroll.cli.tradeoff import Over, measure, question_of, ranges_of, require_observables
 from proofroll.core.errors import InputError, ProofrollError, require_known
+from proofroll.core.number_format import number
 
 if TYPE_CHECKING:
+    from rich.table import Table
+
     from proofroll.core.comparison import Tolerance
     from proofroll.report.changes import EarlierReport
+    from proofroll.report.long_table import TableLine
+    from proofroll.report.page.choice_matrix import ChoiceMatrix
     from proofroll.studies.tradeoff.claims import TradeoffClaims
     from proofroll.studies.tradeoff.curve import Question
     from proofroll.studies.tradeoff.records import TradeoffStudy
+
+# A part of the path, as the first screen of a report has it.
+_OF_PATH = re.compile(r"\s*(\d+\.?\d*(?:[eE][-+]?\d+)?)\s*of\s+(?:the\s+)?path\s*")
 
 
 def recommend(
@@ -27,7 +38,7 @@ def recommend(
     ],
     quantity: Annotated[str, typer.Option(help="Observable that matters.")] = "",
     tolerance: Annotated[
-        str, typer.Option(help="Largest error: 1e-3 in its unit, '1 mm', or '1 %' of its scale.")
+        str, typer.Option(help="Largest error: 1e-3 in its unit, '1 mm', '1 %' or '1e-4 of path' of its size.")
     ] = "",
     max_cost: Annotated[
         float | None, typer.Option(help="Wall seconds per simulated second that a run may take.")
@@ -55,26 +66,24 @@ def recommend(
     It chooses among models of engines; solutions of the scene's own equations (closed form, reduced, projection) are
     listed apart, unless --engine asks for them. Of the cheaper ones, which all fail, the most accurate is shown.
 
-    For a group (as loops) and for several scenes or studies the runs of a report answer, OUT/report.json unless
-    --report names another: a choice for each, and over all. The tolerance is then a part of the path, or '0.1 %' of it;
-    by default 1e-4, as on the first screen. Where --forces asks for forces that are not judged, the choice is for
-    motion alone.
+    The runs of a report answer, OUT/report.json unless --report names another, for a group (as loops), several scenes
+    or studies, and a scene that it has: a choice for each, over all, and what every engine costs. Without --tolerance
+    it is 1e-4 of the path, as on the first screen. A scene that the report does not have is answered from measured
+    curves. Where --forces asks for forces that are not judged, the choice is for motion alone.
     """
-    from proofroll.files.scene_file import is_scene
-
     if budget is not None:
         raise InputError("--budget", budget, "here it is --max-cost; elsewhere a budget is processor time")
     found = out / "report.json"
-    grouped = found.is_file() and not is_scene(scenes[0]) and not scenes[0].endswith(".toml")
-    if len(scenes) > 1 or forces or grouped or report is not None:
-        given = {
-            "--quantity": quantity,
-            "--max-cost": max_cost,
-            "--set": settings,
-            "--over": over,
-            "--until": until,
-            "--measure": measure_first,
-        }
+    given = {
+        "--quantity": quantity,
+        "--max-cost": max_cost,
+        "--set": settings,
+        "--over": over,
+        "--until": until,
+        "--measure": measure_first,
+    }
+    asked = len(scenes) > 1 or forces or report is not None
+    if asked or (not any(given.values()) and _is_in_report(scenes[0], found)):
         for name, value in given.items():
             if value:
                 raise InputError(name, value if value is not True else "given", "it is for one scene, without a report")
@@ -103,10 +112,21 @@ def recommend(
     raise typer.Exit(options.OK if recommendation.answer.choice and recommendation.affordable else options.CONTRADICTED)
 
 
+def _is_in_report(name: str, path: Path) -> bool:
+    """True if a report has runs of a scene; a name that is no scene is always looked for there."""
+    from proofroll.files.scene_file import is_scene
+    from proofroll.report.changes import EarlierReport
+
+    if not path.is_file() or name.endswith(".toml"):
+        return False
+    return not is_scene(name) or any(line.scene == name for line in EarlierReport.read(path, "stored report").lines)
+
+
 def _from_report(
     names: list[str], tolerance: str, engines: list[str], report: EarlierReport, *, forces: bool, as_json: bool
 ) -> NoReturn:
     """Prints advice for several scenes from a report's runs, and exits: 1 if in one nothing holds the tolerance."""
+    from proofroll.core.comparison import Tolerance
     from proofroll.files.scene_file import is_scene
     from proofroll.files.toml import named_file
     from proofroll.report.page.advice import advice
@@ -126,15 +146,72 @@ def _from_report(
                 lacking = f"has no runs of it; proofroll report {name} makes them"
             raise InputError("scenes", name, f"{path} {lacking}")
         studies |= {line.study: ChoiceStudy(line.study, "") for line in own}
-    part = _tolerance(tolerance, "1").absolute(1.0) if tolerance else FIRST_TOLERANCE
+    lines = [line for line in lines if line.study in studies]
+    unit = _unit_of(lines)
+    bound = _tolerance(tolerance, unit) if tolerance else Tolerance(FIRST_TOLERANCE, True)
+    if not bound.relative:
+        if forces:
+            advice_of_parts = "motion and forces have different units; give a part, as '0.01 %' or '1e-4 of path'"
+            raise InputError("tolerance", tolerance, advice_of_parts)
+        # in the unit of the motion: a quantity whose scale is one unit has that error as its part
+        lines = [replace(line, scale=1.0) for line in lines if line.unit == unit or not line.quantity]
+    part = bound.value
     matrix = choice_matrix(lines, studies)
     advised = advice(matrix, part, forces)
-    content = {"report": str(path), "tolerance": part, "with_forces": forces, "advice": advised}
+    costs = _engine_costs(matrix, part, forces=forces)
+    content = {
+        "report": str(path),
+        "tolerance": part,
+        "unit": "part of the path" if bound.relative else unit,
+        "with_forces": forces,
+        "advice": advised,
+        "engines": costs,
+    }
+    head = f"Tolerance: {number(part)} {'of the path' if bound.relative else unit}."
     key = "s/s: seconds of computing per second of motion; ~: to a factor of about two."
-    options.show(content, as_json, lambda: [*(item.sentence for item in advised), key])
+    options.show(content, as_json, lambda: [head, *(item.sentence for item in advised), *_cost_tables(costs), key])
     single = [item for item, column in zip(advised, matrix.columns, strict=False) if len(column.studies) == 1]
     chosen = [bool(item.choice) for item in single if item.judged]
     raise typer.Exit(options.OK if chosen and all(chosen) else options.CONTRADICTED)
+
+
+def _unit_of(lines: Iterable[TableLine]) -> str:
+    """Unit of the motion that summaries show; of several units the most frequent."""
+    units = [line.unit for line in lines if line.role == "motion" and line.headline and line.unit]
+    return max(sorted(set(units)), key=units.count, default="m")
+
+
+def _engine_costs(matrix: ChoiceMatrix, tolerance: float, *, forces: bool) -> list[dict[str, Any]]:
+    """Every formulation in each group or scene: whether it holds the tolerance, its cost [s/s], setting, or why not."""
+    costs = []
+    for column in matrix.columns:
+        for row in matrix.rows:
+            if row.setting:
+                continue
+            cell = matrix.cell(row, column, tolerance, forces)
+            if cell.state == "none":
+                continue
+            held = math.isfinite(cell.cost)
+            setting = matrix.step(row, cell) if cell.name else ""
+            answer = {"of": column.name, "engine": row.name, "holds": held, "setting": setting}
+            costs.append(answer | {"cost": cell.cost if held else None, "text": cell.text if held else cell.why})
+    return costs
+
+
+def _cost_tables(costs: Sequence[Mapping[str, Any]]) -> Iterator[Table]:
+    """Table of every engine for each group or scene, the cheapest first."""
+    from rich.table import Column
+
+    from proofroll.report.terminal.screen import plain_table
+
+    for name in dict.fromkeys(item["of"] for item in costs):
+        table = plain_table(
+            Column(name, overflow="fold"), Column("s/s"), Column("setting, or why not", overflow="fold")
+        )
+        rows = [item for item in costs if item["of"] == name]
+        for item in sorted(rows, key=lambda item: (not item["holds"], item["cost"] or 0.0)):
+            table.add_row(item["engine"], *((item["text"], item["setting"]) if item["holds"] else ("–", item["text"])))
+        yield table
 
 
 def _tolerance(text: str, unit: str) -> Tolerance:
@@ -144,7 +221,8 @@ def _tolerance(text: str, unit: str) -> Tolerance:
     if not text:
         words = "give the largest error that you can bear, e.g. --tolerance 1e-3, or --tolerance '1 %' of the scale"
         raise ProofrollError(f"--tolerance is missing: {words}")
-    return Tolerance.of_quantity("tolerance", text, unit)
+    part = _OF_PATH.fullmatch(text)
+    return Tolerance.of_quantity("tolerance", f"{100 * float(part[1]):.17g} %" if part else text, unit)
 
 
 def _seconds(max_cost: float | None) -> float | None:
