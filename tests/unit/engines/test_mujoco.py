@@ -23,6 +23,7 @@ from proofroll.elements.ball_on_surface.sampling import BallSample
 from proofroll.elements.ball_on_surface.surfaces import Cylinder
 from proofroll.engines.mujoco import Mujoco, mjspec
 from proofroll.engines.mujoco.settings import OF_MECHANISMS, ORDER_OF_TURNING, PRESETS
+from proofroll.files.data_folders import data_folder
 from proofroll.files.scene_file import load_scene
 from proofroll.running.identity import used
 from proofroll.running.recording import record
@@ -464,9 +465,34 @@ def test_a_mechanism_as_a_spec_and_as_a_file(name):
     assert np.array_equal(own.key_qpos[0], run._data.qpos)
     with pytest.raises(InputError, match="steps"):
         mjspec(scene, steps=3)
-    with pytest.raises(InputError, match="joints, geoms"):
-        mjspec(scene, formulation="free")
+    with pytest.raises(InputError, match="choose one of chart, free, facets, joints, geoms"):
+        mjspec(scene, formulation="none")
     assert len(mjspec(load_scene("sled"), formulation="geoms").geoms) > len(mjspec(load_scene("pendulum")).geoms)
+
+
+def test_a_spec_of_what_export_takes():
+    """A ball on a surface and bodies that touch have a spec, too; ``portable`` keeps MuJoCo's automatic reset."""
+    flag = int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
+    for name in ("inclined_plane", "sled"):
+        scene = load_scene(name)
+        model = mjspec(scene).compile()
+        assert model.nkey == 1
+        assert model.opt.disableflags & flag
+        assert not mjspec(scene, portable=True).compile().opt.disableflags & flag
+
+
+def test_a_spec_holds_a_constant_drive(tmp_path):
+    """From its keyframe, the model alone moves as the run with a constant torque of a joint does."""
+    text = (data_folder("models") / "pendulum" / "scene.toml").read_text(encoding="utf-8")
+    (tmp_path / "scene.toml").write_text(text.replace('v0 = "$speed"', 'v0 = "$speed"\ntorque = 2.5'), encoding="utf-8")
+    scene = load_scene(str(tmp_path))
+    run, model = Mujoco.build(scene, PRESETS["joints"]["default"]), mjspec(scene, preset="default").compile()
+    data = mujoco.MjData(model)
+    mujoco.mj_resetDataKeyframe(model, data, model.key("start").id)
+    run.advance(0.1)
+    mujoco.mj_step(model, data, nstep=round(0.1 / model.opt.timestep))
+    assert np.allclose(data.qpos, run._data.qpos, rtol=0, atol=1e-13)
+    assert model.nu == 1
 
 
 def test_six_digits_are_said(monkeypatch):

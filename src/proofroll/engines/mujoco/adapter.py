@@ -8,7 +8,6 @@ import mujoco
 import numpy as np
 
 from proofroll.core.engine_abilities import Level, Term, require_provided
-from proofroll.core.errors import InputError
 from proofroll.core.events import Event
 from proofroll.core.plugins import resolve_settings
 from proofroll.core.scene import Scene
@@ -152,8 +151,13 @@ class Mujoco(SteppedModel):
     @classmethod
     def model_file(cls, scene: Scene, settings: MujocoSettings) -> str:
         """MJCF, whose keyframe ``start`` is time 0; see :class:`proofroll.core.engine_abilities.WritesModels`."""
+        return written(cls._startable(scene, settings))
+
+    @classmethod
+    def _startable(cls, scene: Scene, settings: MujocoSettings) -> Any:
+        """MjSpec of a scene, whose keyframe ``start`` is time 0."""
         if settings.formulation in _MECHANISMS:
-            return written(_MECHANISMS[settings.formulation](scene, settings).spec())
+            return _MECHANISMS[settings.formulation](scene, settings).spec()
         engine, spec = cls._build_ball(scene, settings), _spec(scene, rolling_ball(scene), settings)
         for key in list(spec.keys):
             spec.delete(key)
@@ -161,7 +165,7 @@ class Mujoco(SteppedModel):
         pose = {"mpos": data.mocap_pos.ravel(), "mquat": data.mocap_quat.ravel()} if len(data.mocap_pos) else {}
         spec.add_key(name="start", qpos=data.qpos, qvel=data.qvel, **pose)
         compiled(spec)
-        return written(spec)
+        return spec
 
     @classmethod
     def reproducer(cls, scene: Scene, settings: MujocoSettings) -> str:
@@ -264,21 +268,24 @@ def _spec(scene: Scene, body: RollingBall, settings: MujocoSettings) -> Any:
     return spec
 
 
-def mjspec(scene: Scene, **settings: Any) -> mujoco.MjSpec:
-    """MjSpec of a scene of one mechanism, as the formulation builds it; its keyframe ``start`` is time 0.
+def mjspec(scene: Scene, *, portable: bool = False, **settings: Any) -> mujoco.MjSpec:
+    """MjSpec of a scene as ``proofroll export`` writes it; its keyframe ``start`` is time 0.
 
-    Bodies and joints have the scene's names; of several MuJoCo joints that make up one, .0, .1 … follow. Reactions come
-    from sensors ``FORCE0``, ``TORQUE0`` … of the joints in their order.
+    Bodies and joints of a mechanism have the scene's names; of several MuJoCo joints that make up one, .0, .1 … follow.
+    Reactions come from sensors ``FORCE0``, ``TORQUE0`` … of the joints in their order. A constant drive is an actuator
+    ``drive.JOINT`` that needs no control.
 
     Args:
-        scene: holds one mechanism.
-        **settings: settings of the adapter (``dt``, ``preset`` …); ``formulation`` defaults to ``joints``.
+        scene: a ball on a surface, or a mechanism.
+        portable: False keeps a state that is not finite as it is; True leaves MuJoCo's automatic reset on, for readers
+            that refuse the flag (mujoco_warp).
+        **settings: settings of the adapter (``formulation``, ``dt``, ``preset`` …), by default those of ``run``.
 
     Raises:
-        InputError: a setting or formulation of mechanisms that does not exist.
+        InputError: a setting that does not exist.
         Refused: MuJoCo cannot represent the scene, or only with values that the adapter sets anew in every step.
     """
-    resolved = resolve_settings(Mujoco, {"formulation": "joints", **settings}, scene.requires)
-    if resolved.formulation not in _MECHANISMS:
-        raise InputError("formulation", resolved.formulation, f"take one of {', '.join(_MECHANISMS)}")
-    return _MECHANISMS[resolved.formulation](scene, resolved).spec()
+    spec = Mujoco._startable(scene, resolve_settings(Mujoco, settings, scene.requires))
+    if portable:
+        spec.option.disableflags &= ~int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
+    return spec

@@ -104,15 +104,14 @@ class MujocoMechanism(SteppedModel):
         """MjSpec, whose keyframe ``start`` is time 0.
 
         Raises:
-            Refused: a joint has a drive, or an actuator a changing target: MuJoCo keeps these in the state.
+            Refused: a drive or the target of an actuator changes in time: MuJoCo keeps these in the state.
         """
         if self._moving:
             raise Refused("a drive or a target that changes is set from outside in every step, and in no MJCF")
-        driven = [joint.name for joint in self._mechanism.joints if joint.torque]
-        if driven:
-            raise Refused(f"the constant drive of {driven[0]} is set from outside in every step, and in no MJCF")
         spec = mechanism_model.write(self._mechanism, self._settings)
-        spec.add_key(name="start", qpos=self._data.qpos, qvel=self._data.qvel, ctrl=self._data.ctrl)
+        drives = mechanism_model.add_constant_drives(spec, self._mechanism)
+        control = np.append(self._data.ctrl, np.zeros(drives))
+        spec.add_key(name="start", qpos=self._data.qpos, qvel=self._data.qvel, ctrl=control)
         compiled(spec)
         return spec
 

@@ -17,6 +17,7 @@ from proofroll.elements.mechanism import WORLD, Body, Joint, Loop, Mechanism
 from proofroll.elements.mechanism.drives import Actuator, Coupling
 from proofroll.elements.mechanism.loop_points import held_points
 from proofroll.elements.mechanism.rotations import to_quaternion
+from proofroll.elements.mechanism.signal import varies
 from proofroll.engines.mujoco.mechanism_contacts import write_contacts
 from proofroll.engines.mujoco.settings import MujocoSettings
 
@@ -146,6 +147,18 @@ def _add_actuator(spec: Any, actuator: Actuator) -> None:
     if actuator.limit is not None:
         most = actuator.limit / abs(actuator.gear)
         added.forcelimited, added.forcerange = True, (-most, most)
+
+
+def add_constant_drives(spec: Any, mechanism: Mechanism) -> int:
+    """Number of actuators that are added, one for each constant drive of a joint; they need no control."""
+    driven = [joint for joint in mechanism.joints if joint.torque and not varies(joint.torque)]
+    for joint in driven:
+        added = spec.add_actuator(
+            name=f"drive.{joint.name}", trntype=mujoco.mjtTrn.mjTRN_JOINT, target=part_names(joint)[0]
+        )
+        added.gaintype, added.gainprm[0] = mujoco.mjtGain.mjGAIN_FIXED, 0.0
+        added.biastype, added.biasprm[0] = mujoco.mjtBias.mjBIAS_AFFINE, joint.torque
+    return len(driven)
 
 
 def _set_switches(part: Any, joint: Joint, settings: MujocoSettings) -> None:
