@@ -114,6 +114,37 @@ class Mimic:
 
 
 @dataclasses.dataclass(frozen=True)
+class RobotLoop:
+    """A constraint that closes the tree: two bodies share a point, or are fixed to each other.
+
+    Attributes:
+        name: of the constraint.
+        kind: ``spherical`` or ``fixed``.
+        body_a, body_b: bodies, or :data:`NO_BODY`.
+        position_a, position_b: the shared point in each body's frame [m], shape (3,).
+        rotation: of body_b's frame against body_a's, held by a fixed loop, shape (3, 3).
+    """
+
+    name: str
+    kind: str
+    body_a: str
+    body_b: str
+    position_a: Array
+    position_b: Array
+    rotation: Array
+
+
+@dataclasses.dataclass(frozen=True)
+class Tie:
+    """A sum of coordinates, each times its coefficient, that has a fixed value, as of a tendon [rad or m]."""
+
+    name: str
+    joints: tuple[str, ...]
+    coefficients: tuple[float, ...]
+    value: float = 0.0
+
+
+@dataclasses.dataclass(frozen=True)
 class Robot:
     """A tree of bodies, every joint after the joint of its parent.
 
@@ -122,6 +153,9 @@ class Robot:
         bodies: by name.
         joints: parents first; one for each body.
         mimics: joints that follow another.
+        loops: constraints that close the tree; a check of importers compares the tree alone.
+        ties: further linear relations of joints.
+        further: names of constraints that none of these represents.
         gravity: acceleration [m/s²], shape (3,).
         sources: body -> facts of the file that only hypotheses need: its inertia as written, for example.
     """
@@ -132,6 +166,9 @@ class Robot:
     mimics: tuple[Mimic, ...] = ()
     gravity: Array = dataclasses.field(default_factory=lambda: np.array([0.0, 0.0, -9.81]))
     sources: Mapping[str, Any] = dataclasses.field(default_factory=dict)
+    loops: tuple[RobotLoop, ...] = ()
+    ties: tuple[Tie, ...] = ()
+    further: tuple[str, ...] = ()
 
     @cached_property
     def moving(self) -> tuple[RobotJoint, ...]:

@@ -14,7 +14,7 @@ import numpy as np
 from proofroll.core.announced import announced
 from proofroll.core.errors import InputError, Missing, Refused, require_known
 from proofroll.files.json_data import plain
-from proofroll.robots.model import Mimic, Robot, RobotBody, RobotJoint
+from proofroll.robots.model import Mimic, Robot, RobotBody, RobotJoint, RobotLoop, Tie
 from proofroll.robots.protocol import GROUP, Reading, Request, Whole
 from proofroll.robots.robot_file import RobotFile
 from proofroll.robots.states import RobotStates
@@ -227,6 +227,9 @@ def robot_from(data: Mapping[str, Any]) -> Robot:
         tuple(Mimic(**mimic) for mimic in data["mimics"]),
         np.array(data["gravity"]),
         data["sources"],
+        tuple(RobotLoop(**_arrays(loop)) for loop in data["loops"]),
+        tuple(Tie(tie["name"], tuple(tie["joints"]), tuple(tie["coefficients"]), tie["value"]) for tie in data["ties"]),
+        tuple(data["further"]),
     )
 
 

@@ -1,10 +1,12 @@
 """A robot file as a scene: its tree of links, released from a random pose under gravity.
 
-Links connected by fixed joints are one body, in the frame of the child of its moving joint. Contacts and looks are left
+Links connected by fixed joints are one body, in the frame of the child of its moving joint. Constraints that close the
+tree are loops and couplings; joints in them start near the file's pose, at rest. Contacts and looks are left
 out; actuators of an MJCF act if the scene's parameter ``actuators`` is 1.
 """
 
 from collections.abc import Iterator, Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any, ClassVar
 from xml.etree.ElementTree import Element, tostring
@@ -17,12 +19,13 @@ from proofroll.elements.mechanism.joint import LAWS
 from proofroll.elements.mechanism.rotations import to_rpy
 from proofroll.robots.actuators import scene_actuators
 from proofroll.robots.meaning import opened, robot_of_text
-from proofroll.robots.model import NO_BODY, Array, Mimic, Robot, RobotJoint
+from proofroll.robots.model import NO_BODY, Array, Mimic, Robot, RobotJoint, RobotLoop, Tie
 from proofroll.robots.opening import BASES
 from proofroll.robots.robot_file import RobotFile
 from proofroll.robots.states import RobotStates, random_states
 
 _DURATION = 1.0  # s: an arm falls through much of its reach, and few are chaotic so early
+_NEAR = 0.2  # part of a random coordinate that a guess of a closed pose is away from the file's pose, which is closed
 # Parameters: default, unit, meaning, bounds.
 _RELEASE: dict[str, tuple[float, str, str, dict[str, Any]]] = {
     "seed": (0, "1", "which random pose and velocities the robot is released with", {"at_least": 0, "integer": True}),
@@ -94,6 +97,8 @@ class RobotScenes:
                 raise InputError(f"{path}: <link {link}> inertia", body.moments.tolist(), advice)
         start = random_states(robot, 1, int(values["seed"]))
         names = _names(robot)
+        held = bool(values["couplings"])
+        following = _following(robot) if held else frozenset()
         gravity = robot.gravity if robot.gravity.any() else np.array([0.0, 0.0, -1.0])
         bodies = [(names[joint.child], robot.groups[joint.name]) for joint in robot.moving]
         carriers = {robot.welded[joint.parent][0] for joint in robot.moving}
@@ -104,17 +109,21 @@ class RobotScenes:
                 {"name": name, "mass": body.mass, "com": body.com.tolist(), "inertia": body.inertia.tolist()}
                 for name, body in bodies
             ],
-            "joints": [_joint(robot, joint, names, start, values) for joint in robot.moving],
+            "joints": [
+                _joint(robot, joint, names, start, values) | (_guess(joint, start) if joint.name in following else {})
+                for joint in robot.moving
+            ],
+            "loops": [_loop(robot, loop, names) for loop in robot.loops] if held else [],
             "points": [
                 {"name": name, "body": name, "position": body.com.tolist()}
                 for joint, (name, body) in zip(robot.moving, bodies, strict=True)
                 if joint.name not in carriers
             ],
             "actuators": acting,
-            "couplings": list(_coupled(robot)) if values["couplings"] else [],
+            "couplings": list(_coupled(robot)) if held else [],
             "unmodelled": [
                 *(f"{what} (actuators=0 leaves all out)" for what in silent),
-                *(f"{what} (couplings=0 leaves it out)" for what in _couplings(file, robot) if values["couplings"]),
+                *(f"{what} (couplings=0 leaves it out)" for what in _couplings(file, robot) if held),
                 *(
                     f"the {law} of the {joint.kind} joint {joint.name} ({law}=0 leaves all out)"
                     for joint in robot.moving
@@ -178,6 +187,8 @@ def _coupled(robot: Robot) -> Iterator[dict[str, Any]]:
         if _follows(robot, mimic):
             ends = {"joint_a": mimic.other, "joint_b": mimic.joint}
             yield {"name": mimic.joint, **ends, "ratio": mimic.multiplier, "offset": mimic.offset}
+    for tie in filter(partial(_tied, robot), robot.ties):
+        yield {"name": tie.name, "joints": tie.joints, "coefficients": tie.coefficients, "offset": tie.value}
 
 
 def _follows(robot: Robot, mimic: Mimic) -> bool:
@@ -186,17 +197,60 @@ def _follows(robot: Robot, mimic: Mimic) -> bool:
     return bool(mimic.multiplier) and dofs.get(mimic.joint) == dofs.get(mimic.other) == 1
 
 
+def _tied(robot: Robot, tie: Tie) -> bool:
+    """True if a coupling of a scene can represent a tie."""
+    dofs = {joint.name: joint.dofs for joint in robot.moving}
+    return len(tie.joints) > 1 and all(tie.coefficients) and all(dofs.get(name) == 1 for name in tie.joints)
+
+
+def _following(robot: Robot) -> frozenset[str]:
+    """Moving joints whose start follows from loops and ties: those between the bodies of a loop, and those of a tie."""
+    by_child = {joint.child: joint for joint in robot.joints}
+
+    def carriers(body: str) -> set[str]:
+        found = set()
+        while body != NO_BODY:
+            joint = by_child[body]
+            body = joint.parent
+            found |= {joint.name} if joint.dofs else set()
+        return found
+
+    between = (carriers(loop.body_a) ^ carriers(loop.body_b) for loop in robot.loops)
+    tied = (set(tie.joints) for tie in robot.ties if _tied(robot, tie))
+    free = {joint.name for joint in robot.moving if joint.kind == "free"}
+    return frozenset(set().union(*between, *tied) - free)
+
+
+def _guess(joint: RobotJoint, start: RobotStates) -> dict[str, Any]:
+    """Keys of a joint whose start follows from loops: a guess near the pose of the file, where they are closed."""
+    if joint.kind == "spherical":
+        return {"dependent": True, "q0": [1.0, 0.0, 0.0, 0.0]}
+    return {"dependent": True, "q0": [_NEAR * float(start.angle[joint.name][0])]}
+
+
+def _loop(robot: Robot, loop: RobotLoop, names: Mapping[str, str]) -> dict[str, Any]:
+    """Scene table of a loop; its ends are the scene's bodies, which may hold several links."""
+    table: dict[str, Any] = {"name": loop.name, "kind": loop.kind}
+    turns = {}
+    for side, link, position in (("a", loop.body_a, loop.position_a), ("b", loop.body_b, loop.position_b)):
+        home, p, R = robot.welded[link]
+        carrier = next((joint.child for joint in robot.moving if joint.name == home), NO_BODY)
+        table |= {f"body_{side}": "world" if home == NO_BODY else names[carrier]}
+        table |= {f"position_{side}": (p + R @ position).tolist()}
+        turns[side] = R
+    if loop.kind == "fixed":
+        table["orientation"] = list(to_rpy(turns["a"] @ loop.rotation @ turns["b"].T))
+    return table
+
+
 def _couplings(file: RobotFile, robot: Robot) -> Iterator[str]:
     """Clauses on what a scene leaves out: mimics, equality constraints, tendons, a viscous medium."""
     for mimic in (mimic for mimic in robot.mimics if not _follows(robot, mimic)):
         yield f"joint {mimic.joint} following {mimic.other} (mimic)"
     if file.kind != "mjcf":
         return
-    followers = {mimic.joint for mimic in robot.mimics}
-    for constraints in file.root.iter("equality"):
-        for item in constraints:
-            if item.get("joint1") not in followers:
-                yield f"the equality constraint {_called(item)}"
+    for name in (*robot.further, *(f"tendon {tie.name}" for tie in robot.ties if not _tied(robot, tie))):
+        yield f"the equality constraint {name}"
     for tendons in file.root.iter("tendon"):
         for item in tendons:
             if any(item.get(key) not in {None, "0"} for key in ("stiffness", "damping", "frictionloss", "armature")):

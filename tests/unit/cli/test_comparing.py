@@ -87,7 +87,7 @@ def test_why_nobody_can_is_said_engine_by_engine(
     monkeypatch.setattr("proofroll.studies.comparison.default_comparison.engine_names", lambda: ["reduced"])
     code, _, err = command_line("compare", str(mixed))
     assert code == 2
-    assert "no installed engine has revolute joints" in err
+    assert "no adapter that is installed here represents revolute joints" in err
     provided = {"jointed": {"rods": ["revolute joints"]}, "rolling": {"ball": ["rolling without slip"]}}
     engines = [SimpleNamespace(name=name, provides=provides, made_for={}) for name, provides in provided.items()]
     monkeypatch.setattr("proofroll.studies.comparison.default_comparison._installed", lambda *_: engines)

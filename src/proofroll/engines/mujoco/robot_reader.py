@@ -1,7 +1,7 @@
 """MuJoCo's own importer of URDF and MJCF, with the compiled model read back."""
 
 import importlib.metadata
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from proofroll.core.errors import Refused
 from proofroll.engines.mujoco.running import mass_matrix, written
-from proofroll.robots.model import NO_BODY, Array, Mimic, Robot, RobotBody, RobotJoint, composed
+from proofroll.robots.model import NO_BODY, Array, Mimic, Robot, RobotBody, RobotJoint, RobotLoop, Tie, composed
 from proofroll.robots.protocol import AtState, Reading, Request, Whole, evaluate
 
 # Springs and dampers; MuJoCo up to 3.3 has one flag for both.
@@ -226,7 +226,8 @@ def robot_of(model: Any) -> Robot:
             joints.append(_joint(model, joint, parent, child, position, rotation, joint in driven))
             parent, position, rotation = child, np.zeros(3), np.eye(3)
     gravity = np.zeros(3) if _off(model, "GRAVITY") else np.array(model.opt.gravity)
-    robot = Robot("robot", bodies, tuple(joints), _mimics(model), gravity, _sources(model, names))
+    loops, ties, further = _constraints(model, names)
+    robot = Robot("robot", bodies, tuple(joints), _mimics(model), gravity, _sources(model, names), loops, ties, further)
     laws = {"SPRING": "stiffness", "DAMPER": "damping", "FRICTIONLOSS": "friction"}
     return robot.with_joints(**{law: 0.0 for flag, law in laws.items() if _off(model, flag)})
 
@@ -295,6 +296,63 @@ def _mimics(model: Any) -> tuple[Mimic, ...]:
         if model.eq_type[index] == coupling and other >= 0 and model.eq_active0[index] and not np.any(factors[2:]):
             mimics.append(Mimic(model.joint(first).name, model.joint(other).name, float(factors[1]), float(factors[0])))
     return tuple(mimics)
+
+
+def _constraints(model: Any, names: Sequence[str]) -> tuple[tuple[RobotLoop, ...], tuple[Tie, ...], tuple[str, ...]]:
+    """Active equality constraints as loops, as ties of joints, and the names of all others but mimics.
+
+    Coordinates count from ``qpos0``, where a tendon that an equality holds has the length that is kept.
+    """
+    kinds = mujoco.mjtEq
+    loops: list[RobotLoop] = []
+    ties: list[Tie] = []
+    further: list[str] = []
+    for index in range(model.neq):
+        kind, data = int(model.eq_type[index]), np.array(model.eq_data[index])
+        a, b = int(model.eq_obj1id[index]), int(model.eq_obj2id[index])
+        word = kinds(kind).name.removeprefix("mjEQ_").lower()
+        name = model.equality(index).name or f"{word}{index}"
+        if not model.eq_active0[index]:
+            continue
+        if kind in {int(kinds.mjEQ_CONNECT), int(kinds.mjEQ_WELD)}:
+            if model.eq_objtype[index] == mujoco.mjtObj.mjOBJ_SITE:
+                (a, at_a, R_a), (b, at_b, R_b) = (_site(model, site) for site in (a, b))
+                place, turn = (at_a, at_b), R_a @ R_b.T
+            elif kind == int(kinds.mjEQ_CONNECT):
+                place, turn = (data[:3], data[3:6]), np.eye(3)
+            else:
+                place, turn = (data[3:6], data[:3]), matrix(data[6:10])
+            closing = "spherical" if kind == int(kinds.mjEQ_CONNECT) else "fixed"
+            loops.append(RobotLoop(name, closing, names[a], names[b], *place, turn))
+        elif kind == int(kinds.mjEQ_TENDON) and (terms := _held_sum(model, a, b, data)):
+            ties.append(Tie(name, tuple(terms), tuple(terms.values()), float(data[0])))
+        elif kind != int(kinds.mjEQ_JOINT) or b < 0 or np.any(data[2:5]):
+            further.append(f"{word} {name}")
+    return tuple(loops), tuple(ties), tuple(further)
+
+
+def _site(model: Any, site: int) -> tuple[int, Array, Array]:
+    """Body of a site, and the site's position and axes in that body's frame."""
+    return int(model.site_bodyid[site]), np.array(model.site_pos[site]), matrix(model.site_quat[site])
+
+
+def _held_sum(model: Any, first: int, second: int, data: Array) -> dict[str, float]:
+    """Coefficient of each joint in the sum that an equality of one or two fixed tendons holds; empty if it is none."""
+    if second >= 0 and (np.any(data[2:5]) or not _fixed_tendon(model, second)):
+        return {}
+    terms: dict[str, float] = {}
+    for tendon, factor in ((first, 1.0), *(((second, -float(data[1])),) if second >= 0 else ())):
+        for joint, coefficient in _fixed_tendon(model, tendon):
+            terms[joint] = terms.get(joint, 0.0) + factor * coefficient
+    return terms if _fixed_tendon(model, first) else {}
+
+
+def _fixed_tendon(model: Any, tendon: int) -> list[tuple[str, float]]:
+    """Joints of a fixed tendon with their coefficients; empty for a tendon through sites."""
+    parts = range(int(model.tendon_adr[tendon]), int(model.tendon_adr[tendon] + model.tendon_num[tendon]))
+    if any(model.wrap_type[part] != mujoco.mjtWrap.mjWRAP_JOINT for part in parts):
+        return []
+    return [(model.joint(int(model.wrap_objid[part])).name, float(model.wrap_prm[part])) for part in parts]
 
 
 def _first(value: Any) -> float:

@@ -179,7 +179,7 @@ def _reason_for_none(scene: Scene, workers: Workers | None) -> str:
     engines = _installed(workers)
     given = {item for engine in engines for items in engine.provides.values() for item in items}
     if lacking := scene.requires - given:
-        return f"no installed engine has {', '.join(sorted(lacking))}"
+        return f"no adapter that is installed here represents {', '.join(sorted(lacking))}"
     reasons = []
     for engine in engines:
         none = [
