@@ -276,6 +276,10 @@ def test_engines(proofroll: Proofroll, monkeypatch: pytest.MonkeyPatch) -> None:
     code, out, err = proofroll("engines")
     assert (code, err) == (0, "")
     assert "no_such_module_anywhere" in " ".join(out.split())
+    assert "a only (" in out
+    rows = [line.split() for line in out.splitlines()]
+    assert ["capability", "oracle"] in rows
+    assert ["rolling", "without", "slip", "a"] in rows
 
 
 COMPARISON = """

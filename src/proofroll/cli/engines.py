@@ -1,7 +1,9 @@
 """Commands ``engines``: lists engines, and makes and removes environments of other versions."""
 
 import dataclasses
+import string
 import sys
+from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import Annotated, Any
 
@@ -35,7 +37,6 @@ def listed(context: typer.Context, as_json: options.Json = False) -> None:
     from proofroll.report.terminal.tables import console
 
     installed = Table("engine", "version", "formulations (presets)", box=None, pad_edge=False)
-    provided = Table("", "provides", box=None, pad_edge=False)
     for item in described:
         name = item["name"]
         if item["status"] != "installed":
@@ -43,11 +44,16 @@ def listed(context: typer.Context, as_json: options.Json = False) -> None:
         elif name in others:
             installed.add_row(name, item["version"], others[name])
         else:
-            formulations = "\n".join(f"{key} ({', '.join(presets)})" for key, presets in item["presets"].items())
+            letters = _letters(item["presets"])
+            formulations = "\n".join(
+                f"{letters[key]} {key} ({', '.join(presets)})" for key, presets in item["presets"].items()
+            )
             installed.add_row(name, item["version"].replace(", ", "\n"), formulations)
-            provided.add_row(name, "; ".join(sorted(set().union(*item["provides"].values()))))
     console().print(installed)
-    console().print(provided)
+    provided = [item for item in described if item["status"] == "installed" and item["name"] not in others]
+    if provided:
+        console().print(_capabilities(provided))
+        sys.stdout.write("A scene runs in a formulation that has all that proofroll check says it requires.\n")
     if others:
         sys.stdout.write(f"Engines with @ are folders NAME/LABEL of {root()}\n")
 
@@ -82,6 +88,25 @@ def remove(
     for item in environment:
         removed(item)
         sys.stdout.write(f"{item} is removed\n")
+
+
+def _letters(formulations: Iterable[str]) -> dict[str, str]:
+    """Formulation of an engine -> the letter that stands for it."""
+    return dict(zip(formulations, string.ascii_lowercase, strict=False))
+
+
+def _capabilities(engines: Sequence[Mapping[str, Any]]) -> Any:
+    """Matrix of capabilities and engines, whose cells have the letters of the formulations that provide each."""
+    from rich.table import Column, Table
+
+    table = Table(Column("capability", overflow="fold"), *(item["name"] for item in engines), box=None, pad_edge=False)
+    for capability in sorted({name for item in engines for names in item["provides"].values() for name in names}):
+        cells = []
+        for item in engines:
+            letters = _letters(item["presets"])
+            cells.append("".join(letters[key] for key in letters if capability in item["provides"].get(key, ())))
+        table.add_row(capability, *cells)
+    return table
 
 
 def _described(name: str) -> dict[str, Any]:
