@@ -5,8 +5,10 @@ A stretch that has no rule in symbols, as where contacts share a load, takes the
 
 from __future__ import annotations
 
+from collections import OrderedDict
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from threading import get_ident
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
@@ -21,6 +23,7 @@ from proofroll.truth.hybrid import Stretch, StretchLaw
 from proofroll.truth.mechanism.contact_guards import Touchable, guards_of
 from proofroll.truth.mechanism.contact_symbols import SolvedSymbols, Vector, guard_symbols, slip_symbols, turning_slip
 from proofroll.truth.mechanism.maximal_equations import FUNCTIONS
+from proofroll.truth.mechanism.run_time_constants import Constants, Symbol
 from proofroll.truth.picard import Inside, PicardSteps
 from proofroll.truth.scalars import Scalar
 
@@ -32,6 +35,7 @@ except ImportError:  # no wheel for this platform
 # Least slip speed over that at the start of a step, below which it stops in the step; and part of the way to the stop
 # after which the next step begins.
 _STOPS, _BEFORE_STOP = 1e-3, 0.9
+_KEPT = 8  # arrays of parameters
 _TakeStep = Callable[[float, Array, float], tuple[float, Array, Inside]]
 
 
@@ -85,6 +89,36 @@ class CompiledModes:
         return self._modes[key]
 
 
+class _Compiled(NamedTuple):
+    """Function of all values of a mode, and integrator of its rates, which are the last."""
+
+    values: Any
+    integrator: Any
+
+
+_MODES: OrderedDict[tuple[int, ...], _Compiled] = OrderedDict()
+_MOST_MODES = 128  # compiled modes that are kept
+
+
+def _compiled(expressions: Sequence[Any], state: Sequence[Any], by_collocation: bool) -> _Compiled:
+    """What is compiled of a mode; the same for scenes that differ in numbers alone, in one thread.
+
+    They are recognised by hashes: to compare expressions takes for ever where they share parts. Optimised code takes
+    two to ten times as long to compile, which no run earns back.
+    """
+    key = (get_ident(), by_collocation, *map(hash, expressions))
+    if key not in _MODES:
+        values = heyoka.cfunc(expressions, state, compact_mode=True, opt_level=0)
+        rates = list(zip(state, expressions[-len(state) :], strict=True))
+        start = np.zeros(len(state))
+        integrator = None if by_collocation else heyoka.taylor_adaptive(rates, start, compact_mode=True, opt_level=0)
+        _MODES[key] = _Compiled(values, integrator)
+        if len(_MODES) > _MOST_MODES:
+            _MODES.popitem(last=False)
+    _MODES.move_to_end(key)
+    return _MODES[key]
+
+
 class CompiledMode:
     """Integrator and guards of a mode, compiled."""
 
@@ -96,28 +130,24 @@ class CompiledMode:
         length: int,
         by_collocation: bool,
     ) -> None:
-        state = [heyoka.make_vars(f"s{index}") for index in range(length)]
-        functions = {name: getattr(heyoka, name) for name in FUNCTIONS}
         lined = [k for k, own in enumerate(mode) if own.along is not None]
+        constants = Constants(lambda index: heyoka.par[index], 3 * len(lined), heyoka.expression)
+        state = [heyoka.make_vars(f"s{index}") for index in range(length)]
+        functions = constants.functions({name: getattr(heyoka, name) for name in FUNCTIONS})
         began: list[Vector | None] = [None] * len(mode)
         for place, k in enumerate(lined):
-            began[k] = [heyoka.par[3 * place + axis] for axis in range(3)]
-        solved, guards = symbols.solved(state, mode, began, functions), guards_of(contacts, mode)
+            began[k] = [Symbol(heyoka.par[3 * place + axis], constants) for axis in range(3)]
+        solved = symbols.solved([Symbol(each, constants) for each in state], mode, began, functions)
+        guards = guards_of(contacts, mode)
         slips = slip_symbols(mode, contacts, solved)
         values = [*guard_symbols(guards, contacts, solved, began, functions), *slips, *solved.rates, 1.0]
-        expressions = [v if isinstance(v, heyoka.expression) else heyoka.expression(float(v)) for v in values]
         self._by_collocation = by_collocation
         self._turning = [k for k, pair in enumerate(zip(mode, contacts, strict=True)) if turning_slip(*pair)]
         self._count, self._slips, self._lined = len(guards), len(slips), lined
-        # Optimised code takes two to ten times as long to compile, which no run earns back.
-        self._values = heyoka.cfunc(expressions, state, compact_mode=True, opt_level=0)
-        if not by_collocation:
-            self._integrator = heyoka.taylor_adaptive(
-                list(zip(state, expressions[len(guards) + len(slips) :], strict=True)),
-                np.zeros(length),
-                compact_mode=True,
-                opt_level=0,
-            )
+        expressions = [constants.symbol(value) for value in values]
+        self._constants = constants.values
+        self._values, self._integrator = _compiled(expressions, state, by_collocation)
+        self._pars: dict[tuple[ContactMode, int], Array] = {}
 
     def _at_points(self, mode: ContactMode, inside: Inside, start: float, end: float) -> tuple[Array, Array]:
         """Guards and numbers of slips at the points of a step, (points, …).
@@ -130,9 +160,9 @@ class CompiledMode:
             raise Diverged(f"a guard is not finite near t = {start:.6g} s")
         return guards, slips
 
-    def _lines(self, mode: ContactMode) -> Array:
-        """Run-time parameters of a mode: directions of the lines at its start."""
-        return np.array([x for k in self._lined for x in mode[k].along or ()])
+    def _parameters(self, mode: ContactMode) -> Array:
+        """Run-time parameters: directions of the lines at the start of a mode, and the numbers of the scene."""
+        return np.concatenate([[x for k in self._lined for x in mode[k].along or ()], self._constants])
 
     def values(self, states: Array, mode: ContactMode) -> tuple[Array, Array, Array]:
         """Guards, numbers of slips and rates of states (times, state), each (times, …)."""
@@ -145,8 +175,13 @@ class CompiledMode:
         inputs = np.ascontiguousarray(states.T)
         if not self._values.nparams:
             return np.asarray(self._values(inputs))
-        lines = self._lines(mode)[: self._values.nparams]
-        return np.asarray(self._values(inputs, pars=np.repeat(lines[:, None], len(states), axis=1)))
+        key = mode if self._lined else (), len(states)
+        if key not in self._pars:
+            if len(self._pars) > _KEPT:
+                self._pars.clear()
+            pars = self._parameters(mode)[: self._values.nparams]
+            self._pars[key] = np.repeat(pars[:, None], len(states), axis=1)
+        return np.asarray(self._values(inputs, pars=self._pars[key]))
 
     def walk(self, law: StretchLaw, mode: ContactMode, time: float, state: Array, until: float) -> Stretch[ContactMode]:
         """Stretch from a time and state to the first rise of a guard, or to ``until`` [s].
@@ -204,7 +239,7 @@ class CompiledMode:
         integrator = self._integrator
         powers = np.arange(integrator.order + 1)[:, None]
         if len(integrator.pars):
-            integrator.pars[:] = self._lines(mode)[: len(integrator.pars)]
+            integrator.pars[:] = self._parameters(mode)[: len(integrator.pars)]
 
         def step(time: float, state: Array, until: float) -> tuple[float, Array, Inside]:
             integrator.state[:], integrator.time = state, time

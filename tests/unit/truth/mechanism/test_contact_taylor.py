@@ -62,3 +62,15 @@ def test_a_falling_rod_slips_when_it_does_without_compilation(monkeypatch: pytes
     assert one.time_low <= two.time_high
     assert two.time_low <= one.time_high
     assert compiled.record.p_WB == pytest.approx(plain.record.p_WB, abs=1e-12)
+
+
+def test_a_sweep_compiles_once() -> None:
+    """Scenes that differ in numbers alone share what is compiled, and move each in its own way."""
+    pytest.importorskip("heyoka")
+    ends, counts = [], []
+    for friction in (0.31, 0.33, 0.35):
+        mechanism = load_scene("falling_rod", friction=friction).elements[0].mechanism  # type: ignore[attr-defined]
+        ends.append(float(truth_of(mechanism, np.array([0.0, 0.7])).record.p_WB[-1, 0, 0]))
+        counts.append(len(contact_taylor._MODES))
+    assert counts[0] == counts[1] == counts[2]
+    assert len(set(ends)) == 3
