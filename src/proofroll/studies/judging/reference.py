@@ -68,7 +68,7 @@ class Reference:
 
     @property
     def ended(self) -> str:
-        """When and why the truth ends early, as a clause; empty: it does not. What lies behind is not judged."""
+        """Clause on the time and reason of an early end of the truth; empty if there is none. Nothing is judged behind it."""
         end = ended_early(self.dataset)
         return f"the truth ends at t = {end[0]:.6g} s: {end[1]}" if end else ""
 

@@ -45,7 +45,7 @@ class SolvedSymbols(NamedTuple):
 
 
 class HeldRows(NamedTuple):
-    """What a contact holds, and what pushes it: directions of rows and of their forces, (rows, 3) each."""
+    """Directions of a contact's rows and of the forces in them, (rows, 3) each."""
 
     directions: Sequence[Vector]
     along: Sequence[Vector]
@@ -107,7 +107,7 @@ def guard_symbols(
 
 
 def slip_symbols(mode: ContactMode, contacts: Sequence[Touchable], solved: SolvedSymbols) -> list[Scalar]:
-    """Of each slip u in the plane with friction: u², u·u̇ and u̇²; u² is smooth, also where the slip stops."""
+    """Products u², u·u̇ and u̇² of each slip u in the plane with friction; u² is smooth, also where the slip stops."""
     found: list[Scalar] = []
     for own, contact, touch, rate in zip(mode, contacts, solved.touching, solved.slide_rates, strict=True):
         if turning_slip(own, contact):

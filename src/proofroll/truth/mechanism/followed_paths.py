@@ -60,7 +60,7 @@ def end_of(paths: tuple[FollowedPath, FollowedPath]) -> tuple[float, str]:
 
 
 def times_known(paths: tuple[FollowedPath, FollowedPath], times: Array) -> Array:
-    """Those of rising times, in natural units, at which both paths are known; the first time always is."""
+    """Times, in natural units, at which both paths are known, of rising ones whose first always is."""
     end = end_of(paths)[0]
     known = times < end - time_accuracy(end) if np.isfinite(end) else np.ones(len(times), dtype=bool)
     known[0] = True

@@ -145,7 +145,7 @@ def _check_energy(mechanism: Mechanism, record: Record, route: str) -> None:
     """Checks that a route keeps the energy of a conservative mechanism.
 
     Raises:
-        Diverged: it does not, so that the route has failed.
+        Diverged: the energy changes, so that the route has failed.
     """
     if not mechanism.conservative:
         return
