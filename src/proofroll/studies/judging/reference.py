@@ -68,7 +68,7 @@ class Reference:
 
     @property
     def ended(self) -> str:
-        """Clause on the time and reason of an early end of the truth; empty if there is none. Nothing is judged behind it."""
+        """Clause on the time and reason of an early end of the truth, behind which nothing is judged; or empty."""
         end = ended_early(self.dataset)
         return f"the truth ends at t = {end[0]:.6g} s: {end[1]}" if end else ""
 
