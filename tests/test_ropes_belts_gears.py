@@ -1,0 +1,50 @@
+"""Scenes of the page about ropes, belts, gears, screws and differentials: their truths are closed forms."""
+
+from __future__ import annotations
+
+import math
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from proofroll.core.truth import truth
+from proofroll.files.scene_file import load_scene
+
+PAGE = Path(__file__).resolve().parents[1] / "docs" / "ropes_belts_gears.md"
+SCENES = dict(
+    re.findall(r"^```toml\n# (\w+)/scene\.toml\n(.*?)^```$", PAGE.read_text("utf-8"), re.DOTALL | re.MULTILINE)
+)
+_G, _K = 9.81, (2 * math.pi / 0.01) ** 2
+
+
+def _differential() -> tuple[float, float]:
+    """Accelerations of both wheels [rad/s²], from their balance with the carrier between them."""
+    # 2 a = l + r;  6 = 0.02 a + 2 M;  0.1 l = M;  0.3 r = M
+    moment = 6 / (2 + 0.02 * (1 / 0.1 + 1 / 0.3) / 2)
+    return moment / 0.1, moment / 0.3
+
+
+@pytest.mark.parametrize(
+    ("name", "accelerations"),
+    [
+        ("belt", {"motor": 100.0, "shaft": 50.0}),
+        ("tackle", {"x1": -0.2 * _G}),
+        ("screw", {"slide": -_G * 0.5 / (0.5 + 1e-4 * _K)}),
+        ("differential", dict(zip(("left_shaft", "right_shaft"), _differential(), strict=True))),
+    ],
+)
+def test_a_scene_of_the_page_has_its_closed_form(name: str, accelerations: dict[str, float], tmp_path: Path) -> None:
+    """From rest each coordinate is half its constant acceleration times the time squared, to the error bar."""
+    (tmp_path / "scene.toml").write_text(SCENES[name], encoding="utf-8")
+    dataset = truth(load_scene(str(tmp_path)), np.array([0.0, 0.2]))
+    for joint, acceleration in accelerations.items():
+        coordinate = dataset[f"q.{joint}"]
+        assert float(coordinate[-1]) == pytest.approx(0.02 * acceleration, rel=1e-11)
+        assert float(coordinate.attrs["error_bar"]) < 1e-10
+
+
+def test_the_page_has_these_scenes() -> None:
+    """Every scene of the page is tested."""
+    assert set(SCENES) == {"belt", "tackle", "screw", "differential"}
