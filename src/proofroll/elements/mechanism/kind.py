@@ -78,7 +78,7 @@ class MechanismKind:
     """See :class:`proofroll.core.element.ElementKind`."""
 
     name: ClassVar[str] = "mechanism"
-    tables: ClassVar[tuple[str, ...]] = (*KINDS, "repeat", "published", "unmodelled")
+    tables: ClassVar[tuple[str, ...]] = (*KINDS, "repeat", "published", "unmodelled", "impacts")
     units: ClassVar[Mapping[str, str]] = all_units_of(*KINDS.values())
 
     @staticmethod

@@ -24,6 +24,9 @@ from proofroll.elements.mechanism.parts import Body, Loop, Point, Spring
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.elements.mechanism.signal import Signal
 
+# Laws of impacts of several contacts at once, see Mechanism.impacts.
+IN_ANY_ORDER, TOGETHER = "any order", "together"
+
 
 class JointOrLoop(NamedTuple):
     """Connection of bodies a and b (b: a joint's child): places [m] and frames, as columns, in each body's axes."""
@@ -49,6 +52,8 @@ class Mechanism:
         gravity: acceleration in the world's axes, m/s².
         actuators: in the order of the scene; each drives a joint.
         couplings: pairs of joints that move together.
+        impacts: law of impacts of several contacts at once. "any order": one after the other in any order, whose
+            outcomes must be the same; "together": Moreau's law for all of them.
         unmodelled: features of its source that no model here has, in a few words each; with any of them every route and
             engine refuses the mechanism.
     """
@@ -64,6 +69,7 @@ class Mechanism:
     pairs: tuple[Pair, ...] = ()
     actuators: tuple[Actuator, ...] = ()
     couplings: tuple[Coupling, ...] = ()
+    impacts: str = IN_ANY_ORDER
 
     def __post_init__(self) -> None:
         parts = ("bodies", "joints", "loops", "springs", "points", "geometries", "pairs", "actuators", "couplings")
@@ -71,6 +77,8 @@ class Mechanism:
             checks.assign(self, **{key: tuple(getattr(self, key))})
             _check_unique(key, getattr(self, key))
         checks.assign(self, unmodelled=tuple(self.unmodelled))
+        if self.impacts not in {IN_ANY_ORDER, TOGETHER}:
+            raise InputError("impacts", self.impacts, f'give "{IN_ANY_ORDER}" or "{TOGETHER}"')
         _check_unique("loops", self.joints + self.loops)  # results name both alike
         names = sorted({WORLD, *(body.name for body in self.bodies)})
         for kind in ("joints", "loops", "springs", "points", "geometries"):
@@ -83,6 +91,11 @@ class Mechanism:
         checks.assign(self, gravity=checks.vector("gravity", self.gravity))
         _check_masses(self.bodies, self.joints, {name for item in self.couplings for name, _ in item.terms})
         _check_unique("pairs", (*self.joints, *self.loops, *self.contacts))  # their forces are named alike
+
+    @property
+    def together(self) -> bool:
+        """True if impacts of several contacts at once follow Moreau's law."""
+        return self.impacts == TOGETHER
 
     @cached_property
     def contacts(self) -> tuple[BodyContact, ...]:

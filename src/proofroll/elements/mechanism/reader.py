@@ -19,7 +19,7 @@ from proofroll.elements.mechanism.contacts.geometry import Geometry, Pair
 from proofroll.elements.mechanism.contacts.start import check_contacts
 from proofroll.elements.mechanism.drives import Actuator, Coupling
 from proofroll.elements.mechanism.joint import Joint
-from proofroll.elements.mechanism.model import Mechanism
+from proofroll.elements.mechanism.model import IN_ANY_ORDER, Mechanism
 from proofroll.elements.mechanism.parts import Body, Loop, Point, Spring
 from proofroll.elements.mechanism.signal import Table, read_signal
 
@@ -43,7 +43,7 @@ def made_mechanism(content: Mapping[str, Any], gravity: checks.Vector, numbers: 
     """Mechanism of a scene file, its loops closed, able to move.
 
     Args:
-        content: the tables of :data:`KINDS`, ``repeat``, and the list of texts ``unmodelled``.
+        content: the tables of :data:`KINDS`, ``repeat``, the list of texts ``unmodelled``, and ``impacts``.
         gravity: acceleration in the world's axes [m/s²].
         numbers: the parameters.
 
@@ -60,7 +60,8 @@ def made_mechanism(content: Mapping[str, Any], gravity: checks.Vector, numbers: 
     if not made["bodies"]:
         raise InputError("bodies", "none", "a mechanism needs a body; add a [[bodies]] table")
     parts = {kind: tuple(items) for kind, items in made.items()}
-    mechanism = assemble(Mechanism(gravity=gravity, unmodelled=_texts(content, "unmodelled"), **parts))
+    law = content.get("impacts", IN_ANY_ORDER)
+    mechanism = assemble(Mechanism(gravity=gravity, unmodelled=_texts(content, "unmodelled"), impacts=law, **parts))
     check_start(mechanism)
     check_contacts(mechanism)
     return mechanism

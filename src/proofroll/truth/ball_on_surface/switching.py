@@ -67,6 +67,8 @@ def follow(body: RollingBall, route: Route, until: float) -> Path:
         Diverged: a route makes no progress.
     """
     path = hybrid.follow(SwitchedBall(body, route), until)
+    if path.ended:
+        raise Refused(path.ended)
     events = [(cast(EventKind, event.kind), event.time) for event in path.happenings]
     blurs = {event.time: event.blur for event in path.happenings if event.blur}
     return Path(list(path.stretches), events, None if path.known else path.stretches[-1].end, blurs)

@@ -7,10 +7,12 @@ import numpy as np
 
 from proofroll.core.errors import Refused
 from proofroll.elements.mechanism.contacts.acting import OPEN, Acting, ContactMode, Direction, first_mode, slip_velocity
+from proofroll.elements.mechanism.contacts.sequences import groups_of
 from proofroll.elements.mechanism.contacts.start import closed_and_still
 from proofroll.elements.mechanism.contacts.touching import Touching
 from proofroll.elements.mechanism.rotations import Array, cross, frame_of_axis
 from proofroll.truth.hybrid import Transition
+from proofroll.truth.mechanism.body_impacts import impulses_in_turn
 from proofroll.truth.mechanism.body_switching import SLACK
 from proofroll.truth.mechanism.contact_body_symbols import BodySymbols
 from proofroll.truth.mechanism.contact_equations import BodiesSolution, BodiesState, ContactEquations
@@ -19,7 +21,6 @@ from proofroll.truth.mechanism.contact_stretches import ContactStretches, modes_
 from proofroll.truth.mechanism.contact_taylor import ModeSymbols
 
 _MOST = 6  # largest number of contacts closed at the same time: each has up to four candidate modes
-_SAME = 1e-6  # velocity difference, relative to the largest speed, below which two outcomes of an impact are the same
 _SIDES = 180  # sides of a pyramid inside each friction cone, for the test of balance at rest
 Trial = Callable[[ContactMode, Sequence[Array | None]], BodiesSolution]
 
@@ -87,29 +88,24 @@ class ContactBodies(ContactStretches):
         aims = np.concatenate([-bodies.force, size * bounds[bounds > 0]])
         return bool(nnls(matrix, aims, maxiter=100 * matrix.shape[1])[1] <= SLACK * size)
 
-    def _struck(
-        self,
-        state: Array,
-        mode: ContactMode,  # noqa: ARG002 -- for the other route
-        closed: Sequence[bool],
-        laws: Sequence[float],
-    ) -> tuple[Array, list[bool], float]:
+    def _struck(self, state: Array, closed: Sequence[bool], laws: Sequence[float]) -> tuple[Array, list[bool], float]:
         bodies = self.equations.at(state)
-        speeds = [float(each.normal @ each.slide) for each in bodies.touching]
-        after = np.array([-law * min(speed, 0.0) for law, speed in zip(laws, speeds, strict=True)])
-
-        def trial(mode: ContactMode, headings: Sequence[Array | None]) -> BodiesSolution:
-            return self.equations.struck(bodies, mode, headings, after.tolist())
-
-        comes = float(np.abs(bodies.J @ bodies.u).max())
-        (_, solution, _), *others = self._tried(bodies, closed, [True] * len(closed), trial, comes, impact=True)
+        which = np.flatnonzero(closed).tolist()
+        ways, G = self.equations.coupled_responses(bodies, which)
+        slides = np.concatenate(
+            [frame_of_axis(bodies.touching[k].normal)[:, [2, 0, 1]].T @ bodies.touching[k].slide for k in which]
+        )
+        friction, names = [float(self.equations.friction[k]) for k in which], [self.contacts[k].name for k in which]
+        together = self.equations.mechanism.together
+        groups = groups_of([self.contacts[k].pair for k in which], slides, together=together)
+        impulses = impulses_in_turn(G, slides, groups, friction, [laws[k] for k in which], names, float(state[-1]))
         e = self.equations.equations.equations
         state = state.copy()
-        state[e.nx : e.nx + e.nu] = solution.moved
-        parting = (float(each.normal @ slide) for each, slide in zip(bodies.touching, solution.slide, strict=True))
-        stays = [shut and away <= SLIP_ENDED for shut, away in zip(closed, parting, strict=True)]
-        apart = max((float(np.abs(other.moved - solution.moved).max()) for _, other, _ in others), default=0.0)
-        return state, stays, 0.0 if apart > _SAME * float(np.abs(bodies.u).max()) else np.inf
+        state[e.nx : e.nx + e.nu] += ways @ impulses
+        parting, stays = (slides + G @ impulses)[::3], [False] * len(self.contacts)
+        for k, away in zip(which, parting, strict=True):
+            stays[k] = bool(away <= SLIP_ENDED)
+        return state, stays, np.inf
 
     def _own(self, bodies: BodiesState, closed: Sequence[bool]) -> list[Acting]:
         """Provisional mode of each contact: open, or stick, with its line if it can slide along a line only."""
@@ -126,13 +122,11 @@ class ContactBodies(ContactStretches):
         still: Sequence[bool],
         trial: Trial,
         free: float,
-        *,
-        impact: bool = False,
     ) -> list[tuple[float, BodiesSolution, ContactMode]]:
         """Candidate modes that violate no inequality, best first: relative margin, solution, mode.
 
         ``free``: largest slide, or rate of a slide, without forces, to which margins are relative if those with forces
-        are less. Of an ``impact`` those with shared loads count only where none has unique impulses.
+        are less.
 
         Raises:
             Refused: there is none, or too many contacts are closed.
@@ -155,7 +149,7 @@ class ContactBodies(ContactStretches):
             )
             if (least := min(apart, default=np.inf)) >= -SLACK:
                 (shared if solution.loose else unique).insert(0, (max(least, 0.0), solution, headed))
-        kept = unique or shared if impact else shared + unique
+        kept = shared + unique
         if not kept:
             raise Refused("nothing that the contacts can do keeps all inequalities of contact")
         return sorted(kept, key=lambda one: -one[0])

@@ -10,7 +10,7 @@ from proofroll.elements.mechanism.contacts.geometry import BodyContact
 from proofroll.elements.mechanism.contacts.joint_laws import JointContact, joint_contacts, mode_of_joints
 from proofroll.elements.mechanism.contacts.touching import Moving, Touching, touch
 from proofroll.elements.mechanism.model import Mechanism
-from proofroll.elements.mechanism.rotations import Array, cross
+from proofroll.elements.mechanism.rotations import Array, cross, frame_of_axis
 from proofroll.elements.mechanism.switches import HOLDING, STOPPED, switched_joints
 from proofroll.truth.mechanism.maximal_coordinates import RANK, NumericEquations
 from proofroll.truth.mechanism.maximal_equations import Switched
@@ -45,14 +45,14 @@ class BodiesState:
 
 @dataclass(frozen=True)
 class BodiesSolution:
-    """Accelerations and contact forces in a mode; or velocities and impulses after an impact.
+    """Accelerations and contact forces in a mode.
 
     Attributes:
         mode: the mode, with lines of contacts as they lie now.
-        moved: u̇, or u after an impact.
-        force: contact force or impulse on body a of each contact, (contacts, 3).
-        slide: rate of each sliding velocity, or the velocity after an impact, (contacts, 3).
-        parting: second rate of each gap; or after an impact its rate minus that of the restitution law, (contacts).
+        moved: u̇.
+        force: on body a of each contact, (contacts, 3).
+        slide: rate of each sliding velocity, (contacts, 3).
+        parting: second rate of each gap, (contacts).
         response: Painlevé's measure, 1 without friction.
         loose: True if the forces are not unique.
         splits: ways to split a load that contacts share: changes of the normal forces, (contacts, ways).
@@ -145,24 +145,26 @@ class ContactEquations:
         each = ways.T.reshape(*state.J.shape)
         return np.asarray(each @ each.swapaxes(1, 2))
 
+    def coupled_responses(self, state: BodiesState, which: Sequence[int]) -> tuple[Array, Array]:
+        """Changes of the velocities (nu, 3 contacts) and slides (3 contacts, 3 contacts) by unit impulses on contacts.
+
+        Components of an impulse or a slide are along the normal and two directions of the surface.
+        """
+        frames = [frame_of_axis(state.touching[k].normal)[:, [2, 0, 1]] for k in which]
+        J = np.concatenate([frame.T @ state.J[k] for frame, k in zip(frames, which, strict=True)])
+        root = np.linalg.cholesky(state.mass)
+        ways = np.linalg.solve(root, J.T)
+        if len(state.C):
+            joints = np.linalg.solve(root, state.C.T)
+            ways = ways - joints @ np.linalg.lstsq(joints, ways, rcond=RANK)[0]
+        return np.asarray(np.linalg.solve(root.T, ways)), np.asarray(ways.T @ ways)
+
     def _held(self, state: BodiesState, mode: ContactMode) -> list[Array]:
         """Directions in which each contact constrains the sliding velocity."""
         return [
             held_directions(own, each, presses=not bound)
             for own, each, bound in zip(mode, state.touching, self.bounds, strict=True)
         ]
-
-    def struck(
-        self, state: BodiesState, mode: ContactMode, headings: Sequence[Array | None], after: Sequence[float]
-    ) -> BodiesSolution:
-        """Velocities and impulses after an impact in these modes; ``after``: normal speeds of closed contacts, m/s."""
-        wanted = [
-            held @ each.normal * speed
-            for held, each, speed in zip(self._held(state, mode), state.touching, after, strict=True)
-        ]
-        still = np.zeros(len(state.of_joints))
-        bias = np.zeros((len(mode), 3))
-        return self._solved(state, mode, headings, wanted, state.mass @ state.u, still, bias, -np.array(after))
 
     def _solved(
         self,

@@ -102,14 +102,11 @@ class ContactStretches(Stretches[ContactMode]):
         """Mode that follows from the forces, and its relative margin from another mode."""
 
     @abstractmethod
-    def _struck(
-        self, state: Array, mode: ContactMode, closed: Sequence[bool], laws: Sequence[float]
-    ) -> tuple[Array, list[bool], float]:
+    def _struck(self, state: Array, closed: Sequence[bool], laws: Sequence[float]) -> tuple[Array, list[bool], float]:
         """State after an impact, contacts that stay closed, and the relative margin from another outcome.
 
         Args:
             state: before the impact.
-            mode: before the impact.
             closed: contacts that may take impulses.
             laws: restitution of each contact in this impact.
         """
@@ -263,11 +260,11 @@ class ContactStretches(Stretches[ContactMode]):
         ]
         laws = [contact.restitution if k in hits else 0.0 for k, contact in enumerate(contacts)]
         speed, delay = -float(touching[hit].normal @ touching[hit].slide), 0.0
-        state, stays, margin = self._struck(stretch.last, stretch.mode, closed, laws)
+        state, stays, margin = self._struck(stretch.last, closed, laws)
         if self._settles(hit, speed, law):
             pull = -float(touching[hit].normal @ self._solved(state, stretch.mode).slide_rate[hit])
             delay = self._bouncing(self.contacts[hit].name, speed * law, pull, law)
-            state, stays, margin = self._struck(stretch.last, stretch.mode, closed, [0.0] * len(closed))
+            state, stays, margin = self._struck(stretch.last, closed, [0.0] * len(closed))
         stays = [stay or bool(contact.bound) for stay, contact in zip(stays, contacts, strict=True)]
         happened = tuple(("settle" if delay and k == hit else "impact", contacts[k].name) for k in hits)
         return self._after(stretch, state, stays, happened, margin, delay)

@@ -36,14 +36,12 @@ class ContactTree(ContactStretches):
         state = self.dynamics.eliminated(np.concatenate([*self.dynamics.mechanism.start(), [0.0]]), mode)
         return Transition(state, mode, (), margin)
 
-    def _struck(
-        self, state: Array, mode: ContactMode, closed: Sequence[bool], laws: Sequence[float]
-    ) -> tuple[Array, list[bool], float]:
+    def _struck(self, state: Array, closed: Sequence[bool], laws: Sequence[float]) -> tuple[Array, list[bool], float]:
         (q, v, time), which = self.dynamics.parts(state), np.flatnonzero(closed).tolist()
         after, impulse, margin = self.dynamics.struck(q, v, which, np.array([laws[k] for k in which]), time)
         stays, touching = list(closed), self.dynamics.at(q, after).touching
         for pressed, k in zip(impulse[:, 0] > 0, which, strict=True):
-            leaves = mode[k].kind == "open" or float(touching[k].normal @ touching[k].slide) > SLIP_ENDED
+            leaves = float(touching[k].normal @ touching[k].slide) > SLIP_ENDED
             stays[k] = not laws[k] if pressed else not leaves
         return np.concatenate([q, after, [time]]), stays, margin
 

@@ -21,7 +21,6 @@ from proofroll.core.scene import Scene
 from proofroll.core.truth import truth
 from proofroll.elements.ball_on_surface.element import scene_with
 from proofroll.elements.mechanism.contacts import coulomb
-from proofroll.elements.mechanism.contacts.acting import OPEN
 from proofroll.elements.mechanism.contacts.geometry import Geometry, Pair
 from proofroll.elements.mechanism.drives import Actuator
 from proofroll.elements.mechanism.element import MechanismElement
@@ -761,22 +760,20 @@ def test_a_capsule_slides_and_rolls_on_both_its_ends() -> None:
     assert np.isnan(found.pressed[2, :, 1]).all()
 
 
-def test_corners_that_share_forces_as_they_rub_are_not_searched_for_directions(monkeypatch: pytest.MonkeyPatch) -> None:
-    """An impact of four corners takes hundreds of solutions, not thousands: most modes of theirs have no one motion."""
+def test_an_impact_on_one_edge_of_a_face_opens_the_other() -> None:
+    """A turning box whose face is down lands on the two corners that come, and its other two lift."""
     body = Body("box", 1.0, inertia=(2e-3, 3e-3, 4e-3))
-    start = Joint("free", "free", "world", "box", q0=(0, 0, 0.05, 1, 0, 0, 0), v0=(0.3, 0.1, 0, 0.02, 1, 0))
+    start = Joint("free", "free", "world", "box", q0=(0, 0, 0.05, 1, 0, 0, 0), v0=(0.3, 0.1, 0, 0, 1, 0))
     shapes = (Geometry("hull", "box", "box", size=(0.2, 0.1, 0.1)), Geometry("floor", "world", "plane"))
     pairs = (Pair("ground", ("hull", "floor"), friction=0.1),)
     box = Mechanism(bodies=(body,), joints=(start,), geometries=shapes, pairs=pairs)
     equations = ContactEquations(box, MaximalCoordinates(box).lean)
-    bodies, solved, tried = ContactBodies(equations, 3e-14, 1.0), equations.struck, []
-    monkeypatch.setattr(equations, "struck", lambda *given: tried.append(1) or solved(*given))
+    bodies = ContactBodies(equations, 3e-14, 1.0)
     state = np.append(equations.equations.equations.start(), 0.0)
     closed = [each.gap < 1e-9 for each in equations.at(state).touching]
     assert sum(closed) == 4
-    _, stays, _ = bodies._struck(state, (OPEN,) * 8, closed, [0.0] * 8)
+    _, stays, _ = bodies._struck(state, closed, [0.0] * 8)
     assert sum(stays) == 2
-    assert len(tried) < 1000
 
 
 def dragged(*, sole: float = 0.2, pull: float = 0.0, **rail: Any) -> Mechanism:
@@ -833,3 +830,51 @@ def test_a_flicked_ball_has_narrow_bars_at_other_numbers(finger: float, swing: f
     assert np.isinf(found.horizon)
     assert {("lift_off", "push"), ("stick", "ground")} <= set(happened(found))
     assert max(float(bar[-1]) for bar in found.bars.values()) < 1e-9
+
+
+def dropped_box(
+    turned: tuple[float, float, float, float] = (1.0, 0.0, 0.0, 0.0),
+    *,
+    height: float = 0.1,
+    slip: float = 0.0,
+    friction: float = 0.5,
+    restitution: float = 0.0,
+    **changed: Any,
+) -> Mechanism:
+    """A box of 0.4 m × 0.3 m × 0.2 m whose lowest corner is at a height above a floor."""
+    size = (0.4, 0.3, 0.2)
+    w, x, y, z = turned
+    vertical = np.array([2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)])
+    above = float(np.abs(vertical) @ np.array(size) / 2) + height
+    mechanism = Mechanism(
+        bodies=(Body("box", 2.0, inertia=(13 / 600, 20 / 600, 25 / 600)),),
+        joints=(Joint("free", "free", "world", "box", q0=(0, 0, above, *turned), v0=(slip, 0, 0, 0, 0, 0)),),
+        geometries=(Geometry("hull", "box", "box", size=size), Geometry("floor", "world", "plane")),
+        pairs=(Pair("touch", ("hull", "floor"), friction=friction, restitution=restitution),),
+    )
+    return replace(mechanism, **changed)
+
+
+@pytest.mark.parametrize("slip", [0.0, 0.3, pytest.param(2.0, marks=pytest.mark.drill)])
+def test_a_box_that_lands_flat_has_a_truth_to_its_rest(slip: float) -> None:
+    """Its face lands as one: it stops at once if friction can do that, or slides on by Coulomb's law."""
+    falls, impulse, mu = float(np.sqrt(0.2 / 9.81)), float(np.sqrt(0.2 * 9.81)), 0.5
+    slides = max(slip - mu * impulse, 0.0)
+    found = truth_of(dropped_box(slip=slip, friction=mu), np.array([0.0, 0.1, 1.0]))
+    assert (found.ended, found.horizon) == ("", np.inf)
+    assert [(event.kind, event.time) for event in found.events[:4]] == [
+        ("impact", pytest.approx(falls, abs=DIGITS))
+    ] * 4
+    assert found.record.p_WB[2, 0] == pytest.approx([slip * falls + slides**2 / (2 * mu * 9.81), 0, 0.1], abs=DIGITS)
+    assert np.abs(found.record.v_WB[2]).max() < DIGITS
+
+
+@pytest.mark.parametrize("impacts", ["any order", "together"])
+def test_two_feet_that_land_at_once_have_an_outcome_where_no_order_decides(impacts: str) -> None:
+    """A plank whose ends are two contacts falls flat: where its order decides the truth ends, unless it has none."""
+    block = mechanism_of("rocking_block", friction=0.2)
+    flat = replace(block.joints[0], q0=(0.0, -0.3, 0.0), v0=(0.0, 0.0, 0.0))
+    found = truth_of(replace(block, joints=(flat,), impacts=impacts), np.array([0.0, 0.1, 0.3]))
+    assert ("its outcome depends on their order" in found.ended) == (impacts == "any order")
+    if impacts == "together":
+        assert np.abs(found.record.v_WB[2]).max() < DIGITS

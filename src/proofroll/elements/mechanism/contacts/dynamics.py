@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 
-from proofroll.core.errors import NotUnique
 from proofroll.elements.mechanism.analysis import RANK
 from proofroll.elements.mechanism.contacts.acting import (
     OPEN,
@@ -22,9 +21,10 @@ from proofroll.elements.mechanism.contacts.acting import (
     held_directions,
     turned,
 )
-from proofroll.elements.mechanism.contacts.coulomb import robust_forces
+from proofroll.elements.mechanism.contacts.coulomb import contact_forces, robust_forces
 from proofroll.elements.mechanism.contacts.geometry import BodyContact
 from proofroll.elements.mechanism.contacts.joint_laws import JointContact, joint_contacts, mode_of_joints
+from proofroll.elements.mechanism.contacts.sequences import groups_of, refuse_spread, sequences
 from proofroll.elements.mechanism.contacts.start import STILL, closed_and_still, natural_scale, touches
 from proofroll.elements.mechanism.contacts.touching import Touching, lying
 from proofroll.elements.mechanism.joint_coordinates import JointCoordinates, Solution
@@ -323,11 +323,20 @@ class ContactDynamics:
         speeds, scale = (J @ v)[::3], float(np.abs(J @ v).max())
         hit = (speeds < -STILL * scale) | (impulse[:, 0] > STILL * impulse[:, 0].max())
         lossy = np.array([bool(self.contacts[k].friction or self.contacts[k].restitution) for k in closed])
-        if pair := _ordered(G, lossy, hit):
-            a, b = (names[k] for k in pair)
-            raise NotUnique(
-                f"an impact at t = {time:.6g} s presses {a} and {b} at once: its outcome depends on their order"
-            )
+        if not self.mechanism.together and _ordered(G, lossy, hit):
+            groups = groups_of([self.contacts[k].pair for k in closed], J @ v, together=False)
+
+            def strike(response: Array, slides: Array, group: list[int]) -> Array:
+                of = np.array([closed[k] for k in group])
+                comes = slides.copy()
+                comes[::3] += restitution[group] * np.minimum(comes[::3], 0.0)
+                told = [names[k] for k in group]
+                return contact_forces(response, comes, self.friction[of], [None] * len(of), told, time=time)[0].ravel()
+
+            outcomes = sequences(G, J @ v, groups, strike)
+            jumps = state.W @ J.T @ np.vstack([impulse.ravel(), outcomes.impulses]).T
+            refuse_spread(jumps, outcomes, [names[k] for k in np.flatnonzero(hit)], time)
+            same = True
         return v + state.W @ J.T @ impulse.ravel(), impulse, np.inf if same else 0.0
 
     def _refuse_flat(self, state: ContactsNow, closed: Sequence[int], time: float) -> None:

@@ -164,6 +164,7 @@ class BodyContact:
         body_a, body_b: of the first and the second geometry.
         shape_a, shape_b: in the frames of these; one of them may be a wall.
         friction, restitution: of the pair.
+        pair: its name.
         bound: largest friction without a normal force; always 0 between bodies [N].
     """
 
@@ -175,6 +176,7 @@ class BodyContact:
     shape_b: Shape
     friction: float
     restitution: float
+    pair: str = ""
 
     @property
     def of_disc(self) -> bool:
@@ -216,7 +218,7 @@ def contacts_of(geometries: Sequence[Geometry], pairs: Sequence[Pair]) -> tuple[
         touching = list(itertools.product(a.shapes, b.shapes))
         for number, (one, other) in enumerate(touching, 1):
             name = pair.name if len(touching) == 1 else f"{pair.name}.{number}"
-            found.append(BodyContact(name, a.body, b.body, one, other, pair.friction, pair.restitution))
+            found.append(BodyContact(name, a.body, b.body, one, other, pair.friction, pair.restitution, pair.name))
     return tuple(found)
 
 

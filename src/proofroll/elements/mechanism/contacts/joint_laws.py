@@ -39,6 +39,11 @@ class JointContact:
         return self.joint.name
 
     @property
+    def pair(self) -> str:
+        """Text that no other contact has."""
+        return f"{self.joint.name} {self.side}"
+
+    @property
     def bound(self) -> float:
         """Largest force of dry friction [N, N m]; 0: a stop."""
         return 0.0 if self.side else self.joint.friction
