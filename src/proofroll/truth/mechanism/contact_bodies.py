@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator, Sequence
 import numpy as np
 
 from proofroll.core.errors import Refused
+from proofroll.elements.mechanism.analysis import RANK
 from proofroll.elements.mechanism.contacts.acting import OPEN, Acting, ContactMode, Direction, first_mode, slip_velocity
 from proofroll.elements.mechanism.contacts.sequences import groups_of
 from proofroll.elements.mechanism.contacts.start import closed_and_still
@@ -21,6 +22,7 @@ from proofroll.truth.mechanism.contact_stretches import ContactStretches, modes_
 from proofroll.truth.mechanism.contact_taylor import ModeSymbols
 
 _MOST = 6  # largest number of contacts closed at the same time: each has up to four candidate modes
+_SHARING = 2  # least number of contacts that may share a load
 _SIDES = 180  # sides of a pyramid inside each friction cone, for the test of balance at rest
 Trial = Callable[[ContactMode, Sequence[Array | None]], BodiesSolution]
 
@@ -57,7 +59,9 @@ class ContactBodies(ContactStretches):
             ]
             return self.equations.accelerated(bodies, tuple(directed))
 
-        if any(closed) and list(still) == list(closed) and self._balanced(bodies, closed):
+        if any(closed) and list(still) == list(closed) and (
+            self._balanced(bodies, closed) or self._held_together(bodies, closed)
+        ):
             own = zip(self._own(bodies, closed), self._rubs, strict=True)
             return tuple(
                 each if rub or each.kind == "open" else each._replace(kind="slip") for each, rub in own
@@ -72,14 +76,7 @@ class ContactBodies(ContactStretches):
 
         if np.abs(bodies.u).max() > AT_REST:
             return False
-        angles = np.linspace(0, 2 * np.pi, _SIDES, endpoint=False)
-        columns, bounds = [bodies.C.T, -bodies.C.T], self.equations.bounds
-        for each, J, mu, shut in zip(bodies.touching, bodies.J, self.equations.friction, closed, strict=True):
-            if not shut:
-                continue
-            frame = frame_of_axis(each.normal)
-            sides = np.outer(np.cos(angles), frame[:, 0]) + np.outer(np.sin(angles), frame[:, 1])
-            columns.append(J.T @ (each.normal + mu * sides).T)
+        columns, bounds = [bodies.C.T, -bodies.C.T, *self._pushes(bodies, closed)], self.equations.bounds
         size, count = float(np.linalg.norm(bodies.force)), sum(each.shape[1] for each in columns)
         rubs = bodies.J[bounds > 0].sum(axis=1)  # the slide of these has one component
         # A bounded friction has a part in each direction and a remainder; the three sum to the bound.
@@ -87,6 +84,34 @@ class ContactBodies(ContactStretches):
         matrix = np.block([[*columns, rubs.T, -rubs.T, 0 * rubs.T], [np.zeros((len(rubs), count)), parts]])
         aims = np.concatenate([-bodies.force, size * bounds[bounds > 0]])
         return bool(nnls(matrix, aims, maxiter=100 * matrix.shape[1])[1] <= SLACK * size)
+
+    def _pushes(self, bodies: BodiesState, closed: Sequence[bool]) -> list[Array]:
+        """Loads by unit normal forces with friction in the directions of a pyramid, for each closed contact."""
+        angles, loads = np.linspace(0, 2 * np.pi, _SIDES, endpoint=False), []
+        for each, J, mu, shut in zip(bodies.touching, bodies.J, self.equations.friction, closed, strict=True):
+            if shut:
+                frame = frame_of_axis(each.normal)
+                sides = np.outer(np.cos(angles), frame[:, 0]) + np.outer(np.sin(angles), frame[:, 1])
+                loads.append(J.T @ (each.normal + mu * sides).T)
+        return loads
+
+    def _held_together(self, bodies: BodiesState, closed: Sequence[bool]) -> bool:
+        """True if contacts share loads, and forces within their cones let all of them stick while bodies move."""
+        from scipy.optimize import nnls
+
+        if sum(closed) < _SHARING or self.equations.bounds.any():
+            return False
+        which = np.flatnonzero(closed)
+        held = np.concatenate(bodies.J[which])
+        if np.linalg.matrix_rank(held @ np.linalg.solve(bodies.mass, held.T), RANK, hermitian=True) == len(held):
+            return False
+        rows = np.concatenate([bodies.C, held])
+        rates = np.concatenate([bodies.of_joints, bodies.bias[which].ravel()])
+        loads = np.column_stack([bodies.C.T, -bodies.C.T, *self._pushes(bodies, closed)])
+        inertial = np.linalg.solve(bodies.mass, np.column_stack([bodies.force, loads]))
+        aims = -(rows @ inertial[:, 0] + rates)
+        size = max(float(np.linalg.norm(aims)), AT_REST)
+        return bool(nnls(rows @ inertial[:, 1:], aims, maxiter=100 * loads.shape[1])[1] <= SLACK * size)
 
     def _struck(self, state: Array, closed: Sequence[bool], laws: Sequence[float]) -> tuple[Array, list[bool], float]:
         bodies = self.equations.at(state)

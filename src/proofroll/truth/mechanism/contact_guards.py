@@ -25,6 +25,7 @@ LEAST_RESPONSE = 1e-3
 TURNED = 0.5  # cosine of the angle by which a line may turn in a stretch
 # Speed, in natural units, by which slips may differ that share a load: round-off leaves 4e-15 of parallel ones.
 SHARED = 1e-11
+_TOGETHER = 1e-13  # relative to the mechanism's size: gaps of contacts of a face that bounces, by round-off
 _DIGITS = 1e-14  # relative to the mechanism's size: round-off of a gap that has just opened
 
 
@@ -168,12 +169,15 @@ def _stopping(own: Acting, touch: Touching) -> float:
     return -float(heading_of(own, touch) @ touch.slide)
 
 
-def striking(mode: ContactMode, touching: Sequence[Touching], hit: int, time: float) -> list[int]:
-    """Contacts that close at the same time [s] as the contact ``hit``, within the accuracy of times, and ``hit``."""
+def striking(mode: ContactMode, touching: Sequence[Touching], hit: int, time: float, size: float) -> list[int]:
+    """Contacts that close at the same time [s] as the contact ``hit``, and ``hit``.
+
+    Within the accuracy of times, or with gaps that are round-off in a mechanism of this size.
+    """
 
     def closes(touch: Touching) -> bool:
         closing = -float(touch.normal @ touch.slide)
-        return closing > 0 and touch.gap <= closing * time_accuracy(time)
+        return closing > 0 and touch.gap <= max(closing * time_accuracy(time), size * _TOGETHER)
 
     return [
         k

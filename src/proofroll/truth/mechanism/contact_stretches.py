@@ -252,7 +252,7 @@ class ContactStretches(Stretches[ContactMode]):
     def _impact(self, stretch: Stretch[ContactMode], hit: int) -> Transition[ContactMode]:
         """Transition at an impact."""
         contacts, touching, law = self.contacts, self._touching(stretch.last), self.contacts[hit].restitution
-        hits = striking(stretch.mode, touching, hit, stretch.end)
+        hits = striking(stretch.mode, touching, hit, stretch.end, self._size)
         # dry friction of joints gives no impulse
         closed = [
             (own.kind != "open" or k in hits) and not contact.bound
