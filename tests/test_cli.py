@@ -412,6 +412,10 @@ def test_times_of_a_first_look(proofroll: Proofroll, tmp_path: Path) -> None:
     assert code == 0, err
     document = json.loads(out)
     assert (document["until"], document["every"]) == (0.2, 0.05)
+    for option, value, words in (("--until", "1e308", "not negative, at most"), ("--every", "0", "positive")):
+        code, out, err = proofroll(*command, option, value)
+        assert (code, out, err.count("\n")) == (2, "", 1)
+        assert words in err
     code, out, err = proofroll("compare", "stick_slip", "--until", "1")
     assert (code, out) == (2, "")
     assert "until = 1.0: a comparison file has its own times; name a scene instead" in err

@@ -14,6 +14,8 @@ from proofroll.core.errors import InputError, choices, require_known
 from proofroll.core.number_format import spaced
 from proofroll.core.parameters import in_radians
 
+_LONGEST_NAME = 200  # characters
+
 
 @dataclass(frozen=True)
 class Parameter:
@@ -78,6 +80,9 @@ def check_parameters(parameters: Mapping[str, Parameter], units: Iterable[str], 
     known_units = dict.fromkeys(units)
     for name, parameter in parameters.items():
         where = f"{path}: parameters.{name}"
+        if len(name) > _LONGEST_NAME or not name.isprintable():
+            advice = f"a name is one line of at most {_LONGEST_NAME} printable characters"
+            raise InputError(f"{path}: parameters", name, advice)
         advice = "this unit is not known, and nothing is converted; write the value in"
         require_known(f"{where}.unit", parameter.unit, known_units, advice)
         for key in ("value", "above", "at_least", "below", "at_most"):

@@ -195,6 +195,7 @@ def test_a_scene_outside_models(edited: Callable[[str, str], str]) -> None:
         ("direction = [0, 0, -1]", "direction = [1e308, 0, -1]", ["gravity.direction.0 = 1e+308", "overflows"]),
         ('name = "ball"', 'name = "the.ball"', ["balls.0.name = 'the.ball'", "no dot and no slash"]),
         ('name = "ball"', 'name = "../../x"', ["balls.0.name = '../../x'", "no dot and no slash"]),
+        ("[parameters.mass]", f"[parameters.{'m' * 201}]", ["parameters = 'mmm", "at most 200 printable characters"]),
         ('title = "', 'duration = 1e308\ntitle = "', ["duration = 1e+308", "at most 1e+09 s"]),
         ('mass = "$mass"', "mass = true", ["balls.0.mass = True", "give one in kg"]),
         ('radius = "$radius"', "radius = 0", ["balls.0.radius = 0", "above 0"]),

@@ -53,6 +53,8 @@ def default_comparison(
     """
     before = processor_seconds()
     file, scene = read_scene_file(name), load_scene(name, **parameters)
+    if until is not None:
+        time_grid(until, until or 1.0)  # raises for a time that makes no sense
     usual = times_of(replace(file, duration=min(file.duration or _UNTIL, _FIRST) if until is None else until))
     until, every = usual[0] if until is None else until, usual[1] if every is None else every
     time_grid(until, every)
