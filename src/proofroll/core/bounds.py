@@ -8,6 +8,9 @@ from proofroll.core.errors import InputError
 # Larger numbers have squares near the end of the range of doubles, 1.8e308.
 LARGEST = 1e150
 
+# Density of osmium, the densest material, and of an aerogel, lighter than air between its solids [kg/m³].
+DENSEST, LIGHTEST = 22600.0, 0.1
+
 
 def require_usable(field: str, value: object) -> None:
     """Raises InputError for a finite number whose square would overflow; other values pass."""

@@ -5,7 +5,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from proofroll.elements.mechanism.plausibility import DENSEST, FAR, LARGE, TIMES
+from proofroll.core.bounds import DENSEST
+from proofroll.elements.mechanism.plausibility import FAR, LARGE, TIMES
 from proofroll.robots.mjcf_classes import with_classes
 from proofroll.robots.model import Robot, RobotBody
 from proofroll.robots.robot_file import RobotFile, floats

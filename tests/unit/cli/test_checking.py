@@ -89,6 +89,11 @@ def test_how_a_scene_starts(
         ("free_body", ('name = "body"', 'name = "body"\ncom = [351, 0, 0]'), "lies 351 m from its origin; lengths are"),
         ("free_body", ('kind = "free"', 'kind = "free"\norientation = [0, 0, 90]'), "an angle of 90 rad is 14.3 turns"),
         ("slide_to_roll", ("", ""), ""),
+        (
+            "sphere_in_cylinder",
+            ('value = 0.025\nunit = "m"', 'value = 0.0025\nunit = "m"'),
+            "denser than osmium; lengths",
+        ),
     ],
 )
 def test_numbers_in_another_unit(

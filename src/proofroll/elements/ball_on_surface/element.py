@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
+from proofroll.core.bounds import DENSEST, LIGHTEST
 from proofroll.core.columns import Columns
 from proofroll.core.element import FirstMotion, OptionalTerm, Sign, StepNumber
 from proofroll.core.element_abilities import RunWatch
@@ -130,6 +131,17 @@ class BallOnSurface:
         slip = float(np.linalg.norm(body.slip0))
         moves = f"it slips at {slip:.4g} m/s" if slip else "it rolls" if np.any(body.v0) else "its centre is at rest"
         return [*sentences, f"{moves}; the {body.wall.kind} presses it with {press:.4g} N"]
+
+    @property
+    def implausible(self) -> Sequence[str]:
+        """See :class:`proofroll.core.element_abilities.DoubtsNumbers`; osmium is the densest material."""
+        ball = self.ball
+        density = ball.mass / (4 / 3 * math.pi * ball.radius**3)
+        if LIGHTEST <= density <= DENSEST:
+            return []
+        what = f"{ball.mass:.4g} kg in a radius of {ball.radius:.4g} m are {density:.2g} kg/m³"
+        than = "denser than osmium" if density > DENSEST else "less than any solid"
+        return [f"ball {ball.name}: {what}, {than}; lengths are metres, masses kg"]
 
     @cached_property
     def rolling(self) -> RollingBall:

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from proofroll.core.bounds import DENSEST, LIGHTEST
 from proofroll.elements.mechanism.contacts.geometry import Geometry
 from proofroll.elements.mechanism.joint import Joint
 from proofroll.elements.mechanism.model import Mechanism
@@ -17,8 +18,6 @@ LARGE = 10.0
 # Largest plausible distance of a centre of mass from its origin: the larger of this [m] and this many times the sum of
 # the distances between joints.
 FAR, TIMES = 1.0, 10.0
-# Density of osmium, the densest material, and of an aerogel, lighter than air between its solids [kg/m³].
-DENSEST, LIGHTEST = 22600.0, 0.1
 # Angles between these are probably degrees [rad]; larger ones are meant.
 _TURN, _MOST = 2 * math.pi, 720.0
 _METRES, _RADIANS = "lengths are metres", "angles are radians, or written as '30 deg'"
