@@ -21,7 +21,9 @@ from proofroll.truth.mechanism.contact_guards import AT_REST, SLIP_ENDED, Solved
 from proofroll.truth.mechanism.contact_stretches import ContactStretches, modes_of
 from proofroll.truth.mechanism.contact_taylor import ModeSymbols
 
-_MOST = 6  # largest number of contacts closed at the same time: each has up to four candidate modes
+_MOST = 6  # largest number of closed contacts of which all modes are tried: each has up to four
+_PIVOTS = 4  # exchanges at most of a search by pivots, for each contact
+_CLEAR = 1e-6  # relative margin above which a mode found by pivots is the only one
 _SHARING = 2  # least number of contacts that may share a load
 _SIDES = 180  # sides of a pyramid inside each friction cone, for the test of balance at rest
 Trial = Callable[[ContactMode, Sequence[Array | None]], BodiesSolution]
@@ -59,8 +61,10 @@ class ContactBodies(ContactStretches):
             ]
             return self.equations.accelerated(bodies, tuple(directed))
 
-        if any(closed) and list(still) == list(closed) and (
-            self._balanced(bodies, closed) or self._held_together(bodies, closed)
+        if (
+            any(closed)
+            and list(still) == list(closed)
+            and (self._balanced(bodies, closed) or self._held_together(bodies, closed))
         ):
             own = zip(self._own(bodies, closed), self._rubs, strict=True)
             return tuple(
@@ -154,12 +158,18 @@ class ContactBodies(ContactStretches):
         are less.
 
         Raises:
-            Refused: there is none, or too many contacts are closed.
+            Refused: there is none, or it is not found.
         """
         count = sum(closed)
-        if count > _MOST:
-            raise Refused(f"{count} contacts are closed at once; at most {_MOST} are tried")
         choices = [list(self._candidates(k, own, still[k], bodies)) for k, own in enumerate(self._own(bodies, closed))]
+        exchanged = self._exchanged(bodies, choices, still, trial, free)
+        if exchanged is not None and (count > _MOST or (exchanged[0] > _CLEAR and not exchanged[1].loose)):
+            return [exchanged]
+        if count > _MOST:
+            raise Refused(
+                f"{count} contacts are closed at once, and exchanges of one after the other lead to no mode that keeps "
+                "all inequalities of contact, as where contacts that begin to slip share a load"
+            )
         unique, shared = (list[tuple[float, BodiesSolution, ContactMode]]() for _ in range(2))
         for mode in itertools.product(*choices):
             attempt = self._headed(bodies, mode, still, trial)
@@ -178,6 +188,60 @@ class ContactBodies(ContactStretches):
         if not kept:
             raise Refused("nothing that the contacts can do keeps all inequalities of contact")
         return sorted(kept, key=lambda one: -one[0])
+
+    def _exchanged(
+        self,
+        bodies: BodiesState,
+        choices: Sequence[Sequence[Acting]],
+        still: Sequence[bool],
+        trial: Trial,
+        free: float,
+    ) -> tuple[float, BodiesSolution, ContactMode] | None:
+        """Mode of :meth:`_tried` by pivots: what violates its inequality most is exchanged; None: that leads nowhere.
+
+        The first mode has all contacts closed, those that may stick sticking.
+        """
+        mode = [next((each for each in options if each.kind != "open"), OPEN) for options in choices]
+        for _ in range(_PIVOTS * (1 + len(mode))):
+            attempt = self._headed(bodies, tuple(mode), still, trial)
+            if attempt is None:
+                return None
+            solution, headed = attempt
+            normals = pressing(headed, bodies.touching, solution.force, solution.splits)
+            kept = [
+                self._kept(k, headed[k], still[k], bodies, solution, float(normals[k]), free)
+                if len(options) > 1
+                else np.inf
+                for k, options in enumerate(choices)
+            ]
+            if min(kept, default=np.inf) >= -SLACK:
+                return max(min(kept, default=np.inf), 0.0), solution, headed
+            worst = min(kept)
+            # of contacts that share a load, the one that is pressed least is exchanged
+            k = min(
+                (k for k, value in enumerate(kept) if value <= worst + SLACK),
+                key=lambda k: float(bodies.touching[k].normal @ solution.force[k]),
+            )
+            mode[k] = self._next(k, headed[k], choices[k], solution, float(normals[k]))
+        return None
+
+    def _next(
+        self,
+        k: int,
+        own: Acting,
+        options: Sequence[Acting],
+        solution: BodiesSolution,
+        normal: float,
+    ) -> Acting:
+        """What a contact does instead, where what it does violates an inequality."""
+        if own.kind == "open":
+            return options[1]
+        if normal < 0 and options[0].kind == "open":
+            return OPEN
+        if own.kind == "slip":
+            return next(option for option in options if option.kind == "stick")
+        slips = [option for option in options if option.kind == "slip"]
+        return next((slip for slip in slips if slip.along and np.dot(slip.along, solution.force[k]) < 0), slips[-1])
 
     def _candidates(self, k: int, own: Acting, still: bool, bodies: BodiesState) -> Iterator[Acting]:
         """Candidate modes of a contact."""

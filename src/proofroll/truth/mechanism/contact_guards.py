@@ -22,6 +22,7 @@ AT_REST, STANDS = 1e-13, 1e-9
 SLIP_ENDED = 1e-11  # slip speed that remains when a slip below FAINT is extrapolated to rest
 # Value of Painlevé's measure (1 without friction) that counts as zero.
 LEAST_RESPONSE = 1e-3
+_FEW = 6  # contacts that share a load, up to which all groups of them are tried
 TURNED = 0.5  # cosine of the angle by which a line may turn in a stretch
 # Speed, in natural units, by which slips may differ that share a load: round-off leaves 4e-15 of parallel ones.
 SHARED = 1e-11
@@ -152,6 +153,9 @@ def pressing(mode: ContactMode, touching: Sequence[Touching], force: Array, spli
     if any(own.kind == "stick" for own in mode):
         return normals  # friction that holds may be split, too, within its own bounds
     loads, sums = [np.inf], np.column_stack([splits, np.ones(len(splits))]).T
+    if len(shares) > _FEW:
+        normals[shares] = _most_even(normals[shares], splits[shares])
+        return normals
     aim = np.eye(len(sums))[-1]
     for size in range(1, len(sums) + 1):
         for group in map(list, itertools.combinations(shares, size)):
@@ -160,6 +164,25 @@ def pressing(mode: ContactMode, touching: Sequence[Touching], force: Array, spli
                 loads.append(float(weights @ normals[group]))
     normals[shares] = min(loads)
     return normals
+
+
+def _most_even(normals: Array, splits: Array) -> float:
+    """Least normal force in the split whose least one is largest, by linear programming; inf: it has no bound.
+
+    The groups of contacts are too many to be tried; the program finds the one that limits the load.
+    """
+    from scipy.optimize import linprog
+
+    count, ways = splits.shape
+    sizes = float(np.abs(normals).max()) or 1.0
+    rows, free = np.column_stack([-splits, np.ones(count)]), (None, None)
+    found = linprog([*np.zeros(ways), -1.0], rows, normals / sizes, bounds=[free] * (ways + 1), method="highs")
+    if found.status:
+        return float(np.inf)
+    group = np.flatnonzero(-found.ineqlin.marginals > RANK)
+    sums = np.column_stack([splits, np.ones(count)]).T
+    weights = np.linalg.lstsq(sums[:, group], np.eye(ways + 1)[-1], rcond=RANK)[0]  # exact, for the group
+    return float(weights @ normals[group])
 
 
 def _stopping(own: Acting, touch: Touching) -> float:

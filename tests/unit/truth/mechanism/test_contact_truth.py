@@ -688,11 +688,11 @@ def test_what_no_route_follows_is_refused_and_not_called_ill_posed(monkeypatch: 
         truth(replace(table, elements=(rubs,)), np.array([0.0, 0.1]))
     assert np.isnan(rubs.first_motion.acceleration).all()  # so an engine that has both is asked for no first motion
     monkeypatch.setattr(coulomb, "_SWEEPS", 0)
-    sled = load_scene("sled")
-    (element,) = sled.elements
+    rod = load_scene("falling_rod")  # its foot sticks, so that no program finds its force either
+    (element,) = rod.elements
     assert isinstance(element, MechanismElement)
     with pytest.raises(Refused, match="are not found in 0 sweeps"):
-        truth(sled, np.array([0.0, 0.1]))
+        truth(rod, np.array([0.0, 0.1]))
     assert np.isnan(replace(element).first_motion.acceleration).all()
 
 
@@ -878,3 +878,30 @@ def test_two_feet_that_land_at_once_have_an_outcome_where_no_order_decides(impac
     assert ("its outcome depends on their order" in found.ended) == (impacts == "any order")
     if impacts == "together":
         assert np.abs(found.record.v_WB[2]).max() < DIGITS
+
+
+def on_a_ring_of_feet(count: int, speed: float, spin: float = 0.0) -> Mechanism:
+    """A plate on as many feet, in a ring, with a speed [m/s] along (3, 4)/5 and a spin [rad/s]."""
+    plate = Body("plate", 2.0, (0.0, 0.0, 0.0), inertia=(0.02, 0.03, 0.04))
+    v0 = (0.6 * speed, 0.8 * speed, 0, 0, 0, spin)
+    free = Joint("free", "free", "world", "plate", q0=(0, 0, 0.1, 1, 0, 0, 0), v0=v0)
+    places = [(0.2 * np.cos(x), 0.15 * np.sin(x), -0.08) for x in 2 * np.pi * np.arange(count) / count]
+    feet = [Geometry(f"foot{k}", "plate", "sphere", place, radius=0.02) for k, place in enumerate(places)]
+    pairs = tuple(Pair(f"touch{k}", (f"foot{k}", "floor"), friction=0.3) for k in range(count))
+    shapes = (Geometry("floor", "world", "plane"), *feet)
+    return Mechanism((plate,), (free,), gravity=(0.0, 0.0, -9.81), geometries=shapes, pairs=pairs)
+
+
+def test_a_plate_slides_straight_on_eight_feet() -> None:
+    """More contacts than all modes can be tried of have an answer: the plate moves as a point that friction brakes."""
+    found = truth_of(on_a_ring_of_feet(8, 1.0), np.array([0.0, 0.05]))
+    assert np.isinf(found.horizon)
+    way = 0.05 - 0.3 * 9.81 * 0.05**2 / 2
+    assert found.record.p_WB[1, 0] == pytest.approx([0.6 * way, 0.8 * way, 0.1], abs=DIGITS)
+
+
+def test_a_plate_that_turns_on_thirty_two_feet_has_no_determinate_friction() -> None:
+    """A true reason, and soon: feet that slide in different directions share the load in more ways than one."""
+    found = truth_of(on_a_ring_of_feet(32, 1.0, spin=2.0), np.array([0.0, 0.05]))
+    assert found.horizon == 0.0
+    assert "carry the load together in more ways than one" in found.reason

@@ -12,6 +12,7 @@ from typing import Literal
 import numpy as np
 
 from proofroll.core.errors import NotUnique, Refused
+from proofroll.elements.mechanism.contacts.lemke import lemke
 from proofroll.elements.mechanism.rotations import Array
 
 Outcome = Literal["open", "stick", "slip"]
@@ -82,7 +83,26 @@ def contact_forces(
                 if done[k] == "slip" and along is None and rubs and np.linalg.norm(w[k, 1:]) <= least:
                     done[k] = "stick"  # one of several holding contacts may reach its bound while nothing moves
             return f.reshape(-1, 3), done
+    if not bounds.any() and all(along is not None or not mu for along, mu in zip(sliding, friction, strict=True)):
+        ways = [np.zeros(2) if along is None else along for along in sliding]
+        pressed = _all_sliding(G, c, friction, ways)
+        if pressed is not None:
+            leaving = (c + G @ pressed.ravel())[::3] > least  # one that shares a load may carry none of it, and stay
+            return pressed, ["open" if leaves else "slip" for leaves in leaving]
     raise Refused(f"forces of the contacts {', '.join(names)} at t = {time:.6g} s are not found in {_SWEEPS} sweeps")
+
+
+def _all_sliding(G: Array, c: Array, friction: Array, ways: Sequence[Array]) -> Array | None:
+    """Forces of contacts that all slide, (contacts, 3), by complementarity of their normals; None: there are none.
+
+    Sweeps converge slowly, or not at all, where many contacts share a load.
+    """
+    along = np.array([[1.0, *(-mu * way)] for mu, way in zip(friction, ways, strict=True)])
+    pushes = np.zeros((len(c), len(along)))
+    for k, push in enumerate(along):
+        pushes[3 * k : 3 * k + 3, k] = push
+    normals = lemke((G @ pushes)[::3], c[::3])
+    return None if normals is None else normals[:, None] * along
 
 
 def robust_forces(
