@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -38,6 +39,8 @@ GIVEN = (
 _OPEN = 1e-2
 # Error of the accelerations at the start, in imbalances of the first steps.
 _KNOWN = 10.0
+# Part of the load that is left where a change moves the mechanism with accelerations of another order of magnitude.
+_UNBALANCED = 0.9
 
 
 @cached_on_evidence
@@ -73,11 +76,25 @@ def residuals_of(evidence: Evidence) -> Iterator[Residuals[Change]]:
     if np.isfinite(before) and before > ABOVE * floor:
         first = of_start(evidence, derived=True)
         allowed = CLOSES * before + _KNOWN * _doubt(evidence, first)
-
-        def contradicted(change: Change) -> bool:
-            return first is not None and not float(np.max(np.abs(first.left(change)), initial=0.0)) <= allowed
-
+        contradicted = partial(contradicts_first_steps, first, allowed)
         yield _residuals_at(seen, "along the run", before, CLOSES, contradicted, tells)
+
+
+def contradicts_first_steps(first: MechanismStates | None, allowed: float, change: Change) -> bool:
+    """True if the first steps do not balance with a change of the mechanism.
+
+    Where nearly the whole load is left, the change asks for accelerations of another order of magnitude than those that
+    were seen; then no doubt about these is an excuse, unless they balance as little with the scene's own numbers.
+
+    Args:
+        first: state and accelerations of the first steps; None: there are none.
+        allowed: largest relative imbalance that their error explains.
+        change: of the mechanism.
+    """
+    if first is None:
+        return False
+    left, own = (float(np.max(np.abs(first.left(item)), initial=0.0)) for item in (change, Change(first.mechanism)))
+    return not left <= min(allowed, max(_UNBALANCED, own))
 
 
 def balanced_at_start(start: MechanismStates) -> Residuals[Change]:

@@ -18,7 +18,8 @@ from proofroll.core.diagnosis.scene_diagnosis import diagnose_scene
 from proofroll.core.scene import Scene
 from proofroll.core.truth import truth
 from proofroll.core.verdict import Judgement, Verdict
-from proofroll.elements.mechanism.diagnosis.equations import placed_of
+from proofroll.elements.mechanism.diagnosis.equations import Change, MechanismStates, placed_of
+from proofroll.elements.mechanism.diagnosis.residuals import contradicts_first_steps
 from proofroll.elements.mechanism.element import MechanismElement
 from proofroll.elements.mechanism.signal import Table
 from proofroll.files.scene_file import load_scene
@@ -395,3 +396,14 @@ def test_the_first_steps_of_a_symmetric_top_tell_gravity() -> None:
     ]
     said = [cause.says for cause in diagnose(Evidence(element, lines), hypotheses_of(element))]
     assert said == ["the engine moves it with gravity halved"]
+
+
+@pytest.mark.parametrize(("factor", "contradicted"), [(1.0, False), (0.9, False), (1e-3, True), (1e3, True)])
+def test_first_steps_contradict_masses_of_another_order(factor: float, contradicted: bool) -> None:
+    """However coarse the first steps are, masses a thousandth of the scene's are no cause of accelerations like its."""
+    (element,) = load_scene("stiff_damper").elements
+    mechanism, start = element.mechanism, element.first_motion  # type: ignore[attr-defined]  # a mechanism
+    accelerations = np.concatenate([np.atleast_2d(start.acceleration), np.atleast_2d(start.angular_acceleration)], -1)
+    first = MechanismStates(mechanism, element.start, accelerations[None], np.zeros(1, dtype=int))  # type: ignore[attr-defined]
+    masses = factor * np.array([body.mass for body in mechanism.bodies])
+    assert contradicts_first_steps(first, 5.0, Change(mechanism, mass=masses)) is contradicted
