@@ -9,8 +9,9 @@ from proofroll.core.errors import InputError
 from proofroll.elements.mechanism.analysis import RANK, analyse, least_norm_solution
 from proofroll.elements.mechanism.contacts.start import extent
 from proofroll.elements.mechanism.joint import FACTS
-from proofroll.elements.mechanism.joint_coordinates import SINGULAR, JointCoordinates
+from proofroll.elements.mechanism.joint_coordinates import JointCoordinates
 from proofroll.elements.mechanism.kinematics import Rows, Tree
+from proofroll.elements.mechanism.light_joints import SINGULAR
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.rotations import Array
 

@@ -19,6 +19,7 @@ from proofroll.core.errors import Diverged, Refused
 from proofroll.elements.mechanism.analysis import BRANCHES, RANK, RowSign, analyse, reactions
 from proofroll.elements.mechanism.complementarity import after_impact, decided_mode, load_of, refuse_switching
 from proofroll.elements.mechanism.kinematics import BodyMotion, Rows, Tree
+from proofroll.elements.mechanism.light_joints import lacks_inertia
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.named_forces import joint_force_shares, lengths, pick_named
 from proofroll.elements.mechanism.record import Record, record_of
@@ -26,7 +27,6 @@ from proofroll.elements.mechanism.rotations import Array, skews, to_quaternion
 from proofroll.elements.mechanism.signal import value_at, varies
 from proofroll.elements.mechanism.switches import REDUNDANT, STOPPED, Mode, held_joints, switched_joints
 
-SINGULAR = 1e-12  # least eigenvalue of a mass matrix scaled to a diagonal of ones; below, it counts as singular
 _NEAR = 1e-7  # displacement of coordinates for finite differences of accelerations [m, 1]
 _EQUAL_STEP = 2e-3  # s
 _STEP = 0.05  # of DOP853, in times in which the fastest mode turns by 1 rad; chains of 5 to 80 links need no less
@@ -53,17 +53,6 @@ class Solution:
     split: tuple[Array, Array] | None
     C: Array
     holding: Array
-
-
-def lacks_inertia(mechanism: Mechanism) -> bool:
-    """True if the mass matrix at the start is singular, so that only loops or couplings give some joints inertia."""
-    light = any(not body.mass or not np.any(body.inertia) for body in mechanism.bodies)
-    if not light or not (mechanism.loops or mechanism.couplings):
-        return False
-    equations = JointCoordinates(mechanism, 0)
-    M = equations.inertial(equations.tree.at(*mechanism.start()))[1]
-    size = np.sqrt(np.where(np.diag(M) > 0, np.diag(M), 1.0))
-    return bool(np.linalg.eigvalsh(M / np.outer(size, size)).min(initial=1.0) < SINGULAR)
 
 
 class JointCoordinates:

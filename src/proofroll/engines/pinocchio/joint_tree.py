@@ -13,7 +13,7 @@ import pinocchio as pin
 
 from proofroll.elements.mechanism import WORLD, Joint, Loop, Mechanism, Spring
 from proofroll.elements.mechanism.capabilities import ALL_JOINTS, ALL_LOOPS, FORCES, MechanismCapability
-from proofroll.elements.mechanism.joint_coordinates import lacks_inertia
+from proofroll.elements.mechanism.light_joints import lacks_inertia
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.elements.mechanism.signal import value_at, varies
 

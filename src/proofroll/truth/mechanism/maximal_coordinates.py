@@ -246,10 +246,10 @@ class MaximalCoordinates:
         Raises:
             Missing: heyoka is not installed.
         """
-        rows = self.lean.independent_rows() if rows is None else rows
-        if (long_double, rows) not in self._compiled:
-            self._compiled[long_double, rows] = MaximalTaylor(self.lean.equations, rows, long_double)
-        return self._compiled[long_double, rows]
+        key = long_double, self.lean.independent_rows() if rows is None else rows
+        if key not in self._compiled:
+            self._compiled[key] = MaximalTaylor(self.lean.equations, key[1], long_double)
+        return self._compiled[key]
 
     def taylor_states(self, times: Array, long_double: bool = False, start: Array | None = None) -> Array:
         """States at the given times, s, (times, state), by Taylor series, from the mechanism's own start or another.
@@ -263,9 +263,8 @@ class MaximalCoordinates:
         taylor = self.taylor(long_double)
         if not self.lean.redundant:
             return taylor.run(times, start)
-        time: Any = 0.0
+        time, states = 0.0, list[Array]()
         state = taylor.start() if start is None else start
-        states: list[Array] = []
         rows = self.lean.independent_rows()
         while len(states) < len(times):
             sound = partial(self._sound, rows)
