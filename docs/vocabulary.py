@@ -100,6 +100,12 @@ What somebody else found of the same mechanism; it is kept with the scene and mo
 
 At the top of the file: a list of texts, what the mechanism has besides and nothing here models. The truth and every
 engine refuse the scene and say so.
+
+### `impacts`
+
+At the top of the file: what an impact at several contacts at once does. `"any order"` (the default): one contact after
+another, in any order, with the corners of a flat face as one; the truth goes on where all orders end alike, and ends
+where they do not. `"together"`: Moreau's law for all contacts.
 """,
     "A comparison: `comparisons/*.toml` without `study`": """### `[vary]`, `[brief]`
 

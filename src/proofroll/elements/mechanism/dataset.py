@@ -12,6 +12,7 @@ from proofroll.core.arrays import FloatArray
 from proofroll.core.columns import UNCERTAIN, Columns, Variable, axes
 from proofroll.core.errors import Diverged
 from proofroll.core.turns import doubt
+from proofroll.elements.mechanism.contacts.geometry import shared_pairs
 from proofroll.elements.mechanism.contacts.observables import (
     LAWS,
     RESIDUALS,
@@ -101,18 +102,25 @@ def reactions(element: MechanismElement, sample: MechanismSample, name: str) -> 
 
 
 def columns(
-    element: MechanismElement, placed: Placed, wrench: FloatArray, pressed: FloatArray, named: FloatArray
+    element: MechanismElement,
+    placed: Placed,
+    wrench: FloatArray,
+    pressed: FloatArray,
+    named: FloatArray,
+    sums: FloatArray | None = None,
 ) -> Columns:
     """Variables of a run, from the motion of the bodies and the forces and moments on them.
 
     ``wrench``: of joints and loops, shape (time, 2, joints + loops, 3); ``pressed``: of contacts, (time, contacts, 3);
+    ``sums``: of the contacts of each pair with several, (time, such pairs, 3), by default from ``pressed``;
     ``named``: see :func:`~proofroll.elements.mechanism.named_forces.named_forces`, (time, forces).
     Variables: ``p_WB`` [m], ``v_WB`` [m/s], ``w_WB`` [rad/s] over (time, body, xyz), ``q_WB`` over (time, body, wxyz);
     ``positions`` [m] of the tracked points; ``q.<joint>``, ``v.<joint>`` of joints with one coordinate;
     ``<point>.x|y|z`` [m]; ``force.<joint>.x|y|z`` [N] and ``torque.<joint>.x|y|z`` [N m] on the child, at the joint, in
     world axes, NaN with a reason in the attribute ``absent``; ``forces``, ``torques``: the
     determinate components of all; ``effort.<actuator>``, ``coupling.<name>``, ``friction.<joint>``, ``stop.<joint>``
-    [N, N m] along coordinates; ``force.<pair>.x|y|z`` [N] on the body of its first geometry, ``gap.<pair>`` [m],
+    [N, N m] along coordinates; ``force.<pair>.x|y|z`` [N] on the body of its first geometry, the sum where a pair
+    touches at several places, ``gap.<pair>`` [m],
     ``slip.<pair>`` [m/s], and residuals of Coulomb's law, see
     :data:`~proofroll.elements.mechanism.contacts.observables.RESIDUALS`; ``energy`` [J], ``drift`` [m], and
     ``energy_error`` [J], or ``energy_change`` [J] of what is driven or damped.
@@ -153,7 +161,7 @@ def columns(
             meaning = f"determinate components of the {kind}s on children"
             put(f"{kind}s", values[:, known], unit, meaning, f"{kind}_component")
     if mechanism.contacts:
-        _put_contacts(element, placed, pressed, put)
+        _put_contacts(element, placed, pressed, sums, put)
     for values, item in zip(named.T, named_forces(mechanism), strict=True):
         put(item.name, values, str(item.unit), item.meaning, absent=UNSAID if np.all(np.isnan(values)) else "")
     energy = placed.energy()
@@ -173,9 +181,27 @@ def columns(
     return Columns(found | axes(placed.time) | {"body": Variable(("body",), np.array(element.bodies, dtype=str))})
 
 
-def _put_contacts(element: MechanismElement, placed: Placed, pressed: FloatArray, put: Callable[..., None]) -> None:
-    """Puts gaps, slips, forces and residuals of Coulomb's law, of each contact and of all together."""
+def _put_contacts(
+    element: MechanismElement,
+    placed: Placed,
+    pressed: FloatArray,
+    sums: FloatArray | None,
+    put: Callable[..., None],
+) -> None:
+    """Puts gaps, slips, forces and residuals of Coulomb's law, of each contact, pair and of all together."""
     found = follow_contacts(placed)
+    shared = shared_pairs(placed.mechanism.contacts)
+    if sums is None:
+        sums = np.stack([pressed[:, numbers].sum(axis=1) for numbers in shared.values()], axis=1) if shared else None
+    for index, (name, numbers) in enumerate(shared.items() if sums is not None else ()):
+        assert sums is not None  # by the loop
+        for axis, letter in enumerate("xyz"):
+            component = sums[:, index, axis]
+            absent = UNSAID if np.all(np.isnan(component)) else ""
+            meaning = f"sum of the forces of {name} on {placed.mechanism.contacts[numbers[0]].body_a}"
+            put(f"force.{name}.{letter}", component, "N", meaning, absent=absent)
+    if sums is not None and shared:
+        put("pair_forces", sums, "N", "sums of the forces of pairs that touch at several places", "pair", "xyz")
     for index, contact in enumerate(placed.mechanism.contacts):
         for axis, letter in enumerate("xyz"):
             component = pressed[:, index, axis]

@@ -90,7 +90,8 @@ class Mechanism:
         check_drives(self.joints, self.actuators, self.couplings)
         checks.assign(self, gravity=checks.vector("gravity", self.gravity))
         _check_masses(self.bodies, self.joints, {name for item in self.couplings for name, _ in item.terms})
-        _check_unique("pairs", (*self.joints, *self.loops, *self.contacts))  # their forces are named alike
+        for touching in (self.contacts, self.pairs):  # forces of all of these are named alike
+            _check_unique("pairs", (*self.joints, *self.loops, *touching))
 
     @property
     def together(self) -> bool:

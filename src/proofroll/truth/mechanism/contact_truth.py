@@ -5,6 +5,7 @@ import numpy as np
 from proofroll.elements.mechanism.analysis import RANK
 from proofroll.elements.mechanism.contacts.acting import ContactMode, kinds
 from proofroll.elements.mechanism.contacts.dynamics import ContactDynamics
+from proofroll.elements.mechanism.contacts.geometry import pair_sums
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.record import record_of
 from proofroll.elements.mechanism.rotations import Array
@@ -59,7 +60,8 @@ def _in_units(mechanism: Mechanism, units: Units, times: Array) -> TwoRouteMotio
         dynamics.sample(*dynamics.parts(state)[:2], paths[0].stretches[number].mode, float(state[-1]))
         for state, number in zip(states_of(tree, paths[0], times, stretches), stretches, strict=True)
     ]
-    one, pressed = record_of(times, [record for record, _ in samples]), np.array([force for _, force in samples])
+    one, pressed = record_of(times, [record for record, _, _ in samples]), np.array([force for _, force, _ in samples])
+    summed = np.array([sums for _, _, sums in samples])
     states = states_of(bodies, paths[1], times, others)
     modes = [paths[1].stretches[number].mode for number in others]
     applied = [bodies.forces(state, mode) for state, mode in zip(states, modes, strict=True)]
@@ -73,10 +75,22 @@ def _in_units(mechanism: Mechanism, units: Units, times: Array) -> TwoRouteMotio
     ended = first_close(paths, CLOSE)
     reason = _shared_load(dynamics, paths[0], ended) if ended == 0 or not paths[0].known else ""
     reason = reason or "a change of the parameters within their accuracy changes which contacts stick, slide or open"
-    forces = pressed * units.force, np.array([force for force, _ in applied]) * units.force
+    other = np.array([force for force, _ in applied])
+    forces = pressed * units.force, other * units.force
+    sums = summed * units.force, np.einsum("pk,tki->tpi", pair_sums(own.contacts), other) * units.force
     one, two = units.record(mechanism, one), units.record(mechanism, two)
     return two_route_motion(
-        mechanism, paths, one, two, routes, reason, units, kinds=kinds, pressed=forces, until=until * units.time
+        mechanism,
+        paths,
+        one,
+        two,
+        routes,
+        reason,
+        units,
+        kinds=kinds,
+        pressed=forces,
+        sums=sums,
+        until=until * units.time,
     )
 
 

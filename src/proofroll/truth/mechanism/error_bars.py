@@ -41,6 +41,7 @@ class TwoRouteMotion:
         ended: reason why it ends there, as a clause.
         pressed: contact forces on the first bodies [N], (times, contacts, 3), NaN where not determinate; None: no
             contacts.
+        sums: their sums over the contacts of each pair with several, (times, such pairs, 3); None: as ``pressed``.
     """
 
     record: Record
@@ -56,6 +57,7 @@ class TwoRouteMotion:
     pressed: Array | None = None
     end: float = np.inf
     ended: str = ""
+    sums: Array | None = None
 
 
 def fields_with_bars(mechanism: Mechanism, record: Record) -> dict[str, Array]:

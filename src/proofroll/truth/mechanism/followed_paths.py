@@ -78,6 +78,7 @@ def two_route_motion(
     *,
     kinds: Callable[[Any], Any] = lambda mode: mode,
     pressed: tuple[Array, Array] | None = None,
+    sums: tuple[Array, Array] | None = None,
     until: float = np.inf,
 ) -> TwoRouteMotion:
     """Motion with error bars, from the paths and records of two routes.
@@ -92,6 +93,7 @@ def two_route_motion(
         units: natural units of the paths.
         kinds: part of a mode in which both routes must agree.
         pressed: contact forces by both routes [N], (times, contacts, 3).
+        sums: their sums over pairs with several contacts by both routes [N], (times, such pairs, 3).
         until: last time asked for [s].
     """
     parted, determinate = _parted(*paths, kinds) * units.time, analyse(mechanism).determinate
@@ -99,6 +101,8 @@ def two_route_motion(
     fields, others = fields_with_bars(mechanism, masked), fields_with_bars(mechanism, two)
     if pressed is not None:
         fields["pressed"], others["pressed"] = pressed
+    if sums is not None:
+        fields["sums"], others["sums"] = sums
     placed = masked.placed(mechanism)
     bars, differences, least, step = {}, {}, round_off(fields, placed), _of_a_step(mechanism, masked, units)
     for field, values in fields.items():
@@ -129,6 +133,7 @@ def two_route_motion(
         events=happened,
         reason=reason,
         pressed=force,
+        sums=None if sums is None else sums[0],
         end=end * units.time,
         ended=ended,
     )
@@ -145,7 +150,11 @@ def _of_a_step(mechanism: Mechanism, record: Record, units: Units) -> dict[str, 
     sizes |= {"points": units.length, "energy": units.force * units.length}
     spin, speed = (float(np.abs(each).max(initial=0.0)) for each in (record.w_WB, record.v_WB))
     quadratic = 2 * max(1.0, units.time * spin, units.time * speed / units.length)
-    sizes |= {"wrench": quadratic * sizes["wrench"], "pressed": quadratic * units.force}
+    sizes |= {
+        "wrench": quadratic * sizes["wrench"],
+        "pressed": quadratic * units.force,
+        "sums": quadratic * units.force,
+    }
     return {name: TOLERANCES[0] * size for name, size in sizes.items()}
 
 

@@ -13,6 +13,7 @@ from proofroll.core.element import Element
 from proofroll.core.errors import NotUnique
 from proofroll.core.events import with_events
 from proofroll.core.observable import Role
+from proofroll.elements.mechanism.contacts.geometry import shared_pairs
 from proofroll.elements.mechanism.contacts.observables import PRESSES, SLIDES
 from proofroll.elements.mechanism.dataset import columns
 from proofroll.elements.mechanism.element import MechanismElement
@@ -27,7 +28,8 @@ _BARS = {
     "p_WB": "p_WB", "v_WB": "v_WB", "w_WB": "w_WB", "q_WB": "q_WB", "attitudes": "q_WB", "positions": "points",
     "forces": "wrench", "torques": "wrench", "energy": "energy", "energy_error": "energy",
     "energy_change": "energy", "drift": "drift", "gaps": "gap", "slips": "slip", "normal_forces": "pressed",
-    "contact_forces": "pressed", "penetration": "gap", "contact_pull": "pressed", "cone_excess": "pressed",
+    "contact_forces": "pressed", "pair_forces": "sums", "penetration": "gap", "contact_pull": "pressed",
+    "cone_excess": "pressed",
     "hop_speed": "slip", "energy_gain": "energy",
 }  # fmt: skip
 _POSES = ("p_WB", "v_WB", "w_WB", "q_WB")
@@ -58,7 +60,9 @@ class MechanismTruth:
         record = motion.record
         wrench = np.stack([record.wrench[..., :3], record.wrench[..., 3:]], axis=1)
         pressed = np.zeros((len(times), 0, 3)) if motion.pressed is None else motion.pressed
-        dataset = columns(element, record.placed(element.mechanism), wrench, pressed, record.named).dataset()
+        dataset = columns(
+            element, record.placed(element.mechanism), wrench, pressed, record.named, motion.sums
+        ).dataset()
         points = [point.name for point in element.mechanism.points]
         of_contacts = {
             f"{kind}.{contact.name}{axis}": field
@@ -70,6 +74,8 @@ class MechanismTruth:
             )
             for axis in axes
         }
+        pairs = shared_pairs(element.mechanism.contacts)
+        of_contacts |= {f"force.{name}.{letter}": "sums" for name in pairs for letter in "xyz"}
         place, turn, velocity, spin = (motion.bars[field] for field in ("p_WB", "q_WB", "v_WB", "w_WB"))
         # at the end of a body's arm; a quaternion changes by half the angle
         bars = motion.bars | {"gap": place + 2 * element.length * turn}

@@ -34,6 +34,7 @@ from proofroll.truth.mechanism.contact_bodies import ContactBodies
 from proofroll.truth.mechanism.contact_equations import ContactEquations
 from proofroll.truth.mechanism.error_bars import TwoRouteMotion
 from proofroll.truth.mechanism.maximal_coordinates import MaximalCoordinates
+from proofroll.truth.mechanism.plug_in import MechanismTruth
 from proofroll.truth.mechanism.switched_truth import truth_of
 from proofroll_drill.published import true_values
 
@@ -657,6 +658,21 @@ def test_a_rod_that_leans_against_its_slip_has_no_truth() -> None:
     with pytest.raises(NotUnique, match=r"^contact would not press but tear from t = 0 s on: .* \(Painlevé\)$"):
         truth_of(mechanism_of("painleve_rod"), np.array([0.0, 0.01]))
     motion("painleve_rod", [0.0, 0.01], friction=0.5)
+
+
+def test_the_sum_of_forces_at_corners_is_known_where_their_split_is_not() -> None:
+    """A cube at rest presses with its weight, though no equation says how its corners share that."""
+    body = Body("cube", 10.0, inertia=(0.3, 0.3, 0.3))
+    start = Joint("free", "free", "world", "cube", q0=(0, 0, 0.2, 1, 0, 0, 0))
+    shapes = (Geometry("hull", "cube", "box", size=(0.4, 0.4, 0.4)), Geometry("floor", "world", "plane"))
+    pairs = (Pair("touch", ("hull", "floor"), friction=1.0),)
+    element = MechanismElement(Mechanism((body,), (start,), geometries=shapes, pairs=pairs))
+    found = MechanismTruth.truth(element, np.array([0.0, 0.5, 1.0]), ())
+    assert found["force.touch.z"].to_numpy() == pytest.approx(98.1, abs=1e-9)
+    assert found["force.touch.z"].attrs["error_bar"] < 1e-9
+    assert np.isnan(found["force.touch.1.z"].to_numpy()).all()
+    assert found["pair_forces"].shape == (3, 1, 3)
+    assert found["pair_forces"].attrs["error_bar"] < 1e-9
 
 
 def test_what_has_no_truth_is_held_to_the_laws_of_contact_alone() -> None:

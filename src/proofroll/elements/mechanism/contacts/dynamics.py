@@ -4,7 +4,6 @@ Between two events each contact is ``open``, ``slip``s (one row, friction agains
 rows). The next mode follows from the forces, by :mod:`proofroll.elements.mechanism.contacts.coulomb`.
 """
 
-import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -22,9 +21,9 @@ from proofroll.elements.mechanism.contacts.acting import (
     turned,
 )
 from proofroll.elements.mechanism.contacts.coulomb import contact_forces, robust_forces
-from proofroll.elements.mechanism.contacts.geometry import BodyContact
+from proofroll.elements.mechanism.contacts.geometry import BodyContact, pair_sums
 from proofroll.elements.mechanism.contacts.joint_laws import JointContact, joint_contacts, mode_of_joints
-from proofroll.elements.mechanism.contacts.sequences import groups_of, refuse_spread, sequences
+from proofroll.elements.mechanism.contacts.sequences import groups_of, ordered, refuse_spread, sequences
 from proofroll.elements.mechanism.contacts.start import STILL, closed_and_still, natural_scale, touches
 from proofroll.elements.mechanism.contacts.touching import Touching, lying
 from proofroll.elements.mechanism.joint_coordinates import JointCoordinates, Solution
@@ -66,6 +65,7 @@ class ContactSolution:
         acceleration: v̇, (nv).
         force: on body a of each contact [N], (contacts, 3); the smallest where they are not determinate.
         determinate: True for each determinate component of ``force``, (contacts, 3).
+        determinate_sums: the same of the sum of forces of each pair with several contacts, (such pairs, 3).
         slide_rate: rate of each slide [m/s²], (contacts, 3).
         response: Painlevé's measure, above 0 in a possible motion: response to normal forces with friction over the
             response without.
@@ -78,6 +78,7 @@ class ContactSolution:
     acceleration: Array
     force: Array
     determinate: Any
+    determinate_sums: Any
     slide_rate: Array
     response: float
     splits: Array
@@ -103,6 +104,7 @@ class ContactDynamics:
         self.contacts: tuple[BodyContact | JointContact, ...] = (*mechanism.contacts, *self._of_joints)
         self.friction = np.array([contact.friction for contact in self.contacts])
         self._bounds = np.array([contact.bound for contact in self.contacts])
+        self.sums = np.pad(pair_sums(mechanism.contacts), ((0, 0), (0, len(self._of_joints))))
         index = mechanism.body_index
         self._bodies = [(index[contact.body_a], index[contact.body_b]) for contact in mechanism.contacts]
 
@@ -162,7 +164,8 @@ class ContactDynamics:
         K, free = np.concatenate(rows), state.solution.acceleration
         free = free + state.W @ np.einsum("kin,ki->n", state.J, force)
         if not owner:
-            return self._solution(state, mode, free, force, known, 1.0, np.zeros((len(mode), 0)), 0.0)
+            summed = np.ones((len(self.sums), 3), dtype=bool)
+            return self._solution(state, mode, free, force, known, summed, 1.0, np.zeros((len(mode), 0)), 0.0)
         D = np.array([direction @ state.J[k] for direction, k in zip(along, owner, strict=True)])
         S, wanted = K @ state.W @ D.T, -(K @ free + np.concatenate(bias))
         smooth = K @ state.W @ K.T
@@ -170,18 +173,22 @@ class ContactDynamics:
         weak = values < RANK * values[-1]
         z = np.linalg.lstsq(S, wanted, rcond=RANK)[0] if weak.any() else np.linalg.solve(S, wanted)
         ways = np.linalg.svd(S)[2][len(S) - weak.sum() :].T if weak.any() else np.zeros((len(S), 0))
-        splits = np.zeros((len(mode), ways.shape[1]))
+        splits, shifts = np.zeros((len(mode), ways.shape[1])), np.zeros((len(mode), 3, ways.shape[1]))
         for k, direction, size, loose in zip(owner, along, z, ways, strict=True):
             force[k] += size * direction
+            shifts[k] += np.outer(direction, loose)
             splits[k] += float(direction @ state.touching[k].normal) * loose
             known[k] &= np.abs(direction) * np.linalg.norm(loose) <= RANK
+        summed = np.linalg.norm(np.einsum("pk,kiw->piw", self.sums, shifts), axis=2) <= RANK
         for k, (own, found) in enumerate(zip(mode, state.touching, strict=True)):
             if own.kind == "stick" and own.along is not None:  # across its line the joints hold it, too
-                known[k] &= np.abs(cross(found.normal, np.array(own.along))) <= RANK
+                alone = np.abs(cross(found.normal, np.array(own.along))) <= RANK
+                known[k] &= alone
+                summed[self.sums[:, k] > 0] &= alone
         whole = vectors[:, ~weak]  # without what the split of a shared load changes
         response = float(np.linalg.det(whole.T @ S @ whole) / np.linalg.det(whole.T @ smooth @ whole))
         spread = float(np.linalg.norm(state.W @ (D.T @ ways)))
-        return self._solution(state, mode, free + state.W @ D.T @ z, force, known, response, splits, spread)
+        return self._solution(state, mode, free + state.W @ D.T @ z, force, known, summed, response, splits, spread)
 
     @staticmethod
     def heading(own: Acting, found: Touching) -> Array:
@@ -195,12 +202,13 @@ class ContactDynamics:
         acceleration: Array,
         force: Array,
         known: Any,
+        summed: Any,
         response: float,
         splits: Array,
         spread: float,
     ) -> ContactSolution:
         slide_rate = state.J @ acceleration + state.bias
-        return ContactSolution(state, mode, acceleration, force, known, slide_rate, response, splits, spread)
+        return ContactSolution(state, mode, acceleration, force, known, summed, slide_rate, response, splits, spread)
 
     def rate(self, y: Array, mode: ContactMode) -> Array:
         """Right-hand side for the state (q, v, time)."""
@@ -323,7 +331,7 @@ class ContactDynamics:
         speeds, scale = (J @ v)[::3], float(np.abs(J @ v).max())
         hit = (speeds < -STILL * scale) | (impulse[:, 0] > STILL * impulse[:, 0].max())
         lossy = np.array([bool(self.contacts[k].friction or self.contacts[k].restitution) for k in closed])
-        if not self.mechanism.together and _ordered(G, lossy, hit):
+        if not self.mechanism.together and ordered(G, lossy, hit):
             groups = groups_of([self.contacts[k].pair for k in closed], J @ v, together=False)
 
             def strike(response: Array, slides: Array, group: list[int]) -> Array:
@@ -345,10 +353,10 @@ class ContactDynamics:
             if state.touching[k].flat:
                 raise lying(self.contacts[k].name, time)
 
-    def sample(self, q: Array, v: Array, mode: ContactMode, time: float = 0.0) -> tuple[dict[str, Any], Array]:
-        """Fields of a record at one time [s], and contact forces between bodies [N], (contacts, 3).
+    def sample(self, q: Array, v: Array, mode: ContactMode, time: float = 0.0) -> tuple[dict[str, Any], Array, Array]:
+        """Fields of a record at one time [s], contact forces between bodies, and sums of pairs with several contacts.
 
-        Forces are NaN where they are not determinate.
+        Forces [N], (contacts, 3), and sums [N], (such pairs, 3), are NaN where they are not determinate.
         """
         found, count = self.solve(q, v, mode, time), len(self._bodies)
         pressed = found.force[:count]
@@ -364,28 +372,8 @@ class ContactDynamics:
                  if not own[c.direction != 0].all()}  # fmt: skip
         named = [item.field in {"friction", "stop"} and item.number in loose for item in named_forces(self.mechanism)]
         record["named"] = np.where(named, np.nan, record["named"])
-        return record, np.where(found.determinate[:count], pressed, np.nan)
-
-
-def _ordered(G: Array, lossy: Array, hit: Array) -> tuple[int, int] | None:
-    """Two contacts whose order decides the outcome of an impact; None: it is the same in any order.
-
-    Impacts without coupling are independent. Smooth plastic contacts, if none opens another, press more and more in any
-    order, up to the least impulses after which nothing closes (least elements of Z-matrices: R. W. Cottle, J.-S. Pang
-    and R. E. Stone, The Linear Complementarity Problem, 1992). Moreau's law for all contacts at once gives the same.
-
-    Args:
-        G: changes of all slides by unit impulses, (3 contacts, 3 contacts).
-        lossy: True for contacts with friction or restitution.
-        hit: True for contacts that close, or that the outcome presses.
-    """
-    blocks, least = G.reshape(len(hit), 3, len(hit), 3), RANK * float(np.abs(G).max())
-    coupled = np.abs(blocks).max(axis=(1, 3)) > least
-    opens = (blocks[:, 0, :, 0] > least) & ~np.eye(len(hit), dtype=bool)
-    for a, b in itertools.combinations(np.flatnonzero(hit).tolist(), 2):
-        if coupled[a, b] and (opens[[a, b]].any() or lossy[coupled[a] | coupled[b]].any()):
-            return a, b
-    return None
+        sums = np.where(found.determinate_sums, self.sums[:, :count] @ pressed, np.nan)
+        return record, np.where(found.determinate[:count], pressed, np.nan), sums
 
 
 def _least_motion_for(W: Array, K: Array, violation: Array) -> Array:

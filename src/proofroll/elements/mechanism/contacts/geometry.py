@@ -222,6 +222,20 @@ def contacts_of(geometries: Sequence[Geometry], pairs: Sequence[Pair]) -> tuple[
     return tuple(found)
 
 
+def shared_pairs(contacts: Sequence[BodyContact]) -> dict[str, list[int]]:
+    """Indices of the contacts of each pair that has several, by its name."""
+    found: dict[str, list[int]] = {}
+    for k, contact in enumerate(contacts):
+        found.setdefault(contact.pair, []).append(k)
+    return {name: numbers for name, numbers in found.items() if len(numbers) > 1}
+
+
+def pair_sums(contacts: Sequence[BodyContact]) -> Array:
+    """Matrix that sums over the contacts of each pair with several, (such pairs, contacts)."""
+    sums = [np.isin(np.arange(len(contacts)), numbers) for numbers in shared_pairs(contacts).values()]
+    return np.array(sums, dtype=float).reshape(len(sums), len(contacts))
+
+
 def _a(kind: str) -> str:
     return f"an {kind}" if kind == "ellipsoid" else f"a {kind}"
 

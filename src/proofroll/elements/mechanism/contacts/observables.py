@@ -11,6 +11,7 @@ from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Diverged
 from proofroll.core.events import EVENT_ORDER
 from proofroll.core.observable import Observable, Role
+from proofroll.elements.mechanism.contacts.geometry import shared_pairs
 from proofroll.elements.mechanism.contacts.touching import Moving, touch
 from proofroll.elements.mechanism.signal import varies
 
@@ -118,6 +119,9 @@ def contact_observables(mechanism: Mechanism, sizes: Mapping[str, float], least:
     yield Observable("normal_forces", "N", meaning, Role.REACTION, floor=force, headline=True, column=True)
     meaning = "forces between what may touch, where they are determinate all the time"
     yield Observable("contact_forces", "N", meaning, Role.REACTION, floor=force, asked_for=False)
+    if shared_pairs(mechanism.contacts):
+        meaning = "sums of the forces of each pair that touches at several places, where they are determinate"
+        yield Observable("pair_forces", "N", meaning, Role.REACTION, floor=force, asked_for=False)
     meaning = "share of the samples so far in which what may touch does not press"
     yield Observable("unpressed", "1", meaning, Role.REACTION, floor=1.0, asked_for=False)
     laws = [law for law in LAWS if law[0] in kept_laws(mechanism)]

@@ -8,6 +8,7 @@ import numpy as np
 
 from proofroll.core.errors import NotUnique
 from proofroll.core.number_format import number
+from proofroll.elements.mechanism.analysis import RANK
 from proofroll.elements.mechanism.rotations import Array
 
 # Impulses of contacts struck together, (3 contacts,), from the changes of their slides by unit impulses, their slides
@@ -133,4 +134,25 @@ def _sequence(
         impulse = strike(G[np.ix_(row, row)], w[row], order[last])
         impulses[row] += impulse
         w = w + G[:, row] @ impulse
+    return None
+
+
+def ordered(G: Array, lossy: Array, hit: Array) -> tuple[int, int] | None:
+    """Two contacts whose order decides the outcome of an impact; None: it is the same in any order.
+
+    Impacts without coupling are independent. Smooth plastic contacts, if none opens another, press more and more in any
+    order, up to the least impulses after which nothing closes (least elements of Z-matrices: R. W. Cottle, J.-S. Pang
+    and R. E. Stone, The Linear Complementarity Problem, 1992). Moreau's law for all contacts at once gives the same.
+
+    Args:
+        G: changes of all slides by unit impulses, (3 contacts, 3 contacts).
+        lossy: True for contacts with friction or restitution.
+        hit: True for contacts that close, or that the outcome presses.
+    """
+    blocks, least = G.reshape(len(hit), 3, len(hit), 3), RANK * float(np.abs(G).max())
+    coupled = np.abs(blocks).max(axis=(1, 3)) > least
+    opens = (blocks[:, 0, :, 0] > least) & ~np.eye(len(hit), dtype=bool)
+    for a, b in itertools.combinations(np.flatnonzero(hit).tolist(), 2):
+        if coupled[a, b] and (opens[[a, b]].any() or lossy[coupled[a] | coupled[b]].any()):
+            return a, b
     return None
