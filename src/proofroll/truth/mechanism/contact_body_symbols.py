@@ -7,6 +7,7 @@ from typing import Any
 
 from proofroll.elements.mechanism.contacts.acting import ContactMode
 from proofroll.elements.mechanism.contacts.geometry import BodyContact
+from proofroll.elements.mechanism.signal import Table
 from proofroll.truth.mechanism.contact_equations import ContactEquations
 from proofroll.truth.mechanism.contact_scalars import ScalarMotion, ScalarTouch, floats, known_shapes, touch_in_scalars
 from proofroll.truth.mechanism.contact_symbols import Row, SolvedSymbols, Vector, eliminated, held_rows
@@ -33,7 +34,8 @@ class BodySymbols:
         laws = any(joint.armature for joint in bodies.mechanism.joints) or any(
             actuator.limit is not None for actuator in bodies.mechanism.actuators
         )
-        return shapes and not bodies.light and not laws
+        tables = any(isinstance(signal, Table) for signal in bodies.mechanism.signals)
+        return shapes and not bodies.light and not laws and not tables
 
     def solved(
         self, state: Sequence[Scalar], mode: ContactMode, began: Sequence[Vector | None], functions: Any

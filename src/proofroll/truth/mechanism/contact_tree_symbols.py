@@ -14,7 +14,7 @@ from proofroll.elements.mechanism.contacts.dynamics import ContactDynamics
 from proofroll.elements.mechanism.contacts.geometry import BodyContact
 from proofroll.elements.mechanism.joint import AXES
 from proofroll.elements.mechanism.model import Mechanism
-from proofroll.elements.mechanism.signal import varies
+from proofroll.elements.mechanism.signal import Table, value_at
 from proofroll.truth.mechanism.contact_scalars import ScalarMotion, ScalarTouch, floats, known_shapes, touch_in_scalars
 from proofroll.truth.mechanism.contact_symbols import Row, SolvedSymbols, Vector, eliminated, held_rows
 from proofroll.truth.mechanism.maximal_bodies import clean
@@ -83,7 +83,9 @@ class TreeSymbols:
         """True if all parts of the mechanism have a rule here."""
         m = self._mechanism
         shapes = all(isinstance(each, BodyContact) and known_shapes(each) for each in self._dynamics.contacts)
-        return shapes and not (m.loops or m.springs or m.couplings or m.actuators or any(map(varies, m.signals)))
+        limited = any(actuator.limit is not None for actuator in m.actuators)
+        tables = any(isinstance(signal, Table) for signal in m.signals)
+        return shapes and not (m.loops or m.couplings or limited or tables)
 
     def solved(
         self, state: Sequence[Scalar], mode: ContactMode, began: Sequence[Vector | None], functions: Any
@@ -92,7 +94,7 @@ class TreeSymbols:
         m = self._mechanism
         q, v = state[: m.nq], state[m.nq : -1]
         bodies, rates = _tree(m, q, v, functions)
-        mass, load = self._inertial(bodies, q, v)
+        mass, load = self._inertial(bodies, q, v, state[-1], functions)
         motions = [ScalarMotion(body.p, body.R, turned(body.R, body.v), turned(body.R, body.w)) for body in bodies]
         touching = [
             touch_in_scalars(contact, motions[a], motions[b], functions["sqrt"])
@@ -152,7 +154,12 @@ class TreeSymbols:
         return SolvedSymbols([*rates, *moved], touching, lines, forces, response, slide_rates)
 
     def _inertial(
-        self, bodies: Sequence[_Moving], q: Sequence[Scalar], v: Sequence[Scalar]
+        self,
+        bodies: Sequence[_Moving],
+        q: Sequence[Scalar],
+        v: Sequence[Scalar],
+        time: Scalar,
+        functions: Any,
     ) -> tuple[list[Row], list[Scalar]]:
         """Mass matrix and loads along the velocities."""
         m = self._mechanism
@@ -179,8 +186,32 @@ class TreeSymbols:
                 load[n] = sub(load[n], mul(float(joint.damping or 0.0), v[n]))
                 if joint.stiffness:
                     load[n] = sub(load[n], mul(float(joint.stiffness), sub(q[at_q.start + place], float(joint.rest))))
-                load[n] = add(load[n], float(joint.constant_drive))
+                load[n] = add(load[n], value_at(joint.torque, time, functions))
+        for actuator in m.actuators:
+            place, n = m.place_of(actuator.joint)
+            load[n] = add(load[n], actuator.wanted(time, q[place], v[n], functions))
+        self._stretch(bodies, load, functions)
         return mass, load
+
+    def _stretch(self, bodies: Sequence[_Moving], load: list[Scalar], functions: Any) -> None:
+        """Adds the forces of springs between bodies to the loads."""
+        index = self._mechanism.body_index
+        for spring in self._mechanism.springs:
+            ends = []
+            for name, position in ((spring.body_a, spring.position_a), (spring.body_b, spring.position_b)):
+                body, arm = bodies[index[name]], clean(position)
+                speed = turned(body.R, plus(body.v, cross(body.w, arm)))
+                ends.append((body, arm, plus(body.p, turned(body.R, arm)), speed))
+            (_, _, from_a, slow), (_, _, to_b, fast) = ends
+            d = minus(to_b, from_a)
+            length = functions["sqrt"](dot(d, d))
+            pull = mul(float(spring.stiffness), sub(1.0, float(spring.length) / length))
+            if spring.damping:
+                pull = add(pull, mul(float(spring.damping), dot(minus(fast, slow), d) / (length * length)))
+            for (body, arm, _, _), sign in zip(ends, (1.0, -1.0), strict=True):
+                force = turned_back(body.R, scaled(sign, scaled(pull, d)))
+                for n, way in body.at(arm)[0].items():
+                    load[n] = add(load[n], dot(way, force))
 
 
 def _tree(m: Mechanism, q: Sequence[Scalar], v: Sequence[Scalar], functions: Any) -> tuple[list[_Moving], list[Scalar]]:

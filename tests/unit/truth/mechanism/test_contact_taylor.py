@@ -2,10 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from typing import Any
+
 import numpy as np
 import pytest
 
 from proofroll.elements.mechanism.contacts.dynamics import ContactDynamics
+from proofroll.elements.mechanism.drives import Actuator
+from proofroll.elements.mechanism.model import Mechanism
+from proofroll.elements.mechanism.parts import Spring
+from proofroll.elements.mechanism.signal import Formula, Table
 from proofroll.files.scene_file import load_scene
 from proofroll.truth.mechanism import contact_taylor
 from proofroll.truth.mechanism.contact_bodies import ContactBodies
@@ -23,7 +30,11 @@ SCENES = ("sled", "eccentric_sphere", "falling_rod", "rattleback", "tilted_disc"
 
 def routes(scene: str) -> list[ContactStretches]:
     """Both routes of a scene, in natural units."""
-    si = load_scene(scene).elements[0].mechanism  # type: ignore[attr-defined]
+    return routes_of(load_scene(scene).elements[0].mechanism)  # type: ignore[attr-defined]
+
+
+def routes_of(si: Mechanism) -> list[ContactStretches]:
+    """Both routes of a mechanism in SI units, in natural ones."""
     own = natural_units(si).mechanism(si)
     second = MaximalCoordinates(own)
     return [
@@ -74,3 +85,28 @@ def test_a_sweep_compiles_once() -> None:
         counts.append(len(contact_taylor._MODES))
     assert counts[0] == counts[1] == counts[2]
     assert len(set(ends)) == 3
+
+
+def driven_turntable(target: Any, torque: Any) -> Mechanism:
+    """A ball on a turntable with a motor and a drive, held by a spring off its centre."""
+    m = load_scene("free_turntable").elements[0].mechanism  # type: ignore[attr-defined]
+    motor = Actuator("motor", "axle", "position", target=target, kp=0.3, kd=0.01, gear=2.0)
+    spring = Spring("band", "world", "ball", (0.5, 0.1, 0.4), (0.01, 0.0, 0.03), stiffness=0.7, damping=0.1, length=0.1)
+    axle = replace(m.joints[0], torque=torque, damping=0.02, armature=0.0)
+    return replace(m, joints=(axle, *m.joints[1:]), actuators=(motor,), springs=(spring,))
+
+
+def test_springs_motors_and_drives_are_compiled_but_tables_are_not() -> None:
+    """Loads of the joints and between bodies have rules in both routes, also as formulas of time; a table has none."""
+    pytest.importorskip("heyoka")
+    formula = driven_turntable(Formula("0.4*sin(3*t)"), Formula("0.01*t^2"))
+    for route in routes_of(formula):
+        begun = route.begin()
+        assert begun.mode is not None
+        compiled, law = route._by_symbols(begun.state, begun.mode), route._law(begun.state, begun.mode)
+        assert compiled is not None
+        state = law.corrected(begun.state + 0.01 * law.rates(begun.state))
+        assert compiled.values(state[None], begun.mode)[2][0] == pytest.approx(law.rates(state), abs=1e-12)
+    table = driven_turntable(Table((0.0, 0.1), (0.0, 0.2)), 0.0)
+    found = truth_of(table, np.array([0.0, 0.02]))
+    assert [route.split(", ")[1] for route in found.routes] == ["DOP853", "DOP853"]
