@@ -117,7 +117,7 @@ class ContactEquations:
             J[k][:, list(row.coefficients)] = np.outer(contact.direction, list(row.coefficients.values()))
             rates[k] = contact.direction * float(row.bias)
         mass = np.asarray(np.linalg.inv(half @ half.T), dtype=np.float64)
-        C, bias = _independent(C, bias)
+        C, bias = _independent(C, bias, self.equations.rank)
         centres = np.array([view.r for view in constrained.views], dtype=float)
         return BodiesState(touching, J, rates, C, bias, mass, force, state[e.nx : e.nx + e.nu], centres)
 
@@ -282,12 +282,15 @@ class ContactEquations:
         return state
 
 
-def _independent(C: Array, bias: Array) -> tuple[Array, Array]:
-    """Independent rows that are equivalent to all rows."""
+def _independent(C: Array, bias: Array, most: int) -> tuple[Array, Array]:
+    """Independent rows that are equivalent to all rows, at ``most`` as many as at the start.
+
+    Rows that hold a planar body in its plane are none at all, but for the round-off of a turned frame.
+    """
     if not C.size:
         return C, bias
     U, values, Vt = np.linalg.svd(C, full_matrices=False)
-    rank = int((values > RANK * values[0]).sum())
+    rank = min(most, int((values > RANK * values[0]).sum()))
     return Vt[:rank], (U[:, :rank].T @ bias) / values[:rank]
 
 
