@@ -17,7 +17,7 @@ from proofroll.truth.mechanism.body_impacts import impulses_in_turn
 from proofroll.truth.mechanism.body_switching import SLACK
 from proofroll.truth.mechanism.contact_body_symbols import BodySymbols
 from proofroll.truth.mechanism.contact_equations import BodiesSolution, BodiesState, ContactEquations
-from proofroll.truth.mechanism.contact_guards import AT_REST, SLIP_ENDED, SolvedContacts, pressing
+from proofroll.truth.mechanism.contact_guards import AT_REST, SLIP_ENDED, SolvedContacts, pressing, sharing
 from proofroll.truth.mechanism.contact_stretches import ContactStretches, modes_of
 from proofroll.truth.mechanism.contact_taylor import ModeSymbols
 
@@ -71,8 +71,65 @@ class ContactBodies(ContactStretches):
                 each if rub or each.kind == "open" else each._replace(kind="slip") for each, rub in own
             ), np.inf
         free = float(np.abs(bodies.J @ np.linalg.solve(bodies.mass, bodies.force)).max())
-        kept, _, mode = self._tried(bodies, closed, still, trial, free)[0]
-        return mode, kept
+        best = self._tried(bodies, closed, still, trial, free)[0]
+        return self._completed(bodies, closed, still, best, free)
+
+    def _completed(
+        self,
+        bodies: BodiesState,
+        closed: Sequence[bool],
+        still: Sequence[bool],
+        best: tuple[float, BodiesSolution, ContactMode],
+        free: float,
+    ) -> tuple[ContactMode, float]:
+        """Mode with all contacts closed that do not part, and its margin; the mode itself where forces then differ.
+
+        Of contacts that share a load, as corners of one face, some can carry nothing of it and not part either.
+        """
+        kept, solution, mode = best
+        size = max(float(np.abs(solution.slide).max()), free) or 1.0
+        idle = [
+            k
+            for k, own in enumerate(mode)
+            if closed[k] and own.kind == "open" and solution.parting[k] <= SLACK * size and not self.equations.bounds[k]
+        ]
+        if not idle:
+            return mode, kept
+        lines, whole = self._own(bodies, closed), list(mode)
+        for k in idle:
+            each = bodies.touching[k]
+            way = solution.slide[k] if still[k] else each.slide
+            whole[k] = self._following(
+                lines[k], way - each.normal * (each.normal @ way), still[k] and self._rubs[k], SLACK * size
+            )
+        full = self.equations.accelerated(bodies, tuple(whole))
+        shares = sharing(full.splits)
+        apart = float(np.abs(full.moved - solution.moved).max())
+        moves = full.spread > RANK or apart > SLACK * max(free, float(np.abs(full.moved).max()))
+        if moves or not set(idle) <= set(shares):
+            return mode, kept
+        normals = pressing(tuple(whole), bodies.touching, full.force, full.splits)
+        margins = [
+            self._kept(k, own, still[k], bodies, full, float(normals[k]), free)
+            for k, own in enumerate(whole)
+            if closed[k]
+        ]
+        return tuple(whole), max(0.0, min(margins))
+
+    @staticmethod
+    def _following(own: Acting, way: Array, still: bool, least: float) -> Acting:
+        """Mode of a contact that moves with its body along its surface, by a slide or its rate; ``least``: none.
+
+        ``own``: mode with its line.
+        """
+        speed = float(np.linalg.norm(way))
+        if still and speed <= least:
+            return own
+        if own.along is not None:
+            way = np.array(own.along) * (1.0 if way @ own.along >= 0 else -1.0)
+            speed = 1.0
+        heading = _direction(way / (speed or 1.0))
+        return Acting("slip", None if own.along is None else heading, heading)
 
     def _balanced(self, bodies: BodiesState, closed: Sequence[bool]) -> bool:
         """True if nothing moves and forces within the cones and bounds of friction balance all loads."""

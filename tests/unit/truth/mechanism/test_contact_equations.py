@@ -57,6 +57,6 @@ def test_a_turned_planar_contact_keeps_its_motion_its_events_and_its_bars(
         assert other.time_low <= one.time_high
     for field in ("p_WB", "v_WB"):
         bars = plain.bars[field][-1], turned.bars[field][-1]
-        apart = np.abs(turn.as_matrix() @ getattr(plain.record, field)[-1, 0] - getattr(turned.record, field)[-1, 0]).max()
-        assert apart <= sum(bars)
+        one, other = (getattr(found.record, field)[-1, 0] for found in (plain, turned))
+        assert np.abs(turn.as_matrix() @ one - other).max() <= sum(bars)
         assert max(bars) < WIDER * min(bars)

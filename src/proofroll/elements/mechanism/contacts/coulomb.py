@@ -23,6 +23,8 @@ _RESTS = 1e-10  # motion of a contact that counts as none, relative to the loads
 # direction of slip would be found. :func:`robust_forces` tells if an outcome depends on a change within the accuracy
 # of the parameters.
 _AT_BOUND = 1e-9
+# Singular value of normal responses, and motion by a split of a load, relative to the largest, that count as zero.
+_SHARES = 1e-9
 # Relative change of loads and friction with which an outcome is tried on both sides; an outcome that changes is not
 # unique. Each further contact gets an extra 0.382 of it: equal changes would cancel between two walls.
 _NUDGE, _APART = 1e-6, 0.382
@@ -78,6 +80,8 @@ def contact_forces(
                 f[own], done[k] = _one(G[own, own], free, mu, sliding[k], (names[k], time), least)
         if np.abs(f - before).max() <= _SETTLED * np.abs(f).max():
             w = (c + G @ f).reshape(-1, 3)
+            for k in _idle(G, w, friction, sliding, done, least):
+                done[k] = "slip"
             for k, along in enumerate(sliding):
                 rubs = friction[k] or bounds[k]
                 if done[k] == "slip" and along is None and rubs and np.linalg.norm(w[k, 1:]) <= least:
@@ -103,6 +107,39 @@ def _all_sliding(G: Array, c: Array, friction: Array, ways: Sequence[Array]) -> 
         pushes[3 * k : 3 * k + 3, k] = push
     normals = lemke((G @ pushes)[::3], c[::3])
     return None if normals is None else normals[:, None] * along
+
+
+def _idle(
+    G: Array, w: Array, friction: Array, sliding: Sequence[Array | None], done: Sequence[Outcome], least: float
+) -> list[int]:
+    """Open contacts that do not part, if no split of the load that they share with others changes the motion.
+
+    Of the corners of a face that slides without turning, one may carry nothing of the load, and stays closed.
+
+    Args:
+        G: as of :func:`contact_forces`.
+        w: motion, (contacts, 3).
+        friction: coefficients.
+        sliding: as of :func:`contact_forces`.
+        done: outcomes so far.
+        least: motion that counts as none.
+    """
+    idle = [k for k, own in enumerate(done) if own == "open" and w[k, 0] <= least]
+    if not (idle and least):
+        return []
+    closed = [k for k, own in enumerate(done) if own != "open" or k in idle]
+    pushes = np.zeros((len(G), len(closed)))  # unit normal forces with their friction
+    for place, k in enumerate(closed):
+        speed = float(np.linalg.norm(w[k, 1:]))
+        way = w[k, 1:] / speed if speed > least else np.zeros(2)
+        along = sliding[k]
+        pushes[3 * k : 3 * k + 3, place] = [1.0, *(-friction[k] * (way if along is None else along))]
+    normals = [3 * k for k in closed]
+    _, sizes, ways = np.linalg.svd(G[np.ix_(normals, normals)])
+    splits = ways[(sizes > _SHARES * sizes[0]).sum() :]
+    spread = np.abs(G @ pushes @ splits.T).max(initial=0.0)
+    share = np.linalg.norm(splits, axis=0) > _SHARES
+    return [k for k in idle if share[closed.index(k)]] if spread <= _SHARES * np.abs(G).max() else []
 
 
 def robust_forces(

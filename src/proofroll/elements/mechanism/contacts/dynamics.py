@@ -292,11 +292,13 @@ class ContactDynamics:
             sliding.append(None if still[k] else across / np.linalg.norm(across))
         G, names = J @ state.W @ J.T, [self.contacts[k].name for k in which]
         force, done, same = robust_forces(G, c, self.friction[which], sliding, names, self._bounds[which], time)
-        mode = [OPEN for _ in closed]
+        mode, moves = [OPEN for _ in closed], (c + G @ force.ravel()).reshape(-1, 3)
         for place, k in enumerate(which):
             own = slice(3 * place, 3 * place + 3)
             slides = sliding[place]
-            mode[k] = first_mode(done[place], frames[k], -force[place, 1:] if slides is None else slides, G[own, own])
+            if slides is None:  # friction acts against the slide, and one that carries nothing has none
+                slides = -force[place, 1:] if force[place, 1:].any() else moves[place, 1:]
+            mode[k] = first_mode(done[place], frames[k], slides, G[own, own])
         return tuple(mode), np.inf if same else 0.0
 
     def struck(
