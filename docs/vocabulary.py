@@ -124,7 +124,8 @@ INTRODUCTION = """# The vocabulary of scenes and comparisons
 
 Written by `docs/vocabulary.py` from what reads the files; do not edit it. `proofroll check NAME` says whether a file is
 sound, and an unknown key is an error. SI units, angles in rad; nothing is converted. In a scene `"$name"` is the value
-of a parameter, and `"= mass*length^2/12"` is a formula of parameters with `+ - * / ^ ( )` and `pi`. Both must have the
+of a parameter, and `"= mass*length^2/12"` is a formula of parameters with `+ - * / ^ ( )`, `pi`, `sin`, `cos`, `tan`,
+`asin`, `acos`, `atan`, `atan2`, `sqrt`, `hypot` and `abs`; `"30 deg"` is an angle in rad. They must have the
 unit of their place; a bare number takes the unit of what it is added to, and has none in a product.
 """
 

@@ -37,7 +37,12 @@ def compare(
             autocompletion=options.compared_like,
         ),
     ],
-    engine: options.Engines = None,
+    engine: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="Only this engine: its name, or name[key=value,…]; repeat.", autocompletion=options.engines_like
+        ),
+    ] = None,
     settings: options.Set = None,
     out: options.Out = Path("out"),
     fresh: options.Fresh = False,
