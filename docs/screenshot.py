@@ -15,20 +15,20 @@ from playwright.sync_api import sync_playwright
 
 BROWSERS = ("chromium", "chromium-browser", "google-chrome")
 # In CSS pixels, drawn with two device pixels to each, so that the numbers can be read.
-WIDTH, MOST_HEIGHT, DENSITY = 1280, 1100, 2
+WIDTH, MOST_HEIGHT, DENSITY = 1400, 1100, 2
 # A page of text and flat cells has few colours; a palette makes the file a third as large.
 COLOURS = 64
-# The first table of verdicts, which is not that of choice.
-VERDICTS = ".matrix:not(#choice)"
+# The end of the picture, and the first table of verdicts, which stands below it.
+COUNTS, VERDICTS = ".counts", ".matrix"
 # Row for row: what the comparison file calls it, and its verdict.
 ROWS = """(table) => [...document.querySelector(table).querySelectorAll("tbody tr:not(.group)")].map((row) =>
   [row.querySelector("th").title, row.querySelector(".v").textContent.trim().split(" ")[1]])"""
 
 
 def screenshot(report: Path, picture: Path) -> None:
-    """Photographs a report down to the end of its first table of verdicts.
+    """Photographs the first screen of a report: chips, cards and counts.
 
-    The verdicts that the picture shows are also in it as text, under ``verdicts``: a test reads them there.
+    The verdicts of its first comparison are in the picture as text, under ``verdicts``: a test reads them there.
 
     Args:
         report: the page.
@@ -43,7 +43,7 @@ def screenshot(report: Path, picture: Path) -> None:
             viewport={"width": WIDTH, "height": MOST_HEIGHT}, device_scale_factor=DENSITY, color_scheme="light"
         )
         page.goto(report.resolve().as_uri())
-        end = page.locator(VERDICTS).first.evaluate("(table) => table.getBoundingClientRect().bottom + 16")
+        end = page.locator(COUNTS).evaluate("(counts) => counts.getBoundingClientRect().bottom + 16")
         area: Any = {"x": 0, "y": 0, "width": WIDTH, "height": min(end, MOST_HEIGHT)}
         image = Image.open(io.BytesIO(page.screenshot(clip=area)))
         said = PngInfo()

@@ -50,7 +50,7 @@ SHOWN = (
 COLOURS = mpl.colormaps["viridis"](np.linspace(0.92, 0.0, len(SHOWN)))
 
 # Comparisons of the report whose first screen is the picture in README.md.
-REPORTED = ("paper", "four_bar", "slider_crank", "inclined_plane", "two_spheres")
+REPORTED = ("paper", "stick_slip", "inclined_plane", "four_bar", "slider_crank", "heavy_top", "sled", "two_spheres")
 
 
 def draw(outcome: Outcome, path: Path) -> None:

@@ -122,7 +122,7 @@ window.reading = (() => {
 
   // Everything that a keyboard must reach, numbered in the order of the page; and from now on each that gets the focus.
   function reachable() {
-    const found = all().filter((element) => element.matches("a[href], button, summary, input, select, [tabindex='0']") && !element.disabled);
+    const found = all().filter((element) => element.matches("a[href]:not([tabindex='-1']), button, summary, input, select, [tabindex='0']") && !element.disabled);
     found.forEach((element, number) => { element.dataset.number = number; });
     return found.map(named);
   }

@@ -19,7 +19,8 @@ _NUMBER = re.compile(r"(?<![\w.\-−])[-−]?\d+(?:\.\d+)?(?:e[-+−]?\d+)?(?![\
 # What is no result: counts of certificates' lines, half-widths of intervals of costs in per cent, multiples of a
 # tolerance, and the confidence of those intervals.
 _NO_RESULT = re.compile(r"\b\d+ of \d+\b|±\s?\d+\s?%|\d+\s%|(?:more than )?[\d.]+ times better than asked")
-_OF_FILES = {"Findings about engines"}  # versions and titles of findings
+# Versions and titles of findings; speeds, which are reciprocals of the table's costs.
+_OF_FILES = {"Findings about engines", "What to use for each scene", "Which engine for which scenes, and how fast"}
 
 
 class Cells(HTMLParser):

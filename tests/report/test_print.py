@@ -20,7 +20,7 @@ PAPER = {"width": round((210 - 2 * 10) / 25.4 * 96), "height": round((297 - 12 -
 MOST_PAGES = 30
 # A table of verdicts with as many observables as our largest comparison judges: cells as wide as numbers become.
 WIDEN = """(more) => {
-  const table = document.querySelector(".matrix:not(#choice)");
+  const table = document.querySelector(".matrix");
   for (const row of table.querySelectorAll("tr:not(.group)")) {
     const cell = row.querySelector("th.n, .cell");
     for (let added = 0; cell && added < more; ++added) cell.after(cell.cloneNode(true));
@@ -65,11 +65,11 @@ def test_nothing_is_cut_off_at_the_edge_of_the_paper(report_page: Path, visit: V
     Verdicts of every point are there, folded or not; contents and buttons are not.
     """
     with visit(report_page, viewport=PAPER, before=UNDRAWN) as seen:
-        matrices = seen.page.locator(".matrix:not(#choice)")
+        matrices = seen.page.locator(".matrix")
         assert matrices.count() == 2, "one is folded, and not built on the screen"
         seen.page.evaluate("folds.find('').then(() => dispatchEvent(new Event('beforeprint')))")
         seen.page.emulate_media(media="print")
-        seen.wait("document.querySelectorAll('.matrix:not(#choice)').length === 3")  # a busy machine takes a moment
+        seen.wait("document.querySelectorAll('.matrix').length === 3")  # a busy machine takes a moment
         assert all(matrices.nth(number).is_visible() for number in range(3))
         for control in ("nav", ".skip", "button[data-all]"):
             assert not seen.page.locator(control).first.is_visible()
@@ -93,7 +93,7 @@ def test_pdf_holds_the_verdicts_and_is_short(printed: PdfReader) -> None:
     for word in ("An invented comparison", "✓ agrees", "✗ differs", "! failed", "gamma is not installed here"):
         assert word in text, word
     assert text.count("not expected") >= 2
-    assert "Skip to the verdicts" not in text
+    assert "Skip to the answer" not in text
 
 
 @pytest.mark.drill

@@ -89,7 +89,7 @@ def test_no_sentence_speaks_of_agreement_with_a_truth(content: ReportContent) ->
         "laws that are judged in every case and 1 gives no result at some points."
     )
     assert content.findings.sentences[1] == "No setting that ran to its end breaks a law of mechanics."
-    assert "Over all: motion is judged in no study." in text
+    assert "Over all: motion is judged in no scene." in text
     assert "3 keep the laws that are judged in every case" in text
 
 

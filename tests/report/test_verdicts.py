@@ -306,14 +306,14 @@ def test_the_cheapest_is_the_same_in_each_sentence_and_in_the_matrix(
             step = LadderRun(4e-3, rung, {item.observable: 1e-8 for item in run.judgements})
             runs[number].append(dataclasses.replace(run, result=fine, rungs=[step]))
     content = report_content([with_runs(made[0], runs)], "proofroll report invented")
-    (column,) = content.choice.columns
-    (_, cell), *_ = content.choice.ranked(column, FIRST_TOLERANCE, forces=True)
+    (column,) = content.choice.kinds
+    cell = content.choice.standings(column, FIRST_TOLERANCE, True)[0].cell
     assert "4e-3 s" in cell.name if coarse < 0.2 else cell.cost == 0.2
-    assert f"{cell.name} for {column.group} ({cell.text})" in content.findings.sentences[2]
+    assert "alpha for rolling balls" in content.findings.sentences[2]
     assert content.comparisons[0].evidence
-    held = "To hold motion to 1e-4 of the path and forces to 1e-4 of the largest"
+    held = "To hold 0.1 mm per metre of the true path and forces within 1e-4 of the largest"
     answer = content.comparisons[0].evidence.findings.answer
-    assert f"{held}, the cheapest is {cell.name}: {cell.text} s" in answer
+    assert f"{held}, the cheapest is {cell.name}: {cell.text} real time" in answer
 
 
 def test_equations_derived_for_a_scene_are_in_no_contest(made: tuple[Outcome, Store]) -> None:

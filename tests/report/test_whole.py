@@ -9,8 +9,10 @@ from typing import Any, ClassVar
 
 import pytest
 from invented import further, stability_study, tradeoff_study
+from report_schema import SCHEMA, problems
 
 from proofroll.core.errors import ProofrollError
+from proofroll.report.page.answer import answer
 from proofroll.report.page.choice_matrix import FIRST_TOLERANCE, choice_matrix
 from proofroll.report.page.first_sentences import three_sentences
 from proofroll.report.page.growing import Report, begun
@@ -78,7 +80,18 @@ def test_sections_answer_in_order(written_page: str, parse: Any) -> None:
     """What agrees, what to use, why; each section is there, has a heading and says something."""
     elements = parse(written_page)
     ids = [attributes["id"] for tag, attributes in elements.tags if tag == "section" and "id" in attributes]
-    assert ids == ["verdicts", "use", "findings", "study-tradeoff", "study-stability", "evidence-invented", "made"]
+    assert ids == [
+        "answer",
+        "sec-matrix",
+        "sec-profile",
+        "use",
+        "verdicts",
+        "findings",
+        "study-tradeoff",
+        "study-stability",
+        "evidence-invented",
+        "made",
+    ]
     assert "1 of 2 boundaries are passed in silence" in elements.text
     assert "good depends on mass" in elements.text
     assert "with at most 3 values for each axis" in elements.text
@@ -114,7 +127,7 @@ def test_exactly_three_sentences_from_the_data(report: Report) -> None:
         "1 setting differs from the truth and runs to the end without a word, worst alpha fine default"
     )
     assert found[1].endswith("1 of 2 boundaries of stability and accuracy are passed without a word.")
-    assert found[2] == report.content.choice.answer(FIRST_TOLERANCE, forces=True)
+    assert found[2] == answer(report.content.choice, FIRST_TOLERANCE, forces=True).sentence
     nothing = three_sentences([], {}, choice_matrix([], {}))
     assert len(nothing) == 3
     assert all(sentence.endswith(".") for sentence in nothing)
@@ -166,6 +179,7 @@ def test_json_has_no_nan_and_no_path_outside(report: Report, tmp_path: Path) -> 
 
     report.write(tmp_path)
     content = json.loads((tmp_path / "report.json").read_text(encoding="utf-8"), parse_constant=refuse)
+    assert list(problems(content, SCHEMA)) == []
     assert content["tradeoffs"][0]["study"]["points"]
     comparison = content["comparisons"][0]
     named = [item["trajectory"] for item in (*comparison["runs"], *comparison["truths"]) if item["trajectory"]]

@@ -130,7 +130,8 @@ def _from_report(
     from proofroll.files.scene_file import is_scene
     from proofroll.files.toml import named_file
     from proofroll.report.page.advice import advice
-    from proofroll.report.page.choice_matrix import FIRST_TOLERANCE, ChoiceStudy, choice_matrix
+    from proofroll.report.page.choice_matrix import FIRST_TOLERANCE, ChoiceStudy, choice_matrix, naming
+    from proofroll.report.terminal.tables import answer_table
 
     path, lines = report.path, report.lines
     for name in engines:
@@ -156,7 +157,7 @@ def _from_report(
         # in the unit of the motion: a quantity whose scale is one unit has that error as its part
         lines = [replace(line, scale=1.0) for line in lines if line.unit == unit or not line.quantity]
     part = bound.value
-    matrix = choice_matrix(lines, studies)
+    matrix = choice_matrix(lines, studies, naming(report.names))
     advised = advice(matrix, part, forces)
     costs = _engine_costs(matrix, part, forces=forces)
     content = {
@@ -168,9 +169,10 @@ def _from_report(
         "engines": costs,
     }
     head = f"Tolerance: {number(part)} {'of the path' if bound.relative else unit}."
-    key = "s/s: seconds of computing per second of motion; ~: to a factor of about two."
-    options.show(content, as_json, lambda: [head, *(item.sentence for item in advised), *_cost_tables(costs), key])
-    single = [item for item, column in zip(advised, matrix.columns, strict=False) if len(column.studies) == 1]
+    key = "× real time: seconds of motion per second of computing; ≈: to a factor of about two."
+    shown: list[Table | str] = [answer_table(matrix, part, forces, scenes=True), advised[-1].sentence]
+    options.show(content, as_json, lambda: [head, *shown, *_cost_tables(costs), key])
+    single = [item for item, column in zip(advised, matrix.columns, strict=False) if not column.whole]
     chosen = [bool(item.choice) for item in single if item.judged]
     raise typer.Exit(options.OK if chosen and all(chosen) else options.CONTRADICTED)
 
@@ -183,16 +185,18 @@ def _unit_of(lines: Iterable[TableLine]) -> str:
 
 def _engine_costs(matrix: ChoiceMatrix, tolerance: float, *, forces: bool) -> list[dict[str, Any]]:
     """Every formulation in each group or scene: whether it holds the tolerance, its cost [s/s], setting, or why not."""
+    from proofroll.report.page.choice_cell import CANNOT, NO_RUN
+
     costs = []
     for column in matrix.columns:
         for row in matrix.rows:
             if row.setting:
                 continue
             cell = matrix.cell(row, column, tolerance, forces)
-            if cell.state == "none":
+            if cell.state in {NO_RUN, CANNOT}:
                 continue
             held = math.isfinite(cell.cost)
-            setting = matrix.step(row, cell) if cell.name else ""
+            setting = cell.name.removeprefix(row.name).strip()
             answer = {"of": column.name, "engine": row.name, "holds": held, "setting": setting}
             costs.append(answer | {"cost": cell.cost if held else None, "text": cell.text if held else cell.why})
     return costs
@@ -206,7 +210,7 @@ def _cost_tables(costs: Sequence[Mapping[str, Any]]) -> Iterator[Table]:
 
     for name in dict.fromkeys(item["of"] for item in costs):
         table = plain_table(
-            Column(name, overflow="fold"), Column("s/s"), Column("setting, or why not", overflow="fold")
+            Column(name, overflow="fold"), Column("× real time"), Column("setting, or why not", overflow="fold")
         )
         rows = [item for item in costs if item["of"] == name]
         for item in sorted(rows, key=lambda item: (not item["holds"], item["cost"] or 0.0)):

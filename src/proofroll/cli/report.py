@@ -269,7 +269,7 @@ def _exit_code(content: ReportContent, compared: int, unmade: Collection[str]) -
 def _shown(content: ReportContent, out: Path) -> Iterator[Table | str]:
     """Tables and lines for the terminal: verdicts, further studies, what to look at first, path, and the choice."""
     from proofroll.report.page.choice_matrix import FIRST_TOLERANCE
-    from proofroll.report.terminal.tables import change_lines, first_lines, part_lines, verdict_parts
+    from proofroll.report.terminal.tables import answer_table, change_lines, first_lines, part_lines, verdict_parts
 
     for item in content.comparisons:
         yield from verdict_parts(item)
@@ -282,4 +282,4 @@ def _shown(content: ReportContent, out: Path) -> Iterator[Table | str]:
         yield content.omission_sentences
     yield f"The report is in {out / 'report.html'}, the same content in {out / 'report.json'}."
     if content.choice.rows:
-        yield f"{content.choice.answer(FIRST_TOLERANCE, False)} {content.choice.with_forces(FIRST_TOLERANCE)}".rstrip()
+        yield answer_table(content.choice, FIRST_TOLERANCE, False)

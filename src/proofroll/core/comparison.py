@@ -105,6 +105,7 @@ class Row:
         order: observable -> lowest and highest order that is expected.
         limit: observable -> largest expected distance of the limit of small steps from the truth.
         bound: observable -> tolerance that replaces the band's.
+        short: why it does not hold a tolerance, for the first screen: a clause of at most twelve words, or empty.
     """
 
     engine: str
@@ -118,6 +119,7 @@ class Row:
     order: dict[str, tuple[float, float]] = field(default_factory=dict)
     limit: dict[str, Tolerance] = field(default_factory=dict)
     bound: dict[str, Tolerance] = field(default_factory=dict)
+    short: str = ""
 
     def expected(self, point: dict[str, float]) -> list[Verdict]:
         """Expected verdicts at a point of the parameters."""

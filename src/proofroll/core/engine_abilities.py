@@ -76,6 +76,24 @@ class TellsLevels(Protocol):
 
 
 @runtime_checkable
+class HasTitle(Protocol):
+    """Ability of an engine that has another name for readers than its code name.
+
+    Attributes:
+        title: as its makers spell it.
+        witness: True for a solver that cross-checks the truth, as our own do: it is shown and never recommended.
+    """
+
+    title: ClassVar[str]
+    witness: ClassVar[bool]
+
+
+def title_of(engine: Any) -> str:
+    """Name of an engine for a reader; without one its code name."""
+    return engine.title if isinstance(engine, HasTitle) else str(engine.name)
+
+
+@runtime_checkable
 class TellsCaveats(Protocol):
     """Ability of an engine with settings that the engine alone would not have.
 

@@ -21,6 +21,8 @@ from proofroll.files.toml import named_file, read_toml, study_of
 
 # Most combinations of parameters; a run takes about a second, so more are a mistake.
 _MOST_POINTS = 10_000
+# Most words of a row's short reason.
+_SHORTEST = 12
 
 
 def comparison_names() -> list[str]:
@@ -157,6 +159,9 @@ def _check(where: str, row: Row, comparison: Comparison, known: Mapping[str, Obs
     _check_bounds(where, known, row.limit)
     _check_bounds(where, known, row.bound)
     _check_points(f"{where}.only", comparison, row.only)
+    if len(row.short.split()) > _SHORTEST:
+        advice = f"it stands on a card and has {len(row.short.split())} words; say it in {_SHORTEST}"
+        raise InputError(f"{where}.short", row.short, advice)
     for exception in row.except_at:
         _check_points(f"{where}.except_at", comparison, exception.where)
         if not exception.where or not comparison.combinations(exception.where):

@@ -5,8 +5,8 @@ from __future__ import annotations
 import json
 import math
 from collections import defaultdict
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from statistics import median
 from typing import Any, TypeGuard
@@ -99,13 +99,14 @@ class Against:
 
 @dataclass(frozen=True)
 class EarlierReport:
-    """An earlier report, as far as it is compared: date, machine, versions and long table."""
+    """An earlier report, as far as it is used: date, machine, versions, long table; ``names``: engines for readers."""
 
     path: Path
     date: str
     machine: str
     versions: dict[str, str]
     lines: list[TableLine]
+    names: Mapping[str, str] = field(default_factory=dict)
 
     @classmethod
     def read(cls, path: Path, option: str = "--against") -> EarlierReport:
@@ -120,7 +121,7 @@ class EarlierReport:
             rows = [zip(table["columns"], row, strict=True) for row in table["data"]]
             lines = [TableLine(**{name: value for name, value in row if name in COLUMNS}) for row in rows]
             lines = [line for line in lines if not line.record]
-            return cls(path, content["date"], made["machine"], made["versions"], lines)
+            return cls(path, content["date"], made["machine"], made["versions"], lines, content.get("names", {}))
         except OSError as problem:
             why = f"cannot be read: {problem.strerror or problem}; proofroll report writes one"
             raise InputError(option, path, why) from None

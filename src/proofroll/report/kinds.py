@@ -35,12 +35,14 @@ class ReportKind(Protocol):
         caption: text below the drawings.
         replay_script: script in the folder ``templates`` that draws the kind's replays in a browser; empty: none. Its
             input and output are described in ``replay.js``.
+        groups: name of a group of scenes -> its title for a reader, and what its scenes are, as a clause.
     """
 
     template: ClassVar[str] = ""
     names: ClassVar[Mapping[str, Any]] = {}
     caption: ClassVar[str] = ""
     replay_script: ClassVar[str] = ""
+    groups: ClassVar[Mapping[str, tuple[str, str]]] = {}
 
     @staticmethod
     def covers(scene: Scene) -> bool:

@@ -93,6 +93,9 @@ class EngineFacts:
         precision: of its arithmetic, see :func:`proofroll.core.engine.precision_of`.
         scheme: integration rule, see :class:`proofroll.core.engine.Scheme`; empty: it declares none.
         level: rung of the ladder of models, see :class:`proofroll.core.engine_abilities.Level`; empty: not declared.
+        title: name of the engine for a reader, see :class:`proofroll.core.engine_abilities.HasTitle`.
+        witness: True if it cross-checks the truth and is never recommended.
+        provides: formulation -> its capabilities, sorted.
         libraries: versions of Python, numpy and scipy, which decide the last digits; in another interpreter also a hash
             of all its packages.
     """
@@ -112,6 +115,9 @@ class EngineFacts:
     precision: str = "double"
     scheme: str = ""
     level: str = ""
+    title: str = ""
+    witness: bool = False
+    provides: dict[str, list[str]] = field(default_factory=dict)
     libraries: dict[str, str] = field(default_factory=dict)
 
     @property
@@ -165,7 +171,8 @@ class Case:
         left_out = {"time_limit", *(name for name in ("asks", "turns", "between") if not getattr(self, name))}
         content = {name: value for name, value in asdict(self).items() if name not in left_out}
         content["engine"]["name"] = plain_name(self.engine.name)
-        del content["engine"]["level"]  # a word for people
+        for words in ("level", "title", "witness", "provides"):  # for people
+            del content["engine"][words]
         return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()[:24]
 
     @classmethod

@@ -62,7 +62,15 @@ def resolve(engine: str, options: dict[str, Any], requires: Sequence[str] = ()) 
             raise InputError("truth", ", ".join(options), "the truth has no settings; leave them out")
         return dataclasses.asdict(EngineFacts("truth", truth_version(), _code_of(*load_truths()), {}))
     from proofroll.core.engine import precision_of, scheme_of
-    from proofroll.core.engine_abilities import LowersOrder, SharesEquations, TellsCaveats, TellsLevels, laws
+    from proofroll.core.engine_abilities import (
+        HasTitle,
+        LowersOrder,
+        SharesEquations,
+        TellsCaveats,
+        TellsLevels,
+        laws,
+        title_of,
+    )
     from proofroll.core.plugins import resolve_settings
     from proofroll.running.loading import load
 
@@ -82,6 +90,9 @@ def resolve(engine: str, options: dict[str, Any], requires: Sequence[str] = ()) 
         precision=precision_of(settings),
         scheme=scheme_of(settings),
         level=kind.levels.get(settings.formulation, "") if isinstance(kind, TellsLevels) else "",
+        title=title_of(kind),
+        witness=kind.witness if isinstance(kind, HasTitle) else False,
+        provides={formulation: sorted(names) for formulation, names in kind.provides.items()},
         libraries=libraries(engine),
     )
     return dataclasses.asdict(facts)

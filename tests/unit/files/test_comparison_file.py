@@ -177,6 +177,7 @@ def test_tolerances_of_another_form(text: object) -> None:
         ('engine = "projection"', 'engines = "projection"', ["rows.0.engine"]),
         ('expect = "converges"', 'expect = "maybe"', ["rows.1.expect", "maybe", "'converges'"]),
         ('because = "the contact is soft"', "", ["rows.1.because", "needs its reason"]),
+        ("ladder = [1, 0.5, 0.25]", f"short = '{'far ' * 13}'", ["rows.1.short", "has 13 words", "say it in 12"]),
         ("ladder = [1, 0.5, 0.25]", "ladder = [1, 0.5]", ["rows.1.ladder", "three positive factors"]),
         ("ladder = [1, 0.5, 0.25]", "ladder = [0.25, 0.5, 1]", ["rows.1.ladder", "largest first"]),
         ("ladder = [1, 0.5, 0.25]", "ladder = [8, 4, 2]", ["rows.1.ladder", "one of them 1"]),

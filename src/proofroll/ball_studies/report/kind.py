@@ -22,6 +22,11 @@ class BallReport(ReportKind):
     template: ClassVar[str] = "slips.html"
     names: ClassVar[Mapping[str, Any]] = {"onsets": onsets}
     replay_script: ClassVar[str] = "replay_ball.js"
+    groups: ClassVar[Mapping[str, tuple[str, str]]] = {
+        "ball rolling": ("Rolling balls", "a ball rolls without slip on a wall"),
+        "ball slipping": ("Slipping balls", "a ball sticks, slips and may fall: bounded friction"),
+        "ball impacts": ("Bouncing balls", "a ball hits a wall and leaves it"),
+    }
     caption: ClassVar[str] = (
         "First the whole, to scale; then the ball enlarged, with its local frame at the contact: e₁ into the wall, e₂ "
         "and e₃ along its coordinates. N, F₂, F₃ are drawn as forces on the ball, in their positive sense."

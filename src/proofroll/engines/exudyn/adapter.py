@@ -59,6 +59,8 @@ class Exudyn:
     """Exudyn's implicit integration of multibody systems with constraints, or with its penalty contact."""
 
     name: ClassVar[str] = "exudyn"
+    title: ClassVar[str] = "Exudyn"
+    witness: ClassVar[bool] = False
     oldest: ClassVar[str] = "1.11"  # the oldest that was tried
     provides: ClassVar[Mapping[str, frozenset[str]]] = {
         "generic": (ALL_OF_A_BALL | {BallCapability.MOVING_WALL}) - {BallCapability.ORIENTATION},

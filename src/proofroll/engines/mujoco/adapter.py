@@ -47,6 +47,8 @@ class Mujoco(SteppedModel):
     """
 
     name: ClassVar[str] = "mujoco"
+    title: ClassVar[str] = "MuJoCo"
+    witness: ClassVar[bool] = False
     oldest: ClassVar[str] = "3.5"  # the first version with mj_copyData, which every sample needs
     provides: ClassVar[Mapping[str, frozenset[str]]] = {
         "chart": ALL_OF_A_BALL,

@@ -29,6 +29,8 @@ class Pinocchio:
     """Adapter of Pinocchio: its equations of motion with rolling constraints, or its own frictional contact solver."""
 
     name: ClassVar[str] = "pinocchio"
+    title: ClassVar[str] = "Pinocchio"
+    witness: ClassVar[bool] = False
     oldest: ClassVar[str] = "3.9"  # oldest version tried
     provides: ClassVar[Mapping[str, frozenset[str]]] = {
         "composite": ALL_OF_A_BALL,

@@ -36,6 +36,8 @@ class Projection:
     """Blajer's projection method, for a ball on any surface that guides it and for mechanisms."""
 
     name: ClassVar[str] = "projection"
+    title: ClassVar[str] = "projection solver"
+    witness: ClassVar[bool] = True
     provides: ClassVar[Mapping[str, frozenset[str]]] = {
         **dict.fromkeys(_OF_BALLS, ALL_OF_A_BALL | {BallCapability.MOVING_WALL}),
         "dependent": mechanism.PROVIDES,

@@ -269,6 +269,8 @@ class Reduced:
     """
 
     name: ClassVar[str] = "reduced"
+    title: ClassVar[str] = "reduced equations"
+    witness: ClassVar[bool] = True
     provides: ClassVar[Mapping[str, frozenset[str]]] = {
         "equations": ROLLS | {BallCapability.MOVING_WALL},
         "closed_form": (ROLLS | {BallCapability.MOVING_WALL}) - {BallCapability.ROLLING_RESISTANCE},

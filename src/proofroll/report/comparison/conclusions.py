@@ -11,8 +11,9 @@ from proofroll.report.comparison.scores import closest, furthest_off, scores
 from proofroll.report.comparison.spread import ALONE
 from proofroll.report.kinds import ReportKind
 from proofroll.report.labels import names, off_by, unjudged, with_caveat
+from proofroll.report.page.answer import ReaderQuestion, of_column
 from proofroll.report.page.candidates import Candidate
-from proofroll.report.page.choice_matrix import FIRST_TOLERANCE, NEEDS, ChoiceMatrix
+from proofroll.report.page.choice_matrix import FIRST_TOLERANCE, ChoiceMatrix
 
 
 @dataclass(frozen=True)
@@ -49,11 +50,11 @@ def _answer(content: ReportedComparison, choice: ChoiceMatrix) -> str:
         expected = " Nothing of it was unexpected." if unjudged(content) else " All of this was expected."
     text = f"Of {counted(len(rows), 'engine settings')}, {standings(rows, alone)}.{expected if content.claims else ''}"
     text = f"{ALONE[0].upper()}{ALONE[1:]}. {text}" if alone else text
-    for column in choice.columns:
-        forces = not choice.unjudged[True].issuperset(column.studies)
-        for _, cell in choice.ranked(column, FIRST_TOLERANCE, forces)[:1]:
-            needs = NEEDS[forces].format(number(FIRST_TOLERANCE))
-            text += f" To hold {needs}, the cheapest is {cell.name}: {cell.text} s of computing per simulated second."
+    for column in choice.kinds:
+        asked = ReaderQuestion(FIRST_TOLERANCE, not choice.unjudged[True].issuperset(column.studies))
+        taken = of_column(choice, column, asked).taken
+        if taken is not None:
+            text += f" To hold {asked.words}, the cheapest is {taken.cell.name}: {taken.cell.text} real time."
     return text
 
 

@@ -43,7 +43,7 @@ def _plain(outcome: Outcome, run: Run, row: int) -> TableLine:
         place=point_name(run.parameters),
         row=row,
         version=facts.version,
-        own_equations=bool(run.shared) or by_hand(facts.level),
+        own_equations=bool(run.shared) or by_hand(facts.level) or facts.witness,
         verdict=run.verdict,
         **setting_columns(facts.name, run.row.engine, facts),
         **_ended(outcome, run.result),

@@ -130,6 +130,7 @@ class ReportedRow(Setting):
     expected: list[Verdict]
     expected_for: dict[str, list[Verdict]]
     because: str
+    short: str
     tolerance: str
     claims: Claims
     as_expected: bool
@@ -195,6 +196,7 @@ class ReportedComparison:
     Attributes:
         group: of its scene (:func:`proofroll.report.kinds.group_of`).
         shown_by: name of the kind of element that adds to its report.
+        requires: capabilities that its scene requires of a formulation, sorted.
         spread: of the points where only laws of mechanics are judged.
     """
 
@@ -204,6 +206,7 @@ class ReportedComparison:
     scene: str
     group: str
     shown_by: str
+    requires: list[str]
     observables: dict[str, ShownObservable]
     until: float
     every: float

@@ -43,6 +43,7 @@ def outcome_content(outcome: Outcome) -> ReportedComparison:
         scene=comparison.scene,
         group=group_of(first),
         shown_by=kind_name(first),
+        requires=sorted(first.requires),
         observables={
             name: ShownObservable(item.unit, item.shown, item.role, item.headline, item.audit)
             for name, item in first.observables.items()
@@ -118,6 +119,7 @@ def _row(runs: list[Run], until: float) -> ReportedRow:
         expected=first.row.expect,
         expected_for=first.row.expect_for,
         because=first.row.because,
+        short=first.row.short,
         tolerance=first.row.tolerance,
         claims=Claims.of(first.row),
         as_expected=not any(run.contradictions for run in runs),

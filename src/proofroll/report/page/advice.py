@@ -1,12 +1,14 @@
-"""Advice in words: the cheapest setting for each group of scenes and each scene, alternatives, and the best for all."""
+"""Advice in words: the answer for each kind of scenes and each scene as sentences, and the best for all scenes."""
 
-import json
 import math
+from collections.abc import Collection
 from dataclasses import dataclass
 
 from proofroll.core.number_format import counted, number
 from proofroll.core.verdict import Verdict
-from proofroll.report.page.choice_matrix import ASKED, NO_RUN, SEVERITY, ChoiceCell, ChoiceColumn, ChoiceMatrix
+from proofroll.report.page.answer import ColumnAnswer, FirstAnswer, ReaderQuestion, answer, of_column, take_words
+from proofroll.report.page.choice_cell import NO_RUN, PARTLY
+from proofroll.report.page.choice_matrix import ChoiceColumn, ChoiceMatrix, EngineStanding
 
 NOTHING = "nothing that was run and timed holds it"
 NOT_REACHED = "no run could be judged, for lack of time or of a truth"
@@ -17,7 +19,7 @@ class Advised:
     """Advice for some scenes.
 
     Attributes:
-        of: name of the group or study; ``all``: all studies.
+        of: name of the group or scene; ``all``: all scenes.
         sentence: for a person.
         choice: setting and step, or formulation; None: nothing holds the tolerance.
         cost: of the choice, wall seconds per simulated second at the slowest scene; None: without a choice, or for
@@ -32,79 +34,63 @@ class Advised:
     judged: bool = True
 
 
-def advice(matrix: ChoiceMatrix, tolerance: float, forces: bool) -> list[Advised]:
-    """Advice for each column of the matrix, then for all studies."""
-    return [
-        *(of_column(matrix, column, tolerance, forces) for column in matrix.columns),
-        over_all(matrix, tolerance, forces),
-    ]
-
-
-def words(matrix: ChoiceMatrix) -> str:
-    """JSON of the sentences for every tolerance in :data:`ASKED`, and of parts for sentences on some engines.
-
-    The parts are the heads of the sentences, and for each column its engines, the cheapest first: engine, cost (null:
-    the tolerance is not held), name or the clause why the tolerance is not held, and what the cost is said to be.
-    """
-    answers = []
-    for forces, tolerance in ASKED:
-        heads, engines = [], []
-        for column in matrix.columns:
-            head, judged = _asked(matrix, column, tolerance, forces)
-            found = {} if judged is None else _engines(matrix, column, tolerance, judged)
-            heads.append(head)
-            engines.append(
-                [
-                    (engine, cell.cost, _told(name, cell), _spent(name, cell))
-                    if math.isfinite(cell.cost)
-                    else (engine, None, _other(name, cell, cell), "")
-                    for engine, (name, cell) in found.items()
-                ]
-            )
-        sentences = [item.sentence for item in advice(matrix, tolerance, forces)]
-        answers.append({"said": sentences, "heads": heads, "engines": engines})
-    return json.dumps(answers, ensure_ascii=False, separators=(",", ":"))
-
-
-def of_column(matrix: ChoiceMatrix, column: ChoiceColumn, tolerance: float, forces: bool) -> Advised:
-    """Advice for a column: the cheapest that holds the tolerance, the best of other engines, the effect of forces.
+def advice(
+    matrix: ChoiceMatrix, tolerance: float, forces: bool, engines: Collection[str] | None = None
+) -> list[Advised]:
+    """Advice for each column of the matrix, then for all scenes; ``engines``: of these alone.
 
     Where forces are asked for and are not judged, the advice is for motion alone and says so.
     """
-    asked, judged = _asked(matrix, column, tolerance, forces)
-    engines = _engines(matrix, column, tolerance, bool(judged))
-    if not engines:
-        return Advised(column.title, f"{asked} no engine was run.")
-    first, *others = engines.values()
-    if judged is None:
-        return Advised(column.title, f"{asked}: motion is not judged there.", judged=False)
-    if not _was_judged(matrix, column, tolerance, judged):
-        return Advised(column.title, f"{asked}: {NOT_REACHED}.")
-    clauses = [_other(name, cell, first[1]) for name, cell in others]
-    held = math.isfinite(first[1].cost)
-    if held:
-        clauses.insert(0, f"take {_told(*first)} ({_spent(*first)})")
-    else:
-        clauses = [NOTHING, _other(*first, first[1]), *clauses]
-    changed = "" if forces else _with_forces(matrix, column, tolerance, first[1])
-    choice = (_named(*first), first[1].cost) if held else (None, None)
-    return Advised(column.title, f"{asked} {'; '.join(clauses)}.{changed}", *choice)
+    found = answer(matrix, tolerance, forces, engines)
+    answers = {(item.column.group, item.column.name, item.column.whole): item for item in (*found.kinds, *found.scenes)}
+    columns = [answers[column.group, column.name, column.whole] for column in matrix.columns]
+    return [*(_of_column(matrix, found, item, engines) for item in columns), over_all(matrix, tolerance, forces)]
+
+
+def _of_column(
+    matrix: ChoiceMatrix, found: FirstAnswer, item: ColumnAnswer, engines: Collection[str] | None
+) -> Advised:
+    """Advice for a column: the cheapest that holds the tolerance, the best of other engines, the effect of forces."""
+    column, asked = item.column, found.question
+    name = column.name
+    size = number(asked.tolerance)
+    head = f"{column.title}{'' if column.whole else f' ({column.meaning})'} to {size}"
+    if matrix.unjudged[False].issuperset(column.studies):
+        return Advised(name, f"{head}: motion is not judged there.", judged=False)
+    if asked.forces and not item.judged:
+        head = f"{column.title}: forces are not judged; for motion alone to {size}"
+        item = of_column(matrix, column, ReaderQuestion(asked.tolerance, False), engines)
+    elif asked.forces:
+        head += " with forces"
+    ran = [one for one in item.standings if one.cell.state != NO_RUN]
+    if not ran:
+        return Advised(name, f"{head}: no engine was run.")
+    if all(one.cell.state == Verdict.NOT_JUDGED for one in ran):
+        return Advised(name, f"{head}: {NOT_REACHED}.")
+    taken = item.taken
+    others = [_other(matrix, one, taken) for one in ran if one is not taken]
+    clauses = [f"take {_told(matrix, taken)} ({spent(taken)})" if taken else NOTHING, *others]
+    changed = "" if asked.forces else _with_forces(matrix, column, asked.tolerance, taken, engines)
+    sentence = f"{head}: {'; '.join(clauses)}.{changed}"
+    if taken is None:
+        return Advised(name, sentence)
+    return Advised(name, sentence, taken.cell.name or f"{taken.engine} {taken.formulation}".strip(), taken.cell.cost)
 
 
 def over_all(matrix: ChoiceMatrix, tolerance: float, forces: bool) -> Advised:
-    """Advice over all studies: fewest formulations that hold the tolerance in most of them, the most useful first."""
-    alone = {column.studies[0]: column for column in matrix.columns if len(column.studies) == 1}
-    judged = {name: column for name, column in alone.items() if name not in matrix.unjudged[forces]}
-    columns = {name: column for name, column in judged.items() if _was_judged(matrix, column, tolerance, forces)}
+    """Advice over all scenes: fewest formulations that hold the tolerance in most of them, the most useful first."""
+    alone = {(column.group, column.name): column for column in matrix.columns if not column.whole}
+    judged = {name: item for name, item in alone.items() if not matrix.unjudged[forces].issuperset(item.studies)}
+    columns = {name: item for name, item in judged.items() if _was_judged(matrix, item, tolerance, forces)}
     if judged and not columns:
         return Advised("all", f"Over all: {NOT_REACHED}.")
     if alone and not columns:
-        return Advised("all", f"Over all: {'forces are' if forces else 'motion is'} judged in no study.")
+        return Advised("all", f"Over all: {'forces are' if forces else 'motion is'} judged in no scene.")
     costs = {
         row.name: {
             name: cell.cost
             for name, column in columns.items()
-            if math.isfinite((cell := matrix.cell(row, column, tolerance, forces)).cost)
+            if (cell := matrix.cell(row, column, tolerance, forces)).holds
         }
         for row in matrix.models
     }
@@ -118,101 +104,69 @@ def over_all(matrix: ChoiceMatrix, tolerance: float, forces: bool) -> Advised:
         missing -= gained
         chosen.append(best)
         steps.append(f"{best} {'holds it in' if not steps else 'brings it to'} {len(columns) - len(missing)}")
-    asked = f"Over all, {counted(len(columns), 'studies')}, to {number(tolerance)}{' with forces' if forces else ''}"
-    left = ", ".join(matrix.titles[name] for name in columns if name in missing)
+    asked = f"Over all, {counted(len(columns), 'scenes')}, to {number(tolerance)}{' with forces' if forces else ''}"
+    left = ", ".join(item.title for name, item in columns.items() if name in missing)
     sentence = f"{asked}: {'; '.join(steps) or NOTHING}{f'; nothing holds it for {left}' if steps and left else ''}."
     return Advised("all", sentence, ", ".join(chosen) or None)
 
 
-def _use(costs: dict[str, float], missing: set[str]) -> tuple[int, float]:
-    """Ranking of a formulation: number of studies that it adds, then its cheapness there."""
+def _use(costs: dict[tuple[str, str], float], missing: set[tuple[str, str]]) -> tuple[int, float]:
+    """Ranking of a formulation: number of scenes that it adds, then its cheapness there."""
     gained = missing & costs.keys()
     return len(gained), -sum(math.log(costs[name]) for name in gained if costs[name] > 0)
-
-
-def _asked(matrix: ChoiceMatrix, column: ChoiceColumn, tolerance: float, forces: bool) -> tuple[str, bool | None]:
-    """Head of a sentence, and whether the answer is about forces, too; None: motion is not judged."""
-    title = column.title if column.whole else f"{column.name} (“{column.title}”)"
-    if column.whole and len(column.studies) == 1:
-        title += f" ({column.studies[0]})"
-    size = number(tolerance)
-    if _unjudged(matrix, column, False):
-        return f"For {title} to {size}", None
-    if forces and _unjudged(matrix, column, True):
-        return f"For {title} forces are not judged; for motion alone to {size}", False
-    return f"For {title} to {size}{' with forces' if forces else ''}", forces
-
-
-def _unjudged(matrix: ChoiceMatrix, column: ChoiceColumn, forces: bool) -> bool:
-    return matrix.unjudged[forces].issuperset(column.studies)
 
 
 def _was_judged(matrix: ChoiceMatrix, column: ChoiceColumn, tolerance: float, forces: bool) -> bool:
     """False if every formulation was left out there, say for lack of time."""
     cells = (matrix.cell(row, column, tolerance, forces) for row in matrix.models)
-    return any(cell.state not in {NO_RUN, Verdict.NOT_JUDGED} for cell in cells)
+    return any(cell.state not in {NO_RUN, "cannot", Verdict.NOT_JUDGED} for cell in cells)
 
 
-def _engines(
-    matrix: ChoiceMatrix, column: ChoiceColumn, tolerance: float, forces: bool
-) -> dict[str, tuple[str, ChoiceCell]]:
-    """Best formulation of each engine, the best engine first: cheapest that holds the tolerance, else the closest."""
-    best_of: dict[str, tuple[str, ChoiceCell]] = {}
-    for row in matrix.models:
-        cell = matrix.cell(row, column, tolerance, forces)
-        if row.found.keys() & set(column.studies):
-            best = best_of.setdefault(row.engine, (row.name, cell))
-            if _standing(cell) < _standing(best[1]):
-                best_of[row.engine] = (row.name, cell)
-    return dict(sorted(best_of.items(), key=lambda item: _standing(item[1][1])))
+def _told(matrix: ChoiceMatrix, one: EngineStanding) -> str:
+    setting = one.setting
+    return f"{take_words(matrix, one)}{f', {setting}' if setting else ''}{one.cell.share}"
 
 
-def _standing(cell: ChoiceCell) -> tuple[float, float, int]:
-    held = math.isfinite(cell.cost)
-    return cell.absent if held else math.inf, cell.cost, SEVERITY.index(cell.state)
+def spent(one: EngineStanding, more: str = "") -> str:
+    """Speed, and the scene that it is of with its setting, where scenes need different ones."""
+    study, setting = one.cell.slowest
+    words = setting.removeprefix(f"{one.engine} {one.formulation}").strip()
+    return f"{one.cell.text} real time{more}{f'; {study} needs most: {words}' if study else ''}"
 
 
-def _named(name: str, cell: ChoiceCell) -> str:
-    return cell.name or name
-
-
-def _told(name: str, cell: ChoiceCell) -> str:
-    return f"{_named(name, cell)}{cell.share}"
-
-
-def _spent(name: str, cell: ChoiceCell, more: str = "") -> str:
-    """Cost, and the scene that it is of with its setting, where scenes need different ones."""
-    study, setting = cell.slowest
-    return f"{cell.text} s/s{more}{f'; {study} needs most: {setting.removeprefix(name).strip()}' if study else ''}"
-
-
-def _other(name: str, cell: ChoiceCell, first: ChoiceCell) -> str:
+def _other(matrix: ChoiceMatrix, one: EngineStanding, first: EngineStanding | None) -> str:
     """Clause on another engine: its cost relative to the cheapest, or the reason why it does not hold the tolerance."""
-    if math.isfinite(cell.cost):
-        return f"{_told(name, cell)} costs {_times(cell.cost, first.cost)}"
-    if cell.state == Verdict.NOT_JUDGED:
+    name = take_words(matrix, one)
+    if one.cell.holds and first is not None:
+        if one.ties(first):
+            return f"{_told(matrix, one)} is a tie"
+        return f"{_told(matrix, one)} costs {one.cell.cost / first.cell.cost:.2g} times that"
+    if one.cell.state == Verdict.NOT_JUDGED:
         return f"{name} was not judged"
-    return f"{name} does not get there ({cell.why})" if cell.why else f"{_named(name, cell)} holds it, not timed"
+    if one.cell.state == "cannot":
+        return f"{matrix.title(one.engine)} cannot represent it"
+    if one.cell.state == PARTLY:
+        return f"{name} {one.cell.why}"
+    return f"{name} does not get there ({one.cell.why})" if one.cell.why else f"{name} holds it, not timed"
 
 
-def _with_forces(matrix: ChoiceMatrix, column: ChoiceColumn, tolerance: float, without: ChoiceCell) -> str:
+def _with_forces(
+    matrix: ChoiceMatrix,
+    column: ChoiceColumn,
+    tolerance: float,
+    without: EngineStanding | None,
+    engines: Collection[str] | None,
+) -> str:
     """Sentence on the effect of forces for an answer about motion alone."""
-    if _unjudged(matrix, column, True):
+    both = of_column(matrix, column, ReaderQuestion(tolerance, True), engines)
+    if not both.judged:
         return " Forces are not judged there."
-    name, cell = next(iter(_engines(matrix, column, tolerance, True).values()))
-    judged = [study for study in column.studies if study not in matrix.unjudged[True]]
-    if len(judged) < len(column.studies) and math.isfinite(cell.cost):
-        taken = f"{_named(name, cell)} ({_spent(name, cell)})"
-        return f" In {', '.join(judged)}, where forces are judged, take {taken} for both."
-    if not math.isfinite(cell.cost):
+    judged = [scene.words for scene in column.scenes if not matrix.unjudged[True].issuperset(scene.studies)]
+    if both.taken is None:
         return " If forces count, too, nothing that was run and timed holds it."
-    if cell.cost == without.cost:
+    taken = f"{_told(matrix, both.taken)} ({spent(both.taken)})"
+    if len(judged) < len(column.scenes):
+        return f" In {', '.join(judged)}, where forces are judged, take {taken} for both."
+    if without is not None and both.taken.cell.cost == without.cell.cost:
         return " It holds the forces, too."
-    more = f", {_times(cell.cost, without.cost)}" if math.isfinite(without.cost) else ""
-    return f" If forces count, too, take {_named(name, cell)} ({_spent(name, cell, more)})."
-
-
-def _times(cost: float, of: float) -> str:
-    """Cost relative to another one in words: ``as much``, ``3.4 times that``."""
-    times = float(f"{cost / of:.2g}") if of else math.inf
-    return "as much" if times == 1 else f"{times:g} times that"
+    return f" If forces count, too, take {taken}."

@@ -1,19 +1,18 @@
-"""Matrix of engines and groups of scenes: the cheapest run that holds a tolerance, or the reason why none does."""
+"""Matrix of engines and kinds of scenes: the cheapest run that holds a tolerance, or the reason why none does."""
 
-import json
 import math
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Collection, Iterable, Mapping
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import groupby, product
 from types import MappingProxyType
 from typing import NamedTuple
 
-from proofroll.core.number_format import error, number
-from proofroll.core.verdict import LimitResult, Verdict
+from proofroll.core.verdict import Verdict
+from proofroll.report.kinds import report_kinds
 from proofroll.report.long_table import TableLine
 from proofroll.report.page.candidates import Candidate, candidates
-from proofroll.report.pages import packed
+from proofroll.report.page.choice_cell import CANNOT, NO_RUN, ORDER, PARTLY, ChoiceCell, cell_of, joined
 
 # Tolerances that a reader can choose: negative powers of ten, relative to the path or the largest force.
 DECADES = range(2, 9)
@@ -22,81 +21,86 @@ FIRST = 4
 FIRST_TOLERANCE = 10.0**-FIRST
 # All questions that a reader can ask: with forces or not, and the tolerance.
 ASKED = [(forces, 10.0**-decade) for forces, decade in product((False, True), DECADES)]
-NEEDS = ("motion to {0} of the path", "motion to {0} of the path and forces to {0} of the largest")
-UNIT = "in seconds of computing per second of motion"
-WITH_FORCES = "With forces to {0} of the largest, too"
-SAME = "the same for"
-UNJUDGED_FORCES = "forces are not judged for"
-NOTHING = "nothing that was run and timed holds it for"
-UNJUDGED = "that is judged in no scene that was run"
-NO_RUN = "none"
-SEVERITY = list(map(str, Verdict))
-# Number of groups beside which scenes find room on a screen of 1400 px.
-FEW = 5
-_WHY = {
-    LimitResult.WITHIN: "finer steps come closer",
-    LimitResult.NO_LADDER: "the closest of what was run",
-    LimitResult.NOT_SHOWN: "no limit of small steps is shown",
-    LimitResult.ANOTHER: "its limit of small steps is another",
-}
-
-
-class ChoiceCell(NamedTuple):
-    """Cell of an engine in a group of scenes at a tolerance.
-
-    Attributes:
-        state: verdict, for colour and glyph; ``none``: nothing was run.
-        text: cost [s/s] if the tolerance is held, else the least error, or the number of scenes that hold it.
-        title: the same in sentences.
-        href: HTML id of the evidence; empty: there is none.
-        cost: of the slowest scene; infinite unless the tolerance is held in all and costs were measured.
-        name: setting and step; for several scenes the ones that they share, or empty.
-        slowest: the scene whose cost it is and its setting and step, where scenes need different ones; else empty.
-        why: short reason why the tolerance is not held; empty: it is.
-        scenes, lacking: numbers of the column's scenes in which it was judged, and of those in which only others were.
-        absent: number of the latter without a run of it, as it may be unable to represent them; others were left out.
-    """
-
-    state: str
-    text: str
-    title: str
-    href: str = ""
-    cost: float = math.inf
-    name: str = ""
-    slowest: tuple[str, str] = ("", "")
-    why: str = ""
-    scenes: int = 1
-    lacking: int = 0
-    absent: int = 0
-
-    @property
-    def share(self) -> str:
-        """Words for the part of the column's scenes in which it was judged; empty: in all."""
-        return f" in {self.scenes} of {self.scenes + self.lacking} scenes" if self.lacking else ""
+# Ratio of rough costs below which two engines tie.
+TIE = 2.0
 
 
 class ChoiceStudy(NamedTuple):
-    """A study in the matrix: title, HTML id of its evidence, and those of its runs by row and place."""
+    """A study in the matrix.
+
+    Attributes:
+        title: of the study.
+        href: HTML id of its evidence.
+        runs: HTML ids of the evidence of its runs, by row and place.
+        requires: capabilities that its scene requires of a formulation; None: not known.
+        short: why a row does not hold in at most twelve words, by number of the row.
+    """
 
     title: str
     href: str
     runs: Mapping[tuple[int, str], str] = MappingProxyType({})
+    requires: frozenset[str] | None = None
+    short: Mapping[int, str] = MappingProxyType({})
+
+
+class Naming(NamedTuple):
+    """Names for readers, and abilities.
+
+    Attributes:
+        engines: code name -> name for readers.
+        kinds: group of scenes -> title and meaning.
+        provides: engine -> formulation -> capabilities.
+    """
+
+    engines: Mapping[str, str] = MappingProxyType({})
+    kinds: Mapping[str, tuple[str, str]] = MappingProxyType({})
+    provides: Mapping[str, Mapping[str, Collection[str]]] = MappingProxyType({})
+
+
+UNNAMED = Naming()
+
+
+def naming(
+    engines: Mapping[str, str], provides: Mapping[str, Mapping[str, Collection[str]]] = UNNAMED.provides
+) -> Naming:
+    """Names of engines for readers, capabilities, and the titles that report kinds give their groups of scenes."""
+    kinds = {name: words for kind in report_kinds().values() for name, words in kind.groups.items()}
+    return Naming(engines=engines, kinds=kinds, provides=provides)
+
+
+@dataclass(frozen=True)
+class ChoiceScene:
+    """A scene with the studies about it; it counts once however many they are."""
+
+    name: str
+    studies: tuple[str, ...]
+
+    @property
+    def words(self) -> str:
+        """Name for a reader."""
+        return self.name.rpartition("/")[2].replace("_", " ")
 
 
 @dataclass(frozen=True)
 class ChoiceColumn:
-    """Column of a group of scenes (``whole``), or of one study in it."""
+    """Column of a kind of scenes (``whole``), or of one scene of it; ``title`` and ``meaning`` are for readers."""
 
     group: str
     title: str
+    meaning: str
     href: str
-    studies: tuple[str, ...]
+    scenes: tuple[ChoiceScene, ...]
     whole: bool = True
 
     @property
+    def studies(self) -> tuple[str, ...]:
+        """Names of the studies about its scenes."""
+        return tuple(name for scene in self.scenes for name in scene.studies)
+
+    @property
     def name(self) -> str:
-        """Name of the group or of the study."""
-        return self.group if self.whole else self.studies[0]
+        """Name of the group or of the scene."""
+        return self.group if self.whole else self.scenes[0].name
 
 
 @dataclass(frozen=True)
@@ -121,26 +125,77 @@ class ChoiceRow:
 
 
 @dataclass(frozen=True)
+class EngineStanding:
+    """Cell of an engine in a column: that of its best formulation; ``scenes``: its best cell in each scene."""
+
+    engine: str
+    formulation: str
+    cell: ChoiceCell
+    scenes: tuple[ChoiceCell, ...]
+
+    @property
+    def rank(self) -> tuple[float, float, int]:
+        """Sort key: what holds in all scenes comes first, the cheapest first; then by state."""
+        return self.cell.absent if self.cell.holds else math.inf, self.cell.cost, ORDER.index(self.cell.state)
+
+    def ties(self, first: "EngineStanding") -> bool:
+        """True if its cost cannot be told from that of the first."""
+        rough = not (self.cell.clean and first.cell.clean)
+        return self is not first and self.cell.holds and rough and self.cell.cost < TIE * first.cell.cost
+
+    @property
+    def setting(self) -> str:
+        """Setting and step without engine and formulation; empty if scenes need different ones."""
+        words = self.cell.name.removeprefix(f"{self.engine} {self.formulation}".strip()).strip()
+        return words.removeprefix("at ").replace(" at ", ", ")
+
+
+@dataclass(frozen=True)
 class ChoiceMatrix:
-    """Matrix of engines and scenes; ``titles``: of studies, by name."""
+    """Matrix of engines and scenes; ``studies`` by name, ``naming`` for readers."""
 
     columns: list[ChoiceColumn]
     rows: list[ChoiceRow]
-    titles: dict[str, str]
+    studies: Mapping[str, ChoiceStudy]
+    naming: Naming = UNNAMED
 
     @property
-    def unfolded(self) -> list[str]:
-        """Groups whose scenes are columns from the start: those of at most two, unless there are many groups."""
-        groups = [column for column in self.columns if column.whole]
-        return [column.group for column in groups if len(column.studies) <= 2] if len(groups) <= FEW else []
+    def titles(self) -> dict[str, str]:
+        """Titles of studies, by name."""
+        return {name: item.title for name, item in self.studies.items()}
+
+    @property
+    def kinds(self) -> list[ChoiceColumn]:
+        """Columns of kinds of scenes."""
+        return [column for column in self.columns if column.whole]
 
     @property
     def engines(self) -> list[str]:
-        """Names of the engines, in the order of the rows."""
-        return list(dict.fromkeys(row.engine for row in self.rows))
+        """Names of the engines: those that may be taken, then witnesses; each group sorted."""
+        names = dict.fromkeys(row.engine for row in self.rows)
+        return sorted(names, key=lambda name: (name in self.witnesses, self.title(name).lower()))
+
+    @cached_property
+    def witnesses(self) -> set[str]:
+        """Engines that solve equations derived for a scene alone: they are never recommended."""
+        return {row.engine for row in self.rows} - {row.engine for row in self.rows if row.is_model}
+
+    def title(self, engine: str) -> str:
+        """Name of an engine for a reader."""
+        return self.naming.engines.get(engine.partition("@")[0], engine)
 
     def cell(self, row: ChoiceRow, column: ChoiceColumn, tolerance: float, forces: bool) -> ChoiceCell:
         """Cell of a row and column at a tolerance relative to the quantities' size."""
+        key = (id(row), column.name, column.whole, tolerance, forces)
+        if key not in self._cells:
+            self._cells[key] = self._new_cell(row, column, tolerance, forces)
+        return self._cells[key]
+
+    @cached_property
+    def _cells(self) -> dict[tuple[int, str, bool, float, bool], ChoiceCell]:
+        return {}
+
+    def _new_cell(self, row: ChoiceRow, column: ChoiceColumn, tolerance: float, forces: bool) -> ChoiceCell:
         own = [name for name in column.studies if name in row.found]
         judged = [name for name in own if name not in self.unjudged[forces]]
         if own and not judged:
@@ -148,13 +203,38 @@ class ChoiceMatrix:
             return ChoiceCell(Verdict.NOT_JUDGED, what, f"{what} judged here", why=f"{what} judged")
         # A study without any judgement, say for lack of time, does not count against the studies that ran.
         known = [name for name in judged if any(item.blame != Verdict.NOT_JUDGED for item in row.found[name])]
-        cells = {name: _cell(row.found[name], tolerance, forces) for name in known or judged}
+        cells = {name: cell_of(row.found[name], tolerance, forces) for name in known or judged}
         if not cells:
-            return ChoiceCell(NO_RUN, "", "not run")
-        lacking = self.judged[forces].intersection(column.studies).difference(known)
-        return _joined(cells, self.titles)._replace(
-            scenes=len(cells), lacking=len(lacking), absent=len(lacking - row.found.keys())
+            return self._without_run(row, column)
+        scenes = {
+            scene.name: joined(
+                {name: cells[name] for name in scene.studies if name in cells}, self.titles, counted=False
+            )
+            for scene in column.scenes
+            if cells.keys() & set(scene.studies)
+        }
+        lacking = [
+            scene
+            for scene in column.scenes
+            if self.judged[forces].intersection(scene.studies) and not set(known).intersection(scene.studies)
+        ]
+        return joined(scenes, {scene.name: scene.words for scene in column.scenes})._replace(
+            scenes=len(scenes),
+            lacking=len(lacking),
+            absent=sum(not row.found.keys() & set(scene.studies) for scene in lacking),
         )
+
+    def _without_run(self, row: ChoiceRow, column: ChoiceColumn) -> ChoiceCell:
+        """Cell without a run: the formulation cannot represent the scenes, or was not tried."""
+        provided = self.naming.provides.get(row.engine, {}).get(row.formulation)
+        needs = [need for name in column.studies if (need := self.studies[name].requires) is not None]
+        if provided is None or not needs:
+            return ChoiceCell(NO_RUN, "", "was not run in this report")
+        lacking = [sorted(need - set(provided)) for need in needs]
+        if not all(lacking):
+            return ChoiceCell(NO_RUN, "", "could represent this, but was not run in this report")
+        named = " and ".join(f"“{word}”" for word in min(lacking, key=len))
+        return ChoiceCell(CANNOT, "", f"cannot represent this: it lacks {named}")
 
     @cached_property
     def judged(self) -> tuple[set[str], set[str]]:
@@ -175,195 +255,89 @@ class ChoiceMatrix:
         """Rows for which :attr:`ChoiceRow.is_model` is true."""
         return [row for row in self.rows if row.is_model]
 
-    def ranked(self, column: ChoiceColumn, tolerance: float, forces: bool) -> list[tuple[int, ChoiceCell]]:
-        """Formulations that hold a tolerance: number of the row, and its cell.
+    def formulations(self, engine: str) -> list[ChoiceRow]:
+        """Rows of an engine with all settings of a formulation; equations derived for a scene only of a witness."""
+        witness = engine in self.witnesses
+        return [row for row in self.rows if row.engine == engine and not row.setting and (witness or row.is_model)]
 
-        Those with runs in the most scenes come first, for scenes differ in cost, and of these the cheapest. What was
-        left out, say for lack of time, does not count here.
+    def standing(self, engine: str, column: ChoiceColumn, tolerance: float, forces: bool) -> EngineStanding:
+        """EngineStanding of an engine in a column.
+
+        A formulation that holds all scenes comes first, the cheapest of these; then the best one for each scene.
         """
-        rows = [(place, row) for place, row in enumerate(self.rows) if row.is_model]
-        cells = [(place, self.cell(row, column, tolerance, forces)) for place, row in rows]
-        held = [item for item in cells if math.isfinite(item[1].cost)]
-        return sorted(held, key=lambda item: (item[1].absent, item[1].cost))
-
-    def best(self, tolerance: float, forces: bool) -> list[int | None]:
-        """Number of the row of each column's cheapest formulation; None where none holds the tolerance."""
-        ranks = (self.ranked(column, tolerance, forces) for column in self.columns)
-        return [found[0][0] if found else None for found in ranks]
-
-    def answer(self, tolerance: float, forces: bool) -> str:
-        """Sentence with the cheapest formulation of each group that holds the tolerance in all scenes it ran."""
-        groups = [column for column in self.columns if column.whole]
-        ranks = [self.ranked(column, tolerance, forces) for column in groups]
-        held = [self._phrase(column, *found[0]) for column, found in zip(groups, ranks, strict=True) if found]
-        without = [
-            column.group
-            for column, found in zip(groups, ranks, strict=True)
-            if not found and column.group in self.judged_groups[forces]
-        ]
-        nothing = f"{NOTHING} {', '.join(without)}" if without else ""
-        asked = NEEDS[forces].format(number(tolerance))
-        if not held:
-            return f"To hold {asked}: {nothing or (UNJUDGED if groups else 'nothing was run')}."
-        return f"The cheapest to hold {asked}, {UNIT}: {', '.join(held)}{f'; {nothing}' if nothing else ''}."
-
-    def with_forces(self, tolerance: float) -> str:
-        """Sentence that follows an answer about motion: changes if forces count; empty if forces are judged nowhere."""
-        motion_judged, judged = self.judged_groups
-        whole = [column for column in self.columns if column.whole]
-        groups = [column for column in whole if column.group in judged]
-        silent = [column.group for column in whole if column.group in set(motion_judged).difference(judged)]
-        other: list[str] = []
-        same: list[str] = []
-        without: list[str] = []
-        for column in groups:
-            motion, both = (self.ranked(column, tolerance, forces) for forces in (False, True))
-            if not both:
-                without.append(column.group)
-            elif motion and self._phrase(column, *motion[0]) == self._phrase(column, *both[0]):
-                same.append(column.group)
-            else:
-                other.append(self._phrase(column, *both[0]))
-        lists = (SAME, same), (NOTHING, without), (UNJUDGED_FORCES, silent)
-        rest = [f"{words} {', '.join(names)}" for words, names in lists if names]
-        clauses = [", ".join(other), *rest] if other else rest
-        return f"{WITH_FORCES.format(number(tolerance))}: {'; '.join(clauses)}." if groups else ""
-
-    def step(self, row: ChoiceRow, cell: ChoiceCell) -> str:
-        """Setting and step of a cell, without the formulation of its row; empty if scenes need different ones."""
-        return cell.name.removeprefix(row.name).strip()
-
-    def _phrase(self, column: ChoiceColumn, place: int, cell: ChoiceCell) -> str:
-        return f"{cell.name or self.rows[place].name} for {column.name} ({cell.text}{cell.share})"
+        key = (engine, column.name, column.whole, tolerance, forces)
+        if key not in self._standings:
+            self._standings[key] = self._new_standing(engine, column, tolerance, forces)
+        return self._standings[key]
 
     @cached_property
-    def judged_groups(self) -> tuple[list[str], list[str]]:
-        """Groups and studies in which motion is judged, and those in which forces are judged, too."""
-        motion, both = (
-            [item.name for item in self.columns if not lacking.issuperset(item.studies)] for lacking in self.unjudged
-        )
-        return motion, both
+    def _standings(self) -> dict[tuple[str, str, bool, float, bool], EngineStanding]:
+        return {}
 
-    @cached_property
-    def data(self) -> str:
-        """JSON of all cells at all tolerances: distinct cells once, and for each row and column their numbers."""
-        pool: dict[tuple[str, str, str, str], int] = {}
-        grid = [
-            [
-                [pool.setdefault(self.cell(row, column, at, need)[:4], len(pool)) for need, at in ASKED]
-                for column in self.columns
-            ]
-            for row in self.rows
+    def _new_standing(self, engine: str, column: ChoiceColumn, tolerance: float, forces: bool) -> EngineStanding:
+        rows = self.formulations(engine)
+        found = [
+            EngineStanding(engine, row.formulation, cell, (cell,))
+            for row in rows
+            for cell in [self.cell(row, column, tolerance, forces)]
         ]
-        ranks = [
-            [
-                [
-                    (place, self._phrase(column, place, cell), self.step(self.rows[place], cell))
-                    for place, cell in self.ranked(column, at, need)
-                ]
-                for column in self.columns
-            ]
-            for need, at in ASKED
-        ]
-        names = [column.name for column in self.columns]
-        groups = [column.group if column.whole else "" for column in self.columns]
-        content = {
-            "cells": list(pool),
-            "grid": grid,
-            "ranks": ranks,
-            "groups": groups,
-            "names": names,
-            "judged": self.judged_groups,
-        }
-        return json.dumps(content, separators=(",", ":"))
+        best = min(found, key=lambda item: item.rank)
+        single = [item for item in self.columns if not item.whole and item.group == column.group]
+        if not column.whole or len(column.scenes) == 1 or len(single) < len(column.scenes):
+            return best
+        each = [self.standing(engine, item, tolerance, forces) for item in single]
+        best = EngineStanding(engine, best.formulation, best.cell, tuple(item.cell for item in each))
+        ran = [item for item in each if item.cell.state not in {NO_RUN, CANNOT, Verdict.NOT_JUDGED}]
+        asked = [item for item in each if item in ran or (item.cell.state in {NO_RUN, CANNOT} and best.cell.lacking)]
+        held = [item for item in asked if item.cell.holds]
+        if (best.cell.holds and not best.cell.absent) or not ran:
+            return best
+        slowest = max(held, key=lambda item: item.cell.cost, default=best)
+        words = ", ".join(dict.fromkeys(item.formulation for item in held)) or best.formulation
+        named = {scene.name: scene.words for scene in column.scenes}
+        says = "; ".join(f"{named[item.name]}: {one.cell.title}" for item, one in zip(single, each, strict=True))
+        if len(held) == len(asked):
+            return EngineStanding(engine, words, slowest.cell._replace(title=says, name=""), best.scenes)
+        state = PARTLY if held else max((item.cell.state for item in ran), key=ORDER.index)
+        text = f"{len(held)} of {len(asked)}"
+        cell = ChoiceCell(state, text, says, best.cell.href, why=f"holds {text} scenes", scenes=len(ran))
+        return EngineStanding(engine, words, cell, best.scenes)
 
-    @property
-    def packed(self) -> str:
-        """The JSON of :attr:`data`, compressed for a page."""
-        return packed(self.data.encode())
+    def standings(
+        self, column: ChoiceColumn, tolerance: float, forces: bool, engines: Collection[str] | None = None
+    ) -> list[EngineStanding]:
+        """Standings of the engines that may be taken, the best first; ``engines``: of these alone."""
+        names = [name for name in self.engines if name not in self.witnesses and (engines is None or name in engines)]
+        return sorted((self.standing(name, column, tolerance, forces) for name in names), key=lambda item: item.rank)
 
 
-def choice_matrix(lines: Iterable[TableLine], studies: Mapping[str, ChoiceStudy]) -> ChoiceMatrix:
-    """Matrix of the lines of some studies, in their order; cheapest formulations first, by column."""
+def choice_matrix(
+    lines: Iterable[TableLine], studies: Mapping[str, ChoiceStudy], naming: Naming = UNNAMED
+) -> ChoiceMatrix:
+    """Matrix of the lines of some studies, in their order; rows by engine and formulation as the studies have them."""
     order = {name: number for number, name in enumerate(studies)}
     chosen = sorted((line for line in lines if line.study in order), key=lambda x: (order[x.study], x.row, x.engine))
     rows: dict[tuple[str, str, str], ChoiceRow] = {}
-    groups: dict[str, dict[str, None]] = {}
+    groups: dict[str, dict[str, dict[str, None]]] = {}
     derived = {(line.engine, line.formulation) for line in chosen if line.own_equations}
     for (name, _, _), own in groupby(chosen, key=lambda x: (x.study, x.row, x.engine)):
-        of_row, (_, href, runs) = list(own), studies[name]
-        first, found = of_row[0], candidates(of_row, href, runs)
-        groups.setdefault(first.group, {})[name] = None
+        of_row, study = list(own), studies[name]
+        first, found = of_row[0], candidates(of_row, study.href, study.runs)
+        groups.setdefault(first.group, {}).setdefault(first.scene, {})[name] = None
         for setting in ("", first.setting or "as it is"):
             key = (first.engine, first.formulation, setting)
             row = rows.setdefault(key, ChoiceRow(*key, own_equations=key[:2] in derived))
             row.found.setdefault(name, []).extend(found)
     columns = []
     for group, names in groups.items():
-        members = [ChoiceColumn(group, studies[name].title, studies[name].href, (name,), whole=False) for name in names]
-        columns.append(ChoiceColumn(group, group, members[0].href if len(members) == 1 else "", tuple(names)))
-        columns += members if len(members) > 1 else []
+        scenes = tuple(ChoiceScene(name, tuple(own)) for name, own in names.items())
+        title, meaning = naming.kinds.get(group, (group[:1].upper() + group[1:], ""))
+        whole = ChoiceColumn(group, title, meaning, "", scenes)
+        single = []
+        for scene in scenes:
+            about = studies[scene.studies[0]]
+            single.append(ChoiceColumn(group, scene.words, about.title, about.href, (scene,), whole=False))
+        columns += [replace(whole, href=single[0].href if len(single) == 1 else ""), *single]
     orders = [list(dict.fromkeys(key[:end] for key in rows)) for end in (1, 2, 3)]
     keys = sorted(rows, key=lambda key: [known.index(key[: end + 1]) for end, known in enumerate(orders)])
-    titles = {name: item.title for name, item in studies.items()}
-    matrix = ChoiceMatrix(columns, [rows[key] for key in keys], titles)
-    best = zip(*(matrix.best(FIRST_TOLERANCE, forces) for forces in (False, True)), strict=True)
-    useful = dict.fromkeys(matrix.rows[at].name for pair in best for at in pair if at is not None)
-    ranks = {name: rank for rank, name in enumerate(useful)}
-    return ChoiceMatrix(columns, sorted(matrix.rows, key=lambda row: ranks.get(row.name, len(ranks))), titles)
-
-
-def _cell(steps: Sequence[Candidate], tolerance: float, forces: bool) -> ChoiceCell:
-    """Cell of one study: the cheapest candidate that holds the tolerance, else the closest, else why there is none."""
-    whole = [item for item in steps if item.blame is None]
-    known = [(size, item) for item in whole if (size := item.tolerance(forces)) is not None]
-    held = [(item.cost if item.cost is not None else math.inf, size, item) for size, item in known if size <= tolerance]
-    if held:
-        cost, size, item = min(held, key=lambda entry: entry[:2])
-        text = "not timed" if math.isinf(cost) else f"{'' if item.clean else '~'}{number(cost)}"
-        spent = text if math.isinf(cost) else f"{text} s of computing per simulated second"
-        title = f"{item.name}: within {number(size)}, {spent}"
-        return ChoiceCell(Verdict.AGREES, text, title, item.href, cost, item.name)
-    if known:
-        size, item = min(known, key=lambda entry: entry[0])
-        limit, own = item.limit(forces, tolerance), item.error(forces)
-        state = Verdict.CONVERGES if limit == LimitResult.WITHIN else Verdict.DIFFERS
-        luck = own is not None and own <= tolerance
-        size = own if own is not None and not luck else size
-        off = _beyond(size, tolerance)
-        by = f"its error of {number(own)} is luck, finer steps or their limit are off by" if luck else "off by"
-        title, why = f"{item.name}: {by} {_beyond(size, tolerance, 2)}; {_WHY[limit]}", f"{by} {off}, {_WHY[limit]}"
-        return ChoiceCell(state, off, title, item.href, name=item.name, why=why)
-    if whole:
-        lacking = "no forces" if whole[0].motion is not None else "no motion"
-        title = f"{whole[0].name}: reports {lacking}"
-        return ChoiceCell(Verdict.INCOMPLETE, lacking, title, whole[0].href, why=f"reports {lacking}")
-    item = steps[0]
-    state = item.blame or Verdict.FAILED
-    word = "missing" if item.status == "missing" else str(state)  # its engine is not installed
-    return ChoiceCell(state, word, f"{item.name}: {item.message}".rstrip(": "), item.href, why=word)
-
-
-def _beyond(size: float, tolerance: float, digits: int = 1) -> str:
-    """Text of an error with enough digits to show that it exceeds the tolerance."""
-    text = error(size, digits)
-    return (
-        text
-        if digits > 4 or not math.isfinite(size) or float(text) > tolerance
-        else _beyond(size, tolerance, digits + 1)
-    )
-
-
-def _joined(cells: Mapping[str, ChoiceCell], titles: Mapping[str, str]) -> ChoiceCell:
-    """One cell for several studies: the worst; its cost is that of the slowest if all hold the tolerance."""
-    study, worst = max(cells.items(), key=lambda item: (SEVERITY.index(item[1].state), item[1].cost))
-    if len(cells) == 1:
-        return worst
-    title = "; ".join(f"{titles[name]}: {cell.title}" for name, cell in cells.items())
-    held = sum(cell.state == Verdict.AGREES for cell in cells.values())
-    shared = len({cell.name for cell in cells.values()}) == 1
-    worst = worst._replace(title=title, name=worst.name if shared else "")
-    if held == len(cells):
-        return worst if shared else worst._replace(slowest=(study, cells[study].name))
-    why = f"{worst.why}; holds {held} of {len(cells)}"
-    return worst._replace(text=f"{held} of {len(cells)}", cost=math.inf, why=why)
+    return ChoiceMatrix(columns, [rows[key] for key in keys], dict(studies), naming)

@@ -2,6 +2,7 @@
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 from proofroll.core.number_format import counted, number
 from proofroll.report.comparison.conclusions import standings
@@ -9,9 +10,47 @@ from proofroll.report.comparison.records import ReportedComparison
 from proofroll.report.comparison.scores import closest, furthest_off
 from proofroll.report.comparison.spread import ALONE
 from proofroll.report.labels import off_by, with_caveat
+from proofroll.report.page.answer import answer
 from proofroll.report.page.choice_matrix import FIRST_TOLERANCE, ChoiceMatrix
 from proofroll.report.parts import PartEntry
 from proofroll.studies.stability.records import StabilityStudy
+
+
+@dataclass(frozen=True)
+class Kept:
+    """What agrees, and what is wrong without a warning.
+
+    Attributes:
+        verdicts: number of settings by verdict, of all comparisons.
+        silent: number of settings that are wrong though every run ended as done.
+        worst: the one furthest off, and by how much; empty without any.
+        passed, boundaries: limits of stability or accuracy that are passed without a warning, of how many.
+    """
+
+    verdicts: dict[str, int]
+    silent: int
+    worst: str
+    passed: int
+    boundaries: int
+
+
+def kept(
+    comparisons: Sequence[ReportedComparison], entries: Mapping[str, Sequence[PartEntry]], names: Mapping[str, str]
+) -> Kept:
+    """Counts over the comparisons and the maps of stability in ``entries``; ``names``: of engines for readers."""
+    counts = Counter(str(row.verdict) for comparison in comparisons for row in comparison.rows)
+    wrong = [item for comparison in comparisons for item in _wrong(comparison)]
+    _, name, text = max(wrong, default=(0.0, "", ""))
+    engine, space, rest = name.partition(" ")
+    name = f"{names.get(engine, engine)}{space}{rest}"
+    maps = [entry.study for entry in entries.get("stability", ()) if entry.study is not None]
+    return Kept(
+        verdicts=dict(counts),
+        silent=len(wrong),
+        worst=f"{name}, {text}" if wrong else "",
+        passed=sum(study.silent for study in maps),
+        boundaries=sum(study.boundaries for study in maps),
+    )
 
 
 def three_sentences(
@@ -19,7 +58,11 @@ def three_sentences(
 ) -> list[str]:
     """Three sentences: the best agreement, silent disagreement (also of the maps in ``entries``), and advice."""
     maps = [entry.study for entry in entries.get("stability", ()) if entry.study is not None]
-    return [_agrees(comparisons, choice), _silent(comparisons, maps), choice.answer(FIRST_TOLERANCE, forces=True)]
+    return [
+        _agrees(comparisons, choice),
+        _silent(comparisons, maps),
+        answer(choice, FIRST_TOLERANCE, forces=True).sentence,
+    ]
 
 
 def _agrees(comparisons: Sequence[ReportedComparison], choice: ChoiceMatrix) -> str:

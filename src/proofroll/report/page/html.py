@@ -18,11 +18,11 @@ from proofroll.report import labels
 from proofroll.report.comparison import tables, verdict_matrix
 from proofroll.report.comparison.spread import ALONE
 from proofroll.report.kinds import ReportKind, report_kinds
-from proofroll.report.page import choice_matrix
-from proofroll.report.page.advice import NOTHING as NOT_HELD
-from proofroll.report.page.advice import advice, words
+from proofroll.report.page import profile
+from proofroll.report.page.answer import LENGTHS, closest_words
 from proofroll.report.page.choice_matrix import DECADES, FIRST, FIRST_TOLERANCE
-from proofroll.report.pages import environment, folded, packed, rendered
+from proofroll.report.page.first_screen import STATES, FirstScreen, bar, look
+from proofroll.report.pages import environment, folded, packed, rendered, slug
 from proofroll.report.parts import Part, part_kinds
 from proofroll.report.styles import OUTLINES, styles
 from proofroll.running.case import host_sentences
@@ -49,6 +49,7 @@ def page(
         "rows": [_drawn_rows(comparison, content.engines) for comparison in content.comparisons],
         "points": [_marked(*pair) for pair in zip(content.comparisons, curves, strict=True)],
     }
+    screen = FirstScreen(content)
     whole = rendered(
         templates(),
         "page.html",
@@ -56,8 +57,8 @@ def page(
         curves=curves,
         pictures=pictures,
         choice=content.choice,
-        words=[item.sentence for item in advice(content.choice, FIRST_TOLERANCE, False)],
-        all_words=packed(words(content.choice).encode("utf-8", "replace")),
+        screen=screen,
+        screen_data=screen.packed(templates()) if content.choice.rows else "",
         styles=[styles(comparison.rows, content.engines) for comparison in content.comparisons],
         replay=replay,
         replay_scripts=[kind.replay_script for kind in report_kinds().values() if kind.replay_script],
@@ -128,17 +129,13 @@ def _templates(kinds: tuple[type[Part] | type[ReportKind], ...]) -> jinja2.Envir
         "decades": DECADES,
         "first_decade": FIRST,
         "first_tolerance": FIRST_TOLERANCE,
-        "answer_words": {
-            "needs": choice_matrix.NEEDS,
-            "with_forces": choice_matrix.WITH_FORCES,
-            "same": choice_matrix.SAME,
-            "unjudged_forces": choice_matrix.UNJUDGED_FORCES,
-            "unit": choice_matrix.UNIT,
-            "nothing": choice_matrix.NOTHING,
-            "unjudged": choice_matrix.UNJUDGED,
-            "lacking": NOT_HELD,
-            "tolerances": [number_format.number(10.0**-decade) for decade in DECADES],
-        },
+        "states": STATES,
+        "look": look,
+        "bar": bar,
+        "lengths": LENGTHS,
+        "closest_words": closest_words,
+        "profiles": profile,
+        "loop_key": slug,
         "again": _again,
         "host_sentences": host_sentences,
         "part_kinds": part_kinds(),

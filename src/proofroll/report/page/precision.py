@@ -60,7 +60,7 @@ class WorkPrecision:
     @property
     def entries(self) -> list[int]:
         """Number of curves of each engine in the picture of the first quantity; they decide its height."""
-        drawn = (x.engine for x in self.curves if any(p.cost > 0 and p.errors[0] is not None for p in x.points))
+        drawn = (x.engine for x in self.curves if any(_is_drawn(p) for p in x.points))
         return list(Counter(drawn).values())
 
 
@@ -118,3 +118,9 @@ def _point(
 
 def _short(value: float) -> float:
     return float(f"{value:.3g}")
+
+
+def _is_drawn(point: PrecisionPoint) -> bool:
+    """True if a point of the first quantity is drawn: it has a cost, and an error no larger than the quantity."""
+    error = point.errors[0]
+    return point.cost > 0 and error is not None and error <= 1.0

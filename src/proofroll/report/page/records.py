@@ -21,11 +21,12 @@ from proofroll.report.comparison.records import ReportedComparison
 from proofroll.report.comparison.summary import outcome_content
 from proofroll.report.kinds import kind_of
 from proofroll.report.long_table import LongTable, TableLine
-from proofroll.report.page.choice_matrix import ChoiceMatrix, ChoiceStudy, choice_matrix
-from proofroll.report.page.first_sentences import three_sentences
+from proofroll.report.page.choice_matrix import ChoiceMatrix, ChoiceStudy, choice_matrix, naming
+from proofroll.report.page.first_sentences import Kept, kept, three_sentences
 from proofroll.report.page.precision import WorkPrecision, work_precision
 from proofroll.report.page.scene_sheet import SceneSheet, sheet_of
 from proofroll.report.parts import PartEntry, part_kinds
+from proofroll.running.environments import shown_name
 from proofroll.running.timing import machine
 from proofroll.studies.comparison.outcome import Outcome
 from proofroll.studies.findings import load_findings
@@ -92,11 +93,6 @@ class Sentences:
 
     sentences: list[str]
 
-    @property
-    def on_engines(self) -> list[str]:
-        """The sentences before the last, which is advice: the page gives that above its matrix."""
-        return self.sentences[:-1]
-
 
 @dataclass(frozen=True)
 class ReportContent:
@@ -109,6 +105,8 @@ class ReportContent:
         left_out: names of the comparisons that a report of all studies leaves out.
         engine_findings: known faults and surprises of engines.
         entries: of further studies, by the key of their kind.
+        names: code name of each engine -> its name for readers.
+        provides: engine -> formulation -> capabilities.
         environment: command, machine and versions that made it.
         findings: three sentences on the whole report.
         table: every quantity of every run.
@@ -122,6 +120,8 @@ class ReportContent:
     left_out: list[str]
     engine_findings: list[KnownFinding]
     entries: Mapping[str, Sequence[PartEntry]] = field(metadata=MERGED)
+    names: dict[str, str]
+    provides: dict[str, dict[str, list[str]]]
     environment: MadeWith
     findings: Sentences
     table: LongTable
@@ -130,8 +130,9 @@ class ReportContent:
 
     @property
     def engines(self) -> list[str]:
-        """Names of the engines that are compared, in the page's order."""
-        return list(dict.fromkeys(row.name for comparison in self.comparisons for row in comparison.rows))
+        """Names of the engines that are compared, in the page's order: those that may be taken, then witnesses."""
+        compared = {row.name for comparison in self.comparisons for row in comparison.rows}
+        return [*(name for name in self.choice.engines if name in compared), *sorted(compared - {*self.choice.engines})]
 
     @property
     def further(self) -> list[PartEntry]:
@@ -150,13 +151,27 @@ class ReportContent:
         """Choice matrix of the comparisons and of the trade-offs that have results."""
         studies = {
             item.name: ChoiceStudy(
-                item.title, item.section, {(run.row, run.point): item.run_id(run.row, run.point) for run in item.runs}
+                title=item.title,
+                href=item.section,
+                runs={(run.row, run.point): item.run_id(run.row, run.point) for run in item.runs},
+                requires=frozenset(item.requires),
+                short={number: row.short for number, row in enumerate(item.rows) if row.short},
             )
             for item in self.comparisons
         }
         swept = [item for item in self.entries.get("tradeoffs", ()) if item.study]
         studies |= {item.name: ChoiceStudy(item.title, item.section) for item in swept}
-        return choice_matrix(self.table.lines, studies)
+        return choice_matrix(self.table.lines, studies, naming(self.names, self.provides))
+
+    @property
+    def sheets(self) -> dict[str, SceneSheet]:
+        """Sheet of each scene by its name."""
+        return {item.scene: item.evidence.sheet for item in reversed(self.comparisons) if item.evidence is not None}
+
+    @property
+    def kept(self) -> Kept:
+        """Counts of verdicts, of settings that are silently wrong, and of limits that are passed silently."""
+        return kept(self.comparisons, self.entries, self.names)
 
     @property
     def beyond_budget(self) -> str:
@@ -198,6 +213,8 @@ def report_content(outcomes: list[Outcome], command: str) -> ReportContent:
     for run in (run for outcome in outcomes for run in outcome.runs):
         versions |= run.result.versions
     entries: dict[str, list[PartEntry]] = {kind.key: [] for kind in part_kinds()}
+    asked = [run.facts for outcome in outcomes for run in outcome.runs if run.facts is not None]
+    provides = {shown_name(item.name): item.provides for item in asked if item.provides}
     content = ReportContent(
         datetime.now(UTC).isoformat(timespec="seconds"),
         comparisons,
@@ -205,6 +222,8 @@ def report_content(outcomes: list[Outcome], command: str) -> ReportContent:
         [],
         [KnownFinding(item.name, item.engine, item.title, item.seen, item.gone) for item in load_findings()],
         entries,
+        {item.name.partition("@")[0]: item.title or item.name for item in asked},
+        provides,
         MadeWith(command, f"{facts['system']}, {facts['processor']}", versions),
         Sentences([]),
         LongTable([line for own in lines for line in own]),

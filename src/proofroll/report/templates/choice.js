@@ -1,114 +1,144 @@
-// The matrix of engines and scenes: its cells at the tolerance that the reader chooses; rows and columns unfold.
+// The first screen: chips, cards, matrix, profile and advice follow the question; rows unfold, and cells explain themselves.
 (() => {
   const table = document.getElementById("choice");
   if (!table) return;
-  const form = document.getElementById("choose");
-  const slider = document.getElementById("tolerance");
-  const forces = document.getElementById("forces");
-  const scene = document.getElementById("scene");
-  const told = document.getElementById("tolerated");
-  const answer = document.getElementById("answer");
-  const rows = [...table.tBodies[0].rows], heads = [...table.tHead.rows[0].cells];
-  const symbols = {{ symbols|tojson }};
-  const first = {{ decades.start }}, count = {{ decades|length }};
+  const place = (id) => document.getElementById(id);
+  const slider = place("tolerance"), forces = place("forces");
+  const first = {{ decades.start }}, count = {{ decades|length }}, lengths = {{ lengths|tojson }};
+  const rows = [...table.querySelectorAll("[data-place]")];
+  const boxes = [...document.querySelectorAll("[name=engine]")];
+  const off = () => new Set(boxes.filter((box) => !box.checked).map((box) => box.value));
+  const rivals = boxes.filter((box) => !("witness" in box.dataset)).map((box) => box.value);
 
-  // Texts are inserted as text nodes, for an engine's message must not become markup.
-  function fill(cell, [state, text, title, href], best, step) {
-    cell.className = `cell ${state}${best ? " best" : ""}`;
-    cell.replaceChildren();
-    const hidden = (word) => Object.assign(document.createElement("span"), { className: "vh", textContent: word });
-    if (state === "none") return cell.append(hidden("not run"));
-    const link = Object.assign(document.createElement("a"), { title });
-    if (href) link.href = `#${href}`;
-    const sign = Object.assign(document.createElement("span"), { textContent: symbols[state] });
-    sign.setAttribute("aria-hidden", "true");
-    link.append(sign, hidden(best ? "cheapest that agrees" : state), ` ${text}`);
-    if (best && step) link.append(" ", Object.assign(document.createElement("small"), { textContent: step }));
-    cell.append(link);
-  }
-  const chosen = (on) => [...form.querySelectorAll("[name=engine]")].filter((box) => box.checked === on).map((box) => box.value);
-  const { needs, unit, nothing, unjudged, tolerances, with_forces, same, unjudged_forces, lacking: unheld } = {{ answer_words|tojson }};
-  // The cheapest of the chosen engines, worded as `ChoiceMatrix.answer`.
-  function sentence(best, { groups, judged }) {
-    const held = best.filter((found, j) => found && groups[j]).map((found) => found[1]);
-    const without = groups.filter((group, j) => group && !best[j] && judged[+forces.checked].includes(group));
-    const lacking = without.length ? `${nothing} ${without.join(", ")}` : "";
-    const asked = needs[+forces.checked].replaceAll("{0}", tolerances[Number(slider.value) - first]);
-    const whole = held.length ? `The cheapest to hold ${asked}, ${unit}: ${[held.join(", "), lacking].filter(Boolean).join("; ")}.` : `To hold ${asked}: ${lacking || (groups.some(Boolean) ? unjudged : "nothing was run")}.`;
-    return chosen(false).length ? `${whole} This is of ${chosen(true).join(", ") || "no engine"} alone.` : whole;
-  }
-  // Changes if forces count, worded as `ChoiceMatrix.with_forces`.
-  function also(motion, both, { groups, judged }) {
-    const asked = groups.map((group, j) => ({ group, before: motion[j]?.[1], now: both[j]?.[1] })).filter(({ group }) => group && judged[1].includes(group));
-    const listed = (words, test) => { const found = asked.filter(test).map(({ group }) => group); return found.length ? `${words} ${found.join(", ")}` : ""; };
-    const other = asked.filter(({ before, now }) => now && now !== before).map(({ now }) => now).join(", ");
-    const said = [other, listed(same, ({ before, now }) => now && now === before), listed(nothing, ({ now }) => !now)];
-    const silent = groups.filter((group) => group && judged[0].includes(group) && !judged[1].includes(group));
-    if (silent.length) said.push(`${unjudged_forces} ${silent.join(", ")}`);
-    return judged[1].length ? `${with_forces.replace("{0}", tolerances[Number(slider.value) - first])}: ${said.filter(Boolean).join("; ")}.` : "";
-  }
-  // Advice for each column, of the chosen engines, worded as `of_column` but without the effect of forces.
-  function advised({ said, heads, engines }) {
-    const off = new Set(chosen(false));
-    if (!off.size) return said;
-    const times = (ratio) => ratio === 1 ? "as much" : `${ratio} times that`;
-    return [...heads.map((head, j) => {
-      const own = engines[j].filter(([engine]) => !off.has(engine));
-      if (!own.length) return engines[j].length ? `${head} none of the chosen engines was run.` : said[j];
-      const [[, least, name, text]] = own;
-      const others = own.slice(least === null ? 0 : 1).map(([, cost, other]) => cost === null ? other : `${other} costs ${times(Number((cost / least).toPrecision(2)))}`);
-      return `${head} ${[least === null ? unheld : `take ${name} (${text})`, ...others].join("; ")}.`;
-    }), `This is of ${chosen(true).join(", ") || "no engine"} alone. What serves all scenes, and what forces change, is said of all engines together.`];
-  }
-  // A text whose numbers as 1e-3 are not broken, as `unbroken`.
-  const put = (place, text) => place.replaceChildren(...text.split(/(\d[\d.]*e-\d+(?: (?:s|m|N|J|rad)\b(?:\/s)?)?)/).map(
-    (part, at) => at % 2 ? Object.assign(document.createElement("span"), { className: "whole", textContent: part }) : part));
-  // The chosen scene, or group of scenes, alone: its column, the rows that ran there, and the sentences.
-  function narrow() {
-    const only = scene.value === "" ? null : Number(scene.value) + 1;
-    const fold = only && table.querySelector(`[data-group="${CSS.escape(heads[only].dataset.of ?? "")}"][aria-expanded=false]`);
-    if (fold) unfoldChoice(fold, true);
-    for (const row of [heads[0].parentElement, ...rows]) {
-      [...row.cells].forEach((cell, at) => cell.classList.toggle("beside", only !== null && at > 0 && at !== only));
-      row.classList.toggle("beside", only !== null && row.cells[only].matches(".none"));
-    }
-    document.querySelectorAll("#words li").forEach((line, at) => { line.hidden = only !== null && at !== only - 1; });
-  }
+  // What is put in place was made by the same templates as the page, with every text escaped.
   async function show() {
-    const place = (forces.checked ? count : 0) + Number(slider.value) - first;
-    told.textContent = `1e-${slider.value}`;
-    slider.setAttribute("aria-valuetext", told.textContent);
+    const decade = Number(slider.value), asked = (forces.checked ? count : 0) + decade - first;
+    place("tolerated").textContent = `1e-${decade}`;
+    slider.setAttribute("aria-valuetext", `1e-${decade} of the path, ${lengths[decade]} per metre`);
+    place("in-words").textContent = `${lengths[decade]} of error per metre of path${forces.checked ? `, and 1e-${decade} of the largest force` : ""}`;
     const data = JSON.parse(await unpack("choices"));
-    if (scene.value !== "") data.groups = data.names.map((name, j) => j === Number(scene.value) ? name : "");
-    const cheapest = (asked) => data.ranks[asked].map((ranked) => ranked.find(([at]) => !rows[at].classList.contains("off")));
-    const best = cheapest(place);
-    rows.forEach((row, i) => data.grid[i].forEach((numbers, j) => fill(row.cells[j + 1], data.cells[numbers[place]], best[j]?.[0] === i, best[j]?.[2])));
-    put(answer, sentence(best, data));
-    put(document.getElementById("also"), forces.checked ? "" : also(best, cheapest(place + count), data));
-    const words = advised(JSON.parse(await unpack("all-words"))[place]);
-    document.querySelectorAll("#words li").forEach((line, i) => put(line, words[i]));
-    narrow();
-    table.dataset.at = place;
-    table.dispatchEvent(new Event("filled"));
+    const gone = off(), chosen = rivals.filter((name) => !gone.has(name)), own = data.screens[chosen.join(" ")];
+    const screen = (own ?? data.screens[rivals.join(" ")])[asked];
+    place("asked").textContent = `The cheapest that holds ${screen.asked}${own && gone.size ? `, of ${chosen.map(title).join(" and ")} alone` : ""}:`;
+    for (const part of ["chips", "cards", "profile", "use"]) place(`answer-${part}`).innerHTML = screen[part];
+    rows.forEach((row, i) => [...row.cells].slice(1).forEach((cell, j) => {
+      const [look, inner] = data.cells[data.grid[i][j][asked]];
+      cell.className = `s-${look} ${cell.classList.contains("of-kind") ? "of-kind" : "of-scene"}${screen.best[j] === i ? " best" : ""}`;
+      cell.innerHTML = inner;
+    }));
+    hide(document);
+    table.dataset.at = asked;
+    start();
   }
-  slider.addEventListener("input", show);
-  form.addEventListener("change", (event) => {
-    if (event.target.name === "engine") hide(document);
-    if (event.target !== slider) show();
-  });
+  const title = (name) => boxes.find((box) => box.value === name).parentElement.textContent.trim();
   function hide(within) {
-    const off = new Set(chosen(false));
-    within.querySelectorAll("[data-engine]").forEach((part) => part.classList.toggle("off", off.has(part.dataset.engine)));
+    const gone = off();
+    within.querySelectorAll("[data-engine]").forEach((part) => part.classList.toggle("off", gone.has(part.dataset.engine)));
   }
   everywhere(hide);
-  form.addEventListener("submit", (event) => event.preventDefault());
+  slider.addEventListener("input", show);
+  forces.addEventListener("change", show);
+  boxes.forEach((box) => box.addEventListener("change", show));
+  document.querySelectorAll(".ask").forEach((form) => form.addEventListener("submit", (event) => event.preventDefault()));
 
-  // Before the head itself hears of it, which would sort its column.
-  table.addEventListener("keypress", (event) => { if (event.target.closest("thead :is([data-group], a)")) event.stopPropagation(); }, true);
-  table.addEventListener("click", (event) => {
-    const button = event.target.closest("[data-group], [data-model]");
-    if (event.target.closest("thead :is([data-group], a)")) event.stopPropagation();
-    if (!button) return;
-    unfoldChoice(button, button.getAttribute("aria-expanded") !== "true");
-  }, true);
+  // Rows unfold: engines to formulations, formulations to settings.
+  function fold(button, open) {
+    button.setAttribute("aria-expanded", open);
+    for (const row of rows.filter((row) => row.dataset.of === button.dataset.unfold)) {
+      row.hidden = !open;
+      const below = row.querySelector("[data-unfold]");
+      if (below && !open) fold(below, false);
+    }
+  }
+  window.unfoldRow = (row) => {
+    const above = row.dataset.of && table.querySelector(`[data-unfold="${CSS.escape(row.dataset.of)}"]`);
+    if (!above) return;
+    unfoldRow(above.closest("tr"));
+    fold(above, true);
+  };
+  table.addEventListener("click", ({ target }) => {
+    const button = target.closest("[data-unfold]");
+    if (button) fold(button, button.getAttribute("aria-expanded") !== "true");
+  });
+  const all = place("formulations");
+  all.addEventListener("click", () => {
+    const open = all.getAttribute("aria-pressed") !== "true";
+    all.setAttribute("aria-pressed", open);
+    all.textContent = open ? "hide formulations" : "show all formulations";
+    table.querySelectorAll(".engine [data-unfold]").forEach((button) => fold(button, open));
+  });
+  const kinds = [...document.querySelectorAll("[data-columns]")];
+  kinds.forEach((button) => button.addEventListener("click", () => {
+    table.className = button.dataset.columns;
+    kinds.forEach((other) => other.setAttribute("aria-pressed", other === button));
+    start();
+  }));
+
+  // The cells are one stop of the Tab key; arrows, Home and End walk.
+  const seen = (part) => part && part.offsetParent !== null;
+  const inside = (cell) => cell.querySelector(".in, [data-unfold]");
+  function start() {
+    const cells = [...table.querySelectorAll(".in")];
+    cells.forEach((cell) => { cell.tabIndex = -1; });
+    const at = cells.find(seen);
+    if (at) at.tabIndex = 0;
+  }
+  table.addEventListener("keydown", (event) => {
+    const from = event.target.closest(".in, [data-unfold]"), step = { ArrowRight: [0, 1], ArrowLeft: [0, -1], ArrowDown: [1, 0], ArrowUp: [-1, 0], Home: [0, -99], End: [0, 99] }[event.key];
+    if (!from || !step) return;
+    const lines = [...table.tBodies[0].rows].filter((row) => seen(row) && !row.matches(".group"));
+    const row = from.closest("tr"), cells = (line) => [...line.cells].filter(seen);
+    const down = lines[lines.indexOf(row) + step[0]] ?? row, across = cells(row).indexOf(from.closest("td, th"));
+    const line = cells(down), next = inside(line[Math.max(0, Math.min(line.length - 1, across + step[1]))]);
+    event.preventDefault();
+    if (!next) return;
+    if (next.matches(".in")) { table.querySelectorAll(".in[tabindex='0']").forEach((cell) => { cell.tabIndex = -1; }); next.tabIndex = 0; }
+    next.focus();
+  });
+  start();
+
+  // A tooltip in place of the browser's: the first line bold; by pointer, keyboard or touch, Escape closes it.
+  const tip = Object.assign(document.createElement("div"), { id: "tip", hidden: true });
+  tip.setAttribute("role", "tooltip");
+  document.body.append(tip);
+  let owner = null;
+  function close() {
+    tip.hidden = true;
+    owner?.removeAttribute("aria-describedby");
+    owner = null;
+  }
+  function open(part) {
+    if (part.title) { part.dataset.tip = part.title; part.removeAttribute("title"); }
+    const [head, ...rest] = part.dataset.tip.split("\n");
+    tip.replaceChildren(Object.assign(document.createElement("b"), { textContent: head }), rest.join(" "));
+    close();
+    owner = part;
+    tip.hidden = false;
+    part.setAttribute("aria-describedby", "tip");
+    const box = part.getBoundingClientRect();
+    tip.style.left = `${Math.max(8, Math.min(innerWidth - tip.offsetWidth - 8, box.left + box.width / 2 - tip.offsetWidth / 2))}px`;
+    tip.style.top = `${box.bottom + tip.offsetHeight + 10 < innerHeight ? box.bottom + 7 : Math.max(6, box.top - tip.offsetHeight - 7)}px`;
+  }
+  const told = (target) => target.closest?.("#choice [title], #choice [data-tip], .key [title], .key [data-tip], #uses th[title], #uses th[data-tip]");
+  document.addEventListener("pointerover", ({ target }) => { const part = told(target); if (part) open(part); else if (owner && owner !== document.activeElement) close(); });
+  document.addEventListener("focusin", ({ target }) => { const part = told(target); if (part) open(part); else close(); });
+  document.addEventListener("keydown", ({ key }) => { if (key === "Escape") close(); });
+  addEventListener("scroll", close, { passive: true });
+
+  // The matrix as it is shown, as a file.
+  place("csv").addEventListener("click", () => {
+    const said = (cell) => {
+      const copy = cell.cloneNode(true);
+      copy.querySelectorAll("[aria-hidden]").forEach((part) => part.remove());
+      copy.querySelectorAll("small, .f").forEach((part) => part.before(" "));
+      return copy.textContent.replace(/\s+/g, " ").trim();
+    };
+    const lines = [...table.querySelectorAll("tr:not(.group)")].map((row) => {
+      const above = row.dataset.of ? `${row.dataset.of} ` : "";
+      return [...row.cells].map((cell, at) => `"${((at ? "" : above) + said(cell)).replaceAll('"', '""')}"`).join(",");
+    });
+    const address = URL.createObjectURL(new Blob([lines.join("\n")], { type: "text/csv" }));
+    Object.assign(document.createElement("a"), { href: address, download: `engines to ${place("tolerated").textContent}${forces.checked ? " with forces" : ""}.csv` }).click();
+    setTimeout(() => URL.revokeObjectURL(address), 1000);
+  });
 })();

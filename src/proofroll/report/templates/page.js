@@ -40,17 +40,32 @@ const folds = (() => {
     await ready();
     if (empty()) build(empty());
   }, true);
-  // For a search in the browser, or to read and print all of it.
-  button.hidden = false;
-  button.addEventListener("click", async () => {
+  async function all() {
     await ready();
     every("[data-fold]");
     document.querySelectorAll("details").forEach((fold) => { fold.open = true; });
+  }
+  // Opens what is in sight, the rest when it is scrolled to or printed: all at once would take a browser seconds.
+  let watch = null;
+  const follow = (part) => part.querySelectorAll("details:not([open])").forEach((fold) => watch.observe(fold));
+  button.addEventListener("click", async () => {
+    await ready();
+    watch ??= new IntersectionObserver((entries) => entries.filter((entry) => entry.isIntersecting).forEach(({ target }) => {
+      watch.unobserve(target);
+      target.open = true;
+    }), { rootMargin: "50%" });
+    follow(document);
+    button.setAttribute("aria-pressed", "true");
   });
+  document.addEventListener("built", ({ target }) => { if (watch) follow(target); });
   // Print shows folds, but not each run; printing does not wait, so the texts are unpacked before.
-  addEventListener("beforeprint", () => { if (texts) every("[data-fold]:not(.run > *)"); });
+  addEventListener("beforeprint", () => {
+    if (!texts) return;
+    every(watch ? "[data-fold]" : "[data-fold]:not(.run > *)");
+    if (watch) document.querySelectorAll("details").forEach((fold) => { fold.open = true; });
+  });
   addEventListener("load", () => (window.requestIdleCallback ?? setTimeout)(ready));
-  return { find };
+  return { find, all };
 })();
 
 // A link to evidence opens the folds around it.
@@ -61,7 +76,7 @@ const folds = (() => {
     if (!target) return;
     for (let fold = target.closest("details"); fold; fold = fold.parentElement.closest("details")) fold.open = true;
     for (const fold of target.querySelectorAll(":scope > details:only-of-type")) fold.open = true;
-    if (target.hidden) document.querySelector(`#choice [data-model="${CSS.escape(target.dataset.of)}"]`).click();
+    if (target.hidden) window.unfoldRow(target);
     target.classList.add("target");
     // A section that is not drawn has no place for what is in it yet.
     target.closest("main > section")?.style.setProperty("content-visibility", "visible");
@@ -87,21 +102,26 @@ addEventListener("load", () => {
   idle(next);
 });
 
-// The contents mark the section that is being read, and keep its link in sight.
+// The rail marks the section that is being read; on a narrow screen a list of sections stands in its place.
 (() => {
-  const contents = document.querySelector("nav");
-  const links = [...contents.querySelectorAll("a")].map((link) => [link, document.getElementById(link.hash.slice(1))]);
-  let marked = null;
+  const rail = document.querySelector(".rail"), jump = document.getElementById("jump");
+  const links = [...rail.querySelectorAll("ul a")];
+  const place = (link) => document.getElementById(link.hash.slice(1));
+  links.forEach((link) => jump.append(new Option(link.textContent, link.hash)));
+  jump.addEventListener("change", () => { location.hash = jump.value; });
+  let marked = null, waiting = false;
   function follow() {
-    const begun = links.filter(([, section]) => section && section.getBoundingClientRect().top < innerHeight / 3);
-    const link = begun.length ? begun[begun.length - 1][0] : null;
+    waiting = false;
+    const begun = links.filter((link) => place(link)?.getBoundingClientRect().top < innerHeight / 3);
+    const link = begun.at(-1) ?? links[0];
     if (link === marked) return;
-    if (marked) marked.removeAttribute("aria-current");
-    if (link) link.setAttribute("aria-current", "true");
-    contents.scrollLeft = link ? link.offsetLeft - contents.offsetLeft - 40 : 0;
+    marked?.removeAttribute("aria-current");
+    link.setAttribute("aria-current", "true");
+    jump.value = link.hash;
+    if (link.offsetTop < rail.scrollTop || link.offsetTop > rail.scrollTop + rail.clientHeight) rail.scrollTop = link.offsetTop - 60;
     marked = link;
   }
-  addEventListener("scroll", follow, { passive: true });
+  addEventListener("scroll", () => { if (!waiting) { waiting = true; requestAnimationFrame(follow); } }, { passive: true });
   follow();
 })();
 

@@ -2,10 +2,10 @@
 // chosen beside it, engines, tolerance and whether forces count on the first screen.
 (() => {
   const DASHES = ["solid", "dash", "dot", "dashdot", "longdash", "longdashdot"], SYMBOLS = {{ outlines|list|tojson }};
-  const LARGEST = 1, LEAST = 1e-17;  // errors beyond the quantity's size are cut there
+  const LARGEST = 1, LEAST = 1e-17;  // errors beyond the quantity's size tell nothing more, and are left out
   const PANEL = 215, TICKS = 38, ENTRY = 19, HEAD = 22;  // heights of a panel and of what is around it [CSS px]
   const drawn = new Map();  // part of the page -> its plotly element
-  const slider = document.getElementById("tolerance"), form = document.getElementById("choose");
+  const slider = document.getElementById("tolerance");
   const { paint } = plots, literal = picture.literal;
   const short = (value) => (value >= 1e300 ? "∞" : String(Number(value.toPrecision(2))));
   const decade = () => Number(slider?.value ?? {{ first_decade }});
@@ -13,11 +13,11 @@
 
   // Points with a value of the quantity, without hidden engines.
   function curves(study, quantity) {
-    const off = new Set([...(form?.querySelectorAll("[name=engine]:not(:checked)") ?? [])].map((box) => box.value));
+    const off = new Set([...document.querySelectorAll("[name=engine]:not(:checked)")].map((box) => box.value));
     const found = study.curves.filter(({ engine }) => !off.has(engine)).map((curve, number) => ({
       ...curve, number,
-      points: curve.points.filter(([, cost, , , errors]) => cost > 0 && errors[quantity] !== null)
-        .map(([step, cost, clean, verdict, errors, held]) => ({ step, cost, clean, verdict, error: errors[quantity], held: held[quantity], y: Math.min(Math.max(errors[quantity], LEAST), LARGEST) })),
+      points: curve.points.filter(([, cost, , , errors]) => cost > 0 && errors[quantity] !== null && errors[quantity] <= LARGEST)
+        .map(([step, cost, clean, verdict, errors, held]) => ({ step, cost, clean, verdict, error: errors[quantity], held: held[quantity], y: Math.max(errors[quantity], LEAST) })),
     }));
     return found.filter(({ points }) => points.length);
   }
@@ -80,7 +80,7 @@
         traces.push({
           ...here, name: literal(curve.name), mode: "lines+markers", x: curve.points.map(({ cost }) => cost), y: curve.points.map((point) => point.y),
           line: { color, width: 1.5, dash: DASHES[formulations.indexOf(curve.formulation) % DASHES.length] },
-          marker: { color, size: 6, symbol: curve.points.map(({ error, clean }) => (error > LARGEST ? "triangle-up" : clean ? symbol : `${symbol}-open`)) },
+          marker: { color, size: 6, symbol: curve.points.map(({ clean }) => (clean ? symbol : `${symbol}-open`)) },
           hovertemplate: curve.points.map((point) => told(curve, point)),
         });
         if (curve.points.includes(choice)) traces.push({
@@ -118,7 +118,7 @@
     near.observe(each);
   }));
   document.addEventListener("change", (event) => { if (drawn.has(event.target.closest(".precision"))) show(event.target.closest(".precision")); });
-  form?.addEventListener("change", again);
+  document.addEventListener("change", ({ target }) => { if (target.matches("#tolerance, #forces, [name=engine]")) again(); });
   addEventListener("beforeprint", again);
   addEventListener("afterprint", again);
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", again);

@@ -9,7 +9,7 @@
     });
     return library;
   }
-  const sorts = (table) => table.querySelector("tbody tr:not(.group)");
+  const sorts = (table) => !table.matches("#choice, #uses") && table.querySelector("tbody tr:not(.group)");
 
   // Rows of engines one after the other, each with its engine: a table that sorts has neither groups nor joined cells.
   function flatten(table) {
@@ -43,19 +43,6 @@
     const found = text.replace("−", "-").match(/-?\d[\d.]*(?:e[-+]?\d+)?/i);
     return found ? Number(found[0]) : text.includes("∞") ? 1e300 : 1e301;
   }
-  // In the first matrix settings stay below their formulation, whose keys they share, and are found by its name.
-  function keyMatrix(rows) {
-    let model;
-    for (const row of rows) {
-      if (!row.dataset.of) model = row;
-      [...row.cells].forEach((cell, at) => {
-        const of = model.cells[at], state = order.indexOf(of.classList[1]);
-        cell.dataset.order = !at ? of.textContent.trim() : state < 0 ? 1e301 : 1e6 * state + Math.min(rank(of, true), 9e5);
-      });
-      row.cells[0].dataset.search = `${row.dataset.of ?? ""} ${row.cells[0].textContent}`;
-      if (row !== model) model.cells[0].dataset.search += ` ${row.cells[0].textContent}`;
-    }
-  }
   function keyTable(rows, heads) {
     for (const row of rows) {
       heads.forEach((head, at) => { row.cells[at].dataset.order = rank(row.cells[at], head.classList.contains("n") || row.cells[at].classList.contains("step")); });
@@ -65,26 +52,22 @@
     const copy = cell.cloneNode(true);
     copy.querySelectorAll("[aria-hidden], .dt-column-order").forEach((part) => part.remove());
     copy.querySelectorAll("br, small, b").forEach((part) => part.before(" "));
-    const setting = cell.scope === "row" ? cell.parentElement.dataset.of ?? "" : "";
-    return `${setting} ${cell.dataset.axis ?? ""} ${copy.textContent}`.replace(/\s+/g, " ").trim();
+    return `${cell.dataset.axis ?? ""} ${copy.textContent}`.replace(/\s+/g, " ").trim();
   }
   async function enliven(table) {
     const { default: DataTable } = await load();
     const region = table.closest(".scroll");
     const label = region.getAttribute("aria-label");
-    const form = table.id === "choice" ? document.getElementById("choose") : null;
-    if (!form) flatten(table);
+    flatten(table);
     const heads = [...[...table.tHead.rows].at(-1).cells], rows = [...table.tBodies[0].rows];
-    const key = form ? keyMatrix : keyTable;
-    key(rows, heads);
-    const asked = () => form ? ` to ${form.querySelector("output").textContent}${form.querySelector("#forces").checked ? " with forces" : ""}` : "";
+    keyTable(rows, heads);
     const made = new DataTable(table, {
       paging: false, info: false, autoWidth: false, order: [], orderDescReverse: false,
       language: { search: "Filter", zeroRecords: "no row has this" },
       layout: {
         topStart: rows.length < 2 ? null : "search",
         // A file has one row of heads: the last one, whose cells name their groups.
-        topEnd: { buttons: [{ extend: "csv", text: "CSV", filename: () => `${label}${asked()}`, title: null,
+        topEnd: { buttons: [{ extend: "csv", text: "CSV", filename: label, title: null,
           exportOptions: { customizeData: (data) => { data.headerStructure = data.headerStructure.slice(-1); }, format: { body: (_, __, ___, cell) => said(cell), header: (_, __, cell) => said(cell ?? heads[__]) } } }] },
         bottomStart: null, bottomEnd: null,
       },
@@ -93,8 +76,7 @@
     tools.classList.add("tools");
     tools.querySelector("input")?.setAttribute("aria-label", `Filter: ${label}`);
     tools.querySelector("button").setAttribute("aria-label", `CSV: ${label}`);
-    (form?.querySelector(".tools") ?? region.previousElementSibling).replaceWith(tools);
-    table.addEventListener("filled", () => { key(rows, heads); made.rows().invalidate("dom").draw(false); });
+    region.previousElementSibling.replaceWith(tools);
     region.dataset.sorts = "";
   }
   const near = new IntersectionObserver((entries) => entries.forEach((entry) => {
@@ -106,7 +88,7 @@
     if (!sorts(table)) return;
     // Room for the signs and the tools of a table that sorts, so that nothing moves when they come.
     table.classList.add("sorts");
-    if (table.id !== "choice") table.closest(".scroll").before(Object.assign(document.createElement("div"), { className: "tools" }));
+    table.closest(".scroll").before(Object.assign(document.createElement("div"), { className: "tools" }));
     near.observe(table);
   }));
 })();

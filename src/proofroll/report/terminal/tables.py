@@ -14,6 +14,7 @@ from proofroll.core.verdict import Verdict
 from proofroll.report.comparison.spread import ALONE
 from proofroll.report.comparison.tables import observables, one_scheme, remarks, seconds_before
 from proofroll.report.labels import SYMBOLS, caveat_lines, step, unit, unjudged, verdict_text
+from proofroll.report.page.answer import answer, closest_words, forces_words, next_words, take_words
 from proofroll.report.parts import part_kinds
 from proofroll.report.terminal.screen import Screen, numeric, plain_table, unbroken
 from proofroll.running.case import Status, host_sentences
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
     from proofroll.report.changes import Against
     from proofroll.report.comparison.records import ReportedComparison, WorstJudgement
     from proofroll.report.comparison.spread import Spread
+    from proofroll.report.page.choice_matrix import ChoiceMatrix
     from proofroll.report.page.records import ReportContent
 
 WIDTH = 100
@@ -215,3 +217,33 @@ def first_lines(content: ReportContent) -> list[str]:
 def _one_line(text: str) -> str:
     """Text without line breaks, which quoted messages may have."""
     return " ".join(text.split())
+
+
+def answer_table(matrix: ChoiceMatrix, tolerance: float, forces: bool, *, scenes: bool = False) -> Table:
+    """The answer of the first screen: for each kind of scenes, or each scene, what to take, its speed, and the next."""
+    found = answer(matrix, tolerance, forces)
+    with_forces = None if forces else answer(matrix, tolerance, True)
+    table = plain_table(
+        Column("scene" if scenes else "kind of scene", min_width=_WORD),
+        Column("take", min_width=_WORD),
+        *numeric("× real time"),
+        Column("next engine", min_width=_WORD),
+        *([] if forces else [Column("if forces count", min_width=_WORD)]),
+        title=f"The cheapest that holds {found.question.words}",
+    )
+    for at, item in enumerate(found.scenes if scenes else found.kinds):
+        taken = item.taken
+        take = ", ".join(filter(None, (take_words(matrix, taken), taken.setting))) if taken else ""
+        both = (
+            []
+            if with_forces is None
+            else [forces_words(matrix, item, (with_forces.scenes if scenes else with_forces.kinds)[at])]
+        )
+        table.add_row(
+            Text(item.column.title),
+            Text(take if taken else closest_words(matrix, item)),
+            Text(f"{taken.cell.text}{taken.cell.share}" if taken else "–"),
+            Text(next_words(matrix, item)),
+            *map(Text, both),
+        )
+    return table

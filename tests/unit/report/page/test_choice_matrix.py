@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import replace
-from itertools import product
 from typing import Any
 
 import pytest
@@ -12,8 +10,10 @@ from table_lines import ARM, FINER, FORCE, LINE, line
 
 from proofroll.core.verdict import Verdict
 from proofroll.report.long_table import TableLine
-from proofroll.report.page.advice import of_column
-from proofroll.report.page.choice_matrix import DECADES, NO_RUN, ChoiceCell, ChoiceMatrix, ChoiceStudy, choice_matrix
+from proofroll.report.page.advice import advice
+from proofroll.report.page.answer import answer
+from proofroll.report.page.choice_cell import CANNOT, NO_RUN, PARTLY, ChoiceCell, speed
+from proofroll.report.page.choice_matrix import ChoiceMatrix, ChoiceStudy, Naming, choice_matrix
 
 STUDIES = {
     "arm": ChoiceStudy("An arm", "c0", {(0, ""): "c0.joints", (0, "mass=2"): "c0.joints.mass-2"}),
@@ -34,23 +34,12 @@ def at(
 
 def test_a_cell_has_the_cheapest_run_that_holds_the_tolerance() -> None:
     """The step of the comparison, then a finer one of its ladder, then another setting, each with its cost."""
-    assert at(ARM, 3)[:2] == (Verdict.AGREES, "0.01")
-    assert at(ARM, 4)[:2] == (Verdict.AGREES, "~0.04")
-    assert at(ARM, 6)[:2] == (Verdict.AGREES, "0.2")
+    assert at(ARM, 3)[:2] == (Verdict.AGREES, "100×")
+    assert at(ARM, 4)[:2] == (Verdict.AGREES, "≈ 25×")
+    assert at(ARM, 6)[:2] == (Verdict.AGREES, "5×")
     assert "alpha joints tuned at dt 1e-3 s: within 2e-7" in at(ARM, 6).title
     assert at(ARM, 3).href == "c0.joints"
     assert at(ARM, 6, setting="default").state == Verdict.CONVERGES, "what unfolds is that setting alone"
-
-
-def test_rows_that_are_cheapest_somewhere_come_first_by_column() -> None:
-    """The cheapest of the first group is the first row, wherever the comparison has it."""
-    rivals = [
-        line(engine=name, row=row, error=1e-6, cost=cost) for row, name, cost in [(0, "slow", 9.0), (1, "a", 1.0)]
-    ]
-    lone = [replace(item, study="ball", group="balls", cost=1 / item.cost) for item in rivals]
-    found = choice_matrix([*rivals, *lone], STUDIES)
-    assert [row.engine for row in found.models] == ["a", "slow"]
-    assert found.best(1e-4, False) == [0, 2], "numbers of rows, settings among them"
 
 
 def lucky(*errors: float, **changes: Any) -> list[TableLine]:
@@ -67,8 +56,8 @@ def test_a_small_error_at_one_step_is_luck_where_finer_steps_are_worse(precision
     cell = at(lines, 4)
     assert (cell.state, cell.cost) == (Verdict.DIFFERS, float("inf"))
     assert "its error of 1e-6 is luck" in cell.title, "what is seen at that step is said, too"
-    assert "nothing that was run and timed holds it" in choice_matrix(lines, STUDIES).answer(1e-4, False)
-    assert at(lucky(1e-6, 1e-3, 1e-7, limit="no limit shown"), 4)[:2] == (Verdict.AGREES, "0.4"), "the finest holds"
+    assert answer(choice_matrix(lines, STUDIES), 1e-4, False).kinds[0].taken is None
+    assert at(lucky(1e-6, 1e-3, 1e-7, limit="no limit shown"), 4)[:2] == (Verdict.AGREES, "2.5×"), "the finest holds"
     other = replace(lines[1], place="mass=2", error=1e-6)
     assert at([*lucky(1e-6, 1e-6), other, replace(other, step=1e-3)], 4).state == Verdict.AGREES, (
         "each place for itself"
@@ -93,14 +82,14 @@ def test_a_floor_of_single_precision_is_no_luck() -> None:
     lines = lucky(
         4e-5, 3e-5, 4e-4, limit="no limit shown", precision="single", floor="best step 5e-4 s: single precision"
     )
-    assert at(lines, 4)[:2] == (Verdict.AGREES, "0.1")
+    assert at(lines, 4)[:2] == (Verdict.AGREES, "10×")
     assert at([replace(item, floor="") for item in lines], 4).state != Verdict.AGREES
 
 
 def test_forces_count_where_they_are_asked_for() -> None:
     """With forces the same tolerance takes a finer run; an engine that reports none says so."""
-    assert at(ARM, 2)[:2] == (Verdict.AGREES, "0.01")
-    assert at(ARM, 2, forces=True)[:2] == (Verdict.AGREES, "~0.04")
+    assert at(ARM, 2)[:2] == (Verdict.AGREES, "100×")
+    assert at(ARM, 2, forces=True)[:2] == (Verdict.AGREES, "≈ 25×")
     told = replace(FORCE, engine="beta", row=7)
     assert at([LINE, told], 2, forces=True)[:2] == (Verdict.INCOMPLETE, "no forces")
 
@@ -119,7 +108,7 @@ def test_what_no_run_holds_shows_the_least_error_and_why() -> None:
 def test_a_scene_without_judged_forces_takes_no_part_where_forces_count() -> None:
     """Alone it says so, and the answer does not call it unheld; in a group the other scenes decide."""
     assert at([LINE], 2, forces=True)[:2] == (Verdict.NOT_JUDGED, "no forces")
-    assert "nothing that was run" not in choice_matrix([LINE], STUDIES).answer(1e-2, True)
+    assert not answer(choice_matrix([LINE], STUDIES), 1e-2, True).kinds[0].judged
     chain = replace(LINE, study="chain", scene="chain")
     assert at([*ARM, chain], 4, forces=True)[:2] == at(ARM, 4, forces=True)[:2]
 
@@ -129,7 +118,7 @@ def test_a_scene_without_judged_motion_takes_no_part() -> None:
     laws = replace(LINE, role="residual", study="chain", scene="chain")
     assert at([laws], 2)[:2] == (Verdict.NOT_JUDGED, "no motion")
     assert at([*ARM, laws], 2)[:2] == at(ARM, 2)[:2]
-    assert choice_matrix([laws], STUDIES).answer(1e-2, False).endswith(": that is judged in no scene that was run.")
+    assert "Not judged for trees" in answer(choice_matrix([laws], STUDIES), 1e-2, False).sentence
 
 
 def test_the_limit_of_forces_says_nothing_of_motion() -> None:
@@ -162,7 +151,7 @@ def test_a_run_holds_only_at_all_places() -> None:
     assert at([LINE, heavy], 3)[:2] == (Verdict.CONVERGES, "0.05")
     assert at([LINE, heavy], 3).href == "c0.joints.mass-2"
     assert at([LINE, replace(heavy, verdict="ill-posed")], 3).state == Verdict.AGREES
-    assert at([LINE, replace(heavy, error=1e-4)], 3)[:2] == (Verdict.AGREES, "0.03"), "the slowest place"
+    assert at([LINE, replace(heavy, error=1e-4)], 3)[:2] == (Verdict.AGREES, "33×"), "the slowest place"
     assert at([LINE, FORCE, *FINER, heavy], 4).state != Verdict.AGREES, "the finer step was not run there"
 
 
@@ -174,87 +163,15 @@ def test_an_error_that_is_too_large_looks_so() -> None:
 
 
 def test_a_group_holds_where_all_its_scenes_do() -> None:
-    """All: the cost of the slowest scene; some: how many; a group of one scene has no column besides."""
+    """All: the cost of the slowest scene; some: how many; each scene has a column of its own."""
     chain = [replace(item, study="chain", scene="chain", cost=0.5) for item in ARM]
-    assert at([*ARM, *chain], 3)[:2] == (Verdict.AGREES, "0.5")
+    assert at([*ARM, *chain], 3)[:2] == (Verdict.AGREES, "2×")
     coarse = [line(study="chain", scene="chain", error=4e-2)]
     assert at([*ARM, *coarse], 3)[:2] == (Verdict.CONVERGES, "1 of 2")
-    columns = choice_matrix([*ARM, *coarse, line(study="ball", group="ball rolling")], STUDIES).columns
+    columns = choice_matrix([*ARM, *coarse, line(study="ball", scene="ball", group="ball rolling")], STUDIES).columns
     assert [(item.title, item.whole) for item in columns] == [
-        ("trees", True), ("An arm", False), ("A chain", False), ("ball rolling", True),
+        ("Trees", True), ("arm", False), ("chain", False), ("Ball rolling", True), ("ball", False),
     ]  # fmt: skip
-
-
-def test_the_answer_names_the_cheapest_engine_of_each_group() -> None:
-    """Solutions of the scene's own equations are no answer; a group that nothing holds is named."""
-    beta = line(engine="beta", row=3, error=1e-9, cost=0.5)
-    own = line(engine="gamma", row=4, error=1e-12, cost=1e-6, own_equations=True)
-    ball = line(study="ball", group="ball rolling", error=0.1)
-    found = choice_matrix([*ARM, beta, own, ball], STUDIES)
-    assert found.answer(1e-3, False) == (
-        "The cheapest to hold motion to 1e-3 of the path, in seconds of computing per second of motion: "
-        "alpha joints default at dt 1e-3 s for trees (0.01); nothing that was run and timed holds it for ball rolling."
-    )
-    assert "beta joints default at dt 1e-3 s for trees (0.5)" in found.answer(1e-8, False)
-    assert "motion to 1e-3 of the path and forces to 1e-3 of the largest" in found.answer(1e-3, True)
-
-
-def test_beside_the_answer_stands_what_forces_change(whole: ChoiceMatrix) -> None:
-    """A group whose cheapest run stays the same, that takes another, that nothing holds, without judged forces."""
-    same = choice_matrix([line(error=1e-6), replace(FORCE, error=1e-9)], STUDIES).with_forces(1e-4)
-    assert same == "With forces to 1e-4 of the largest, too: the same for trees."
-    changed = choice_matrix(ARM, STUDIES)
-    assert changed.with_forces(1e-8).endswith("too: nothing that was run and timed holds it for trees.")
-    finer = changed.ranked(changed.columns[0], 1e-2, True)[0][1]
-    assert changed.with_forces(1e-2).endswith(f"too: {finer.name} for trees ({finer.text}).")
-    assert choice_matrix([LINE], STUDIES).with_forces(1e-4) == "", "no forces are judged"
-    assert whole.with_forces(1e-4).endswith("; forces are not judged for ball rolling.")
-
-
-def test_the_cheapest_of_each_column_is_framed() -> None:
-    """The row of its formulation, with all settings; no row where nothing holds the tolerance."""
-    beta = line(engine="beta", row=3, error=1e-9, cost=0.5)
-    own = line(engine="gamma", row=4, error=1e-12, cost=1e-6, own_equations=True)
-    found = choice_matrix([*ARM, beta, own, line(study="ball", group="ball rolling", error=0.1)], STUDIES)
-    names = [[None if at is None else found.rows[at].name for at in found.best(at, False)] for at in (1e-3, 1e-8)]
-    assert names == [["alpha joints", None], ["beta joints", None]]
-    assert not any(found.rows[at].setting for at in found.best(1e-3, False) if at is not None)
-
-
-def test_a_formulation_of_all_scenes_comes_before_a_cheaper_one_of_some() -> None:
-    """Scenes differ in cost: what ran only in a group's cheap scene does not answer for the group, and says so."""
-    both = [line(error=1e-9, cost=0.5), line(error=1e-9, cost=2.0, study="chain")]
-    found = choice_matrix([*both, line(engine="beta", row=3, error=1e-9, cost=0.1)], STUDIES)
-    whole = found.columns[0]
-    assert [found.rows[place].engine for place, _ in found.ranked(whole, 1e-4, False)] == ["alpha", "beta"]
-    assert "alpha joints default at dt 1e-3 s for trees (2)" in found.answer(1e-4, False)
-    told = of_column(found, whole, 1e-4, False).sentence
-    assert "; beta joints default at dt 1e-3 s in 1 of 2 scenes costs 0.05 times that." in told
-    late = line(engine="beta", row=3, study="chain", status="left out", verdict="not-judged", error=None, cost=None)
-    unfinished = choice_matrix([*both, line(engine="beta", row=3, error=1e-9, cost=0.1), late], STUDIES)
-    assert "(0.1 in 1 of 2 scenes)" in unfinished.answer(1e-4, False), "lack of time makes no other engine cheaper"
-    alone = replace(found, rows=[row for row in found.rows if row.engine == "beta"])
-    vars(alone)["judged"] = found.judged
-    assert "(0.1 in 1 of 2 scenes)" in alone.answer(1e-4, False), "the only one of the chosen engines"
-
-
-def test_the_data_hold_every_cell(whole: ChoiceMatrix) -> None:
-    """What the page's program shows is what the matrix says, for all tolerances, with and without forces."""
-    data = json.loads(whole.data)
-    for index, (forces, decade) in enumerate(product((False, True), DECADES)):
-        best = [ranked[0][0] if ranked else None for ranked in data["ranks"][index]]
-        assert best == whole.best(10.0**-decade, forces)
-        for row, numbers in zip(whole.rows, data["grid"], strict=True):
-            for column, own in zip(whole.columns, numbers, strict=True):
-                assert tuple(data["cells"][own[index]]) == whole.cell(row, column, 10.0**-decade, forces)[:4]
-    assert len(data["cells"]) < len(whole.rows) * len(whole.columns) * 14
-
-
-def test_what_was_not_run_is_empty(whole: ChoiceMatrix) -> None:
-    """An engine that was not asked for a scene has a cell that says so."""
-    row = next(item for item in whole.rows if item.engine == "beta")
-    column = next(item for item in whole.columns if item.group == "ball rolling")
-    assert whole.cell(row, column, 1e-4, False) == ChoiceCell(NO_RUN, "", "not run")
 
 
 @pytest.fixture
@@ -271,20 +188,92 @@ def test_a_scene_that_was_left_out_says_nothing_against_those_that_ran() -> None
     assert at([*ARM, gone], 4)[:2] == at(ARM, 4)[:2]
     other = replace(gone, engine="beta", status="done", verdict="agrees", error=1e-6, cost=1.0)
     assert at([*ARM, gone, other], 4)[:2] == at(ARM, 4)[:2], "also where another engine ran it"
-    said = choice_matrix([*ARM, gone, other], STUDIES).answer(1e-4, False)
-    assert "alpha joints default at dt 2.5e-4 s for trees" in said
+    taken = answer(choice_matrix([*ARM, gone, other], STUDIES), 1e-4, False).kinds[0].taken
+    assert taken is not None
+    assert taken.cell.name == "alpha joints default at dt 2.5e-4 s"
     assert at([gone], 4).state == Verdict.NOT_JUDGED
-
-
-def test_scenes_of_small_groups_are_unfolded_beside_few_groups_alone() -> None:
-    """A group of one or two scenes is unfolded beside four others, and beside eight folded as they are."""
-    for many, unfolded in ((5, 5), (9, 0)):
-        lines = [line(study=f"s{at}", scene=f"s{at}", group=f"group {at}") for at in range(many)]
-        matrix = choice_matrix(lines, {item.study: ChoiceStudy(item.study, "") for item in lines})
-        assert len(matrix.unfolded) == unfolded
 
 
 def test_a_cell_without_a_cost_says_so() -> None:
     """What holds the tolerance and was not timed is told in words beside its sign, which stands once."""
     found = at([line(error=1e-9, cost=None)], 4)
     assert (found.state, found.text) == (Verdict.AGREES, "not timed")
+
+
+@pytest.mark.parametrize(
+    ("cost", "clean", "text"),
+    [
+        (0.011, True, "91×"), (0.011, False, "≈ 90×"), (0.053, False, "≈ 19×"), (0.024, False, "≈ 40×"),
+        (0.82, False, "≈ 1.2×"), (3.4e-4, True, "2900×"), (4.0, True, "0.25×"), (0.0, True, "not timed"),
+    ],
+)  # fmt: skip
+def test_a_cost_is_told_as_a_speed(cost: float, clean: bool, text: str) -> None:
+    """Times real time: two digits of clean runs, coarse steps of rough ones."""
+    assert speed(cost, clean) == text
+
+
+def test_a_scene_counts_once_however_many_studies_use_it() -> None:
+    """Two studies of one scene are one scene, whose cell is the worse; another scene is a second."""
+    again = [replace(item, study="chain") for item in ARM]
+    other = [replace(item, study="ball", scene="ball") for item in ARM]
+    found = choice_matrix([*ARM, *again, *other], STUDIES)
+    assert [(item.name, item.whole, len(item.scenes)) for item in found.columns] == [
+        ("trees", True, 2), ("arm", False, 1), ("ball", False, 1),
+    ]  # fmt: skip
+    worse = [line(study="chain", error=4e-2)]
+    assert at([*ARM, *worse], 3)[:2] == (Verdict.CONVERGES, "0.04"), "no number of studies"
+
+
+def test_what_cannot_be_represented_is_told_from_what_was_not_run(whole: ChoiceMatrix) -> None:
+    """A formulation that lacks what a scene requires cannot; one that provides it, or is not known, was not run."""
+    row = next(item for item in whole.rows if item.engine == "beta")
+    column = next(item for item in whole.columns if item.group == "ball rolling")
+    assert whole.cell(row, column, 1e-4, False) == ChoiceCell(NO_RUN, "", "was not run in this report")
+    needs = {name: study._replace(requires=frozenset({"a wall"})) for name, study in STUDIES.items()}
+    for provided, state in (([], CANNOT), (["a wall"], NO_RUN)):
+        told = replace(whole, studies=needs, naming=Naming(provides={"beta": {"joints": provided}}))
+        cell = told.cell(row, column, 1e-4, False)
+        assert (cell.state, "lacks “a wall”" in cell.title) == (state, state == CANNOT)
+
+
+def test_an_engine_stands_by_its_formulations() -> None:
+    """One for all scenes comes first; else the best for each; some scenes are told as partly, none by the worst."""
+    chain = {"study": "chain", "scene": "chain"}
+    lines = [
+        line(error=1e-9, cost=0.1),
+        line(error=1e-9, cost=0.3, **chain),
+        line(formulation="maps", row=1, error=1e-9, cost=0.01),
+        line(formulation="maps", row=1, error=0.5, cost=0.01, **chain),
+    ]
+    found = choice_matrix(lines, STUDIES)
+    standing = found.standing("alpha", found.kinds[0], 1e-4, False)
+    assert (standing.formulation, standing.cell.cost) == ("joints", 0.3)
+    found = choice_matrix([lines[1], lines[2]], STUDIES)
+    standing = found.standing("alpha", found.kinds[0], 1e-4, False)
+    assert (set(standing.formulation.split(", ")), standing.cell.cost) == ({"joints", "maps"}, 0.3)
+    found = choice_matrix(lines[2:], STUDIES)
+    standing = found.standing("alpha", found.kinds[0], 1e-4, False)
+    assert (standing.cell.state, standing.cell.text) == (PARTLY, "1 of 2")
+    assert [cell.holds for cell in standing.scenes] == [True, False]
+    assert found.standing("alpha", found.kinds[0], 1e-12, False).cell.text == "0 of 2"
+
+
+def test_what_holds_all_scenes_comes_before_what_is_cheaper_in_some() -> None:
+    """Scenes differ in cost: what ran only in a kind's cheap scene does not answer for the kind."""
+    both = [line(error=1e-9, cost=0.5), line(error=1e-9, cost=2.0, study="chain", scene="chain")]
+    found = choice_matrix([*both, line(engine="beta", row=3, error=1e-9, cost=0.1)], STUDIES)
+    ranked = found.standings(found.kinds[0], 1e-4, False)
+    assert [(item.engine, item.cell.state) for item in ranked] == [("alpha", Verdict.AGREES), ("beta", PARTLY)]
+    late = line(
+        engine="beta",
+        row=3,
+        study="chain",
+        scene="chain",
+        status="left out",
+        verdict="not-judged",
+        error=None,
+        cost=None,
+    )
+    unfinished = choice_matrix([*both, line(engine="beta", row=3, error=1e-9, cost=0.1), late], STUDIES)
+    assert unfinished.standings(unfinished.kinds[0], 1e-4, False)[0].engine == "beta", "lack of time is no failure"
+    assert "beta joints, default, dt 1e-3 s in 1 of 2 scenes" in advice(unfinished, 1e-4, False)[0].sentence

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
@@ -35,6 +35,13 @@ class MechanismReport(ReportKind):
     """See :class:`proofroll.report.kinds.ReportKind`."""
 
     replay_script: ClassVar[str] = "replay_mechanism.js"
+    groups: ClassVar[Mapping[str, tuple[str, str]]] = {
+        "contact": ("Contact", "bodies that touch, slide and hit each other"),
+        "joint laws": ("Joint laws", "joints with friction, stops, couplings or limits of a drive"),
+        "loops": ("Closed loops", "joints that close rings, with redundant constraints"),
+        "springs and drives": ("Springs and drives", "bodies on joints with springs, dampers or motors"),
+        "trees": ("Trees", "bodies on joints, no loop"),
+    }
     caption: ClassVar[str] = (
         "At the start, to scale. Filled dots are centres of mass, with a line to all that is fastened to the body; "
         "circles are joints, dashed circles the loops that close the tree, zigzags springs, coloured circles the "

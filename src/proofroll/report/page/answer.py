@@ -1,0 +1,251 @@
+"""The answer to a reader's question: for each kind of scene the engine to take, its rivals, and what fails.
+
+Chips, cards and tables of the page, the end of the terminal's text and ``proofroll recommend`` are all made of it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
+
+from proofroll.core.number_format import number
+from proofroll.core.verdict import Verdict
+from proofroll.report.page.choice_cell import CANNOT, NO_RUN, PARTLY, ChoiceCell, cell_of
+from proofroll.report.page.choice_matrix import ChoiceColumn, ChoiceMatrix, EngineStanding
+
+# Lengths per metre of path, in words, by negative power of ten of the tolerance.
+LENGTHS = {
+    2: "1 cm", 3: "1 mm", 4: "0.1 mm", 5: "10 µm", 6: "1 µm", 7: "0.1 µm", 8: "10 nm",
+}  # fmt: skip
+# States that say nothing about an engine.
+_SILENT = {Verdict.AGREES, Verdict.NOT_JUDGED, Verdict.ILL_POSED, Verdict.ANOTHER_SCENE, NO_RUN, CANNOT}
+# States of what fails, the gravest first.
+_STATES = (Verdict.FAILED, Verdict.DIFFERS, Verdict.CONVERGES, Verdict.REFUSED)
+# Most reasons on a card.
+_REASONS = 2
+
+
+@dataclass(frozen=True)
+class ReaderQuestion:
+    """Tolerance relative to path and largest force, and whether forces count."""
+
+    tolerance: float
+    forces: bool
+
+    @property
+    def words(self) -> str:
+        """What is asked for, for a sentence: ``motion within 0.1 mm per metre of path``."""
+        return f"{self.motion}{f' and forces within {number(self.tolerance)} of the largest' if self.forces else ''}"
+
+    @property
+    def motion(self) -> str:
+        """The tolerance of the motion in words."""
+        decade = -math.log10(self.tolerance)
+        length = LENGTHS.get(round(decade)) if abs(decade - round(decade)) < 1e-9 else None
+        return f"{length} per metre of the true path" if length else f"{number(self.tolerance)} of the path"
+
+
+@dataclass(frozen=True)
+class Failure:
+    """A setting that does not hold the tolerance: state, who, and why in at most twelve words."""
+
+    state: str
+    who: str
+    why: str
+
+
+@dataclass(frozen=True)
+class ColumnAnswer:
+    """FirstAnswer for a kind of scenes or for one scene.
+
+    Attributes:
+        column: of the matrix.
+        standings: of the engines that may be taken, the best first.
+        scenes: best cell of these in each scene of the column.
+        failures: what fails and why.
+        judged: False: what is asked for is judged in none of its scenes.
+    """
+
+    column: ChoiceColumn
+    standings: list[EngineStanding]
+    scenes: list[ChoiceCell]
+    failures: list[Failure]
+    judged: bool
+
+    @property
+    def taken(self) -> EngineStanding | None:
+        """The engine to take; None: nothing holds the tolerance."""
+        return self.standings[0] if self.standings and self.standings[0].cell.holds else None
+
+    @property
+    def next(self) -> EngineStanding | None:
+        """The next engine that holds the tolerance, or None."""
+        return self.standings[1] if self.taken and len(self.standings) > 1 and self.standings[1].cell.holds else None
+
+    @property
+    def tied(self) -> list[EngineStanding]:
+        """Engines whose cost cannot be told from that of the one to take."""
+        return [item for item in self.standings if self.taken and item.ties(self.taken)]
+
+    @property
+    def most_held(self) -> int:
+        """Largest number of the column's scenes that one engine holds."""
+        return max((sum(cell.holds for cell in item.scenes) for item in self.standings), default=0)
+
+
+@dataclass(frozen=True)
+class Chip:
+    """One clause of the answer in a line: an engine (empty: none) for kinds of scenes."""
+
+    engine: str
+    title: str
+    words: str
+
+
+@dataclass(frozen=True)
+class FirstAnswer:
+    """FirstAnswer to a question: for each kind of scenes, and for each scene."""
+
+    question: ReaderQuestion
+    kinds: list[ColumnAnswer]
+    scenes: list[ColumnAnswer]
+    chips: list[Chip]
+
+    @property
+    def sentence(self) -> str:
+        """The chips as one sentence."""
+        if not self.chips:
+            return "Nothing was run that could be advised."
+        clauses = "; ".join(f"{chip.title} {chip.words}" for chip in self.chips)
+        return f"The cheapest that holds {self.question.words}: {clauses}."
+
+
+def answer(matrix: ChoiceMatrix, tolerance: float, forces: bool, engines: Collection[str] | None = None) -> FirstAnswer:
+    """FirstAnswer of a matrix to a question; ``engines``: of these alone."""
+    asked = ReaderQuestion(tolerance, forces)
+    found = {(item.name, item.group, item.whole): of_column(matrix, item, asked, engines) for item in matrix.columns}
+    kinds = [item for (_, _, whole), item in found.items() if whole]
+    scenes = [item for (_, _, whole), item in found.items() if not whole]
+    return FirstAnswer(asked, kinds, scenes, _chips(matrix, kinds))
+
+
+def of_column(
+    matrix: ChoiceMatrix, column: ChoiceColumn, asked: ReaderQuestion, engines: Collection[str] | None = None
+) -> ColumnAnswer:
+    """FirstAnswer for one column of the matrix."""
+    standings = matrix.standings(column, asked.tolerance, asked.forces, engines)
+    best = [min(cells, key=_state_rank) for cells in zip(*(item.scenes for item in standings), strict=True)]
+    judged = not matrix.unjudged[asked.forces].issuperset(column.studies)
+    return ColumnAnswer(column, standings, best, _failures(matrix, column, asked, engines), judged)
+
+
+def _state_rank(cell: ChoiceCell) -> tuple[bool, bool]:
+    return not cell.holds, cell.state in _SILENT
+
+
+def _failures(
+    matrix: ChoiceMatrix, column: ChoiceColumn, asked: ReaderQuestion, engines: Collection[str] | None
+) -> list[Failure]:
+    """Rows of the column's comparisons that do not hold the tolerance and have a short reason, one per formulation."""
+    found: list[tuple[int, float, Failure, str]] = []
+    for row in matrix.rows:
+        if not row.setting or row.own_equations or (engines is not None and row.engine not in engines):
+            continue
+        for study in column.studies:
+            for number_of_row, short in matrix.studies[study].short.items():
+                steps = [item for item in row.found.get(study, ()) if item.row == number_of_row]
+                cell = cell_of(steps, asked.tolerance, asked.forces) if steps else None
+                if cell is None or cell.state in _SILENT:
+                    continue
+                sizes = [size for item in steps if (size := item.tolerance(asked.forces)) is not None]
+                preset = f" {row.setting}" if row.setting == "default" else ""
+                who = f"{matrix.title(row.engine)} {row.formulation.replace('_', ' ')}{preset}"
+                place = _STATES.index(cell.state) if cell.state in _STATES else len(_STATES)
+                found.append((place, -min(sizes, default=0.0), Failure(cell.state, who, short), row.name))
+    found.sort(key=lambda item: item[:2])
+    first = {name: item for *_, item, name in reversed(found)}
+    return [item for *_, item, name in found if first[name] is item][:_REASONS]
+
+
+def _chips(matrix: ChoiceMatrix, kinds: Sequence[ColumnAnswer]) -> list[Chip]:
+    """Kinds by the engine to take, engines with the most kinds first; then kinds that none holds, or nobody judges."""
+    taken: dict[str, list[str]] = {}
+    nobody, silent = [], []
+    for item in kinds:
+        name = _lower(item.column.title)
+        many = len(item.column.scenes)
+        if item.taken is not None:
+            taken.setdefault(item.taken.engine, []).append(name)
+        elif not item.judged:
+            silent.append(name)
+        elif all(x.cell.state in {NO_RUN, CANNOT, Verdict.NOT_JUDGED} for x in item.standings):
+            silent.append(f"{name} (no result)")
+        else:
+            nobody.append(
+                f"all {many} scenes of {name}" if many > 2 else f"both scenes of {name}" if many == 2 else name
+            )
+    ranked = sorted(taken.items(), key=lambda item: -len(item[1]))
+    chips = [Chip(engine, matrix.title(engine), f"for {listed(names)}") for engine, names in ranked]
+    chips += [Chip("", "No engine", f"for {listed(nobody)}")] if nobody else []
+    return chips + ([Chip("?", "Not judged", f"for {listed(silent)}")] if silent else [])
+
+
+def _lower(title: str) -> str:
+    return title[:1].lower() + title[1:]
+
+
+def listed(words: Sequence[str]) -> str:
+    """Words as a list in a sentence; what ends alike is told once: ``rolling and slipping balls``."""
+    last = [word.rpartition(" ")[2] for word in words]
+    for ending in dict.fromkeys(last):
+        alike = [word for word in words if word.endswith(f" {ending}") and word.count(" ") == 1]
+        if len(alike) > 1 and last.count(ending) == len(alike):
+            joined = " and ".join(word.partition(" ")[0] for word in alike) + f" {ending}"
+            words = [joined, *(word for word in words if word not in alike)]
+    return f"{', '.join(words[:-1])} and {words[-1]}" if len(words) > 1 else words[0]
+
+
+def take_words(matrix: ChoiceMatrix, standing: EngineStanding) -> str:
+    """Engine and formulation for a reader."""
+    return f"{matrix.title(standing.engine)} {standing.formulation.replace('_', ' ')}".strip()
+
+
+def next_words(matrix: ChoiceMatrix, item: ColumnAnswer) -> str:
+    """The next engine and what it costs relative to the one to take; or what it does not do."""
+    second, first = item.next, item.taken
+    if second is None or first is None:
+        return "no other engine holds it" if first else ""
+    if second.ties(first):
+        return f"{take_words(matrix, second)}, a tie"
+    return f"{take_words(matrix, second)}, {second.cell.cost / first.cell.cost:.2g}× the cost"
+
+
+def closest_words(matrix: ChoiceMatrix, item: ColumnAnswer) -> str:
+    """What stands in place of a choice where nothing holds the tolerance."""
+    if not item.judged:
+        return "not judged"
+    if not item.standings:
+        return "no engine was run"
+    best = item.standings[0]
+    if best.cell.state == PARTLY:
+        held = [
+            f"{scene.words} {cell.text}"
+            for scene, cell in zip(item.column.scenes, best.scenes, strict=True)
+            if cell.holds
+        ]
+        return f"none for all; {matrix.title(best.engine)} holds {best.cell.text}: {', '.join(held)}"
+    return f"none; closest {take_words(matrix, best)}: {best.cell.why or best.cell.state}"
+
+
+def forces_words(matrix: ChoiceMatrix, motion: ColumnAnswer, both: ColumnAnswer) -> str:
+    """What forces change: ``motion`` and ``both``: answers for motion alone and with forces."""
+    if not both.judged:
+        return "not judged"
+    if both.taken is None:
+        return "✗ none"
+    same = motion.taken is not None and (motion.taken.engine, motion.taken.cell.name) == (
+        both.taken.engine,
+        both.taken.cell.name,
+    )
+    return "✓ the same" if same else f"{take_words(matrix, both.taken)}, {both.taken.cell.text}"

@@ -1,0 +1,111 @@
+"""The answer that chips, cards, tables, the terminal and ``recommend`` have in common."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+from table_lines import ARM, FORCE, LINE, line
+
+from proofroll.report.page.answer import ReaderQuestion, answer, closest_words, forces_words, listed, next_words
+from proofroll.report.page.choice_matrix import ChoiceStudy, Naming, choice_matrix
+from proofroll.report.page.profile import profile
+from proofroll.report.terminal.tables import answer_table
+
+STUDIES = {name: ChoiceStudy(f"A {name}", f"c{number}") for number, name in enumerate(("arm", "chain", "ball"))}
+BETA = line(engine="beta", row=3, error=1e-9, cost=0.5)
+OWN = line(engine="gamma", row=4, error=1e-12, cost=1e-6, own_equations=True)
+BALL = line(study="ball", scene="ball", group="ball rolling", error=0.1)
+NAMES = Naming(engines={"alpha": "Alpha"}, kinds={"ball rolling": ("Rolling balls", "a ball rolls")})
+
+
+def test_the_cheapest_engine_of_each_kind_is_told_and_a_witness_never_is() -> None:
+    """Engines by the number of kinds, then kinds that nothing holds; the words of the tolerance are a length."""
+    found = answer(choice_matrix([*ARM, BETA, OWN, BALL], STUDIES, NAMES), 1e-3, False)
+    assert found.sentence == (
+        "The cheapest that holds 1 mm per metre of the true path: Alpha for trees; No engine for rolling balls."
+    )
+    assert [item.engine for item in found.kinds[0].standings] == ["alpha", "beta"]
+    assert answer(choice_matrix([*ARM, BETA, BALL], STUDIES), 1e-8, False).chips[0].title == "beta"
+    assert answer(choice_matrix([*ARM, BETA], STUDIES), 1e-3, False, {"beta"}).chips[0].title == "beta"
+    assert "and forces within 1e-3 of the largest" in ReaderQuestion(1e-3, True).words
+    assert "2e-3 of the path" in ReaderQuestion(2e-3, False).words
+
+
+def test_a_tie_is_told_of_rough_costs_alone() -> None:
+    """Costs known to a factor of two that are nearer than that tie; clean ones do not."""
+    for clean, words in ((False, "beta joints, a tie"), (True, "beta joints, 1.5× the cost")):
+        lines = [line(error=1e-9, cost=0.2, clean=clean), replace(BETA, cost=0.3, clean=clean)]
+        matrix = choice_matrix(lines, STUDIES)
+        item = answer(matrix, 1e-4, False).kinds[0]
+        assert next_words(matrix, item) == words
+        assert [tied.engine for tied in item.tied] == ([] if clean else ["beta"])
+
+
+def test_where_nothing_holds_it_the_closest_is_told() -> None:
+    """By what it is off; of several scenes how many the best engine holds, and at which speed."""
+    matrix = choice_matrix([BALL], STUDIES)
+    item = answer(matrix, 1e-3, False).kinds[0]
+    assert closest_words(matrix, item).startswith("none; closest alpha joints: off by 0.1")
+    matrix = choice_matrix([LINE, replace(LINE, study="chain", scene="chain", error=0.5)], STUDIES)
+    item = answer(matrix, 1e-3, False).kinds[0]
+    assert closest_words(matrix, item) == "none for all; alpha holds 1 of 2: arm 100×"
+    assert item.most_held == 1
+
+
+def test_forces_are_told_where_they_change_the_choice() -> None:
+    """The same, another setting, none, or not judged."""
+    for lines, words in (
+        ([LINE, replace(FORCE, error=1e-9)], "✓ the same"),
+        ([LINE, FORCE], "✗ none"),
+        ([LINE], "not judged"),
+    ):
+        matrix = choice_matrix(lines, STUDIES)
+        motion, both = (answer(matrix, 1e-3, forces).kinds[0] for forces in (False, True))
+        assert forces_words(matrix, motion, both) == words
+
+
+def test_what_fails_is_told_in_the_words_of_its_comparison() -> None:
+    """One reason for a formulation, the gravest first, and none of what holds the tolerance."""
+    wrong = line(engine="delta", row=5, error=0.5, limit="another limit", verdict="differs", preset="default")
+    studies = STUDIES | {"arm": STUDIES["arm"]._replace(short={0: "it is soft", 5: "it falls"})}
+    matrix = choice_matrix([LINE, wrong], studies)
+    told = answer(matrix, 1e-6, False).kinds[0].failures
+    assert [(item.who, item.why) for item in told] == [
+        ("delta joints default", "it falls"), ("alpha joints default", "it is soft"),
+    ]  # fmt: skip
+    assert [item.why for item in answer(matrix, 1e-2, False).kinds[0].failures] == ["it falls"]
+
+
+@pytest.mark.parametrize(
+    ("words", "text"),
+    [
+        (["trees"], "trees"),
+        (["rolling balls", "slipping balls"], "rolling and slipping balls"),
+        (["closed loops", "rolling balls", "slipping balls"], "rolling and slipping balls and closed loops"),
+        (["closed loops", "trees", "contact"], "closed loops, trees and contact"),
+    ],
+)
+def test_kinds_are_listed_as_in_a_sentence(words: list[str], text: str) -> None:
+    """What ends alike is told once."""
+    assert listed(words) == text
+
+
+def test_the_terminal_shows_the_same_answer() -> None:
+    """A line for each kind: what to take with its step, speed, the next engine, and what forces change."""
+    table = answer_table(choice_matrix([*ARM, BETA, BALL], STUDIES, NAMES), 1e-3, False)
+    lines = list(zip(*([str(cell) for cell in column.cells] for column in table.columns), strict=True))
+    assert lines[0][:4] == ("Trees", "Alpha joints, default, dt 1e-3 s", "100×", "beta joints, 50× the cost")
+    assert lines[1][:3] == ("Rolling balls", "none; closest Alpha joints: off by 0.1, finer steps come closer", "–")
+
+
+def test_the_profile_counts_the_scenes_of_each_engine() -> None:
+    """Scenes held within a ratio of the cheapest engine's cost; a witness has a line and is no rival."""
+    matrix = choice_matrix([*ARM, BETA, OWN, BALL], STUDIES)
+    found = profile(matrix, answer(matrix, 1e-3, False))
+    assert found.scenes == 2
+    assert {item.engine: (item.within(1), len(item.ratios)) for item in found.rivals} == {
+        "alpha": (1, 1),
+        "beta": (0, 1),
+    }
+    assert [item.engine for item in found.lines if item.witness] == ["gamma"]
