@@ -3,17 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 from proofroll.elements.mechanism.contacts.acting import ContactMode
-from proofroll.elements.mechanism.contacts.geometry import BodyContact
+from proofroll.elements.mechanism.contacts.joint_laws import JointContact
 from proofroll.elements.mechanism.signal import Table
+from proofroll.truth.mechanism.constraint_rows import ConstraintRow
 from proofroll.truth.mechanism.contact_equations import ContactEquations
 from proofroll.truth.mechanism.contact_scalars import ScalarMotion, ScalarTouch, floats, known_shapes, touch_in_scalars
-from proofroll.truth.mechanism.contact_symbols import Row, SolvedSymbols, Vector, eliminated, held_rows
+from proofroll.truth.mechanism.contact_symbols import Row, SolvedSymbols, Vector, eliminated, of_joint, rows_of
 from proofroll.truth.mechanism.maximal_bodies import AXES, BodyInScalars
-from proofroll.truth.mechanism.maximal_equations import ConstrainedEquations
 from proofroll.truth.scalars import Scalar, add, cross, dot, is_zero, minus, mul, plus, scaled, sub, turned
+
+
+class _Now(NamedTuple):
+    """Bodies, and rates of the joints whose laws are contacts, at one instant."""
+
+    views: Sequence[BodyInScalars]
+    laws: Sequence[ConstraintRow]
 
 
 class BodySymbols:
@@ -25,12 +32,14 @@ class BodySymbols:
     def __init__(self, equations: ContactEquations) -> None:
         self._equations, self._bodies = equations, equations.equations.equations
         self._kept = equations.equations.independent_rows()
+        self._touchings = len(equations.mechanism.contacts)
+        self._laws = [each for each in equations.contacts if isinstance(each, JointContact)]
 
     @property
     def covers(self) -> bool:
         """True if all parts of the mechanism have a rule here."""
-        contacts, bodies = self._equations.contacts, self._bodies
-        shapes = all(isinstance(contact, BodyContact) and known_shapes(contact) for contact in contacts)
+        bodies = self._bodies
+        shapes = all(map(known_shapes, bodies.mechanism.contacts))
         laws = any(joint.armature for joint in bodies.mechanism.joints) or any(
             actuator.limit is not None for actuator in bodies.mechanism.actuators
         )
@@ -43,27 +52,33 @@ class BodySymbols:
         """Rates and forces for a state that ends with the time; ``began``: line of each contact at the start."""
         e = self._bodies
         now = e.at(state[:-1], functions, time=state[-1])
-        touching = self._touching(now.views, functions)
+        numbers = [law.joint.number for law in self._laws]
+        at = _Now(now.views, e.rate_rows(state[:-1], numbers, functions))
+        touching = [*self._touching(now.views, functions), *self._of_joints(state, at)]
         joints = [now.rows[k] for k in self._kept]
         held = [(row.coefficients, row.bias) for row in joints]
         lines = [
-            None if start is None else self._line(k, touching[k], start, now, held, functions)
+            start if start is None or k >= self._touchings else self._line(k, touching[k], start, at, held, functions)
             for k, start in enumerate(began)
         ]
         rows, pushes, aims = [row for row, _ in held], [row for row, _ in held], [sub(0.0, bias) for _, bias in held]
+        force = list(now.force)
         owner: list[tuple[int, Vector]] = []
         for k, (own, touch, line) in enumerate(zip(mode, touching, lines, strict=True)):
             if own.kind == "open":
                 continue
-            part = held_rows(own.kind, touch, line, float(self._equations.friction[k]), functions["sqrt"])
-            rate = self._bias(k, touch, now.views)
+            part = rows_of(own.kind, touch, line, self._equations.contacts[k], functions["sqrt"])
+            rate = self._bias(k, touch, at)
+            if line is not None and own.kind == "slip" and (bound := float(self._equations.bounds[k])):
+                for n, value in self._row(k, touch, scaled(-bound, line), at).items():
+                    force[n] = add(force[n], value)
             for direction, along in zip(part.directions, part.along, strict=True):
-                rows.append(self._row(k, touch, direction, now.views))
-                pushes.append(self._row(k, touch, along, now.views))
+                rows.append(self._row(k, touch, direction, at))
+                pushes.append(self._row(k, touch, along, at))
                 turning = dot(touch.normal_rate, touch.slide) if own.kind == "slip" else 0.0
                 aims.append(sub(sub(0.0, dot(direction, rate)), turning))
                 owner.append((k, along))
-        (answer,), pivots = self._eliminated(rows, pushes, [[*now.force, *aims]])
+        (answer,), pivots = self._eliminated(rows, pushes, [[*force, *aims]])
         response: Scalar = 1.0
         if any(own.kind == "slip" and mu for own, mu in zip(mode, self._equations.friction, strict=True)):
             smooth = self._eliminated(rows, rows, [])[1]
@@ -71,13 +86,10 @@ class BodySymbols:
                 response = mul(response, one / other)
         forces: list[Vector | None] = [None if own.kind == "open" else [0.0, 0.0, 0.0] for own in mode]
         for (k, along), size in zip(owner, answer[e.nu + len(held) :], strict=True):
-            force = forces[k]
-            assert force is not None  # its owner is closed
-            forces[k] = plus(force, scaled(size, along))
-        moved = [
-            plus(self._moved(k, touch, answer, now.views), self._bias(k, touch, now.views))
-            for k, touch in enumerate(touching)
-        ]
+            own_force = forces[k]
+            assert own_force is not None  # its owner is closed
+            forces[k] = plus(own_force, scaled(size, along))
+        moved = [plus(self._moved(k, touch, answer, at), self._bias(k, touch, at)) for k, touch in enumerate(touching)]
         return SolvedSymbols([*now.rate, *answer[: e.nu], *now.angle_rate], touching, lines, forces, response, moved)
 
     def _touching(self, views: Sequence[BodyInScalars], functions: Any) -> list[ScalarTouch]:
@@ -88,9 +100,25 @@ class BodySymbols:
         pairs = zip(self._bodies.mechanism.contacts, self._equations.pairs, strict=True)
         return [touch_in_scalars(contact, bodies[a], bodies[b], functions["sqrt"]) for contact, (a, b) in pairs]
 
-    def _row(self, k: int, touch: ScalarTouch, direction: Vector, views: Sequence[BodyInScalars]) -> Row:
+    def _of_joints(self, state: Sequence[Scalar], at: _Now) -> list[ScalarTouch]:
+        """Laws of joints as contacts; angles that are integrated count whole turns."""
+        e = self._bodies
+        u, kept = state[e.nx : e.nx + e.nu], {number: index for index, (number, _) in enumerate(e.angles)}
+        found = []
+        for law, row in zip(self._laws, at.laws, strict=True):
+            index = kept.get(law.joint.number)
+            q = row.residual if index is None else state[e.nx + e.nu + index]
+            found.append(of_joint(law, q, add(*(mul(value, u[n]) for n, value in row.coefficients.items()))))
+        return found
+
+    def _row(self, k: int, touch: ScalarTouch, direction: Vector, now: _Now) -> Row:
         """Coefficients, along the velocities, of a contact's slide in a direction."""
         row: Row = {}
+        if k >= self._touchings:
+            part = dot(floats(self._laws[k - self._touchings].direction), direction)
+            moves = now.laws[k - self._touchings].coefficients
+            return {} if is_zero(part) else {n: mul(part, value) for n, value in moves.items()}
+        views = now.views
         for body, sign in zip(self._equations.pairs[k], (1.0, -1.0), strict=True):
             if body < 0:
                 continue
@@ -100,14 +128,16 @@ class BodySymbols:
                 row[at] = add(row.get(at, 0.0), entry)
         return {at: entry for at, entry in row.items() if not is_zero(entry)}
 
-    def _moved(self, k: int, touch: ScalarTouch, u: Sequence[Scalar], views: Sequence[BodyInScalars]) -> list[Scalar]:
+    def _moved(self, k: int, touch: ScalarTouch, u: Sequence[Scalar], now: _Now) -> list[Scalar]:
         """Slide of a contact by velocities u, or its rate by accelerations."""
-        rows = [self._row(k, touch, axis, views) for axis in AXES]
+        rows = [self._row(k, touch, axis, now) for axis in AXES]
         return [add(*(mul(value, u[at]) for at, value in row.items())) for row in rows]
 
-    def _bias(self, k: int, touch: ScalarTouch, views: Sequence[BodyInScalars]) -> Vector:
+    def _bias(self, k: int, touch: ScalarTouch, now: _Now) -> Vector:
         """Rate of a contact's slide while the velocities stay."""
-        a, b = (views[body] for body in self._equations.pairs[k])
+        if k >= self._touchings:
+            return scaled(now.laws[k - self._touchings].bias, floats(self._laws[k - self._touchings].direction))
+        a, b = (now.views[body] for body in self._equations.pairs[k])
         return minus(*(cross(view.w, minus(touch.place_rate, view.v)) for view in (a, b)))
 
     def _line(
@@ -115,16 +145,16 @@ class BodySymbols:
         k: int,
         touch: ScalarTouch,
         start: Vector,
-        now: ConstrainedEquations,
+        now: _Now,
         held: Sequence[tuple[Row, Scalar]],
         functions: Any,
     ) -> Vector:
         """Present direction of the only line along which a contact can slide: where a force across would move it."""
-        push = self._row(k, touch, touch.across(start), now.views)
+        push = self._row(k, touch, touch.across(start), now)
         right = [push.get(at, 0.0) for at in range(self._bodies.nu)] + [0.0] * len(held)
         joints = [row for row, _ in held]
         (answer,), _ = self._eliminated(joints, joints, [right])
-        way = touch.across(self._moved(k, touch, answer, now.views))
+        way = touch.across(self._moved(k, touch, answer, now))
         return scaled(1.0 / functions["sqrt"](dot(way, way)), way)
 
     def _eliminated(

@@ -9,6 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
 from proofroll.elements.mechanism.contacts.acting import FAINT, Acting, ContactMode
+from proofroll.elements.mechanism.contacts.joint_laws import JointContact
 from proofroll.elements.mechanism.contacts.touching import FLAT
 from proofroll.truth.mechanism.contact_guards import (
     LEAST_RESPONSE,
@@ -17,11 +18,12 @@ from proofroll.truth.mechanism.contact_guards import (
     ContactGuard,
     Touchable,
 )
-from proofroll.truth.mechanism.contact_scalars import ScalarTouch
+from proofroll.truth.mechanism.contact_scalars import ScalarTouch, floats
 from proofroll.truth.scalars import Scalar, dot, is_zero, minus, mul, scaled, sub
 
 Vector = Sequence[Scalar]
 Row = dict[int, Scalar]
+_NONE = (0.0, 0.0, 0.0)
 
 
 class SolvedSymbols(NamedTuple):
@@ -68,6 +70,27 @@ def held_rows(
     return HeldRows([touch.normal], [minus(touch.normal, scaled(friction, line))])
 
 
+def of_joint(contact: JointContact, q: Scalar, v: Scalar) -> ScalarTouch:
+    """A law of a joint as a contact, at a coordinate and its rate; see :meth:`JointContact.touching`."""
+    stop = contact.joint.low if contact.side > 0 else contact.joint.high
+    gap = mul(float(contact.side), sub(q, float(stop))) if contact.side else 0.0
+    return ScalarTouch(gap, (1.0, 0.0, 0.0), _NONE, _NONE, _NONE, scaled(v, floats(contact.direction)))
+
+
+def rows_of(
+    kind: str,
+    touch: ScalarTouch,
+    line: Vector | None,
+    contact: Touchable,
+    root: Callable[[Scalar], Scalar],
+) -> HeldRows:
+    """Rows of a closed contact or law of a joint; dry friction of a joint holds its line, and has no normal."""
+    if contact.bound:
+        assert line is not None  # it has one coordinate
+        return HeldRows([line], [line]) if kind == "stick" else HeldRows([], [])
+    return held_rows(kind, touch, line, float(contact.friction), root)
+
+
 def guard_symbols(
     guards: Sequence[ContactGuard],
     contacts: Sequence[Touchable],
@@ -93,8 +116,10 @@ def guard_symbols(
         if guard.kind in {"lift", "break"}:
             assert force is not None  # the contact is closed
             normal = dot(touch.normal, force)
-            held = size(touch.across(force)) if guard.kind == "break" else 0.0
-            return sub(held, mul(float(contacts[k].friction) if guard.kind == "break" else 1.0, normal))
+            if guard.kind == "lift":
+                return sub(0.0, normal)
+            bound = float(contacts[k].bound) or mul(float(contacts[k].friction), normal)
+            return sub(size(touch.across(force)), bound)
         plain = {
             "close": sub(0.0, touch.gap),
             "flat": sub(FLAT, touch.tilt),

@@ -11,12 +11,12 @@ from typing import Any
 
 from proofroll.elements.mechanism.contacts.acting import ContactMode
 from proofroll.elements.mechanism.contacts.dynamics import ContactDynamics
-from proofroll.elements.mechanism.contacts.geometry import BodyContact
+from proofroll.elements.mechanism.contacts.joint_laws import JointContact
 from proofroll.elements.mechanism.joint import AXES
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.signal import Table, value_at
 from proofroll.truth.mechanism.contact_scalars import ScalarMotion, ScalarTouch, floats, known_shapes, touch_in_scalars
-from proofroll.truth.mechanism.contact_symbols import Row, SolvedSymbols, Vector, eliminated, held_rows
+from proofroll.truth.mechanism.contact_symbols import Row, SolvedSymbols, Vector, eliminated, of_joint, rows_of
 from proofroll.truth.mechanism.maximal_bodies import clean
 from proofroll.truth.scalars import (
     Scalar,
@@ -82,7 +82,7 @@ class TreeSymbols:
     def covers(self) -> bool:
         """True if all parts of the mechanism have a rule here."""
         m = self._mechanism
-        shapes = all(isinstance(each, BodyContact) and known_shapes(each) for each in self._dynamics.contacts)
+        shapes = all(map(known_shapes, m.contacts))
         limited = any(actuator.limit is not None for actuator in m.actuators)
         tables = any(isinstance(signal, Table) for signal in m.signals)
         return shapes and not (m.loops or m.couplings or limited or tables)
@@ -104,27 +104,25 @@ class TreeSymbols:
             _slide(touch, [(bodies[a], motions[a], 1.0), (bodies[b], motions[b], -1.0)])
             for touch, (a, b) in zip(touching, self._pairs, strict=True)
         ]
-        lines: list[Vector | None] = [None] * len(mode)
-        # Responses by one elimination of the mass matrix: the load, then what pushes in each row, and in each line.
-        rights: list[list[Scalar]] = [load]
+        for contact in self._dynamics.contacts[len(m.contacts) :]:
+            assert isinstance(contact, JointContact)  # they come after those of bodies
+            n = contact.joint.velocity
+            touching.append(of_joint(contact, q[contact.joint.coordinate], v[n]))
+            slides.append(({n: floats(contact.direction)}, _NONE))
+        for k, start in enumerate(began[len(m.contacts) :], len(m.contacts)):
+            bound = float(self._dynamics.contacts[k].bound)
+            if start is not None and mode[k].kind == "slip" and bound:  # dry friction, which is as large as it can be
+                for n, value in _along(slides[k][0], scaled(-bound, start)).items():
+                    load[n] = add(load[n], value)
+        free, lines = self._lines(began, mass, load, touching, slides, functions)
         rows: list[Row] = []
         aims: list[Scalar] = []
-        for k, start in enumerate(began):
-            if start is not None:
-                rights.append(_dense(_along(slides[k][0], touching[k].across(start)), m.nv))
-        answers, _ = eliminated(mass, rights)
-        free, ways = answers[0], iter(answers[1:])
-        for k, start in enumerate(began):
-            if start is not None:
-                answer = next(ways)
-                way = touching[k].across(_moved(slides[k][0], answer))
-                lines[k] = scaled(1.0 / functions["sqrt"](dot(way, way)), way)
         pushes: list[Row] = []
         owner: list[tuple[int, Vector]] = []
         for k, (own, touch, line) in enumerate(zip(mode, touching, lines, strict=True)):
             if own.kind == "open":
                 continue
-            part = held_rows(own.kind, touch, line, float(self._dynamics.friction[k]), functions["sqrt"])
+            part = rows_of(own.kind, touch, line, self._dynamics.contacts[k], functions["sqrt"])
             turning = dot(touch.normal_rate, touch.slide) if own.kind == "slip" else 0.0
             for direction, along in zip(part.directions, part.along, strict=True):
                 rows.append(_along(slides[k][0], direction))
@@ -152,6 +150,30 @@ class TreeSymbols:
             moved = plus(moved, scaled(size, each))
         slide_rates = [plus(_moved(J, moved), bias) for J, bias in slides]
         return SolvedSymbols([*rates, *moved], touching, lines, forces, response, slide_rates)
+
+    def _lines(
+        self,
+        began: Sequence[Vector | None],
+        mass: list[Row],
+        load: list[Scalar],
+        touching: Sequence[ScalarTouch],
+        slides: Sequence[tuple[dict[int, Vector], Vector]],
+        functions: Any,
+    ) -> tuple[list[Scalar], list[Vector | None]]:
+        """Accelerations without contact forces, and present directions of lines: where a force across would move.
+
+        Those of joints never turn.
+        """
+        lines, bodies = list(began), len(self._mechanism.contacts)
+        turning = {k: start for k, start in enumerate(began[:bodies]) if start is not None}
+        pushes = [
+            _dense(_along(slides[k][0], touching[k].across(start)), self._mechanism.nv) for k, start in turning.items()
+        ]
+        (free, *answers), _ = eliminated(mass, [load, *pushes])
+        for k, answer in zip(turning, answers, strict=True):
+            way = touching[k].across(_moved(slides[k][0], answer))
+            lines[k] = scaled(1.0 / functions["sqrt"](dot(way, way)), way)
+        return free, lines
 
     def _inertial(
         self,

@@ -205,9 +205,11 @@ class MaximalEquations:
             [entry for body, view, one in bodies for entry in body.projected(view, one[:3], one[3:])], float
         )
 
-    def rate_rows(self, state: Sequence[Scalar], joints: Sequence[int]) -> list[ConstraintRow]:
+    def rate_rows(
+        self, state: Sequence[Scalar], joints: Sequence[int], functions: Mapping[str, Any] = FUNCTIONS
+    ) -> list[ConstraintRow]:
         """Rates of revolute and prismatic joints as rows; the residual of a prismatic one is the coordinate."""
-        made = self._rows(self._views(state, FUNCTIONS))
+        made = self._rows(self._views(state, functions))
         return [made.of_rate(number, self.mechanism.joints[number].kind) for number in joints]
 
     def _rows(self, views: Sequence[BodyInScalars]) -> ConstraintRows:

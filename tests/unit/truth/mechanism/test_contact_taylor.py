@@ -110,3 +110,21 @@ def test_springs_motors_and_drives_are_compiled_but_tables_are_not() -> None:
     table = driven_turntable(Table((0.0, 0.1), (0.0, 0.2)), 0.0)
     found = truth_of(table, np.array([0.0, 0.02]))
     assert [route.split(", ")[1] for route in found.routes] == ["DOP853", "DOP853"]
+
+
+@pytest.mark.parametrize("law", [{"friction": 0.003}, {"limits": (-1.0, 0.5), "restitution": 0.5}])
+def test_stops_and_dry_friction_of_joints_are_compiled(law: dict[str, Any]) -> None:
+    """Laws of a joint beside a contact of bodies are rows of both routes' compiled modes, and guards of them."""
+    pytest.importorskip("heyoka")
+    m = load_scene("free_turntable").elements[0].mechanism  # type: ignore[attr-defined]
+    for route in routes_of(replace(m, joints=(replace(m.joints[0], **law), *m.joints[1:]))):
+        begun = route.begin()
+        assert begun.mode is not None
+        compiled, stretch = route._by_symbols(begun.state, begun.mode), route._law(begun.state, begun.mode)
+        assert compiled is not None
+        state = stretch.corrected(begun.state + 0.01 * stretch.rates(begun.state))
+        guards, _, rates = compiled.values(state[None], begun.mode)
+        assert rates[0] == pytest.approx(stretch.rates(state), abs=1e-12)
+        assert guards[0] == pytest.approx(
+            route._guards(state, begun.mode, guards_of(route.contacts, begun.mode)), abs=1e-12
+        )
