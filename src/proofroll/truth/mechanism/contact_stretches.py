@@ -266,7 +266,10 @@ class ContactStretches(Stretches[ContactMode]):
             delay = self._bouncing(self.contacts[hit].name, speed * law, pull, law)
             state, stays, margin = self._struck(stretch.last, closed, [0.0] * len(closed))
         stays = [stay or bool(contact.bound) for stay, contact in zip(stays, contacts, strict=True)]
-        happened = tuple(("settle" if delay and k == hit else "impact", contacts[k].name) for k in hits)
+        settled = [bool(delay) and contacts[k].pair == contacts[hit].pair for k in hits]
+        happened = tuple(
+            ("settle" if over else "impact", contacts[k].name) for k, over in zip(hits, settled, strict=True)
+        )
         return self._after(stretch, state, stays, happened, margin, delay)
 
     def _stopped(self, stretch: Stretch[ContactMode]) -> Transition[ContactMode]:

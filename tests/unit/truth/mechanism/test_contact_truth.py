@@ -921,3 +921,37 @@ def test_a_plate_that_turns_on_thirty_two_feet_has_no_determinate_friction() -> 
     found = truth_of(on_a_ring_of_feet(32, 1.0, spin=2.0), np.array([0.0, 0.05]))
     assert found.horizon == 0.0
     assert "carry the load together in more ways than one" in found.reason
+
+
+@pytest.mark.drill
+def test_a_box_that_lands_on_an_edge_tips_on_its_face_and_rests() -> None:
+    """Both corners of the edge land, then both of the other edge, and all four share the weight."""
+    turned = (float(np.cos(0.15)), 0.0, float(np.sin(0.15)), 0.0)
+    found = truth_of(dropped_box(turned), np.array([0.0, 0.1, 1.0]))
+    assert (found.ended, found.horizon) == ("", np.inf)
+    kinds = [event.kind for event in found.events]
+    assert kinds == ["impact"] * 4 + ["rest"] * 2
+    assert found.record.p_WB[2, 0, 2] == pytest.approx(0.1, abs=DIGITS)
+    assert found.record.q_WB[2, 0] == pytest.approx([1, 0, 0, 0], abs=DIGITS)
+
+
+def test_a_box_that_lands_on_a_cart_moves_on_with_it() -> None:
+    """Momentum along the rail is shared: four corners stick on a plate that moves."""
+    box = dropped_box()
+    cart = Joint("rail", "prismatic", "world", "cart", axis=(1, 0, 0), v0=(0.5,))
+    bodies = (*box.bodies, Body("cart", 50.0, inertia=(1.0, 1.0, 1.0)))
+    floor = replace(box.geometries[1], body="cart")
+    moving = replace(box, bodies=bodies, joints=(*box.joints, cart), geometries=(box.geometries[0], floor))
+    found = truth_of(moving, np.array([0.0, 0.1, 1.0]))
+    assert (found.ended, found.horizon) == ("", np.inf)
+    assert found.record.v_WB[2, :, 0] == pytest.approx(0.5 * 50 / 52, abs=DIGITS)
+
+
+def test_a_box_that_bounces_flat_comes_to_rest_when_its_rebounds_are_summed() -> None:
+    """With e = 1/2 the flights last 2 e^n t, t the fall: at 3 t it rests, flat, where it was dropped."""
+    falls = float(np.sqrt(0.2 / 9.81))
+    found = truth_of(dropped_box(restitution=0.5), np.array([0.0, 0.1, 1.0]))
+    assert (found.ended, found.horizon) == ("", np.inf)
+    settled = [event.time for event in found.events if event.kind == "settle"]
+    assert settled == [pytest.approx(3 * falls, abs=DIGITS)] * 4
+    assert found.record.p_WB[2, 0] == pytest.approx([0, 0, 0.1], abs=DIGITS)

@@ -49,6 +49,7 @@ def contact_forces(
     names: Sequence[str],
     bounds: Array | None = None,
     time: float = 0.0,
+    near: float = 0.0,
 ) -> tuple[Array, list[Outcome]]:
     """Forces of all contacts, shape (contacts, 3), and outcome of each contact.
 
@@ -61,6 +62,7 @@ def contact_forces(
         names: for messages.
         bounds: largest friction of each contact without a normal force; 0, or None: a contact with one.
         time: for messages [s].
+        near: part of the loads and of friction's bound that is round-off where all contacts stick.
 
     Raises:
         NotUnique: the force of a contact is not unique.
@@ -69,6 +71,10 @@ def contact_forces(
     f, done = np.zeros(len(c)), list[Outcome](["open"] * len(friction))
     bounds = np.zeros(len(friction)) if bounds is None else bounds
     least = _RESTS * float(np.abs(c).max())
+    if len(friction) > 1 and friction.all() and not bounds.any() and all(slip is None for slip in sliding):
+        held = _all_held(G, c, friction, max(near, _RESTS), max(near, _AT_BOUND))
+        if held is not None:
+            return held.reshape(-1, 3), ["stick"] * len(friction)
     for _ in range(_SWEEPS):
         before = f.copy()
         for k, mu in enumerate(friction):
@@ -140,6 +146,18 @@ def _idle(
     spread = np.abs(G @ pushes @ splits.T).max(initial=0.0)
     share = np.linalg.norm(splits, axis=0) > _SHARES
     return [k for k in idle if share[closed.index(k)]] if spread <= _SHARES * np.abs(G).max() else []
+
+
+def _all_held(G: Array, c: Array, friction: Array, rests: float, near: float) -> Array | None:
+    """Least forces that let every contact stick, if they press within the cones of friction; else None."""
+    held = np.asarray(-np.linalg.pinv(G, 1e-12, hermitian=True) @ c, dtype=np.float64)
+    N, T = held[::3], np.linalg.norm(held.reshape(-1, 3)[:, 1:], axis=1)
+    sticks = (
+        np.abs(c + G @ held).max() <= rests * np.abs(c).max()
+        and (N > 0).all()
+        and (friction * N * (1 + near) >= T).all()
+    )
+    return held if sticks else None
 
 
 def robust_forces(

@@ -34,6 +34,7 @@ from proofroll.elements.mechanism.rotations import Array, cross, frame_of_axis, 
 
 # Impulse, relative to the largest of an impact, that counts as none; a pressure nudged by 1e-6 makes such impulses.
 _NO_IMPULSE = 1e-4
+_ROUND_OFF = 1e-13  # of slides in a sequence of impacts, relative to the largest
 
 
 @dataclass(frozen=True)
@@ -327,7 +328,7 @@ class ContactDynamics:
         c[::3] += restitution * np.minimum(c[::3], 0.0)
         G, names = J @ state.W @ J.T, [self.contacts[k].name for k in closed]
         sliding = [None] * len(closed)
-        impulse, _, same = robust_forces(
+        impulse, done, same = robust_forces(
             G, c, self.friction[list(closed)], sliding, names, time=time, least=_NO_IMPULSE
         )
         speeds, scale = (J @ v)[::3], float(np.abs(J @ v).max())
@@ -341,13 +342,19 @@ class ContactDynamics:
                 comes = slides.copy()
                 comes[::3] += restitution[group] * np.minimum(comes[::3], 0.0)
                 told = [names[k] for k in group]
-                return contact_forces(response, comes, self.friction[of], [None] * len(of), told, time=time)[0].ravel()
+                near = _ROUND_OFF * scale / float(np.abs(comes).max())
+                none = [None] * len(of)
+                return contact_forces(response, comes, self.friction[of], none, told, None, time, near)[0].ravel()
 
             outcomes = sequences(G, J @ v, groups, strike)
             jumps = state.W @ J.T @ np.vstack([impulse.ravel(), outcomes.impulses]).T
             refuse_spread(jumps, outcomes, [names[k] for k in np.flatnonzero(hit)], time)
             same = True
-        return v + state.W @ J.T @ impulse.ravel(), impulse, np.inf if same else 0.0
+        after = v + state.W @ J.T @ impulse.ravel()
+        # The impulses are found to some digits; what holds fixes the velocities to the last one.
+        held = np.array([[way != "open", *[way == "stick"] * 2] for way in done]).ravel()
+        after -= _least_motion_for(state.W, J[held], (J @ (after - v) + c)[held])
+        return after, impulse, np.inf if same else 0.0
 
     def _refuse_flat(self, state: ContactsNow, closed: Sequence[int], time: float) -> None:
         """Raises NotUnique if one of these contacts is of a disc that lies flat at a time [s]."""
