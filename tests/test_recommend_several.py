@@ -139,6 +139,7 @@ def test_one_scene_is_answered_from_the_report_of_the_folder(proofroll: Proofrol
     code, out, err = proofroll("recommend", "pendulum", "--out", str(tmp_path), "--json")
     assert (code, err) == (0, "")
     content = json.loads(out)
+    assert len(content["engines"]) == 3
     assert {item["engine"]: (item["holds"], item["cost"]) for item in content["engines"]} == {
         "alpha joints": (True, 0.2), "beta joints": (True, 0.7), "gamma joints": (False, None),
     }  # fmt: skip

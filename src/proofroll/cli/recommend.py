@@ -188,7 +188,8 @@ def _engine_costs(matrix: ChoiceMatrix, tolerance: float, *, forces: bool) -> li
     from proofroll.report.page.choice_cell import CANNOT, NO_RUN
 
     costs = []
-    for column in matrix.columns:
+    columns = {column.studies: column for column in reversed(matrix.columns)}  # a group of one study is told once
+    for column in reversed(columns.values()):
         for row in matrix.rows:
             if row.setting:
                 continue
