@@ -42,8 +42,8 @@ def advice(
     Where forces are asked for and are not judged, the advice is for motion alone and says so.
     """
     found = answer(matrix, tolerance, forces, engines)
-    answers = {(item.column.group, item.column.name, item.column.whole): item for item in (*found.kinds, *found.scenes)}
-    columns = [answers[column.group, column.name, column.whole] for column in matrix.columns]
+    answers = {item.column.key: item for item in (*found.kinds, *found.scenes)}
+    columns = [answers[column.key] for column in matrix.columns]
     return [*(_of_column(matrix, found, item, engines) for item in columns), over_all(matrix, tolerance, forces)]
 
 

@@ -124,7 +124,7 @@ class FirstAnswer:
 def answer(matrix: ChoiceMatrix, tolerance: float, forces: bool, engines: Collection[str] | None = None) -> FirstAnswer:
     """FirstAnswer of a matrix to a question; ``engines``: of these alone."""
     asked = ReaderQuestion(tolerance, forces)
-    found = {(item.name, item.group, item.whole): of_column(matrix, item, asked, engines) for item in matrix.columns}
+    found = {item.key: of_column(matrix, item, asked, engines) for item in matrix.columns}
     kinds = [item for (_, _, whole), item in found.items() if whole]
     scenes = [item for (_, _, whole), item in found.items() if not whole]
     return FirstAnswer(asked, kinds, scenes, _chips(matrix, kinds))

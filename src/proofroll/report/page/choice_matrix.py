@@ -102,6 +102,11 @@ class ChoiceColumn:
         """Name of the group or of the scene."""
         return self.group if self.whole else self.scenes[0].name
 
+    @property
+    def key(self) -> tuple[str, str, bool]:
+        """Key that no other column has: one scene may be of two kinds, by its parameters."""
+        return self.group, self.name, self.whole
+
 
 @dataclass(frozen=True)
 class ChoiceRow:
@@ -186,13 +191,13 @@ class ChoiceMatrix:
 
     def cell(self, row: ChoiceRow, column: ChoiceColumn, tolerance: float, forces: bool) -> ChoiceCell:
         """Cell of a row and column at a tolerance relative to the quantities' size."""
-        key = (id(row), column.name, column.whole, tolerance, forces)
+        key = (id(row), column.key, tolerance, forces)
         if key not in self._cells:
             self._cells[key] = self._new_cell(row, column, tolerance, forces)
         return self._cells[key]
 
     @cached_property
-    def _cells(self) -> dict[tuple[int, str, bool, float, bool], ChoiceCell]:
+    def _cells(self) -> dict[tuple[int, tuple[str, str, bool], float, bool], ChoiceCell]:
         return {}
 
     def _new_cell(self, row: ChoiceRow, column: ChoiceColumn, tolerance: float, forces: bool) -> ChoiceCell:
@@ -265,13 +270,13 @@ class ChoiceMatrix:
 
         A formulation that holds all scenes comes first, the cheapest of these; then the best one for each scene.
         """
-        key = (engine, column.name, column.whole, tolerance, forces)
+        key = (engine, column.key, tolerance, forces)
         if key not in self._standings:
             self._standings[key] = self._new_standing(engine, column, tolerance, forces)
         return self._standings[key]
 
     @cached_property
-    def _standings(self) -> dict[tuple[str, str, bool, float, bool], EngineStanding]:
+    def _standings(self) -> dict[tuple[str, tuple[str, str, bool], float, bool], EngineStanding]:
         return {}
 
     def _new_standing(self, engine: str, column: ChoiceColumn, tolerance: float, forces: bool) -> EngineStanding:

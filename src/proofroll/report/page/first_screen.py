@@ -176,8 +176,8 @@ class FirstScreen:
         """Number of the row of each column's engine to take; -1 where nothing holds the tolerance."""
         place = {row.name: number for number, row in enumerate(self.rows) if row.level == "engine"}
         both = (*found.kinds, *found.scenes)
-        answers = {(item.column.group, item.column.name, item.column.whole): item for item in both}
-        taken = (answers[column.group, column.name, column.whole].taken for column in self.matrix.columns)
+        answers = {item.column.key: item for item in both}
+        taken = (answers[column.key].taken for column in self.matrix.columns)
         return [-1 if item is None else place[item.engine] for item in taken]
 
     def uses(self, found: FirstAnswer) -> Iterator[tuple[ColumnAnswer, str, str]]:

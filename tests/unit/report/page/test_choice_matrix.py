@@ -277,3 +277,12 @@ def test_what_holds_all_scenes_comes_before_what_is_cheaper_in_some() -> None:
     unfinished = choice_matrix([*both, line(engine="beta", row=3, error=1e-9, cost=0.1), late], STUDIES)
     assert unfinished.standings(unfinished.kinds[0], 1e-4, False)[0].engine == "beta", "lack of time is no failure"
     assert "beta joints, default, dt 1e-3 s in 1 of 2 scenes" in advice(unfinished, 1e-4, False)[0].sentence
+
+
+def test_a_scene_of_two_kinds_has_two_columns() -> None:
+    """By its parameters one scene may roll in one comparison and slip in another: neither answers for the other."""
+    rolls = line(study="arm", scene="wall", group="rolling", error=1e-9, cost=0.1)
+    slips = line(study="chain", scene="wall", group="slipping", error=1e-9, cost=0.5)
+    found = choice_matrix([rolls, slips], STUDIES)
+    costs = [found.standing("alpha", column, 1e-4, False).cell.cost for column in found.columns]
+    assert costs == [0.1, 0.1, 0.5, 0.5]
