@@ -11,8 +11,17 @@ from proofroll.elements.mechanism.signal import Table
 from proofroll.truth.mechanism.constraint_rows import ConstraintRow
 from proofroll.truth.mechanism.contact_equations import ContactEquations
 from proofroll.truth.mechanism.contact_scalars import ScalarMotion, ScalarTouch, floats, known_shapes, touch_in_scalars
-from proofroll.truth.mechanism.contact_symbols import Row, SolvedSymbols, Vector, eliminated, of_joint, rows_of
+from proofroll.truth.mechanism.contact_symbols import (
+    Row,
+    SolvedSymbols,
+    Vector,
+    eliminated,
+    limit_guard,
+    of_joint,
+    rows_of,
+)
 from proofroll.truth.mechanism.maximal_bodies import AXES, BodyInScalars
+from proofroll.truth.mechanism.maximal_equations import Switched
 from proofroll.truth.scalars import Scalar, add, cross, dot, is_zero, minus, mul, plus, scaled, sub, turned
 
 
@@ -40,18 +49,28 @@ class BodySymbols:
         """True if all parts of the mechanism have a rule here."""
         bodies = self._bodies
         shapes = all(map(known_shapes, bodies.mechanism.contacts))
-        laws = any(joint.armature for joint in bodies.mechanism.joints) or any(
-            actuator.limit is not None for actuator in bodies.mechanism.actuators
-        )
+        laws = any(joint.armature for joint in bodies.mechanism.joints)
         tables = any(isinstance(signal, Table) for signal in bodies.mechanism.signals)
         return shapes and not bodies.light and not laws and not tables
 
     def solved(
-        self, state: Sequence[Scalar], mode: ContactMode, began: Sequence[Vector | None], functions: Any
+        self,
+        state: Sequence[Scalar],
+        mode: ContactMode,
+        clamped: Sequence[int],
+        began: Sequence[Vector | None],
+        functions: Any,
     ) -> SolvedSymbols:
         """Rates and forces for a state that ends with the time; ``began``: line of each contact at the start."""
         e = self._bodies
-        now = e.at(state[:-1], functions, time=state[-1])
+        limited = [k for k, actuator in enumerate(e.mechanism.actuators) if actuator.limit is not None]
+        bounds = {k: float(e.mechanism.actuators[k].bound) for k in limited}
+        efforts = {k: sign * bounds[k] for k, sign in zip(limited, clamped, strict=True) if sign}
+        now = e.at(state[:-1], functions, Switched(clamped=efforts), time=state[-1])
+        limits = [
+            limit_guard(self._wanted(state, k, functions), bounds[k], sign, functions["sqrt"])
+            for k, sign in zip(limited, clamped, strict=True)
+        ]
         numbers = [law.joint.number for law in self._laws]
         at = _Now(now.views, e.rate_rows(state[:-1], numbers, functions))
         touching = [*self._touching(now.views, functions), *self._of_joints(state, at)]
@@ -90,7 +109,25 @@ class BodySymbols:
             assert own_force is not None  # its owner is closed
             forces[k] = plus(own_force, scaled(size, along))
         moved = [plus(self._moved(k, touch, answer, at), self._bias(k, touch, at)) for k, touch in enumerate(touching)]
-        return SolvedSymbols([*now.rate, *answer[: e.nu], *now.angle_rate], touching, lines, forces, response, moved)
+        return SolvedSymbols(
+            [*now.rate, *answer[: e.nu], *now.angle_rate], touching, lines, forces, response, moved, limits
+        )
+
+    def _wanted(self, state: Sequence[Scalar], number: int, functions: Any) -> Scalar:
+        """Effort of an actuator before it is clamped."""
+        e = self._bodies
+        actuator = e.mechanism.actuators[number]
+        joint = e.mechanism.joint_index[actuator.joint]
+        (row,) = e.rate_rows(state[:-1], [joint], functions)
+        return actuator.wanted(state[-1], *self._along(state, joint, row), functions)
+
+    def _along(self, state: Sequence[Scalar], joint: int, row: ConstraintRow) -> tuple[Scalar, Scalar]:
+        """Coordinate and rate of a joint; angles that are integrated count whole turns."""
+        e = self._bodies
+        index = next((index for index, (number, _) in enumerate(e.angles) if number == joint), None)
+        u = state[e.nx : e.nx + e.nu]
+        rate = add(*(mul(value, u[n]) for n, value in row.coefficients.items()))
+        return (row.residual if index is None else state[e.nx + e.nu + index]), rate
 
     def _touching(self, views: Sequence[BodyInScalars], functions: Any) -> list[ScalarTouch]:
         bodies = []
@@ -101,15 +138,9 @@ class BodySymbols:
         return [touch_in_scalars(contact, bodies[a], bodies[b], functions["sqrt"]) for contact, (a, b) in pairs]
 
     def _of_joints(self, state: Sequence[Scalar], at: _Now) -> list[ScalarTouch]:
-        """Laws of joints as contacts; angles that are integrated count whole turns."""
-        e = self._bodies
-        u, kept = state[e.nx : e.nx + e.nu], {number: index for index, (number, _) in enumerate(e.angles)}
-        found = []
-        for law, row in zip(self._laws, at.laws, strict=True):
-            index = kept.get(law.joint.number)
-            q = row.residual if index is None else state[e.nx + e.nu + index]
-            found.append(of_joint(law, q, add(*(mul(value, u[n]) for n, value in row.coefficients.items()))))
-        return found
+        """Laws of joints as contacts."""
+        pairs = zip(self._laws, at.laws, strict=True)
+        return [of_joint(law, *self._along(state, law.joint.number, row)) for law, row in pairs]
 
     def _row(self, k: int, touch: ScalarTouch, direction: Vector, now: _Now) -> Row:
         """Coefficients, along the velocities, of a contact's slide in a direction."""

@@ -246,6 +246,10 @@ class ContactEquations:
         """Efforts before clamping over their limits, minus 1."""
         return np.abs(self._wanted(state)) / [actuator.bound for actuator in self._limited.values()] - 1
 
+    def pushes(self, state: Array) -> Array:
+        """Sign of each effort with a limit."""
+        return np.sign(self._wanted(state))
+
     def clamped(self, state: Array) -> Switched:
         """Switched state with the efforts that are clamped at their limits."""
         wanted = zip(self._limited.items(), self._wanted(state), strict=True)

@@ -59,6 +59,8 @@ class _Equations(Protocol):
 
     def excess(self, state: Array, /) -> Array: ...
 
+    def pushes(self, state: Array, /) -> Array: ...
+
 
 class ContactStretches(Stretches[ContactMode]):
     """Stretches of a mechanism with contacts, and transitions; the last component of a state is the time.
@@ -162,7 +164,7 @@ class ContactStretches(Stretches[ContactMode]):
 
     def _by_symbols(self, state: Array, mode: ContactMode) -> CompiledMode | None:
         """Compiled mode, if all parts of the mechanism have a rule in symbols and no load is shared."""
-        compiled = None if self._compiled is None else self._compiled.of(mode)
+        compiled = None if self._compiled is None else self._compiled.of(mode, self._clamped(state, mode))
         if compiled is None:
             return None
         solved = self._solved(state, mode)
@@ -171,6 +173,15 @@ class ContactStretches(Stretches[ContactMode]):
         apart = np.abs(rates[place : place + len(solved.acceleration)] - solved.acceleration).max()
         agrees = apart <= _SAME_RATES * max(1.0, float(np.abs(solved.acceleration).max()))
         return compiled if agrees and not solved.splits.shape[1] else None
+
+    def _clamped(self, state: Array, mode: ContactMode) -> tuple[int, ...]:
+        """Sign of each effort that is at its limit in a stretch from a state, 0 of others, of those with a limit."""
+        equations = self._equations
+        if not len(equations.excess(state)):
+            return ()
+        ahead = state + _AHEAD * equations.rate(state, mode)
+        signs = np.where(equations.excess(ahead) > 0, equations.pushes(ahead), 0.0)
+        return tuple(int(sign) for sign in signs)
 
     def within(self, stretch: Stretch[ContactMode], times: Array) -> Array:
         """See the protocol."""

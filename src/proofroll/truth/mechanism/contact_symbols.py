@@ -36,6 +36,7 @@ class SolvedSymbols(NamedTuple):
         forces: on body a of each contact, (3,); None: open.
         response: Painlevé's measure.
         slide_rates: rate of each sliding velocity, (3,).
+        within_limits: guards of efforts with a limit: they reach it, or come back from it.
     """
 
     rates: Sequence[Scalar]
@@ -44,6 +45,7 @@ class SolvedSymbols(NamedTuple):
     forces: Sequence[Vector | None]
     response: Scalar
     slide_rates: Sequence[Vector]
+    within_limits: Sequence[Scalar] = ()
 
 
 class HeldRows(NamedTuple):
@@ -75,6 +77,12 @@ def of_joint(contact: JointContact, q: Scalar, v: Scalar) -> ScalarTouch:
     stop = contact.joint.low if contact.side > 0 else contact.joint.high
     gap = mul(float(contact.side), sub(q, float(stop))) if contact.side else 0.0
     return ScalarTouch(gap, (1.0, 0.0, 0.0), _NONE, _NONE, _NONE, scaled(v, floats(contact.direction)))
+
+
+def limit_guard(wanted: Scalar, bound: float, clamped: int, root: Callable[[Scalar], Scalar]) -> Scalar:
+    """Guard of an effort with a limit; ``clamped``: its sign if it is at the limit, else 0."""
+    excess = sub(root(mul(wanted, wanted)) / bound, 1.0)
+    return sub(0.0, excess) if clamped else excess
 
 
 def rows_of(

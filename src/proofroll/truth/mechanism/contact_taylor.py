@@ -47,9 +47,14 @@ class ModeSymbols(Protocol):
         """True if all parts of the mechanism have a rule."""
 
     def solved(
-        self, state: Sequence[Scalar], mode: ContactMode, began: Sequence[Vector | None], functions: Any
+        self,
+        state: Sequence[Scalar],
+        mode: ContactMode,
+        clamped: Sequence[int],
+        began: Sequence[Vector | None],
+        functions: Any,
     ) -> SolvedSymbols:
-        """Rates and forces at a state in a mode whose lines began as given."""
+        """Rates and forces at a state in a mode whose lines began as given; ``clamped``: signs of efforts at limits."""
 
 
 @dataclass(frozen=True)
@@ -77,15 +82,20 @@ class CompiledModes:
         self._symbols, self._contacts, self._length = symbols, contacts, length
         self._by_collocation = by_collocation
         self._covers = heyoka is not None and symbols.covers
-        self._modes: dict[tuple[tuple[str, bool], ...], CompiledMode] = {}
+        self._modes: dict[tuple[tuple[int, ...], tuple[tuple[str, bool], ...]], CompiledMode] = {}
 
-    def of(self, mode: ContactMode) -> CompiledMode | None:
-        """Compiled mode; None: heyoka is missing, or a part of the mechanism has no rule in symbols."""
+    def of(self, mode: ContactMode, clamped: tuple[int, ...]) -> CompiledMode | None:
+        """Compiled mode, by the signs of efforts at their limits.
+
+        None: heyoka is missing, or a part of the mechanism has no rule in symbols.
+        """
         if not self._covers:
             return None
-        key = tuple((own.kind, own.along is not None) for own in mode)
+        key = clamped, tuple((own.kind, own.along is not None) for own in mode)
         if key not in self._modes:
-            self._modes[key] = CompiledMode(self._symbols, self._contacts, mode, self._length, self._by_collocation)
+            self._modes[key] = CompiledMode(
+                self._symbols, self._contacts, mode, clamped, self._length, self._by_collocation
+            )
         return self._modes[key]
 
 
@@ -127,6 +137,7 @@ class CompiledMode:
         symbols: ModeSymbols,
         contacts: Sequence[Touchable],
         mode: ContactMode,
+        clamped: Sequence[int],
         length: int,
         by_collocation: bool,
     ) -> None:
@@ -137,10 +148,10 @@ class CompiledMode:
         began: list[Vector | None] = [None] * len(mode)
         for place, k in enumerate(lined):
             began[k] = [Symbol(heyoka.par[3 * place + axis], constants) for axis in range(3)]
-        solved = symbols.solved([Symbol(each, constants) for each in state], mode, began, functions)
-        guards = guards_of(contacts, mode)
+        solved = symbols.solved([Symbol(each, constants) for each in state], mode, clamped, began, functions)
         slips = slip_symbols(mode, contacts, solved)
-        values = [*guard_symbols(guards, contacts, solved, began, functions), *slips, *solved.rates, 1.0]
+        guards = [*guard_symbols(guards_of(contacts, mode), contacts, solved, began, functions), *solved.within_limits]
+        values = [*guards, *slips, *solved.rates, 1.0]
         self._by_collocation = by_collocation
         self._turning = [k for k, pair in enumerate(zip(mode, contacts, strict=True)) if turning_slip(*pair)]
         self._count, self._slips, self._lined = len(guards), len(slips), lined

@@ -16,7 +16,15 @@ from proofroll.elements.mechanism.joint import AXES
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.signal import Table, value_at
 from proofroll.truth.mechanism.contact_scalars import ScalarMotion, ScalarTouch, floats, known_shapes, touch_in_scalars
-from proofroll.truth.mechanism.contact_symbols import Row, SolvedSymbols, Vector, eliminated, of_joint, rows_of
+from proofroll.truth.mechanism.contact_symbols import (
+    Row,
+    SolvedSymbols,
+    Vector,
+    eliminated,
+    limit_guard,
+    of_joint,
+    rows_of,
+)
 from proofroll.truth.mechanism.maximal_bodies import clean
 from proofroll.truth.scalars import (
     Scalar,
@@ -83,18 +91,22 @@ class TreeSymbols:
         """True if all parts of the mechanism have a rule here."""
         m = self._mechanism
         shapes = all(map(known_shapes, m.contacts))
-        limited = any(actuator.limit is not None for actuator in m.actuators)
         tables = any(isinstance(signal, Table) for signal in m.signals)
-        return shapes and not (m.loops or m.couplings or limited or tables)
+        return shapes and not (m.loops or m.couplings or tables)
 
     def solved(
-        self, state: Sequence[Scalar], mode: ContactMode, began: Sequence[Vector | None], functions: Any
+        self,
+        state: Sequence[Scalar],
+        mode: ContactMode,
+        clamped: Sequence[int],
+        began: Sequence[Vector | None],
+        functions: Any,
     ) -> SolvedSymbols:
         """Rates and forces for a state that ends with the time; ``began``: line of each contact at the start."""
         m = self._mechanism
         q, v = state[: m.nq], state[m.nq : -1]
         bodies, rates = _tree(m, q, v, functions)
-        mass, load = self._inertial(bodies, q, v, state[-1], functions)
+        mass, load, limits = self._inertial(bodies, q, v, state[-1], clamped, functions)
         motions = [ScalarMotion(body.p, body.R, turned(body.R, body.v), turned(body.R, body.w)) for body in bodies]
         touching = [
             touch_in_scalars(contact, motions[a], motions[b], functions["sqrt"])
@@ -149,7 +161,7 @@ class TreeSymbols:
             forces[k] = plus(force, scaled(size, along))
             moved = plus(moved, scaled(size, each))
         slide_rates = [plus(_moved(J, moved), bias) for J, bias in slides]
-        return SolvedSymbols([*rates, *moved], touching, lines, forces, response, slide_rates)
+        return SolvedSymbols([*rates, *moved], touching, lines, forces, response, slide_rates, limits)
 
     def _lines(
         self,
@@ -181,9 +193,10 @@ class TreeSymbols:
         q: Sequence[Scalar],
         v: Sequence[Scalar],
         time: Scalar,
+        clamped: Sequence[int],
         functions: Any,
-    ) -> tuple[list[Row], list[Scalar]]:
-        """Mass matrix and loads along the velocities."""
+    ) -> tuple[list[Row], list[Scalar], list[Scalar]]:
+        """Mass matrix and loads along the velocities, and guards of efforts with a limit."""
         m = self._mechanism
         mass: list[Row] = [{} for _ in range(m.nv)]
         load: list[Scalar] = [0.0] * m.nv
@@ -209,11 +222,17 @@ class TreeSymbols:
                 if joint.stiffness:
                     load[n] = sub(load[n], mul(float(joint.stiffness), sub(q[at_q.start + place], float(joint.rest))))
                 load[n] = add(load[n], value_at(joint.torque, time, functions))
+        limits: list[Scalar] = []
         for actuator in m.actuators:
             place, n = m.place_of(actuator.joint)
-            load[n] = add(load[n], actuator.wanted(time, q[place], v[n], functions))
+            wanted = actuator.wanted(time, q[place], v[n], functions)
+            if actuator.limit is not None:
+                sign = clamped[len(limits)]
+                limits.append(limit_guard(wanted, float(actuator.bound), sign, functions["sqrt"]))
+                wanted = sign * float(actuator.bound) if sign else wanted
+            load[n] = add(load[n], wanted)
         self._stretch(bodies, load, functions)
-        return mass, load
+        return mass, load, limits
 
     def _stretch(self, bodies: Sequence[_Moving], load: list[Scalar], functions: Any) -> None:
         """Adds the forces of springs between bodies to the loads."""

@@ -128,3 +128,12 @@ def test_stops_and_dry_friction_of_joints_are_compiled(law: dict[str, Any]) -> N
         assert guards[0] == pytest.approx(
             route._guards(state, begun.mode, guards_of(route.contacts, begun.mode)), abs=1e-12
         )
+
+
+def test_an_effort_at_its_limit_is_compiled() -> None:
+    """A motor reaches its limit and comes back: both routes stay compiled, with the limit as a guard."""
+    pytest.importorskip("heyoka")
+    found = truth_of(load_scene("flick").elements[0].mechanism, np.array([0.0, 0.08]))  # type: ignore[attr-defined]
+    assert [route.split(", ")[1] for route in found.routes] == ["collocation", "Taylor series"]
+    assert [(event.kind, event.name) for event in found.events] == [("slip", "push")]
+    assert found.events[0].time == pytest.approx(0.060258231738, abs=1e-11)

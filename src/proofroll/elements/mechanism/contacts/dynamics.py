@@ -228,6 +228,11 @@ class ContactDynamics:
             [abs(m.wanted(time, q[at_q], v[at_v])) / m.bound - 1 for m, at_q, at_v in self.equations.limited]
         )
 
+    def pushes(self, y: Array) -> Array:
+        """Sign of each effort with a limit, (limited actuators,)."""
+        q, v, time = self.parts(y)
+        return np.array([np.sign(m.wanted(time, q[at_q], v[at_v])) for m, at_q, at_v in self.equations.limited])
+
     def eliminated(self, y: Array, mode: ContactMode) -> Array:
         """The state with violations of loops, closed contacts and unit quaternions removed."""
         y = np.append(self.equations.eliminated(y[:-1], ()), y[-1])
