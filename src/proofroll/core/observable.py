@@ -28,13 +28,16 @@ class Observable:
             tolerance must be absolute.
         headline: True if summaries show it: the motion, and the forces that a person asks for first.
         watched: True if a first look judges it though no summary shows it.
-        always: True if it is judged without a tolerance, too: against half of its size, events by their number.
+        always: part of its size against which it is judged without a tolerance, too, events by their number; 0: it is
+            not.
         asked_as: word in a scene's ``asks`` for which a first look judges it, e.g. ``orientation``; empty: none.
         decides: True if trade-offs, stability maps and recommendations use it by default.
         asked_for: True if a person may ask for a recommendation by it.
         column: True if a trade-off shows it by default beside the deciding one.
         audit: True if it compares the reactions that an engine reports with the motion that it computed.
         hangs_on_events: True if it is unpredictable once the time of an event is ill-posed.
+        at_impacts: False if it has no value beside an impact, whose length is an engine's own, nor where the question
+            is ill-posed.
         difference_of: larger variable whose small difference, with its round-off, it is; empty: none.
         absent: reason for which no run of the scene has it, and the remedy; empty: runs have it.
     """
@@ -47,13 +50,14 @@ class Observable:
     floor: float | None = None
     headline: bool = False
     watched: bool = False
-    always: bool = False
+    always: float = 0.0
     asked_as: str = ""
     decides: bool = False
     asked_for: bool = True
     column: bool = False
     audit: bool = False
     hangs_on_events: bool = True
+    at_impacts: bool = True
     absent: str = ""
     difference_of: str = ""
 

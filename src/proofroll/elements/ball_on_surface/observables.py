@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 # Least scale of an observable, relative to its natural size: a ball that moves by less than a hundredth of its radius
 # (0.25 mm inside the cylinder) looks at rest, and a range of round-off is no scale.
 _LEAST = 1e-2
+# Part of its size by which slip may be off where no tolerance is given.
+_ALWAYS = 0.5
 _FORCES = ("N", "F2", "F3")
 # Number of steps that integrate the turning from one sample to the next.
 _SUBSTEPS = 16
@@ -61,7 +63,7 @@ def table(body: RollingBall) -> tuple[Observable, ...]:
     apart = "m", "distance of the ball from the wall"
 
     # A ball that flies may begin and end slip in flight, unseen
-    says_slip = bool(bounded) and not body.flies
+    always = _ALWAYS if bounded and not body.flies else 0.0
 
     def residual(name: str, unit: str, meaning: str, floor: float, **more: Any) -> Observable:
         return Observable(name, unit, meaning, Role.RESIDUAL, floor=floor, hangs_on_events=False, **more)
@@ -97,7 +99,7 @@ def table(body: RollingBall) -> tuple[Observable, ...]:
             Role.MOTION if bounded or flies else Role.RESIDUAL,
             floor=speed,
         ),
-        residual("creep", "m", "way slipped while sticking", a, always=says_slip),
+        residual("creep", "m", "way slipped while sticking", a, always=always),
         Observable(
             "first_slip",
             "s",
@@ -106,7 +108,7 @@ def table(body: RollingBall) -> tuple[Observable, ...]:
             column=True,
             absent=never,
             watched=bool(bounded),
-            always=says_slip,
+            always=always,
         ),
         Observable("event_times", "s", "times of all events", Role.EVENT, asked_for=False),
         Observable("event_order", "events", "events of another kind than the truth's", Role.EVENT, asked_for=False),

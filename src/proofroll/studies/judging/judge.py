@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 _USUAL = Tolerance(0.01, True)
 _LEAST = 0.01
 _NO_TOLERANCE = "no tolerance is given for it"
-_UNDETERMINED = "the truth does not determine it at all times"
+_UNDETERMINED = "the truth does not determine it"
 _MOST_TRUTHS = 64
 _truths: dict[tuple[str, bytes, bytes], xr.Dataset] = {}
 
@@ -192,6 +192,8 @@ def judge(
         if any(scene.observables[name].role is Role.REACTION for name in bounds if name in scene.observables):
             unjudged = {name: why for name, why in unjudged.items() if name not in given.reactions}
         unjudged |= dict.fromkeys((name for name in observed if _unknown(reference, name)), _UNDETERMINED)
+    parts = (f"parts of {item.judgement.observable}" for item in compared if _in_parts(reference, item))
+    unjudged |= dict.fromkeys(parts, _UNDETERMINED)
     for item in compared:  # judged observables, though perhaps derived from other given variables
         unjudged.pop(item.judgement.observable, None)
     return Judged(scene.name, tuple(compared), because, unjudged, reference.ended)
@@ -274,8 +276,16 @@ def _is_main(item: Observable) -> bool:
 
 
 def _unknown(reference: Reference, name: str) -> bool:
-    """True for a force that the truth does not know at some time, as across a line to which joints confine it."""
+    """True for a force that the truth never knows, as across a line to which joints confine it."""
     return reference.scene.observables[name].role is Role.REACTION and name not in reference.curves
+
+
+def _in_parts(reference: Reference, item: Compared) -> bool:
+    """True for a compared force that the truth determines in some of its components, or at some times, only."""
+    name = item.judgement.observable
+    lacks = reference.scene.observables.get(name) is None or name in reference.determinate
+    known = reference.dataset.variables.get(name)
+    return lacks and known is not None and bool(np.isnan(known.values[1:]).any())
 
 
 def _states(reference: Reference, variables: Sequence[str]) -> list[str]:
@@ -322,6 +332,9 @@ def _compared(
             known, values = known[1:], values[1:]  # several engines define reactions only after a first step
         if truth_of.dims[-1:] == ("wxyz",):
             values = turned_alike(values, known)
+        if name not in reference.curves and values.shape == known.shape:  # of forces, where they are not determinate
+            determinate = np.isfinite(known)
+            values, known = np.where(determinate, values, 0.0), np.where(determinate, known, 0.0)
         run = RunCurve(values, between=run_values.values_off_grid(reference, name, dataset))
         true, scale = TrueCurve(known, float(truth_of.attrs["error_bar"])), _size(reference, name, known, unit)
     judgement = judge_curve(Allowance(name, unit, bound.absolute(scale), scale), run, true)

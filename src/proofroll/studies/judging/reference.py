@@ -4,17 +4,18 @@ from __future__ import annotations
 
 import re
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
+from numpy.typing import NDArray
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.beside_events import beside_events
 from proofroll.core.dataset import LEFT_OUT, Key, before_end, common_span, ended_early, observe, part, scales
 from proofroll.core.element_abilities import KnowsAnotherScene
-from proofroll.core.events import EVENT_ORDER, Event, events_of
+from proofroll.core.events import EVENT_ORDER, JUMPS, Event, events_of
 from proofroll.core.observable import Role
 from proofroll.core.scene import Scene
 from proofroll.core.verdict import Doubt, TrueCurve
@@ -30,27 +31,31 @@ class Reference:
     Attributes:
         scene: with the parameters of the truth.
         dataset: the true trajectory.
-        curves: observable -> its true values.
+        curves: observable -> its true values; of a force that is not determinate all the time, zero where it is not.
         sizes: observable -> its scale.
+        determinate: observable -> where the truth has a value; only those that lack some.
     """
 
     scene: Scene
     dataset: xr.Dataset
     curves: dict[str, FloatArray]
     sizes: dict[str, float]
+    determinate: dict[str, NDArray[np.bool_]] = field(default_factory=dict)
 
     @classmethod
     def of(cls, scene: Scene, dataset: xr.Dataset) -> Self:
         """Reference from a true trajectory."""
         dataset = before_end(scene, dataset)
-        return cls(scene, dataset, observe(scene, dataset), scales(scene, dataset))
+        curves, determinate = _true_curves(scene, dataset)
+        return cls(scene, dataset, curves, scales(scene, dataset), determinate)
 
     def common_span(self, trajectories: Mapping[Key, xr.Dataset]) -> tuple[Reference, dict[Key, xr.Dataset]]:
         """Truth and runs cut to the time in which they are comparable (:class:`WatchesRuns`)."""
         truth, runs = common_span(self.scene, self.dataset, trajectories)
         if truth is self.dataset:
             return self, runs
-        return replace(self, dataset=truth, curves=observe(self.scene, truth)), runs
+        curves, determinate = _true_curves(self.scene, truth)
+        return replace(self, dataset=truth, curves=curves, determinate=determinate), runs
 
     def another_scene(self, lines: Sequence[Mapping[str, Any]]) -> str | None:
         """Reason why a model with this certificate represents another kind of scene than the one asked for; or None."""
@@ -174,3 +179,34 @@ class Reference:
     def events_of(self, dataset: xr.Dataset) -> list[Event]:
         """Events of all elements in a run."""
         return [event for item in self.scene.elements for event in events_of(part(self.scene, item, dataset))]
+
+
+def _true_curves(scene: Scene, dataset: xr.Dataset) -> tuple[dict[str, FloatArray], dict[str, NDArray[np.bool_]]]:
+    """``curves`` and ``determinate`` of a :class:`Reference`."""
+    curves, determinate = observe(scene, dataset), {}
+    for name, item in scene.observables.items():
+        if item.role is not Role.REACTION or name not in dataset.variables or (name in curves and item.at_impacts):
+            continue
+        values = dataset.variables[name].values[1:]
+        mask = np.isfinite(values)
+        if not item.at_impacts:
+            mask[_unsteady(scene, dataset)[1:]] = False
+        if mask.all():
+            continue
+        if mask.any():
+            curves[name], determinate[name] = np.where(mask, values, 0.0), mask
+        else:
+            curves.pop(name, None)
+    return curves, determinate
+
+
+def _unsteady(scene: Scene, dataset: xr.Dataset) -> NDArray[np.bool_]:
+    """Samples next to an impact, and those from which on the question is ill-posed, shape (time,)."""
+    times = dataset.variables["time"].values
+    found = times >= float(dataset.attrs.get("horizon", np.inf))
+    for element in scene.elements:
+        for event in events_of(part(scene, element, dataset)):
+            if event.kind in JUMPS:
+                after = int(np.searchsorted(times, event.time))
+                found[max(after - 1, 0) : after + 1] = True
+    return np.asarray(found)

@@ -26,12 +26,21 @@ def always_judged(reference: Reference, names: Iterable[str]) -> dict[str, Toler
     """Tolerances of the observables that are judged even without one in the file; only differences are shown."""
     items = {name: reference.scene.observables[name] for name in names if reference.scene.observables[name].always}
     end = Tolerance(float(reference.dataset.variables["time"].values[-1]), False, "s")
-    return {name: end if item.role is Role.EVENT else Tolerance(0.5, True) for name, item in items.items()}
+    return {name: end if item.role is Role.EVENT else Tolerance(item.always, True) for name, item in items.items()}
 
 
 def observables_of(reference: Reference, dataset: xr.Dataset) -> dict[str, FloatArray]:
-    """Observables of an engine's trajectory, by name."""
+    """Observables of an engine's trajectory, by name.
+
+    A force that is not determinate all the time is zero where it is not, as its true values are.
+    """
     curves, given = observe(reference.scene, dataset), dataset.variables
+    for name, determinate in reference.determinate.items():
+        curves.pop(name, None)
+        values = given[name].values[1:] if name in given else np.zeros(0)
+        if values.shape[1:] == determinate.shape[1:] and len(values) <= len(determinate):
+            masked = np.where(determinate[: len(values)], values, 0.0)
+            curves |= {} if np.any(np.isnan(masked)) else {name: masked}
     for element in reference.scene.elements:
         own, true = part(reference.scene, element, dataset), part(reference.scene, element, reference.dataset)
         if "event_kind" in own:  # the run reports events

@@ -277,4 +277,4 @@ def test_scales_have_floors() -> None:
 @pytest.mark.parametrize(("friction", "judged"), [({"mu_static": 0.2, "mu_kinetic": 0.15}, True), ({}, False)])
 def test_a_way_slipped_while_sticking_needs_no_tolerance_to_be_judged(friction: dict[str, float], judged: bool) -> None:
     """A run that says it sticks while it slips differs whatever the file asks; one that cannot slip says nothing."""
-    assert load_scene("sphere_in_cylinder", **friction).observables["creep"].always is judged
+    assert load_scene("sphere_in_cylinder", **friction).observables["creep"].always == (0.5 if judged else 0.0)

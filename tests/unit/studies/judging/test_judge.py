@@ -70,15 +70,38 @@ def test_samples_that_nearly_all_lie_on_impacts_are_judged() -> None:
 
 
 @pytest.mark.drill
-def test_a_force_that_the_truth_does_not_determine_accuses_nobody() -> None:
-    """Across the plane to which a joint confines a rod, joint and foot share the force: whatever is said of it."""
+def test_a_force_is_judged_where_the_truth_determines_it() -> None:
+    """Across the plane to which a joint confines a rod, joint and foot share the force; along it nothing is free."""
     run = proofroll.simulate("falling_rod", "projection", until=0.1, every=0.01).copy(deep=True)
     found = proofroll.judge(run, "falling_rod")
     assert found.agrees, found
-    assert found.unjudged["contact_forces"] == "the truth does not determine it at all times"
-    run["normal_forces"][5:] *= 1.1
-    run["contact_forces"][5:] *= 1.1
+    assert "contact_forces" in {item.judgement.observable for item in found.compared}
+    assert found.unjudged["parts of contact_forces"] == "the truth does not determine it"
+    run["contact_forces"][5:, 0, 1] += 10.0
+    assert proofroll.judge(run, "falling_rod").agrees
+    run["contact_forces"][5:, 0, 0] *= 1.3
     assert not proofroll.judge(run, "falling_rod").agrees
+
+
+@pytest.mark.drill
+def test_a_sled_whose_friction_is_thrice_and_reversed_differs() -> None:
+    """Forces are judged up to the rest in which three feet share them, also where a motion alone has a tolerance."""
+    run = proofroll.simulate("sled", "projection", until=0.7, every=0.02).copy(deep=True)
+    assert proofroll.judge(run, "sled").agrees
+    assert proofroll.judge(run, "sled", {"positions": "1e-3 m"}).agrees
+    run["contact_forces"][..., :2] *= -3.0
+    for tolerance in (None, {"positions": "1e-3 m"}):
+        found = proofroll.judge(run, "sled", tolerance)
+        assert next(item.judgement.observable for item in found.compared if not item.agrees) == "contact_forces"
+
+
+def test_a_given_force_is_judged_where_the_truth_determines_it() -> None:
+    """A column of a person's own, which a truth has at some times only, is judged at these."""
+    run = proofroll.simulate("falling_rod", until=0.1, every=0.01)
+    across = run["force.contact.y"].to_numpy()
+    assert np.isnan(across).all()
+    own = {"time": run["time"].to_numpy(), "force.contact.x": run["force.contact.x"].to_numpy()}
+    assert proofroll.judge(own, "falling_rod").agrees
 
 
 def test_a_sample_on_a_bounce_may_be_of_either_side() -> None:

@@ -19,7 +19,7 @@ from proofroll.files.scene_file import load_scene
 from proofroll.running.case import Result, Status
 from proofroll.running.identity import resolve
 from proofroll.studies.judging import run_values
-from proofroll.studies.judging.reference import Reference
+from proofroll.studies.judging.reference import Reference, _true_curves
 from proofroll.studies.tradeoff.curve import CurvePoint, with_errors
 from proofroll.truth.ball_on_surface.polar import Polar
 from proofroll.truth.ball_on_surface.rolling import reduced
@@ -57,12 +57,30 @@ def test_a_gap_has_the_round_off_of_the_places_that_it_is_between() -> None:
 
 
 def test_nothing_is_held_against_what_the_truth_does_not_tell() -> None:
-    """Forces that are not determinate all the time are no curve of the truth: engines that tell them are not judged."""
+    """Forces that are never determinate are no curve of the truth: engines that tell them are not judged."""
     held, told = Reference(load_scene("falling_rod"), xr.Dataset(), {}, {}), np.ones((3, 2, 3))
     allowance = Allowance("contact_forces", "N", tolerance=1.0, scale=1.0)
     judgement = judge_curve(allowance, RunCurve(told), held.true("contact_forces", told))
     assert judgement.verdict is Verdict.NOT_JUDGED
     assert judgement.reason == "not judged: the truth does not tell it here"
+
+
+def test_forces_are_compared_where_and_while_they_are_determinate() -> None:
+    """Those that joints share with a contact, those beside an impact and all of an ill-posed question are left out."""
+    scene = load_scene("falling_rod")
+    forces = np.ones((7, 1, 3))
+    forces[2, 0, 1] = np.nan
+    axes = ("time", "contact", "xyz")
+    true = xr.Dataset(
+        {"contact_forces": (axes, forces, {"units": "N", "error_bar": 1e-9})},
+        {"time": 0.1 * np.arange(7)},
+        {"horizon": 0.55, "ill_posed": "chance"},
+    )
+    curves, determinate = _true_curves(scene, with_events(true, [Event("impact", 0.35, 0.35, 0.35)]))
+    mask = determinate["contact_forces"]
+    assert mask[:, 0, 0].tolist() == [True, True, False, False, True, False]
+    assert mask[:, 0, 1].tolist() == [True, False, False, False, True, False]
+    assert curves["contact_forces"].sum() == mask.sum()
 
 
 def test_events_of_a_scene_without_any_are_too_many() -> None:
