@@ -92,8 +92,9 @@ class SwitchedJoint:
 class Settling:
     """Largest impact speed at each stop or contact so far, which decides when rebounds are summed."""
 
-    def __init__(self) -> None:
-        self._fastest: dict[int, float] = {}
+    def __init__(self, *, early: bool = False) -> None:
+        """Takes whether rebounds are summed ``early``: one before, and at twice the speed at least."""
+        self._fastest, self._early = dict[int, float](), early
 
     def __call__(self, which: int, speed: float, restitution: float) -> bool:
         """True if only the total time of the rebounds that follow this impact is summed.
@@ -102,7 +103,8 @@ class Settling:
         least 1, for the first impact itself may come from a fall of round-off.
         """
         fastest = self._fastest[which] = max(speed, self._fastest.get(which, 1.0))
-        return 0.0 < restitution < 1.0 and speed < SETTLED * fastest
+        limit = SETTLED * fastest / (min(restitution, 0.5) if self._early and restitution else 1.0)
+        return 0.0 < restitution < 1.0 and speed < limit
 
 
 def switched_joints(mechanism: Mechanism) -> tuple[SwitchedJoint, ...]:

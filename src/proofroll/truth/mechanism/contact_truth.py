@@ -18,7 +18,9 @@ from proofroll.truth.mechanism.error_bars import TwoRouteMotion, check_start, on
 from proofroll.truth.mechanism.followed_paths import (
     CLOSE,
     TOLERANCES,
+    Routed,
     counterparts,
+    cut_early,
     followed,
     refuse_uncovered,
     times_known,
@@ -56,12 +58,8 @@ def _in_units(mechanism: Mechanism, units: Units, times: Array) -> TwoRouteMotio
     times = times_known(paths, times)
     stretches = paths[0].stretch_at(times)
     others = counterparts(paths, stretches, kinds)
-    samples = [
-        dynamics.sample(*dynamics.parts(state)[:2], paths[0].stretches[number].mode, float(state[-1]))
-        for state, number in zip(states_of(tree, paths[0], times, stretches), stretches, strict=True)
-    ]
-    one, pressed = record_of(times, [record for record, _, _ in samples]), np.array([force for _, force, _ in samples])
-    summed = np.array([sums for _, _, sums in samples])
+    first = _by_the_tree(tree, paths[0], times)
+    one, cut = first.record, cut_early(tree.early(), paths[0], until, kinks, times, kinds)
     states = states_of(bodies, paths[1], times, others)
     modes = [paths[1].stretches[number].mode for number in others]
     applied = [bodies.forces(state, mode) for state, mode in zip(states, modes, strict=True)]
@@ -76,22 +74,49 @@ def _in_units(mechanism: Mechanism, units: Units, times: Array) -> TwoRouteMotio
     reason = _shared_load(dynamics, paths[0], ended) if ended == 0 or not paths[0].known else ""
     reason = reason or "a change of the parameters within their accuracy changes which contacts stick, slide or open"
     other = np.array([force for force, _ in applied])
-    forces = pressed * units.force, other * units.force
-    sums = summed * units.force, np.einsum("pk,tki->tpi", pair_sums(own.contacts), other) * units.force
-    one, two = units.record(mechanism, one), units.record(mechanism, two)
+    others_sums = np.einsum("pk,tki->tpi", pair_sums(own.contacts), other) * units.force
+    first, two = _in_si(mechanism, units, first), units.record(mechanism, two)
+    left = None
+    if cut is not None:
+        early = _by_the_tree(tree, cut[0], times)
+        early = early._replace(record=on_same_turns(own, one, early.record))
+        left = _in_si(mechanism, units, early), cut[1]
+    assert first.pressed is not None  # of a mechanism with contacts
+    assert first.sums is not None  # of a mechanism with contacts
     return two_route_motion(
         mechanism,
         paths,
-        one,
+        first.record,
         two,
         routes,
         reason,
         units,
         kinds=kinds,
-        pressed=forces,
-        sums=sums,
+        pressed=(first.pressed, other * units.force),
+        sums=(first.sums, others_sums),
         until=until * units.time,
+        cut=left,
     )
+
+
+def _by_the_tree(tree: ContactTree, path: HybridPath[Stretch[ContactMode]], times: Array) -> Routed:
+    """Motion and forces of the first route along a path, in natural units."""
+    stretches, dynamics = path.stretch_at(times), tree.dynamics
+    records, forces, sums = zip(
+        *(
+            dynamics.sample(*dynamics.parts(state)[:2], path.stretches[number].mode, float(state[-1]))
+            for state, number in zip(states_of(tree, path, times, stretches), stretches, strict=True)
+        ),
+        strict=True,
+    )
+    return Routed(record_of(times, records), np.array(forces), np.array(sums))
+
+
+def _in_si(mechanism: Mechanism, units: Units, own: Routed) -> Routed:
+    """Motion and forces in SI units."""
+    assert own.pressed is not None  # of a mechanism with contacts
+    assert own.sums is not None  # of a mechanism with contacts
+    return Routed(units.record(mechanism, own.record), own.pressed * units.force, own.sums * units.force)
 
 
 def _shared_load(dynamics: ContactDynamics, path: HybridPath[Stretch[ContactMode]], time: float) -> str:

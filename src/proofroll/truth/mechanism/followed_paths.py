@@ -1,11 +1,12 @@
 """Truth of a mechanism that switches, from the paths of two routes: horizon, events, error bars."""
 
 from bisect import bisect_right
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from proofroll.core.errors import Refused
 from proofroll.core.events import Event
@@ -47,6 +48,41 @@ def followed(
     return one, follow(second, until, kinks, CLOSE, first_close([one], CLOSE))
 
 
+class Routed(NamedTuple):
+    """Motion of one route at some times.
+
+    Attributes:
+        record: the motion.
+        pressed: contact forces [N], (times, contacts, 3).
+        sums: their sums over pairs with several contacts [N], (times, such pairs, 3).
+    """
+
+    record: Record
+    pressed: Array | None = None
+    sums: Array | None = None
+
+
+def cut_early(
+    route: HybridRoute[ModeT],
+    path: HybridPath[Stretch[ModeT]],
+    until: float,
+    kinks: Sequence[float],
+    times: Array,
+    kinds: Callable[[Any], Any] = lambda mode: mode,
+) -> tuple[HybridPath[Stretch[ModeT]], NDArray[np.bool_]] | None:
+    """Path of a ``route`` that cuts infinitely many rebounds early, and at which times it has the mode of the path.
+
+    The error of a cut is quadratic in its speed, so that of the path itself is at most a third of their difference.
+    None: no rebounds were cut.
+    """
+    if not any(item.kind == "settle" for item in path.happenings):
+        return None
+    early = follow(route, until, kinks, CLOSE)
+    modes = ([kinds(each.stretches[k].mode) for k in each.stretch_at(times)] for each in (path, early))
+    alike = np.array([one == other for one, other in zip(*modes, strict=True)])
+    return early, alike & (early.known | (times < early.stretches[-1].end))
+
+
 def end_of(paths: tuple[FollowedPath, FollowedPath]) -> tuple[float, str]:
     """Time in natural units at which the first of two paths ends early, and the error that ended it.
 
@@ -80,6 +116,7 @@ def two_route_motion(
     pressed: tuple[Array, Array] | None = None,
     sums: tuple[Array, Array] | None = None,
     until: float = np.inf,
+    cut: tuple[Routed, NDArray[np.bool_]] | None = None,
 ) -> TwoRouteMotion:
     """Motion with error bars, from the paths and records of two routes.
 
@@ -95,6 +132,7 @@ def two_route_motion(
         pressed: contact forces by both routes [N], (times, contacts, 3).
         sums: their sums over pairs with several contacts by both routes [N], (times, such pairs, 3).
         until: last time asked for [s].
+        cut: motion of the first route with rebounds cut early, and at which times it counts.
     """
     parted, determinate = _parted(*paths, kinds) * units.time, analyse(mechanism).determinate
     masked = replace(one, wrench=np.where(determinate, one.wrench, np.nan))
@@ -103,11 +141,12 @@ def two_route_motion(
         fields["pressed"], others["pressed"] = pressed
     if sums is not None:
         fields["sums"], others["sums"] = sums
+    left = _left_by_a_cut(mechanism, fields, cut, determinate)
     placed = masked.placed(mechanism)
     bars, differences, least, step = {}, {}, round_off(fields, placed), _of_a_step(mechanism, masked, units)
     for field, values in fields.items():
         difference = largest(np.where(np.isnan(values), np.nan, others[field]) - values)
-        bars[field] = np.maximum.accumulate(SAFETY * difference + least[field]) + step[field]
+        bars[field] = np.maximum.accumulate(SAFETY * difference + left[field] + least[field]) + step[field]
         differences[field] = float(difference[one.time < parted].max(initial=0.0))
     reach = np.maximum(units.length, np.maximum(largest(placed.p_WB), largest(placed.points)))
     bars["drift"] = np.maximum.accumulate(placed.drift() + ROUND_OFF * reach)
@@ -137,6 +176,25 @@ def two_route_motion(
         end=end * units.time,
         ended=ended,
     )
+
+
+def _left_by_a_cut(
+    mechanism: Mechanism,
+    fields: Mapping[str, Array],
+    cut: tuple[Routed, NDArray[np.bool_]] | None,
+    determinate: NDArray[np.bool_],
+) -> dict[str, Array]:
+    """Difference in each field from the motion with rebounds cut early, at each time; zero where it does not count."""
+    left = {name: np.zeros(len(values)) for name, values in fields.items()}
+    if cut is None:
+        return left
+    routed, counts = cut
+    record = replace(routed.record, wrench=np.where(determinate, routed.record.wrench, np.nan))
+    others = fields_with_bars(mechanism, record)
+    others |= {name: values for name in ("pressed", "sums") if (values := getattr(routed, name)) is not None}
+    for name, values in fields.items():
+        left[name] = np.where(counts, largest(others[name] - values), 0.0)
+    return left
 
 
 def _of_a_step(mechanism: Mechanism, record: Record, units: Units) -> dict[str, float]:

@@ -2,7 +2,8 @@
 
 import math
 from abc import ABC, abstractmethod
-from typing import Generic, TypeVar
+from copy import copy
+from typing import Generic, Self, TypeVar
 
 import numpy as np
 
@@ -25,6 +26,12 @@ class Stretches(ABC, Generic[ModeT]):
         self._tolerance = np.full(size, tolerance)
         self._settles = Settling()
         self._span: float | None = None
+
+    def early(self) -> Self:
+        """The same route, which sums rebounds one before, at twice the speed at least."""
+        route = copy(self)
+        route._settles, route._span = Settling(early=True), None
+        return route
 
     @abstractmethod
     def _law(self, state: Array, mode: ModeT) -> StretchLaw:

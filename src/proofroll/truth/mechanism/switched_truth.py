@@ -8,17 +8,19 @@ from proofroll.core.errors import Diverged, Refused
 from proofroll.elements.mechanism.joint import Joint
 from proofroll.elements.mechanism.joint_coordinates import JointCoordinates
 from proofroll.elements.mechanism.model import Mechanism
-from proofroll.elements.mechanism.record import record_of
+from proofroll.elements.mechanism.record import Record, record_of
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.elements.mechanism.signal import breaks
-from proofroll.elements.mechanism.switches import STOPPED
-from proofroll.truth.hybrid import states_of
+from proofroll.elements.mechanism.switches import STOPPED, Mode
+from proofroll.truth.hybrid import HybridPath, Stretch, states_of
 from proofroll.truth.mechanism.body_switching import SwitchedBodies
 from proofroll.truth.mechanism.contact_truth import contact_truth
 from proofroll.truth.mechanism.error_bars import TwoRouteMotion, check_start, on_same_turns
 from proofroll.truth.mechanism.followed_paths import (
     TOLERANCES,
+    Routed,
     counterparts,
+    cut_early,
     followed,
     refuse_uncovered,
     times_known,
@@ -118,18 +120,24 @@ def _switched(mechanism: Mechanism, units: Units, own: Mechanism, times: Array) 
     times = times_known(paths, times)
     stretches = paths[0].stretch_at(times)
     others = counterparts(paths, stretches)
-    q_and_v = states_of(tree, paths[0], times, stretches)
-    nq = mechanism.nq
-    one = record_of(
-        times,
-        [
-            equations.sample(state[:nq], state[nq:-1], paths[0].stretches[number].mode, float(state[-1]))
-            for state, number in zip(q_and_v, stretches, strict=True)
-        ],
-    )
+    one, cut = _by_the_tree(tree, paths[0], times), cut_early(tree.early(), paths[0], until, kinks, times)
     modes = [bodies.switched(paths[1].stretches[number].mode) for number in others]
     two = on_same_turns(own, one, second.recorded(times, states_of(bodies, paths[1], times, others)[:, :-1], modes))
     routes = ("joint coordinates, DOP853, modes by complementarity", "maximal coordinates, DOP853, modes by trial")
     reason = "a change of the parameters within their accuracy changes which joints hold or hit a stop"
+    left = None
+    if cut is not None:
+        early = on_same_turns(own, one, _by_the_tree(tree, cut[0], times))
+        left = Routed(units.record(mechanism, early)), cut[1]
     one, two = units.record(mechanism, one), units.record(mechanism, two)
-    return two_route_motion(mechanism, paths, one, two, routes, reason, units, until=until * units.time)
+    return two_route_motion(mechanism, paths, one, two, routes, reason, units, until=until * units.time, cut=left)
+
+
+def _by_the_tree(tree: SwitchedTree, path: HybridPath[Stretch[Mode]], times: Array) -> Record:
+    """Motion of the first route along a path, in natural units."""
+    stretches, nq = path.stretch_at(times), tree.equations.mechanism.nq
+    samples = [
+        tree.equations.sample(state[:nq], state[nq:-1], path.stretches[number].mode, float(state[-1]))
+        for state, number in zip(states_of(tree, path, times, stretches), stretches, strict=True)
+    ]
+    return record_of(times, samples)

@@ -20,6 +20,7 @@ from proofroll.core.plugins import load_engine
 from proofroll.core.scene import Scene
 from proofroll.core.truth import truth
 from proofroll.elements.ball_on_surface.element import scene_with
+from proofroll.elements.mechanism import switches
 from proofroll.elements.mechanism.contacts import coulomb
 from proofroll.elements.mechanism.contacts.geometry import Geometry, Pair
 from proofroll.elements.mechanism.drives import Actuator
@@ -344,6 +345,24 @@ def test_infinitely_many_impacts_end_when_their_sum_says() -> None:
     assert found.record.p_WB[1, 0] == pytest.approx([0, 0, 0.025], abs=1e-15)
     assert found.pressed is not None
     assert found.pressed[1, 0, 2] == pytest.approx(0.517 * 9.81, abs=DIGITS)
+
+
+@pytest.mark.parametrize("friction", [0.0, 0.2])
+def test_the_error_of_rebounds_cut_short_is_within_the_bars(friction: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Infinitely many rebounds are summed from some on: where that begins changes the motion within its bars."""
+    body = Body("ball", 1.0, inertia=(0.016, 0.016, 0.016))
+    start = Joint("free", "free", "world", "ball", q0=(0, 0, 0.25, 1, 0, 0, 0), v0=(1.5, 0.5, -1, 2, -1, 3))
+    shapes = (Geometry("s", "ball", "sphere", radius=0.2), Geometry("floor", "world", "plane"))
+    pairs = (Pair("c", ("s", "floor"), friction=friction, restitution=0.4),)
+    ball = Mechanism((body,), (start,), geometries=shapes, pairs=pairs, gravity=(2.0, 1.0, -9.0))
+    monkeypatch.setattr(switches, "SETTLED", 1e-3)
+    rough = truth_of(ball, np.array([0.0, 0.8]))
+    monkeypatch.setattr(switches, "SETTLED", 1e-6)
+    fine = truth_of(ball, np.array([0.0, 0.8]))
+    assert "settle" in {event.kind for event in rough.events}
+    for field in ("p_WB", "v_WB"):
+        off = float(np.abs(getattr(rough.record, field)[-1] - getattr(fine.record, field)[-1]).max())
+        assert off < float(rough.bars[field][-1]) < max(100 * off, 1e-12)
 
 
 def test_friction_that_tears_is_refused() -> None:
