@@ -28,7 +28,7 @@ from proofroll.elements.mechanism.contacts.acting import (
 )
 from proofroll.elements.mechanism.contacts.coulomb import contact_forces, torn
 from proofroll.elements.mechanism.contacts.geometry import BodyContact
-from proofroll.elements.mechanism.contacts.joint_laws import JointContact, joint_contacts
+from proofroll.elements.mechanism.contacts.joint_laws import JointContact, joint_contacts, refuse_rubbing_stops
 from proofroll.elements.mechanism.contacts.start import closed_and_still, natural_scale
 from proofroll.elements.mechanism.contacts.touching import Moving, Touching, touch
 from proofroll.elements.mechanism.rotations import Array, frame_of_axis
@@ -92,6 +92,7 @@ class ContactMotion(AlternatingMotion[ContactMode]):
         self._limit_efforts(start)
         now = self.at(start)
         closed, still = closed_and_still(now.touching, scale.length / self._arms, scale.rate)
+        refuse_rubbing_stops(self.contacts, closed, 0.0)
         self.mode = tuple(OPEN for _ in self.contacts)
         self._enter(0.0, start, self._decided(now, closed, still))
 
@@ -355,6 +356,10 @@ class ContactMotion(AlternatingMotion[ContactMode]):
             bool(self._bounds[k]) or (k in which and parts[k] <= self._still and not (k == hit and e))
             for k in range(len(self.mode))
         ]
+        try:
+            refuse_rubbing_stops(self.contacts, closed, self.t)
+        except Refused as error:
+            raise Diverged(str(error)) from None
         return x, closed, settles
 
     def _framed(self, now: ContactsThere, which: Sequence[int]) -> tuple[list[Array], Array, Array]:

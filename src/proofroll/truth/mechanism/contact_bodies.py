@@ -8,6 +8,7 @@ import numpy as np
 from proofroll.core.errors import Refused
 from proofroll.elements.mechanism.analysis import RANK
 from proofroll.elements.mechanism.contacts.acting import OPEN, Acting, ContactMode, Direction, first_mode, slip_velocity
+from proofroll.elements.mechanism.contacts.joint_laws import refuse_rubbing_stops
 from proofroll.elements.mechanism.contacts.sequences import groups_of
 from proofroll.elements.mechanism.contacts.start import closed_and_still
 from proofroll.elements.mechanism.contacts.touching import Touching
@@ -47,6 +48,7 @@ class ContactBodies(ContactStretches):
         """See the protocol."""
         state = np.append(self.equations.equations.equations.start(), 0.0)
         closed, still = closed_and_still(self.equations.at(state).touching, np.ones(len(self.contacts)), 1.0)
+        refuse_rubbing_stops(self.contacts, closed, 0.0)
         state = self.equations.eliminated(state, modes_of(closed, still))
         mode, margin = self._decided(state, closed, still)
         return Transition(state, mode, (), margin)

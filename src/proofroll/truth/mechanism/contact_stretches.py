@@ -15,6 +15,7 @@ from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Diverged
 from proofroll.elements.mechanism.contacts.acting import FAINT, OPEN, Acting, ContactMode, changes, slip_velocity
 from proofroll.elements.mechanism.contacts.coulomb import torn
+from proofroll.elements.mechanism.contacts.joint_laws import refuse_rubbing_stops
 from proofroll.elements.mechanism.contacts.touching import Touching, lying
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.rotations import Array
@@ -308,6 +309,7 @@ class ContactStretches(Stretches[ContactMode]):
         stopped: float = SLIP_ENDED,
     ) -> Transition[ContactMode]:
         """Transition to the mode that follows from the forces; contacts not faster than ``stopped`` are at rest."""
+        refuse_rubbing_stops(self.contacts, closed, stretch.end)
         slips = [float(np.linalg.norm(slip_velocity(each))) for each in self._touching(state)]
         still = [shut and slip <= stopped for shut, slip in zip(closed, slips, strict=True)]
         state = self._equations.eliminated(state, modes_of(closed, still))

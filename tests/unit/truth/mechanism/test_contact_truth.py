@@ -27,6 +27,7 @@ from proofroll.elements.mechanism.drives import Actuator
 from proofroll.elements.mechanism.element import MechanismElement
 from proofroll.elements.mechanism.joint import Joint
 from proofroll.elements.mechanism.model import Mechanism
+from proofroll.elements.mechanism.named_forces import named_forces
 from proofroll.elements.mechanism.parts import Body, Spring
 from proofroll.elements.mechanism.signal import Formula
 from proofroll.files.scene_file import load_scene
@@ -459,10 +460,37 @@ def test_early_events_lie_within_their_brackets() -> None:
     assert stick.time_high - stick.time_low < 1e-14
 
 
-def test_stops_with_friction_beside_contact_are_refused() -> None:
-    """One joint with both is refused: what each holds at a stop is not determinate."""
-    with pytest.raises(Refused, match="rail has stops and dry friction beside contacts"):
-        truth_of(dragged(friction=1.0, limits=(-1.0, 0.1)), np.array([0.0, 0.1]))
+def test_stops_with_friction_beside_contact_are_followed_to_the_stop() -> None:
+    """A joint with both has a truth until it rests on a stop, where what each holds is not determinate."""
+    times = np.array([0.0, 0.05, 0.1, 0.2])
+    free, far = (truth_of(dragged(friction=1.0, limits=(-1.0, at)), times) for at in (9.0, 0.1))
+    assert np.isinf(free.horizon)
+    assert np.isinf(free.end)
+    plain = truth_of(dragged(friction=1.0), times)
+    assert free.record.q == pytest.approx(plain.record.q, abs=1e-12)
+    assert [item.name for item in named_forces(dragged(friction=1.0, limits=(-1.0, 9.0)))] == [
+        "friction.rail", "stop.rail"
+    ]  # fmt: skip
+    assert free.record.named[:, 0] == pytest.approx(plain.record.named[:, 0], abs=1e-12)
+    assert free.record.named[:, 1] == pytest.approx(0.0, abs=1e-12)
+    assert "joint rail rests on a stop from t = 0.11" in far.ended
+    assert far.record.time.tolist() == [0.0, 0.05, 0.1]
+
+
+def test_a_joint_that_rubs_bounces_off_its_stop_beside_contacts() -> None:
+    """An impact with restitution leaves the stop, so that nothing is shared there."""
+    times = np.array([0.0, 0.05, 0.1, 0.2])
+    bounces = truth_of(dragged(friction=1.0, limits=(-1.0, 0.1), restitution=0.5), times)
+    assert ("impact", "rail") in happened(bounces)
+    assert np.isinf(bounces.end)
+
+
+def test_a_joint_that_starts_on_a_stop_and_rubs_beside_contacts_is_refused() -> None:
+    """What its stop and its friction hold is not determinate from the start."""
+    joint = replace(dragged(friction=1.0, limits=(-1.0, 0.0)).joints[0], v0=(0.0,))
+    cart = dragged(friction=1.0)
+    with pytest.raises(Refused, match="joint rail rests on a stop from t = 0 s on and has dry friction"):
+        truth_of(replace(cart, joints=(joint, *cart.joints[1:])), np.array([0.0, 0.1]))
 
 
 def test_friction_of_a_joint_and_of_a_contact_stop_a_foot() -> None:
@@ -717,9 +745,9 @@ def test_what_no_route_follows_is_refused_and_not_called_ill_posed(monkeypatch: 
     table = load_scene("free_turntable")
     (element,) = table.elements
     assert isinstance(element, MechanismElement)
-    axle = replace(element.mechanism.joints[0], friction=0.1, limits=(-9.0, 9.0))
+    axle = replace(element.mechanism.joints[0], friction=0.1, limits=(-9.0, 0.0), v0=(0.0,))
     rubs = replace(element, mechanism=replace(element.mechanism, joints=(axle, *element.mechanism.joints[1:])))
-    with pytest.raises(Refused, match="has stops and dry friction beside contacts"):
+    with pytest.raises(Refused, match="rests on a stop from t = 0 s on and has dry friction"):
         truth(replace(table, elements=(rubs,)), np.array([0.0, 0.1]))
     assert np.isnan(rubs.first_motion.acceleration).all()  # so an engine that has both is asked for no first motion
     monkeypatch.setattr(coulomb, "_SWEEPS", 0)

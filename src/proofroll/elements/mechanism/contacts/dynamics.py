@@ -22,7 +22,12 @@ from proofroll.elements.mechanism.contacts.acting import (
 )
 from proofroll.elements.mechanism.contacts.coulomb import contact_forces, robust_forces
 from proofroll.elements.mechanism.contacts.geometry import BodyContact, pair_sums
-from proofroll.elements.mechanism.contacts.joint_laws import JointContact, joint_contacts, mode_of_joints
+from proofroll.elements.mechanism.contacts.joint_laws import (
+    JointContact,
+    joint_contacts,
+    mode_of_joints,
+    refuse_rubbing_stops,
+)
 from proofroll.elements.mechanism.contacts.sequences import groups_of, ordered, refuse_spread, sequences
 from proofroll.elements.mechanism.contacts.start import STILL, closed_and_still, natural_scale, touches
 from proofroll.elements.mechanism.contacts.touching import Touching, lying
@@ -259,13 +264,19 @@ class ContactDynamics:
         return _least_motion_for(state.W, K, K @ v)
 
     def begin(self) -> tuple[ContactMode, float]:
-        """Mode at the start, and its margin to another one: inf, or 0 if it is not unique."""
+        """Mode at the start, and its margin to another one: inf, or 0 if it is not unique.
+
+        Raises:
+            Refused: a joint with dry friction starts on a stop.
+        """
         q, v = self.mechanism.start()
         scale = natural_scale(self.mechanism)
         turns = [isinstance(c, JointContact) and self.mechanism.joints[c.joint.number].kind != "prismatic"
                  for c in self.contacts]  # fmt: skip
         lengths = np.where(turns, 1.0, scale.length)
-        return self.decided(q, v, *closed_and_still(self.at(q, v).touching, lengths, scale.rate))
+        closed, still = closed_and_still(self.at(q, v).touching, lengths, scale.rate)
+        refuse_rubbing_stops(self.contacts, closed, 0.0)
+        return self.decided(q, v, closed, still)
 
     def decided(
         self, q: Array, v: Array, closed: Sequence[bool], still: Sequence[bool], time: float = 0.0

@@ -14,7 +14,7 @@ from proofroll.elements.mechanism.contacts.acting import ContactMode
 from proofroll.elements.mechanism.contacts.geometry import BodyContact
 from proofroll.elements.mechanism.contacts.touching import Touching
 from proofroll.elements.mechanism.rotations import Array
-from proofroll.elements.mechanism.switches import Mode, SwitchedJoint
+from proofroll.elements.mechanism.switches import STOPPED, Mode, SwitchedJoint
 
 _X, _Y, _NONE = np.eye(3)[0], np.eye(3)[1], np.zeros(3)
 
@@ -66,21 +66,28 @@ class JointContact:
 
 
 def joint_contacts(joints: Sequence[SwitchedJoint]) -> tuple[JointContact, ...]:
-    """Laws of switched joints as contacts: a stop each, or dry friction.
-
-    Raises:
-        Refused: a joint has stops and dry friction, whose shares at a stop are not determinate.
-    """
+    """Laws of switched joints as contacts: of each joint its stops, then its dry friction."""
     found = []
     for joint in joints:
-        sides = [side for side, stop in ((1, joint.low), (-1, joint.high)) if np.isfinite(stop)]
-        if sides and joint.friction:
-            raise Refused(
-                f"joint {joint.name} has stops and dry friction beside contacts of bodies: at rest on a stop their "
-                "shares of the force are not determinate; leave out its limits or its friction"
-            )
-        found += [JointContact(joint, side) for side in sides or [0]]
+        found += [JointContact(joint, side) for side, stop in ((1, joint.low), (-1, joint.high)) if np.isfinite(stop)]
+        if joint.friction:
+            found.append(JointContact(joint, 0))
     return tuple(found)
+
+
+def refuse_rubbing_stops(contacts: Sequence[BodyContact | JointContact], closed: Sequence[bool], time: float) -> None:
+    """Refuses a joint with dry friction that a stop holds from a time on [s].
+
+    Raises:
+        Refused: the shares of its friction and its stop are not determinate, and neither is when it leaves the stop.
+    """
+    for contact, shut in zip(contacts, closed, strict=True):
+        if shut and isinstance(contact, JointContact) and contact.side and contact.joint.friction:
+            raise Refused(
+                f"joint {contact.name} rests on a stop from t = {time:.6g} s on and has dry friction, beside contacts "
+                "of bodies: their shares of its force are not determinate; end before, or leave out its limits or its "
+                "friction"
+            )
 
 
 def mode_of_joints(
@@ -93,6 +100,8 @@ def mode_of_joints(
             continue
         if contact.side:
             own[contact.name] = "low" if contact.side > 0 else "high"
+        elif own[contact.name] in STOPPED:
+            continue
         elif acting.kind == "stick":
             own[contact.name] = "stick"
         else:
