@@ -283,7 +283,7 @@ def _read(limit: Limit, allowance: Allowance, true: TrueCurve, round_off: float,
     if limit.floor:
         text += f"; {limit.floor}"
     if limit.saturated:
-        text += "; two tolerances give the same run, so its steps have another limit, as near samples"
+        text += "; two tolerances give the same run, so something else sets its steps, as samples do"
     return _Ladder(finding, error, bar, order, doubted, leaves, wrong, text)
 
 

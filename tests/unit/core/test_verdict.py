@@ -370,6 +370,7 @@ def test_tolerances_that_give_the_same_run_show_no_limit(off: tuple[float, float
     found = verdict_of(off[0], tightest([TRUE + value for value in off]), ladder=True)
     assert (found.verdict, found.limit) == (Verdict.DIFFERS, LimitResult.NOT_SHOWN)
     assert "two tolerances give the same run" in found.reason
+    assert "another limit" not in found.reason
     assert verdict_of(1e-5, tightest([TRUE + 1e-5] * 3), ladder=True).verdict is Verdict.AGREES
 
 

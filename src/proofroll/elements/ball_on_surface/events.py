@@ -71,7 +71,9 @@ class Watch:
             return SeenInRun(kept, [left] if left is not None else None, ended)
         if located is None or contradicted(at, sticking, events):
             events = [event for event in events if event.kind not in _SWITCHES]
-            events = [*between_samples(at, [bool(value) for value in sticking]), *events]
+            slides = located is None and not self._body.flies and not sticking[0] and at[0] == 0
+            begun = [Event("slip", 0.0, 0.0, 0.0)] if slides else []
+            events = [*begun, *between_samples(at, [bool(value) for value in sticking]), *events]
         return SeenInRun(kept, sorted(events, key=lambda event: event.time), ended)
 
     def _press(self, sample: BallSample) -> float:

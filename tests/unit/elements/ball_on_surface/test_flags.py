@@ -39,3 +39,16 @@ def test_events_that_the_samples_deny_are_not_believed() -> None:
     sample = BallSample(body.p0, body.v0, body.w0, force=np.array([0, 0, 5.0]), sticking=True)
     seen = Watch(body).conclude(np.array(TIMES), [sample] * 5, [STICK])
     assert seen.events == []
+
+
+def test_a_ball_that_slides_from_the_start_slips_at_once() -> None:
+    """An engine without events of its own has the truth's slip at 0 s if its first sample slides, else none there."""
+    body = rolling_ball(load_scene("slide_to_roll"))
+    slides, sticks = (
+        BallSample(body.p0, body.v0, body.w0, force=np.array([0, 0, 5.0]), sticking=sticking)
+        for sticking in (False, True)
+    )
+    seen = Watch(body).conclude(np.array(TIMES), [slides, slides, sticks, sticks, sticks], None)
+    assert seen.events is not None
+    assert [(event.kind, event.time_low) for event in seen.events] == [("slip", 0.0), ("stick", 0.1)]
+    assert Watch(body).conclude(np.array(TIMES), [sticks] * 5, None).events == []
