@@ -1,12 +1,12 @@
 """Content of ``proofroll run``, and its lines on the terminal."""
 
 import math
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from proofroll.core.columns import SMALLEST, UNCERTAIN
+from proofroll.core.columns import SMALLEST, UNCERTAIN, Columns, Variable
 from proofroll.core.dataset import ended_early
 from proofroll.core.diagnosis.scene_diagnosis import Diagnosis, diagnose_scene
 from proofroll.core.events import Event, events_of
@@ -20,6 +20,7 @@ from proofroll.running.case import Case, Result
 
 _FORCES = ("N", "N m")
 _FEW = 3  # most forces and moments that are shown without being asked for
+_FEW_BODIES = 6  # most bodies whose places are shown where no point is tracked
 _DIGITS = 12
 _ROUND_OFF = 1e-14  # of the largest value of a dimension
 _EVENTS = 8  # most events on the terminal; the JSON document has all
@@ -100,6 +101,7 @@ def run_content(case: Case, result: Result, trajectory: Path) -> RunContent:
     turned = {key: item for key, item in columns.variables.items() if case.asks and item.dims == ("time", "wxyz")}
     for key, item in turned.items():
         curves |= {f"{key}.{part}": item._replace(values=item.values[:, i]) for i, part in enumerate("wxyz")}
+    curves = _places(columns, curves) | curves
     end = ended_early(columns)
     least = {key: value for key, value in columns.attrs.items() if key.startswith(SMALLEST)}
     smallest = {key.removeprefix(SMALLEST): float(value) for key, value in least.items()}
@@ -114,6 +116,22 @@ def run_content(case: Case, result: Result, trajectory: Path) -> RunContent:
         error_bars={name: float(c.attrs["error_bar"]) for name, c in curves.items() if "error_bar" in c.attrs} or None,
         ends=end[0] if end else None,
     )
+
+
+def _places(columns: Columns, curves: Mapping[str, Variable]) -> dict[str, Variable]:
+    """Places of the frames of a few bodies, where no point is tracked: ``<body>.x|y|z`` -> along time [m]."""
+    places = columns.variables.get("p_WB")
+    tracked = any(name.endswith(".x") and item.attrs.get("units") == "m" for name, item in curves.items())
+    if tracked or places is None or "body" not in columns.variables:
+        return {}
+    bodies = [str(name) for name in columns["body"].values]
+    if len(bodies) > _FEW_BODIES:
+        return {}
+    return {
+        f"{body}.{letter}": places._replace(dims=("time",), values=places.values[:, i, axis])
+        for i, body in enumerate(bodies)
+        for axis, letter in enumerate("xyz")
+    }
 
 
 def _event_text(event: Event) -> str:

@@ -116,3 +116,18 @@ def test_positions_come_first_and_forces_on_request(tmp_path: Path) -> None:
     assert "force.a" not in texts[0]
     assert "4 forces and moments are not shown; --forces shows them" in texts[0]
     assert "force.a" in texts[1]
+
+
+@pytest.mark.parametrize("tracked", [False, True])
+def test_a_body_without_tracked_points_is_shown_where_it_is(tracked: bool, tmp_path: Path) -> None:
+    """The places of bodies stand among the values, with their error bar, where a scene tracks no point."""
+    metres = {"units": "m", "long_name": "places", "error_bar": 1e-9}
+    variables: dict[str, Any] = {"p_WB": (("time", "body", "xyz"), np.array([[[0.0, 0, 0]], [[1.0, 2, 3]]]), metres)}
+    variables |= {"middle.x": ("time", np.ones(2), metres)} if tracked else {}
+    coordinates = {"time": ("time", [0.0, 1.0], {"units": "s"}), "body": ["box"]}
+    write(xr.Dataset(variables, coordinates), tmp_path / "run.npz")
+    result = Result(Status.DONE, "reached 1 s", trajectory="run.npz", wall_seconds=0.1)
+    content = run_content(_case("pendulum"), result, tmp_path / "run.npz")
+    places = {name: value for name, value in content.final.items() if name.startswith("box.")}
+    assert places == ({} if tracked else {"box.x": 1.0, "box.y": 2.0, "box.z": 3.0})
+    assert tracked or (content.error_bars or {})["box.z"] == 1e-9
