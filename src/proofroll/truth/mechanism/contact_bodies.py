@@ -16,6 +16,7 @@ from proofroll.elements.mechanism.rotations import Array, cross, frame_of_axis
 from proofroll.truth.hybrid import Transition
 from proofroll.truth.mechanism.body_impacts import impulses_in_turn
 from proofroll.truth.mechanism.body_switching import SLACK
+from proofroll.truth.mechanism.contact_balance import balanced, cone_loads
 from proofroll.truth.mechanism.contact_body_symbols import BodySymbols
 from proofroll.truth.mechanism.contact_equations import BodiesSolution, BodiesState, ContactEquations
 from proofroll.truth.mechanism.contact_guards import AT_REST, SLIP_ENDED, SolvedContacts, pressing, sharing
@@ -26,7 +27,6 @@ _MOST = 6  # largest number of closed contacts of which all modes are tried: eac
 _PIVOTS = 4  # exchanges at most of a search by pivots, for each contact
 _CLEAR = 1e-6  # relative margin above which a mode found by pivots is the only one
 _SHARING = 2  # least number of contacts that may share a load
-_SIDES = 180  # sides of a pyramid inside each friction cone, for the test of balance at rest
 Trial = Callable[[ContactMode, Sequence[Array | None]], BodiesSolution]
 
 
@@ -66,7 +66,7 @@ class ContactBodies(ContactStretches):
         if (
             any(closed)
             and list(still) == list(closed)
-            and (self._balanced(bodies, closed) or self._held_together(bodies, closed))
+            and (balanced(self.equations, bodies, closed) or self._held_together(bodies, closed))
         ):
             own = zip(self._own(bodies, closed), self._rubs, strict=True)
             return tuple(
@@ -133,31 +133,6 @@ class ContactBodies(ContactStretches):
         heading = _direction(way / (speed or 1.0))
         return Acting("slip", None if own.along is None else heading, heading)
 
-    def _balanced(self, bodies: BodiesState, closed: Sequence[bool]) -> bool:
-        """True if nothing moves and forces within the cones and bounds of friction balance all loads."""
-        from scipy.optimize import nnls
-
-        if np.abs(bodies.u).max() > AT_REST:
-            return False
-        columns, bounds = [bodies.C.T, -bodies.C.T, *self._pushes(bodies, closed)], self.equations.bounds
-        size, count = float(np.linalg.norm(bodies.force)), sum(each.shape[1] for each in columns)
-        rubs = bodies.J[bounds > 0].sum(axis=1)  # the slide of these has one component
-        # A bounded friction has a part in each direction and a remainder; the three sum to the bound.
-        parts = np.kron([1.0, 1.0, 1.0], np.eye(len(rubs))) * size
-        matrix = np.block([[*columns, rubs.T, -rubs.T, 0 * rubs.T], [np.zeros((len(rubs), count)), parts]])
-        aims = np.concatenate([-bodies.force, size * bounds[bounds > 0]])
-        return bool(nnls(matrix, aims, maxiter=100 * matrix.shape[1])[1] <= SLACK * size)
-
-    def _pushes(self, bodies: BodiesState, closed: Sequence[bool]) -> list[Array]:
-        """Loads by unit normal forces with friction in the directions of a pyramid, for each closed contact."""
-        angles, loads = np.linspace(0, 2 * np.pi, _SIDES, endpoint=False), []
-        for each, J, mu, shut in zip(bodies.touching, bodies.J, self.equations.friction, closed, strict=True):
-            if shut:
-                frame = frame_of_axis(each.normal)
-                sides = np.outer(np.cos(angles), frame[:, 0]) + np.outer(np.sin(angles), frame[:, 1])
-                loads.append(J.T @ (each.normal + mu * sides).T)
-        return loads
-
     def _held_together(self, bodies: BodiesState, closed: Sequence[bool]) -> bool:
         """True if contacts share loads, and forces within their cones let all of them stick while bodies move."""
         from scipy.optimize import nnls
@@ -170,7 +145,7 @@ class ContactBodies(ContactStretches):
             return False
         rows = np.concatenate([bodies.C, held])
         rates = np.concatenate([bodies.of_joints, bodies.bias[which].ravel()])
-        loads = np.column_stack([bodies.C.T, -bodies.C.T, *self._pushes(bodies, closed)])
+        loads = np.column_stack([bodies.C.T, -bodies.C.T, *cone_loads(self.equations, bodies, closed)])
         inertial = np.linalg.solve(bodies.mass, np.column_stack([bodies.force, loads]))
         aims = -(rows @ inertial[:, 0] + rates)
         size = max(float(np.linalg.norm(aims)), AT_REST)
