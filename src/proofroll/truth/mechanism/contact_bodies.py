@@ -7,7 +7,15 @@ import numpy as np
 
 from proofroll.core.errors import Refused
 from proofroll.elements.mechanism.analysis import RANK
-from proofroll.elements.mechanism.contacts.acting import OPEN, Acting, ContactMode, Direction, first_mode, slip_velocity
+from proofroll.elements.mechanism.contacts.acting import (
+    OPEN,
+    Acting,
+    ContactMode,
+    Direction,
+    first_mode,
+    following,
+    slip_velocity,
+)
 from proofroll.elements.mechanism.contacts.joint_laws import refuse_rubbing_stops
 from proofroll.elements.mechanism.contacts.sequences import groups_of
 from proofroll.elements.mechanism.contacts.start import closed_and_still
@@ -101,7 +109,7 @@ class ContactBodies(ContactStretches):
         for k in idle:
             each = bodies.touching[k]
             way = solution.slide[k] if still[k] else each.slide
-            whole[k] = self._following(
+            whole[k] = following(
                 lines[k], way - each.normal * (each.normal @ way), still[k] and self._rubs[k], SLACK * size
             )
         full = self.equations.accelerated(bodies, tuple(whole))
@@ -117,21 +125,6 @@ class ContactBodies(ContactStretches):
             if closed[k]
         ]
         return tuple(whole), max(0.0, min(margins))
-
-    @staticmethod
-    def _following(own: Acting, way: Array, still: bool, least: float) -> Acting:
-        """Mode of a contact that moves with its body along its surface, by a slide or its rate; ``least``: none.
-
-        ``own``: mode with its line.
-        """
-        speed = float(np.linalg.norm(way))
-        if still and speed <= least:
-            return own
-        if own.along is not None:
-            way = np.array(own.along) * (1.0 if way @ own.along >= 0 else -1.0)
-            speed = 1.0
-        heading = _direction(way / (speed or 1.0))
-        return Acting("slip", None if own.along is None else heading, heading)
 
     def _held_together(self, bodies: BodiesState, closed: Sequence[bool]) -> bool:
         """True if contacts share loads, and forces within their cones let all of them stick while bodies move."""

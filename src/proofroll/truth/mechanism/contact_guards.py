@@ -7,7 +7,6 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
-from proofroll.core.errors import Refused
 from proofroll.elements.mechanism.analysis import RANK
 from proofroll.elements.mechanism.contacts.acting import FAINT, Acting, ContactMode, heading_of, slip_velocity
 from proofroll.elements.mechanism.contacts.geometry import BodyContact
@@ -218,17 +217,3 @@ def faint_time(touch: Touching, slide_rate: Array) -> float:
     """Time until a slip stops at its present rate [s]."""
     u = slip_velocity(touch)
     return max(0.0, -float(u @ slide_rate) / float(slide_rate @ slide_rate))
-
-
-def refuse_turning_onset(contact: Touchable, own: Acting, time: float) -> None:
-    """Refuses a slip in the plane that starts from rest at the bound of friction, at a ``time`` [s].
-
-    Raises:
-        Refused: its equations get stiffer the slower it is.
-    """
-    if own.along is None:
-        raise Refused(
-            f"{contact.name} begins to slip from rest at t = {time:.6g} s, in whatever direction of its surface: the "
-            "slower such a slip is, the faster friction turns it, and no route of the truth follows that; end before, "
-            "or take more friction"
-        )

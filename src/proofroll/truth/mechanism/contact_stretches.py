@@ -33,12 +33,12 @@ from proofroll.truth.mechanism.contact_guards import (
     guards_of,
     noise_of,
     pressing,
-    refuse_turning_onset,
     sharing,
     striking,
 )
 from proofroll.truth.mechanism.contact_taylor import CompiledMode, CompiledModes, CompiledStretch, ModeSymbols
 from proofroll.truth.mechanism.followed_paths import CLOSE
+from proofroll.truth.mechanism.planar_slip import BegunSlip, begun_slip, leading
 from proofroll.truth.mechanism.stretches import Stretches
 
 _AHEAD = 1e-9  # time step, relative to the natural time, after which an effort is compared with its limit
@@ -70,6 +70,7 @@ class ContactStretches(Stretches[ContactMode]):
     """
 
     _after_velocities = 0  # components of a state after the velocities, without the time
+    _begins_by = 14  # nodes of the first instants of a slip from rest
     _by_collocation = False  # integrator of compiled modes: collocation, or Taylor series
 
     def __init__(self, equations: _Equations, length: int, tolerance: float, size: float) -> None:
@@ -138,6 +139,8 @@ class ContactStretches(Stretches[ContactMode]):
         """See the protocol."""
         if self._stands(state, mode):
             return Stretch(time, until, mode, state, state, None)
+        if any(own.leads for own in mode):
+            return self._begun(time, state, mode, until)
         guards = guards_of(self.contacts, mode)
         share = next((number for number, guard in enumerate(guards) if guard.kind == "share"), None)
         if share is not None and self._guards(state, mode, [guards[share]])[0] > 0:
@@ -151,6 +154,21 @@ class ContactStretches(Stretches[ContactMode]):
                 last = self._spent(last, mode, k, stretch)
                 end += float(last[-1] - stretch.last[-1])
         return replace(stretch, start=time, first=state, end=end, last=last)
+
+    def _begun(self, time: float, state: Array, mode: ContactMode, until: float) -> Stretch[ContactMode]:
+        """First instants of a slip from rest in the plane, which end before another contact changes."""
+        name = next(contact.name for contact, own in zip(self.contacts, mode, strict=True) if own.leads)
+        guards = guards_of(self.contacts, mode)
+        others = [guard for guard in guards if guard.kind != "still" or not mode[guard.contact].leads]
+
+        def clear(y: Array, now: ContactMode) -> bool:
+            return bool(np.all(self._guards(y, now, others) <= noise_of(others, self._size)))
+
+        rate, solve, count = self._equations.rate, self._solved, self._begins_by
+        begun = begun_slip(time, state, mode, until, rate, solve, clear, count, name)
+        last = self._equations.eliminated(begun.last, begun.mode)
+        goes_on = None if begun.end >= until else len(guards)
+        return replace(begun, last=last, guard=goes_on)
 
     def _walked(self, time: float, state: Array, mode: ContactMode, until: float) -> Stretch[ContactMode]:
         """Stretch by a compiled mode, or by DOP853 where there is none, and near singular poses, where it fails."""
@@ -186,6 +204,8 @@ class ContactStretches(Stretches[ContactMode]):
 
     def within(self, stretch: Stretch[ContactMode], times: Array) -> Array:
         """See the protocol."""
+        if isinstance(stretch, BegunSlip):
+            return np.array([self._equations.eliminated(state, stretch.mode) for state in stretch.at(times)])
         if isinstance(stretch, CompiledStretch) and stretch.by is not None:
             return stretch.by.within(self._law(stretch.first, stretch.mode), stretch, times)
         return super().within(stretch, times)
@@ -229,7 +249,7 @@ class ContactStretches(Stretches[ContactMode]):
     def change(self, stretch: Stretch[ContactMode]) -> Transition[ContactMode]:
         """See the protocol."""
         guards = guards_of(self.contacts, stretch.mode)
-        if stretch.guard is None or stretch.guard >= len(guards):  # a break of the rates, or the limit of an effort
+        if stretch.guard is None or stretch.guard >= len(guards):  # a break of the rates, an effort, a slip begun
             return Transition(stretch.last, stretch.mode, ())
         k, kind = guards[stretch.guard]
         mode, name = list(stretch.mode), self.contacts[k].name
@@ -247,7 +267,6 @@ class ContactStretches(Stretches[ContactMode]):
             mode[k] = OPEN
             return Transition(stretch.last, tuple(mode), (("lift_off", name),))
         if kind == "break":
-            refuse_turning_onset(self.contacts[k], mode[k], stretch.end)
             mode[k] = self._leaving(stretch.last, stretch.mode, k)
             return Transition(stretch.last, tuple(mode), (("slip", name),))
         return self._stopped(stretch) if kind == "still" else self._impact(stretch, k)
@@ -256,7 +275,8 @@ class ContactStretches(Stretches[ContactMode]):
         """Slip that starts at the bound of friction, opposite to the friction that held."""
         solved = self._solved(state, mode)
         line = solved.mode[k].along
-        assert line is not None  # other contacts are refused before
+        if line is None:
+            return leading(mode[k], solved, k)
         sign = -1.0 if np.dot(line, solved.force[k]) > 0 else 1.0
         x, y, z = (sign * component for component in line)
         return Acting("slip", (x, y, z), (x, y, z))

@@ -21,7 +21,7 @@ class ContactTree(ContactStretches):
     Implements :class:`proofroll.truth.hybrid.HybridRoute`.
     """
 
-    _by_collocation = True
+    _begins_by, _by_collocation = 15, True
 
     def __init__(self, dynamics: ContactDynamics, tolerance: float, size: float) -> None:
         self.dynamics = dynamics

@@ -19,6 +19,7 @@ from proofroll.truth.mechanism.followed_paths import (
     CLOSE,
     TOLERANCES,
     Routed,
+    at_times,
     counterparts,
     cut_early,
     followed,
@@ -57,7 +58,7 @@ def _in_units(mechanism: Mechanism, units: Units, times: Array) -> TwoRouteMotio
     paths = followed(tree, bodies, until, kinks)
     times = times_known(paths, times)
     stretches = paths[0].stretch_at(times)
-    others = counterparts(paths, stretches, kinds)
+    others = at_times(paths[1], counterparts(paths, stretches, kinds), times, kinds)
     first = _by_the_tree(tree, paths[0], times)
     one, cut = first.record, cut_early(tree.early(), paths[0], until, kinks, times, kinds)
     states = states_of(bodies, paths[1], times, others)

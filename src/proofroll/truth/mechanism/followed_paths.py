@@ -230,6 +230,25 @@ def counterparts(
     return found
 
 
+def at_times(
+    path: FollowedPath, stretches: Sequence[int], times: Array, kinds: Callable[[Any], Any] = lambda mode: mode
+) -> list[int]:
+    """Numbers of a path's stretches at times in natural units, near the given ones and of the same kinds of mode.
+
+    A route may divide what the other follows in one stretch at another time, as the beginning of a slip.
+    """
+    found = []
+    for number, time in zip(stretches, times, strict=True):
+        kind, near = kinds(path.stretches[number].mode), number
+        for step in (-1, 1):
+            while 0 <= near + step < len(path.stretches) and kinds(path.stretches[near + step].mode) == kind:
+                if time > path.stretches[near].start if step < 0 else time < path.stretches[near].end:
+                    break
+                near += step
+        found.append(near)
+    return found
+
+
 def _alike(
     one: FollowedPath, two: FollowedPath, kinds: Callable[[Any], Any]
 ) -> tuple[list[tuple[int, int]], list[Stretch[Any]]]:

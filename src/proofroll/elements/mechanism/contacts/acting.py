@@ -24,11 +24,13 @@ class Acting(NamedTuple):
         along: direction of the only line along which it can slide, if there is one, where the mode began; in a slip,
             its sense too.
         heading: initial direction of a slip that begins from rest.
+        leads: True if friction acts against ``heading`` whatever the slip is, which has just begun.
     """
 
     kind: Literal["open", "slip", "stick"]
     along: Direction | None = None
     heading: Direction | None = None
+    leads: bool = False
 
 
 ContactMode = tuple[Acting, ...]
@@ -52,7 +54,7 @@ def heading_of(own: Acting, found: Touching) -> Array:
     """
     slip = slip_velocity(found)
     speed = float(np.linalg.norm(slip))
-    if own.along is None and speed > FAINT / 2:
+    if own.along is None and not own.leads and speed > FAINT / 2:
         return np.asarray(slip / speed)
     given = np.array(own.heading if own.along is None else own.along)
     given = given - found.normal * (found.normal @ given)
@@ -115,6 +117,25 @@ def first_mode(kind: Literal["open", "slip", "stick"], frame: Array, heading: Ar
         return Acting("stick", along)
     size = float(np.linalg.norm(heading)) or 1.0
     return Acting("slip", along, _direction(frame[:, 1:] @ (heading / size)))
+
+
+def following(own: Acting, way: Array, still: bool, least: float) -> Acting:
+    """Mode of a closed contact whose body moves it along its surface.
+
+    Args:
+        own: mode at rest, with its line.
+        way: slide, or its rate where the contact is ``still``, along the surface.
+        still: True for a contact at rest.
+        least: size of a rate that counts as none.
+    """
+    speed = float(np.linalg.norm(way))
+    if still and speed <= least:
+        return own
+    if own.along is not None:
+        line = np.array(own.along)
+        heading = _direction(line if way @ line >= 0 else -line)
+        return Acting("slip", heading, heading)
+    return Acting("slip", None, _direction(way / (speed or 1.0)))
 
 
 class _Named(Protocol):
