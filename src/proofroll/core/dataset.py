@@ -204,6 +204,7 @@ def off_impacts(scene: Scene, truth: xr.Dataset, runs: Mapping[Key, xr.Dataset])
     hits = np.array([event.time for event in happened if event.kind in JUMPS])
     near = _ON_IMPACT * float(np.max(np.diff(times), initial=0.0))
     on = np.any(np.abs(times[:, None] - hits) <= near, axis=1)
+    on[-1:] |= ended_early(truth) is not None  # a step to there may reach over the end, as over an impact
     on[:1] = False
     if not on.any() or np.mean(on) >= 0.5:
         return dict(runs)

@@ -201,9 +201,10 @@ def _true_curves(scene: Scene, dataset: xr.Dataset) -> tuple[dict[str, FloatArra
 
 
 def _unsteady(scene: Scene, dataset: xr.Dataset) -> NDArray[np.bool_]:
-    """Samples next to an impact, and those from which on the question is ill-posed, shape (time,)."""
+    """Samples next to an impact or to an early end, and those of an ill-posed question, shape (time,)."""
     times = dataset.variables["time"].values
     found = times >= float(dataset.attrs.get("horizon", np.inf))
+    found[-1:] |= ended_early(dataset) is not None
     for element in scene.elements:
         for event in events_of(part(scene, element, dataset)):
             if event.kind in JUMPS:

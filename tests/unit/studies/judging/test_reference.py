@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from proofroll.core.dataset import off_impacts
+from proofroll.core.dataset import ENDED, ENDS, off_impacts
 from proofroll.core.engine_abilities import SharesEquations
 from proofroll.core.events import Event, events_of, with_events
 from proofroll.core.truth import truth
@@ -83,6 +83,17 @@ def test_forces_are_compared_where_and_while_they_are_determinate() -> None:
     assert curves["contact_forces"].sum() == mask.sum()
 
 
+def test_forces_beside_an_early_end_are_left_out() -> None:
+    """The step of an engine that holds the last known sample may hold the impact that ends the truth, too."""
+    true = xr.Dataset(
+        {"contact_forces": (("time", "contact", "xyz"), np.ones((4, 1, 3)), {"units": "N", "error_bar": 1e-9})},
+        {"time": 0.1 * np.arange(4)},
+        {ENDS: 0.305, ENDED: "a disc lies flat"},
+    )
+    _, determinate = _true_curves(load_scene("falling_rod"), with_events(true, []))
+    assert determinate["contact_forces"][:, 0, 0].tolist() == [True, True, False]
+
+
 def test_events_of_a_scene_without_any_are_too_many() -> None:
     """A run that tells a lift-off where the truth knows no event is wrong about events, and has errors elsewhere."""
     scene = load_scene("sphere_in_cylinder")
@@ -106,6 +117,16 @@ def test_a_velocity_at_an_impact_may_be_that_of_either_side() -> None:
         run = true.assign(v_WB=velocity)
         point = with_errors(CurvePoint(None, Result(Status.DONE, "")), Reference.of(scene, true), run)  # type: ignore[arg-type]  # what it ran is a dataset here
         assert point.errors["v_WB"] < 1e-9
+
+
+def test_reactions_at_the_last_sample_of_an_early_end_are_the_truths() -> None:
+    """The force of a step that reaches over the end may be that of an impact behind it."""
+    scene = load_scene("falling_rod")
+    force = ("time", np.array([1.0, 1, 1, 1]), {"units": "N"})
+    true = xr.Dataset({"normal_forces": force}, {"time": 0.1 * np.arange(4)}, {ENDS: 0.305, ENDED: "it lies flat"})
+    run = true.assign(normal_forces=("time", np.array([1.0, 1, 1, 500]), {"units": "N"}))
+    judged = off_impacts(scene, with_events(true, []), {0: with_events(run, [])})[0]
+    assert judged["normal_forces"].to_numpy().tolist() == [1.0, 1.0, 1.0, 1.0]
 
 
 @pytest.mark.drill
