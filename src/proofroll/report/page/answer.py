@@ -35,7 +35,7 @@ class ReaderQuestion:
 
     @property
     def words(self) -> str:
-        """What is asked for, for a sentence: ``motion within 0.1 mm per metre of path``."""
+        """Question of a reader, as part of a sentence: ``motion within 0.1 mm per metre of path``."""
         return f"{self.motion}{f' and forces within {number(self.tolerance)} of the largest' if self.forces else ''}"
 
     @property
@@ -63,7 +63,7 @@ class ColumnAnswer:
         column: of the matrix.
         standings: of the engines that may be taken, the best first.
         scenes: best cell of these in each scene of the column.
-        failures: what fails and why.
+        failures: settings that fail, each with its reason.
         judged: False: what is asked for is judged in none of its scenes.
     """
 
@@ -85,7 +85,7 @@ class ColumnAnswer:
 
     @property
     def tied(self) -> list[EngineStanding]:
-        """Engines whose cost cannot be told from that of the one to take."""
+        """Engines whose costs overlap with that of the one to take."""
         return [item for item in self.standings if self.taken and item.ties(self.taken)]
 
     @property
@@ -169,7 +169,7 @@ def _failures(
 
 
 def _chips(matrix: ChoiceMatrix, kinds: Sequence[ColumnAnswer]) -> list[Chip]:
-    """Kinds by the engine to take, engines with the most kinds first; then kinds that none holds, or nobody judges."""
+    """Kinds by the engine to take, engines with the most kinds first; then kinds that none holds, or that are not judged."""
     taken: dict[str, list[str]] = {}
     nobody, silent = [], []
     for item in kinds:
@@ -196,7 +196,7 @@ def _lower(title: str) -> str:
 
 
 def listed(words: Sequence[str]) -> str:
-    """Words as a list in a sentence; what ends alike is told once: ``rolling and slipping balls``."""
+    """Words as a list in a sentence; equal endings are written once: ``rolling and slipping balls``."""
     last = [word.rpartition(" ")[2] for word in words]
     for ending in dict.fromkeys(last):
         alike = [word for word in words if word.endswith(f" {ending}") and word.count(" ") == 1]
@@ -222,7 +222,7 @@ def next_words(matrix: ChoiceMatrix, item: ColumnAnswer) -> str:
 
 
 def closest_words(matrix: ChoiceMatrix, item: ColumnAnswer) -> str:
-    """What stands in place of a choice where nothing holds the tolerance."""
+    """Text in place of a choice where nothing holds the tolerance."""
     if not item.judged:
         return "not judged"
     if not item.standings:
@@ -239,7 +239,7 @@ def closest_words(matrix: ChoiceMatrix, item: ColumnAnswer) -> str:
 
 
 def forces_words(matrix: ChoiceMatrix, motion: ColumnAnswer, both: ColumnAnswer) -> str:
-    """What forces change: ``motion`` and ``both``: answers for motion alone and with forces."""
+    """Effect of forces on the answer: ``motion`` and ``both``: answers for motion alone and with forces."""
     if not both.judged:
         return "not judged"
     if both.taken is None:

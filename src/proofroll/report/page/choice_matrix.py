@@ -144,7 +144,7 @@ class EngineStanding:
         return self.cell.absent if self.cell.holds else math.inf, self.cell.cost, ORDER.index(self.cell.state)
 
     def ties(self, first: "EngineStanding") -> bool:
-        """True if its cost cannot be told from that of the first."""
+        """True if its cost overlaps with that of the first."""
         rough = not (self.cell.clean and first.cell.clean)
         return self is not first and self.cell.holds and rough and self.cell.cost < TIE * first.cell.cost
 

@@ -94,7 +94,7 @@ class MatrixRow:
 
 @dataclass(frozen=True)
 class FirstScreen:
-    """What the first screen shows of a report's matrix."""
+    """Content of the first screen, from a report's matrix."""
 
     content: ReportContent
 
@@ -203,7 +203,7 @@ class FirstScreen:
 
     @property
     def choices(self) -> list[tuple[str, ...]]:
-        """Sets of engines of which a reader may ask."""
+        """Sets of engines that a reader may choose."""
         rivals = [name for name in self.matrix.engines if name not in self.matrix.witnesses]
         sizes = range(1, len(rivals) + 1)
         if len(rivals) > _ALL_CHOICES:

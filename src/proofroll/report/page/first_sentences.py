@@ -18,7 +18,7 @@ from proofroll.studies.stability.records import StabilityStudy
 
 @dataclass(frozen=True)
 class Kept:
-    """What agrees, and what is wrong without a warning.
+    """Sentences on the settings that agree, and on those that are wrong without a warning.
 
     Attributes:
         verdicts: number of settings by verdict, of all comparisons.

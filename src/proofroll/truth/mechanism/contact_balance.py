@@ -1,4 +1,4 @@
-"""Whether forces of contacts within their cones and bounds hold bodies that do not move."""
+"""Balance of bodies at rest by forces of contacts within their cones and bounds."""
 
 from collections.abc import Sequence
 

@@ -260,7 +260,7 @@ class ContactBodies(ContactStretches):
         solution: BodiesSolution,
         normal: float,
     ) -> Acting:
-        """What a contact does instead, where what it does violates an inequality."""
+        """Next trial of a contact whose present one violates an inequality."""
         if own.kind == "open":
             return options[1]
         if normal < 0 and options[0].kind == "open":
