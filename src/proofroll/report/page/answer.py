@@ -169,7 +169,7 @@ def _failures(
 
 
 def _chips(matrix: ChoiceMatrix, kinds: Sequence[ColumnAnswer]) -> list[Chip]:
-    """Kinds by the engine to take, engines with the most kinds first; then kinds that none holds, or that are not judged."""
+    """Kinds by the engine to take, engines with the most kinds first; then kinds that none holds or judges."""
     taken: dict[str, list[str]] = {}
     nobody, silent = [], []
     for item in kinds:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Container, Iterable, Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,6 +13,7 @@ from proofroll.core.arrays import FloatArray, largest_difference
 from proofroll.core.comparison import Tolerance
 from proofroll.core.dataset import BETWEEN, observe, part
 from proofroll.core.events import EVENT_ORDER, events_of
+from proofroll.core.number_format import number
 from proofroll.core.observable import Role
 from proofroll.core.turns import on_turns_of
 from proofroll.core.verdict import RunCurve
@@ -21,12 +22,32 @@ from proofroll.studies.judging.reference import Reference
 if TYPE_CHECKING:
     import xarray as xr
 
+_CONTRADICTS = 0.1  # part of their range by which velocities are off at most samples of another motion
+
 
 def always_judged(reference: Reference, names: Iterable[str]) -> dict[str, Tolerance]:
     """Tolerances of the observables that are judged even without one in the file; only differences are shown."""
     items = {name: reference.scene.observables[name] for name in names if reference.scene.observables[name].always}
     end = Tolerance(float(reference.dataset.variables["time"].values[-1]), False, "s")
     return {name: end if item.role is Role.EVENT else Tolerance(item.always, True) for name, item in items.items()}
+
+
+def rates_remark(reference: Reference, curves: Mapping[str, FloatArray], judged: Container[str]) -> str:
+    """Clause on velocities that no tolerance judges and that contradict the motion; empty if there are none.
+
+    Velocities of a right motion are right: at most samples they differ from the true ones by less than ``_CONTRADICTS``
+    of their range. Impacts, which an engine may have a step late, are at few samples.
+    """
+    scene = reference.scene
+    for name in [scene.label(element, key) for element in scene.elements for key in element.sample_type.widths]:
+        true, run = reference.curves.get(name), curves.get(name)
+        if true is None or run is None or name in judged or run.shape != true.shape or not len(true):
+            continue
+        unit, size = scene.observables[name].unit, reference.sizes.get(name, 1.0)
+        apart = float(np.median(np.abs(run - true).reshape(len(true), -1).max(axis=1)))
+        if unit.endswith("/s") and not apart <= _CONTRADICTS * size:
+            return f"{name} does not belong to this motion: off by {number(apart)} {unit} at half of the samples"
+    return ""
 
 
 def observables_of(reference: Reference, dataset: xr.Dataset) -> dict[str, FloatArray]:
