@@ -13,6 +13,7 @@ from proofroll.core.comparison import Band, Comparison
 from proofroll.core.convergence import Limit, falls_faster, floor_of, richardson, scatter_of, tightest
 from proofroll.core.diagnosis.scene_diagnosis import diagnose_scene
 from proofroll.core.errors import ProofrollError
+from proofroll.core.observable import Role
 from proofroll.core.verdict import Allowance, Judgement, Refinement, Verdict, judge_curve
 from proofroll.files.trajectory_file import StoredTrajectory
 from proofroll.running.case import LASTING, Case, EngineFacts, Result, Status
@@ -191,6 +192,8 @@ def _judgements(
     judgements: list[Judgement] = []
     errors: dict[float, dict[str, float]] = {factor: {} for factor in curves if factor != 1}
     always, given = run_values.always_judged(reference, main), band.bounds | run.row.bound
+    if reference.ended and {reference.scene.observables[name].role for name in given} == {Role.RESIDUAL}:
+        always = {}  # laws alone are asked for, which hold behind the end of the truth too
     for name, curve in main.items():
         tolerance = given.get(name) or always.get(name)
         if tolerance is None:
