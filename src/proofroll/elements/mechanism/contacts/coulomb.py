@@ -12,6 +12,7 @@ from typing import Literal
 import numpy as np
 
 from proofroll.core.errors import NotUnique, Refused
+from proofroll.elements.mechanism.analysis import RANK
 from proofroll.elements.mechanism.contacts.lemke import lemke
 from proofroll.elements.mechanism.rotations import Array
 
@@ -256,3 +257,8 @@ def _pressing(G: Array, c: Array, mu: float, t: Array, where: tuple[str, float])
     if response <= 0:
         raise torn(*where)
     return np.asarray(-c[0] / response * along)
+
+
+def least_motion_for(W: Array, K: Array, violation: Array) -> Array:
+    """Motion of least kinetic energy that makes these violations of rows K, (nv)."""
+    return np.asarray(W @ K.T @ (np.linalg.pinv(K @ W @ K.T, RANK, hermitian=True) @ violation))

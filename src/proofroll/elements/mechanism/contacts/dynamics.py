@@ -20,7 +20,7 @@ from proofroll.elements.mechanism.contacts.acting import (
     held_directions,
     turned,
 )
-from proofroll.elements.mechanism.contacts.coulomb import contact_forces, robust_forces
+from proofroll.elements.mechanism.contacts.coulomb import contact_forces, least_motion_for, robust_forces
 from proofroll.elements.mechanism.contacts.geometry import BodyContact, pair_sums
 from proofroll.elements.mechanism.contacts.joint_laws import (
     JointContact,
@@ -248,7 +248,7 @@ class ContactDynamics:
         state = self.at(q, v)
         normals = np.array([state.touching[k].normal @ state.J[k] for k in closed])
         gaps = np.array([state.touching[k].gap for k in closed])
-        q = self.equations.tree.moved(q, -_least_motion_for(state.W, normals, gaps))
+        q = self.equations.tree.moved(q, -least_motion_for(state.W, normals, gaps))
         state = self.at(q, v)
         return np.concatenate([q, v - self._brought(state, v, mode), [time]])
 
@@ -261,7 +261,7 @@ class ContactDynamics:
             elif own.kind == "slip":
                 rows.append(state.touching[k].normal[None] @ state.J[k])
         K = np.concatenate(rows)
-        return _least_motion_for(state.W, K, K @ v)
+        return least_motion_for(state.W, K, K @ v)
 
     def begin(self) -> tuple[ContactMode, float]:
         """Mode at the start, and its margin to another one: inf, or 0 if it is not unique.
@@ -369,7 +369,7 @@ class ContactDynamics:
         after = v + state.W @ J.T @ impulse.ravel()
         # The impulses are found to some digits; what holds fixes the velocities to the last one.
         held = np.array([[way != "open", *[way == "stick"] * 2] for way in done]).ravel()
-        after -= _least_motion_for(state.W, J[held], (J @ (after - v) + c)[held])
+        after -= least_motion_for(state.W, J[held], (J @ (after - v) + c)[held])
         return after, impulse, np.inf if same else 0.0
 
     def _refuse_flat(self, state: ContactsNow, closed: Sequence[int], time: float) -> None:
@@ -399,8 +399,3 @@ class ContactDynamics:
         record["named"] = np.where(named, np.nan, record["named"])
         sums = np.where(found.determinate_sums, self.sums[:, :count] @ pressed, np.nan)
         return record, np.where(found.determinate[:count], pressed, np.nan), sums
-
-
-def _least_motion_for(W: Array, K: Array, violation: Array) -> Array:
-    """Motion of least kinetic energy that makes these violations of rows K, (nv)."""
-    return np.asarray(W @ K.T @ (np.linalg.pinv(K @ W @ K.T, RANK, hermitian=True) @ violation))
