@@ -1,7 +1,6 @@
 """Equations of motion of a mechanism whose bodies touch, in the coordinates of its tree.
 
-Between two events each contact is ``open``, ``slip``s (one row, friction against the slip), or ``stick``s (three
-rows). The next mode follows from the forces, by :mod:`proofroll.elements.mechanism.contacts.coulomb`.
+Between events each contact is ``open``, ``slip``s (one row, friction against the slip), or ``stick``s (three rows).
 """
 
 from collections.abc import Sequence
