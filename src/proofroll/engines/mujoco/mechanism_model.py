@@ -97,6 +97,7 @@ def _add_coupling(spec: Any, coupling: Coupling) -> Any:
         tendon.wrap_joint(joint, factor)
     added = spec.add_equality(name=name, type=mujoco.mjtEq.mjEQ_TENDON, objtype=mujoco.mjtObj.mjOBJ_TENDON)
     added.name1 = name
+    added.data[0] = coupling.place
     return added
 
 

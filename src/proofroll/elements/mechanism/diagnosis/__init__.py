@@ -10,7 +10,7 @@ from proofroll.elements.mechanism.diagnosis import contacts
 from proofroll.elements.mechanism.diagnosis.contacts_at_start import at_start
 from proofroll.elements.mechanism.diagnosis.equations import Change
 from proofroll.elements.mechanism.diagnosis.impacts import impacts, laws_of_impacts
-from proofroll.elements.mechanism.diagnosis.joint_laws import of_actuators, of_couplings, of_stops
+from proofroll.elements.mechanism.diagnosis.joint_laws import of_actuators, of_couplings, of_stops, soft_couplings
 from proofroll.elements.mechanism.diagnosis.numbers import (
     FACTORS_OF_ALL,
     friction_of_each_joint,
@@ -47,6 +47,7 @@ HYPOTHESES: tuple[Any, ...] = (
     *FACTORS_OF_ALL,
     of_actuators,
     of_couplings,
+    soft_couplings,
     of_stops,
     of_each_body,
     of_each_joint,

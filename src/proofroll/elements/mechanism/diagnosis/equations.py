@@ -89,14 +89,14 @@ class MechanismStates:
     def free(self, state: MechanismState, without: tuple[int, ...]) -> FloatArray:
         """Directions of velocity allowed at one state, (nv, directions), if some rows of loops are left out."""
         rows = self.tree.loop_rows(state.motion)
-        C = np.concatenate([np.delete(rows.C, without, axis=0), self._geared])
+        C = np.concatenate([np.delete(rows.C, without, axis=0), self.coupled])
         if not len(C):
             return np.eye(self.mechanism.nv)
         _, S, Vt = np.linalg.svd(C)
         return Vt[int(np.sum(_DEPENDENT * S[0] < S)) :].T
 
     @cached_property
-    def _geared(self) -> FloatArray:
+    def coupled(self) -> FloatArray:
         """Rows of the couplings on the velocities, (couplings, nv)."""
         found = np.zeros((len(self.mechanism.couplings), self.mechanism.nv))
         for row, coupling in zip(found, self.mechanism.couplings, strict=True):

@@ -7,11 +7,13 @@ import numpy as np
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.diagnosis import CLOSES_EXACTLY, Cause, Evidence, above_round_off, hypothesis
-from proofroll.core.diagnosis.fitting import change_by, factor_text, possible
+from proofroll.core.diagnosis.fitting import change_by, factor_text, least_squares_parameter, possible
 from proofroll.core.diagnosis.samples import run_and_truth
+from proofroll.core.errors import Diverged, Refused
 from proofroll.elements.mechanism.diagnosis.equations import Change, is_motion, is_one_motion, of_start, placed_of
 from proofroll.elements.mechanism.diagnosis.residuals import COVERED, best, residuals_of
 from proofroll.elements.mechanism.drives import Actuator
+from proofroll.elements.mechanism.joint import WITH_QUATERNION
 from proofroll.elements.mechanism.joint_coordinates import JointCoordinates
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.signal import value_at
@@ -20,6 +22,8 @@ Effort = Callable[[Actuator, float, float, float], float]
 _COVERS = ("motion", *COVERED, "effort")
 _STILL = 1e-9
 _AT_STOP = 1e-3  # largest distance from a stop of rebounds found by parabolas, relative to the joint's range
+# Softness at which the fit of a soft coupling starts: that of a row of impedance 0.9.
+_SOFT = 0.1
 # Least change of velocity between two samples, relative to the changes before and after, that counts as a jump.
 _JUMPS = 5.0
 _REACHES = 2.0  # steps of way beyond a stop in which a method may turn back
@@ -141,6 +145,68 @@ def of_couplings(evidence: Evidence) -> Iterator[Cause]:
         change = np.inf if after <= CLOSES_EXACTLY * before else change_by(ratio / own)
         count = len(moving[0]) if alone else None
         yield Cause(f"ratio of {coupling.name}", says, *what, remedy, 1, _COVERS, explains=count, change=change)
+
+
+@hypothesis(
+    "soft couplings",
+    "at time 0, all accelerations are those of couplings that yield to their forces, each by the same part of an "
+    "inverse inertia that the joints have without them",
+)
+def soft_couplings(evidence: Evidence) -> Iterator[Cause]:
+    """Hypothesis: the couplings' rows are soft in proportion to an inverse inertia.
+
+    A regularised row gives way by softness times its force. Engines take the softness as a part of an estimate of the
+    row's inverse inertia: of its own, or of the sum of those of its joints. A light joint between heavy ones has a
+    large one, and its coupling hardly holds.
+    """
+    mechanism = evidence.element.mechanism
+    start = of_start(evidence) if mechanism.couplings else None
+    if start is None:
+        return
+    rows, rates = start.coupled, start.v_rates[0]
+    q, v = mechanism.start()
+    try:
+        without = JointCoordinates(replace(mechanism, couplings=()))
+        free = without.solve(q, v).acceleration
+        response = np.array([without.solve(q, v, load=row).acceleration - free for row in rows]).T
+        inverse = np.linalg.inv(without.inertial(without.tree.at(_at_zero(mechanism), np.zeros(mechanism.nv)))[1])
+    except (Diverged, Refused, np.linalg.LinAlgError):  # joints without inertia of their own, which no soft row holds
+        return
+    of_rows = np.einsum("ij,jk,ik->i", rows, inverse, rows)
+    pairs = np.array([len(item.terms) == 2 for item in mechanism.couplings])
+    estimates = [("its own inverse inertia", of_rows)]
+    if pairs.any():
+        of_joints = np.where(pairs, (rows != 0) @ np.diag(inverse), of_rows)
+        estimates.insert(0, ("the sum of its joints' inverse inertias", of_joints))
+
+    def accelerations(softness: FloatArray) -> FloatArray:
+        return np.asarray(free - response @ np.linalg.solve(rows @ response + np.diag(softness), rows @ free))
+
+    before = float(np.max(np.abs(accelerations(np.zeros(len(rows))) - rates)))
+    if not above_round_off(before, float(np.max(np.abs(rates)))):
+        return
+    for whose, estimate in estimates:
+        part = least_squares_parameter(lambda x, of=estimate: accelerations(x * of) - rates, _SOFT, _SOFT)  # type: ignore[misc]  # bound now
+        after = float(np.max(np.abs(accelerations(part * estimate) - rates)))
+        if part <= 0 or after > CLOSES_EXACTLY * before:
+            continue
+        says = f"each coupling is soft and yields to its force by {part:.4g} times {whose}"
+        remedy = (
+            f"make the couplings stiffer (their impedance is {1 / (1 + part):.4g}; 1 is rigid), give light joints an "
+            "armature, or relate heavy joints by one coupling without the light ones"
+        )
+        what = "accelerations at time 0", "1/s^2", before, after
+        yield Cause("soft couplings", says, *what, remedy, 1, _COVERS, explains=len(rates), change=part)
+        return
+
+
+def _at_zero(mechanism: Mechanism) -> FloatArray:
+    """Coordinates (nq) of the pose that the scene's joints describe: zero, or no rotation."""
+    q = np.zeros(mechanism.nq)
+    for joint, place in zip(mechanism.joints, mechanism.q_slices, strict=True):
+        if joint.kind in WITH_QUATERNION:
+            q[place.stop - 4] = 1.0
+    return q
 
 
 def _off_at_start(mechanism: Mechanism, number: int, ratio: float, rates: FloatArray) -> float:
