@@ -116,8 +116,10 @@ def reasons(certificate: Iterable[Mapping[str, Any]]) -> dict[str, list[str]]:
 
 @dataclass(frozen=True)
 class Belief:
-    """Evidence from a row's certificates: lines that hold, all lines, and the largest difference without a reason.
+    """Evidence from a row's certificates: lines that hold, all lines, and the largest difference over its allowance.
 
+    ``largest``: certificate line with the largest difference relative to what it may be, its ``point`` empty for the
+    scene as it is; None: no line has a finite one.
     ``soft``: quantities that may differ, for a reason; ``silent``: quantities that the engine does not report;
     ``audit``: worst judgement of the audit of reactions.
     """
@@ -125,7 +127,7 @@ class Belief:
     name: str
     held: int
     total: int
-    difference: float | None
+    largest: Mapping[str, Any] | None
     soft: list[str]
     silent: list[str]
     audit: Judgement | None
@@ -136,15 +138,15 @@ def belief(content: ReportedComparison) -> list[Belief]:
     lines = []
     audits = [name for name, item in content.observables.items() if item.audit]
     for name, row, runs in content.lines():
-        lines_of_all = [line for run in runs for line in run.certificate]
+        lines_of_all = [{**line, "point": run.point} for run in runs for line in run.certificate]
         certificate = [line for line in lines_of_all if line["standing"] != Standing.NOT_REPORTED]
-        exact = [line["difference"] for line in certificate if not line["because"] and line["difference"] is not None]
+        finite = [line for line in certificate if line["difference"] is not None and math.isfinite(line["difference"])]
         lines.append(
             Belief(
                 name,
                 sum(bool(line["holds"]) for line in certificate),
                 len(certificate),
-                max(filter(math.isfinite, exact), default=None),
+                max(finite, key=lambda line: line["difference"] / line["tolerance"], default=None),
                 list(dict.fromkeys(line["quantity"] for line in certificate if line["because"])),
                 list(dict.fromkeys(not_reported(lines_of_all))),
                 next((row.observables[item] for item in audits if item in row.observables), None),

@@ -96,7 +96,10 @@ class ColumnAnswer:
 
 @dataclass(frozen=True)
 class Chip:
-    """One clause of the answer in a line: an engine (empty: none) for kinds of scenes."""
+    """One clause of the answer in a line: an engine (empty: none) for kinds of scenes.
+
+    Engines whose costs tie are all in ``title``, by name; ``engine`` is the first of them.
+    """
 
     engine: str
     title: str
@@ -170,13 +173,15 @@ def _failures(
 
 def _chips(matrix: ChoiceMatrix, kinds: Sequence[ColumnAnswer]) -> list[Chip]:
     """Kinds by the engine to take, engines with the most kinds first; then kinds that none holds or judges."""
-    taken: dict[str, list[str]] = {}
+    taken: dict[tuple[str, ...], list[str]] = {}
     nobody, silent = [], []
     for item in kinds:
         name = _lower(item.column.title)
         many = len(item.column.scenes)
         if item.taken is not None:
-            taken.setdefault(item.taken.engine, []).append(name)
+            equals = [tie.engine for tie in item.tied if tie.cell.absent == item.taken.cell.absent]
+            engines = sorted([item.taken.engine, *equals], key=lambda engine: matrix.title(engine).lower())
+            taken.setdefault(tuple(engines), []).append(name)
         elif not item.judged:
             silent.append(name)
         elif all(x.cell.state in {NO_RUN, CANNOT, Verdict.NOT_JUDGED} for x in item.standings):
@@ -186,7 +191,10 @@ def _chips(matrix: ChoiceMatrix, kinds: Sequence[ColumnAnswer]) -> list[Chip]:
                 f"all {many} scenes of {name}" if many > 2 else f"both scenes of {name}" if many == 2 else name
             )
     ranked = sorted(taken.items(), key=lambda item: -len(item[1]))
-    chips = [Chip(engine, matrix.title(engine), f"for {listed(names)}") for engine, names in ranked]
+    chips = [
+        Chip(engines[0], " or ".join(matrix.title(engine) for engine in engines), f"for {listed(names)}")
+        for engines, names in ranked
+    ]
     chips += [Chip("", "No engine", f"for {listed(nobody)}")] if nobody else []
     return chips + ([Chip("?", "Not judged", f"for {listed(silent)}")] if silent else [])
 

@@ -42,6 +42,14 @@ def test_a_tie_is_told_of_rough_costs_alone() -> None:
         assert [tied.engine for tied in item.tied] == ([] if clean else ["beta"])
 
 
+def test_a_tie_is_told_in_the_chip_in_a_fixed_order() -> None:
+    """Whichever of two engines with rough costs came out cheaper, the chip names both, by name."""
+    for cheap, dear in ((0.2, 0.3), (0.3, 0.2)):
+        lines = [line(error=1e-9, cost=cheap, clean=False), replace(BETA, cost=dear, clean=False)]
+        chips = answer(choice_matrix(lines, STUDIES, NAMES), 1e-4, False).chips
+        assert [(chip.engine, chip.title) for chip in chips] == [("alpha", "Alpha or beta")]
+
+
 def test_where_nothing_holds_it_the_closest_is_told() -> None:
     """By what it is off; of several scenes how many the best engine holds, and at which speed."""
     matrix = choice_matrix([BALL], STUDIES)
