@@ -20,7 +20,7 @@ ROOT = Path(__file__).resolve().parents[1]
 # Extras without which nothing is simulated otherwise.
 _NO_NUMBERS = {"report", "robots", "all", "dev", "cluster", "docs"}
 # Of a comparison these are for a person.
-_WORDS = ("title", "question", "order")
+_WORDS = ("title", "question", "order", "short")
 
 
 def facts(name: str, workers: Workers | None = None) -> list[EngineFacts]:
@@ -53,6 +53,7 @@ def stamp(name: str, settings: list[EngineFacts], root: Path = ROOT) -> str:
     Code of adapters and truths is left out, for it changes too often.
     """
     content: dict[str, Any] = tomllib.loads((data_folder("comparisons") / f"{name}.toml").read_text(encoding="utf-8"))
+    content["rows"] = [{key: value for key, value in row.items() if key not in _WORDS} for row in content["rows"]]
     folder = data_folder("models") / content["scene"]
     scene = tomllib.loads((folder / "scene.toml").read_text(encoding="utf-8"))
     chosen = [[item.name, item.settings, item.resolution, item.order] for item in settings]

@@ -121,7 +121,7 @@ def _closed(file: RobotFile) -> Iterator[_Noticed]:
         yield (
             "warning",
             "equality",
-            f"{kinds}: what these close or hold is not compared; the tree is checked as if open",
+            f"{kinds}: the check compares the tree as if open; `run` and `compare` close it",
         )
 
 
