@@ -71,7 +71,7 @@ class Watch:
             return SeenInRun(kept, [left] if left is not None else None, ended)
         if located is None or contradicted(at, sticking, events):
             events = [event for event in events if event.kind not in _SWITCHES]
-            slides = located is None and not self._body.flies and not sticking[0] and at[0] == 0
+            slides = located is None and not sticking[0] and at[0] == 0 and bool(np.any(self._body.slip0))
             begun = [Event("slip", 0.0, 0.0, 0.0)] if slides else []
             events = [*begun, *between_samples(at, [bool(value) for value in sticking]), *events]
         return SeenInRun(kept, sorted(events, key=lambda event: event.time), ended)

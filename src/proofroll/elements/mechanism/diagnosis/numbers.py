@@ -14,6 +14,9 @@ from proofroll.elements.mechanism.diagnosis.residuals import best, residuals_of
 from proofroll.elements.mechanism.joint_coordinates import JointCoordinates
 from proofroll.elements.mechanism.model import Mechanism
 
+# Damping by a scheme of first order at a step h and a stiffness k, in parts of k h: 0.5, and what a fit of it leaves.
+_FIRST_ORDER = 0.6
+
 
 def factor_of_all(
     name: str,
@@ -211,7 +214,8 @@ def of_each_joint(evidence: Evidence) -> Iterator[Cause]:
     """Hypothesis: one joint, or every joint, has additional damping or armature.
 
     Coarse steps have the same effect. So the cause states how large the change is: the armature, or damping times
-    natural time, relative to the inertia that the joint moves at the start.
+    natural time, relative to the inertia that the joint moves at the start. Damping that a first-order scheme adds by
+    itself at the engine's step (implicit Euler: half the stiffness times the step) accuses nothing.
     """
     mechanism = evidence.element.mechanism
     equations = JointCoordinates(mechanism)
@@ -234,9 +238,23 @@ def of_each_joint(evidence: Evidence) -> Iterator[Cause]:
                 value = -float(slope @ at) / square
                 if np.any(own[has] + value * which < 0):
                     continue
+                if has == "damping" and value <= _of_scheme(evidence, mechanism, inertia, which):
+                    continue
                 says = f"{where} has {what} of {value:.4g} more than the scene gives it"
                 size = value * {"armature": 1.0, "damping": evidence.element.natural_time}[has]
                 remedy = f"set {has} of the joints yourself, also where it is zero"
                 change = Change(mechanism, **{key: value * which})
                 part = abs(size) / float(np.min(inertia[which > 0]))
                 yield residuals.cause(f"{what} in {where}", says, change, remedy, 1, part)
+
+
+def _of_scheme(evidence: Evidence, mechanism: Mechanism, inertia: FloatArray, which: FloatArray) -> float:
+    """Largest damping that a first-order scheme adds to some of the joints at the engine's step [N m s/rad, N s/m].
+
+    The stiffness is that of springs and servos, or of a swing with the mechanism's natural time.
+    """
+    stiffness = np.array([joint.stiffness for joint in mechanism.joints for _ in range(joint.nv)])
+    for actuator in mechanism.actuators:
+        stiffness[mechanism.place_of(actuator.joint)[1]] += actuator.gear**2 * actuator.kp
+    stiffness = np.maximum(stiffness, inertia / evidence.element.natural_time**2)
+    return _FIRST_ORDER * (evidence.step or 0.0) * float(np.max(stiffness * which))
