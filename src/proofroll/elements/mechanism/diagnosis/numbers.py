@@ -42,9 +42,10 @@ def factor_of_all(
         mechanism = evidence.element.mechanism
         for residuals in residuals_of(evidence) if has(mechanism) else ():
             factor, fitted = best(residuals, lambda x: change(mechanism, x))
-            if possible(factor, signed):
+            changed = change(mechanism, factor)
+            if possible(factor, signed) and not _by_scheme(evidence, changed):
                 says = f"the engine moves it with {what} {factor_text(factor)}"
-                yield residuals.cause(name, says, change(mechanism, factor), remedy, fitted, change_by(factor))
+                yield residuals.cause(name, says, changed, remedy, fitted, change_by(factor))
 
     return test
 
@@ -238,23 +239,30 @@ def of_each_joint(evidence: Evidence) -> Iterator[Cause]:
                 value = -float(slope @ at) / square
                 if np.any(own[has] + value * which < 0):
                     continue
-                if has == "damping" and value <= _of_scheme(evidence, mechanism, inertia, which):
-                    continue
                 says = f"{where} has {what} of {value:.4g} more than the scene gives it"
                 size = value * {"armature": 1.0, "damping": evidence.element.natural_time}[has]
                 remedy = f"set {has} of the joints yourself, also where it is zero"
                 change = Change(mechanism, **{key: value * which})
+                if _by_scheme(evidence, change):
+                    continue
                 part = abs(size) / float(np.min(inertia[which > 0]))
                 yield residuals.cause(f"{what} in {where}", says, change, remedy, 1, part)
 
 
-def _of_scheme(evidence: Evidence, mechanism: Mechanism, inertia: FloatArray, which: FloatArray) -> float:
-    """Largest damping that a first-order scheme adds to some of the joints at the engine's step [N m s/rad, N s/m].
+def _by_scheme(evidence: Evidence, change: Change) -> bool:
+    """True if a change is damping alone, no more than a first-order scheme adds by itself at the engine's step.
 
     The stiffness is that of springs and servos, or of a swing with the mechanism's natural time.
     """
+    mechanism = evidence.element.mechanism
+    own = np.array([joint.damping for joint in mechanism.joints for _ in range(joint.nv)])
+    added = (change.damping - 1.0) * own + change.added_damping
+    if not evidence.step or np.any(added < 0) or not np.any(added > 0):
+        return False
+    equations = JointCoordinates(mechanism)
+    inertia = np.diag(equations.inertial(equations.tree.at(*mechanism.start()))[1])
     stiffness = np.array([joint.stiffness for joint in mechanism.joints for _ in range(joint.nv)])
     for actuator in mechanism.actuators:
         stiffness[mechanism.place_of(actuator.joint)[1]] += actuator.gear**2 * actuator.kp
     stiffness = np.maximum(stiffness, inertia / evidence.element.natural_time**2)
-    return _FIRST_ORDER * (evidence.step or 0.0) * float(np.max(stiffness * which))
+    return bool(np.all(added <= _FIRST_ORDER * evidence.step * stiffness))
