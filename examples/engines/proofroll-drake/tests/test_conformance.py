@@ -7,8 +7,6 @@ from proofroll.conformance import checks
 
 KNOWN = {
     "tolerance_has_an_effect[continuous-default]": "from Drake's default accuracy on the largest step decides, not it",
-    "moves_as_the_truth[discrete-default-heavy_top]": "first order at 60 rad/s: at 1e-3 s forces are off by a ninth, "
-    "and by half as much at half the step",
 }
 
 

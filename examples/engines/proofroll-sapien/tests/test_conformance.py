@@ -13,8 +13,6 @@ KNOWN = {
     "moves_as_the_truth[pgs-matched-sled]": "friction is a pyramid",
     "moves_as_the_truth[tgs-default-two_spheres]": STEP,
     "moves_as_the_truth[pgs-default-two_spheres]": STEP,
-    "moves_as_the_truth[tgs-matched-two_spheres]": "an impact within a step has the normal of the step's start: "
-    "of first order",
 }
 
 
