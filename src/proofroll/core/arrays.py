@@ -30,8 +30,8 @@ def read_only(item: T) -> T:
     elif isinstance(item, (tuple, list)):
         inside = item
     elif dataclasses.is_dataclass(item) and not isinstance(item, type):
-        own = vars(item) if hasattr(item, "__dict__") else [field.name for field in dataclasses.fields(item)]
-        inside = [getattr(item, name) for name in own]
+        members = vars(item) if hasattr(item, "__dict__") else [field.name for field in dataclasses.fields(item)]
+        inside = [getattr(item, name) for name in members]
     for part in inside:
         read_only(part)
     return item
@@ -64,18 +64,23 @@ def on_turns(time: FloatArray, u: FloatArray, rate: FloatArray, start: float, pe
     return np.asarray(u + period * (turns + np.round((start - u[0]) / period)))
 
 
-def largest_difference(one: FloatArray, other: FloatArray) -> float:
+def longest(vectors: FloatArray) -> float:
+    """Length of the longest of some vectors, shape (…, 3), which is the same in all axes; 0 if there are none."""
+    return float(np.max(np.linalg.norm(vectors, axis=-1), initial=0.0))
+
+
+def largest_difference(curve: FloatArray, rival: FloatArray) -> float:
     """Largest difference of two curves; infinite if their shapes differ or a difference is not finite."""
-    if one.shape != other.shape:
+    if curve.shape != rival.shape:
         return float("inf")
-    difference = float(np.max(np.abs(one - other), initial=0.0))
+    difference = float(np.max(np.abs(curve - rival), initial=0.0))
     return difference if np.isfinite(difference) else float("inf")
 
 
-def known_difference(one: FloatArray, other: FloatArray) -> float:
+def known_difference(array: FloatArray, rival: FloatArray) -> float:
     """Largest difference of the known values of two arrays; infinite if one value is not finite and its partner is.
 
     Pairs of NaN are left out.
     """
-    unknown = np.isnan(one) & np.isnan(other)
-    return largest_difference(np.where(unknown, 0.0, one), np.where(unknown, 0.0, other))
+    unknown = np.isnan(array) & np.isnan(rival)
+    return largest_difference(np.where(unknown, 0.0, array), np.where(unknown, 0.0, rival))

@@ -33,8 +33,8 @@ def beside_events(times: FloatArray, curve: FloatArray, events: Sequence[float],
         sides = slice(max(index - _SIDE, 0), index), slice(index, index + _SIDE)
         if min(len(times[side]) for side in sides) < _SIDE:
             continue
-        before, after = (_taylor(times[side] - event, curve[side]) for side in sides)
-        value, slope, bend = np.max(np.abs(after - before), axis=1)
+        earlier_part, later_part = (_taylor(times[side] - event, curve[side]) for side in sides)
+        value, slope, bend = np.max(np.abs(later_part - earlier_part), axis=1)
         error += late * float(slope + bend * (times[-1] - event))
         if np.any(np.abs(times - event) <= late):
             error += float(value)

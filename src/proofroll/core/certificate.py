@@ -90,8 +90,8 @@ def certify(engine: Any, scene: Scene, settings: Any = None) -> list[Line]:
     built, sample = engine.built(), shaped(scene, engine.sample(), 0.0)
     lines: list[Line] = []
     for element in scene.elements:
-        own = built[element.name] if len(scene.elements) > 1 else built
-        for line in element.certify(own, sample_of(scene, element, sample)):
+        model = built[element.name] if len(scene.elements) > 1 else built
+        for line in element.certify(model, sample_of(scene, element, sample)):
             lines.append(_rounded(replace(line, quantity=scene.label(element, line.quantity)), precision_of(settings)))
     return lines
 
@@ -136,18 +136,19 @@ def require_shapes(built: Any, shapes: Mapping[str, tuple[tuple[int, ...], ...]]
     for name, allowed in shapes.items():
         if not hasattr(built, name):
             raise Diverged(f"the engine's built() gave {type(built).__name__}, which has no {name}")
-        given = getattr(built, name)
-        if given is None:
+        value = getattr(built, name)
+        if value is None:
             continue
         try:
-            shape = np.asarray(given, dtype=np.float64).shape
+            shape = np.asarray(value, dtype=np.float64).shape
         except (TypeError, ValueError):
             raise Diverged(f"the engine's built() gave {name}, which is no array of numbers") from None
         if not any(
-            len(shape) == len(one) and all(n in {m, -1} for n, m in zip(one, shape, strict=True)) for one in allowed
+            len(shape) == len(sizes) and all(n in {m, -1} for n, m in zip(sizes, shape, strict=True))
+            for sizes in allowed
         ):
-            wanted = str(allowed[0]).replace("-1", "n")
-            raise Diverged(f"the engine's built() gave {name} with shape {shape} instead of {wanted}")
+            letters = str(allowed[0]).replace("-1", "n")
+            raise Diverged(f"the engine's built() gave {name} with shape {shape} instead of {letters}")
 
 
 def first_difference(lines: list[Line]) -> str | None:
@@ -158,11 +159,11 @@ def first_difference(lines: list[Line]) -> str | None:
         if all(np.isnan(line.found)):
             return f"the engine's model does not say its {line.quantity}, which the scene requires"
         built, expected = distinct_texts(*worst_numbers(line))
-        where = f" (the one of {len(line.found)} numbers that is furthest off)" if len(line.found) > _SHOWN else ""
+        note = f" (the one of {len(line.found)} numbers that is furthest off)" if len(line.found) > _SHOWN else ""
         refused = f"; {line.quantity} {line.because}" if line.tolerance == EXACT and line.because else ""
         return (
             f"the engine's model differs from the scene: {line.quantity} is {built} instead of "
-            f"{expected} {line.unit}{where} (relative difference {number(line.difference)}{_scale(line)}, "
+            f"{expected} {line.unit}{note} (relative difference {number(line.difference)}{_scale(line)}, "
             f"allowed {number(line.tolerance)}){refused}{_single(line)}"
         )
     return None
@@ -182,13 +183,13 @@ def worst_numbers(line: Line, most: int = _SHOWN) -> tuple[tuple[float, ...], tu
     return (line.found[worst],), (line.expected[worst],)
 
 
-def distinct_texts(found: tuple[float, ...], expected: tuple[float, ...]) -> tuple[str, str]:
+def distinct_texts(numbers: tuple[float, ...], expected: tuple[float, ...]) -> tuple[str, str]:
     """Texts of two lists of numbers, with enough digits to differ."""
     for digits in range(6, 18):
-        one, other = (", ".join(f"{value:.{digits}g}" for value in values) for values in (found, expected))
-        if one != other:
+        text, expected_text = (", ".join(f"{value:.{digits}g}" for value in values) for values in (numbers, expected))
+        if text != expected_text:
             break
-    return one, other
+    return text, expected_text
 
 
 def _scale(line: Line) -> str:
@@ -204,7 +205,7 @@ def _single(line: Line) -> str:
     """Note that the engine's numbers are the scene's rounded to single precision; empty if they are not."""
     if len(line.found) != len(line.expected) or line.found == line.expected:
         return ""
-    one, other = np.array(line.found), np.array(line.expected, dtype=np.float32).astype(float)
-    if not np.array_equal(one, other):
+    numbers, rounded = np.array(line.found), np.array(line.expected, dtype=np.float32).astype(float)
+    if not np.array_equal(numbers, rounded):
         return ""
     return f"; it is the same number in single precision (float32): {SAY_SINGLE}"

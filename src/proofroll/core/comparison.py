@@ -54,14 +54,14 @@ class Tolerance:
             InputError: another form or unit.
         """
         match = re.fullmatch(r"\s*([-+]?[\d.]+(?:[eE][-+]?\d+)?)\s*(.*?)\s*", str(text))
-        given = (match[2] or unit) if match else unit
-        if given not in {unit, "%"} and (given[1:] != unit or given[0] not in _PREFIXES):
+        written_unit = (match[2] or unit) if match else unit
+        if written_unit not in {unit, "%"} and (written_unit[1:] != unit or written_unit[0] not in _PREFIXES):
             raise InputError(field_name, text, f"its unit is {unit}")
         try:
             if match is None:
                 raise ValueError
-            number = match[1] if given in {unit, "%"} else f"{float(match[1]) * _PREFIXES[given[0]]:.17g}"
-            return cls.parse(field_name, f"{number} {given if given == '%' else unit}")
+            number = match[1] if written_unit in {unit, "%"} else f"{float(match[1]) * _PREFIXES[written_unit[0]]:.17g}"
+            return cls.parse(field_name, f"{number} {written_unit if written_unit == '%' else unit}")
         except (InputError, ValueError):
             advice = f"write a positive number and a unit: 1e-3 {unit}, or 1 % of the scale"
             raise InputError(field_name, text, advice) from None

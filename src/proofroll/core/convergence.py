@@ -98,36 +98,38 @@ def richardson(
     """
     coarse, middle, fine = curves
     h = np.asarray(steps, dtype=np.float64) / steps[-1]
-    first, last = largest_magnitude(middle - coarse), largest_magnitude(fine - middle)
-    if last == 0:  # exact, or reported in increments coarser than the change by the refinement
-        return Limit(fine, first, float("nan"))
-    order = observed_order(first, last, h)
-    one_law = _one_law(order, declared, (middle - coarse) / first, (fine - middle) / last) if first else False
+    change_1, change_2 = largest_magnitude(middle - coarse), largest_magnitude(fine - middle)
+    if change_2 == 0:  # exact, or reported in increments coarser than the change by the refinement
+        return Limit(fine, change_1, float("nan"))
+    order = observed_order(change_1, change_2, h)
+    one_law = _one_law(order, declared, (middle - coarse) / change_1, (fine - middle) / change_2) if change_1 else False
     below_any = order < 1 - _ASYMPTOTIC  # an unstable motion amplifies round-off beyond the estimated scatter
-    if scatter and not one_law and (min(first, last) <= _FAR_ABOVE * scatter or below_any):
-        bar = max(first, last, _walked(middle - coarse, fine - middle))
+    if scatter and not one_law and (min(change_1, change_2) <= _FAR_ABOVE * scatter or below_any):
+        bar = max(change_1, change_2, _walked(middle - coarse, fine - middle))
         return Limit(fine, bar, float("nan"), shown=False, rounded=True)
     if not np.isfinite(order) or order < _NO_CONVERGENCE:
         # The finest curve, as uncertain as the largest change seen; from one that vanishes at once no order follows.
-        shown = last < first * (h[1] / h[0]) ** _NO_CONVERGENCE
-        return Limit(fine, max(first, last, _walked(middle - coarse, fine - middle)), float("nan"), shown)
+        shown = change_2 < change_1 * (h[1] / h[0]) ** _NO_CONVERGENCE
+        return Limit(fine, max(change_1, change_2, _walked(middle - coarse, fine - middle)), float("nan"), shown)
     power, rounding, chance = declared or max(1, round(order)), 0.0, 0.0
-    unextrapolated = 2 * last * max(1.0, 1 / (h[1] ** order - 1))
+    unextrapolated = 2 * change_2 * max(1.0, 1 / (h[1] ** order - 1))
     if abs(order - power) > _ASYMPTOTIC:
         power = max(1, round(order))
-        of_one_shape = largest_magnitude((fine - middle) - (middle - coarse) * last / first) <= _ASYMPTOTIC * last
+        of_one_shape = (
+            largest_magnitude((fine - middle) - (middle - coarse) * change_2 / change_1) <= _ASYMPTOTIC * change_2
+        )
         if abs(order - power) > _ASYMPTOTIC or not of_one_shape:
-            chance = max(0.0, first / _shrinkage(declared or order, h) - last)
+            chance = max(0.0, change_1 / _shrinkage(declared or order, h) - change_2)
             return Limit(fine, unextrapolated, order, chance=2 * chance)
         chance = unextrapolated if declared else 0.0
-        rounding = last * abs(1 / (h[1] ** order - 1) - 1 / (h[1] ** power - 1))
-    before = middle + (middle - coarse) / ((h[0] / h[1]) ** power - 1)
-    after = fine + (fine - middle) / (h[1] ** power - 1)
+        rounding = change_2 * abs(1 / (h[1] ** order - 1) - 1 / (h[1] ** power - 1))
+    coarse_limit = middle + (middle - coarse) / ((h[0] / h[1]) ** power - 1)
+    fine_limit = fine + (fine - middle) / (h[1] ** power - 1)
     finer = _removes(power + 1, h, power)
     hidden = _removes(power - 1, h, power) if power > 1 else 0.0
-    change = largest_magnitude(after - before)
+    change = largest_magnitude(fine_limit - coarse_limit)
     bar = max(2 * abs(finer) * change, abs(hidden - finer) * change, 2 * rounding)
-    return Limit(after + (after - before) * finer, bar, order, chance=chance)
+    return Limit(fine_limit + (fine_limit - coarse_limit) * finer, bar, order, chance=chance)
 
 
 def falls_faster(errors: Sequence[float], steps: Sequence[float]) -> bool:
@@ -147,39 +149,44 @@ def falls_faster(errors: Sequence[float], steps: Sequence[float]) -> bool:
     return min(orders) > 0 and all(later > earlier + _ASYMPTOTIC for earlier, later in itertools.pairwise(orders))
 
 
-def _one_law(order: float, declared: int | None, before: FloatArray, after: FloatArray) -> bool:
+def _one_law(order: float, declared: int | None, coarse_change: FloatArray, fine_change: FloatArray) -> bool:
     """True if two normalised changes follow one power law of the step, of the declared or a whole order."""
     whole = declared or (round(order) if np.isfinite(order) else 0)
-    return abs(order - whole) <= _ASYMPTOTIC and whole > 0 and largest_magnitude(after - before) <= _ONE_SHAPE
+    return (
+        abs(order - whole) <= _ASYMPTOTIC and whole > 0 and largest_magnitude(fine_change - coarse_change) <= _ONE_SHAPE
+    )
 
 
-def _walked(first: FloatArray, last: FloatArray) -> float:
+def _walked(change: FloatArray, next_change: FloatArray) -> float:
     """Estimated sum of three further changes if these two grow in one direction; otherwise 0.
 
     Growth by more than a factor of four, which halving the step makes of h^-2, is a jump of one of the runs: 0.
     """
-    growth = largest_magnitude(last) / max(largest_magnitude(first), sys.float_info.min)
-    if not 1 < growth <= _GROWS or largest_magnitude(last - growth * first) > largest_magnitude(last) / 2:
+    growth = largest_magnitude(next_change) / max(largest_magnitude(change), sys.float_info.min)
+    if (
+        not 1 < growth <= _GROWS
+        or largest_magnitude(next_change - growth * change) > largest_magnitude(next_change) / 2
+    ):
         return 0.0
-    return largest_magnitude(last) * (growth + growth**2 + growth**3) / 3
+    return largest_magnitude(next_change) * (growth + growth**2 + growth**3) / 3
 
 
-def observed_order(first: float, last: float, steps: Sequence[float] | FloatArray) -> float:
+def observed_order(change: float, next_change: float, steps: Sequence[float] | FloatArray) -> float:
     """Order p with (h1^p - h2^p) / (h2^p - h3^p) equal to the ratio of the two differences; NaN if none is in (0, 20].
 
     Args:
-        first: size of the difference between the coarse and the middle curve.
-        last: size of the difference between the middle and the fine curve.
+        change: size of the difference between the coarse and the middle curve.
+        next_change: size of the difference between the middle and the fine curve.
         steps: the three steps h1 > h2 > h3.
     """
     from scipy.optimize import brentq
 
-    if not (first > 0 and last > 0):
+    if not (change > 0 and next_change > 0):
         return float("nan")
     h1, h2, h3 = (float(step) / float(steps[-1]) for step in steps)
 
     def excess(p: float) -> float:
-        return float(np.log(_shrinkage(p, (h1, h2, h3)) * last / first))
+        return float(np.log(_shrinkage(p, (h1, h2, h3)) * next_change / change))
 
     low, high = _ORDERS
     return float(brentq(excess, low, high)) if excess(low) < 0 < excess(high) else float("nan")
@@ -192,11 +199,11 @@ def _shrinkage(order: float, h: Sequence[float] | FloatArray) -> float:
 
 def _removes(term: int, h: FloatArray, power: int) -> float:
     """Multiple of the change between two extrapolations that, added to the second, removes a term h^term."""
-    before, after = (
+    coarse_term, fine_term = (
         float(fine**term - (coarse**term - fine**term) / ((coarse / fine) ** power - 1))
         for coarse, fine in itertools.pairwise(h)
     )
-    return after / (before - after)
+    return fine_term / (coarse_term - fine_term)
 
 
 def tightest(curves: Sequence[FloatArray]) -> Limit:
@@ -206,7 +213,7 @@ def tightest(curves: Sequence[FloatArray]) -> Limit:
     one did, whichever is larger. Where one tightening changed nothing, or all changed round-off only, it is the largest
     change: two nearly equal changes of that kind would be extrapolated as slow convergence.
     """
-    changes = [largest_magnitude(after - before) for before, after in itertools.pairwise(curves)]
+    changes = [largest_magnitude(fine - coarse) for coarse, fine in itertools.pairwise(curves)]
     if min(changes) <= _SAME * max(changes):
         return Limit(curves[-1], max(changes), float("nan"), shown=False, saturated=True)
     if max(changes) <= _SCATTER * np.finfo(np.float64).eps * largest_magnitude(curves[-1]):
@@ -275,7 +282,7 @@ def envelope(errors: Sequence[float], floor: int | None = None) -> list[float]:
     last = len(errors) if floor is None else floor + 1
     largest = []
     for index, error in enumerate(errors[:last]):
-        finer = [other for other in errors[index + 1 : last] if other != float("inf")][:_NEIGHBOURS]
+        finer = [finer_error for finer_error in errors[index + 1 : last] if finer_error != float("inf")][:_NEIGHBOURS]
         largest.append(max([error, *finer]))
     return [*largest, *errors[last:]]
 

@@ -47,11 +47,11 @@ class CutOut:
         attributes: names of the attributes that the definitions use.
     """
 
-    def __init__(self, wanted: Sequence[object], uses: Iterable[str], instead: Mapping[str, str] = {}) -> None:
+    def __init__(self, objects: Sequence[object], uses: Iterable[str], instead: Mapping[str, str] = {}) -> None:
         """Cuts out the definitions.
 
         Args:
-            wanted: functions and classes of the package.
+            objects: functions and classes of the package.
             uses: attributes that the program uses.
             instead: name -> text that replaces its definition.
 
@@ -63,10 +63,10 @@ class CutOut:
         self._kept: dict[_Place, ast.stmt] = {}
         self._needs: dict[_Place, list[_Place]] = {}
         self._imports: set[str] = set()
-        roots = [(getattr(one, "__module__"), getattr(one, "__name__")) for one in wanted]  # noqa: B009 -- of any object
-        before = -1
-        while before != len(self.attributes):  # what is called grows with what is kept
-            before = len(self.attributes)
+        roots = [(getattr(kind, "__module__"), getattr(kind, "__name__")) for kind in objects]  # noqa: B009 -- of any object
+        last_count = -1
+        while last_count != len(self.attributes):  # what is called grows with what is kept
+            last_count = len(self.attributes)
             self._kept, self._needs = {}, {}
             for place in roots:
                 self._take(place)
@@ -97,12 +97,12 @@ class CutOut:
         if value is None or isinstance(value, (bool, int, float, str, slice)):
             return f"float('{value}')" if isinstance(value, float) and not math.isfinite(value) else repr(value)
         if (kind := type(value).__name__) in self.names:
-            given = {field.name: getattr(value, field.name) for field in dataclasses.fields(value) if field.init}
+            members = {field.name: getattr(value, field.name) for field in dataclasses.fields(value) if field.init}
         else:
             kind, names = "SimpleNamespace", self.attributes.intersection(dir(value))
-            given = {name: getattr(value, name) for name in sorted(names) if not name.startswith("_")}
-            given = {name: one for name, one in given.items() if not callable(one)}
-        return f"{kind}({', '.join(f'{name}={self.literal(one)}' for name, one in given.items())})"
+            members = {name: getattr(value, name) for name in sorted(names) if not name.startswith("_")}
+            members = {name: entry for name, entry in members.items() if not callable(entry)}
+        return f"{kind}({', '.join(f'{name}={self.literal(entry)}' for name, entry in members.items())})"
 
     def _take(self, place: _Place) -> _Place | None:
         """Keeps a definition with all that it needs; returns its place, or None if it is imported or a builtin."""
@@ -134,8 +134,8 @@ class CutOut:
         self._kept[place] = node
         names, attributes = _asked(node, self._drops(node))
         self.attributes |= attributes
-        needs = [self._take((module, one)) for one in names if one != name]
-        self._needs[place] = [one for one in needs if one is not None]
+        needs = [self._take((module, need)) for need in names if need != name]
+        self._needs[place] = [need for need in needs if need is not None]
         return place
 
     def _drops(self, node: ast.stmt) -> list[ast.stmt]:
@@ -161,14 +161,14 @@ class CutOut:
         lines, node = _read(module).lines, self._kept[place]
         gone = set[int]()
         for dropped in self._drops(node):
-            first = _first(dropped)
-            while lines[first - 2].lstrip().startswith("#"):
-                first -= 1
-            gone |= set(range(first - (not lines[first - 2].strip()), (dropped.end_lineno or first) + 1))
+            head = _first(dropped)
+            while lines[head - 2].lstrip().startswith("#"):
+                head -= 1
+            gone |= set(range(head - (not lines[head - 2].strip()), (dropped.end_lineno or head) + 1))
         docstrings = _docstrings(node, gone)
-        for first, last in docstrings:
-            gone |= set(range(first + 1, last + 1))
-        short = {first: text for (first, _), text in docstrings.items()}
+        for head, last in docstrings:
+            gone |= set(range(head + 1, last + 1))
+        short = {head: text for (head, _), text in docstrings.items()}
         kept, begin = list[str](), _first(node)
         while lines[begin - 2].startswith("#"):  # comment above a constant
             begin -= 1
@@ -186,12 +186,12 @@ def _docstrings(node: ast.stmt, gone: set[int]) -> dict[tuple[int, int], str]:
     first_lines = {}
     for part in ast.walk(node):
         words = ast.get_docstring(part) if isinstance(part, (_Function, ast.ClassDef)) else None
-        if not words or (own := part.body[0]).lineno in gone:  # type: ignore[attr-defined]  # it has a docstring
+        if not words or (docstring := part.body[0]).lineno in gone:  # type: ignore[attr-defined]  # it has a docstring
             continue
         text = words.partition("\n")[0]
         elsewhere = ":`" in text or _OURS in text
         text = f'"""{text}"""' if not elsewhere else "..." if len(part.body) == 1 else ""  # type: ignore[attr-defined]
-        first_lines[own.lineno, own.end_lineno] = text and " " * own.col_offset + text
+        first_lines[docstring.lineno, docstring.end_lineno] = text and " " * docstring.col_offset + text
     return first_lines
 
 
@@ -204,22 +204,24 @@ def _read(module: str) -> _Module:
     imported: dict[str, Any] = {}
     for node in ast.parse(text).body:
         if isinstance(node, ast.ImportFrom) and node.module:
-            imported |= {one.asname or one.name: (node.module, one) for one in node.names}
+            imported |= {alias.asname or alias.name: (node.module, alias) for alias in node.names}
         elif isinstance(node, ast.Import):
-            for one in node.names:
-                imported.setdefault(one.asname or one.name.partition(".")[0], []).append(ast.unparse(node))
+            for alias in node.names:
+                imported.setdefault(alias.asname or alias.name.partition(".")[0], []).append(ast.unparse(node))
         elif isinstance(node, (_Function, ast.ClassDef)):
             defined[node.name] = node
         elif isinstance(node, (ast.Assign, ast.AnnAssign)):
             targets = node.targets if isinstance(node, ast.Assign) else [node.target]
-            defined |= {one.id: node for target in targets for one in ast.walk(target) if isinstance(one, ast.Name)}
+            defined |= {
+                alias.id: node for target in targets for alias in ast.walk(target) if isinstance(alias, ast.Name)
+            }
     return _Module(text.splitlines(), defined, imported)
 
 
 def _first(node: ast.stmt) -> int:
     """First line of a statement with its decorators."""
     decorators: list[ast.expr] = getattr(node, "decorator_list", [])
-    return min([node.lineno, *(one.lineno for one in decorators)])
+    return min([node.lineno, *(decorator.lineno for decorator in decorators)])
 
 
 def _optional(part: ast.stmt) -> str:

@@ -115,10 +115,10 @@ def off_grid_apart(scene: Scene, columns: Columns, asked: FloatArray, between: F
 def _labelled(scene: Scene, element: Element, variables: Mapping[str, Variable]) -> dict[str, Variable]:
     """The variables of an element, and their dimensions, under their names in the scene."""
 
-    def name(own: str) -> str:
-        return own if own in _SHARED else scene.label(element, own)
+    def name(short_name: str) -> str:
+        return short_name if short_name in _SHARED else scene.label(element, short_name)
 
-    return {name(own): item._replace(dims=tuple(map(name, item.dims))) for own, item in variables.items()}
+    return {name(short_name): item._replace(dims=tuple(map(name, item.dims))) for short_name, item in variables.items()}
 
 
 def add_events(scene: Scene, element: Element, columns: Columns, events: Sequence[Event]) -> Columns:
@@ -131,19 +131,19 @@ def part(scene: Scene, element: Element, dataset: xr.Dataset) -> xr.Dataset:
     if len(scene.elements) == 1:
         return dataset
     ending = f".{element.name}"
-    own = [name for name in dataset.variables if str(name).endswith(ending)]
-    own_variables = dataset[[name for name in own if name in dataset.data_vars]]
+    names = [name for name in dataset.variables if str(name).endswith(ending)]
+    own_variables = dataset[[name for name in names if name in dataset.data_vars]]
     return own_variables.rename(
-        {name: str(name).removesuffix(ending) for name in (*own, *own_variables.dims) if name not in _SHARED}
+        {name: str(name).removesuffix(ending) for name in (*names, *own_variables.dims) if name not in _SHARED}
     )
 
 
-def with_part(scene: Scene, element: Element, dataset: xr.Dataset, own: xr.Dataset) -> xr.Dataset:
-    """The dataset with the variables of one element replaced by those of ``own``, the result of :func:`part`."""
+def with_part(scene: Scene, element: Element, dataset: xr.Dataset, data: xr.Dataset) -> xr.Dataset:
+    """The dataset with the variables of one element replaced by those of ``data``, the result of :func:`part`."""
     if len(scene.elements) == 1:
-        return own
-    names = [*own.data_vars, *own.dims]
-    labelled = own.rename({name: scene.label(element, str(name)) for name in names if name not in _SHARED})
+        return data
+    names = [*data.data_vars, *data.dims]
+    labelled = data.rename({name: scene.label(element, str(name)) for name in names if name not in _SHARED})
     return dataset.drop_vars(list(labelled.data_vars)).assign(labelled.data_vars)
 
 
@@ -180,9 +180,9 @@ def _up_to(scene: Scene, dataset: xr.Dataset, last: float) -> xr.Dataset:
     count = int(np.sum(dataset.variables["time"].values <= last))
     cut = dataset.isel(time=slice(count))
     for element in scene.elements:
-        own = part(scene, element, cut)
-        if "event_time" in own:
-            cut = with_part(scene, element, cut, own.isel(event=own["event_time"].to_numpy() <= last))
+        data = part(scene, element, cut)
+        if "event_time" in data:
+            cut = with_part(scene, element, cut, data.isel(event=data["event_time"].to_numpy() <= last))
     return cut
 
 
@@ -199,39 +199,47 @@ def off_impacts(scene: Scene, truth: xr.Dataset, runs: Mapping[Key, xr.Dataset])
     do where most lie on impacts, as of a ball that bounces in time with the samples: else nothing would be judged.
     """
     runs = until_end(scene, truth, runs)
-    times = truth.variables["time"].values
-    happened = [event for element in scene.elements for event in events_of(part(scene, element, truth))]
-    hits = np.array([event.time for event in happened if event.kind in JUMPS])
-    near = _ON_IMPACT * float(np.max(np.diff(times), initial=0.0))
-    on = np.any(np.abs(times[:, None] - hits) <= near, axis=1)
+    on = impact_samples(scene, truth)
     on[-1:] |= ended_early(truth) is not None  # a step to there may reach over the end, as over an impact
-    on[:1] = False
     if not on.any() or np.mean(on) >= 0.5:
         return dict(runs)
     return {key: _of_either_side(scene, truth, run, np.flatnonzero(on)) for key, run in runs.items()}
 
 
+def impact_samples(scene: Scene, truth: xr.Dataset) -> npt.NDArray[np.bool_]:
+    """Samples of a truth that lie on an impact, where a velocity has two values, shape (time,); never the first."""
+    times = truth.variables["time"].values
+    happened = [event for element in scene.elements for event in events_of(part(scene, element, truth))]
+    hits = np.array([event.time for event in happened if event.kind in JUMPS])
+    near = _ON_IMPACT * float(np.max(np.diff(times), initial=0.0))
+    on = np.any(np.abs(times[:, None] - hits) <= near, axis=1)
+    on[:1] = False
+    return np.asarray(on)
+
+
 def _of_either_side(scene: Scene, truth: xr.Dataset, run: xr.Dataset, on: npt.NDArray[np.intp]) -> xr.Dataset:
     """The run with the truth's values at the samples ``on`` impacts, where its own may be those of either side."""
-    at, given, known = on[on < run.sizes["time"]], run.variables, truth.variables
+    indices, run_variables, true_variables = on[on < run.sizes["time"]], run.variables, truth.variables
     last = truth.sizes["time"] - 1
     changed = {}
     for name in map(str, run.data_vars):
-        own, item = given[name], scene.observables.get(name)
+        variable, item = run_variables[name], scene.observables.get(name)
         reaction = item is not None and item.role is Role.REACTION
-        if name not in known or own.dims[:1] != ("time",) or own.dtype.kind != "f":
+        if name not in true_variables or variable.dims[:1] != ("time",) or variable.dtype.kind != "f":
             continue
-        if own.shape[1:] != known[name].shape[1:]:  # a user's file
+        if variable.shape[1:] != true_variables[name].shape[1:]:  # a user's file
             continue
-        if known[name].attrs.get("units") in _CONTINUOUS and not reaction:
+        if true_variables[name].attrs.get("units") in _CONTINUOUS and not reaction:
             continue
-        true = known[name].values
-        around = np.stack([true[at - 1], true[at], true[np.minimum(at + 1, last)]])
+        true = true_variables[name].values
+        around = np.stack([true[indices - 1], true[indices], true[np.minimum(indices + 1, last)]])
         low, high = around.min(axis=0), around.max(axis=0)
-        inside = (own.values[at] >= 2 * low - high) & (own.values[at] <= 2 * high - low)
-        values = own.values.copy()
-        values[at] = np.where((reaction | inside) & np.isfinite(true[at]), true[at], own.values[at])
-        changed[name] = (own.dims, values, own.attrs)
+        inside = (variable.values[indices] >= 2 * low - high) & (variable.values[indices] <= 2 * high - low)
+        values = variable.values.copy()
+        values[indices] = np.where(
+            (reaction | inside) & np.isfinite(true[indices]), true[indices], variable.values[indices]
+        )
+        changed[name] = (variable.dims, values, variable.attrs)
     return run.assign(changed)
 
 
@@ -247,19 +255,19 @@ def shared_events(
     everything, times = [truth, *runs.values()], truth.variables["time"].values
     for element in scene.elements:
         parts = [part(scene, element, item) for item in everything]
-        events = [events_of(own) for own in parts]
+        events = [events_of(run_part) for run_part in parts]
         fewest = min(map(len, events))
-        late = np.array([event.time for one in events for event in one[fewest:]])
+        late = np.array([event.time for run_events in events for event in run_events[fewest:]])
         if not late.size:
             continue
-        widest = max(event.time_high - event.time_low for one in events for event in one)
+        widest = max(event.time_high - event.time_low for run_events in events for event in run_events)
         room = min(widest, float(np.max(np.diff(times), initial=0.0)))
         if not np.all(np.abs(late - times[-1]) <= room):
             continue
-        for number, own in enumerate(parts):
+        for number, run_part in enumerate(parts):
             if left_out := events[number][fewest:]:
                 open_ = max(event.time_high - event.time_low for event in left_out)
-                cut = with_part(scene, element, everything[number], own.isel(event=slice(fewest)))
+                cut = with_part(scene, element, everything[number], run_part.isel(event=slice(fewest)))
                 everything[number] = cut.assign_attrs({LEFT_OUT: max(open_, cut.attrs.get(LEFT_OUT, 0.0))})
     return everything[0], dict(zip(runs, everything[1:], strict=True))
 
@@ -277,9 +285,9 @@ def common_span(
     spans = {}
     for element in scene.elements:
         if isinstance(element, WatchesRuns):
-            own = part(scene, element, truth)
-            true, shorter = element.common_span(own, {key: part(scene, element, run) for key, run in runs.items()})
-            if true is not own:
+            data = part(scene, element, truth)
+            true, shorter = element.common_span(data, {key: part(scene, element, run) for key, run in runs.items()})
+            if true is not data:
                 spans[element.name] = true, shorter
     if not spans:
         return truth, dict(runs)
@@ -294,10 +302,10 @@ def common_span(
     def cut(dataset: xr.Dataset, parts: Mapping[str, xr.Dataset]) -> xr.Dataset:
         span = dataset.isel(time=slice(count))
         for element in scene.elements:
-            own = parts.get(element.name, part(scene, element, dataset)).isel(time=slice(count))
-            if len(scene.elements) > 1 and element.name not in ending and "event_time" in own:
-                own = own.isel(event=own["event_time"].to_numpy() <= end)
-            span = with_part(scene, element, span, own)
+            data = parts.get(element.name, part(scene, element, dataset)).isel(time=slice(count))
+            if len(scene.elements) > 1 and element.name not in ending and "event_time" in data:
+                data = data.isel(event=data["event_time"].to_numpy() <= end)
+            span = with_part(scene, element, span, data)
         return span
 
     own_truths = {name: true for name, (true, _) in spans.items()}

@@ -54,11 +54,11 @@ def controlled_step(solver: Any, accept: Accept | None, until: float, longest: f
         Diverged: no step is small enough.
     """
     solver.t_bound, solver.status, solver.max_step = until, "running", longest
-    wanted = solver.h_abs
+    step_size = solver.h_abs
     if solver.step() is not None:
         raise Diverged(f"the step size fell to nothing at t = {solver.t:.6g} s")
     if solver.t == until:
-        solver.h_abs = max(wanted, solver.h_abs)
+        solver.h_abs = max(step_size, solver.h_abs)
     if accept is not None:
         go_on_from(solver, accept(float(solver.t), solver.y))
 

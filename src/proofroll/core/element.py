@@ -207,14 +207,14 @@ class ElementKind(Protocol):
     units: ClassVar[Mapping[str, str]]
 
     @staticmethod
-    def read(tables: Mapping[str, Any], gravity: Gravity, numbers: Parameters, where: str) -> Sequence[Element]:
+    def read(tables: Mapping[str, Any], gravity: Gravity, numbers: Parameters, place: str) -> Sequence[Element]:
         """The elements in the tables of a scene file.
 
         Args:
             tables: the file's tables of this kind.
             gravity: of the scene.
             numbers: parameters with which formulas in the tables are evaluated.
-            where: the file, for messages.
+            place: the file, for messages.
 
         Raises:
             InputError: the first mistake, with its location.

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
 
 from proofroll.core.arrays import FloatArray
+from proofroll.core.bounces import Bounce
+from proofroll.core.columns import Columns
 from proofroll.core.events import Event
 from proofroll.core.program_text import FailedRun
 
 if TYPE_CHECKING:
     import xarray as xr
+
+    from proofroll.core.element import Element
 
 
 @dataclass(frozen=True)
@@ -47,6 +51,21 @@ class DoubtsNumbers(Protocol):
         """Sentences on implausible numbers, each with the name of its part and the likely mistake."""
 
 
+@runtime_checkable
+class BoundsSteps(Protocol):
+    """Ability of an element whose laws bound the step of explicit schemes, known before any run."""
+
+    def step_bound(self, taken: Iterable[float]) -> str | None:
+        """Clause on the longest stable step and on the steps that engines take [s]; None: nothing bounds it."""
+
+
+def step_bound(elements: Iterable[object], taken: Iterable[float] = ()) -> str:
+    """Clause on the longest stable step of a scene's elements (:class:`BoundsSteps`); empty: nothing bounds it."""
+    steps = [*taken]
+    bounds = (element.step_bound(steps) for element in elements if isinstance(element, BoundsSteps))
+    return "; ".join(filter(None, bounds))
+
+
 class RunWatch(Protocol):
     """Watches one run for events and for its end."""
 
@@ -60,6 +79,18 @@ class RunWatch(Protocol):
             times: planned times of samples [s].
             samples: of the element; fewer than times if the run ended early.
             located: the engine's own events (:class:`proofroll.core.engine_abilities.LocatesEvents`), or None.
+        """
+
+
+@runtime_checkable
+class TellsBounces(Protocol):
+    """Ability of a watch over bodies that bounce."""
+
+    def bounces(self, columns: Columns) -> Sequence[Bounce]:
+        """Energy and height of each impact among the events of a run, from its samples.
+
+        Args:
+            columns: of the run, under the element's own names.
         """
 
 
@@ -95,6 +126,36 @@ class HasOptionalCapabilities(Protocol):
     @property
     def optional(self) -> frozenset[str]:
         """Capabilities that an engine models only if :attr:`Element.requires` or a question names them."""
+
+
+class HeldValues(Protocol):
+    """Values of an element's held signals at the instants of one run."""
+
+    def next_instant(self, t: float) -> float:
+        """First instant after a time [s]; inf: there is none."""
+
+    def values(self, t: float, sample: Any) -> FloatArray:
+        """Values from the instant ``t`` [s] on; to be called at every instant in turn, 0 among them.
+
+        Args:
+            t: the instant.
+            sample: of the element, then.
+        """
+
+
+@runtime_checkable
+class HoldsTargets(Protocol):
+    """Ability of an element with signals that hold from one instant to the next, as the targets of a controller."""
+
+    def commands(self) -> HeldValues | None:
+        """Values of its held signals for a run that is about to begin; None: it has none."""
+
+    def along(self, run: xr.Dataset | None) -> Element | None:
+        """The element with the held values that it had in a run, as functions of time; None: they are not known.
+
+        Args:
+            run: variables of the element; None: of a start without a run.
+        """
 
 
 @runtime_checkable

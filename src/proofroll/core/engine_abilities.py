@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any, ClassVar, Protocol, runtime_checkable
 
+from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Refused
 from proofroll.core.events import Event
 from proofroll.core.scene import Scene
@@ -16,6 +17,14 @@ class LocatesEvents(Protocol):
 
     def events(self) -> Sequence[Event]:
         """The events so far, in order, each with its bracket (one step wide for a fixed step)."""
+
+
+@runtime_checkable
+class TakesTargets(Protocol):
+    """Ability of an engine whose held signals are set from outside, see :mod:`proofroll.core.commanded`."""
+
+    def drive(self, values: FloatArray) -> None:
+        """Sets the held signals, constant until the next call; called between two calls of ``advance``."""
 
 
 @runtime_checkable
@@ -261,8 +270,8 @@ def require_provided(engine: Any, formulation: str, scene: Scene) -> None:
         purposes = engine.made_for if isinstance(engine, MadeFor) else {}
         able = [
             name
-            for name, given in engine.provides.items()
-            if scene.requires <= given and offered(name, scene.requires, purposes)
+            for name, capabilities in engine.provides.items()
+            if scene.requires <= capabilities and offered(name, scene.requires, purposes)
         ]
         instead = (
             f"choose formulation={' or '.join(able)}" if able else f"no formulation of {engine.name} has all of that"

@@ -36,10 +36,10 @@ class InputError(ProofrollError):
         """The same error, reported for a larger field that contains this one."""
         return InputError(field, value, str(self))
 
-    def of(self, where: str) -> InputError:
+    def of(self, place: str) -> InputError:
         """The same error with the name of a file, or of a part of it, before the field."""
-        known = self.field.startswith(where) or self.field == "file"
-        return self if known else InputError(f"{where}: {self.field}", self.value, self.advice)
+        named = self.field.startswith(place) or self.field == "file"
+        return self if named else InputError(f"{place}: {self.field}", self.value, self.advice)
 
 
 class Refused(ProofrollError):  # noqa: N818 -- a refusal is an honest answer, not an error
@@ -63,37 +63,37 @@ class Diverged(ProofrollError):  # noqa: N818 -- a finding about the engine
 
 
 @contextmanager
-def error_location(where: str) -> Iterator[None]:
+def error_location(place: str) -> Iterator[None]:
     """Context manager that adds the name of a file to an InputError, see :meth:`InputError.of`."""
     try:
         yield
     except InputError as error:
-        raise error.of(where) from None
+        raise error.of(place) from None
 
 
-def no_such_key(field: str, value: object, known: Iterable[str]) -> InputError:
+def no_such_key(field: str, value: object, keys: Iterable[str]) -> InputError:
     """Error for an unknown key of a file, with the known keys."""
-    return InputError(field, value, f"there is no such key here; the keys are {', '.join(known)}")
+    return InputError(field, value, f"there is no such key here; the keys are {', '.join(keys)}")
 
 
 def require_known(
-    field: str, name: object, known: Iterable[str], advice: str = "choose one of", given: object = None
+    field: str, name: object, names_allowed: Iterable[str], advice: str = "choose one of", value: object = None
 ) -> None:
     """Raises an error that lists the first twenty known names, unless ``name`` is known.
 
     Args:
         field: for the message.
         name: the name to look for.
-        known: known names.
+        names_allowed: known names.
         advice: beginning of the advice, before the list.
-        given: text to show instead of the name, if the user wrote more than the name.
+        value: text to show instead of the name, if the user wrote more than the name.
 
     Raises:
         InputError: the name is unknown.
     """
-    names = list(known)
+    names = list(names_allowed)
     if name not in names:
-        raise InputError(field, name if given is None else given, f"{advice} {choices(names, name)}")
+        raise InputError(field, name if value is None else value, f"{advice} {choices(names, name)}")
 
 
 def refuse_first(engine: str, settings: object, rules: Iterable[tuple[bool, str, str]]) -> None:
@@ -119,7 +119,7 @@ def raised_at(error: BaseException) -> str:
     """
     frames = [frame for frame in traceback.extract_tb(error.__traceback__) if "importlib" not in frame.filename]
     files = [(frame, Path(frame.filename)) for frame in frames]
-    outside = [one for one, file in files if not file.is_relative_to(_PACKAGE) or file.is_relative_to(_ENGINES)]
+    outside = [line for line, file in files if not file.is_relative_to(_PACKAGE) or file.is_relative_to(_ENGINES)]
     if not outside:
         return ""
     home = Path(outside[0].filename).parent

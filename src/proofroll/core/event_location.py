@@ -16,6 +16,15 @@ Guards = Callable[[FloatArray], FloatArray]
 _POINTS = 20
 _X = chebyshev.chebpts2(_POINTS)
 _TO_CHEBYSHEV = np.linalg.inv(chebyshev.chebvander(_X, _POINTS - 1))
+# Values between the points, of a polynomial through them and of its slope, and the factor by which half the spread of
+# all values is larger at most than that of these (H. Ehlich, K. Zeller, Mathematische Zeitschrift 86, 1964).
+_DENSE = 8 * _POINTS
+_TO_DENSE = (chebyshev.chebvander(chebyshev.chebpts2(_DENSE + 1), _POINTS - 1) @ _TO_CHEBYSHEV).T
+_TO_SLOPES = (chebyshev.chebvander(chebyshev.chebpts2(_DENSE + 1), _POINTS - 2) @ chebyshev.chebder(_TO_CHEBYSHEV)).T
+_LAST = _TO_CHEBYSHEV[-2:].T
+_WIDER = 1 / np.cos(np.pi / 2 * _POINTS / _DENSE)
+# Last terms of a polynomial, relative to its values, that are round-off; how often a step is halved to get there.
+_RESOLVED, _HALVINGS = 1e-14, 6
 _FEW = chebyshev.chebpts2(6)
 _OF_FEW = np.linalg.inv(chebyshev.chebvander(_FEW, len(_FEW) - 1))
 
@@ -105,24 +114,10 @@ def points_within(start: float, end: float) -> FloatArray:
     return (end + start) / 2 + (end - start) / 2 * _X
 
 
-def lowest(values: FloatArray, start: float, end: float) -> tuple[float, float] | None:
-    """First time inside (start, end) at which a smooth function has a minimum, and its value; None: it has none.
-
-    ``values``: at :func:`points_within`.
-    """
-    if np.argmin(values) == _POINTS - 1 and np.all(np.diff(values) <= 0):
-        return None
-    coefficients = _TO_CHEBYSHEV @ values
-    slope = chebyshev.chebder(coefficients)
-    turns = chebyshev.chebroots(np.trim_zeros(slope, "b")) if np.any(slope) else np.empty(0)
-    bend = chebyshev.chebder(slope)
-    found = np.sort(np.real(turns[np.abs(np.imag(turns)) < 1e-6]))
-    low = [x for x in found.tolist() if abs(x) <= 1 and chebyshev.chebval(x, bend) > 0]
-    return (
-        ((end + start) / 2 + (end - start) / 2 * low[0], float(chebyshev.chebval(low[0], coefficients)))
-        if low
-        else None
-    )
+def _highest(dense: FloatArray) -> FloatArray:
+    """Upper bounds of polynomials from their values at the dense points, (functions, points)."""
+    top, bottom = dense.max(axis=1), dense.min(axis=1)
+    return np.asarray(top + (_WIDER - 1) / 2 * (top - bottom))
 
 
 def locate_rise_within(
@@ -133,9 +128,13 @@ def locate_rise_within(
     leaving: bool = False,
     near: FloatArray | float = 0.0,
     grazes: list[float] | None = None,
-    known: FloatArray | None = None,
+    guards_at_points: FloatArray | None = None,
+    halvings: int = _HALVINGS,
 ) -> tuple[float, int] | None:
     """Time [s] and index of the first rise of a guard in a step whose dense output is as accurate as the step.
+
+    A step in which some guard is no polynomial is halved: of a flight the series ends, and its step may be of any
+    length, while the distance from a curved wall has none.
 
     Args:
         guards: of times, shape (times, guards); accurate within the whole step.
@@ -145,17 +144,29 @@ def locate_rise_within(
         leaving: see there.
         near: see there.
         grazes: see there.
-        known: values of the guards at :func:`points_within`; None: they are evaluated.
+        guards_at_points: values of the guards at :func:`points_within`; None: they are evaluated.
+        halvings: largest number of times that the step is halved.
     """
 
-    def values(times: FloatArray, found: FloatArray | None = None) -> FloatArray:
-        found = (guards(times) if found is None else found) - noise
-        return np.where((times <= start)[:, None], np.minimum(found, 0.0), found) if leaving else found
+    def values(times: FloatArray, guard_values: FloatArray | None = None) -> FloatArray:
+        guard_values = (guards(times) if guard_values is None else guard_values) - noise
+        return (
+            np.where((times <= start)[:, None], np.minimum(guard_values, 0.0), guard_values)
+            if leaving
+            else guard_values
+        )
 
-    at_points = values(points_within(start, end), known)
-    sizes = np.abs(_TO_CHEBYSHEV @ (at_points + near))
-    middle = _TO_CHEBYSHEV[0] @ (at_points + near)
-    below = middle + sizes[1:].sum(axis=0) + 10 * sizes[-2:].sum(axis=0) < 0
+    at_points = values(points_within(start, end), guards_at_points)
+    left_out = 10 * np.abs(at_points.T @ _LAST).sum(axis=1)
+    below = _highest(at_points.T @ _TO_DENSE) + near + left_out < 0
+    if below.all():
+        return None
+    below |= (at_points[0] <= 0) & (_highest(at_points.T @ _TO_SLOPES) + _POINTS**2 * left_out < 0)
+    if halvings and np.any(~below & (left_out > _RESOLVED * np.abs(at_points).max(axis=0))):
+        middle = (start + end) / 2
+        rest = near, grazes, None, halvings - 1
+        first = locate_rise_within(guards, start, middle, noise, leaving, *rest)
+        return first or locate_rise_within(guards, middle, end, noise, False, *rest)
     nearly = np.broadcast_to(near, below.shape)
     rises, crests = list[tuple[float, int]](), list[float]()
     for number in np.flatnonzero(np.logical_not(below)).tolist():
@@ -213,23 +224,23 @@ def locate_rise(
         grazes: list to which the times of these crests are appended [s].
     """
     dense, start, end = solver.dense_output(), float(solver.t_old), float(solver.t)
-    known: dict[float, FloatArray] = {}
+    guards_at: dict[float, FloatArray] = {}
 
     def at(time: float) -> FloatArray:
-        if time not in known:
+        if time not in guards_at:
             values = guards(dense(time)) - noise
-            known[time] = np.minimum(values, 0.0) if leaving and time <= start else values
-        return known[time]
+            guards_at[time] = np.minimum(values, 0.0) if leaving and time <= start else values
+        return guards_at[time]
 
     rises, crests = list[tuple[float, int]](), list[float]()
     below = stays_negative(lambda times: np.array([at(float(t)) + near for t in times]), start, end)
     nearly = np.broadcast_to(near, np.shape(below))
     for number in np.flatnonzero(np.logical_not(below)).tolist():
-        own = partial(_one, at, number)
-        rise = first_rise(own, start, end)
+        guard = partial(_one, at, number)
+        rise = first_rise(guard, start, end)
         if rise is not None:
             rises.append((rise, number))
-        if grazes is not None and nearly[number] and (crest := graze(own, start, end, nearly[number])) is not None:
+        if grazes is not None and nearly[number] and (crest := graze(guard, start, end, nearly[number])) is not None:
             crests.append(crest if rise is None else min(rise, crest))
     span = width = 1e-4 * (end - start)
     if grazes is not None:  # after a rise the motion is another; a joint that rubs turns at its crest

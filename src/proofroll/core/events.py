@@ -75,8 +75,8 @@ def event_columns(events: Sequence[Event]) -> dict[str, Variable]:
 
 
 def with_events(dataset: xr.Dataset, events: Sequence[Event]) -> xr.Dataset:
-    """The dataset with variables for the events, see :func:`event_columns`."""
-    return dataset.assign(event_columns(events))
+    """The dataset with variables for these events in place of any others, see :func:`event_columns`."""
+    return dataset.drop_dims("event", errors="ignore").assign(event_columns(events))
 
 
 def events_of(dataset: xr.Dataset | Columns) -> list[Event]:

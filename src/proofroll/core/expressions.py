@@ -60,11 +60,11 @@ def evaluated(
     """
     if len(text) > LONGEST:
         raise InputError(field, text, f"an expression may have at most {LONGEST} characters")
-    known = {**CONSTANTS, **names}
+    constants = {**CONSTANTS, **names}
     called = FUNCTIONS if functions is None else {name: _of_ratio(name, item) for name, item in functions.items()}
     try:
         source = text.replace("^", "**").strip()
-        value = evaluator(known, called, _power).eval(source, ast.parse(source, mode="eval").body)
+        value = evaluator(constants, called, _power).eval(source, ast.parse(source, mode="eval").body)
         quantity = Quantity(0.0) + value
         number = float(quantity.value)
     except ZeroDivisionError:
@@ -72,12 +72,14 @@ def evaluated(
     except UnitsDiffer as error:
         raise InputError(field, text, f"{error}; change the formula, or the unit of a parameter in it") from None
     except FeatureNotAvailable:
-        raise InputError(field, text, f"is no arithmetic; use numbers, + - * / ^ and {_list(known)}") from None
+        raise InputError(field, text, f"is no arithmetic; use numbers, + - * / ^ and {_list(constants)}") from None
     except InvalidExpression as error:
         problem = str(error).splitlines()[0].rstrip(".")
-        raise InputError(field, text, f"{problem}; use + - * / ^, {', '.join(called)} and {_list(known)}") from None
-    except (SyntaxError, TypeError, ValueError, OverflowError, RecursionError, MemoryError, KeyError):
-        raise InputError(field, text, f"is no finite real number; use + - * / ^ and {_list(known)}") from None
+        raise InputError(field, text, f"{problem}; use + - * / ^, {', '.join(called)} and {_list(constants)}") from None
+    except SyntaxError:
+        raise InputError(field, text, f"is not complete; use + - * / ^ and {_list(constants)}") from None
+    except (TypeError, ValueError, OverflowError, RecursionError, MemoryError, KeyError):
+        raise InputError(field, text, f"is no finite real number; use + - * / ^ and {_list(constants)}") from None
     if not math.isfinite(number):
         raise InputError(field, text, "is not finite; change the expression or its parameters")
     if unit and quantity.powers is not None and quantity.powers not in map(powers_of, unit.split(OR)):
@@ -90,10 +92,10 @@ def _of_ratio(name: str, function: Callable[[float], float]) -> Callable[[Quanti
     """Function of quantities that raises UnitsDiffer for an argument with a unit."""
 
     def called(argument: Quantity | float) -> Quantity:
-        given = Quantity(0.0) + argument
-        if given.powers:
-            raise UnitsDiffer(f"{name} is of a ratio, and this is in {given.unit}")
-        return Quantity(float(function(given.value)))
+        ratio = Quantity(0.0) + argument
+        if ratio.powers:
+            raise UnitsDiffer(f"{name} is of a ratio, and this is in {ratio.unit}")
+        return Quantity(float(function(ratio.value)))
 
     return called
 
@@ -102,9 +104,9 @@ def _root(argument: Quantity | float) -> Quantity:
     return (Quantity(0.0) + argument) ** 0.5
 
 
-def _hypotenuse(one: Quantity | float, two: Quantity | float) -> Quantity:
-    total = Quantity(0.0) + one + two  # raises if their units differ
-    return Quantity(math.hypot(_plain(one), _plain(two)), total.powers)
+def _hypotenuse(leg: Quantity | float, two: Quantity | float) -> Quantity:
+    total = Quantity(0.0) + leg + two  # raises if their units differ
+    return Quantity(math.hypot(_plain(leg), _plain(two)), total.powers)
 
 
 def _angle(y: Quantity | float, x: Quantity | float) -> Quantity:

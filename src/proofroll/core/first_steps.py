@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from proofroll.core.arrays import FloatArray
+from proofroll.core.arrays import FloatArray, longest
 from proofroll.core.certificate import EXACT, ROUNDINGS, Line, Standing, certify
 from proofroll.core.element import Element, FirstMotion
 from proofroll.core.engine import EPSILON, fixed_step, precision_of
@@ -72,7 +72,7 @@ def _lines(kind: Any, scene: Scene, settings: Any, index: int, start: FirstMotio
     epsilon = EPSILON[precision_of(settings)]
     # the velocity of a point at rest has the rounding error of a point at the end of its body
     unknown = np.abs(fine - coarse) + np.abs(fine - parabola) + epsilon * rounding
-    turning = max(start.scale / element.length, float(np.max(np.abs(start.angular_acceleration))))
+    turning = max(start.scale / element.length, longest(start.angular_acceleration))
     lines = []
     for row, (quantity, unit, expected, scale) in enumerate(
         (
@@ -80,7 +80,7 @@ def _lines(kind: Any, scene: Scene, settings: Any, index: int, start: FirstMotio
             ("angular acceleration", "rad/s^2", start.angular_acceleration, turning),
         )
     ):
-        difference, bar = (float(np.max(np.abs(x))) / scale for x in (limit[row] - expected, unknown[row]))
+        difference, bar = float(np.max(np.abs(limit[row] - expected))) / scale, longest(unknown[row]) / scale
         lines.append(
             Line(
                 scene.label(element, f"{quantity}{OF_FIRST_STEPS}"),
@@ -98,10 +98,10 @@ def _lines(kind: Any, scene: Scene, settings: Any, index: int, start: FirstMotio
 def softness(engine: Any, scene: Scene) -> float:
     """Largest softening that a freshly built engine declares for the quantities in :attr:`Element.softened`."""
     built = engine.built()
-    each = [built] if len(scene.elements) == 1 else [built[element.name] for element in scene.elements]
+    models = [built] if len(scene.elements) == 1 else [built[element.name] for element in scene.elements]
     tolerances = [0.0]
-    for element, own in zip(scene.elements, each, strict=True):
-        regularised = getattr(own, "regularised", {})
+    for element, model in zip(scene.elements, models, strict=True):
+        regularised = getattr(model, "regularised", {})
         tolerances += [soft.tolerance for name, soft in regularised.items() if name in element.softened]
     return max(tolerances)
 

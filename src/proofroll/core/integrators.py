@@ -52,7 +52,7 @@ class Integrator(ABC):
         """Takes the value of ``dt`` [s] or ``rtol`` [1], as :attr:`resolution` says."""
         self._resolution = resolution
 
-    def begin(self, t: float, x: FloatArray, rates: Rates, accept: Accept, scales: FloatArray) -> None:  # noqa: ARG002 -- a fixed step needs no measure of error
+    def begin(self, t: float, x: FloatArray, rates: Rates, accept: Accept, scales: FloatArray) -> None:
         """Starts, or restarts with a new state or new equations.
 
         Args:
@@ -63,7 +63,11 @@ class Integrator(ABC):
             scales: natural size of each component of x.
         """
         self.t, self.x, self.t_before, self.x_before = t, x, t, x
-        self._rates, self._accept = rates, accept
+        self._rates, self._accept, self._scales = rates, accept, scales
+
+    def restart(self) -> None:
+        """Begins again at the present state, after the rates have jumped."""
+        self.begin(self.t, self.x, self._rates, self._accept, self._scales)
 
     @abstractmethod
     def advance(self, t: float) -> None:
@@ -110,9 +114,9 @@ class Integrator(ABC):
                 return start, start
         root = float(brentq(at, low, high, xtol=width, rtol=4 * np.finfo(float).eps))
         while True:  # widen around the root until the margin has different signs at both ends
-            before, after = max(low, root - width), min(high, root + width)
-            if (at(before) > 0 or before == low) and (at(after) < 0 or after == high):
-                return before, after
+            earlier, later = max(low, root - width), min(high, root + width)
+            if (at(earlier) > 0 or earlier == low) and (at(later) < 0 or later == high):
+                return earlier, later
             width *= 4
 
     def bracket(self, low: float, high: float) -> tuple[float, float]:
@@ -200,7 +204,9 @@ class DormandPrince853(Integrator):
             return self.x_before
         if t == self.t:
             return self.x
-        start, y = max((one for one in self._inside if one[0] <= t), key=lambda one: one[0])  # near a stop it is stiff
+        start, y = max(
+            (entry for entry in self._inside if entry[0] <= t), key=lambda entry: entry[0]
+        )  # near a stop it is stiff
         state = integrated_to(self._solver.fun, start, y, t, self._solver.rtol, self._solver.atol)
         self._inside.append((t, state))
         return self._accept(t, state)

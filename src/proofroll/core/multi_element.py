@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
+from proofroll.core.commanded import CommandedEngine, commanded
 from proofroll.core.element import Element
 from proofroll.core.engine import Sample, fixed_step
 from proofroll.core.engine_abilities import LocatesEvents, TellsRemarks, require_provided
@@ -30,12 +31,12 @@ class IndependentElements:
         self.parts, self._others = {}, []
         self.steps: list[float | None] = []
         for element, alone in zip(scene.elements, each_alone(scene), strict=True):
-            own = _settings_for(kind, alone, settings)
-            require_provided(kind, own.formulation, alone)
-            self.parts[element.name] = kind.build(alone.for_an_engine, own)
-            self.steps.append(fixed_step(own))
-            if own.formulation != settings.formulation:
-                self._others.append(f"{element.name} is in formulation {own.formulation}, preset {own.preset}")
+            chosen = _settings_for(kind, alone, settings)
+            require_provided(kind, chosen.formulation, alone)
+            self.parts[element.name] = commanded(kind.build(alone.for_an_engine, chosen), element, fixed_step(chosen))
+            self.steps.append(fixed_step(chosen))
+            if chosen.formulation != settings.formulation:
+                self._others.append(f"{element.name} is in formulation {chosen.formulation}, preset {chosen.preset}")
         if len(self._others) == len(self.parts):
             raise Refused(f"formulation {settings.formulation} represents no element of this scene")
 
@@ -82,10 +83,10 @@ def formulation_for(requires: Collection[str], formulation: str, provides: Mappi
     """
     if set(requires) <= set(provides[formulation]):
         return formulation
-    kinds = {known for need in requires for known in (type(need) if isinstance(need, Enum) else (need,))}
+    kinds = {kind for need in requires for kind in (type(need) if isinstance(need, Enum) else (need,))}
     if kinds & set(provides[formulation]):
         return None
-    return next((name for name, given in provides.items() if set(requires) <= set(given)), None)
+    return next((name for name, capabilities in provides.items() if set(requires) <= set(capabilities)), None)
 
 
 def represents(scene: Scene, formulation: str, provides: Mapping[str, Collection[str]]) -> bool:
@@ -103,7 +104,14 @@ def build(kind: Any, scene: Scene, settings: Any) -> Any:
     if len(scene.elements) > 1:
         return IndependentElements(kind, scene, settings)
     require_provided(kind, settings.formulation, scene)
-    return kind.build(scene.for_an_engine, settings)
+    return commanded(kind.build(scene.for_an_engine, settings), scene.elements[0], fixed_step(settings))
+
+
+def asking(engine: Any) -> tuple[float, float]:
+    """Wall and processor time that an engine's controllers took so far [s]; not the engine's own."""
+    parts = engine.parts.values() if isinstance(engine, IndependentElements) else [engine]
+    spent = [part.asking for part in parts if isinstance(part, CommandedEngine)]
+    return sum(wall for wall, _ in spent), sum(processor for _, processor in spent)
 
 
 def step_of(engine: Any, settings: Any) -> float | None:
@@ -123,21 +131,21 @@ def _settings_for(kind: Any, alone: Scene, settings: Any) -> Any:
         return settings
     presets = kind.presets[name]
     options = {"formulation": name} | ({"preset": settings.preset} if settings.preset in presets else {})
-    own = resolve_settings(kind, options)
+    resolved = resolve_settings(kind, options)
     step = fixed_step(settings)
-    return own if step is None or fixed_step(own) is None else dataclasses.replace(own, dt=step)
+    return resolved if step is None or fixed_step(resolved) is None else dataclasses.replace(resolved, dt=step)
 
 
 def sample_of(scene: Scene, element: Element, sample: AnySample) -> Sample:
     """Part of a sample that belongs to one element. Raises Diverged if it is missing or of the wrong type."""
     if len(scene.elements) == 1 and isinstance(sample, element.sample_type):
         return sample  # the usual case, without the slow test for a mapping
-    own = sample.get(element.name, sample) if isinstance(sample, Mapping) else sample
-    if not isinstance(own, element.sample_type) or (own is sample and len(scene.elements) > 1):
-        each = " for each element, by its name" if len(scene.elements) > 1 else ""
-        wanted = element.sample_type.__name__
-        raise Diverged(f"the engine's sample() gave {type(own).__name__} instead of a {wanted}{each}")
-    return own
+    state = sample.get(element.name, sample) if isinstance(sample, Mapping) else sample
+    if not isinstance(state, element.sample_type) or (state is sample and len(scene.elements) > 1):
+        addition = " for each element, by its name" if len(scene.elements) > 1 else ""
+        type_name = element.sample_type.__name__
+        raise Diverged(f"the engine's sample() gave {type(state).__name__} instead of a {type_name}{addition}")
+    return state
 
 
 def arrays(scene: Scene, sample: AnySample, t: float) -> Iterator[tuple[str, FloatArray]]:
@@ -147,13 +155,13 @@ def arrays(scene: Scene, sample: AnySample, t: float) -> Iterator[tuple[str, Flo
         Diverged: one is missing, is not of real numbers, or does not have the shape for the scene's bodies.
     """
     for element in scene.elements:
-        own, bodies = sample_of(scene, element, sample), len(element.bodies)
-        for name, width in own.widths.items():
-            given = getattr(own, name)
-            if given is None and name not in REQUIRED:
+        state, bodies = sample_of(scene, element, sample), len(element.bodies)
+        for name, width in state.widths.items():
+            value = getattr(state, name)
+            if value is None and name not in REQUIRED:
                 continue
             try:
-                values = np.asarray(given)
+                values = np.asarray(value)
             except ValueError:  # rows of different lengths
                 values = np.asarray(None)
             if values.dtype.kind not in "fiu":
@@ -174,13 +182,15 @@ def shaped(scene: Scene, sample: AnySample, t: float) -> AnySample:
 def copied(sample: AnySample) -> AnySample:
     """The sample with arrays of its own, for an engine may fill its arrays anew at its next step."""
     if isinstance(sample, Mapping):
-        return {name: _copied(own) if isinstance(own, Sample) else own for name, own in sample.items()}
+        return {name: _copied(state) if isinstance(state, Sample) else state for name, state in sample.items()}
     return _copied(sample)
 
 
 def _copied(sample: Sample) -> Sample:
-    each = ((item.name, getattr(sample, item.name)) for item in dataclasses.fields(sample))
-    return dataclasses.replace(sample, **{name: np.array(own) for name, own in each if isinstance(own, np.ndarray)})
+    members = ((item.name, getattr(sample, item.name)) for item in dataclasses.fields(sample))
+    return dataclasses.replace(
+        sample, **{name: np.array(values) for name, values in members if isinstance(values, np.ndarray)}
+    )
 
 
 def events_of_engine(engine: Any, element: Element) -> Sequence[Event] | None:
@@ -192,7 +202,7 @@ def events_of_engine(engine: Any, element: Element) -> Sequence[Event] | None:
     part = engine.parts[element.name] if isinstance(engine, IndependentElements) else engine
     if not isinstance(part, LocatesEvents):
         return None
-    given = part.events()
-    if not (isinstance(given, Sequence) and all(isinstance(event, Event) for event in given)):
+    located = part.events()
+    if not (isinstance(located, Sequence) and all(isinstance(event, Event) for event in located)):
         raise Diverged("the engine's events() gave something else than a sequence of Event")
-    return list(given)
+    return list(located)

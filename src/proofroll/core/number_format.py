@@ -37,12 +37,12 @@ def spaced(unit: str) -> str:
 
 def vector(values: Sequence[float] | FloatArray) -> str:
     """Text of a vector; components that are round-off of the largest one become zero."""
-    given = [float(value) for value in values]
-    size = max(map(abs, given), default=0.0) or 1.0
-    return f"({', '.join(f'{round(value / size, 9) * size + 0.0:.4g}' for value in given)})"
+    numbers = [float(value) for value in values]
+    size = max(map(abs, numbers), default=0.0) or 1.0
+    return f"({', '.join(f'{round(value / size, 9) * size + 0.0:.4g}' for value in numbers)})"
 
 
 def counted(count: int, many: str) -> str:
     """A count with its noun; ``many`` is the plural: ``1 velocity``, ``2 velocities``."""
-    one = f"{many.removesuffix('ies')}y" if many.endswith("ies") else many.removesuffix("s")
-    return f"{count} {one if count == 1 else many}"
+    singular = f"{many.removesuffix('ies')}y" if many.endswith("ies") else many.removesuffix("s")
+    return f"{count} {singular if count == 1 else many}"

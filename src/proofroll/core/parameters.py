@@ -32,13 +32,13 @@ class Parameters:
     values: Mapping[str, float]
     units: Mapping[str, str]
 
-    def filled(self, content: Any, where: str, units: Mapping[str, Unit], unit: Unit = "") -> Any:
+    def filled(self, content: Any, place: str, units: Mapping[str, Unit], unit: Unit = "") -> Any:
         """Content of a table with its parameters and formulas replaced by numbers, each checked for its unit.
 
         Args:
             content: of a file: ``"$name"`` is a parameter, ``"= ..."`` a formula, ``"30 deg"`` an angle, and ``{i}`` in
                 a text a number.
-            where: location in the file, for messages.
+            place: location in the file, for messages.
             units: key -> unit of its number.
             unit: of the content itself, if it is a number or a list of numbers.
 
@@ -47,39 +47,39 @@ class Parameters:
         """
         if isinstance(content, dict):
             return {
-                key: self.filled(value, f"{where}.{key}", units, units.get(key, "")) for key, value in content.items()
+                key: self.filled(value, f"{place}.{key}", units, units.get(key, "")) for key, value in content.items()
             }
         if isinstance(content, list):
             return [
-                self.filled(value, f"{where}.{index}", units, unit_at(unit, index))
+                self.filled(value, f"{place}.{index}", units, unit_at(unit, index))
                 for index, value in enumerate(content)
             ]
-        own = unit_at(unit, 0)
+        unit_here = unit_at(unit, 0)
         if isinstance(content, str):
-            return self._of_text(content, where, own)
-        if own and isinstance(content, bool):
-            raise _no_number(where, content, own)
-        require_usable(where, content)
+            return self._of_text(content, place, unit_here)
+        if unit_here and isinstance(content, bool):
+            raise _no_number(place, content, unit_here)
+        require_usable(place, content)
         return content
 
-    def _of_text(self, text: str, where: str, unit: str) -> Any:
+    def _of_text(self, text: str, place: str, unit: str) -> Any:
         """Number of a parameter, a formula or an angle in degrees; otherwise the text with its numbers filled in."""
         if text.startswith("$"):
-            require_known(where, text[1:], self.values, "there is no such parameter; choose from", text)
-            given = self.units.get(text[1:], "")
-            if unit and given and given not in unit.split(OR):
-                raise InputError(where, text, f"this number is in {unit}, that parameter in {given}")
+            require_known(place, text[1:], self.values, "there is no such parameter; choose from", text)
+            asked_unit = self.units.get(text[1:], "")
+            if unit and asked_unit and asked_unit not in unit.split(OR):
+                raise InputError(place, text, f"this number is in {unit}, that parameter in {asked_unit}")
             return self.values[text[1:]]
         if text.startswith("="):
-            value = evaluated(where, text[1:], self.quantities, unit)
-            require_usable(where, value)
+            value = evaluated(place, text[1:], self.quantities, unit)
+            require_usable(place, value)
             return value
         if unit:
-            radians = in_radians(where, text, unit)
+            radians = in_radians(place, text, unit)
             if radians is None:
-                raise _no_number(where, text, unit)
+                raise _no_number(place, text, unit)
             return radians
-        return _NUMBERED.sub(lambda index: f"{evaluated(where, index[1], self.quantities):g}", text)
+        return _NUMBERED.sub(lambda index: f"{evaluated(place, index[1], self.quantities):g}", text)
 
     def beside(self, name: str, value: float) -> Parameters:
         """Parameters extended by one plain number of this name."""
@@ -95,8 +95,8 @@ class Parameters:
         }
 
 
-def _no_number(where: str, content: object, unit: str) -> InputError:
-    return InputError(where, content, "this is not a number; give one" + (f" in {unit}" if unit != "1" else ""))
+def _no_number(place: str, content: object, unit: str) -> InputError:
+    return InputError(place, content, "this is not a number; give one" + (f" in {unit}" if unit != "1" else ""))
 
 
 def in_radians(field: str, text: str, unit: str) -> float | None:

@@ -81,8 +81,8 @@ def release(version: str) -> tuple[int, ...]:
 
 def _not_found(point: EntryPoint, error: ModuleNotFoundError) -> ProofrollError:
     """Error for a missing module: not installed, or misspelt."""
-    module, where = error.name or str(error), raised_at(error)
-    whole = f"imports {module} ({where})" if where else f"is announced as {point.value}"
+    module, line = error.name or str(error), raised_at(error)
+    whole = f"imports {module} ({line})" if line else f"is announced as {point.value}"
     top = module.partition(".")[0]
     if top != module and find_spec(top) is not None:
         return ProofrollError(f"{point.name} {whole}; {top} is installed, but has no such module: correct the name")

@@ -115,7 +115,7 @@ def program(failed: FailedRun, what: str, part: str, numbers: Mapping[str, Any],
             name of a failure -> True if it shows.
     """
     head, _, rest = part.partition("\n\n")
-    own = {
+    definitions = {
         "EVERY": failed.every,
         "STEP": float(failed.settings[failed.resolution]),
         "SAMPLES": round(failed.until / failed.every),
@@ -125,7 +125,12 @@ def program(failed: FailedRun, what: str, part: str, numbers: Mapping[str, Any],
     }
     against = "# What the run is held against; TRUE is what two independent routes say.\n"
     lines = "\n".join(_docstring_lines(failed, what, imported_packages(head)))
-    return f'"""{lines}\n"""\n\n{head}\nimport sys\n\n{rest}\n{against}' + assignment(**own, **numbers) + signs + _MAIN
+    return (
+        f'"""{lines}\n"""\n\n{head}\nimport sys\n\n{rest}\n{against}'
+        + assignment(**definitions, **numbers)
+        + signs
+        + _MAIN
+    )
 
 
 def _docstring_lines(failed: FailedRun, what: str, needs: list[str]) -> list[str]:

@@ -37,9 +37,9 @@ def powers_of(unit: str) -> Powers:
     return powers
 
 
-def _product(one: Powers, two: Powers, power: float) -> Powers:
+def _product(base: Powers, two: Powers, power: float) -> Powers:
     """Powers of base units of the product of one unit and a power of another."""
-    powers = {name: one.get(name, 0.0) + power * two.get(name, 0.0) for name in [*one, *two]}
+    powers = {name: base.get(name, 0.0) + power * two.get(name, 0.0) for name in [*base, *two]}
     return {name: value for name, value in sorted(powers.items()) if value}
 
 
@@ -105,8 +105,8 @@ class Quantity:
     def __pos__(self) -> Quantity:
         return self
 
-    def _sum(self, other: object, operation: Callable[[float, float], float]) -> Quantity:
-        right = _quantity(other)
+    def _sum(self, addend: object, operation: Callable[[float, float], float]) -> Quantity:
+        right = _quantity(addend)
         if self.powers is not None and right.powers is not None and self.powers != right.powers:
             raise UnitsDiffer(f"{self.unit} and {right.unit} cannot be added")
         return Quantity(operation(self.value, right.value), right.powers if self.powers is None else self.powers)

@@ -60,8 +60,12 @@ class Scene:
                 raise InputError("scene", name, "a dot parts a quantity from its element; name the element without")
         for name in self.asks:
             if not any(name in element.askable for element in self.elements):
-                known = dict.fromkeys(known for element in self.elements for known in element.askable)
-                advice = f"no element of the scene has that to ask for; choose {choices(known)}" if known else _NOTHING
+                questions = dict.fromkeys(questions for element in self.elements for questions in element.askable)
+                advice = (
+                    f"no element of the scene has that to ask for; choose {choices(questions)}"
+                    if questions
+                    else _NOTHING
+                )
                 raise InputError("asks", name, advice)
 
     @property

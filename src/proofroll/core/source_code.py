@@ -42,7 +42,7 @@ def with_imports(path: Path) -> list[Path]:
         sources.add(source := waiting.pop())
         files = source.rglob("*.py") if source.is_dir() else [source]
         names = {name for file in files for name in _imported(file)} - sys.stdlib_module_names
-        waiting += {found for name in names if (found := _source(name)) is not None} - sources - {OWN}
+        waiting += {origin for name in names if (origin := _source(name)) is not None} - sources - {OWN}
     return sorted(sources)
 
 

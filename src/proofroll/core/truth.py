@@ -110,13 +110,13 @@ def _to_common_end(parts: dict[str, Columns]) -> dict[str, Columns]:
     early = [part for part in parts.values() if ended_early(part)]
     if not early or len(parts) == 1:
         return parts
-    first = min(early, key=lambda part: float(part.attrs[ENDS]))
-    end = {name: first.attrs[name] for name in (ENDS, ENDED)}
+    earliest = min(early, key=lambda part: float(part.attrs[ENDS]))
+    end = {name: earliest.attrs[name] for name in (ENDS, ENDED)}
     cut = {}
     for name, part in parts.items():
-        within = part.at("time", part["time"].values <= first["time"].values[-1]).assign(**end)
+        within = part.at("time", part["time"].values <= earliest["time"].values[-1]).assign(**end)
         if "event_time" in within:
-            within = within.at("event", within["event_time"].values < float(first.attrs[ENDS]))
+            within = within.at("event", within["event_time"].values < float(earliest.attrs[ENDS]))
         cut[name] = within
     return cut
 
@@ -128,14 +128,14 @@ def edge_between(scene: Scene, parameter: str, low: float, high: float, until: f
         InputError: no truth finds edges, or not of this parameter.
     """
     for element in scene.elements:
-        for known in load_truths():
-            if known.covers(element) and isinstance(known, FindsEdges):
-                return known.edge_between(element, parameter, low, high, until)
+        for plug_in in load_truths():
+            if plug_in.covers(element) and isinstance(plug_in, FindsEdges):
+                return plug_in.edge_between(element, parameter, low, high, until)
     raise InputError(parameter, "edge_between", f"no truth of {scene.name} finds edges; give a number")
 
 
 def _of_element(element: Element, times: FloatArray, asks: Sequence[str]) -> xr.Dataset:
-    for known in load_truths():
-        if known.covers(element):
-            return known.truth(element, times, asks)
+    for plug_in in load_truths():
+        if plug_in.covers(element):
+            return plug_in.truth(element, times, asks)
     raise Refused(f"no truth by two routes covers {element.name} ({type(element).__name__})")

@@ -44,11 +44,11 @@ def samples_between(scene: Scene, times: FloatArray, step: float | None = None) 
         Empty if the samples are close enough or the scene has no such angles.
     """
     intervals = [element.turn_interval for element in scene.elements if isinstance(element, CountsTurns)]
-    known = [interval for interval in intervals if interval is not None]
-    if not known or len(times) < 2:
+    limits = [interval for interval in intervals if interval is not None]
+    if not limits or len(times) < 2:
         return np.zeros(0)
     until = float(times[-1])
-    longest = max(min(known), min(EVERY, until / _FEW), until / _MOST)
+    longest = max(min(limits), min(EVERY, until / _FEW), until / _MOST)
     stretches: list[FloatArray] = []
     for start, length in zip(times[:-1], np.diff(times), strict=True):
         count = int(np.ceil(length / longest * (1 - 1e-9)))
@@ -91,14 +91,14 @@ def doubt(
 
 
 def on_turns_of(
-    other: FloatArray | None, values: FloatArray, name: str, datasets: Iterable[xr.Dataset]
+    rival: FloatArray | None, values: FloatArray, name: str, datasets: Iterable[xr.Dataset]
 ) -> FloatArray | None:
     """Values of an observable, shifted by whole periods towards another run's if the turns of a run are uncertain.
 
     Runs that cannot count turns mark the variable with the attribute ``UNCERTAIN``.
 
     Args:
-        other: values of the other run, or None.
+        rival: values of the other run, or None.
         values: of this run, to be shifted.
         name: of the observable.
         datasets: both runs.
@@ -107,11 +107,11 @@ def on_turns_of(
         None if the observable depends on turns without being periodic, so that no comparison is possible (the energy of
             a spring that turns wind up).
     """
-    own = [run.variables[name].attrs for run in datasets if name in run.variables]
-    marked = [attrs for attrs in own if UNCERTAIN in attrs]
-    if not marked or other is None or values.shape != other.shape:
+    attributes = [run.variables[name].attrs for run in datasets if name in run.variables]
+    marked = [attrs for attrs in attributes if UNCERTAIN in attrs]
+    if not marked or rival is None or values.shape != rival.shape:
         return values
     if PERIOD not in marked[0]:
         return None
     period = float(marked[0][PERIOD])
-    return np.asarray(values + period * np.round((other - values) / period))
+    return np.asarray(values + period * np.round((rival - values) / period))

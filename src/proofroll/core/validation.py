@@ -41,28 +41,28 @@ def strict(*types: type, finite: bool = False) -> None:
         setattr(kind, "__pydantic_config__", config)  # noqa: B010 -- the name is pydantic's
 
 
-def validated(kind: type[_T], content: Mapping[str, Any], where: str, **own: object) -> _T:
+def validated(kind: type[_T], content: Mapping[str, Any], place: str, **own: object) -> _T:
     """A dataclass filled with the content of a file, or of a table in it.
 
     Args:
         kind: the dataclass.
         content: key -> value.
-        where: name of the file, for messages.
+        place: name of the file, for messages.
         own: fields whose values the program knows; the file must not have them.
 
     Raises:
         InputError: the first mistake, with its location.
     """
     for name in (name for name in content if name in own):
-        raise no_such_key(f"{where}: {name}", content[name], _keys(kind, (), own))
+        raise no_such_key(f"{place}: {name}", content[name], _keys(kind, (), own))
     try:
         content_of_kind: _T = _adapter(kind).validate_python({**content, **own})  # type: ignore[arg-type]  # any class can be hashed
     except ValidationError as error:
-        raise _first_problem(error, where, kind, content, own) from None
+        raise _first_problem(error, place, kind, content, own) from None
     except OverflowError:
-        raise InputError(where, content, "a product or power of its numbers is too large; give smaller ones") from None
-    for location, given in _booleans(content, content_of_kind):
-        raise InputError(f"{where}: {'.'.join(location)}", given, "this is not a number; give one")
+        raise InputError(place, content, "a product or power of its numbers is too large; give smaller ones") from None
+    for location, value in _booleans(content, content_of_kind):
+        raise InputError(f"{place}: {'.'.join(location)}", value, "this is not a number; give one")
     return content_of_kind
 
 
@@ -87,7 +87,7 @@ def _tables(kind: Any) -> list[Any]:
     return [kind] if is_dataclass(kind) else [table for part in get_args(kind) for table in _tables(part)]
 
 
-def _keys(kind: Any, location: Sequence[str | int], own: Iterable[str]) -> list[str]:
+def _keys(kind: Any, location: Sequence[str | int], own_keys: Iterable[str]) -> list[str]:
     """Allowed keys of the tables at a location in a type, as files spell them."""
     tables = _tables(kind)
     for part in location:
@@ -95,7 +95,7 @@ def _keys(kind: Any, location: Sequence[str | int], own: Iterable[str]) -> list[
         inside = [table for hint in hints if part in hint for table in _tables(hint[part])]
         tables = inside or [table for table in tables if getattr(table, "kind", None) == part] or tables
     keys = [item.metadata.get("key", item.name) for table in tables for item in fields(table) if item.init]
-    return [key for key in dict.fromkeys(keys) if location or key not in own]
+    return [key for key in dict.fromkeys(keys) if location or key not in own_keys]
 
 
 def _location(location: Iterable[str | int], content: Any) -> list[str]:
@@ -110,29 +110,29 @@ def _location(location: Iterable[str | int], content: Any) -> list[str]:
 
 
 def _first_problem(
-    error: ValidationError, where: str, kind: type, content: Mapping[str, Any], own: Iterable[str]
+    error: ValidationError, place: str, kind: type, content: Mapping[str, Any], keys: Iterable[str]
 ) -> InputError:
     """Error for the first mistake that pydantic found."""
     # An unknown key goes before a missing one, as it may be the missing one misspelt.
-    problem = min(error.errors(), key=lambda one: one["type"] not in _UNKNOWN)
+    problem = min(error.errors(), key=lambda entry: entry["type"] not in _UNKNOWN)
     absent = problem["type"] in {"missing", "missing_argument"} and not isinstance(problem["loc"][-1], int)
     location = ".".join(_location(problem["loc"], content) + [str(part) for part in problem["loc"][-1:]] * absent)
     if problem["type"] in _UNKNOWN:
-        return no_such_key(f"{where}: {location}", problem["input"], _keys(kind, problem["loc"][:-1], own))
+        return no_such_key(f"{place}: {location}", problem["input"], _keys(kind, problem["loc"][:-1], keys))
     if absent:
-        return InputError(f"{where}: {location}", "nothing", "this key is required; add it")
+        return InputError(f"{place}: {location}", "nothing", "this key is required; add it")
     error_found = problem.get("ctx", {}).get("error")
     if isinstance(error_found, OutOfBounds):
         location = ".".join(filter(None, [location, error_found.field]))
-        return InputError(f"{where}: {location}", error_found.value, error_found.advice)
+        return InputError(f"{place}: {location}", error_found.value, error_found.advice)
     if problem["type"] in {"union_tag_invalid", "union_tag_not_found"}:
         key = problem["ctx"]["discriminator"].strip("'")
         if problem["type"] == "union_tag_not_found":
-            return InputError(f"{where}: {location}.{key}", "nothing", "this key is required; add it")
+            return InputError(f"{place}: {location}.{key}", "nothing", "this key is required; add it")
         return InputError(
-            f"{where}: {location}.{key}", problem["ctx"]["tag"], f"choose one of {problem['ctx']['expected_tags']}"
+            f"{place}: {location}.{key}", problem["ctx"]["tag"], f"choose one of {problem['ctx']['expected_tags']}"
         )
-    return InputError(f"{where}: {location}", problem["input"], advice(problem["type"], problem["msg"]))
+    return InputError(f"{place}: {location}", problem["input"], advice(problem["type"], problem["msg"]))
 
 
 def advice(kind: str, message: str) -> str:
@@ -156,10 +156,10 @@ def units_of_kind(table: type, kind: object) -> dict[str, Unit]:
 def all_units_of(*types: type) -> dict[str, str]:
     """Every unit that a number of these dataclasses may have, by ``key``, ``key.kind`` or ``key.kind.index``."""
     units: dict[str, str] = {}
-    for each in types:
-        for item in fields(each):
+    for kind_of_record in types:
+        for item in fields(kind_of_record):
             unit = item.metadata.get("unit", "")
-            for kind, own in unit.items() if isinstance(unit, Mapping) else [("", unit)]:
-                for index, one in enumerate(own.split(OR) if isinstance(own, str) else own):
-                    units[".".join(filter(None, [item.name, kind, str(index or "")]))] = one
+            for kind, unit_text in unit.items() if isinstance(unit, Mapping) else [("", unit)]:
+                for index, unit_part in enumerate(unit_text.split(OR) if isinstance(unit_text, str) else unit_text):
+                    units[".".join(filter(None, [item.name, kind, str(index or "")]))] = unit_part
     return {name: unit for name, unit in units.items() if unit}

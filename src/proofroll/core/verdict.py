@@ -49,14 +49,6 @@ class LimitResult(StrEnum):
     NOT_SHOWN = "no limit shown"  # the runs do not settle, or too slowly to tell
 
 
-class Doubt(StrEnum):
-    """Verdicts that an ill-posed question does not allow."""
-
-    NONE = "none"  # the question is well posed
-    DIFFERENCES = "differences"  # a difference proves nothing
-    EVERYTHING = "everything"  # neither does agreement, which would be luck
-
-
 @dataclass(frozen=True)
 class Judgement:
     """Verdict on one observable of one run.
@@ -119,12 +111,11 @@ class Allowance:
 
 @dataclass(frozen=True)
 class TrueCurve:
-    """True values of an observable; ``doubt``: verdicts that an ill-posed question does not allow; ``why``: cause."""
+    """True values of an observable; ``ill_posed``: why no run can answer the question; empty: it is well posed."""
 
     values: FloatArray
     error_bar: float
-    doubt: Doubt = Doubt.NONE
-    why: str = ""
+    ill_posed: str = ""
 
 
 @dataclass(frozen=True)
@@ -191,7 +182,7 @@ def judge_curve(
     if hidden:
         rungs = replace(rungs, finding=refinement.unknown)
     error = max(on_grid, off_grid)
-    verdict = _verdict(error, tolerance, rungs, true.doubt)
+    verdict = Verdict.ILL_POSED if true.ill_posed else _verdict(error, tolerance, rungs)
     own_bar = min(run.own_bar, run.sampled_bar)
     unknown = true.error_bar + (own_bar if error > tolerance else 0.0)
     placed = verdict in {Verdict.AGREES, Verdict.UNCONFIRMED, Verdict.DIFFERS}
@@ -202,7 +193,7 @@ def judge_curve(
         remarks.append(f"within tolerance, but the limit of small steps is shown not to be the truth: {rungs.text}")
     if run.own_bar > tolerance and verdict in {Verdict.AGREES, Verdict.UNCONFIRMED}:
         remarks.append("within tolerance by luck: the run leaves its events open by more than the tolerance")
-    reason = _reason(verdict, error, allowance, true, own_bar, rungs)
+    reason = _reason(verdict, error, allowance, true, run, rungs)
     if hidden:
         reason += f"; at the samples alone {number(on_grid)}{allowance.shown_unit}, so the error is between them"
     return Judgement(
@@ -275,11 +266,11 @@ def _read(limit: Limit, allowance: Allowance, true: TrueCurve, round_off: float,
     )
     text = f"off by {number(error)} ± {number(bar, 1)}{unit}, {shown_order}"
     if not np.isfinite(error):
-        text = "it has not as many values as the truth"
+        text = _unlike(limit.values, true.values)
     elif limit.beside > bar:
         text += f"; one step beside an event does {number(limit.beside, 1)}{unit}"
     if faster and finding == LimitResult.NOT_SHOWN:
-        text += "; the errors of these steps fall ever faster, so a shorter step has to tell"
+        text += "; the errors of these steps fall ever faster, so a shorter step has to tell: --engine NAME[dt=…]"
     if limit.floor:
         text += f"; {limit.floor}"
     if limit.saturated:
@@ -287,28 +278,27 @@ def _read(limit: Limit, allowance: Allowance, true: TrueCurve, round_off: float,
     return _Ladder(finding, error, bar, order, doubted, leaves, wrong, text)
 
 
-def _verdict(error: float, tolerance: float, rungs: _Ladder, doubt: Doubt) -> Verdict:
+def _verdict(error: float, tolerance: float, rungs: _Ladder) -> Verdict:
     """Verdict if the truth is known well enough to give one."""
-    if doubt == Doubt.EVERYTHING:
-        return Verdict.ILL_POSED
     if error <= tolerance and not rungs.leaves:
-        known = rungs.finding in {LimitResult.NO_LADDER, LimitResult.WITHIN}
-        return Verdict.AGREES if known else Verdict.UNCONFIRMED
+        confirmed = rungs.finding in {LimitResult.NO_LADDER, LimitResult.WITHIN}
+        return Verdict.AGREES if confirmed else Verdict.UNCONFIRMED
     if rungs.finding == LimitResult.WITHIN and np.isfinite(error):
         return Verdict.CONVERGES
-    return Verdict.DIFFERS if doubt == Doubt.NONE else Verdict.ILL_POSED
+    return Verdict.DIFFERS
 
 
 def _reason(
-    verdict: Verdict, error: float, allowance: Allowance, true: TrueCurve, own_bar: float, rungs: _Ladder
+    verdict: Verdict, error: float, allowance: Allowance, true: TrueCurve, run: RunCurve, rungs: _Ladder
 ) -> str:
-    """Reason of the verdict, as a clause with numbers; ``own_bar``: the run's error bar."""
+    """Reason of the verdict, as a clause with numbers."""
+    own_bar = min(run.own_bar, run.sampled_bar)
     truth_error_bar, tolerance, unit = true.error_bar, allowance.tolerance, allowance.shown_unit
     shown_error, allowed, bar = *_distinct_texts(error, tolerance), f"{number(truth_error_bar)}{unit}"
     if np.isinf(truth_error_bar):
         return "not judged: the truth does not tell it here"
     if truth_error_bar > tolerance:
-        why = f"; ill-posed: {true.why.removeprefix('ill-posed: ')}" if true.why else ""
+        why = f"; ill-posed: {true.ill_posed.removeprefix('ill-posed: ')}" if true.ill_posed else ""
         return f"not judged: the truth's error bar {bar} exceeds the tolerance {allowed}{unit}{why}"
     if verdict == Verdict.NOT_JUDGED:
         whose = "the truth's error bar"
@@ -317,7 +307,7 @@ def _reason(
         return f"not judged: error {shown_error}{unit} ± {bar}, {whose}, may be within {allowed}{unit} or beyond"
     text = f"error {shown_error}{unit} {'within' if error <= tolerance else 'beyond'} {allowed}{unit}"
     if not np.isfinite(error):
-        text = "not finite, or not as many values as the truth"
+        text = _unlike(run.values, true.values)
     if rungs.finding == LimitResult.NO_LADDER:
         text += "; one step only, so the limit is unknown"
     elif not rungs.text:
@@ -327,7 +317,12 @@ def _reason(
     return f"the question is ill-posed here; {text}" if verdict == Verdict.ILL_POSED else text
 
 
-def _distinct_texts(one: float, other: float) -> tuple[str, str]:
+def _unlike(values: FloatArray, true: FloatArray) -> str:
+    """Clause on a curve without a finite distance from the truth."""
+    return "not finite" if values.shape == true.shape else f"{len(values)} values, the truth has {len(true)}"
+
+
+def _distinct_texts(value: float, rival: float) -> tuple[str, str]:
     """Texts of two numbers with two digits, or as many as they need to differ."""
-    texts = ((number(one, digits), number(other, digits)) for digits in range(2, 18))
-    return next((pair for pair in texts if one == other or pair[0] != pair[1]), (repr(one), repr(other)))
+    texts = ((number(value, digits), number(rival, digits)) for digits in range(2, 18))
+    return next((pair for pair in texts if value == rival or pair[0] != pair[1]), (repr(value), repr(rival)))

@@ -16,7 +16,7 @@ from proofroll.core.time_grid import time_grid
 from proofroll.core.validation import strict, validated
 from proofroll.core.verdict import Verdict
 from proofroll.files.data_folders import study_folders
-from proofroll.files.scene_file import load_scene, scene_names
+from proofroll.files.scene_file import SCENE_IS_A_FOLDER, load_scene, scene_names
 from proofroll.files.toml import named_file, read_toml, study_of
 
 # Most combinations of parameters; a run takes about a second, so more are a mistake.
@@ -54,10 +54,16 @@ def load_comparison(name: str) -> Comparison:
         InputError: there is no such file, or it is broken.
     """
     path = named_file(name)
+    if path is None and Path(name).suffix not in ("", ".toml"):
+        raise InputError("comparison", name, "there is no such file")
     if path is None:
-        known = choices([*comparison_names(), *further_comparison_names(), *scene_names()], Path(name).stem)
-        raise InputError("comparison", name, f"there is no such comparison or scene; choose one of {known} or a file")
+        suggestions = choices([*comparison_names(), *further_comparison_names(), *scene_names()], Path(name).stem)
+        raise InputError(
+            "comparison", name, f"there is no such comparison or scene; choose one of {suggestions} or a file"
+        )
     content = read_toml(path)
+    if "gravity" in content:
+        raise InputError("comparison", name, SCENE_IS_A_FOLDER)
     if "study" in content:
         advice = f"this file is for another command: proofroll {content['study']} {content.get('scene', '')}".strip()
         raise InputError(f"{path}: study", content["study"], advice)
@@ -70,42 +76,46 @@ def _comparison(path: Path, content: dict[str, Any]) -> Comparison:
 
 
 def _checked(path: Path, content: dict[str, Any]) -> Comparison:
-    where = path.name
-    tolerances = _table(f"{where}: tolerances", content.pop("tolerances", {}))
-    bands = {name: _band(f"{where}: tolerances.{name}", table) for name, table in tolerances.items()}
-    given = content.get("rows")
-    if not isinstance(given, list) or not given:
-        shown = "nothing" if given is None else given
-        raise InputError(f"{where}: rows", shown, "give at least one engine; write [[rows]] before each")
-    content["rows"] = [_prepared(f"{where}: rows.{index}", row) for index, row in enumerate(given)]
+    place = path.name
+    tolerances = _table(f"{place}: tolerances", content.pop("tolerances", {}))
+    bands = {name: _band(f"{place}: tolerances.{name}", table) for name, table in tolerances.items()}
+    tables = content.get("rows")
+    if not isinstance(tables, list) or not tables:
+        shown = "nothing" if tables is None else tables
+        raise InputError(f"{place}: rows", shown, "give at least one engine; write [[rows]] before each")
+    content["rows"] = [_prepared(f"{place}: rows.{index}", row) for index, row in enumerate(tables)]
     program: dict[str, object] = {"left_out": 0, "budget": None, "spent": 0.0, "absent": {}}  # no file may have these
-    comparison = validated(Comparison, content, where, name=path.stem, bands=bands, **program)
+    comparison = validated(Comparison, content, place, name=path.stem, bands=bands, **program)
+    for name, values in comparison.vary.items():
+        if not values:
+            raise InputError(f"{place}: vary.{name}", values, "give at least one value, or leave it out")
     if math.prod(map(len, comparison.vary.values())) + len(comparison.points) > _MOST_POINTS:
-        raise InputError(f"{where}: vary", list(comparison.vary), f"that is more than {_MOST_POINTS} points; vary less")
+        raise InputError(f"{place}: vary", list(comparison.vary), f"that is more than {_MOST_POINTS} points; vary less")
     for index, point in enumerate(comparison.points):
         for name, value in point.items():
             if isinstance(value, Edge) and not -math.inf < value.edge_between[0] < value.edge_between[1] < math.inf:
                 raise InputError(f"points.{index}.{name}", list(value.edge_between), "give the lower value first")
-    known = load_scene(comparison.scene).observables
+    observables = load_scene(comparison.scene).observables
     for name, band in comparison.bands.items():
-        _check_bounds(f"{where}: tolerances.{name}", known, band.bounds)
+        _check_bounds(f"{place}: tolerances.{name}", observables, band.bounds)
     for index, row in enumerate(comparison.rows):
-        _check(f"{where}: rows.{index}", row, comparison, known)
+        _check(f"{place}: rows.{index}", row, comparison, observables)
     _check_times(comparison)
-    _check_brief(where, comparison)
+    _check_brief(place, comparison)
     return comparison
 
 
-def _check_brief(where: str, comparison: Comparison) -> None:
-    known = {name for point in comparison.combinations() for name in point}
+def _check_brief(place: str, comparison: Comparison) -> None:
+    parameters = {name for point in comparison.combinations() for name in point}
     for name in comparison.brief:
-        require_known(f"{where}: brief", name, sorted(known), "nothing varies it; choose from")
+        require_known(f"{place}: brief", name, sorted(parameters), "nothing varies it; choose from")
     if comparison.brief and not comparison.briefly().combinations():
-        raise InputError(f"{where}: brief", comparison.brief, "no combination has these values; keep at least one")
+        raise InputError(f"{place}: brief", comparison.brief, "no combination has these values; keep at least one")
 
 
 def _check_times(comparison: Comparison) -> None:
     time_grid(comparison.until, comparison.every)
+    require_bounds("until", comparison.until, above=0)
     if comparison.every > comparison.until:
         advice = f"samples lie further apart than the run is long, {comparison.until:g} s; sample more often"
         raise InputError("every", comparison.every, advice)
@@ -113,27 +123,27 @@ def _check_times(comparison: Comparison) -> None:
     require_bounds("order", comparison.order, unbounded=True)
 
 
-def _table(where: str, value: object) -> dict[str, Any]:
+def _table(place: str, value: object) -> dict[str, Any]:
     if not isinstance(value, dict):
-        raise InputError(where, value, "this must be a table of names and values")
+        raise InputError(place, value, "this must be a table of names and values")
     return dict(value)
 
 
-def _band(where: str, content: object) -> Band:
-    table = _table(where, content)
+def _band(place: str, content: object) -> Band:
+    table = _table(place, content)
     because = table.pop("because", "")
     if not (isinstance(because, str) and because):
-        raise InputError(f"{where}.because", because or "nothing", "every tolerance needs its reason; add it")
-    return Band(because, {name: Tolerance.parse(f"{where}.{name}", text) for name, text in table.items()})
+        raise InputError(f"{place}.because", because or "nothing", "every tolerance needs its reason; add it")
+    return Band(because, {name: Tolerance.parse(f"{place}.{name}", text) for name, text in table.items()})
 
 
-def _prepared(where: str, content: object) -> dict[str, Any]:
+def _prepared(place: str, content: object) -> dict[str, Any]:
     """Table of a row in the form that :func:`validated` expects: texts become tolerances and lists."""
-    row = _table(where, content)
+    row = _table(place, content)
     for key in ("limit", "bound"):
         if key in row:
-            bounds = _table(f"{where}.{key}", row[key])
-            row[key] = {name: Tolerance.parse(f"{where}.{key}.{name}", text) for name, text in bounds.items()}
+            bounds = _table(f"{place}.{key}", row[key])
+            row[key] = {name: Tolerance.parse(f"{place}.{key}.{name}", text) for name, text in bounds.items()}
     if isinstance(row.get("expect"), str):
         row["expect"] = [row["expect"]]
     exceptions = row.get("except_at", [])
@@ -141,86 +151,88 @@ def _prepared(where: str, content: object) -> dict[str, Any]:
         if isinstance(exception, dict) and isinstance(exception.get("expect"), str):
             exception["expect"] = [exception["expect"]]
     if "expect_for" in row:
-        expected = _table(f"{where}.expect_for", row["expect_for"])
+        expected = _table(f"{place}.expect_for", row["expect_for"])
         row["expect_for"] = {k: [v] if isinstance(v, str) else v for k, v in expected.items()}
     return row
 
 
-def _check(where: str, row: Row, comparison: Comparison, known: Mapping[str, Observable]) -> None:
+def _check(place: str, row: Row, comparison: Comparison, observables: Mapping[str, Observable]) -> None:
     """Checks of a row that its types do not express."""
-    _check_engine(where, row)
-    require_known(f"{where}.tolerance", row.tolerance, comparison.bands)
+    _check_engine(place, row)
+    require_known(f"{place}.tolerance", row.tolerance, comparison.bands)
     if row.ladder != [1.0]:
-        _check_ladder(where, row.ladder)
-    _check_expectations(where, row)
-    _check_bounds(where, known, dict.fromkeys([*row.expect_for, *row.order]))
+        _check_ladder(place, row.ladder)
+    _check_expectations(place, row)
+    _check_bounds(place, observables, dict.fromkeys([*row.expect_for, *row.order]))
     for name, pair in row.order.items():
-        require_pair(f"{where}.order.{name}", pair)
-    _check_bounds(where, known, row.limit)
-    _check_bounds(where, known, row.bound)
-    _check_points(f"{where}.only", comparison, row.only)
+        require_pair(f"{place}.order.{name}", pair)
+    _check_bounds(place, observables, row.limit)
+    _check_bounds(place, observables, row.bound)
+    _check_points(f"{place}.only", comparison, row.only)
     if len(row.short.split()) > _SHORTEST:
         advice = f"it stands on a card and has {len(row.short.split())} words; say it in {_SHORTEST}"
-        raise InputError(f"{where}.short", row.short, advice)
+        raise InputError(f"{place}.short", row.short, advice)
     for exception in row.except_at:
-        _check_points(f"{where}.except_at", comparison, exception.where)
+        _check_points(f"{place}.except_at", comparison, exception.where)
         if not exception.where or not comparison.combinations(exception.where):
-            raise InputError(f"{where}.except_at", exception.where, "name values that some point of the comparison has")
+            raise InputError(f"{place}.except_at", exception.where, "name values that some point of the comparison has")
     if not comparison.combinations(row.only):
-        raise InputError(f"{where}.only", row.only, "no point of the comparison fits, so the row would never be run")
+        raise InputError(f"{place}.only", row.only, "no point of the comparison fits, so the row would never be run")
 
 
-def _check_engine(where: str, row: Row) -> None:
+def _check_engine(place: str, row: Row) -> None:
     try:
         name = parse_engine(row.engine).name
         if name != "truth":
             require_engine(name)
     except InputError as error:
-        raise error.within(f"{where}.engine", row.engine) from None
+        raise error.within(f"{place}.engine", row.engine) from None
 
 
-def _check_expectations(where: str, row: Row) -> None:
+def _check_expectations(place: str, row: Row) -> None:
     claims = [row.expect, *row.expect_for.values(), *(exception.expect for exception in row.except_at)]
     for claim in claims:
         if Verdict.DIFFERS in claim and {Verdict.AGREES, Verdict.UNCONFIRMED} & set(claim):
             advice = "that holds for any engine; say with except_at where it agrees and where it differs"
-            raise InputError(f"{where}.expect", " or ".join(claim), advice)
+            raise InputError(f"{place}.expect", " or ".join(claim), advice)
     if {*itertools.chain.from_iterable(claims)} - {Verdict.AGREES} and not row.because:
-        raise InputError(f"{where}.because", "nothing", "an expectation other than agreement needs its reason; add it")
+        raise InputError(f"{place}.because", "nothing", "an expectation other than agreement needs its reason; add it")
 
 
-def _check_points(where: str, comparison: Comparison, chosen: Mapping[str, list[float]]) -> None:
+def _check_points(place: str, comparison: Comparison, chosen: Mapping[str, list[float]]) -> None:
     """Raises InputError unless the comparison has every chosen value."""
-    given: dict[str, list[float]] = {}
+    values_of: dict[str, list[float]] = {}
     for point in comparison.combinations():
         for key, value in point.items():
             if isinstance(value, float):
-                given.setdefault(key, []).append(value)
+                values_of.setdefault(key, []).append(value)
     for key, values in chosen.items():
-        if key not in given:
-            raise InputError(f"{where}.{key}", values, f"the comparison varies {', '.join(given)}")
+        if key not in values_of:
+            raise InputError(f"{place}.{key}", values, f"the comparison varies {', '.join(values_of)}")
         for value in values:
-            if value not in given[key]:
-                known = ", ".join(f"{item:g}" for item in dict.fromkeys(given[key]))
-                raise InputError(f"{where}.{key}", value, f"the comparison has only {known}")
+            if value not in values_of[key]:
+                listed = ", ".join(f"{item:g}" for item in dict.fromkeys(values_of[key]))
+                raise InputError(f"{place}.{key}", value, f"the comparison has only {listed}")
 
 
-def _check_ladder(where: str, ladder: list[float]) -> None:
+def _check_ladder(place: str, ladder: list[float]) -> None:
     falling = all(0 < finer < coarser < math.inf for coarser, finer in itertools.pairwise(ladder))
     if len(ladder) != LADDER_RUNGS or not falling or 1.0 not in ladder:
-        raise InputError(f"{where}.ladder", ladder, "give three positive factors, largest first, one of them 1; or [1]")
+        raise InputError(f"{place}.ladder", ladder, "give three positive factors, largest first, one of them 1; or [1]")
     if not math.isclose(ladder[0] / ladder[1], ladder[1] / ladder[2]):
-        raise InputError(f"{where}.ladder", ladder, "neighbouring factors must have the same ratio")
+        raise InputError(f"{place}.ladder", ladder, "neighbouring factors must have the same ratio")
 
 
-def _check_bounds(where: str, known: Mapping[str, Observable], bounds: Mapping[str, Tolerance | None]) -> None:
+def _check_bounds(place: str, observables: Mapping[str, Observable], bounds: Mapping[str, Tolerance | None]) -> None:
     """Raises InputError unless every name is an observable of the scene, and every tolerance has its unit."""
     for name, bound in bounds.items():
-        require_known(f"{where}: observable", name, known, "there is no such observable; choose from")
-        if bound is not None and bound.relative and known[name].floor is None:
-            raise InputError(f"{where}: {name}", "%", f"it has no size of its own; give a number in {known[name].unit}")
-        if bound is not None and not bound.relative and bound.unit != known[name].unit:
-            raise InputError(f"{where}: {name}", bound.unit, f"its unit is {known[name].unit}")
+        require_known(f"{place}: observable", name, observables, "there is no such observable; choose from")
+        if bound is not None and bound.relative and observables[name].floor is None:
+            raise InputError(
+                f"{place}: {name}", "%", f"it has no size of its own; give a number in {observables[name].unit}"
+            )
+        if bound is not None and not bound.relative and bound.unit != observables[name].unit:
+            raise InputError(f"{place}: {name}", bound.unit, f"its unit is {observables[name].unit}")
 
 
 strict(Comparison, Row, ExceptAt)

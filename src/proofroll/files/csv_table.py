@@ -39,7 +39,7 @@ def csv_text(trajectory: xr.Dataset) -> str:
 def column_names(item: xr.DataArray) -> list[str]:
     """Names of the columns of a variable, one for each of its numbers at a time: ``p_WB/rod/x``."""
     labels = [item[dim].to_numpy().tolist() if dim in item.coords else range(item.sizes[dim]) for dim in item.dims[1:]]
-    return ["/".join(map(str, (item.name, *at))) for at in itertools.product(*labels)]
+    return ["/".join(map(str, (item.name, *labels_of))) for labels_of in itertools.product(*labels)]
 
 
 def read_csv(text: str, new_names: Mapping[str, str] | None = None) -> xr.Dataset:
@@ -55,15 +55,17 @@ def read_csv(text: str, new_names: Mapping[str, str] | None = None) -> xr.Datase
         ValueError: the text is no table of numbers with a header, lacks a column of ``new_names`` or the column time.
     """
     text = text.removeprefix("\ufeff").removeprefix("#")
-    first = text.partition("\n")[0]
-    separator = next((mark for mark in ";\t" if mark in first), ",")
+    head = text.partition("\n")[0]
+    separator = next((mark for mark in ";\t" if mark in head), ",")
     reader = csv.reader(io.StringIO(text), strict=True, delimiter=separator)
     try:
         rows = list(reader)
     except csv.Error as error:  # for example an unclosed quote
         raise ValueError(f"line {reader.line_num}: {error}") from None
     header = [field.strip() for field in rows[0]] if rows else []
-    found = ", ".join(header)[:_LONGEST]
+    if not any(header):
+        raise ValueError("it is empty; its first line has names with units, as time [s], q.pivot [rad]")
+    listed = ", ".join(header)[:_LONGEST]
     header = _renamed(header, new_names or {})
     numbers = _numbers(header, rows[1:], decimal_comma=separator != ",")
     columns: dict[str, dict[tuple[str, ...], Any]] = {}
@@ -75,23 +77,23 @@ def read_csv(text: str, new_names: Mapping[str, str] | None = None) -> xr.Datase
             raise ValueError(
                 f"column {index + 1} is called {field!r}; the header has names with units, as q.pivot [rad]"
             )
-        own = columns.setdefault(name, {})
-        if tuple(labels) in own:
+        cells = columns.setdefault(name, {})
+        if tuple(labels) in cells:
             raise ValueError(f"two columns are called {'/'.join((name, *labels))}")
-        own[tuple(labels)] = numbers[:, index]
+        cells[tuple(labels)] = numbers[:, index]
         if unit is not None:
             units.setdefault(name, set()).add(unit)
     if "time" not in columns:
         raise ValueError(
-            f"it has no column time [s]; its first line has the names, here {found}; "
+            f"it has no column time [s]; its first line has the names, here {listed}; "
             "--map t=time,theta=q.pivot[deg] says which column is what"
         )
     variables: dict[str, Any] = {}
     coordinates: dict[str, list[str]] = {}
-    for name, own in columns.items():
+    for name, cells in columns.items():
         if len(units.get(name, ())) > 1:
             raise ValueError(f"the columns of {name} have several units")
-        values, labels_of = _array(name, own)
+        values, labels_of = _array(name, cells)
         dims = ["time"]
         for level, names in enumerate(labels_of):
             dims.append(_dimension(name, level, names))
@@ -105,8 +107,10 @@ def _renamed(header: list[str], names: Mapping[str, str]) -> list[str]:
     """Header with columns renamed. Raises ValueError if one is not there."""
     plain = [name_and_unit(field) for field in header]
     for name in names:
-        if name not in [known for known, _ in plain]:
-            raise ValueError(f"it has no column {name}; it has {', '.join(known for known, _ in plain)[:_LONGEST]}")
+        if name not in [original for original, _ in plain]:
+            raise ValueError(
+                f"it has no column {name}; it has {', '.join(original for original, _ in plain)[:_LONGEST]}"
+            )
     renamed = []
     for field, (name, unit) in zip(header, plain, strict=True):
         new, new_unit = name_and_unit(names[name]) if name in names else (name, None)
@@ -126,21 +130,23 @@ def _dimension(name: str, level: int, labels: Sequence[str]) -> str:
 def _numbers(header: list[str], rows: list[list[str]], *, decimal_comma: bool) -> Any:
     numbers = []
     for line, row in enumerate(rows, start=2):
-        if not row:
+        if not any(field.strip() for field in row):  # spreadsheets end with rows of separators
             continue
         if len(row) != len(header):
             raise ValueError(f"line {line} has {len(row)} fields, the header {len(header)}")
-        numbers.append([_number(field.replace(",", ".") if decimal_comma else field, line) for field in row])
+        fields = [field.replace(",", ".") if decimal_comma else field for field in row]
+        numbers.append([_number(field, line, column) for field, column in zip(fields, header, strict=True)])
     return np.array(numbers).reshape(len(numbers), len(header))
 
 
-def _number(field: str, line: int) -> float:
+def _number(field: str, line: int, column: str) -> float:
     try:
         if "_" in field:  # which Python would ignore
             raise ValueError
         return float(field)
     except ValueError:
-        raise ValueError(f"line {line}: {field[:60]!r} is no number") from None
+        what = f"{field[:60]!r} is no number" if field.strip() else "there is no number"
+        raise ValueError(f"line {line}, column {column}: {what}; fill it, or leave its row or column out") from None
 
 
 def _array(name: str, columns: Mapping[tuple[str, ...], Any]) -> tuple[Any, list[tuple[str, ...]]]:
@@ -152,5 +158,5 @@ def _array(name: str, columns: Mapping[tuple[str, ...], Any]) -> tuple[Any, list
     part = bool(labels) and set(labels[-1]) < set("wxyz") and "".join(labels[-1]) not in _AXES
     if part or len(depth) > 1 or set(expected) != set(columns):
         raise ValueError(f"the columns of {name} are not whole; write one for each of {name}/x, {name}/y, {name}/z")
-    values = np.stack([columns[at] for at in expected], axis=1)
+    values = np.stack([columns[label] for label in expected], axis=1)
     return values.reshape(-1, *map(len, labels)), labels

@@ -23,7 +23,7 @@ from proofroll.core.time_grid import LATEST
 from proofroll.core.validation import strict, units_of, validated
 from proofroll.files.data_folders import data_folder
 from proofroll.files.scene_parameters import Parameter, angles_read, check_parameters, values_of
-from proofroll.files.scene_sources import source_of
+from proofroll.files.scene_sources import source_of, stem_of
 from proofroll.files.toml import named_file, read_toml
 
 
@@ -41,6 +41,7 @@ class SceneFile:
         duration: length of a run that shows the purpose of the scene [s].
         dt: step that is short enough for engines with a fixed one [s]; recommended if a run with a longer one fails,
             and used by a first look.
+        every: sampling interval [s] of a first look, where the usual one does not fit the step; None: the usual one.
         files: models beside it in the formats of engines, e.g. ``mujoco_free.xml``, with the meshes that these read.
         tables: all others, which kinds of elements read.
     """
@@ -53,6 +54,7 @@ class SceneFile:
     reason: str = ""
     duration: float | None = None
     dt: float | None = None
+    every: float | None = None
     files: list[str] = field(default_factory=list)
     tables: dict[str, Any] = field(default_factory=dict)
 
@@ -64,6 +66,7 @@ class _GravityTable:
     gravity: Gravity
 
 
+SCENE_IS_A_FOLDER = "a scene is a folder: put this file into one, under the name scene.toml"
 strict(Parameter, SceneFile, Gravity)
 _OWN = frozenset(item.name for item in dataclasses.fields(SceneFile)) - {"tables"}
 
@@ -89,19 +92,22 @@ def read_scene_file(name: str) -> SceneFile:
     Raises:
         InputError: there is no such scene, or its file is broken.
     """
+    if (importer := source_of(name)) is not None:  # its tables may need other parameters than the defaults
+        source, path = importer
+        return _checked({"gravity": {}, **source.content(path)}, path)
     return _read(name, {})[0]
 
 
-def _read(name: str, given: Mapping[str, object]) -> tuple[SceneFile, dict[str, float], Path]:
+def _read(name: str, asked: Mapping[str, object]) -> tuple[SceneFile, dict[str, float], Path]:
     """File of a scene, the value of each parameter, and the path of the file."""
-    other = source_of(name)
-    if other is None:
+    importer = source_of(name)
+    if importer is None:
         path = scene_folder(name) / "scene.toml"
         file = _checked(read_toml(path), path)
-        return file, values_of(file.parameters, given), path
-    source, path = other
+        return file, values_of(file.parameters, asked), path
+    source, path = importer
     file = _checked({"gravity": {}, **source.content(path)}, path)
-    values = values_of(file.parameters, given)
+    values = values_of(file.parameters, asked)
     tables = dict(source.tables(path, values))
     return dataclasses.replace(file, gravity=tables.pop("gravity"), tables=tables), values, path
 
@@ -109,9 +115,11 @@ def _read(name: str, given: Mapping[str, object]) -> tuple[SceneFile, dict[str, 
 def scene_folder(name: str) -> Path:
     """Folder of a scene. Raises InputError if there is no such scene."""
     missing = "there is no such scene"
-    own = Path(name).parent if Path(name).name == "scene.toml" else Path(name)
-    for folder in (data_folder("models") / name, own):
+    beside = Path(name).parent if Path(name).name == "scene.toml" else Path(name)
+    for folder in (data_folder("models") / name, beside):
         try:
+            if folder.suffix == ".toml" and folder.name != "scene.toml" and folder.is_file():
+                raise InputError("scene", name, SCENE_IS_A_FOLDER)
             if name and (folder / "scene.toml").is_file():
                 return folder
             if name and folder.is_dir():
@@ -153,57 +161,65 @@ def load_scene(name: str, /, *, asks: Any = (), **parameters: float) -> Scene:
         InputError: unknown scene, parameter or question, or a value that makes no sense.
     """
     file, values, path = _read(name, parameters)
-    own = path.name == "scene.toml"
-    where = str(path)
+    is_own_file = path.name == "scene.toml"
+    place = str(path)
     numbers = Parameters(values, {name: item.unit for name, item in file.parameters.items()})
-    gravity = {"gravity": numbers.filled(file.gravity, f"{where}: gravity", units_of(Gravity))}
-    wanted = _names(asks)
+    gravity = {"gravity": numbers.filled(file.gravity, f"{place}: gravity", units_of(Gravity))}
+    requirements = _names(asks)
     try:
         return Scene(
-            name=path.parent.name if own else path.stem,
+            name=path.parent.name if is_own_file else stem_of(name),
             title=file.title,
-            elements=_elements(file.tables, validated(_GravityTable, gravity, where).gravity, numbers, where),
+            elements=_elements(file.tables, validated(_GravityTable, gravity, place).gravity, numbers, place),
             parameters=values,
-            folder=path.parent if own else Path(),
-            asks=tuple(dict.fromkeys([*file.asks, *wanted])),
+            folder=path.parent if is_own_file else Path(),
+            asks=tuple(dict.fromkeys([*file.asks, *requirements])),
             files=tuple(sorted(file.files)),
         )
     except InputError as error:
-        raise error if error.field == "asks" and error.value in wanted else error.of(where) from None
+        raise error if error.field == "asks" and error.value in requirements else error.of(place) from None
 
 
-def _elements(tables: Mapping[str, Any], gravity: Gravity, numbers: Parameters, where: str) -> tuple[Element, ...]:
+def _elements(tables: Mapping[str, Any], gravity: Gravity, numbers: Parameters, place: str) -> tuple[Element, ...]:
     """Elements in the tables of a file, each read by its kind of element."""
     kinds = load_element_kinds()
     elements: list[Element] = []
-    for kind, own in zip(kinds, _of_each([kind.tables for kind in kinds], tables, where), strict=True):
-        if own:
-            elements += kind.read(own, gravity, numbers, where)
+    for kind, tables_of_kind in zip(kinds, _of_each([kind.tables for kind in kinds], tables, place), strict=True):
+        if tables_of_kind:
+            elements += kind.read(tables_of_kind, gravity, numbers, place)
     return tuple(elements)
 
 
-def _of_each(known: Sequence[Sequence[str]], tables: Mapping[str, Any], where: str) -> list[dict[str, Any]]:
-    """Tables of each kind of element; ``known``: names of the tables that each kind reads.
+def _of_each(names_by_kind: Sequence[Sequence[str]], tables: Mapping[str, Any], place: str) -> list[dict[str, Any]]:
+    """Tables of each kind of element; ``names_by_kind``: names of the tables that each kind reads.
 
     A table that several kinds read is divided: each row goes to the kind whose things it names.
 
     Raises:
         InputError: a table is no list of rows, or a row does not name things of exactly one kind.
     """
-    shared = {name for name in tables if sum(name in own for own in known) > 1}
-    own_tables = [{name: tables[name] for name in own if name in tables and name not in shared} for own in known]
-    named = [{str(row["name"]) for rows in own.values() for row in _rows(rows) if "name" in row} for own in own_tables]
+    shared = {name for name in tables if sum(name in names_of_kind for names_of_kind in names_by_kind) > 1}
+    own_tables = [
+        {name: tables[name] for name in names_of_kind if name in tables and name not in shared}
+        for names_of_kind in names_by_kind
+    ]
+    named = [
+        {str(row["name"]) for rows in names_of_kind.values() for row in _rows(rows) if "name" in row}
+        for names_of_kind in own_tables
+    ]
     for table in shared:
         if not isinstance(tables[table], list) or len(_rows(tables[table])) < len(tables[table]):
-            raise InputError(f"{where}: {table}", tables[table], f"write each row as a table [[{table}]]")
+            raise InputError(f"{place}: {table}", tables[table], f"write each row as a table [[{table}]]")
         for index, row in enumerate(_rows(tables[table])):
             texts = [text for value in row.values() for text in (value if isinstance(value, list) else [value])]
             homes = [
-                k for k, names in enumerate(named) if table in known[k] and any(str(text) in names for text in texts)
+                k
+                for k, names in enumerate(named)
+                if table in names_by_kind[k] and any(str(text) in names for text in texts)
             ]
             if len(homes) != 1:
                 advice = "several kinds of elements have such rows; name a thing of one of them, which another has not"
-                raise InputError(f"{where}: {table}.{index}", row, advice)
+                raise InputError(f"{place}: {table}.{index}", row, advice)
             own_tables[homes[0]].setdefault(table, []).append(row)
     return own_tables
 
@@ -233,14 +249,14 @@ def _check_names(tables: Mapping[str, Any], path: Path) -> None:
 
 def _checked(content: Mapping[str, Any], path: Path) -> SceneFile:
     """Content of a file, with all checks that do not need values of parameters."""
-    own = {key: value for key, value in content.items() if key in _OWN}
+    of_scene = {key: value for key, value in content.items() if key in _OWN}
     tables = {key: value for key, value in content.items() if key not in _OWN}
-    known = [name for kind in load_element_kinds() for name in kind.tables]
+    table_names = [name for kind in load_element_kinds() for name in kind.tables]
     for name, table in tables.items():
-        if name not in known:
-            raise no_such_key(f"{path}: {name}", table, [*sorted(_OWN), *known])
-    file = validated(SceneFile, own, str(path), tables=tables)
-    for name in ("duration", "dt"):
+        if name not in table_names:
+            raise no_such_key(f"{path}: {name}", table, [*sorted(_OWN), *table_names])
+    file = validated(SceneFile, of_scene, str(path), tables=tables)
+    for name in ("duration", "dt", "every"):
         value = getattr(file, name)
         if value is not None and not 0 < value <= LATEST:
             raise InputError(f"{path}: {name}", value, f"give a positive, finite time in s, at most {LATEST:g} s")

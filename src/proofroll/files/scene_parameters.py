@@ -47,12 +47,12 @@ class Parameter:
     integer: bool = False
 
 
-def angles_read(parameters: Mapping[str, Parameter], where: str) -> dict[str, Parameter]:
+def angles_read(parameters: Mapping[str, Parameter], place: str) -> dict[str, Parameter]:
     """Parameters whose values and bounds in degrees, ``"30 deg"``, are in radians.
 
     Args:
         parameters: as a file declares them.
-        where: name of the file, for messages.
+        place: name of the file, for messages.
 
     Raises:
         InputError: a number in degrees is not in rad.
@@ -63,7 +63,7 @@ def angles_read(parameters: Mapping[str, Parameter], where: str) -> dict[str, Pa
         for key in ("value", "above", "at_least", "below", "at_most"):
             text = getattr(parameter, key)
             radians = (
-                in_radians(f"{where}: parameters.{name}.{key}", text, parameter.unit) if isinstance(text, str) else None
+                in_radians(f"{place}: parameters.{name}.{key}", text, parameter.unit) if isinstance(text, str) else None
             )
             if radians is not None:
                 changes[key] = radians
@@ -79,55 +79,55 @@ def check_parameters(parameters: Mapping[str, Parameter], units: Iterable[str], 
     """
     known_units = dict.fromkeys(units)
     for name, parameter in parameters.items():
-        where = f"{path}: parameters.{name}"
+        place = f"{path}: parameters.{name}"
         if len(name) > _LONGEST_NAME or not name.isprintable():
             advice = f"a name is one line of at most {_LONGEST_NAME} printable characters"
             raise InputError(f"{path}: parameters", name, advice)
         advice = "this unit is not known, and nothing is converted; write the value in"
-        require_known(f"{where}.unit", parameter.unit, known_units, advice)
+        require_known(f"{place}.unit", parameter.unit, known_units, advice)
         for key in ("value", "above", "at_least", "below", "at_most"):
-            other = getattr(parameter, key)
-            if not isinstance(other, str):
+            end = getattr(parameter, key)
+            if not isinstance(end, str):
                 continue
-            if other == name or other not in parameters:
-                known = choices(item for item in parameters if item != name)
-                advice = f"there is no such parameter to refer to; choose from {known}"
-                if other.removeprefix("$") in parameters:
+            if end == name or end not in parameters:
+                suggestions = choices(item for item in parameters if item != name)
+                advice = f"there is no such parameter to refer to; choose from {suggestions}"
+                if end.removeprefix("$") in parameters:
                     advice = "a parameter refers to another one by its name alone, without $, and never to itself"
-                raise InputError(f"{where}.{key}", other, advice)
-            if parameters[other].unit != parameter.unit:
-                advice = f"its unit is {parameters[other].unit}, that of {name} is {parameter.unit}"
-                raise InputError(f"{where}.{key}", other, advice)
-        _check_end(parameters, name, f"{where}.value")
+                raise InputError(f"{place}.{key}", end, advice)
+            if parameters[end].unit != parameter.unit:
+                advice = f"its unit is {parameters[end].unit}, that of {name} is {parameter.unit}"
+                raise InputError(f"{place}.{key}", end, advice)
+        _check_end(parameters, name, f"{place}.value")
     try:
         values_of(parameters, {})
     except InputError as error:
         raise InputError(f"{path}: parameters.{error.field}.value", error.value, error.advice) from None
 
 
-def _check_end(parameters: Mapping[str, Parameter], name: str, where: str) -> None:
+def _check_end(parameters: Mapping[str, Parameter], name: str, place: str) -> None:
     """Raises InputError if defaults that refer to other parameters form a circle."""
     passed = [name]
     while isinstance(following := parameters[passed[-1]].value, str) and following in parameters:
         if following in passed:
-            raise InputError(where, " -> ".join([*passed, following]), "this goes round in a circle; give a number")
+            raise InputError(place, " -> ".join([*passed, following]), "this goes round in a circle; give a number")
         passed.append(following)
 
 
-def values_of(parameters: Mapping[str, Parameter], given: Mapping[str, object]) -> dict[str, float]:
+def values_of(parameters: Mapping[str, Parameter], set_values: Mapping[str, object]) -> dict[str, float]:
     """Value of every parameter: the given one, the default, or that of the parameter to which the default refers.
 
     Raises:
         InputError: there is no such parameter, or a value is no number or out of its bounds.
     """
-    for name, value in given.items():
+    for name, value in set_values.items():
         require_known(name, name, parameters, "there is no such parameter; choose from", value)
     values: dict[str, float] = {}
     for name, parameter in parameters.items():
         source = name
-        while source not in given and (following := str(parameters[source].value)) in parameters:
+        while source not in set_values and (following := str(parameters[source].value)) in parameters:
             source = following
-        values[name] = _number(name, given.get(source, parameters[source].value), parameter)
+        values[name] = _number(name, set_values.get(source, parameters[source].value), parameter)
     # Bounds that are numbers come first, so that a parameter is not blamed for the bad value of another.
     for kind in (float, str):
         for name, parameter in parameters.items():

@@ -1,13 +1,29 @@
 """Files of other formats that hold a scene; entry points ``proofroll.scene_sources`` announce their readers."""
 
-from collections.abc import Mapping
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
 from functools import cache
 from pathlib import Path
-from typing import Any, ClassVar, Protocol
+from typing import Any, ClassVar, Protocol, runtime_checkable
 
 from proofroll.core.announced import loaded
+from proofroll.core.errors import InputError
 
 GROUP = "proofroll.scene_sources"
+
+
+# Between the file of a robot and that of its controller, in the name of a scene.
+BESIDE = "+"
+
+
+@runtime_checkable
+class TakesControllers(Protocol):
+    """Ability of a reader whose scenes may have a controller, described in a file of its own."""
+
+    @staticmethod
+    def under(control: Path) -> Any:
+        """Reader of the same files, whose scenes have the controller of a file."""
 
 
 class SceneSource(Protocol):
@@ -40,16 +56,88 @@ class SceneSource(Protocol):
         """
 
 
-def source_of(name: str) -> tuple[type[SceneSource], Path] | None:
+def with_control(name: str, control: Path) -> str:
+    """Name of the scene of a robot file under the controller of another file.
+
+    Raises:
+        InputError: there is no such controller's file, or the scene is no robot file.
+    """
+    if not control.is_file():
+        raise InputError("--control", control, "there is no such file")
+    source = source_of(name)
+    if source is None or not isinstance(source[0], TakesControllers):
+        raise InputError("--control", control, f"it is for a robot file (URDF, MJCF), and {name} is none")
+    return f"{name}{BESIDE}{control}"
+
+
+def parts_of(name: str) -> tuple[str, str]:
+    """Name of a file and of its controller's file; the latter is empty if there is none."""
+    name = str(name)  # callers without type checks give paths
+    places = [place for place, letter in enumerate(name) if letter == BESIDE]
+    pairs = ((name[:place], name[place + 1 :]) for place in places)
+    return next((pair for pair in pairs if _is_file(pair[0]) and _is_file(pair[1])), (name, ""))
+
+
+def stem_of(name: str) -> str:
+    """Name without folders and endings, of a scene in files of other formats."""
+    return BESIDE.join(Path(part).stem for part in parts_of(name) if part)
+
+
+def resolved(name: str) -> str:
+    """Name of a scene with whole paths."""
+    return BESIDE.join(str(Path(part).resolve()) for part in parts_of(name) if part)
+
+
+class JudgedRecord(Protocol):
+    """Judgement of a record, a dataclass.
+
+    Attributes:
+        agrees: True if nothing in the record differs.
+        looked_at: True if something could be judged.
+    """
+
+    agrees: bool
+    looked_at: bool
+
+    def lines(self) -> Iterable[str]:
+        """Lines of text about it."""
+
+
+@runtime_checkable
+class JudgesRecords(Protocol):
+    """Ability of a reader that judges records of its scenes under a controller, without a simulation."""
+
+    @staticmethod
+    def judge_record(record: Path, robot: Path, control: Path, names: Mapping[str, str] | None = None) -> JudgedRecord:
+        """Judgement of the record in a CSV file.
+
+        Args:
+            record: path of the record.
+            robot: path of the file of the scene.
+            control: path of the controller's file.
+            names: column of the record -> its name here, perhaps with its unit, ``q.hip[deg]``.
+
+        Raises:
+            InputError: a file is wrong, or they do not fit.
+        """
+
+
+def source_of(name: str) -> tuple[Any, Path] | None:
     """Reader of a file of another format, and its path; None: the file is none."""
-    path = Path(name)
-    try:
-        if not path.suffix or not path.is_file():
-            return None  # most names are those of folders, so the readers need not be loaded
-    except (OSError, ValueError):  # the name is too long for the file system, or has a zero byte
+    file, control = (name, "") if _is_file(name) else parts_of(name)
+    if not _is_file(file):
+        return None  # most names are those of folders, so the readers need not be loaded
+    source = _sources().get(Path(file).suffix.lower())
+    if source is None or (control and not isinstance(source, TakesControllers)):
         return None
-    source = _sources().get(path.suffix.lower())
-    return None if source is None else (source, path)
+    return source.under(Path(control)) if control else source, Path(file)
+
+
+def _is_file(name: str) -> bool:
+    try:
+        return bool(Path(name).suffix) and Path(name).is_file()
+    except (OSError, ValueError):  # the name is too long for the file system, or has a zero byte
+        return False
 
 
 @cache

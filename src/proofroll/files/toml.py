@@ -22,7 +22,7 @@ def read_toml(path: Path) -> dict[str, Any]:
             text = file.read(_MOST_BYTES + 1)
         if len(text) > _MOST_BYTES:
             raise InputError("file", path, f"the file is larger than {_MOST_BYTES >> 10} kB; shorten it")
-        content = tomllib.loads(text.decode())
+        content = tomllib.loads(text.decode("utf-8-sig"))  # some editors begin with a byte-order mark
     except UnicodeDecodeError:
         raise InputError("file", path, "the file is broken: it is no text in UTF-8") from None
     except ValueError as error:  # no TOML, or an integer of thousands of digits
@@ -68,9 +68,9 @@ def study_content(path: Path, study: str) -> dict[str, Any]:
         InputError: the file is broken, or belongs to another study.
     """
     content = read_toml(path)
-    given = content.pop("study", "nothing")
-    if given != study:
-        raise InputError(f"{path}: study", given, f'only a file with study = "{study}" can be used here')
+    kind = content.pop("study", "nothing")
+    if kind != study:
+        raise InputError(f"{path}: study", kind, f'only a file with study = "{study}" can be used here')
     return content
 
 

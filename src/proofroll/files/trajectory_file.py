@@ -47,12 +47,12 @@ def import_xarray() -> None:
     xarray would import all of dask at its first array, which takes half as long as a run of a second; we do not use it.
     """
     global _without_dask  # noqa: PLW0603 -- of the process, as xarray's own memory of dask is
-    first = not {"xarray", "dask"} & set(sys.modules)
+    is_new = not {"xarray", "dask"} & set(sys.modules)
     with _dask_aside():
         import xarray as xr
 
         xr.Variable((), 0.0)
-    _without_dask |= first
+    _without_dask |= is_new
 
 
 @contextlib.contextmanager
@@ -91,8 +91,8 @@ def write(trajectory: xr.Dataset | Columns, path: Path) -> None:
 
 def _stored(trajectory: xr.Dataset | Columns) -> bytes:
     columns = trajectory if isinstance(trajectory, Columns) else Columns.of(trajectory)
-    own = {name: [item.dims, dict(item.attrs)] for name, item in columns.variables.items()}
-    about = json.dumps([own, dict(columns.attrs)], default=lambda value: value.tolist())  # numpy arrays and numbers
+    layout = {name: [item.dims, dict(item.attrs)] for name, item in columns.variables.items()}
+    about = json.dumps([layout, dict(columns.attrs)], default=lambda value: value.tolist())  # numpy arrays and numbers
     buffer = io.BytesIO()
     with zipfile.ZipFile(buffer, "w") as archive:
         archive.writestr(zipfile.ZipInfo(_ABOUT), about)  # without a date: equal trajectories give equal files
@@ -177,8 +177,8 @@ def read_columns(path: Path) -> Columns:
     content = ordinary_content(path)
     try:
         with np.load(io.BytesIO(content), allow_pickle=False) as file:
-            own, attrs = map(dict, json.loads(file[_ABOUT]))
-            variables = {name: Variable(tuple(dims), file[name], dict(its)) for name, (dims, its) in own.items()}
+            about, attrs = map(dict, json.loads(file[_ABOUT]))
+            variables = {name: Variable(tuple(dims), file[name], dict(its)) for name, (dims, its) in about.items()}
     except _NO_SUCH_FILE as error:
         raise ValueError(f"{path} is no stored trajectory") from error
     return Columns(variables, attrs)

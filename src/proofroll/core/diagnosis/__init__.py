@@ -50,6 +50,7 @@ class Evidence:
         settled: observables whose verdict is right, which need no explanation.
         by_step: True if the limit of small steps leaves no more of the difference than a cause may: the run follows the
             scene's equations.
+        asked: the element as the scene has it, with what chooses its held values; ``element`` has those of the run.
         found: cache of results that hypotheses share, see :func:`proofroll.core.diagnosis.fitting.cached_on_evidence`.
     """
 
@@ -60,6 +61,7 @@ class Evidence:
     step: float | None = None
     settled: frozenset[str] = frozenset()
     by_step: bool = False
+    asked: Any = None
     found: dict[Any, Sequence[Any]] = field(default_factory=dict, init=False, repr=False, compare=False)
 
 
@@ -116,8 +118,8 @@ class Cause:
     def sentence(self) -> str:
         """Clause about the engine, with the proof."""
         unit = spaced(self.unit)
-        before, after = number(self.before), number(self.after, 1)
-        return f"{self.says} ({self.quantity} off by {before}{unit}, by {after}{unit} with that)"
+        difference, remainder = number(self.before), number(self.after, 1)
+        return f"{self.says} ({self.quantity} off by {difference}{unit}, by {remainder}{unit} with that)"
 
 
 @dataclass(frozen=True)
@@ -168,31 +170,35 @@ def diagnose(evidence: Evidence, hypotheses: Sequence[Hypothesis]) -> list[Cause
     proven.sort(key=lambda cause: (cause.fitted, cause.left))
     causes: list[Cause] = []
     for cause in proven:
-        rivals = [other for other in causes if _share(cause, other)]
+        rivals = [candidate for candidate in causes if _share(cause, candidate)]
         if not rivals:
             causes.append(cause)
         elif all(_rivals(cause, rival) for rival in rivals) and len(rivals) <= _ALTERNATIVES:
             causes.append(dataclasses.replace(cause, alternative=True))
-    known = [cause for cause in causes if cause.accuses and not any(_unsure(cause, other) for other in proven)]
-    main = [cause for cause in known if not cause.alternative]
-    return main + [cause for cause in known if cause.alternative and any(_share(cause, first) for first in main)]
+    accusing = [
+        cause for cause in causes if cause.accuses and not any(_unsure(cause, candidate) for candidate in proven)
+    ]
+    main = [cause for cause in accusing if not cause.alternative]
+    return main + [
+        cause for cause in accusing if cause.alternative and any(_share(cause, main_cause) for main_cause in main)
+    ]
 
 
-def _share(one: Cause, other: Cause) -> bool:
+def _share(cause: Cause, rival: Cause) -> bool:
     """True if two causes explain the same quantity."""
-    return bool({one.quantity, *one.covers} & {other.quantity, *other.covers})
+    return bool({cause.quantity, *cause.covers} & {rival.quantity, *rival.covers})
 
 
-def _rivals(cause: Cause, first: Cause) -> bool:
+def _rivals(cause: Cause, rival: Cause) -> bool:
     """True if a cause explains all that the first one does, and as well."""
-    as_good = cause.fitted == first.fitted and cause.left <= _AS_GOOD * first.left
-    whole = cause.quantity == first.quantity or first.quantity in cause.covers
-    return as_good and whole and cause.id != first.id
+    as_good = cause.fitted == rival.fitted and cause.left <= _AS_GOOD * rival.left
+    whole = cause.quantity == rival.quantity or rival.quantity in cause.covers
+    return as_good and whole and cause.id != rival.id
 
 
-def _unsure(cause: Cause, other: Cause) -> bool:
+def _unsure(cause: Cause, rival: Cause) -> bool:
     """True if a fitted cause is one of several with equally good explanations."""
-    return cause.fitted > 0 and _rivals(other, cause)
+    return cause.fitted > 0 and _rivals(rival, cause)
 
 
 def hypotheses_of(element: Element) -> Sequence[Hypothesis]:

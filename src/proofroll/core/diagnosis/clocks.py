@@ -25,8 +25,8 @@ def _comparable(time: FloatArray, reported: FloatArray, true: FloatArray) -> tup
     if len(time) < _FEWEST:
         return None
     flat, exact = reported.reshape(len(time), -1), true.reshape(len(time), -1)
-    known = np.isfinite(flat).all(0) & np.isfinite(exact).all(0)
-    return (flat[:, known], exact[:, known]) if known.any() else None
+    finite = np.isfinite(flat).all(0) & np.isfinite(exact).all(0)
+    return (flat[:, finite], exact[:, finite]) if finite.any() else None
 
 
 def best_delay(time: FloatArray, reported: FloatArray, true: FloatArray) -> tuple[float, float, float] | None:

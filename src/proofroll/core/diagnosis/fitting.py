@@ -37,23 +37,30 @@ FACTORS: Mapping[float, str] = {
 
 
 def least_squares_parameters(
-    residual: Callable[[FloatArray], FloatArray], start: FloatArray, size: float
+    residual: Callable[[FloatArray], FloatArray], start: FloatArray, size: float, rounds: int = _ROUNDS
 ) -> FloatArray:
-    """Parameters that minimise the sum of squared residuals, by Gauss-Newton with halved steps."""
-    x, at = start, residual(start)
-    for _ in range(_ROUNDS):
-        slopes = np.stack([residual(x + h) - at for h in _STEP * size * np.eye(len(x))], axis=-1) / (_STEP * size)
+    """Parameters that minimise the sum of squared residuals, by Gauss-Newton with halved steps.
+
+    Residuals may be NaN, of any shape, where they cannot be computed; the start is returned if it leads nowhere.
+    """
+    x, residuals = start, residual(start)
+    if not np.all(np.isfinite(residuals)):
+        return x
+    for _ in range(rounds):
+        slopes = np.stack([residual(x + h) - residuals for h in _STEP * size * np.eye(len(x))], axis=-1) / (
+            _STEP * size
+        )
         if not np.all(np.isfinite(slopes)) or not np.any(slopes):
             return x
-        step = -np.linalg.lstsq(slopes, at, rcond=None)[0]
+        step = -np.linalg.lstsq(slopes, residuals, rcond=None)[0]
         for _ in range(6):
             tried = residual(x + step)
-            if np.all(np.isfinite(tried)) and tried @ tried <= at @ at:
+            if np.all(np.isfinite(tried)) and tried @ tried <= residuals @ residuals:
                 break
             step /= 2
         else:
             return x
-        x, at = x + step, tried
+        x, residuals = x + step, tried
         if np.max(np.abs(step)) < 1e-9 * size:
             break
     return x
@@ -74,8 +81,8 @@ def known_factor(factor: float) -> tuple[float, str] | None:
 
 def factor_text(factor: float) -> str:
     """A factor in words."""
-    known = known_factor(factor)
-    return known[1] if known else f"{factor:.6g} times"
+    usual = known_factor(factor)
+    return usual[1] if usual else f"{factor:.6g} times"
 
 
 def change_by(factor: float) -> float:
@@ -120,8 +127,8 @@ class Residuals(Generic[M]):
 
         Changes that are round-off are left out, as by numbers that act on accelerations where there are none.
         """
-        at = self.left(self.plain)
-        changed = np.stack([self.left(model) - at for model in self.others()], axis=-1)
+        plain_residual = self.left(self.plain)
+        changed = np.stack([self.left(model) - plain_residual for model in self.others()], axis=-1)
         sizes = np.linalg.norm(changed, axis=0)
         seen = sizes > _CHANGED * self.before
         return np.asarray(changed[:, seen] / sizes[seen])
@@ -160,12 +167,12 @@ class Residuals(Generic[M]):
             number: count of fitted parameters in it.
             change: their change, see :class:`.Cause`.
         """
-        after = self.largest(model)
-        closes = after <= self.closes * self.before
+        remainder = self.largest(model)
+        closes = remainder <= self.closes * self.before
         if closes and (model is None or self.contradicted(model)):
-            after = np.inf
+            remainder = np.inf
         explains = self.explained(model) if number and closes else None
-        proof = self.quantity, self.unit, self.before, after, remedy, number, self.covers, self.closes
+        proof = self.quantity, self.unit, self.before, remainder, remedy, number, self.covers, self.closes
         return Cause(name, says, *proof, explains=explains, change=change)
 
 
@@ -198,14 +205,14 @@ def any_gravity(
     def test(evidence: Evidence) -> Iterator[Cause]:
         element = evidence.element
         g = gravity_of(element)
-        for each in residuals(evidence):
-            at = each.left(falling(element, g))
-            slopes = [each.left(falling(element, g + axis)) - at for axis in np.eye(3)]
-            gravity = g - np.linalg.lstsq(np.stack(slopes, axis=-1), at, rcond=None)[0]
+        for source in residuals(evidence):
+            residual = source.left(falling(element, g))
+            slopes = [source.left(falling(element, g + axis)) - residual for axis in np.eye(3)]
+            gravity = g - np.linalg.lstsq(np.stack(slopes, axis=-1), residual, rcond=None)[0]
             gravity = np.where(np.abs(gravity) < 1e-6 * max(float(np.max(np.abs(gravity))), 1e-300), 0.0, gravity)
             off, size = (float(np.linalg.norm(x)) for x in (gravity - g, g))
             says = f"the engine's gravity is ({', '.join(f'{x:.4g}' for x in gravity)}) m/s^2"
             model, remedy = falling(element, gravity), "look at the axes of gravity"
-            yield each.cause("direction of gravity", says, model, remedy, 3, off / size if size else np.inf)
+            yield source.cause("direction of gravity", says, model, remedy, 3, off / size if size else np.inf)
 
     return test

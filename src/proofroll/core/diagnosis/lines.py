@@ -31,34 +31,34 @@ def scale_of(line: Mapping[str, Any]) -> float:
 
 
 def relative_differences(
-    lines: Sequence[Mapping[str, Any]], expected: Mapping[str, Sequence[float]], given: Collection[str]
+    lines: Sequence[Mapping[str, Any]], expected: Mapping[str, Sequence[float]], names: Collection[str]
 ) -> FloatArray:
     """Relative differences of all reported quantities from those of another model, shape (numbers,).
 
     Args:
         lines: of the certificate.
         expected: quantity -> numbers of the other model; the scene's where it is missing.
-        given: quantities that the adapter hands to the engine (a mass). Where they agree with the scene they are left
+        names: quantities that the adapter hands to the engine (a mass). Where they agree with the scene they are left
             out, as an adapter may report what it meant to build.
     """
     parts = [np.zeros(0)]
     for line in lines:
-        if line["quantity"] in given and line["holds"]:
+        if line["quantity"] in names and line["holds"]:
             continue
         want = np.asarray(expected.get(line["quantity"], line["expected"]), dtype=np.float64)
         got = np.asarray(line["found"], dtype=np.float64)
         if line["difference"] is None or got.shape != want.shape:
             continue
-        known = np.isfinite(got) & np.isfinite(want)
-        parts.append((got - want)[known] / scale_of(line) * (1 if line["tolerance"] <= _EXACT else 0))
+        finite = np.isfinite(got) & np.isfinite(want)
+        parts.append((got - want)[finite] / scale_of(line) * (1 if line["tolerance"] <= _EXACT else 0))
     return np.concatenate(parts)
 
 
-def built_otherwise(given: Collection[str], covers: tuple[str, ...]) -> Hypothesis:
+def built_otherwise(names: Collection[str], covers: tuple[str, ...]) -> Hypothesis:
     """Hypothesis: the model was built with other numbers than the scene's, as its certificate shows.
 
     Args:
-        given: quantities that the adapter hands to the engine.
+        names: quantities that the adapter hands to the engine.
         covers: quantities that follow from them.
     """
 
@@ -66,7 +66,7 @@ def built_otherwise(given: Collection[str], covers: tuple[str, ...]) -> Hypothes
         "built", "the engine's own model, read back, holds other numbers than the scene: its certificate says so"
     )
     def test(evidence: Evidence) -> Iterator[Cause]:
-        wrong = [line for line in differing(evidence.lines) if line["quantity"] in given]
+        wrong = [line for line in differing(evidence.lines) if line["quantity"] in names]
         if not wrong or all(_is_single(line) for line in wrong):
             return
         worst = max(wrong, key=lambda line: float(line["difference"]))
@@ -83,9 +83,9 @@ def built_otherwise(given: Collection[str], covers: tuple[str, ...]) -> Hypothes
 def _otherwise(line: Mapping[str, Any]) -> str:
     """Text about a wrongly built quantity: both numbers, and their ratio if all its numbers have the same."""
     built, expected = (np.asarray(line[key], dtype=np.float64) for key in ("found", "expected"))
-    own = {field.name: line[field.name] for field in dataclasses.fields(Line)}
-    one, other = distinct_texts(*worst_numbers(Line(**own), _SHOWN))
-    shown = f"{one} instead of {other}{'' if line['unit'] == '1' else ' ' + line['unit']}"
+    values = {field.name: line[field.name] for field in dataclasses.fields(Line)}
+    text, expected_text = distinct_texts(*worst_numbers(Line(**values), _SHOWN))
+    shown = f"{text} instead of {expected_text}{'' if line['unit'] == '1' else ' ' + line['unit']}"
     square = float(expected @ expected) if built.shape == expected.shape else 0.0
     factor = float(built @ expected) / square if square else 0.0
     alike = square > 0 and bool(np.max(np.abs(built - factor * expected)) <= _ALIKE * np.max(np.abs(expected)))
@@ -101,7 +101,7 @@ def single_precision(lines: Sequence[Mapping[str, Any]]) -> Iterator[Cause]:
     """Cause: the engine computes with 24 bits, as the differing numbers are the expected ones rounded to float32."""
     exact = [line for line in differing(lines) if _is_single(line)]
     if exact:
-        before = max(line["difference"] for line in exact)
+        difference = max(line["difference"] for line in exact)
         name, says = str(exact[0]["quantity"]), "what the engine holds are single-precision numbers (float32)"
         remedy = 'compute in double precision, or say precision = "single" in the settings'
-        yield Cause("float32", says, f"at time 0 {name}, relative", "1", before, 0.0, remedy)
+        yield Cause("float32", says, f"at time 0 {name}, relative", "1", difference, 0.0, remedy)

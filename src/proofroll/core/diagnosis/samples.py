@@ -55,8 +55,8 @@ def single_precision_run(evidence: Evidence) -> Iterator[Cause]:
     required = [run[name].to_numpy() for name in REQUIRED]
     if all(in_single_precision(reported) for reported in required):
         true, says = truth[REQUIRED[0]].to_numpy(), "every number of the run is a single-precision one (float32)"
-        before = known_difference(required[0], true) if required[0].shape == true.shape else np.inf
-        yield Cause("float32", says, REQUIRED[0], "m", before, 0.0, "compute and report in double precision")
+        difference = known_difference(required[0], true) if required[0].shape == true.shape else np.inf
+        yield Cause("float32", says, REQUIRED[0], "m", difference, 0.0, "compute and report in double precision")
 
 
 def another_clock(state: Callable[[Any, xr.Dataset], FloatArray], covers: tuple[str, ...]) -> Hypothesis:
@@ -83,18 +83,18 @@ def another_clock(state: Callable[[Any, xr.Dataset], FloatArray], covers: tuple[
         reported, true = reported * weights, true * weights
         moved = best_delay(time, reported, true)
         if moved is not None:
-            delay, before, after = moved
+            delay, difference, remainder = moved
             says = f"every sample is {delay_text(delay, evidence.step)}: the motion is right at another time"
             remedy = "advance(t) has to end at t, neither a step before nor after it"
             change = in_steps(delay, evidence.step)
-            yield Cause("late", says, "state", "m", before, after, remedy, 1, covers, _CLOCK, change=change)
+            yield Cause("late", says, "state", "m", difference, remainder, remedy, 1, covers, _CLOCK, change=change)
         paced = best_clock_factor(time, reported, true)
         if paced is not None:
-            rate, before, after = paced
+            rate, difference, remainder = paced
             says = f"the engine's time runs {rate:.6g} times as fast as it says: the motion is right at other times"
             remedy = "the step that the engine takes is not the one that is counted"
             change = change_by(rate)
-            yield Cause("clock", says, "state", "m", before, after, remedy, 1, covers, _CLOCK, change=change)
+            yield Cause("clock", says, "state", "m", difference, remainder, remedy, 1, covers, _CLOCK, change=change)
 
     return test
 
@@ -144,10 +144,10 @@ def reported_vectors(
         if pair is None or clock.proven(evidence):
             return
         run, truth = pair
-        time, own = truth["time"].to_numpy(), frames(evidence)
+        time, frame_data = truth["time"].to_numpy(), frames(evidence)
         for name, (what, unit) in units.items():
             reported, true, size = run[name].to_numpy(), truth[name].to_numpy(), least(evidence.element, name)
-            vector = ReportedVector(name, what, unit, reported, true, time, own, size).after_start()
+            vector = ReportedVector(name, what, unit, reported, true, time, frame_data, size).after_start()
             moves, turns = moves_otherwise(evidence, name), moves_otherwise(evidence, name, "q_WB", "w_WB")
             for cause in (*vector.causes(evidence.step), *besides(vector, evidence)):
                 if not (turns if name != "w_WB" and cause.id.startswith(_OF_BOTH) else moves):
@@ -159,7 +159,7 @@ def reported_vectors(
 def moves_otherwise(evidence: Evidence, name: str, *others: str) -> bool:
     """True if other variables of the state are wrong, too: the motion itself differs, not only one report."""
     least = CLOSES * departure(evidence, name)
-    return any(departure(evidence, other) > least for other in others or _WITH[name])
+    return any(departure(evidence, name_of_rival) > least for name_of_rival in others or _WITH[name])
 
 
 def forced_otherwise(evidence: Evidence, vector: ReportedVector) -> bool:
@@ -196,10 +196,10 @@ def reported_quaternions(true_ones: Callable[[Evidence], FloatArray]) -> Hypothe
             return
         if len(reported) > 1 and known_difference(np.abs(reported[0]), np.abs(true[0])) < _START:
             reported, true = reported[1:], true[1:]  # an engine may give at time 0 what it was given
-        before = _largest_turn(reported, true)
-        if not above_round_off(before, 1.0):
+        difference = _largest_turn(reported, true)
+        if not above_round_off(difference, 1.0):
             return
-        for says, after in (
+        for says, remainder in (
             ("q_WB has its scalar last", _largest_turn(reported, true[..., [1, 2, 3, 0]])),
             (
                 "q_WB is that of the inverse rotation, of the world in the body",
@@ -207,15 +207,15 @@ def reported_quaternions(true_ones: Callable[[Evidence], FloatArray]) -> Hypothe
             ),
         ):
             remedy = "give a unit quaternion of the body, scalar first"
-            yield Cause("quaternion", says, "q_WB", "1", before, after, remedy)
+            yield Cause("quaternion", says, "q_WB", "1", difference, remainder, remedy)
 
     return test
 
 
-def _largest_turn(reported: FloatArray, other: FloatArray) -> float:
+def _largest_turn(reported: FloatArray, rival: FloatArray) -> float:
     """Largest difference of quaternions, up to their signs."""
-    signs = np.where(np.sum(reported * other, axis=-1, keepdims=True) < 0, -1.0, 1.0)
-    return known_difference(reported * signs, other)
+    signs = np.where(np.sum(reported * rival, axis=-1, keepdims=True) < 0, -1.0, 1.0)
+    return known_difference(reported * signs, rival)
 
 
 def at_start(frames_of: Callable[[Any], Mapping[str, FloatArray]], follows: frozenset[str]) -> Hypothesis:

@@ -7,8 +7,11 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from proofroll.core.dataset import common_span, part
+import numpy as np
+
+from proofroll.core.dataset import common_span, impact_samples, part
 from proofroll.core.diagnosis import CLOSES, Cause, Evidence, diagnose, hypotheses_of
+from proofroll.core.element_abilities import HoldsTargets
 from proofroll.core.observable import Role
 from proofroll.core.scene import Scene
 from proofroll.core.verdict import Judgement, Verdict
@@ -58,8 +61,9 @@ def diagnose_scene(
 ) -> list[Diagnosis]:
     """The proven causes of all elements of a scene.
 
-    With judgements, an element whose observables are all right is left out: its remaining differences are round-off and
-    truncation, which any fault may seem to explain.
+    Samples on an impact are left out: which side of it a run reports there is no fault. With judgements, an element
+    whose observables are all right is left out: its remaining differences are round-off and truncation, which any
+    fault may seem to explain.
 
     Args:
         scene: of the run.
@@ -74,25 +78,31 @@ def diagnose_scene(
     if run is not None and truth is not None:
         truth, shorter = common_span(scene, truth, {0: run})
         run = shorter[0]
+        on = impact_samples(scene, truth)
+        if on.any() and np.mean(on) < 0.5 and run.sizes["time"] == len(on):
+            truth, run = (dataset.isel(time=~on) for dataset in (truth, run))
     judged = list(judgements)
     wrong = {item.observable for item in judged if item.verdict in _WRONG}
     right = {item.observable for item in judged if item.verdict in _RIGHT}
     diagnoses, seen = [], agreement_sentence(scene, judged)
     for element in scene.elements:
         ending = f".{element.name}" if len(scene.elements) > 1 else ""
-        own = [
+        own_lines = [
             {**line, "quantity": line["quantity"].removesuffix(ending)}
             for line in lines
             if str(line["quantity"]).endswith(ending)
         ]
-        if judged and all(line["holds"] for line in own) and not any(name.endswith(ending) for name in wrong):
+        if judged and all(line["holds"] for line in own_lines) and not any(name.endswith(ending) for name in wrong):
             continue
         ran = None if run is None else part(scene, element, run)
         true = None if truth is None else part(scene, element, truth)
         settled = frozenset(name.removesuffix(ending) for name in right if name.endswith(ending))
         off = [item for item in judged if item.verdict in _WRONG and item.observable.endswith(ending)]
         by_step = bool(off) and all(_closed_by_step(item) for item in off)
-        evidence = Evidence(element, own, ran, true, step, settled, by_step)
+        commanded = element.along(ran) if isinstance(element, HoldsTargets) else element
+        if commanded is None:  # without its targets every cause would be a guess
+            continue
+        evidence = Evidence(commanded, own_lines, ran, true, step, settled, by_step, element)
         diagnoses += [
             Diagnosis(element.name, cause, seen) for cause in diagnose(evidence, hypotheses_of(element))[:_MOST]
         ]
@@ -112,13 +122,13 @@ def agreement_sentence(scene: Scene, judgements: Iterable[Judgement]) -> str:
     right, wrong = [], []  # residuals (balances, audits) are left out: they follow from the other observables
 
     for item in judgements:
-        known = scene.observables.get(item.observable)
-        if known is None or (known.role == Role.RESIDUAL and not known.hangs_on_events):
+        item_observable = scene.observables.get(item.observable)
+        if item_observable is None or (item_observable.role == Role.RESIDUAL and not item_observable.hangs_on_events):
             continue
         if item.verdict in _RIGHT:
-            right.append(known)
+            right.append(item_observable)
         elif item.verdict in _WRONG:
-            wrong.append(known)
+            wrong.append(item_observable)
     decided = [item for item in right if item.decides]
     if not decided or not wrong:
         return ""

@@ -71,8 +71,8 @@ class ReportedVector:
     @property
     def differs(self) -> bool:
         """True if the report differs by more than round-off and the error bar of the truth."""
-        known = self.reported.shape == self.true.shape and above_round_off(self.before, self.size)
-        return known and self.before > _BARS * self.bar
+        comparable = self.reported.shape == self.true.shape and above_round_off(self.before, self.size)
+        return comparable and self.before > _BARS * self.bar
 
     def after_start(self) -> ReportedVector:
         """The vector without time 0 if it is right there: an engine may report its initial values unchanged."""
@@ -108,11 +108,13 @@ class ReportedVector:
         """
         partly = np.any(np.isnan(self.true), axis=-1, keepdims=True)
         aside = partly & (np.isnan(explained) | np.isnan(self.reported))
-        reported, true, explained = (np.where(aside, np.nan, each) for each in (self.reported, self.true, explained))
-        before, after = known_difference(reported, true), known_difference(reported, explained)
-        if before < self.before / 2:
-            after = np.inf  # most of the difference is in what is left aside
-        proof = self.name, self.unit, before, after
+        reported, true, explained = (
+            np.where(aside, np.nan, values) for values in (self.reported, self.true, explained)
+        )
+        difference, remainder = known_difference(reported, true), known_difference(reported, explained)
+        if difference < self.before / 2:
+            remainder = np.inf  # most of the difference is in what is left aside
+        proof = self.name, self.unit, difference, remainder
         return Cause(
             f"{kind}.{self.name}", says, *proof, remedy, number, closes=closes, explains=explains, change=change
         )
@@ -156,9 +158,9 @@ class ReportedVector:
                 changed = local[..., order] * signs
                 if known_difference(reported, changed) * 4 > self.before:
                     continue
-                where = "" if frame is None else f" in {name}"
+                frame_words = "" if frame is None else f" in {name}"
                 shown = ", ".join("-" * (s < 0) + "xyz"[k] for k, s in zip(order, signs, strict=True))
-                says = f"{self.name} has other axes or signs{where}: its x, y, z are the true {shown}"
+                says = f"{self.name} has other axes or signs{frame_words}: its x, y, z are the true {shown}"
                 explained = changed if frame is None else product(frame, changed)
                 yield self.cause("axes", says, explained, f"look at the signs and the order of axes of {self.name}")
 
@@ -168,11 +170,11 @@ class ReportedVector:
             return
         factor = float(np.nansum(self.reported * self.true)) / square
         impulse = bool(step) and abs(factor - (step or 0.0)) < 1e-3 * (step or 0.0)
-        known = impulse or known_factor(factor) is not None
+        usual = impulse or known_factor(factor) is not None
         times = "times the step, as an impulse" if impulse else factor_text(factor)
         says = f"{self.name} is {self.what} {times}"
         remedy = f"look at the unit of {self.name}"
-        if known:
+        if usual:
             yield self.cause("scaled", says, factor * self.true, remedy)
         else:  # some factor takes any number to any other
             sizes = np.abs(self.true[np.abs(self.true) > _EXACT * self.size])
@@ -185,13 +187,13 @@ class ReportedVector:
         sizes = np.linalg.norm(np.nan_to_num(self.true), axis=-1, keepdims=True)
         longest = float(np.max(np.linalg.norm(np.nan_to_num(self.reported), axis=-1)))
         shorter = self.true * np.minimum(1.0, longest / np.where(sizes > 0, sizes, 1.0))
-        each = np.abs(self.true)
-        for what, at, largest, explained, true in (
-            (f"each component of {self.name}", "", limit, np.clip(self.true, -limit, limit), each),
+        magnitudes = np.abs(self.true)
+        for what, where_limited, largest, explained, true in (
+            (f"each component of {self.name}", "", limit, np.clip(self.true, -limit, limit), magnitudes),
             (self.name, "a length of ", longest, shorter, sizes),
         ):
             remedy = f"find what limits {self.name} to {largest:.6g} {self.unit}"
-            says = f"{what} is clamped at {at}{largest:.6g} {self.unit}"
+            says = f"{what} is clamped at {where_limited}{largest:.6g} {self.unit}"
             above = true[true > largest] - largest
             most = float(np.max(above, initial=0.0))
             change = most / (largest + most) if most else np.inf
@@ -204,13 +206,13 @@ class ReportedVector:
         # a sample on the other side of a jump differs alone, which any curve through the jump explains by a delay
         if shift is None or np.sort(off)[-2] <= 2 * shift[2]:
             return
-        delay, before, after = shift
+        delay, difference, remainder = shift
         # a method of first order, x + h v, is late by half a step without any mistake
-        own = self.unit == "m" and bool(step) and abs(abs(delay) / (step or 1.0) - 0.5) < _HALF
+        half_step = self.unit == "m" and bool(step) and abs(abs(delay) / (step or 1.0) - 0.5) < _HALF
         says = f"{self.name} is {delay_text(delay, step)}"
         remedy = f"sample {self.name} at the time that was asked for"
-        change = 0.0 if own else in_steps(delay, step)
-        yield Cause(f"late.{self.name}", says, self.name, self.unit, before, after, remedy, 1, change=change)
+        change = 0.0 if half_step else in_steps(delay, step)
+        yield Cause(f"late.{self.name}", says, self.name, self.unit, difference, remainder, remedy, 1, change=change)
 
 
 def components_along(frame: FloatArray, vectors: FloatArray) -> FloatArray:

@@ -9,9 +9,17 @@ from typing import TYPE_CHECKING, Literal, TypeVar
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
+from proofroll.core.bounces import Bounce, bounces_along
+from proofroll.core.columns import Columns
 from proofroll.core.element_abilities import SeenInRun
 from proofroll.core.events import Event, events_of
-from proofroll.elements.ball_on_surface.mechanics import always_pressed, natural_acceleration, normal_force
+from proofroll.elements.ball_on_surface.mechanics import (
+    always_pressed,
+    bouncing_bodies,
+    course_of,
+    natural_acceleration,
+    normal_force,
+)
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.sampling import BallSample
 
@@ -75,6 +83,11 @@ class Watch:
             begun = [Event("slip", 0.0, 0.0, 0.0)] if slides else []
             events = [*begun, *between_samples(at, [bool(value) for value in sticking]), *events]
         return SeenInRun(kept, sorted(events, key=lambda event: event.time), ended)
+
+    def bounces(self, columns: Columns) -> Sequence[Bounce]:
+        """See :class:`proofroll.core.element_abilities.TellsBounces`."""
+        motion = (columns[name].values for name in ("time", "p_WB", "v_WB", "w_WB"))
+        return bounces_along(course_of(self._body, *motion), events_of(columns), bouncing_bodies(self._body))
 
     def _press(self, sample: BallSample) -> float:
         """Normal force N [N]; NaN where the engine gives no force."""

@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from proofroll.core.arrays import FloatArray, cross
+from proofroll.core.bounces import Course
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.surfaces import Declared
 
@@ -46,6 +47,17 @@ def energy(body: RollingBall, p_WB: FloatArray, v_WB: FloatArray, w_WB: FloatArr
     m, J = body.ball.mass, body.ball.inertia
     kinetic = 0.5 * m * np.sum(v_WB**2, axis=-1) + 0.5 * J * np.sum(w_WB**2, axis=-1)
     return np.asarray(kinetic - m * p_WB @ body.gravity)
+
+
+def course_of(body: RollingBall, times: FloatArray, p_WB: FloatArray, v_WB: FloatArray, w_WB: FloatArray) -> Course:
+    """Energy along a motion, and height of the centre against gravity."""
+    up = -body.gravity / (float(np.linalg.norm(body.gravity)) or 1.0)
+    return Course(times, energy(body, p_WB, v_WB, w_WB), (p_WB @ up)[:, None], (v_WB @ up)[:, None])
+
+
+def bouncing_bodies(body: RollingBall) -> dict[str, int]:
+    """Name of an event -> index of the body that bounces; empty without gravity, which says what height is."""
+    return {"": 0} if np.any(body.gravity) else {}
 
 
 def always_pressed(body: RollingBall) -> bool:

@@ -4,6 +4,6 @@ from proofroll.elements.mechanism.checks import WORLD
 from proofroll.elements.mechanism.joint import Joint
 from proofroll.elements.mechanism.kinematics import BodyMotion, Tree
 from proofroll.elements.mechanism.model import Mechanism
-from proofroll.elements.mechanism.parts import Body, Loop, Point, Spring
+from proofroll.elements.mechanism.parts import Body, Force, Loop, Point, Spring
 
-__all__ = ["WORLD", "Body", "BodyMotion", "Joint", "Loop", "Mechanism", "Point", "Spring", "Tree"]
+__all__ = ["WORLD", "Body", "BodyMotion", "Force", "Joint", "Loop", "Mechanism", "Point", "Spring", "Tree"]

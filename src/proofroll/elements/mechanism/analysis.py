@@ -7,6 +7,7 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from proofroll.core.last_results import kept
 from proofroll.elements.mechanism.kinematics import BodyMotion, Rows, Tree
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.rotations import Array, cross
@@ -45,6 +46,7 @@ class Analysis:
     determinate: NDArray[np.bool_]
 
 
+@kept
 def analyse(mechanism: Mechanism) -> Analysis:
     """Rank, redundancy, mobility and determinate reactions, at the start and at a general pose near it."""
     tree = Tree(mechanism)
@@ -55,9 +57,9 @@ def analyse(mechanism: Mechanism) -> Analysis:
     at_start = rank_of(values)
     still = np.zeros(mechanism.nv)
 
-    def of_loops(at: Array) -> tuple[Array, Array]:
-        found = tree.loop_rows(tree.at(at, still))
-        return found.residual, found.C
+    def of_loops(q: Array) -> tuple[Array, Array]:
+        rows = tree.loop_rows(tree.at(q, still))
+        return rows.residual, rows.C
 
     near = tree.at(general_place(q, of_loops, tree.moved), still)
     near_rows = tree.loop_rows(near)
@@ -125,8 +127,8 @@ class RowSign:
 
 def determinate(tree: Tree, motion: BodyMotion, rows: Rows, rank: int) -> NDArray[np.bool_]:
     """Mask of wrench components that no null vector of Cᵀ changes, joints before loops, (joints + loops, 6)."""
-    found: NDArray[np.bool_] = freedom(tree, motion, rows, rank) <= _ZERO
-    return found
+    mask: NDArray[np.bool_] = freedom(tree, motion, rows, rank) <= _ZERO
+    return mask
 
 
 def freedom(tree: Tree, motion: BodyMotion, rows: Rows, rank: int) -> Array:
@@ -164,8 +166,8 @@ def reactions(tree: Tree, motion: BodyMotion, rows: Rows, multipliers: Array, lo
         mine = rows.loop == number
         force, torque = multipliers[mine] @ rows.force[mine], multipliers[mine] @ rows.torque[mine]
         of_loops[number] = np.concatenate([force, torque])
-        at = tree.point(motion, loop.body_b, np.array(loop.position_b))[0]
-        about_origin = np.concatenate([force, torque + cross(at, force)])
+        place = tree.point(motion, loop.body_b, np.array(loop.position_b))[0]
+        about_origin = np.concatenate([force, torque + cross(place, force)])
         needed[mechanism.body_index[loop.body_b]] -= about_origin
         needed[mechanism.body_index[loop.body_a]] += about_origin
     of_joints = np.zeros((len(mechanism.joints), 6))

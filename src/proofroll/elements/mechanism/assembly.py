@@ -6,13 +6,14 @@ import numpy as np
 from scipy.linalg import null_space
 
 from proofroll.core.errors import InputError
-from proofroll.elements.mechanism.analysis import RANK, analyse, least_norm_solution
+from proofroll.elements.mechanism.analysis import RANK, least_norm_solution, rank_of, singular_values
 from proofroll.elements.mechanism.contacts.start import extent
-from proofroll.elements.mechanism.joint import FACTS
+from proofroll.elements.mechanism.joint import DISTANCE, FACTS
 from proofroll.elements.mechanism.joint_coordinates import JointCoordinates
-from proofroll.elements.mechanism.kinematics import Rows, Tree
+from proofroll.elements.mechanism.kinematics import BodyMotion, Rows, Tree
 from proofroll.elements.mechanism.light_joints import SINGULAR
 from proofroll.elements.mechanism.model import Mechanism
+from proofroll.elements.mechanism.parts import Loop
 from proofroll.elements.mechanism.rotations import Array
 
 CLOSED = 1e-12  # largest gap of a closed loop, by round-off: relative to the mechanism's size or speeds, or rad
@@ -78,6 +79,26 @@ def _check_inertia(mechanism: Mechanism, M: Array, C: Array) -> None:
         raise InputError("joints", names, advice)
 
 
+def _check_closed(tree: Tree, motion: BodyMotion, loop: Loop, angle: float, near: float) -> None:
+    """Raises InputError if a loop is open by more than ``near`` [m], or its axes by an ``angle`` [rad]."""
+    field, between, index = f"loops.{loop.name}", f"{loop.body_a} to {loop.body_b}", tree.mechanism.body_index
+    apart = tree.point(motion, loop.body_b, np.array(loop.position_b))[0]
+    apart = apart - tree.point(motion, loop.body_a, np.array(loop.position_a))[0]
+    if loop.kind == DISTANCE:
+        if abs(off := float(np.linalg.norm(apart)) - loop.length) > near:
+            raise InputError(field, between, f"its points are {off:.3g} m farther apart than its length; {ADVICE}")
+        return
+    A, B = motion.R_WB[index[loop.body_a]] @ loop.frame_a, motion.R_WB[index[loop.body_b]] @ loop.frame_b
+    locked = FACTS[loop.kind].translations
+    distance = float(np.linalg.norm(apart if len(locked) == 3 else A[:, list(locked)].T @ apart))
+    if distance > near:
+        raise InputError(field, between, f"does not close: its points are {distance:.3g} m apart; {ADVICE}")
+    turned = len(FACTS[loop.kind].rotations) == 3 and np.trace(A.T @ B) < 1
+    if angle > CLOSED or turned:
+        turn = "half a turn" if turned else f"{angle:.3g} rad"
+        raise InputError(field, between, f"does not close: its axes are {turn} apart; {ADVICE}")
+
+
 def check_start(mechanism: Mechanism) -> None:
     """Checks that loops close, velocities keep them closed, springs have a direction, and something can move.
 
@@ -98,25 +119,12 @@ def check_start(mechanism: Mechanism) -> None:
             advice = "its ends are at one place at the start, so that it has no direction; move one"
             raise InputError(f"springs.{spring.name}", f"{spring.body_a} to {spring.body_b}", advice)
     for number, loop in enumerate(mechanism.loops):
-        field, between = f"loops.{loop.name}", f"{loop.body_a} to {loop.body_b}"
         mine = rows.loop == number
-        a, b = mechanism.body_index[loop.body_a], mechanism.body_index[loop.body_b]
-        apart = tree.point(motion, loop.body_b, np.array(loop.position_b))[0]
-        apart = apart - tree.point(motion, loop.body_a, np.array(loop.position_a))[0]
-        A, B = motion.R_WB[a] @ loop.frame_a, motion.R_WB[b] @ loop.frame_b
-        locked = FACTS[loop.kind].translations
-        distance = float(np.linalg.norm(apart if len(locked) == 3 else A[:, list(locked)].T @ apart))
-        if distance > near:
-            raise InputError(field, between, f"does not close: its points are {distance:.3g} m apart; {ADVICE}")
-        angle = float(np.abs(rows.residual[mine]).max(initial=0.0))
-        turned = len(FACTS[loop.kind].rotations) == 3 and np.trace(A.T @ B) < 1
-        if angle > CLOSED or turned:
-            turn = "half a turn" if turned else f"{angle:.3g} rad"
-            raise InputError(field, between, f"does not close: its axes are {turn} apart; {ADVICE}")
+        _check_closed(tree, motion, loop, float(np.abs(rows.residual[mine]).max(initial=0.0)), near)
         rate, least_rate = _opening(rows.C[mine], v, away)
         if rate > least_rate:
             advice = f"v0 opens the loop at {rate:.3g} m/s (or rad/s); {ADVICE.replace('q0', 'v0', 1)}"
-            raise InputError(field, between, advice)
+            raise InputError(f"loops.{loop.name}", f"{loop.body_a} to {loop.body_b}", advice)
     for number, coupling in enumerate(mechanism.couplings, len(mechanism.loops)):
         field, between = f"couplings.{coupling.name}", coupling.between
         apart, sizes = rows.residual[rows.loop == number], np.abs([coupling.place, *q])
@@ -128,13 +136,23 @@ def check_start(mechanism: Mechanism) -> None:
             raise InputError(field, between, advice)
     equations = JointCoordinates(mechanism)
     _check_inertia(mechanism, equations.inertial(motion)[1], rows.C)
-    if analyse(mechanism).mobility == 0:
-        raise InputError("mechanism", f"{len(mechanism.joints)} joints", IMMOBILE)
+    _check_motions(mechanism, rows)
     with np.errstate(all="ignore"):  # the line below says it
         found = equations.solve(q, v, ("free",) * len(equations.switched)).acceleration
     if not np.isfinite(found).all():
         advice = "forces, gains or velocities are too large to be computed with"
         raise InputError("accelerations", "infinite", advice)
+
+
+def _check_motions(mechanism: Mechanism, rows: Rows) -> None:
+    """Raises InputError if a prescribed motion already follows from the loops and the motions before it."""
+    first = len(rows.C) - rows.moved
+    rank = rank_of(singular_values(rows.C[:first]))
+    for number, (joint, _, _) in enumerate(mechanism.prescribed, first + 1):
+        if rank_of(singular_values(rows.C[:number])) == rank:
+            advice = "loops, couplings and other motions already decide this joint; remove one motion"
+            raise InputError(f"joints.{joint.name}.motion", str(joint.motion), advice)
+        rank += 1
 
 
 def _opening(C: Array, v: Array, away: float) -> tuple[float, float]:

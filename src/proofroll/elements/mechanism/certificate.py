@@ -15,7 +15,8 @@ from proofroll.elements.mechanism.contacts.dynamics import ContactDynamics
 from proofroll.elements.mechanism.contacts.start import TOUCHING, touches
 from proofroll.elements.mechanism.dataset import along, reactions
 from proofroll.elements.mechanism.joint import WITH_AXIS, Joint
-from proofroll.elements.mechanism.named_forces import named_forces
+from proofroll.elements.mechanism.matrices import matrices_of
+from proofroll.elements.mechanism.named_forces import lengths, named_forces
 from proofroll.elements.mechanism.sampling import MechanismBuilt, MechanismSample
 
 if TYPE_CHECKING:
@@ -23,13 +24,15 @@ if TYPE_CHECKING:
 
 # Engines compose poses and inertias of chains of bodies by themselves; each product costs a few machine epsilons.
 COMPOSED = 1e-9
+# Least scale of efforts and forces of couplings, relative to the natural one.
+_FAINT = 1e-3
 # Least scale of differences of angular acceleration, relative to the natural one: a pose may have no acceleration.
 _LEAST = 1e-2
 _COMPOSED = "composed along the tree by the engine's own arithmetic"
 # Three evaluations sample the noise without bounding it, and the engine's own is as large.
 _MARGIN = 10.0
 _NOISY = "round-off of the scene's own accelerations, which many bodies in a row magnify"
-_FORCES = ("forces", "torques", "couplings", "forces of contact")
+_FORCES = ("forces", "torques", "couplings", "drives", "forces of contact")
 _FROM_ACCELERATIONS = ("acceleration", "angular acceleration", *_FORCES)
 # Quantities that a model may soften -> largest relative difference that is accepted for any reason, and why.
 CAPS: Mapping[str, Regularised] = {
@@ -37,6 +40,8 @@ CAPS: Mapping[str, Regularised] = {
     name: Regularised(0.5, "a loop that is held by a stiff spring pulls by what it is open")
     for name in _FROM_ACCELERATIONS
 }
+# Quantities with a tolerance of their own, and why.
+_ROUGH = {"inverse friction": (0.02, "no engine's cone is unbounded; a coefficient of 50 or more stands for it")}
 # Accepted shapes: -1 is any number, for bodies or joints may be missing; of one body the index may be left out.
 _SHAPES = {
     "mass": ((-1,), ()),
@@ -44,6 +49,7 @@ _SHAPES = {
     "inertia": ((-1, 3, 3), (3, 3)),
     "gravity": ((3,), (1, 3)),
     **dict.fromkeys(("contact_gap", "contact_friction", "contact_restitution"), ((-1,), ())),
+    **dict.fromkeys(("contact_static", "contact_tangential"), ((-1,), ())),
     **dict.fromkeys(("contact_normal", "contact_place"), ((-1, 3), (3,))),
     "contact_response": ((-1, 3, -1, 3),),
     **dict.fromkeys(("rows", "rank", "mobility", "mass_matrix_error"), ((), (1,))),
@@ -52,14 +58,15 @@ _SHAPES = {
 _Compare = Callable[[str, str, Any, Any, float], None]
 
 
-def _require_readable(built: MechanismBuilt) -> None:
+def _require_readable(built: MechanismBuilt, nv: int) -> None:
     """Raises Diverged, naming the field, if a field has another shape or type than the protocol requires."""
-    require_shapes(built, _SHAPES)
+    of_velocities = dict.fromkeys(("velocity_forces", "gravity_forces"), ((nv,),))
+    require_shapes(built, {**_SHAPES, "mass_matrix": ((nv, nv),), **of_velocities})
 
 
 def certify(element: MechanismElement, built: MechanismBuilt, sample: MechanismSample) -> list[Line]:
     """Lines that compare what was built, and the sample at time 0, with the mechanism; a missing value has one too."""
-    _require_readable(built)
+    _require_readable(built, element.mechanism.nv)
     mechanism, start, found = element.mechanism, element.start, element.first_motion
     lines: list[Line] = []
 
@@ -78,7 +85,7 @@ def certify(element: MechanismElement, built: MechanismBuilt, sample: MechanismS
         soft = built.regularised.get(quantity.replace(" ", "_"))
         if soft is None and quantity in _FORCES:  # as soft as what they accelerate
             soft = max(built.regularised.values(), key=lambda one: one.tolerance, default=None)
-        tolerance, because = tolerated(soft, CAPS.get(quantity), COMPOSED, _COMPOSED)
+        tolerance, because = tolerated(soft, CAPS.get(quantity), *_ROUGH.get(quantity, (COMPOSED, _COMPOSED)))
         own = scale if "acceleration" in quantity else found.scale
         noise = _MARGIN * element.noise / own if quantity in _FROM_ACCELERATIONS else 0.0
         tolerance, because = max((tolerance, because), (noise, _NOISY))
@@ -115,6 +122,17 @@ def certify(element: MechanismElement, built: MechanismBuilt, sample: MechanismS
     return lines
 
 
+def _compare_matrices(element: MechanismElement, built: MechanismBuilt, compare: _Compare) -> None:
+    """Compares the matrices of the equations of motion that the engine gives."""
+    true = matrices_of(element.mechanism)
+    sizes = [float(np.max(np.abs(part), initial=0.0)) for part in true]
+    natural = element.mechanism.mass * element.first_motion.scale * element.length
+    for name, part, size in zip(true._fields, true, sizes, strict=True):
+        if (given := getattr(built, name)) is not None:
+            scale = size if name == "mass_matrix" else max(*sizes[1:], _LEAST * natural)
+            compare(name.replace("_", " "), "1", part, given, scale or 1.0)
+
+
 def _first(element: MechanismElement, built: MechanismBuilt, name: str) -> FloatArray | None:
     """First acceleration that the engine gives; None if contacts are too soft for a first step to show the model."""
     soft = built.regularised.get(name)
@@ -130,11 +148,28 @@ def _compare_contacts(element: MechanismElement, built: MechanismBuilt, compare:
     found = touches(element.mechanism, element._solution.motion)
     compare("gaps", "m", [each.gap for each in found], built.contact_gap, element.length)
     compare("normals of contact", "1", [each.normal for each in found], built.contact_normal, 1.0)
-    compare("places of contact", "m", [each.place for each in found], built.contact_place, element.length)
-    friction = [contact.friction for contact in contacts]
-    compare("friction of contacts", "1", friction, built.contact_friction, max(friction) or 1.0)
+    # of a disc that lies parallel to its plane every point of the edge is as near
+    places = [np.full(3, np.nan) if each.flat else each.place for each in found]
+    compare("places of contact", "m", places, built.contact_place, element.length)
+    friction = np.array([contact.friction for contact in contacts])
+    unbounded, given = np.isinf(friction), built.contact_friction
+    if given is not None and np.size(given) == len(friction):
+        given = np.reshape(given, len(friction))
+        with np.errstate(divide="ignore"):
+            large = np.where(unbounded, 1 / np.asarray(given, dtype=np.float64), 0.0)
+        if unbounded.any():
+            compare("inverse friction", "1", np.where(unbounded, 0.0, np.nan), large, 1.0)
+        given = np.where(unbounded, np.nan, given)
+    friction[unbounded] = np.nan
+    compare("friction of contacts", "1", friction, given, float(np.nanmax(friction, initial=0.0)) or 1.0)
     restitution = [contact.restitution for contact in contacts]
     compare("restitution of contacts", "1", restitution, built.contact_restitution, max(restitution) or 1.0)
+    static = np.array([contact.static_friction or np.nan for contact in contacts])
+    if not np.isnan(static).all():
+        compare("static friction of contacts", "1", static, built.contact_static, float(np.nanmax(static)))
+    sideways = np.array([contact.tangential_restitution for contact in contacts])
+    if sideways.any():
+        compare("tangential restitution of contacts", "1", sideways, built.contact_tangential, 1.0)
     _compare_response(element, built, compare)
 
 
@@ -143,7 +178,7 @@ def _compare_response(element: MechanismElement, built: MechanismBuilt, compare:
     mechanism = element.mechanism
     try:
         dynamics = ContactDynamics(mechanism)
-    except Refused:  # our equations refuse a joint with stops and dry friction; an engine may have one
+    except Refused:  # our equations refuse dry friction along several coordinates; an engine may have it
         return
     state = dynamics.at(*mechanism.start())
     shut = [k for k, _ in enumerate(mechanism.contacts) if state.touching[k].gap <= TOUCHING * element.length]
@@ -177,7 +212,8 @@ def _compare_press(
 def _compare_reactions(
     element: MechanismElement, built: MechanismBuilt, sample: MechanismSample, compare: _Compare
 ) -> None:
-    """Compares named forces, and determinate forces and moments of joints if the model gives them."""
+    """Compares matrices, named forces, and determinate forces and moments of joints if the model gives them."""
+    _compare_matrices(element, built, compare)
     _compare_press(element, built, sample, compare)
     _compare_named(element, sample, compare)
     if sample.joint_force is None or sample.joint_torque is None:
@@ -192,15 +228,17 @@ def _compare_reactions(
 
 
 def _compare_named(element: MechanismElement, sample: MechanismSample, compare: _Compare) -> None:
-    """Compares efforts of actuators and forces of couplings."""
+    """Compares efforts of actuators, forces of couplings, and forces that impose motions."""
     names, natural = named_forces(element.mechanism), element.first_motion.scale * element.length
     natural *= element.mechanism.mass
-    for key, quantity in (("effort", "efforts"), ("coupling", "couplings")):
+    counts, numbers = lengths(element.mechanism), np.array([item.number for item in names], dtype=int)
+    for key, quantity in (("effort", "efforts"), ("coupling", "couplings"), ("drive", "drives")):
         mine = np.array([item.field == key for item in names], dtype=bool)
         if mine.any():
             expected = element.first_named[mine]
-            given = None if getattr(sample, key) is None else along(sample, key, len(expected))
-            compare(quantity, "N or N m", expected, given, float(np.max(np.abs(expected))) or natural)
+            given = None if getattr(sample, key) is None else along(sample, key, counts[key])[numbers[mine]]
+            # a servo that starts at its target has an effort of round-off
+            compare(quantity, "N or N m", expected, given, max(float(np.max(np.abs(expected))), _FAINT * natural))
 
 
 def _turning(element: MechanismElement, soft: bool) -> float:

@@ -42,13 +42,13 @@ def assign(item: object, **values: Any) -> None:
         object.__setattr__(item, key, value)
 
 
-def read(item: object, where: str, reader: Callable[..., Any], *keys: str, **options: Any) -> None:
+def read(item: object, place: str, reader: Callable[..., Any], *keys: str, **options: Any) -> None:
     """Replaces fields of a frozen dataclass, during its construction, by what a check, e.g. :func:`vector`, returns.
 
-    ``where``: location of the item in the user's file; ``options``: of the check.
+    ``place``: location of the item in the user's file; ``options``: of the check.
     """
     for key in keys:
-        assign(item, **{key: reader(f"{where}.{key}", getattr(item, key), **options)})
+        assign(item, **{key: reader(f"{place}.{key}", getattr(item, key), **options)})
 
 
 def name(value: Any, kind: str) -> str:
@@ -62,8 +62,14 @@ def name(value: Any, kind: str) -> str:
     return value
 
 
-def number(field: str, value: Any, *, at_least: float | None = None) -> float:
-    """The value as a finite float. Raises InputError if it is not one, or lies below ``at_least``."""
+def number(field: str, value: Any, *, at_least: float | None = None, bounded: bool = True) -> float:
+    """The value as a finite float, or infinity unless ``bounded``.
+
+    Raises:
+        InputError: the value is not one, or lies below ``at_least``.
+    """
+    if not bounded and isinstance(value, float) and value == np.inf:
+        return value
     try:
         return numbers(field, [value], 1, at_least=at_least)[0]
     except InputError as error:
@@ -77,18 +83,18 @@ def numbers(field: str, value: Any, count: int, *, at_least: float | None = None
         InputError: the value is not ``count`` finite numbers, or one lies below ``at_least``.
     """
     try:
-        found = np.atleast_1d(np.asarray(value))
-        if found.dtype.kind not in "iuf":  # a bool or a text is no number, though numpy would make it one
+        values = np.atleast_1d(np.asarray(value))
+        if values.dtype.kind not in "iuf":  # a bool or a text is no number, though numpy would make it one
             raise ValueError
     except ValueError:
         raise InputError(field, value, f"give {_count(count)}") from None
-    if found.shape != (count,):
+    if values.shape != (count,):
         raise InputError(field, value, f"give {_count(count)}")
-    if not np.isfinite(found).all():
+    if not np.isfinite(values).all():
         raise InputError(field, value, "must be finite")
-    if at_least is not None and (found < at_least).any():
+    if at_least is not None and (values < at_least).any():
         raise InputError(field, value, f"must be at least {at_least:g}")
-    return tuple(float(x) for x in found)
+    return tuple(float(x) for x in values)
 
 
 def vector(field: str, value: Any) -> Vector:
@@ -99,13 +105,13 @@ def vector(field: str, value: Any) -> Vector:
 
 def axis(field: str, value: Any) -> Vector:
     """The value as a unit vector. Raises InputError if it is not three finite numbers, or zero."""
-    found = np.array(vector(field, value))
-    largest = np.abs(found).max()
+    vector_read = np.array(vector(field, value))
+    largest = np.abs(vector_read).max()
     if largest == 0.0:
         raise InputError(field, value, "an axis of length zero has no direction; give a nonzero vector")
     if not _SQUARED < largest < 1 / _SQUARED:
-        found = found / largest
-    x, y, z = (float(component) for component in found / np.linalg.norm(found))
+        vector_read = vector_read / largest
+    x, y, z = (float(component) for component in vector_read / np.linalg.norm(vector_read))
     return x, y, z
 
 
@@ -116,19 +122,19 @@ def inertia(field: str, value: Any) -> Matrix:
         InputError: the tensor is not symmetric, has a negative principal moment, or breaks the triangle inequality.
     """
     try:
-        found = np.asarray(value, dtype=float)
+        matrix = np.asarray(value, dtype=float)
     except (TypeError, ValueError, OverflowError):
-        found = np.zeros(0)
-    if found.shape == (3,):
-        found = np.diag(found)
-    if found.shape != (3, 3) or not np.isfinite(found).all():
+        matrix = np.zeros(0)
+    if matrix.shape == (3,):
+        matrix = np.diag(matrix)
+    if matrix.shape != (3, 3) or not np.isfinite(matrix).all():
         raise InputError(field, value, "give three principal moments or a 3x3 matrix of finite numbers, kg m^2")
-    size = np.abs(found).max()
+    size = np.abs(matrix).max()
     # 1e-9: digits of a file; a flat body fulfils the triangle inequality with equality, so round-off must pass.
-    if np.abs(found - found.T).max() > 1e-9 * size:
+    if np.abs(matrix - matrix.T).max() > 1e-9 * size:
         raise InputError(field, value, "must be symmetric")
-    found = found / 2 + found.T / 2  # whose sum could overflow
-    low, middle, high = np.linalg.eigvalsh(found)
+    matrix = matrix / 2 + matrix.T / 2  # whose sum could overflow
+    low, middle, high = np.linalg.eigvalsh(matrix)
     if low < -1e-9 * size:
         raise InputError(field, value, f"has a negative principal moment, {low:g} kg m^2")
     if high - low - middle > 1e-9 * size:
@@ -137,7 +143,7 @@ def inertia(field: str, value: Any) -> Matrix:
             value,
             f"breaks the triangle inequality: {high:g} > {low:g} + {middle:g}; no rigid body has these moments",
         )
-    rows = [vector(field, row) for row in found]
+    rows = [vector(field, row) for row in matrix]
     return rows[0], rows[1], rows[2]
 
 

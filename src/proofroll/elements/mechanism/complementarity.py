@@ -105,8 +105,8 @@ def margin(free: Array, G: Array, low: Array, high: Array, f: Array, a: Array) -
 def load_of(joints: Sequence[SwitchedJoint], mode: Mode, nv: int) -> Array:
     """Kinetic friction along the velocities of the tree [N, N m], (nv); modes of efforts come last and are ignored."""
     load = np.zeros(nv)
-    for joint, own in zip(joints, mode, strict=False):
-        load[joint.velocity] += joint.push(own)
+    for joint, joint_mode in zip(joints, mode, strict=False):
+        load[joint.velocity] += joint.push(joint_mode)
     return load
 
 
@@ -128,14 +128,16 @@ def decided_mode(joints: Sequence[SwitchedJoint], q: Array, v: Array, responses:
     still = held_joints(tuple(mode))
     if not still:
         return tuple(mode), np.inf
-    at = [joints[number].velocity for number in still]
-    free, response = responses(tuple("free" if number in still else own for number, own in enumerate(mode)), at)
+    velocities = [joints[number].velocity for number in still]
+    free, response = responses(
+        tuple("free" if number in still else joint_mode for number, joint_mode in enumerate(mode)), velocities
+    )
     low, high = np.array([joints[number].bounds(mode[number]) for number in still]).T
-    state, force, acceleration = complementary(free[at], response[at], low, high)
+    state, force, acceleration = complementary(free[velocities], response[velocities], low, high)
     for number, side in zip(still, state, strict=True):
         if side:
             mode[number] = joints[number].moving(-side)
-    return tuple(mode), margin(free[at], response[at], low, high, force, acceleration)
+    return tuple(mode), margin(free[velocities], response[velocities], low, high, force, acceleration)
 
 
 def after_impact(
@@ -153,12 +155,12 @@ def after_impact(
     """
     resting = [k for k, j in enumerate(joints) if v[j.velocity] == 0 and j.stop_at(q[j.coordinate])]
     at_stop = sorted({hit, *resting})
-    at = [joints[number].velocity for number in at_stop]
-    _, response = responses(tuple("free" for _ in joints), at)
-    returned = np.array([1 + joints[number].restitution for number in at_stop]) * v[at]
+    velocities = [joints[number].velocity for number in at_stop]
+    _, response = responses(tuple("free" for _ in joints), velocities)
+    returned = np.array([1 + joints[number].restitution for number in at_stop]) * v[velocities]
     below = np.array([joints[k].stop_at(q[joints[k].coordinate]) == "low" for k in at_stop])
     low, high = np.where(below, 0.0, -np.inf), np.where(below, np.inf, 0.0)
-    _, impulse, left = complementary(returned, response[at], low, high)
+    _, impulse, left = complementary(returned, response[velocities], low, high)
     if np.count_nonzero(impulse) > 1 and any(joints[number].restitution for number in at_stop):
         raise NotUnique("an impact presses several stops at once: with restitution its outcome depends on their order")
     v = v + response @ impulse
@@ -166,7 +168,7 @@ def after_impact(
         joint = joints[number]
         if not rest and not joint.restitution:
             v[joint.velocity] = 0.0
-    return v, margin(returned, response[at], low, high, impulse, left)
+    return v, margin(returned, response[velocities], low, high, impulse, left)
 
 
 def refuse_switching(mechanism: Mechanism) -> None:

@@ -23,6 +23,7 @@ from proofroll.elements.mechanism.contacts.observables import (
     residuals,
 )
 from proofroll.elements.mechanism.joint import TURNING
+from proofroll.elements.mechanism.link_forces import put_links
 from proofroll.elements.mechanism.named_forces import lengths, named_forces, pick_named
 from proofroll.elements.mechanism.placed import TURN, Placed
 from proofroll.elements.mechanism.sampling import MechanismSample
@@ -74,11 +75,11 @@ def along(sample: MechanismSample, name: str, count: int) -> FloatArray:
     Raises:
         Diverged: the field has another shape, or is not of numbers.
     """
-    given = getattr(sample, name)
-    if given is None:
+    value = getattr(sample, name)
+    if value is None:
         return np.full(count, np.nan)
     try:
-        return np.asarray(given, dtype=np.float64).reshape(count)
+        return np.asarray(value, dtype=np.float64).reshape(count)
     except (TypeError, ValueError):
         raise Diverged(f"the engine gave {name}, which is no array of {count} numbers") from None
 
@@ -89,11 +90,11 @@ def reactions(element: MechanismElement, sample: MechanismSample, name: str) -> 
     Raises:
         Diverged: the field is not of numbers, or has neither this shape nor its flat form, (3 (joints + loops),).
     """
-    shape, given = (len(element.mechanism.connections), 3), getattr(sample, name)
-    if given is None:
+    shape, value = (len(element.mechanism.connections), 3), getattr(sample, name)
+    if value is None:
         return np.full(shape, np.nan)
     try:
-        values = np.asarray(given, dtype=np.float64)
+        values = np.asarray(value, dtype=np.float64)
     except (TypeError, ValueError):
         raise Diverged(f"the engine gave {name}, which is no array of numbers") from None
     if values.shape not in {shape, (3 * shape[0],)}:
@@ -108,30 +109,33 @@ def columns(
     pressed: FloatArray,
     named: FloatArray,
     sums: FloatArray | None = None,
+    unsaid: str = UNSAID,
 ) -> Columns:
     """Variables of a run, from the motion of the bodies and the forces and moments on them.
 
     ``wrench``: of joints and loops, shape (time, 2, joints + loops, 3); ``pressed``: of contacts, (time, contacts, 3);
     ``sums``: of the contacts of each pair with several, (time, such pairs, 3), by default from ``pressed``;
+    ``unsaid``: reason of what is NaN at all times;
     ``named``: see :func:`~proofroll.elements.mechanism.named_forces.named_forces`, (time, forces).
     Variables: ``p_WB`` [m], ``v_WB`` [m/s], ``w_WB`` [rad/s] over (time, body, xyz), ``q_WB`` over (time, body, wxyz);
     ``positions`` [m] of the tracked points; ``q.<joint>``, ``v.<joint>`` of joints with one coordinate;
     ``<point>.x|y|z`` [m]; ``force.<joint>.x|y|z`` [N] and ``torque.<joint>.x|y|z`` [N m] on the child, at the joint, in
     world axes, NaN with a reason in the attribute ``absent``; ``forces``, ``torques``: the
     determinate components of all; ``effort.<actuator>``, ``coupling.<name>``, ``friction.<joint>``, ``stop.<joint>``
-    [N, N m] along coordinates; ``force.<pair>.x|y|z`` [N] on the body of its first geometry, the sum where a pair
-    touches at several places, ``gap.<pair>`` [m],
-    ``slip.<pair>`` [m/s], and residuals of Coulomb's law, see
+    [N, N m] along coordinates; ``force.<spring>`` [N], ``force.<bushing>.x|y|z``, ``torque.<bushing>.x|y|z`` on its
+    body_b, ``work.effort.<actuator>``, ``work.drive.<joint>`` [J]; ``force.<pair>.x|y|z`` [N] on the body of its first
+    geometry, the sum where a pair touches at several places, ``gap.<pair>`` [m], ``slip.<pair>`` [m/s], and residuals
+    of Coulomb's law, see
     :data:`~proofroll.elements.mechanism.contacts.observables.RESIDUALS`; ``energy`` [J], ``drift`` [m], and
     ``energy_error`` [J], or ``energy_change`` [J] of what is driven or damped.
     """
     mechanism, determinate = element.mechanism, element.analysis.determinate
     placed = replace(placed, q_WB=_continuous(placed.q_WB, element.start.q_WB[0]))
-    found: dict[str, Variable] = {}
+    variables: dict[str, Variable] = {}
 
     def put(name: str, values: FloatArray, unit: str, meaning: str, *dims: str, **more: Any) -> None:
         attributes = {"units": unit, "long_name": meaning} | {key: value for key, value in more.items() if value}
-        found[name] = Variable(("time", *dims), values, attributes)
+        variables[name] = Variable(("time", *dims), values, attributes)
 
     put("p_WB", placed.p_WB, "m", "origin of each body's frame in the world", "body", "xyz")
     put("v_WB", placed.v_WB, "m/s", "velocity of that origin in the world", "body", "xyz")
@@ -148,22 +152,23 @@ def columns(
         for axis, letter in enumerate("xyz"):
             put(f"{point.name}.{letter}", placed.points[:, index, axis], "m", f"{letter} of the point {point.name}")
     for part, (kind, unit) in enumerate((("force", "N"), ("torque", "N m"))):
-        values, known = wrench[:, part], determinate[:, 3 * part : 3 * part + 3]
-        masked = np.where(known, values, np.nan)
+        values, mask = wrench[:, part], determinate[:, 3 * part : 3 * part + 3]
+        masked = np.where(mask, values, np.nan)
         for index, connection in enumerate(mechanism.connections):
             for axis, letter in enumerate("xyz"):
                 meaning = f"{kind} on the child of {connection.name}"
                 component = masked[:, index, axis]
-                absent = "" if known[index, axis] else UNDETERMINED
-                absent = absent or (UNSAID if np.all(np.isnan(component)) else "")
+                absent = "" if mask[index, axis] else UNDETERMINED
+                absent = absent or (unsaid if np.all(np.isnan(component)) else "")
                 put(f"{kind}.{connection.name}.{letter}", component, unit, meaning, absent=absent)
-        if np.any(known):
+        if np.any(mask):
             meaning = f"determinate components of the {kind}s on children"
-            put(f"{kind}s", values[:, known], unit, meaning, f"{kind}_component")
+            put(f"{kind}s", values[:, mask], unit, meaning, f"{kind}_component")
     if mechanism.contacts:
-        _put_contacts(element, placed, pressed, sums, put)
+        _put_contacts(element, placed, pressed, sums, unsaid, put)
     for values, item in zip(named.T, named_forces(mechanism), strict=True):
-        put(item.name, values, str(item.unit), item.meaning, absent=UNSAID if np.all(np.isnan(values)) else "")
+        put(item.name, values, str(item.unit), item.meaning, absent=unsaid if np.all(np.isnan(values)) else "")
+    put_links(placed, named, put, unsaid)
     energy = placed.energy()
     wound = [doubts[joint.name][UNCERTAIN] for joint in mechanism.joints if joint.stiffness and joint.name in doubts]
     unsure = {UNCERTAIN: wound[0]} if wound else {}
@@ -178,7 +183,7 @@ def columns(
             if name in kept:
                 put(name, value, unit, meaning, *(("xyz",) if value.ndim > 1 else ()))
     put("drift", placed.drift(), "m", "how far joints and loops are open")
-    return Columns(found | axes(placed.time) | {"body": Variable(("body",), np.array(element.bodies, dtype=str))})
+    return Columns(variables | axes(placed.time) | {"body": Variable(("body",), np.array(element.bodies, dtype=str))})
 
 
 def _put_contacts(
@@ -186,10 +191,11 @@ def _put_contacts(
     placed: Placed,
     pressed: FloatArray,
     sums: FloatArray | None,
+    unsaid: str,
     put: Callable[..., None],
 ) -> None:
     """Puts gaps, slips, forces and residuals of Coulomb's law, of each contact, pair and of all together."""
-    found = follow_contacts(placed)
+    followed = follow_contacts(placed)
     shared = shared_pairs(placed.mechanism.contacts)
     if sums is None:
         sums = np.stack([pressed[:, numbers].sum(axis=1) for numbers in shared.values()], axis=1) if shared else None
@@ -197,7 +203,7 @@ def _put_contacts(
         assert sums is not None  # by the loop
         for axis, letter in enumerate("xyz"):
             component = sums[:, index, axis]
-            absent = UNSAID if np.all(np.isnan(component)) else ""
+            absent = unsaid if np.all(np.isnan(component)) else ""
             meaning = f"sum of the forces of {name} on {placed.mechanism.contacts[numbers[0]].body_a}"
             put(f"force.{name}.{letter}", component, "N", meaning, absent=absent)
     if sums is not None and shared:
@@ -205,17 +211,19 @@ def _put_contacts(
     for index, contact in enumerate(placed.mechanism.contacts):
         for axis, letter in enumerate("xyz"):
             component = pressed[:, index, axis]
-            absent = UNSAID if np.all(np.isnan(component)) else ""
+            absent = unsaid if np.all(np.isnan(component)) else ""
             meaning = f"force of {contact.name} on {contact.body_a}"
             put(f"force.{contact.name}.{letter}", component, "N", meaning, absent=absent)
-        put(f"gap.{contact.name}", found.gap[:, index], "m", f"distance of what {contact.name} may touch")
-        put(f"slip.{contact.name}", found.slip[:, index], "m/s", f"speed of slip of {contact.name}")
-    put("gaps", found.gap, "m", "distances between what may touch", "contact")
-    put("slips", found.slip, "m/s", "speeds of slip of what may touch", "contact")
-    put("normal_forces", normal_forces(found, pressed), "N", "normal forces between what may touch", "contact")
+        put(f"gap.{contact.name}", followed.gap[:, index], "m", f"distance of what {contact.name} may touch")
+        put(f"slip.{contact.name}", followed.slip[:, index], "m/s", f"speed of slip of {contact.name}")
+    put("gaps", followed.gap, "m", "distances between what may touch", "contact")
+    put("slips", followed.slip, "m/s", "speeds of slip of what may touch", "contact")
+    put("normal_forces", normal_forces(followed, pressed), "N", "normal forces between what may touch", "contact")
     put("contact_forces", pressed, "N", "forces between what may touch", "contact", "xyz")
-    friction = np.array([contact.friction for contact in placed.mechanism.contacts])
-    left = residuals(found, pressed, friction, element.force, element.speed)
+    friction, static = (
+        np.array([getattr(contact, name) for contact in placed.mechanism.contacts]) for name in ("friction", "static")
+    )
+    left = residuals(followed, pressed, friction, element.force, element.speed, static)
     put("unpressed", left["unpressed"], "1", "share of samples so far without a normal force", "contact")
     for name, unit, meaning in RESIDUALS:
         put(name, left[name], unit, meaning, "contact")
@@ -223,19 +231,19 @@ def _put_contacts(
 
 def _doubts(placed: Placed, interval: float | None) -> dict[str, dict[str, Any]]:
     """Warnings of joints whose angles may be off by whole turns, by joint; see :func:`proofroll.core.turns.doubt`."""
-    found: dict[str, dict[str, Any]] = {}
+    warnings: dict[str, dict[str, Any]] = {}
     if placed.known_q is not None:
-        return found
+        return warnings
     for joint in placed.mechanism.joints:
         if joint.kind in TURNING:
             for angle, rate in zip(*(values.T for values in placed.along(joint)), strict=True):
                 if warning := doubt(placed.time, angle, rate, TURN, interval):
-                    found[joint.name] = warning
-    return found
+                    warnings[joint.name] = warning
+    return warnings
 
 
 def _continuous(q_WB: FloatArray, start: FloatArray) -> FloatArray:
     """Quaternions with signs chosen for continuity, the first nearest to the scene's start."""
-    before = np.concatenate([start[None], q_WB[:-1]])
-    signs = np.where(np.sum(before * q_WB, axis=-1, keepdims=True) < 0, -1.0, 1.0)
+    previous = np.concatenate([start[None], q_WB[:-1]])
+    signs = np.where(np.sum(previous * q_WB, axis=-1, keepdims=True) < 0, -1.0, 1.0)
     return np.asarray(q_WB * np.cumprod(signs, axis=0))

@@ -54,31 +54,31 @@ class Actuator:
     limit: float | None = field(default=None, metadata=_EFFORT)
 
     def __post_init__(self) -> None:
-        where = f"actuators.{checks.name(self.name, 'actuators')}"
-        require_known(f"{where}.kind", self.kind, _GAINS)
-        checks.assign(self, target=checked(f"{where}.target", self.target))
+        place = f"actuators.{checks.name(self.name, 'actuators')}"
+        require_known(f"{place}.kind", self.kind, _GAINS)
+        checks.assign(self, target=checked(f"{place}.target", self.target))
         for key in ("kp", "kd"):
-            value = checks.number(f"{where}.{key}", getattr(self, key), at_least=0)
+            value = checks.number(f"{place}.{key}", getattr(self, key), at_least=0)
             if value and key not in _GAINS[self.kind]:
                 advice = f"an actuator of kind {self.kind} has none; leave it out"
-                raise InputError(f"{where}.{key}", value, advice)
+                raise InputError(f"{place}.{key}", value, advice)
             checks.assign(self, **{key: value})
-        first = next(iter(_GAINS[self.kind]), None)
-        if first and not getattr(self, first):
+        gain = next(iter(_GAINS[self.kind]), None)
+        if gain and not getattr(self, gain):
             raise InputError(
-                f"{where}.{first}", 0.0, f"without it an actuator of kind {self.kind} does nothing; give it"
+                f"{place}.{gain}", 0.0, f"without it an actuator of kind {self.kind} does nothing; give it"
             )
-        gear = checks.number(f"{where}.gear", self.gear)
+        gear = checks.number(f"{place}.gear", self.gear)
         if not gear:
-            raise InputError(f"{where}.gear", gear, "a motor that never turns does nothing; give a number other than 0")
+            raise InputError(f"{place}.gear", gear, "a motor that never turns does nothing; give a number other than 0")
         if not math.isfinite(gear * gear * max(self.kp, self.kd)):
-            raise InputError(f"{where}.gear", gear, "its square times a gain is infinite; give smaller numbers")
+            raise InputError(f"{place}.gear", gear, "its square times a gain is infinite; give smaller numbers")
         checks.assign(self, gear=gear)
         if self.limit is not None:
-            limit = checks.number(f"{where}.limit", self.limit)
+            limit = checks.number(f"{place}.limit", self.limit)
             if limit <= 0:
                 advice = "an effort that is clamped to nothing does nothing; give a positive limit or leave it out"
-                raise InputError(f"{where}.limit", limit, advice)
+                raise InputError(f"{place}.limit", limit, advice)
             checks.assign(self, limit=limit)
 
     @property
@@ -91,8 +91,8 @@ class Actuator:
 
         ``functions``: those that a formula of t may call, for symbols.
         """
-        n, given = self.gear, () if functions is None else (functions,)
-        target = value_at(self.target, time, *given)
+        n, rest = self.gear, () if functions is None else (functions,)
+        target = value_at(self.target, time, *rest)
         if self.kind == "torque":
             return n * target
         effort = (n * self.kd) * (target - n * v) if self.kind == "velocity" else (n * self.kp) * (target - n * q)
@@ -102,16 +102,16 @@ class Actuator:
         """Effort at the joint in a mode of :data:`MODES` [N m, N]; None: clamped to the limit."""
         if mode in {"least", "greatest"}:
             return -self.bound if mode == "least" else self.bound
-        wanted = float(self.wanted(time, q, v))
-        return wanted if mode == "linear" else min(max(wanted, -self.bound), self.bound)
+        free = float(self.wanted(time, q, v))
+        return free if mode == "linear" else min(max(free, -self.bound), self.bound)
 
     def mode(self, time: float, q: float, v: float) -> str:
         """Mode, of :data:`MODES`, at a time [s], for coordinate and rate of the joint."""
         return self.mode_of(float(self.wanted(time, q, v)))
 
-    def mode_of(self, wanted: float) -> str:
+    def mode_of(self, effort: float) -> str:
         """Mode, of :data:`MODES`, for an effort before it is clamped [N m, N]."""
-        return "least" if wanted < -self.bound else "greatest" if wanted > self.bound else "linear"
+        return "least" if effort < -self.bound else "greatest" if effort > self.bound else "linear"
 
 
 @dataclass(frozen=True)
@@ -139,31 +139,31 @@ class Coupling:
     coefficients: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
-        where = f"couplings.{checks.name(self.name, 'couplings')}"
-        checks.read(self, where, checks.number, "ratio", "offset")
+        place = f"couplings.{checks.name(self.name, 'couplings')}"
+        checks.read(self, place, checks.number, "ratio", "offset")
         if self.joints or self.coefficients:
-            self._check_many(where)
+            self._check_many(place)
             return
         for key in ("joint_a", "joint_b"):
             if not getattr(self, key):
-                raise InputError(f"{where}.{key}", "nothing", "name it; or give joints and coefficients")
+                raise InputError(f"{place}.{key}", "nothing", "name it; or give joints and coefficients")
         if not self.ratio:
             raise InputError(
-                f"{where}.ratio", 0.0, "it would hold joint_b and leave joint_a free; fix the joint instead"
+                f"{place}.ratio", 0.0, "it would hold joint_b and leave joint_a free; fix the joint instead"
             )
         if self.joint_a == self.joint_b:
-            raise InputError(f"{where}.joint_b", self.joint_b, "a coupling connects two joints; these are the same")
+            raise InputError(f"{place}.joint_b", self.joint_b, "a coupling connects two joints; these are the same")
 
-    def _check_many(self, where: str) -> None:
-        names = tuple(checks.name(name, f"{where}.joints") for name in self.joints)
-        factors = checks.numbers(f"{where}.coefficients", self.coefficients, len(names))
+    def _check_many(self, place: str) -> None:
+        names = tuple(checks.name(name, f"{place}.joints") for name in self.joints)
+        factors = checks.numbers(f"{place}.coefficients", self.coefficients, len(names))
         checks.assign(self, joints=names, coefficients=factors)
         if self.joint_a or self.joint_b or self.ratio:
-            raise InputError(f"{where}.joints", list(names), "give these, or joint_a, joint_b and ratio; not both")
+            raise InputError(f"{place}.joints", list(names), "give these, or joint_a, joint_b and ratio; not both")
         if len(names) < 2 or len(set(names)) < len(names):
-            raise InputError(f"{where}.joints", list(names), "name two or more joints, each once")
+            raise InputError(f"{place}.joints", list(names), "name two or more joints, each once")
         if not all(factors):
-            raise InputError(f"{where}.coefficients", list(factors), "none may be zero; leave out that joint")
+            raise InputError(f"{place}.coefficients", list(factors), "none may be zero; leave out that joint")
 
     @property
     def terms(self) -> tuple[tuple[str, float], ...]:
@@ -210,9 +210,9 @@ def check_drives(joints: Sequence[Joint], actuators: Sequence[Actuator], couplin
     for item in actuators:
         if item.kind == "torque":
             continue
-        if other := servos.get(item.joint):
+        if rival := servos.get(item.joint):
             advice = (
-                f"{other} and {item.name} hold targets of the same joint and fight; make one of them, with kp and kd"
+                f"{rival} and {item.name} hold targets of the same joint and fight; make one of them, with kp and kd"
             )
             raise InputError(f"actuators.{item.name}.joint", item.joint, advice)
         servos[item.joint] = item.name

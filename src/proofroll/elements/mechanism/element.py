@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
-from proofroll.core.arrays import FloatArray, read_only
+from proofroll.core.arrays import FloatArray, longest, read_only
 from proofroll.core.columns import Columns
 from proofroll.core.element import FirstMotion, OptionalTerm, Sign, StepNumber
 from proofroll.core.element_abilities import RunWatch
@@ -23,18 +23,21 @@ from proofroll.core.turns import PART
 from proofroll.elements.mechanism.analysis import Analysis, analyse
 from proofroll.elements.mechanism.capabilities import MechanismCapability, required
 from proofroll.elements.mechanism.certificate import CAPS, certify
+from proofroll.elements.mechanism.commands import Commands, along, at_start, has_held, placed_start
 from proofroll.elements.mechanism.contacts.observables import LAWS, RESIDUALS, contact_observables, event_observables
 from proofroll.elements.mechanism.contacts.start import extent, followed_moves, natural_length
 from proofroll.elements.mechanism.dataset import from_samples
 from proofroll.elements.mechanism.failure_program import program
 from proofroll.elements.mechanism.joint import TURNING
 from proofroll.elements.mechanism.joint_coordinates import JointCoordinates, Solution
+from proofroll.elements.mechanism.link_forces import link_observables
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.named_forces import named_forces
 from proofroll.elements.mechanism.optional_terms import optional_terms
 from proofroll.elements.mechanism.placed import Placed
 from proofroll.elements.mechanism.plausibility import implausible
 from proofroll.elements.mechanism.sampling import MechanismSample
+from proofroll.elements.mechanism.steps import law_rates, servo_steps, step_numbers
 from proofroll.elements.mechanism.switches import first_change
 from proofroll.elements.mechanism.words import start_facts
 
@@ -44,7 +47,8 @@ if TYPE_CHECKING:
     from proofroll.core.certificate import Line
     from proofroll.core.scene import Scene
     from proofroll.elements.mechanism.contacts.acting import ContactMode
-    from proofroll.elements.mechanism.contacts.dynamics import ContactDynamics, ContactSolution
+    from proofroll.elements.mechanism.contacts.dynamics import ContactDynamics
+    from proofroll.elements.mechanism.contacts.states import ContactSolution
 
 # Least scale of an observable, relative to its natural size, as for balls: smaller changes count as stillness.
 _LEAST = 1e-2
@@ -97,15 +101,19 @@ class MechanismElement:
         redundant = {MechanismCapability.REDUNDANT} if self.analysis.redundant else set()
         return frozenset(required(self.mechanism) | redundant)
 
+    def commands(self) -> Commands | None:
+        """See :class:`proofroll.core.element_abilities.HoldsTargets`."""
+        return Commands(self.mechanism) if has_held(self.mechanism) else None
+
+    def along(self, run: xr.Dataset | None) -> MechanismElement | None:
+        """See :class:`proofroll.core.element_abilities.HoldsTargets`."""
+        targets = along(self.mechanism, run)
+        return None if targets is None else self if targets is self.mechanism else MechanismElement(targets)
+
     @cached_property
     def start(self) -> Placed:
         """Motion of the mechanism at time 0."""
-        motion = self._solution.motion
-        from scipy.spatial.transform import Rotation
-
-        quaternions = Rotation.from_matrix(motion.R_WB[:-1]).as_quat(scalar_first=True)
-        state = (motion.p_WB[:-1], motion.v_WB[:-1], motion.w_WB[:-1], quaternions)
-        return Placed(self.mechanism, np.zeros(1), *(part[None] for part in state))
+        return placed_start(self.mechanism)
 
     @property
     def start_facts(self) -> Sequence[str]:
@@ -119,11 +127,17 @@ class MechanismElement:
 
     @cached_property
     def _equations(self) -> JointCoordinates:
-        return JointCoordinates(self.mechanism)
+        return JointCoordinates(at_start(self.mechanism))
 
     @cached_property
-    def _law_rates(self) -> tuple[FloatArray, FloatArray]:
-        return self._equations.law_rates()
+    def law_rates(self) -> tuple[FloatArray, FloatArray]:
+        """See :func:`proofroll.elements.mechanism.steps.law_rates`."""
+        return read_only(law_rates(JointCoordinates(self.mechanism, self._equations.rank)))
+
+    def step_bound(self, taken: Iterable[float]) -> str | None:
+        """See :class:`proofroll.core.element_abilities.BoundsSteps`."""
+        bounds = servo_steps(JointCoordinates(self.mechanism, self._equations.rank))
+        return None if bounds is None else bounds.sentence(taken)
 
     @cached_property
     def _solution(self) -> Solution:
@@ -141,7 +155,7 @@ class MechanismElement:
 
         if self.mechanism.contacts:
             with contextlib.suppress(Refused):
-                dynamics = ContactDynamics(self.mechanism)
+                dynamics = ContactDynamics(self._equations.mechanism)
                 mode, margin = dynamics.begin()
                 return (dynamics, mode) if margin else None
         return None
@@ -161,8 +175,8 @@ class MechanismElement:
 
     @cached_property
     def _own_length(self) -> float:
-        found = self._solution
-        return extent(self.mechanism, found.motion) or natural_length(self.mechanism, found)
+        solution = self._solution
+        return extent(self.mechanism, solution.motion) or natural_length(self.mechanism, solution)
 
     @cached_property
     def natural_time(self) -> float:
@@ -170,13 +184,13 @@ class MechanismElement:
 
         Without these: of its mass on the stiffest spring between points, else the time of a turn, else 1 s.
         """
-        gravity, rates = float(np.linalg.norm(self.mechanism.gravity)), self._law_rates[1]
+        gravity, rates = float(np.linalg.norm(self.mechanism.gravity)), self.law_rates[1]
         slowest = float(rates.min(initial=np.inf))
         slowest = slowest if slowest > _HELD * float(rates.max(initial=0.0)) and np.isfinite(slowest) else 0.0
         if gravity:
             return 2 * np.pi / max(slowest, float(np.sqrt(gravity / self.length)))
-        stiffest = max((spring.stiffness for spring in self.mechanism.springs), default=0.0)
-        spin = float(np.max(np.linalg.norm(self.start.w_WB, axis=-1)))
+        stiffest = max((link.stiffest for link in self.mechanism.links), default=0.0)
+        spin = longest(self.start.w_WB)
         return 2 * np.pi / rate if (rate := slowest or float(np.sqrt(stiffest / self.mechanism.mass)) or spin) else 1.0
 
     @cached_property
@@ -184,16 +198,16 @@ class MechanismElement:
         """See :class:`proofroll.core.element_abilities.CountsTurns`; None without a revolute or universal joint."""
         if not any(joint.kind in TURNING for joint in self.mechanism.joints):
             return None
-        spin = float(np.max(np.linalg.norm(self.start.w_WB, axis=-1)))
+        spin = longest(self.start.w_WB)
         # A body that turns freely does so evenly, however fast; samples at the usual rate then show its turns.
         fast = max(EVERY, PART * 2 * np.pi / spin) if spin else np.inf
-        loaded = np.any(self.mechanism.gravity) or self.mechanism.springs
+        loaded = np.any(self.mechanism.gravity) or self.mechanism.links or self.mechanism.forces
         return float(min(fast, PART * self.natural_time if loaded or not spin else np.inf))
 
     @cached_property
     def speed(self) -> float:
         """Largest speed at the start or after a fall by its length; if none, length over natural time [m/s]."""
-        moving = max(float(np.max(np.abs(self.start.v_WB))), float(np.max(np.abs(self.start.w_WB))) * self.length)
+        moving = max(longest(self.start.v_WB), longest(self.start.w_WB) * self.length)
         fall = float(np.sqrt(self.length * np.linalg.norm(self.mechanism.gravity)))
         return max(moving, fall) or self.length / self.natural_time
 
@@ -219,8 +233,8 @@ class MechanismElement:
         a, force, turn = least["m"], least["N"], _LEAST * self.speed / self.length
         what = "tracked points" if self.mechanism.points else "centres of mass"
         moves = followed_moves(self.mechanism, self._solution.motion, self.length)
-        found = [Observable("positions", "m", f"the {what}", Role.MOTION, floor=a, headline=moves, decides=moves)]
-        found += [
+        table = [Observable("positions", "m", f"the {what}", Role.MOTION, floor=a, headline=moves, decides=moves)]
+        table += [
             Observable(f"{point.name}.{axis}", "m", f"{axis} of the point {point.name}", Role.MOTION, floor=a)
             for point in self.mechanism.points
             for axis in _AXES
@@ -229,52 +243,38 @@ class MechanismElement:
             if joint.nq == 1:
                 unit = "rad" if joint.kind == "revolute" else "m"
                 floor = _LEAST if joint.kind == "revolute" else a
-                found.append(
+                table.append(
                     Observable(f"q.{joint.name}", unit, f"coordinate of {joint.name}", Role.MOTION, floor=floor)
                 )
         more: dict[str, Any] = {"role": Role.MOTION, "asked_for": False, "watched": True}
         for key, unit, of in (("p_WB", "m", "places"), ("v_WB", "m/s", "velocities")):
-            found.append(Observable(key, unit, f"{of} of the origins of the bodies' frames", floor=least[unit], **more))
-        found.append(Observable("w_WB", "rad/s", "angular velocities of the bodies", floor=turn, **more))
+            table.append(Observable(key, unit, f"{of} of the origins of the bodies' frames", floor=least[unit], **more))
+        table.append(Observable("w_WB", "rad/s", "angular velocities of the bodies", floor=turn, **more))
         turns: dict[str, Any] = dict.fromkeys(("asked_for", "headline", "decides"), not moves)
-        found.append(Observable("attitudes", "1", "quaternions of the bodies", Role.MOTION, floor=1.0, **turns))
+        table.append(Observable("attitudes", "1", "quaternions of the bodies", Role.MOTION, floor=1.0, **turns))
         if np.any(self.analysis.determinate[:, :3]):
             meaning = "determinate components of the forces on children"
-            found.append(Observable("forces", "N", meaning, Role.REACTION, floor=force, headline=True, column=True))
+            table.append(Observable("forces", "N", meaning, Role.REACTION, floor=force, headline=True, column=True))
         if np.any(self.analysis.determinate[:, 3:]):
             meaning = "determinate components of the moments on children at their joints"
-            found.append(Observable("torques", "N m", meaning, Role.REACTION, floor=least["N m"]))
-        found += contact_observables(self.mechanism, self._sizes, _LEAST)
-        found += event_observables(self.mechanism)
+            table.append(Observable("torques", "N m", meaning, Role.REACTION, floor=least["N m"]))
+        table += contact_observables(self.mechanism, self._sizes, _LEAST)
+        table += event_observables(self.mechanism)
         for item in named_forces(self.mechanism):
             floor, column = least[str(item.unit)], item.field == "coupling"
-            found.append(Observable(item.name, str(item.unit), item.meaning, Role.REACTION, floor=floor, column=column))
+            table.append(Observable(item.name, str(item.unit), item.meaning, Role.REACTION, floor=floor, column=column))
+        table += link_observables(self.mechanism, least)
         if self.conservative:
             never: dict[str, Any] = {"hangs_on_events": False, "difference_of": "energy", "floor": least["J"]}
             meaning = "energy now minus energy at the start"
-            found.append(Observable("energy_error", "J", meaning, Role.RESIDUAL, "ΔE", column=True, **never))
+            table.append(Observable("energy_error", "J", meaning, Role.RESIDUAL, "ΔE", column=True, **never))
         never = {"hangs_on_events": False, "difference_of": "p_WB", "floor": a, "asked_for": False}
-        found.append(Observable("drift", "m", "how far joints and loops are open", Role.RESIDUAL, **never))
-        return tuple(found)
+        table.append(Observable("drift", "m", "how far joints and loops are open", Role.RESIDUAL, **never))
+        return tuple(table)
 
     def step_numbers(self, h: float, truth: xr.Dataset | None) -> Sequence[StepNumber]:
         """See the protocol."""
-        spin = float(np.max(np.linalg.norm(self.start.w_WB, axis=-1)))
-        fastest = None if truth is None else float(np.max(np.linalg.norm(truth["w_WB"].to_numpy(), axis=-1)))
-        fall = float(np.sqrt(np.linalg.norm(self.mechanism.gravity) / self.length))
-        damper, spring = (float(rates.max(initial=0.0)) for rates in self._law_rates)
-        laws = [
-            StepNumber("damper", "hc/m", "step in parts of the time constant of a joint's damper or servo", damper * h),
-            StepNumber("servo", "h√(k/m)", "angle [rad] of a joint on its spring or servo in a step", spring * h),
-        ]
-        return (
-            StepNumber("spin", "|ω0|h", "largest angle [rad] by which a body turns in the first step", spin * h),
-            StepNumber(
-                "rotation", "h|ω|", "largest angle [rad] by which a body turns in a step", fastest and fastest * h
-            ),
-            StepNumber("fall", "h√(g/L)", "step in parts of the time of a fall by the mechanism's size", fall * h),
-            *(number for number in laws if number.value),
-        )
+        return step_numbers(self, h, truth)
 
     @property
     def first_motion(self) -> FirstMotion:
@@ -282,7 +282,7 @@ class MechanismElement:
         motion = self._solution.motion
         rates = self._solution.acceleration if self._pressed is None else self._pressed.acceleration
         acceleration = (motion.J @ rates + motion.bias)[:-1]
-        scale = max(float(np.max(np.abs(acceleration[:, :3]))), self.speed**2 / self.length)
+        scale = max(longest(acceleration[:, :3]), self.speed**2 / self.length)
         lasts = first_change(self._equations.switched, *self.mechanism.start(), rates)
         if self._pressed is not None and self._touching is not None:
             lasts = min(lasts, self._pressed.lasts(self._touching[1]))
@@ -299,9 +299,9 @@ class MechanismElement:
     @property
     def first_press(self) -> FloatArray:
         """Forces of contacts on their first bodies at the start [N], (contacts, 3); NaN where not determinate."""
-        found, count = self._pressed, len(self.mechanism.contacts)
+        pressed, count = self._pressed, len(self.mechanism.contacts)
         unknown = np.full((count, 3), np.nan)
-        return unknown if found is None else np.where(found.determinate, found.force, np.nan)[:count]
+        return unknown if pressed is None else np.where(pressed.determinate, pressed.force, np.nan)[:count]
 
     @cached_property
     def first_named(self) -> FloatArray:
@@ -313,8 +313,8 @@ class MechanismElement:
         start = self.mechanism.start()
         if self._touching is not None:
             return self._touching[0].sample(*start, self._touching[1])[0]
-        found = self._equations.sample(*start)
-        return found | {"wrench": np.full_like(found["wrench"], np.nan)} if self.mechanism.contacts else found
+        sample = self._equations.sample(*start)
+        return sample | {"wrench": np.full_like(sample["wrench"], np.nan)} if self.mechanism.contacts else sample
 
     def variables(self, times: FloatArray, samples: Sequence[MechanismSample]) -> Columns:
         """See the protocol; the variables are those of :mod:`proofroll.elements.mechanism.dataset`."""
@@ -327,21 +327,21 @@ class MechanismElement:
 
     def observe(self, dataset: xr.Dataset) -> dict[str, FloatArray]:
         """See the protocol; reactions that an engine gives in part only are left out."""
-        found = {}
+        observed = {}
         if self.mechanism.has_events and "event_kind" in dataset:
-            found["event_times"] = np.array([event.time for event in events_of(dataset)])
-        known = dataset.variables  # indexing a dataset would make coordinates, too
-        for item in (one for one in self.observables if one.name in known):
-            values = known[item.name].values
+            observed["event_times"] = np.array([event.time for event in events_of(dataset)])
+        variables = dataset.variables  # indexing a dataset would make coordinates, too
+        for item in (item_observable for item_observable in self.observables if item_observable.name in variables):
+            values = variables[item.name].values
             values = values[1:] if item.role == Role.REACTION else values
             if not np.any(np.isnan(values)):
-                found[item.name] = values
-        return found
+                observed[item.name] = values
+        return observed
 
     def scales(self, truth: xr.Dataset) -> dict[str, float]:
         """See the protocol: ranges, largest reactions, and natural sizes of what should be zero."""
-        known = truth.variables
-        reach, speed = (float(np.max(np.ptp(known[name].values, axis=0))) for name in ("positions", "v_WB"))
+        variables = truth.variables
+        reach, speed = (float(np.max(np.ptp(variables[name].values, axis=0))) for name in ("positions", "v_WB"))
         by_motion = not self._own_length and reach and speed
         own = self.mechanism.natural_sizes(reach, speed) if by_motion else self._sizes
         natural = {"attitudes": 1.0, "energy_error": own["J"], "drift": own["m"]}
@@ -350,7 +350,7 @@ class MechanismElement:
         for item in self.observables:
             if item.role == Role.EVENT:
                 continue
-            values = known[item.name].values if item.name in known else np.zeros(1)
+            values = variables[item.name].values if item.name in variables else np.zeros(1)
             if item.role == Role.REACTION and item.name not in natural:
                 sizes[item.name] = float(np.nanmax(np.abs(values), initial=0.0))
             else:

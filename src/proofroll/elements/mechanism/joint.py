@@ -15,10 +15,11 @@ from proofroll.core.errors import InputError, require_known
 from proofroll.core.parameters import Unit
 from proofroll.elements.mechanism import checks, rotations
 from proofroll.elements.mechanism.checks import METRES, RADIANS, RATIO, WORLD, ZERO, Numbers, Vector, Z
+from proofroll.elements.mechanism.prescribed import checked_motion
 from proofroll.elements.mechanism.rotations import Array
-from proofroll.elements.mechanism.signal import Formula, Table, checked, varies
+from proofroll.elements.mechanism.signal import Formula, Signal, Table, checked, varies
 
-Kind = Literal["fixed", "revolute", "prismatic", "universal", "spherical", "planar", "free"]
+Kind = Literal["fixed", "revolute", "prismatic", "cylindrical", "universal", "spherical", "planar", "free"]
 
 
 class Facts(NamedTuple):
@@ -41,25 +42,34 @@ FACTS: dict[str, Facts] = {
     "fixed": Facts(0, 0, _ALL, _EQUAL),
     "revolute": Facts(1, 1, _ALL, _PARALLEL),
     "prismatic": Facts(1, 1, (0, 1), _EQUAL),
+    "cylindrical": Facts(2, 2, (0, 1), _PARALLEL),
     "universal": Facts(2, 2, _ALL, ((2, 0),)),
     "spherical": Facts(4, 3, _ALL, ()),
     "planar": Facts(3, 3, (2,), _PARALLEL),
     "free": Facts(7, 6, (), ()),
 }
 
+DISTANCE = "distance"  # kind of a loop alone: its one row holds the distance of its points
+LOOP_FACTS: dict[str, Facts] = {**FACTS, DISTANCE: Facts(0, 0, (), ())}
+
 
 def rows_of(kinds: Sequence[str]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """Indices of the constraint rows of connections: points, (2, points), and angles, (3, angles).
 
-    Each column is the number of a connection, then its axis of A (points), or its axes of A and of B (angles).
+    Each column is the number of a connection, then its axis of A (points), or its axes of A and of B (angles). A
+    distance is a row of points, whose direction is not the axis.
     """
-    points = [(number, k) for number, kind in enumerate(kinds) for k in FACTS[kind].translations]
-    angles = [(number, *pair) for number, kind in enumerate(kinds) for pair in FACTS[kind].rotations]
+    points = [
+        (number, k)
+        for number, kind in enumerate(kinds)
+        for k in ((0,) if kind == DISTANCE else FACTS[kind].translations)
+    ]
+    angles = [(number, *pair) for number, kind in enumerate(kinds) for pair in LOOP_FACTS[kind].rotations]
     return np.array(points, dtype=np.intp).reshape(-1, 2).T, np.array(angles, dtype=np.intp).reshape(-1, 3).T
 
 
 TURNING = ("revolute", "universal")  # coordinates are angles that may exceed a turn
-WITH_AXIS = ("revolute", "prismatic", "universal", "planar")
+WITH_AXIS = ("revolute", "prismatic", "cylindrical", "universal", "planar")
 WITH_QUATERNION = ("spherical", "free")
 _O, _UNIT = np.zeros(3), np.eye(3)
 # For each velocity: (its axis belongs to B, not to A; number of the axis; it is a rotation; the child carries the axis,
@@ -68,6 +78,7 @@ AXES: dict[str, tuple[tuple[bool, int, bool, bool], ...]] = {
     "fixed": (),
     "revolute": ((False, 2, True, False),),
     "prismatic": ((False, 2, False, False),),
+    "cylindrical": ((False, 2, False, False), (False, 2, True, False)),
     "universal": ((False, 2, True, False), (True, 0, True, True)),
     "spherical": tuple((True, axis, True, False) for axis in range(3)),
     "planar": ((False, 0, False, False), (False, 1, False, False), (False, 2, True, False)),
@@ -83,11 +94,19 @@ LAWS: dict[str, tuple[str, ...]] = {
     "armature": ("revolute", "prismatic"),
 }
 AT_STOP = 1e-9  # relative to the range between stops: a joint may start so far beyond a stop, by rounding in a file
+MOVED = ("revolute", "prismatic")  # kinds that may have a motion
+_START = 1e-9  # largest difference of q0 and v0 from a motion at time 0, relative to the largest of them
 _LENGTHS, _SPEEDS = ("m", "m", "m"), ("m/s", "m/s", "m/s")
 _ABOUT: dict[str, dict[str, Unit]] = {
-    "q": {"spherical": "1", "planar": ("m", "m", "rad"), "free": (*_LENGTHS, "1", "1", "1", "1")},
+    "q": {
+        "spherical": "1",
+        "cylindrical": ("m", "rad"),
+        "planar": ("m", "m", "rad"),
+        "free": (*_LENGTHS, "1", "1", "1", "1"),
+    },
     "v": {
         "spherical": "rad/s",
+        "cylindrical": ("m/s", "rad/s"),
         "planar": ("m/s", "m/s", "rad/s"),
         "free": (*_SPEEDS, "rad/s", "rad/s", "rad/s"),
     },
@@ -117,6 +136,7 @@ class Joint:
     velocities, which are their rates unless noted:
 
     * revolute: angle about z; prismatic: B's origin along z of A;
+    * cylindrical: B's origin along z of A, angle about z;
     * universal: angle about z of A (``axis``, fixed in the parent), then angle about x of B (``second_axis``, fixed in
       the child), which is perpendicular to it;
     * planar: B's origin along x and y of A, angle about z;
@@ -130,7 +150,7 @@ class Joint:
         parent, child: names of bodies; the parent may be ``world``.
         position: of the joint in the parent's frame [m].
         orientation: roll, pitch, yaw (fixed axes x, y, z) of the child's frame against the parent's at q = 0 [rad].
-        axis: in the child's frame; of revolute, prismatic, universal and planar joints (the plane's normal).
+        axis: in the child's frame; of all but fixed, spherical and free joints; of planar ones the plane's normal.
         second_axis: in the child's frame, perpendicular to ``axis``: second axis of a universal joint, x of a planar
             one; None: any perpendicular (x of the child, where it can be).
         child_position: of the joint in the child's frame [m].
@@ -139,6 +159,8 @@ class Joint:
         rest: coordinate at which the spring has no force.
         friction: largest dry friction.
         torque: drive; a number, a formula ``"= 0.3*sin(2*pi*t)"``, or a table ``{times = [..], values = [..]}``.
+        motion: coordinate that an ideal drive imposes, of a revolute or prismatic joint: a number, a formula
+            ``"= 0.02*sin(40*t)"`` or a table, which a spline of fifth order joins, at rest outside; q0 and v0 follow.
         armature: inertia of the drive along the coordinate, added to that of the bodies.
         limits: least and greatest coordinate of a revolute or prismatic joint, where stops are; None: no stops.
         restitution: speed after an impact on a stop over the speed before it, from 0 to 1.
@@ -162,6 +184,7 @@ class Joint:
     damping: float = field(default=0.0, metadata=_UNITS["damping"])
     friction: float = field(default=0.0, metadata=_UNITS["effort"])
     torque: float | Formula | Table = field(default=0.0, metadata={**_UNITS["effort"], "signal": True})
+    motion: float | Formula | Table | None = field(default=None, metadata={**_UNITS["coordinate"], "signal": True})
     armature: float = field(default=0.0, metadata=_UNITS["armature"])
     limits: tuple[float, float] | None = field(default=None, metadata=_UNITS["coordinate"])
     restitution: float = field(default=0.0, metadata=RATIO)
@@ -183,6 +206,7 @@ class Joint:
             if abs(np.dot(second, self.axis)) > 1e-9:
                 raise InputError(f"{where}.second_axis", self.second_axis, "must be perpendicular to axis")
             checks.assign(self, second_axis=second)
+        self._check_motion(where)
         self._check_start(where)
         for key, kinds in LAWS.items():
             least = None if key in {"rest", "torque"} else 0.0
@@ -203,6 +227,28 @@ class Joint:
                 advice = f"the joint starts beyond a stop; its limits are {low:g} and {high:g}"
                 raise InputError(f"{where}.q0", self.q0[0], advice)
         self._check_restitution(where)
+
+    def _check_motion(self, where: str) -> None:
+        """Takes q0 and v0 from a motion. Raises InputError if the motion and other data contradict each other."""
+        if self.motion is None:
+            return
+        if self.kind not in MOVED:
+            raise InputError(
+                f"{where}.motion", str(self.motion), f"a {self.kind} joint has none; it is for {', '.join(MOVED)}"
+            )
+        for key in ("friction", "limits", "dependent"):
+            if value := getattr(self, key):
+                advice = "the motion of the joint is prescribed, so that this changes nothing; remove it or the motion"
+                raise InputError(f"{where}.{key}", value, advice)
+        signal: Signal = checked(f"{where}.motion", self.motion)
+        place, rate, _ = checked_motion(f"{where}.motion", signal)
+        for key, value in (("q0", place), ("v0", rate)):
+            given = getattr(self, key)
+            if not _none(given):
+                (number,) = checks.numbers(f"{where}.{key}", given, 1)
+                if abs(number - value) > _START * max(abs(number), abs(value)):
+                    raise InputError(f"{where}.{key}", number, f"the motion begins with {value:g}; leave {key} out")
+        checks.assign(self, motion=signal, q0=(place,), v0=(rate,))
 
     @property
     def stop_digits(self) -> float:
@@ -233,7 +279,7 @@ class Joint:
     @property
     def constant_drive(self) -> float:
         """The drive [N, N m]; zero where it changes in time."""
-        return 0.0 if isinstance(self.torque, Formula | Table) else self.torque
+        return 0.0 if varies(self.torque) else float(self.torque)  # type: ignore[arg-type]  # what does not vary is a number
 
     @property
     def nq(self) -> int:
@@ -268,6 +314,8 @@ def child_in_parent(kind: str, q: Array) -> tuple[Array, Array]:
         rotation = rotations.about(2, q[0])
     elif kind == "prismatic":
         origin = np.array([0.0, 0.0, q[0]])
+    elif kind == "cylindrical":
+        origin, rotation = np.array([0.0, 0.0, q[0]]), rotations.about(2, q[1])
     elif kind == "universal":
         rotation = rotations.about(2, q[0]) @ rotations.about(0, q[1])
     elif kind == "spherical":

@@ -22,6 +22,7 @@ from proofroll.elements.mechanism.kinematics import BodyMotion, Rows, Tree
 from proofroll.elements.mechanism.light_joints import lacks_inertia
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.named_forces import joint_force_shares, lengths, pick_named
+from proofroll.elements.mechanism.point_loads import point_loads
 from proofroll.elements.mechanism.record import Record, record_of
 from proofroll.elements.mechanism.rotations import Array, skews, to_quaternion
 from proofroll.elements.mechanism.signal import value_at, varies
@@ -101,8 +102,8 @@ class JointCoordinates:
         b = self._torque - self._damping * v - loads.ravel() @ J.reshape(-1, len(v))
         for stiffness, rest, at_q, at_v in self._springs:
             b[at_v] -= stiffness * (q[at_q] - rest)
-        for i, arm, force in self._spring_forces(motion):
-            b += np.concatenate([force, cross(arm, force)]) @ motion.J[i]
+        for i, arm, force, moment in point_loads(self.mechanism, motion, time):
+            b += np.concatenate([force, moment + cross(arm, force)]) @ motion.J[i]
         if self.switched:
             b += load_of(self.switched, mode, len(v))
         if load is not None:
@@ -112,7 +113,7 @@ class JointCoordinates:
         if self.actuators:
             for (_, _, at), effort in zip(self.actuators, self.efforts(time, q, v, mode), strict=True):
                 b[at] += effort
-        rows = self.tree.loop_rows(motion)
+        rows = self.tree.loop_rows(motion, time)
         C, bias, rank = rows.C, rows.bias, self.rank
         if held := [self.switched[number].velocity for number in held_joints(mode)]:
             C, bias, rank = np.vstack([C, np.eye(len(v))[held]]), np.append(bias, np.zeros(len(held))), rank + len(held)
@@ -222,29 +223,19 @@ class JointCoordinates:
         noise = max(float(np.abs(each.acceleration - acceleration).max(initial=0.0)) for each in nudged)
         return max(1.0, float(np.sqrt(slope))), noise
 
-    def law_rates(self) -> tuple[Array, Array]:
-        """Rates of the joints' dampers [1/s] and springs [rad/s] at the start, servos included; ascending, (freedoms).
-
-        Loops and couplings are taken into account: a servo behind a gear moves the reflected inertia, too.
-        """
-        damping, stiffness = self._damping.copy(), np.zeros(self.mechanism.nv)
+    def joint_gains(self) -> tuple[Array, Array]:
+        """Damping and stiffness of the joints' own laws along the velocities, (nv) each."""
+        stiffness = np.zeros(self.mechanism.nv)
         for of_joint, _, _, at_v in self._springs:
             stiffness[at_v] += of_joint
+        return self._damping.copy(), stiffness
+
+    def servo_gains(self) -> tuple[Array, Array]:
+        """Gains kd and kp of actuators at their joints, along the velocities, (nv) each."""
+        gains = np.zeros((2, self.mechanism.nv))
         for actuator, _, at in self.actuators:
-            damping[at] += actuator.gear**2 * actuator.kd
-            stiffness[at] += actuator.gear**2 * actuator.kp
-        if not (damping.any() or stiffness.any()):
-            return damping[self.rank :], stiffness[self.rank :]
-        motion = self.tree.at(*self.mechanism.start())
-        M, rows = self.inertial(motion)[1], self.tree.loop_rows(motion).C
-        if self.rank:
-            free = np.linalg.svd(rows)[2][self.rank :].T
-            M, *laws = (free.T @ matrix @ free for matrix in (M, np.diag(damping), np.diag(stiffness)))
-        else:
-            laws = [np.diag(damping), np.diag(stiffness)]
-        into = np.linalg.inv(np.linalg.cholesky(M))
-        dampers, springs = (np.linalg.eigvalsh(into @ law @ into.T) for law in laws)
-        return dampers, np.sqrt(np.maximum(springs, 0.0))
+            gains[:, at] += actuator.gear**2 * np.array([actuator.kd, actuator.kp])
+        return gains[0], gains[1]
 
     def _least(self, tolerance: float) -> Array:
         """Error tolerances of coordinates and velocities, (nq + nv): the level of the noise of accelerations.
@@ -296,7 +287,8 @@ class JointCoordinates:
             found = self.solve(q, v, mode)
             if found.split is not None:
                 into, back = found.split
-                v = v - into @ (back @ (found.C @ v))
+                opening = np.append(found.rows.opening(v), found.C[len(found.rows.residual) :] @ v)
+                v = v - into @ (back @ opening)
                 residual = np.append(found.rows.residual, np.zeros(len(found.C) - len(found.rows.residual)))
                 q = self.tree.moved(q, -into @ (back @ residual))
         return np.concatenate([q, v])
@@ -320,9 +312,9 @@ class JointCoordinates:
         found = self.solve(q, v, mode, load, time)
         motion, rows, mechanism = found.motion, found.rows, self.mechanism
         n = len(mechanism.bodies)
-        needed = self._needed(found) - (0.0 if applied is None else applied)
+        needed = self._needed(found, time) - (0.0 if applied is None else applied)
         wrench = np.concatenate(reactions(self.tree, motion, rows, found.multipliers, needed))
-        largest = [np.abs(rows.residual).max(initial=0.0), np.abs(rows.C @ v).max(initial=0.0)]
+        largest = [np.abs(rows.residual).max(initial=0.0), np.abs(rows.opening(v)).max(initial=0.0)]
         return {
             "p_WB": motion.p_WB[:n],
             "v_WB": motion.v_WB[:n],
@@ -338,7 +330,10 @@ class JointCoordinates:
     def _named(self, found: Solution, q: Array, v: Array, mode: Mode, time: float) -> Array:
         fields = {name: np.zeros(count) for name, count in lengths(self.mechanism).items()}
         fields["effort"][:] = self.efforts(time, q, v, mode)
-        fields["coupling"][:] = found.multipliers[len(found.multipliers) - len(fields["coupling"]) :]
+        moved = len(found.multipliers) - found.rows.moved
+        fields["coupling"][:] = found.multipliers[moved - len(fields["coupling"]) : moved]
+        driven = [self.mechanism.joint_index[joint.name] for joint, _, _ in self.mechanism.prescribed]
+        fields["drive"][driven] = found.multipliers[moved:]
         holding = dict(zip(held_joints(mode), found.holding, strict=True))
         for number, (joint, own) in enumerate(zip(self.switched, mode, strict=False)):
             force = holding.get(number, joint.push(own))
@@ -366,7 +361,7 @@ class JointCoordinates:
         moment = inertia @ alpha + turn @ (inertia @ w[:, :, None])
         return np.concatenate([self._mass[:, None] * (at_com - self._gravity), moment[..., 0]], axis=1)
 
-    def _needed(self, found: Solution) -> Array:
+    def _needed(self, found: Solution, time: float) -> Array:
         """Wrenches about the world's origin that joints and loops bring to the bodies; the last is the world's."""
         motion, n = found.motion, len(self._mass)
         R = motion.R_WB[:n]
@@ -377,20 +372,6 @@ class JointCoordinates:
         needed = np.zeros((n + 1, 6))
         needed[:n] = wrenches
         needed[:n, 3:] += cross(motion.p_WB[:n] + arm, wrenches[:, :3])
-        for i, arm, force in self._spring_forces(motion):
-            needed[i] -= np.concatenate([force, cross(motion.p_WB[i] + arm, force)])
+        for i, arm, force, moment in point_loads(self.mechanism, motion, time):
+            needed[i] -= np.concatenate([force, moment + cross(motion.p_WB[i] + arm, force)])
         return needed
-
-    def _spring_forces(self, motion: BodyMotion) -> list[tuple[int, Array, Array]]:
-        """Force at each end of each spring: body, place from its frame's origin and force, world axes."""
-        found, index = [], self.mechanism.body_index
-        for spring in self.mechanism.springs:
-            a, b = index[spring.body_a], index[spring.body_b]
-            arm_a, arm_b = motion.R_WB[a] @ spring.position_a, motion.R_WB[b] @ spring.position_b
-            d = motion.p_WB[b] + arm_b - motion.p_WB[a] - arm_a
-            slide = motion.v_WB[b] + cross(motion.w_WB[b], arm_b) - motion.v_WB[a] - cross(motion.w_WB[a], arm_a)
-            length = float(np.linalg.norm(d))
-            along = d / length
-            pull = spring.stiffness * (length - spring.length) + spring.damping * (along @ slide)
-            found += [(a, arm_a, pull * along), (b, arm_b, -pull * along)]
-        return found

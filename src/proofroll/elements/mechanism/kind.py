@@ -13,8 +13,10 @@ from proofroll.core.scene import Scene
 from proofroll.core.validation import all_units_of
 from proofroll.elements.mechanism.drives import Actuator, Coupling
 from proofroll.elements.mechanism.element import MechanismElement, the_mechanism
+from proofroll.elements.mechanism.published import read_published
 from proofroll.elements.mechanism.reader import KINDS, made_mechanism
 from proofroll.elements.mechanism.signal import Formula
+from proofroll.elements.mechanism.spring_law import IN_LAWS
 
 if TYPE_CHECKING:
     from proofroll.core.diagnosis import Hypothesis
@@ -48,14 +50,14 @@ def _falling(scene: Scene) -> Scene:
 
 def _with_drive(scene: Scene, drive: str) -> Scene:
     """Copy of a scene of two hinges, both moving, with an actuator at the second or a coupling of the two."""
-    joints = one, two = tuple(replace(joint, v0=(_SPEED,)) for joint in the_mechanism(scene).mechanism.joints)
-    servo = Actuator("servo", two.name, "position", 1.0, kp=30.0, kd=2.0, gear=2.0)
+    joints = joint_1, joint_2 = tuple(replace(joint, v0=(_SPEED,)) for joint in the_mechanism(scene).mechanism.joints)
+    servo = Actuator("servo", joint_2.name, "position", 1.0, kp=30.0, kd=2.0, gear=2.0)
     of_time = replace(servo, target=Formula("cos(5*t)"))
     drives: Mapping[str, Mapping[str, Any]] = {
         "servo": {"actuators": (servo,)},
         "limit": {"actuators": (replace(servo, limit=5.0),)},
         "target": {"actuators": (of_time,)},
-        "coupling": {"couplings": (Coupling("gear", one.name, two.name, 1.0, two.q0[0] - one.q0[0]),)},
+        "coupling": {"couplings": (Coupling("gear", joint_1.name, joint_2.name, 1.0, joint_2.q0[0] - joint_1.q0[0]),)},
     }
     return _changed(scene, f"{scene.name}-{drive}", joints=joints, **drives[drive])
 
@@ -78,19 +80,20 @@ class MechanismKind:
     """See :class:`proofroll.core.element.ElementKind`."""
 
     name: ClassVar[str] = "mechanism"
-    tables: ClassVar[tuple[str, ...]] = (*KINDS, "repeat", "published", "unmodelled", "impacts")
-    units: ClassVar[Mapping[str, str]] = all_units_of(*KINDS.values())
+    tables: ClassVar[tuple[str, ...]] = (*KINDS, "repeat", "published", "unmodelled", "impacts", "control")
+    units: ClassVar[Mapping[str, str]] = all_units_of(*KINDS.values()) | {unit: unit for unit in IN_LAWS}
 
     @staticmethod
     def read(
-        tables: Mapping[str, Any], gravity: Gravity, numbers: Parameters, where: str
+        tables: Mapping[str, Any], gravity: Gravity, numbers: Parameters, place: str
     ) -> Sequence[MechanismElement]:
         """One mechanism from all bodies, joints, loops, springs and other tables of a file."""
         x, y, z = gravity.vector.tolist()
         try:
+            read_published(tables.get("published", []))
             return [MechanismElement(made_mechanism(tables, (x, y, z), numbers))]
         except InputError as error:
-            raise InputError(f"{where}: {error.field}", error.value, error.advice) from None
+            raise InputError(f"{place}: {error.field}", error.value, error.advice) from None
 
     @staticmethod
     def conformance_scenes() -> Mapping[str, Scene]:
@@ -109,13 +112,13 @@ class MechanismKind:
         """
         from proofroll.files.scene_file import load_scene
 
-        found = {name: load_scene(name) for name in ("slider_crank", "heavy_top", "oscillators", "sled")}
-        found[_PLAIN] = plain = load_scene(_PLAIN)
-        found["slow_top"] = load_scene("heavy_top", spin=2.0, tilt=1.2)
-        found["falling_body"] = _falling(load_scene("free_body", w1=2.0, w3=1.0))
-        found["two_spheres"] = _sooner(load_scene("two_spheres", friction=0.5), _SOONER)
-        found |= {f"{_PLAIN}-{law}": _with_law(plain, law, value) for law, value in _LAWS.items()}
-        return found | {f"{_PLAIN}-{drive}": _with_drive(plain, drive) for drive in _DRIVES}
+        scenes = {name: load_scene(name) for name in ("slider_crank", "heavy_top", "oscillators", "sled")}
+        scenes[_PLAIN] = plain = load_scene(_PLAIN)
+        scenes["slow_top"] = load_scene("heavy_top", spin=2.0, tilt=1.2)
+        scenes["falling_body"] = _falling(load_scene("free_body", w1=2.0, w3=1.0))
+        scenes["two_spheres"] = _sooner(load_scene("two_spheres", friction=0.5), _SOONER)
+        scenes |= {f"{_PLAIN}-{law}": _with_law(plain, law, value) for law, value in _LAWS.items()}
+        return scenes | {f"{_PLAIN}-{drive}": _with_drive(plain, drive) for drive in _DRIVES}
 
     @staticmethod
     def hypotheses() -> Sequence[Hypothesis]:

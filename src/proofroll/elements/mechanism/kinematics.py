@@ -7,9 +7,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from proofroll.elements.mechanism.drives import Coupling
-from proofroll.elements.mechanism.joint import AXES, FACTS, child_in_parent, coordinate_rate
+from proofroll.elements.mechanism.joint import AXES, DISTANCE, FACTS, Joint, child_in_parent, coordinate_rate
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.parts import Loop
+from proofroll.elements.mechanism.prescribed import moved
 from proofroll.elements.mechanism.rotations import Array, cross
 
 _O, _UNIT = np.zeros(3), np.eye(3)
@@ -41,16 +42,18 @@ class BodyMotion:
 
 
 class Rows(NamedTuple):
-    """Constraints of loops, then of couplings: Φ(q) = 0, C v = 0, C v̇ + bias = 0.
+    """Constraints of loops, then of couplings, then of prescribed motions: Φ(q) = 0, C v = rate, C v̇ + bias = 0.
 
     Each row of a loop is n·(v_b − v_a) + t·(ω_b − ω_a) − (d×n)·ω_a at its points, d from a to b. That of a coupling
-    has no n and no t.
+    has no n and no t, nor has that of a motion, whose Φ is zero and whose rate is the joint's present one: it holds
+    the acceleration, so that integration alone makes place and rate.
 
     Attributes:
         residual: Φ, m or 1, (m).
         C, bias: (m, nv), (m).
         force, torque: n and t, what a unit multiplier applies to body_b at its point, (m, 3).
-        loop: index of each row's loop, those of couplings after those of loops, (m).
+        loop: index of each row's loop, those of couplings and motions after those of loops, (m).
+        moved: number of rows of motions.
     """
 
     residual: Array
@@ -59,6 +62,13 @@ class Rows(NamedTuple):
     force: Array
     torque: Array
     loop: NDArray[np.intp]
+    moved: int
+
+    def opening(self, v: Array) -> Array:
+        """Rates C v of the violations for velocities v, (m); of motions zero."""
+        rates = self.C @ v
+        rates[len(rates) - self.moved :] = 0.0
+        return np.asarray(rates)
 
 
 class Tree:
@@ -159,16 +169,17 @@ class Tree:
             motion.bias[i, :3] + cross(motion.bias[i, 3:], arm) + cross(w, cross(w, arm)),
         )
 
-    def loop_rows(self, motion: BodyMotion) -> Rows:
-        """Residuals and rows of all loops, then of all couplings."""
+    def loop_rows(self, motion: BodyMotion, time: float = 0.0) -> Rows:
+        """Residuals and rows of all loops, then of all couplings, then of all prescribed motions at a time [s]."""
         parts = [self._rows_of(motion, loop) for loop in self.mechanism.loops]
         parts += [self._coupled(motion, coupling) for coupling in self.mechanism.couplings]
+        parts += [self._moved(joint, at_v, time) for joint, _, at_v in self.mechanism.prescribed]
         if not parts:
             none, nv = np.zeros(0), self.mechanism.nv
-            return Rows(none, np.zeros((0, nv)), none, np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0, dtype=int))
+            return Rows(none, np.zeros((0, nv)), none, np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0, dtype=int), 0)
         loop = np.repeat(np.arange(len(parts)), [len(part[0]) for part in parts])
         residual, C, bias, force, torque = (np.concatenate(columns) for columns in zip(*parts, strict=True))
-        return Rows(residual, C, bias, force, torque, loop)
+        return Rows(residual, C, bias, force, torque, loop, len(self.mechanism.prescribed))
 
     def _coupled(self, motion: BodyMotion, coupling: Coupling) -> tuple[Array, Array, Array, Array, Array]:
         C, apart = np.zeros((1, self.mechanism.nv)), -coupling.place
@@ -178,6 +189,17 @@ class Tree:
             apart += factor * motion.q[at_q]
         return np.array([apart]), C, np.zeros(1), np.zeros((1, 3)), np.zeros((1, 3))
 
+    def _moved(self, joint: Joint, at_v: int, time: float) -> tuple[Array, Array, Array, Array, Array]:
+        assert joint.motion is not None  # as of all prescribed ones
+        acceleration = float(moved(joint.motion, time).acceleration)
+        return (
+            np.zeros(1),
+            np.eye(self.mechanism.nv)[[at_v]],
+            -np.array([acceleration]),
+            np.zeros((1, 3)),
+            np.zeros((1, 3)),
+        )
+
     def _rows_of(self, motion: BodyMotion, loop: Loop) -> tuple[Array, Array, Array, Array, Array]:
         a, b = self.mechanism.body_index[loop.body_a], self.mechanism.body_index[loop.body_b]
         R_a, R_b, w_a, w_b = motion.R_WB[a], motion.R_WB[b], motion.w_WB[a], motion.w_WB[b]
@@ -186,6 +208,15 @@ class Tree:
         d = motion.p_WB[b] + arm_b - motion.p_WB[a] - arm_a
         d_rate = motion.v_WB[b] + slide_b - motion.v_WB[a] - slide_a
         pull = cross(w_b, slide_b) - cross(w_a, slide_a)
+        if loop.kind == DISTANCE:
+            length = float(np.sqrt(d @ d))
+            n = d / length
+            stretching = n @ d_rate
+            on_b, on_a = np.hstack([n, cross(arm_b, n)]), np.hstack([n, cross(arm_a, n)])
+            C = on_b @ motion.J[b] - on_a @ motion.J[a]
+            drift = on_b @ motion.bias[b] - on_a @ motion.bias[a]
+            bend = n @ pull + (d_rate @ d_rate - stretching**2) / length
+            return np.array([length - loop.length]), C[None], np.array([drift + bend]), n[None], np.zeros((1, 3))
         A, B = R_a @ loop.frame_a, R_b @ loop.frame_b
         facts = FACTS[loop.kind]
         # three locked directions hold two points together in the world; fewer hold along axes that move with a

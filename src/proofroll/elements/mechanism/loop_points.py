@@ -24,14 +24,15 @@ def held_points(mechanism: Mechanism, loop: Loop) -> tuple[float, ...]:
 def is_planar(mechanism: Mechanism) -> bool:
     """True if the axes of joints and loops at the start restrict all bodies to motion in parallel planes.
 
-    Prismatic axes must lie in that plane and revolute axes be normal to it. Spherical loops have no axis and count as
-    planar; every other joint or loop with more axes counts as spatial.
+    Prismatic axes must lie in that plane and revolute axes be normal to it. Spherical loops and struts have no axis and
+    count as planar; every other joint or loop with more axes counts as spatial.
     """
     motion = Tree(mechanism).at(*mechanism.start())
-    axes = [(joint.kind, A[:, 2]) for joint, A in zip(mechanism.joints, motion.R_parent, strict=True)]
+    axes = [(str(joint.kind), A[:, 2]) for joint, A in zip(mechanism.joints, motion.R_parent, strict=True)]
     for loop in mechanism.loops:
         R = motion.R_WB[mechanism.body_index[loop.body_a]]
-        axes.append(("fixed" if loop.kind == "spherical" else loop.kind, R @ loop.frame_a[:, 2]))
+        without = loop.kind in {"spherical", "distance"}
+        axes.append(("fixed" if without else loop.kind, R @ loop.frame_a[:, 2]))
     if any(kind not in {"fixed", "revolute", "prismatic", "planar"} for kind, _ in axes):
         return False
     turning = [axis for kind, axis in axes if kind in {"revolute", "planar"}]

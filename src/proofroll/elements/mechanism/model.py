@@ -1,4 +1,4 @@
-"""The data of a mechanism: bodies, a tree of joints, loops, springs, tracked points, drives, gravity.
+"""The data of a mechanism: bodies, a tree of joints, loops, springs, bushings, forces, points, drives, gravity.
 
 SI units, angles in rad, world frame W with z up. Every body has a frame of its own; the frame of the world is the
 body ``world``. Each object checks itself and raises :class:`~proofroll.core.errors.InputError` with one line.
@@ -16,20 +16,25 @@ import numpy as np
 from proofroll.core.arrays import slices
 from proofroll.core.errors import InputError, require_known
 from proofroll.elements.mechanism import checks
+from proofroll.elements.mechanism.bushing import Bushing
 from proofroll.elements.mechanism.checks import WORLD, Vector
 from proofroll.elements.mechanism.contacts.geometry import BodyContact, Geometry, Pair, contacts_of
+from proofroll.elements.mechanism.control import Control
 from proofroll.elements.mechanism.drives import Actuator, Coupling, check_drives
 from proofroll.elements.mechanism.joint import Joint
-from proofroll.elements.mechanism.parts import Body, Loop, Point, Spring
+from proofroll.elements.mechanism.parts import Body, Force, Loop, Point, Spring
 from proofroll.elements.mechanism.rotations import Array
-from proofroll.elements.mechanism.signal import Signal
+from proofroll.elements.mechanism.signal import Held, Signal
 
 # Laws of impacts of several contacts at once, see Mechanism.impacts.
 IN_ANY_ORDER, TOGETHER = "any order", "together"
 
 
 class JointOrLoop(NamedTuple):
-    """Connection of bodies a and b (b: a joint's child): places [m] and frames, as columns, in each body's axes."""
+    """Connection of bodies a and b (b: a joint's child): places [m] and frames, as columns, in each body's axes.
+
+    ``length``: of a loop that holds a distance [m].
+    """
 
     name: str
     kind: str
@@ -39,6 +44,7 @@ class JointOrLoop(NamedTuple):
     b: str
     position_b: Vector
     frame_b: Array
+    length: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -48,10 +54,12 @@ class Mechanism:
     Attributes:
         bodies: in the order of the scene; arrays over bodies have this order.
         joints: sorted depth-first from the world, whatever order is given; q and v have this order.
-        loops, springs, points, geometries, pairs: in the order of the scene.
+        loops, springs, bushings, forces, points, geometries, pairs: in the order of the scene.
         gravity: acceleration in the world's axes, m/s².
         actuators: in the order of the scene; each drives a joint.
         couplings: pairs of joints that move together.
+        control: sets targets of actuators at instants; None: nothing does.
+        cells: its held signals while it runs, see :mod:`proofroll.elements.mechanism.commands`.
         impacts: law of impacts of several contacts at once. "any order": one after the other in any order, whose
             outcomes must be the same; "together": Moreau's law for all of them.
         unmodelled: features of its source that no model here has, in a few words each; with any of them every route and
@@ -70,10 +78,14 @@ class Mechanism:
     actuators: tuple[Actuator, ...] = ()
     couplings: tuple[Coupling, ...] = ()
     impacts: str = IN_ANY_ORDER
+    forces: tuple[Force, ...] = ()
+    control: Control | None = None
+    cells: tuple[Held, ...] = ()
+    bushings: tuple[Bushing, ...] = ()
 
     def __post_init__(self) -> None:
-        parts = ("bodies", "joints", "loops", "springs", "points", "geometries", "pairs", "actuators", "couplings")
-        for key in parts:
+        kinds = ("bodies", "joints", "loops", "springs", "forces", "points", "geometries", "pairs", "actuators")
+        for key in (*kinds, "couplings", "bushings"):
             checks.assign(self, **{key: tuple(getattr(self, key))})
             _check_unique(key, getattr(self, key))
         checks.assign(self, unmodelled=tuple(self.unmodelled))
@@ -81,17 +93,19 @@ class Mechanism:
             raise InputError("impacts", self.impacts, f'give "{IN_ANY_ORDER}" or "{TOGETHER}"')
         _check_unique("loops", self.joints + self.loops)  # results name both alike
         names = sorted({WORLD, *(body.name for body in self.bodies)})
-        for kind in ("joints", "loops", "springs", "points", "geometries"):
+        for kind in ("joints", "loops", "springs", "bushings", "forces", "points", "geometries"):
             for item in getattr(self, kind):
-                for key in ("parent", "child", "body_a", "body_b", "body"):
+                for key in ("parent", "child", "body_a", "body_b", "body", "reaction"):
                     field = f"{kind}.{item.name}.{key}"
                     require_known(field, getattr(item, key, WORLD), names, "there is no such body; choose from")
         checks.assign(self, joints=_depth_first(self.bodies, self.joints))
         check_drives(self.joints, self.actuators, self.couplings)
+        if self.control is not None:
+            self.control.check(self.actuators)
         checks.assign(self, gravity=checks.vector("gravity", self.gravity))
         _check_masses(self.bodies, self.joints, {name for item in self.couplings for name, _ in item.terms})
         for touching in (self.contacts, self.pairs):  # forces of all of these are named alike
-            _check_unique("pairs", (*self.joints, *self.loops, *touching))
+            _check_unique("pairs", (*self.joints, *self.loops, *self.bushings, *touching))
 
     @property
     def together(self) -> bool:
@@ -119,7 +133,9 @@ class Mechanism:
                 for j in self.joints
             ),
             *(
-                JointOrLoop(k.name, k.kind, k.body_a, k.position_a, k.frame_a, k.body_b, k.position_b, k.frame_b)
+                JointOrLoop(
+                    k.name, k.kind, k.body_a, k.position_a, k.frame_a, k.body_b, k.position_b, k.frame_b, k.length
+                )
                 for k in self.loops
             ),
         )
@@ -133,16 +149,18 @@ class Mechanism:
     @cached_property
     def conservative(self) -> bool:
         """True if nothing drives or dissipates."""
-        if self.actuators:
+        if self.actuators or self.forces or self.prescribed:
             return False
         laws = [(j.damping, j.friction, j.torque, j.limits and j.restitution < 1) for j in self.joints]
-        lossy = any(pair.friction or pair.restitution < 1 for pair in self.pairs)
-        damped = any(spring.damping for spring in self.springs)
+        turning = any(pair.rolling_resistance or pair.spinning_friction for pair in self.pairs)
+        lossy = turning or any(pair.friction or pair.restitution < 1 for pair in self.pairs)
+        damped = any(spring.damping or spring.force for spring in self.springs)
+        damped = damped or any(any(bushing.damping) for bushing in self.bushings)
         return not lossy and not damped and not any(any(law) for law in laws)
 
     @property
     def fastened(self) -> dict[str, list[Vector]]:
-        """Points of each body, and of the world, to which joints, loops, springs or tracked points are attached [m].
+        """Points of each body, and of the world, that joints, loops, springs, bushings, forces or points have [m].
 
         In the frame of the body; the world comes last. A free joint attaches nothing.
         """
@@ -151,12 +169,20 @@ class Mechanism:
             if connection.kind != "free":
                 found[connection.a].append(connection.position_a)
                 found[connection.b].append(connection.position_b)
-        for spring in self.springs:
-            found[spring.body_a].append(spring.position_a)
-            found[spring.body_b].append(spring.position_b)
+        for link in self.links:
+            found[link.body_a].append(link.position_a)
+            found[link.body_b].append(link.position_b)
+        for force in self.forces:
+            if force.kind == "force":
+                found[force.body].append(force.position)
         for point in self.points:
             found[point.body].append(point.position)
         return found
+
+    @property
+    def links(self) -> tuple[Spring | Bushing, ...]:
+        """Springs, then bushings: what acts between a place of one body and one of another."""
+        return (*self.springs, *self.bushings)
 
     @cached_property
     def followed(self) -> tuple[tuple[str, Vector], ...]:
@@ -205,9 +231,16 @@ class Mechanism:
         return {joint.name: number for number, joint in enumerate(self.joints)}
 
     @cached_property
+    def prescribed(self) -> tuple[tuple[Joint, int, int], ...]:
+        """Joints with a prescribed motion, each with its indices in q and v."""
+        return tuple((joint, *self.place_of(joint.name)) for joint in self.joints if joint.motion is not None)
+
+    @cached_property
     def signals(self) -> tuple[Signal, ...]:
-        """Drives of joints, then targets of actuators."""
-        return tuple(joint.torque for joint in self.joints) + tuple(item.target for item in self.actuators)
+        """Drives of joints, targets of actuators, components of forces, prescribed motions."""
+        of_joints = *(joint.torque for joint in self.joints), *(item.target for item in self.actuators)
+        of_forces = (part for force in self.forces for part in force.value)
+        return (*of_joints, *of_forces, *(joint.motion for joint, _, _ in self.prescribed if joint.motion is not None))
 
     def place_of(self, joint: str) -> tuple[int, int]:
         """Indices in q and v of a joint with one coordinate."""

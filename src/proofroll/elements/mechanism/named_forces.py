@@ -1,4 +1,4 @@
-"""Named forces along coordinates: of actuators, couplings, dry friction and stops."""
+"""Named forces along coordinates: of actuators, couplings, prescribed motions, dry friction and stops."""
 
 from collections.abc import Mapping
 from typing import NamedTuple
@@ -15,7 +15,7 @@ class NamedForce(NamedTuple):
 
     Attributes:
         name: as files and commands write it, e.g. ``effort.motor``.
-        field: field of a sample that holds it: ``effort``, ``coupling``, ``friction`` or ``stop``.
+        field: field of a sample that holds it: ``effort``, ``coupling``, ``drive``, ``friction`` or ``stop``.
         number: index in that field.
         unit: N m about an axis, N along one.
         meaning: one line for a person.
@@ -29,17 +29,17 @@ class NamedForce(NamedTuple):
 
 
 # Fields of a sample that hold named forces, in the order of :func:`named_forces`.
-FIELDS = ("effort", "coupling", "friction", "stop")
+FIELDS = ("effort", "coupling", "drive", "friction", "stop")
 
 
 def named_forces(mechanism: Mechanism) -> tuple[NamedForce, ...]:
     """Named forces of a mechanism; arrays over them have this order."""
     unit = {joint.name: "N" if joint.kind == "prismatic" else "N m" for joint in mechanism.joints}
-    found = [
+    forces = [
         NamedForce(f"effort.{item.name}", "effort", k, unit[item.joint], f"effort of {item.name} at {item.joint}")
         for k, item in enumerate(mechanism.actuators)
     ]
-    found += [
+    forces += [
         NamedForce(
             f"coupling.{item.name}",
             "coupling",
@@ -51,17 +51,23 @@ def named_forces(mechanism: Mechanism) -> tuple[NamedForce, ...]:
     ]
     rubbing = [joint.name for joint in mechanism.joints if joint.friction and joint.nq == 1]
     stopped = [joint.name for joint in mechanism.joints if joint.limits is not None]
-    for key, what, names in (("friction", "dry friction", rubbing), ("stop", "force of a stop", stopped)):
-        found += [
+    driven = [joint.name for joint, _, _ in mechanism.prescribed]
+    kinds = (
+        ("drive", "force that imposes the motion", driven),
+        ("friction", "dry friction", rubbing),
+        ("stop", "force of a stop", stopped),
+    )
+    for key, what, names in kinds:
+        forces += [
             NamedForce(f"{key}.{name}", key, mechanism.joint_index[name], unit[name], f"{what} along {name}")
             for name in names
         ]
-    return tuple(found)
+    return tuple(forces)
 
 
 def lengths(mechanism: Mechanism) -> Mapping[str, int]:
     """Length of each field of a sample in :data:`FIELDS`."""
-    counts = (len(mechanism.actuators), len(mechanism.couplings), len(mechanism.joints), len(mechanism.joints))
+    counts = (len(mechanism.actuators), len(mechanism.couplings), *(len(mechanism.joints),) * 3)
     return dict(zip(FIELDS, counts, strict=True))
 
 

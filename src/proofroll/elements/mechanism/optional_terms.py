@@ -9,7 +9,12 @@ from proofroll.elements.mechanism.model import Mechanism
 
 # Laws of joints and of contacts that the ladder of models can leave out, by their key.
 _OF_JOINTS = {"armature": "armature of joints", "friction": "dry friction of joints", "damping": "damping of joints"}
-_OF_PAIRS = {"friction": "friction of contacts", "restitution": "restitution of contacts"}
+_OF_PAIRS = {
+    "friction": "friction of contacts",
+    "restitution": "restitution of contacts",
+    "rolling_resistance": "rolling resistance of contacts",
+    "spinning_friction": "friction of contacts against spin",
+}
 _FAR = 1000.0  # factor on limits of efforts with which they bound nothing
 _ROLLS = 10.0  # factor on friction with which little slip is left; with much more some solvers do not end
 
@@ -30,9 +35,9 @@ def optional_terms(mechanism: Mechanism, parameters: Mapping[str, float]) -> lis
         terms.append(OptionalTerm("limits of efforts", meaning, {}, {"limit": _FAR * parameters["limit"]}))
     rubbing: dict[str, float] = {}
     for key, name in _OF_PAIRS.items():
-        if own := _owned(parameters, key, mechanism.pairs, mechanism.joints):
-            terms.append(OptionalTerm(name, because, {}, dict.fromkeys(own, 0.0)))
-            rubbing = rubbing or {parameter: _ROLLS * value for parameter, value in own.items() if key == "friction"}
+        if owners := _owned(parameters, key, mechanism.pairs, mechanism.joints):
+            terms.append(OptionalTerm(name, because, {}, dict.fromkeys(owners, 0.0)))
+            rubbing = rubbing or {parameter: _ROLLS * value for parameter, value in owners.items() if key == "friction"}
     if rubbing:
         meaning = f"friction is bounded; here by {_ROLLS:g} times as much, with which what touches sticks or rolls"
         terms.append(OptionalTerm("slip of contacts", meaning, {}, rubbing))
@@ -47,9 +52,15 @@ def _owned(
     A parameter's name must end with the key. If ``others`` have that key too, the value decides: it must be one of the
     parts and not of the others.
     """
-    own, theirs = ({getattr(part, key, 0.0) for part in group} - {0.0} for group in (parts, others))
+    values, theirs = ({getattr(part, key, 0.0) for part in group} - {0.0} for group in (parts, others))
     return {
         name: value
         for name, value in parameters.items()
-        if own and value and name.endswith(key) and (not theirs or value in own - theirs)
+        if values and value and _ends_with(name, key) and (not theirs or value in values - theirs)
     }
+
+
+def _ends_with(name: str, key: str) -> bool:
+    """True if a parameter's name ends with a key, and with no longer one of another law."""
+    longer = (law for law in _OF_PAIRS if law != key and law.endswith(key))
+    return name.endswith(key) and not any(name.endswith(law) for law in longer)

@@ -1,9 +1,11 @@
-"""Bodies, loops, springs and tracked points."""
+"""Bodies, loops, springs, applied forces and tracked points."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Any, Literal
 
 import numpy as np
 
@@ -11,8 +13,15 @@ from proofroll.core.arrays import read_only
 from proofroll.core.errors import InputError, require_known
 from proofroll.elements.mechanism import checks, rotations
 from proofroll.elements.mechanism.checks import METRES, RADIANS, RATIO, WORLD, ZERO, Inertia, Vector, Z
-from proofroll.elements.mechanism.joint import FACTS, Kind
+from proofroll.elements.mechanism.joint import DISTANCE, LOOP_FACTS, Kind
 from proofroll.elements.mechanism.rotations import Array
+from proofroll.elements.mechanism.signal import FUNCTIONS, Formula, Table, checked, value_at
+from proofroll.elements.mechanism.spring_law import SpringLaw
+
+LoopKind = Kind | Literal["distance"]
+ForceKind = Literal["force", "moment"]
+Axes = Literal["world", "body"]
+_LOAD: Mapping[str, Any] = {"unit": {"force": "N", "moment": "N m"}, "signal": True}
 
 
 @dataclass(frozen=True)
@@ -49,16 +58,17 @@ class Loop:
 
     Attributes:
         name: unique among joints and loops.
-        kind: kind of joint whose constraints it has; any but free.
+        kind: kind of joint whose constraints it has, any but free; or ``distance``, a strut without mass.
         body_a, body_b: names of bodies, or ``world``.
         position_a, position_b: the point of each body that the loop holds together, in its frame [m].
         axis_a, axis_b: axis in the frame of each body; revolute, planar: parallel; universal: perpendicular;
             prismatic: ``axis_a`` alone.
         orientation: roll, pitch, yaw of body_b's frame against body_a's, held by fixed and prismatic loops [rad].
+        length: distance of the points that a ``distance`` holds [m].
     """
 
     name: str
-    kind: Kind
+    kind: LoopKind
     body_a: str
     body_b: str
     position_a: Vector = field(default=ZERO, metadata=METRES)
@@ -66,16 +76,21 @@ class Loop:
     axis_a: Vector = field(default=Z, metadata=RATIO)
     axis_b: Vector = field(default=Z, metadata=RATIO)
     orientation: Vector = field(default=ZERO, metadata=RADIANS)
+    length: float = field(default=0.0, metadata=METRES)
 
     def __post_init__(self) -> None:
         where = f"loops.{checks.name(self.name, 'loops')}"
-        require_known(f"{where}.kind", self.kind, FACTS)
+        require_known(f"{where}.kind", self.kind, LOOP_FACTS)
         if self.kind == "free":
             raise InputError(f"{where}.kind", self.kind, "a free loop holds nothing; remove it")
         if self.body_a == self.body_b:
             raise InputError(f"{where}.body_b", self.body_b, "a loop connects two bodies; these are the same")
         checks.read(self, where, checks.vector, "position_a", "position_b", "orientation")
         checks.read(self, where, checks.axis, "axis_a", "axis_b")
+        checks.read(self, where, checks.number, "length", at_least=0)
+        if (self.kind == DISTANCE) != (self.length > 0):
+            advice = "a distance loop needs one" if self.kind == DISTANCE else f"a {self.kind} loop has none; remove it"
+            raise InputError(f"{where}.length", self.length, advice)
 
     @cached_property
     def frame_a(self) -> Array:
@@ -94,7 +109,7 @@ class Loop:
 
 @dataclass(frozen=True)
 class Spring:
-    """A straight spring and damper between two points; it pulls with stiffness·(L − length) + damping·L̇.
+    """A straight spring and damper between two points; it pulls with stiffness·(L − length) + damping·L̇ + force.
 
     Attributes:
         name: unique among springs.
@@ -102,7 +117,8 @@ class Spring:
         position_a, position_b: its ends in the frame of each body [m].
         stiffness: of the pull along the line [N/m].
         damping: of the pull along the line [N s/m].
-        length: free length, at which the spring does not pull [m].
+        length: free length, at which stiffness does not pull [m].
+        force: further pull as a formula of the length L [m] and its rate dL [m/s]: ``"= 80*(L - 0.3)^3"``.
     """
 
     name: str
@@ -113,6 +129,7 @@ class Spring:
     stiffness: float = field(default=0.0, metadata={"unit": "N/m"})
     damping: float = field(default=0.0, metadata={"unit": "N s/m"})
     length: float = field(default=0.0, metadata=METRES)
+    force: SpringLaw | None = field(default=None, metadata={"unit": "N", "law": True})
 
     def __post_init__(self) -> None:
         where = f"springs.{checks.name(self.name, 'springs')}"
@@ -120,6 +137,59 @@ class Spring:
             raise InputError(f"{where}.body_b", self.body_b, "a spring connects two bodies; these are the same")
         checks.read(self, where, checks.vector, "position_a", "position_b")
         checks.read(self, where, checks.number, "stiffness", "damping", "length", at_least=0)
+
+    @property
+    def stiffest(self) -> float:
+        """Stiffness along its line [N/m]."""
+        return self.stiffness
+
+    def pull(self, length: Any, rate: Any) -> Any:
+        """Pull on both ends for a length [m] and its rate [m/s], N; numbers or arrays."""
+        pull = self.stiffness * (length - self.length) + self.damping * rate
+        return pull if self.force is None else pull + self.force.pull(length, rate)
+
+
+@dataclass(frozen=True)
+class Force:
+    """A force or a moment that acts on a body from outside, or between two bodies.
+
+    Attributes:
+        name: unique among forces.
+        body: the body on which it acts.
+        kind: a force [N] or a moment [N m].
+        value: three components, each a number or a formula ``"= 2*sin(t)"``; or a table of times and values.
+        position: place of the body on which a force acts, in its frame [m].
+        frame: axes of the components: ``world``, or ``body``, so that the force turns with the body.
+        reaction: second body, on which the opposite force acts at the same place; the world feels none.
+    """
+
+    name: str
+    body: str
+    kind: ForceKind
+    value: tuple[float | Formula | Table, float | Formula | Table, float | Formula | Table] = field(metadata=_LOAD)
+    position: Vector = field(default=ZERO, metadata=METRES)
+    frame: Axes = "world"
+    reaction: str = WORLD
+
+    def __post_init__(self) -> None:
+        where = f"forces.{checks.name(self.name, 'forces')}"
+        require_known(f"{where}.kind", self.kind, ("force", "moment"))
+        require_known(f"{where}.frame", self.frame, ("world", "body"))
+        if self.body == WORLD:
+            raise InputError(f"{where}.body", WORLD, "a force on the world moves nothing; name a body")
+        if self.body == self.reaction:
+            raise InputError(f"{where}.reaction", self.reaction, "the force and its reaction cancel; name another body")
+        checks.read(self, where, checks.vector, "position")
+        if self.kind == "moment" and any(self.position):
+            raise InputError(f"{where}.position", self.position, "a moment has no place; leave it out")
+        if not isinstance(self.value, tuple | list) or len(self.value) != 3:
+            raise InputError(f"{where}.value", self.value, "give three components")
+        parts = tuple(checked(f"{where}.value.{number}", part) for number, part in enumerate(self.value))
+        checks.assign(self, value=parts)
+
+    def at(self, time: Any, functions: Mapping[str, Callable[[Any], Any]] = FUNCTIONS) -> list[Any]:
+        """Components at a time [s], which may be a symbol if ``functions`` evaluates calls for it [N or N m]."""
+        return [value_at(part, time, functions) for part in self.value]
 
 
 @dataclass(frozen=True)

@@ -7,9 +7,11 @@ from functools import cached_property
 import numpy as np
 
 from proofroll.core.arrays import FloatArray, cross, on_turns, read_only
+from proofroll.elements.mechanism.bushing import Bushing
 from proofroll.elements.mechanism.checks import ZERO
-from proofroll.elements.mechanism.joint import AXES, FACTS, WITH_QUATERNION, Joint
+from proofroll.elements.mechanism.joint import AXES, DISTANCE, FACTS, WITH_QUATERNION, Joint
 from proofroll.elements.mechanism.model import Mechanism
+from proofroll.elements.mechanism.prescribed import moved
 
 TURN = 2 * np.pi
 
@@ -137,11 +139,23 @@ class Placed:
         for spring in self.mechanism.springs:
             ends = self.point(spring.body_a, spring.position_a) - self.point(spring.body_b, spring.position_b)
             found.append(0.5 * spring.stiffness * (np.linalg.norm(ends, axis=-1) - spring.length) ** 2)
+        for bushing in self.mechanism.bushings:
+            found += self._of_bushing(bushing)
         for joint in self.mechanism.joints:
             if joint.stiffness or joint.armature:
                 q, v = self.along(joint)
                 found.append(0.5 * np.sum(joint.stiffness * (q - joint.rest) ** 2 + joint.armature * v**2, -1))
         return np.array(found).T
+
+    def _of_bushing(self, bushing: Bushing) -> list[FloatArray]:
+        from scipy.spatial.transform import Rotation
+
+        A = self.R_WB[:, self.mechanism.body_index[bushing.body_a]] @ bushing.frame_a
+        B = self.R_WB[:, self.mechanism.body_index[bushing.body_b]] @ bushing.frame_b
+        apart = self.point(bushing.body_b, bushing.position_b) - self.point(bushing.body_a, bushing.position_a)
+        turned = Rotation.from_matrix(A.swapaxes(1, 2) @ B).as_rotvec()
+        sizes = np.concatenate([np.einsum("tji,tj->ti", A, apart), turned], axis=1)
+        return list(0.5 * np.array(bushing.stiffness)[:, None] * sizes.T**2)
 
     def momentum(self) -> tuple[FloatArray, FloatArray]:
         """Momentum [N s] and moment of momentum about the world's origin [N m s], shapes (time, 3)."""
@@ -154,14 +168,20 @@ class Placed:
         return linear, angular
 
     def drift(self) -> FloatArray:
-        """Largest violation of a joint's or loop's constraints, separation [m] or cosine [1], shape (time,)."""
+        """Largest violation of a joint, loop or prescribed motion: distance [m], cosine [1] or angle, shape (time,)."""
         worst = np.zeros(len(self.time))
-        for _, kind, a, at_a, frame_a, b, at_b, frame_b in self.mechanism.connections:
+        for _, kind, a, at_a, frame_a, b, at_b, frame_b, length in self.mechanism.connections:
             A = self.R_WB[:, self.mechanism.body_index[a]] @ frame_a
             B = self.R_WB[:, self.mechanism.body_index[b]] @ frame_b
             apart = self.point(b, at_b) - self.point(a, at_a)
+            if kind == DISTANCE:
+                worst = np.maximum(worst, np.abs(np.linalg.norm(apart, axis=-1) - length))
+                continue
             for axis in FACTS[kind].translations:
                 worst = np.maximum(worst, np.abs(np.sum(apart * A[..., axis], -1)))
             for first, second in FACTS[kind].rotations:
                 worst = np.maximum(worst, np.abs(np.sum(A[..., first] * B[..., second], -1)))
+        for joint, _, _ in self.mechanism.prescribed:
+            assert joint.motion is not None  # as of all prescribed ones
+            worst = np.maximum(worst, np.abs(self.along(joint)[0][:, 0] - moved(joint.motion, self.time).place))
         return worst

@@ -72,6 +72,9 @@ def _volume(shape: Geometry) -> float:
         return math.prod(shape.size)
     if shape.kind == "ellipsoid" and shape.axes is not None:
         return 4 / 3 * math.pi * math.prod(shape.axes)
+    if shape.length is not None:
+        caps = 4 / 3 * math.pi * (shape.radius or 0.0) ** 3 if shape.kind == "capsule" else 0.0
+        return caps + math.pi * (shape.radius or 0.0) ** 2 * shape.length
     return 4 / 3 * math.pi * (shape.radius or 0.0) ** 3 if shape.kind == "sphere" else 0.0
 
 
@@ -83,7 +86,7 @@ def _density(body: Body, shapes: list[Geometry]) -> Iterator[str]:
 
 
 def _shape(shape: Geometry) -> Iterator[str]:
-    sizes = [shape.radius or 0.0, *(shape.axes or ()), *(shape.size or ())]
+    sizes = [shape.radius or 0.0, shape.length or 0.0, *(shape.axes or ()), *(shape.size or ())]
     if max(sizes) > LARGE and shape.body != "world":
         yield f"a size of {max(sizes):.4g} m; {_METRES}"
     largest = max(map(abs, shape.orientation))

@@ -10,6 +10,7 @@ from proofroll.core.engine import Regularised, Sample
 from proofroll.core.errors import Refused
 from proofroll.elements.mechanism import joint
 from proofroll.elements.mechanism.analysis import Start, general_place
+from proofroll.elements.mechanism.commands import begun
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.rotations import Array
 
@@ -32,6 +33,7 @@ class MechanismSample(Sample):
             where nothing touches, NaN where the engine does not know it.
         effort: of each actuator at its joint, clamped [N m, N], shape (actuators,).
         coupling: of each coupling on its joint_b [N m, N], shape (couplings,).
+        drive: of prescribed motions, along each joint's coordinate [N m, N], shape (joints,); NaN for joints without.
         friction, stop: of dry friction and of a stop along each joint's coordinate [N m, N], shape (joints,); NaN for
             joints where the engine does not know them.
     """
@@ -41,6 +43,7 @@ class MechanismSample(Sample):
     contact_force: Array | None = None
     effort: Array | None = None
     coupling: Array | None = None
+    drive: Array | None = None
     friction: Array | None = None
     stop: Array | None = None
 
@@ -61,6 +64,8 @@ class MechanismBuilt:
         contact_place: point of contact in the world [m], shape (contacts, 3): on the shape that is not a plane, for two
             spheres on a.
         contact_friction, contact_restitution: coefficients that the engine made of the pair's, shape (contacts,).
+        contact_static, contact_tangential: coefficients of static friction and of tangential restitution, of an engine
+            that has them, shape (contacts,).
         contact_response: rates of all slides caused by unit forces on body a of each contact, world axes [1/kg] (the
             Delassus matrix), shape (contacts, 3, contacts, 3); for a pair without friction only along normals.
         rows: number of the engine's constraint rows.
@@ -70,6 +75,8 @@ class MechanismBuilt:
         angular_acceleration: of each body in the world [rad/s²], shape (bodies, 3).
         mass_matrix_error: largest difference between the engine's mass matrix and the forces of its inverse dynamics
             for unit accelerations, relative to the matrix's largest element; for an engine that has both.
+        mass_matrix, velocity_forces, gravity_forces: M, h and g of M v̇ + h + g = τ at time 0, in the velocities of
+            the tree, (nv, nv), (nv,), (nv,); M with the armature of joints, g minus the weights.
         regularised: names of these quantities that the model softens, with tolerance and reason; the tolerance of
             ``acceleration`` and of ``angular_acceleration`` is relative to the largest component of any body.
     """
@@ -86,6 +93,9 @@ class MechanismBuilt:
     acceleration: Array | None = None
     angular_acceleration: Array | None = None
     mass_matrix_error: float | None = None
+    mass_matrix: Array | None = None
+    velocity_forces: Array | None = None
+    gravity_forces: Array | None = None
     regularised: Mapping[str, Regularised] = field(default_factory=dict)
     contact_gap: Array | None = None
     contact_normal: Array | None = None
@@ -93,20 +103,22 @@ class MechanismBuilt:
     contact_friction: Array | None = None
     contact_restitution: Array | None = None
     contact_response: Array | None = None
+    contact_static: Array | None = None
+    contact_tangential: Array | None = None
 
 
 def mechanism_of(scene: Any) -> Mechanism:
-    """Mechanism of a scene with one element, or the given mechanism itself.
+    """Mechanism of a scene with one element, or the given mechanism itself; its held signals are set from outside.
 
     Raises:
         Refused: the scene has other elements.
     """
     if isinstance(scene, Mechanism):
-        return scene
-    found = [getattr(element, "mechanism", None) for element in scene.elements]
-    if len(found) != 1 or not isinstance(found[0], Mechanism):
+        return begun(scene)
+    mechanisms = [getattr(element, "mechanism", None) for element in scene.elements]
+    if len(mechanisms) != 1 or not isinstance(mechanisms[0], Mechanism):
         raise Refused("needs a scene of one mechanism, and this formulation represents nothing else")
-    return found[0]
+    return begun(mechanisms[0])
 
 
 def row_rank(rows: Array) -> int:

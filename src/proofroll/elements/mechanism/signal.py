@@ -1,10 +1,10 @@
-"""Signals of time: a number, a smooth formula of the time t, or a table with linear interpolation."""
+"""Signals of time: a number, a smooth formula of the time t, a table, or a value held from one instant to the next."""
 
 import ast
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -26,12 +26,28 @@ FUNCTIONS: Mapping[str, Callable[[Any], Any]] = {
 
 
 # What evaluates to no number; KeyError: an operator that is not known, such as a comparison.
-_NO_NUMBER: tuple[type[Exception], ...] = (InvalidExpression, ArithmeticError, KeyError, SyntaxError, TypeError)
-_NO_NUMBER += (ValueError, RecursionError, MemoryError)
+NO_NUMBER: tuple[type[Exception], ...] = (InvalidExpression, ArithmeticError, KeyError, SyntaxError, TypeError)
+NO_NUMBER += (ValueError, RecursionError, MemoryError)
 
 
-def _power(base: Any, power: Any) -> Any:
-    return (float(base) if isinstance(base, int) else base) ** power  # integers would grow for hours
+def _power(functions: Mapping[str, Callable[[Any], Any]], base: Any, power: Any) -> Any:
+    base = float(base) if isinstance(base, int) else base  # integers would grow for hours
+    if isinstance(power, int | float | np.ndarray | np.number):
+        return base**power
+    return functions["exp"](power * (math.log(base) if isinstance(base, float) else functions["log"](base)))
+
+
+def parsed_formula(text: str) -> Any:
+    """Formula without its sign, parsed once for many evaluations."""
+    return SimpleEval.parse(text.replace("^", "**").strip())
+
+
+def formula_value(parsed: Any, names: Mapping[str, Any], functions: Mapping[str, Callable[[Any], Any]]) -> Any:
+    """Value of a parsed formula; names may be numbers, arrays or symbols, which ``functions`` take."""
+    with np.errstate(all="ignore"):
+        return evaluator({"pi": math.pi, **names}, functions, partial(_power, functions)).eval(
+            "", previously_parsed=parsed
+        )
 
 
 @dataclass(frozen=True)
@@ -49,7 +65,7 @@ class Formula:
     def __post_init__(self) -> None:
         try:
             value = float(self.at(0.0))
-        except _NO_NUMBER:
+        except NO_NUMBER:
             value = math.nan
         if len(self.text) > LONGEST or not math.isfinite(value):
             advice = "is no finite number at t = 0; use t, parameters, + - * / ^ ( ), pi and " + ", ".join(FUNCTIONS)
@@ -57,13 +73,11 @@ class Formula:
 
     def at(self, time: Any, functions: Mapping[str, Callable[[Any], Any]] = FUNCTIONS) -> Any:
         """Value at a time [s], which may be an array or a symbol; ``functions`` evaluates the calls for that type."""
-        names = {"pi": math.pi, **dict(self.numbers), TIME: time}
-        with np.errstate(all="ignore"):
-            return evaluator(names, functions, _power).eval("", previously_parsed=self._parsed)
+        return formula_value(self._parsed, {**dict(self.numbers), TIME: time}, functions)
 
     @cached_property
     def _parsed(self) -> Any:
-        return SimpleEval.parse(self.text.replace("^", "**").strip())
+        return parsed_formula(self.text)
 
     def __str__(self) -> str:
         return f"= {self.text}"
@@ -71,15 +85,17 @@ class Formula:
 
 @dataclass(frozen=True)
 class Table:
-    """Values at times, with linear interpolation; constant before the first and after the last time.
+    """Values at times, constant before the first and after the last time.
 
     Attributes:
         times: growing [s].
         values: one for each time.
+        hold: True if each value holds from its time to the next one; False: linear interpolation.
     """
 
     times: tuple[float, ...]
     values: tuple[float, ...]
+    hold: bool = False
 
     def __post_init__(self) -> None:
         count = max(len(self.times), 1)
@@ -91,18 +107,56 @@ class Table:
             raise InputError(f"times.{late[0] + 1}", self.times[late[0] + 1], advice)
 
     def at(self, time: Any) -> Any:
-        """Value at a time [s], or at an array of them."""
+        """Value at a time [s], or at an array of them; the time of a held value belongs to it."""
+        if self.hold:
+            return np.asarray(self.values)[np.maximum(np.searchsorted(self.times, time, side="right") - 1, 0)]
         return np.interp(time, self.times, self.values)
 
 
-Signal = float | Formula | Table
+class Held:
+    """Value that is set from outside at instants, and constant between them.
+
+    Attributes:
+        value: the present one.
+        past: values of a run that is over, by which :meth:`at` answers; None: the present value answers.
+    """
+
+    def __init__(self, value: float = 0.0) -> None:
+        self.value = value
+        self.past: Table | None = None
+
+    def at(self, time: Any) -> Any:
+        """The present value; of a run that is over, the value at a time [s]."""
+        return self.value if self.past is None else self.past.at(time)
+
+
+Signal = float | Formula | Table | Held
 
 
 def value_at(signal: Signal, time: Any, functions: Mapping[str, Callable[[Any], Any]] = FUNCTIONS) -> Any:
     """Value of a signal at a time [s]; for a formula the time may be an array or a symbol."""
     if isinstance(signal, Formula):
         return signal.at(time, functions)
-    return signal.at(time) if isinstance(signal, Table) else signal
+    return signal.at(time) if isinstance(signal, Table | Held) else signal
+
+
+@dataclass(frozen=True)
+class _Delayed(Formula):
+    """A formula whose time runs late."""
+
+    delay: float = 0.0
+
+    def at(self, time: Any, functions: Mapping[str, Callable[[Any], Any]] = FUNCTIONS) -> Any:
+        return super().at(time - self.delay, functions)
+
+
+def delayed(signal: Signal, delay: float) -> Signal:
+    """The signal with the values that it had by ``delay`` [s] earlier."""
+    if isinstance(signal, Formula):
+        return _Delayed(signal.text, signal.numbers, delay)
+    if isinstance(signal, Table):
+        return Table(tuple(time + delay for time in signal.times), signal.values, signal.hold)
+    return signal
 
 
 def varies(signal: Signal) -> bool:
@@ -110,41 +164,54 @@ def varies(signal: Signal) -> bool:
     return not isinstance(signal, float | int)
 
 
+def is_held(signal: Signal) -> bool:
+    """True if a signal jumps at instants, and is constant between them."""
+    return isinstance(signal, Held) or (isinstance(signal, Table) and signal.hold)
+
+
 def breaks(signals: Sequence[Signal]) -> list[float]:
     """Times at which one of the signals is not smooth [s], sorted."""
     return sorted({time for signal in signals if isinstance(signal, Table) for time in signal.times})
 
 
-def checked(field: str, given: Any) -> Signal:
+def checked(field: str, value: Any) -> Signal:
     """Signal of a part of a mechanism. Raises InputError if the value is not a signal."""
-    return given if isinstance(given, Formula | Table) else checks.number(field, given)
+    return value if isinstance(value, Formula | Table | Held) else checks.number(field, value)
 
 
 def read_signal(field: str, given: Any, numbers: Parameters, unit: str = "") -> Any:
     """Signal of a file, in this unit; a number or a formula without time is returned unchanged.
 
+    A list of components gives a list of signals, and so does a table whose values are lists.
+
     Raises:
         InputError: a formula or a table is wrong, or a formula has another unit.
     """
+    if isinstance(given, dict) and (columns := _columns(field, given)):
+        given = columns
+    if isinstance(given, list):
+        return [read_signal(f"{field}.{number}", part, numbers, unit) for number, part in enumerate(given)]
     try:
         if isinstance(given, str) and given.startswith("=") and TIME not in numbers.values:
-            used = _names(given[1:])
+            used = names_in(given[1:])
             if TIME in used or used - {*CONSTANTS, *OF_PARAMETERS, *numbers.values}:
                 for name in sorted(used - {TIME, "pi", *FUNCTIONS}):
                     require_known(
                         field, name, [TIME, *sorted(numbers.values)], "there is no such parameter; choose from"
                     )
-                own = tuple((name, float(value)) for name, value in numbers.values.items() if name in used)
-                made = Formula(given[1:].strip(), own)
+                constants = tuple((name, float(value)) for name, value in numbers.values.items() if name in used)
+                made = Formula(given[1:].strip(), constants)
                 _check_unit(field, made.text, numbers, unit)
                 return made
         if isinstance(given, dict):
             for key in given:
-                if key not in {"times", "values"}:
-                    raise no_such_key(key, given[key], ("times", "values"))
-            axes = {"times": "s", "values": unit}
+                if key not in {"times", "values", "hold"}:
+                    raise no_such_key(key, given[key], ("times", "values", "hold"))
+            axes, hold = {"times": "s", "values": unit}, given.get("hold", False)
+            if not isinstance(hold, bool):
+                raise InputError("hold", hold, "give true (each value holds until the next) or false")
             filled = {key: numbers.filled(given.get(key, []), key, {}, axes[key]) for key in axes}
-            return Table(**filled)
+            return Table(**filled, hold=hold)
         if isinstance(given, str) and not given.startswith(("=", "$")) and in_radians(field, given, unit) is None:
             raise InputError(
                 field, given, "give a number, a formula that begins with =, or a table of times and values"
@@ -153,6 +220,18 @@ def read_signal(field: str, given: Any, numbers: Parameters, unit: str = "") -> 
         inside = "" if error.field in {"formula", field} else f".{error.field}"
         raise InputError(f"{field}{inside}", error.value, error.advice) from None
     return given
+
+
+def _columns(field: str, table: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """Table of each component, for a table whose values are lists; else an empty list."""
+    rows = table.get("values")
+    if not isinstance(rows, list) or not any(isinstance(row, list) for row in rows):
+        return []
+    counts = [len(row) if isinstance(row, list) else 1 for row in rows]
+    for number, row in enumerate(rows):
+        if counts[number] != counts[0]:
+            raise InputError(f"{field}.values.{number}", row, f"give {counts[0]} components, as in the first row")
+    return [{**table, "values": list(column)} for column in zip(*rows, strict=True)]
 
 
 def _check_unit(field: str, text: str, numbers: Parameters, unit: str) -> None:
@@ -169,7 +248,7 @@ def _check_unit(field: str, text: str, numbers: Parameters, unit: str) -> None:
         raise wrong
 
 
-def _names(text: str) -> set[str]:
+def names_in(text: str) -> set[str]:
     """Names in a formula; empty if it cannot be parsed, an error that its evaluation reports."""
     try:
         nodes = ast.walk(ast.parse(text.replace("^", "**").strip(), mode="eval"))

@@ -113,7 +113,7 @@ def switched_joints(mechanism: Mechanism) -> tuple[SwitchedJoint, ...]:
     Raises:
         Refused: dry friction in a joint with several coordinates, which has no direction of its own.
     """
-    found = []
+    switched = []
     for number, joint in enumerate(mechanism.joints):
         if not joint.friction and joint.limits is None:
             continue
@@ -121,8 +121,8 @@ def switched_joints(mechanism: Mechanism) -> tuple[SwitchedJoint, ...]:
             raise Refused(f"joint {joint.name} has dry friction along several coordinates, which no route follows")
         q, v = mechanism.q_slices[number].start, mechanism.v_slices[number].start
         low, high = joint.limits or (-math.inf, math.inf)
-        found.append(SwitchedJoint(joint.name, number, q, v, joint.friction, low, high, joint.restitution))
-    return tuple(found)
+        switched.append(SwitchedJoint(joint.name, number, q, v, joint.friction, low, high, joint.restitution))
+    return tuple(switched)
 
 
 def first_change(joints: Sequence[SwitchedJoint], q: Array, v: Array, rates: Array) -> float:
@@ -135,19 +135,19 @@ def end_event(mode: str) -> str:
     return "slip" if mode == "stick" else "lift_off"
 
 
-def changes(joints: Sequence[SwitchedJoint], before: Mode, after: Mode) -> tuple[tuple[str, str], ...]:
+def changes(joints: Sequence[SwitchedJoint], old: Mode, new: Mode) -> tuple[tuple[str, str], ...]:
     """Events (kind, joint) of joints that become held, reverse, or are set free by a change of mode."""
-    found = []
-    for joint, was, now in zip(joints, before, after, strict=False):
+    events = []
+    for joint, was, now in zip(joints, old, new, strict=False):
         if now in HOLDING and was not in HOLDING:
-            found.append(("stick" if now == "stick" else "rest", joint.name))
+            events.append(("stick" if now == "stick" else "rest", joint.name))
         elif was in HOLDING and now not in HOLDING:
-            found.append((end_event(was), joint.name))
+            events.append((end_event(was), joint.name))
         elif was != now and was not in HOLDING:
-            found.append(("turn", joint.name))
-    return tuple(found)
+            events.append(("turn", joint.name))
+    return tuple(events)
 
 
 def held_joints(mode: Mode) -> list[int]:
     """Indices, among the switched joints, of those that are held."""
-    return [number for number, own in enumerate(mode) if own in HOLDING]
+    return [number for number, joint_mode in enumerate(mode) if joint_mode in HOLDING]

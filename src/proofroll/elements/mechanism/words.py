@@ -27,12 +27,15 @@ FRAMES = (
 
 def start_facts(element: MechanismElement) -> Sequence[str]:
     """Sentences on degrees of freedom, redundant constraints, a singular pose, places of bodies, and gaps of pairs."""
-    found, mechanism = element.analysis, element.mechanism
-    clauses = [f"degrees of freedom: {found.mobility}"]
-    if found.rows:
-        repeated = f", of which {found.redundant} follow from the others" if found.redundant else ""
-        clauses[0] += f"; loops add {found.rows} constraints{repeated}"
-    if found.singular_start:
+    analysis, mechanism = element.analysis, element.mechanism
+    clauses = [f"degrees of freedom: {analysis.mobility}"]
+    driven = len(mechanism.prescribed)
+    if rows := analysis.rows - driven:
+        repeated = f", of which {analysis.redundant} follow from the others" if analysis.redundant else ""
+        clauses[0] += f"; loops add {rows} constraints{repeated}"
+    if driven:
+        clauses[0] += f"; prescribed motions: {', '.join(joint.name for joint, _, _ in mechanism.prescribed)}"
+    if analysis.singular_start:
         clauses.append("the start is a singular pose: constraints lose rank there, and the motion may go several ways")
     moving = element.start
     for body in mechanism.bodies[:_BODIES]:
@@ -42,8 +45,10 @@ def start_facts(element: MechanismElement) -> Sequence[str]:
     if more := len(mechanism.bodies) - _BODIES:
         clauses += [f"and {more} more bodies"] if more > 0 else []
     clauses += _start_velocities(element)
+    bound = element.step_bound(())
+    clauses += [bound] if bound else []
     touching = touches(mechanism, Tree(mechanism).at(*mechanism.start()))
-    gaps = [f"{pair.name} {each.gap:.4g} m" for pair, each in zip(mechanism.contacts, touching, strict=True)]
+    gaps = [f"{pair.name} {touch.gap:.4g} m" for pair, touch in zip(mechanism.contacts, touching, strict=True)]
     clauses += [f"gaps of pairs: {', '.join(gaps)}"] if gaps else []
     return [*clauses, FRAMES]
 
@@ -55,12 +60,12 @@ def _start_velocities(element: MechanismElement) -> list[str]:
         if joint.kind not in {"free", "spherical"} or not any(joint.v0):
             continue
         linear = f"velocity {vector(joint.v0[:3])} m/s, " if joint.kind == "free" else ""
-        given = f"{linear}angular velocity {vector(joint.v0[-3:])} rad/s along the axes of {joint.child}"
+        velocity = f"{linear}angular velocity {vector(joint.v0[-3:])} rad/s along the axes of {joint.child}"
         number = element.mechanism.body_index[joint.child]
         moving = [f"{vector(element.start.w_WB[0, number])} rad/s"]
         if linear:
             moving.insert(0, f"{vector(element.start.v_WB[0, number])} m/s")
-        sentences.append(f"{joint.name}: v0 is {given}; along the world's: {' and '.join(moving)}")
+        sentences.append(f"{joint.name}: v0 is {velocity}; along the world's: {' and '.join(moving)}")
     return sentences[:_BODIES]
 
 
@@ -68,7 +73,7 @@ def pose(mechanism: Mechanism, sample: MechanismSample) -> str:
     """Coordinates of the first joints with one coordinate each; empty without such joints."""
     arrays = (sample.p_WB, sample.v_WB, sample.w_WB, sample.q_WB)
     placed = Placed(mechanism, np.zeros(1), *(np.asarray(item)[None] for item in arrays))
-    found = placed.coordinates()
+    coordinates = placed.coordinates()
     units = {joint.name: "rad" if joint.kind == "revolute" else "m" for joint in mechanism.joints}
-    words = [f"q.{name} = {float(q[0]):.4g} {units[name]}" for name, (q, _) in list(found.items())[:_JOINTS]]
-    return ", ".join(words) + (", …" if len(found) > _JOINTS else "")
+    words = [f"q.{name} = {float(q[0]):.4g} {units[name]}" for name, (q, _) in list(coordinates.items())[:_JOINTS]]
+    return ", ".join(words) + (", …" if len(coordinates) > _JOINTS else "")

@@ -13,7 +13,7 @@ from proofroll.core.arrays import FloatArray
 from proofroll.core.bounds import require_bounds
 from proofroll.core.errors import InputError
 from proofroll.elements.ball_on_surface.surfaces.declared import Declared
-from proofroll.elements.ball_on_surface.surfaces.formula import sqrt
+from proofroll.elements.mechanism.contacts.walls.of_revolution import bowl_distance
 
 
 @dataclass(frozen=True)
@@ -60,7 +60,7 @@ class Bowl(Declared):
 
     def distance(self, x: Any, y: Any, z: Any) -> Any:
         """See :class:`Declared`."""
-        return self.radius - sqrt(x * x + y * y + z * z)
+        return bowl_distance(self.radius, x, y, z)
 
     def locate(self, p_WB: npt.ArrayLike) -> FloatArray:
         """See :class:`Surface`."""

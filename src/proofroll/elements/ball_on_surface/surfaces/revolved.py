@@ -15,6 +15,7 @@ from proofroll.core.bounds import OutOfBounds, require_bounds
 from proofroll.core.errors import InputError
 from proofroll.elements.ball_on_surface.surfaces.declared import Declared
 from proofroll.elements.ball_on_surface.surfaces.formula import Jet, cos, sin, sqrt, variables
+from proofroll.elements.mechanism.contacts.walls.of_revolution import cone_distance, ring_distance
 
 # Number of start points along a curve for the search of the nearest point, of Newton steps, and relative tolerance.
 _PLACES, _NEWTON, _ROUND_OFF = 65, 30, 1e-15
@@ -188,7 +189,7 @@ class Cone(Revolved):
 
     def away(self, r: Any, z: Any) -> Any:
         """See :class:`Revolved`."""
-        return (z - self.tip) * math.cos(self.slope) - r * math.sin(self.slope)
+        return cone_distance(self.slope, r, z - self.tip)
 
     def along(self, r: FloatArray, z: FloatArray) -> FloatArray:
         """See :class:`Revolved`."""
@@ -235,8 +236,7 @@ class Torus(Revolved):
 
     def away(self, r: Any, z: Any) -> Any:
         """See :class:`Revolved`."""
-        across = r - self.ring_radius
-        return sqrt(across * across + z * z) - self.wire_radius
+        return ring_distance(self.ring_radius, self.wire_radius, r, z)
 
     def along(self, r: FloatArray, z: FloatArray) -> FloatArray:
         """See :class:`Revolved`."""

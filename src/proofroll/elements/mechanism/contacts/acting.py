@@ -6,13 +6,14 @@ from typing import Literal, NamedTuple, Protocol
 import numpy as np
 
 from proofroll.elements.mechanism.contacts.touching import Touching
-from proofroll.elements.mechanism.rotations import Array
+from proofroll.elements.mechanism.rotations import Array, frame_of_axis
 
 Direction = tuple[float, float, float]
 # Slip speed in the plane below which the direction of slip is not well known; the rest of the slip is followed as a
 # straight line [m/s; in the truth in natural units].
 FAINT = 1e-8
 _LINE = 1e-9  # response across over response along, below which a contact can slide along a line only
+EXACT = 1e-16  # violation of what holds, in natural units, that is only round-off
 _TURNED = 0.5  # least length of the first direction of a slip after projection on a surface that has turned since
 
 
@@ -47,6 +48,18 @@ def slip_velocity(found: Touching) -> Array:
     return np.asarray(found.slide - found.normal * (found.normal @ found.slide))
 
 
+def forbidding_rows(mode: ContactMode, touching: Sequence[Touching], J: Array, presses: Sequence[bool]) -> Array:
+    """Rows by which closed contacts forbid velocities, (rows, velocities), from the derivatives of the slides by these.
+
+    One that sticks forbids all three components of its slide; one that ``presses`` and slips, that along its normal.
+    """
+    rows = [np.zeros((0, J.shape[-1]))]
+    for own, found, of_slide, pressing in zip(mode, touching, J, presses, strict=True):
+        if own.kind == "stick" or (own.kind == "slip" and pressing):
+            rows.append(of_slide if own.kind == "stick" else found.normal[None] @ of_slide)
+    return np.concatenate(rows)
+
+
 def heading_of(own: Acting, found: Touching) -> Array:
     """Unit direction of a slip, shape (3,); friction acts against it.
 
@@ -75,15 +88,16 @@ def turned(own: Acting, found: Touching, G: Array) -> Acting:
     values, vectors = np.linalg.eigh(across @ G @ across)
     if values[-1] <= _LINE * np.trace(G):  # it slides along no line at all
         return own
-    line = _direction(vectors[:, -1] if vectors[:, -1] @ own.along >= 0 else -vectors[:, -1])
+    line = direction_of(vectors[:, -1] if vectors[:, -1] @ own.along >= 0 else -vectors[:, -1])
     return own._replace(along=line, heading=own.heading and line)
 
 
 def held_directions(own: Acting, found: Touching, presses: bool) -> Array:
     """Directions in which a contact permits no motion, (directions, 3).
 
-    A slip holds its normal, if it ``presses`` (dry friction of a joint does not). A sticking contact holds all
-    directions, or its normal and its line if it can slide along one line only.
+    A slip holds its normal, if it ``presses`` (dry friction of a joint and of turning do not). A sticking contact holds
+    all directions, those of its surface if it does not press, or its normal and its line if it can slide along one line
+    only.
     """
     if own.kind == "open":
         return np.zeros((0, 3))
@@ -91,7 +105,7 @@ def held_directions(own: Acting, found: Touching, presses: bool) -> Array:
     if own.kind == "slip":
         return normal
     if own.along is None:
-        return np.eye(3)
+        return np.eye(3) if presses else frame_of_axis(found.normal)[:, :2].T
     line = np.array(own.along) - found.normal * (found.normal @ np.array(own.along))
     return np.vstack([normal, line / np.linalg.norm(line)])
 
@@ -112,11 +126,11 @@ def first_mode(kind: Literal["open", "slip", "stick"], frame: Array, heading: Ar
     line = vectors[:, 1] if values[0] <= _LINE * values[1] else None
     if line is not None and line @ heading < 0:
         line = -line
-    along = None if line is None else _direction(frame[:, 1:] @ line)
+    along = None if line is None else direction_of(frame[:, 1:] @ line)
     if kind == "stick":
         return Acting("stick", along)
     size = float(np.linalg.norm(heading)) or 1.0
-    return Acting("slip", along, _direction(frame[:, 1:] @ (heading / size)))
+    return Acting("slip", along, direction_of(frame[:, 1:] @ (heading / size)))
 
 
 def following(own: Acting, way: Array, still: bool, least: float) -> Acting:
@@ -133,9 +147,9 @@ def following(own: Acting, way: Array, still: bool, least: float) -> Acting:
         return own
     if own.along is not None:
         line = np.array(own.along)
-        heading = _direction(line if way @ line >= 0 else -line)
+        heading = direction_of(line if way @ line >= 0 else -line)
         return Acting("slip", heading, heading)
-    return Acting("slip", None, _direction(way / (speed or 1.0)))
+    return Acting("slip", None, direction_of(way / (speed or 1.0)))
 
 
 class _Named(Protocol):
@@ -145,13 +159,21 @@ class _Named(Protocol):
     @property
     def bound(self) -> float: ...
 
+    @property
+    def pressed_by(self) -> int | None: ...
+
 
 def changes(
     contacts: Sequence[_Named], before: ContactMode, after: ContactMode, stands: bool
 ) -> tuple[tuple[str, str], ...]:
-    """Kind and contact of each event of a change of mode; ``stands``: nothing moves any more."""
+    """Kind and contact of each event of a change of mode; ``stands``: nothing moves any more.
+
+    Friction against turning changes without events.
+    """
     found: list[tuple[str, str]] = []
     for contact, was, now in zip(contacts, before, after, strict=True):
+        if contact.pressed_by is not None:
+            continue
         if now.kind == "stick" and was.kind != "stick":
             found.append(("rest" if stands and not contact.bound else "stick", contact.name))
         elif was.kind == "stick" and now.kind == "slip":
@@ -167,6 +189,23 @@ def _opposite(was: Acting, now: Acting) -> bool:
     return was.along is not None and now.heading is not None and float(np.dot(was.along, now.heading)) < 0
 
 
-def _direction(vector: Array) -> Direction:
+def direction_of(vector: Array) -> Direction:
+    """A vector as plain floats."""
     x, y, z = vector.tolist()
     return x, y, z
+
+
+def headed(own: Acting, touch: Touching) -> Acting:
+    """Mode of a contact with the present direction of its slip in the plane, however slow."""
+    slip = slip_velocity(touch)
+    if own.kind != "slip" or own.along is not None or not slip.any():
+        return own
+    x, y, z = (slip / np.linalg.norm(slip)).tolist()
+    return own._replace(heading=(x, y, z))
+
+
+def modes_of(closed: Sequence[bool], still: Sequence[bool]) -> ContactMode:
+    """Modes of contacts: stick if closed and still, slip if only closed, else open."""
+    return tuple(
+        Acting("stick" if stands else "slip" if shut else "open") for shut, stands in zip(closed, still, strict=True)
+    )

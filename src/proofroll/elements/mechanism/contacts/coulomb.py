@@ -7,39 +7,47 @@ bound of its own; it acts along the coordinate alone.
 """
 
 from collections.abc import Sequence
-from typing import Literal
+from typing import Any
 
 import numpy as np
 
-from proofroll.core.errors import NotUnique, Refused
+from proofroll.core.errors import Refused
 from proofroll.elements.mechanism.analysis import RANK
 from proofroll.elements.mechanism.contacts.lemke import lemke
+from proofroll.elements.mechanism.contacts.one_contact import AT_BOUND, Outcome, force_of_one, rubbing
 from proofroll.elements.mechanism.rotations import Array
 
-Outcome = Literal["open", "stick", "slip"]
 _SWEEPS = 1000
 _SETTLED = 1e-12  # largest change in the last sweep, relative to the largest force
 _RESTS = 1e-10  # motion of a contact that counts as none, relative to the loads
-# Margin, relative to friction's bound, above which a contact slides: closer to the bound round-off decides, and no
-# direction of slip would be found. :func:`robust_forces` tells if an outcome depends on a change within the accuracy
-# of the parameters.
-_AT_BOUND = 1e-9
 # Singular value of normal responses, and motion by a split of a load, relative to the largest, that count as zero.
 _SHARES = 1e-9
 # Relative change of loads and friction with which an outcome is tried on both sides; an outcome that changes is not
 # unique. Each further contact gets an extra 0.382 of it: equal changes would cancel between two walls.
 _NUDGE, _APART = 1e-6, 0.382
-# Angles between which the direction of slip is searched; the offset keeps the axes inside an interval.
-_DIRECTIONS = np.linspace(-np.pi, np.pi, 73) + 0.01
-_WAYS = np.array([np.cos(_DIRECTIONS), np.sin(_DIRECTIONS)])
 
 
-def torn(name: str, time: float) -> NotUnique:
-    """Error of Painlevé's paradox at a contact, from a time on [s]."""
-    return NotUnique(
-        f"{name} would not press but tear from t = {time:.6g} s on: its friction makes what follows not unique or not "
-        "possible (Painlevé)"
+def largest_friction(friction: Any, normal: Any) -> Any:
+    """Largest friction by coefficients, which may be infinite, and normal forces; 0 without a normal force."""
+    unbounded = np.isinf(friction)
+    return np.where(
+        unbounded, np.where(np.greater(normal, 0), np.inf, 0.0), np.where(unbounded, 0.0, friction) * normal
     )
+
+
+def returning(slides: Array, restitution: Array, sideways: Array) -> Array:
+    """Slides before an impact plus what restitution returns of them, (3 contacts,), where a contact closes.
+
+    Args:
+        slides: first components along the normals, (3 contacts,).
+        restitution: of the normal speeds.
+        sideways: of the slips.
+    """
+    parts = slides.reshape(-1, 3).copy()
+    closes = parts[:, 0] < 0
+    parts[closes, 0] *= 1 + restitution[closes]
+    parts[closes, 1:] *= 1 + sideways[closes, None]
+    return np.asarray(parts.ravel())
 
 
 def contact_forces(
@@ -51,29 +59,40 @@ def contact_forces(
     bounds: Array | None = None,
     time: float = 0.0,
     near: float = 0.0,
+    static: Array | None = None,
+    guess: Sequence[Outcome] | None = None,
+    pressed_by: Sequence[int | None] | None = None,
 ) -> tuple[Array, list[Outcome]]:
     """Forces of all contacts, shape (contacts, 3), and outcome of each contact.
 
     Args:
         G: (3 contacts, 3 contacts).
         c: (3 contacts).
-        friction: coefficient of each.
+        friction: coefficient of each while it slips.
         sliding: unit vector of slip along the surface, shape (2,), or None for a contact that does not slide yet;
             friction acts against it.
         names: for messages.
         bounds: largest friction of each contact without a normal force; 0, or None: a contact with one.
         time: for messages [s].
         near: part of the loads and of friction's bound that is round-off where all contacts stick.
+        static: coefficient of each while it sticks; None: as while it slips.
+        guess: outcomes whose forces the sweeps start from; None: all press that can.
+        pressed_by: place of the contact whose normal force bounds the moment of a friction against turning; None: an
+            own normal force, or a bound.
 
     Raises:
         NotUnique: the force of a contact is not unique.
         Refused: no answer is found.
     """
-    f, done = np.zeros(len(c)), list[Outcome](["open"] * len(friction))
+    done = list[Outcome](["open"] * len(friction))
     bounds = np.zeros(len(friction)) if bounds is None else bounds
+    pressing = [None] * len(friction) if pressed_by is None else pressed_by
+    turns = any(by is not None for by in pressing)
+    f = np.zeros(len(c)) if turns else _guessed(G, c, friction, sliding, bounds, guess)
+    static = friction if static is None else static
     least = _RESTS * float(np.abs(c).max())
     if len(friction) > 1 and friction.all() and not bounds.any() and all(slip is None for slip in sliding):
-        held = _all_held(G, c, friction, max(near, _RESTS), max(near, _AT_BOUND))
+        held = _all_held(G, c, static, max(near, _RESTS), max(near, AT_BOUND), pressing)
         if held is not None:
             return held.reshape(-1, 3), ["stick"] * len(friction)
     for _ in range(_SWEEPS):
@@ -81,26 +100,64 @@ def contact_forces(
         for k, mu in enumerate(friction):
             own = slice(3 * k, 3 * k + 3)
             free = c[own] + G[own] @ f - G[own, own] @ f[own]
-            if bounds[k]:
-                f[own], done[k] = _rubbing(G[own, own], free, bounds[k], sliding[k])
+            by = pressing[k]
+            bound = bounds[k] if by is None else mu * max(float(f[3 * by]), 0.0)
+            if by is not None and not bound:
+                f[own], done[k] = 0.0, "open"
+            elif bound:
+                f[own], done[k] = rubbing(G[own, own], free, bound, sliding[k])
             else:
-                f[own], done[k] = _one(G[own, own], free, mu, sliding[k], (names[k], time), least)
-        if np.abs(f - before).max() <= _SETTLED * np.abs(f).max():
+                f[own], done[k] = force_of_one(G[own, own], free, (mu, static[k]), sliding[k], (names[k], time), least)
+        if len(friction) == 1 or np.abs(f - before).max() <= _SETTLED * np.abs(f).max():
             w = (c + G @ f).reshape(-1, 3)
-            for k in _idle(G, w, friction, sliding, done, least):
+            for k in [] if turns else _idle(G, w, friction, sliding, done, least):
                 done[k] = "slip"
             for k, along in enumerate(sliding):
                 rubs = friction[k] or bounds[k]
                 if done[k] == "slip" and along is None and rubs and np.linalg.norm(w[k, 1:]) <= least:
                     done[k] = "stick"  # one of several holding contacts may reach its bound while nothing moves
             return f.reshape(-1, 3), done
-    if not bounds.any() and all(along is not None or not mu for along, mu in zip(sliding, friction, strict=True)):
-        ways = [np.zeros(2) if along is None else along for along in sliding]
-        pressed = _all_sliding(G, c, friction, ways)
-        if pressed is not None:
-            leaving = (c + G @ pressed.ravel())[::3] > least  # one that shares a load may carry none of it, and stay
-            return pressed, ["open" if leaves else "slip" for leaves in leaving]
+    together = None if bounds.any() or turns else _together(G, c, friction, sliding, least)
+    if together is not None:
+        return together
     raise Refused(f"forces of the contacts {', '.join(names)} at t = {time:.6g} s are not found in {_SWEEPS} sweeps")
+
+
+def _guessed(
+    G: Array,
+    c: Array,
+    friction: Array,
+    sliding: Sequence[Array | None],
+    bounds: Array,
+    guess: Sequence[Outcome] | None,
+) -> Array:
+    """Forces for a guess of outcomes, from which sweeps start; zero where a direction of slip is not known."""
+    rows, along, f = list[int](), list[Array](), np.zeros(len(c))
+    for k, slip in enumerate(sliding):
+        own = "stick" if slip is None else "slip"
+        if guess is not None:
+            own = guess[k]
+        if own == "open":
+            continue
+        if own == "stick" and slip is None and (friction[k] or bounds[k]):
+            ways = [1, 2] if bounds[k] else [0, 1, 2]
+            rows += [3 * k + way for way in ways]
+            along += [np.eye(len(c))[3 * k + way] for way in ways]
+        elif slip is None and (friction[k] or bounds[k]):
+            return np.zeros(len(c))
+        elif bounds[k]:
+            assert slip is not None
+            f[3 * k + 1 : 3 * k + 3] = -bounds[k] * slip
+        else:
+            push = np.zeros(len(c))
+            push[3 * k : 3 * k + 3] = [1.0, *(-friction[k] * (np.zeros(2) if slip is None else slip))]
+            rows.append(3 * k)
+            along.append(push)
+    if not rows:
+        return f
+    D = np.array(along).T
+    found = f + D @ np.linalg.lstsq((G @ D)[rows], -(c + G @ f)[rows], rcond=_SHARES)[0]
+    return np.asarray(found) if (found[::3] >= 0).all() else np.zeros(len(c))
 
 
 def _all_sliding(G: Array, c: Array, friction: Array, ways: Sequence[Array]) -> Array | None:
@@ -114,6 +171,43 @@ def _all_sliding(G: Array, c: Array, friction: Array, ways: Sequence[Array]) -> 
         pushes[3 * k : 3 * k + 3, k] = push
     normals = lemke((G @ pushes)[::3], c[::3])
     return None if normals is None else normals[:, None] * along
+
+
+def _together(
+    G: Array, c: Array, friction: Array, sliding: Sequence[Array | None], least: float
+) -> tuple[Array, list[Outcome]] | None:
+    """Forces and outcomes of contacts that all slide already, or set off in one direction; None: neither."""
+    if all(along is not None or not mu for along, mu in zip(sliding, friction, strict=True)):
+        ways = [np.zeros(2) if along is None else along for along in sliding]
+        pressed = _all_sliding(G, c, friction, ways)
+        if pressed is None:
+            return None
+        leaving = (c + G @ pressed.ravel())[::3] > least  # one that shares a load may carry none of it, and stay
+        return pressed, ["open" if leaves else "slip" for leaves in leaving]
+    if np.isfinite(friction).all() and all(along is None for along in sliding):
+        pressed = _all_setting_off(G, c, friction, least)
+        return None if pressed is None else (pressed, ["slip"] * len(friction))
+    return None
+
+
+def _all_setting_off(G: Array, c: Array, friction: Array, least: float) -> Array | None:
+    """Forces of contacts at rest that all set off in the direction that they would have without friction; None: not so.
+
+    Sweeps converge slowly, or not at all, where feet of one body share friction at its bound.
+    """
+    free = c.reshape(-1, 3)[:, 1:]
+    speeds = np.linalg.norm(free, axis=1)
+    if speeds.min() <= least:
+        return None
+    ways = free / speeds[:, None]
+    pressed = _all_sliding(G, c, friction, list(ways))
+    if pressed is None:
+        return None
+    moves = (c + G @ pressed.ravel()).reshape(-1, 3)
+    ahead = np.einsum("ki,ki->k", moves[:, 1:], ways)
+    aside = moves[:, 1:] - ahead[:, None] * ways
+    sets_off = ahead.min() > 0 and np.abs(aside).max() <= least and np.abs(moves[:, 0]).max() <= least
+    return pressed if sets_off else None
 
 
 def _idle(
@@ -140,7 +234,8 @@ def _idle(
         speed = float(np.linalg.norm(w[k, 1:]))
         way = w[k, 1:] / speed if speed > least else np.zeros(2)
         along = sliding[k]
-        pushes[3 * k : 3 * k + 3, place] = [1.0, *(-friction[k] * (way if along is None else along))]
+        mu = friction[k] if np.isfinite(friction[k]) else 0.0  # what never slips has no friction of a slip
+        pushes[3 * k : 3 * k + 3, place] = [1.0, *(-mu * (way if along is None else along))]
     normals = [3 * k for k in closed]
     _, sizes, ways = np.linalg.svd(G[np.ix_(normals, normals)])
     splits = ways[(sizes > _SHARES * sizes[0]).sum() :]
@@ -149,14 +244,17 @@ def _idle(
     return [k for k in idle if share[closed.index(k)]] if spread <= _SHARES * np.abs(G).max() else []
 
 
-def _all_held(G: Array, c: Array, friction: Array, rests: float, near: float) -> Array | None:
+def _all_held(
+    G: Array, c: Array, friction: Array, rests: float, near: float, pressing: Sequence[int | None]
+) -> Array | None:
     """Least forces that let every contact stick, if they press within the cones of friction; else None."""
     held = np.asarray(-np.linalg.pinv(G, 1e-12, hermitian=True) @ c, dtype=np.float64)
     N, T = held[::3], np.linalg.norm(held.reshape(-1, 3)[:, 1:], axis=1)
+    N = N[[k if by is None else by for k, by in enumerate(pressing)]]
     sticks = (
         np.abs(c + G @ held).max() <= rests * np.abs(c).max()
         and (N > 0).all()
-        and (friction * N * (1 + near) >= T).all()
+        and (largest_friction(friction, N) * (1 + near) >= T).all()
     )
     return held if sticks else None
 
@@ -170,13 +268,16 @@ def robust_forces(
     bounds: Array | None = None,
     time: float = 0.0,
     least: float = 0.0,
+    static: Array | None = None,
+    pressed_by: Sequence[int | None] | None = None,
 ) -> tuple[Array, list[Outcome], bool]:
     """Solution as of :func:`contact_forces`, and True if slightly changed pressure and friction give the same outcomes.
 
     A contact whose force is at most a ``least`` part of the largest force counts as open.
     """
     bounds = np.zeros(len(friction)) if bounds is None else bounds
-    force, done = contact_forces(G, c, friction, sliding, names, bounds, time)
+    static = friction if static is None else static
+    force, done = contact_forces(G, c, friction, sliding, names, bounds, time, static=static, pressed_by=pressed_by)
     own = np.diag(G)[::3]
     # as a force at each contact, which the holds of the other contacts balance
     lift = np.where(own > 0, (1 + _APART * np.arange(len(own))) / np.where(own > 0, own, 1), 0.0)
@@ -188,75 +289,24 @@ def robust_forces(
 
     nominal = outcome(force, done)
     same = all(
-        outcome(*contact_forces(G, c + side * nudge, friction * part, sliding, names, bounds * part, time)) == nominal
+        outcome(
+            *contact_forces(
+                G,
+                c + side * nudge,
+                friction * part,
+                sliding,
+                names,
+                bounds * part,
+                time,
+                static=static * part,
+                guess=done,
+                pressed_by=pressed_by,
+            )
+        )
+        == nominal
         for side, part in ((1.0, 1 - _NUDGE), (-1.0, 1 + _NUDGE))
     )
     return force, done, same
-
-
-def _rubbing(G: Array, c: Array, bound: float, sliding: Array | None) -> tuple[Array, Outcome]:
-    """Force and outcome of friction without a normal, along a line, while all other forces stay."""
-    if sliding is not None:
-        return np.array([0.0, *(-bound * sliding)]), "slip"
-    held = -np.linalg.pinv(G, 1e-12, hermitian=True) @ c
-    size = float(np.linalg.norm(held))
-    return (held, "stick") if size <= bound * (1 + _AT_BOUND) else (held * (bound / size), "slip")
-
-
-def _one(
-    G: Array, c: Array, mu: float, sliding: Array | None, where: tuple[str, float], least: float
-) -> tuple[Array, Outcome]:
-    """Force and outcome of one contact while the other forces stay; a motion up to ``least`` counts as none.
-
-    ``where``: its name and the time [s], for messages.
-    """
-    if c[0] >= 0:
-        return np.zeros(3), "open"
-    if sliding is not None or not mu:
-        return _pressing(G, c, mu, np.zeros(2) if sliding is None else sliding, where), "slip"
-    from scipy.optimize import brentq  # half a second, which most uses of a mechanism do not need
-
-    held = -np.linalg.pinv(G, 1e-12, hermitian=True) @ c
-    rests = float(np.abs(c + G @ held).max()) <= least  # joints may let a contact that rebounds do nothing but slide
-    if rests and np.linalg.norm(held[1:]) <= mu * held[0] * (1 + _AT_BOUND):
-        return held, "stick"
-
-    def across(angle: float) -> float:
-        """Component of the slip perpendicular to the direction that friction opposes; zero at the solution."""
-        t = np.array([np.cos(angle), np.sin(angle)])
-        w = c + G @ _pressing(G, c, mu, t, where)
-        return float(w[2] * t[0] - w[1] * t[1])
-
-    values = _across(G, c, mu, where)
-    pairs = zip(_DIRECTIONS[:-1], _DIRECTIONS[1:], values[:-1], values[1:], strict=True)
-    for low, high, at_low, at_high in pairs:
-        if at_low * at_high > 0:
-            continue
-        angle = low if at_low == 0 else brentq(across, low, high, xtol=1e-15, rtol=1e-15)
-        t = np.array([np.cos(angle), np.sin(angle)])
-        f = _pressing(G, c, mu, t, where)
-        if (c + G @ f)[1:] @ t > 0:
-            return f, "slip"
-    raise Refused("no direction of slip at {} at t = {:.6g} s is against its friction".format(*where))
-
-
-def _across(G: Array, c: Array, mu: float, where: tuple[str, float]) -> Array:
-    """Component of the slip perpendicular to what friction opposes, for each of the searched directions."""
-    along = np.vstack([np.ones(len(_DIRECTIONS)), -mu * _WAYS])
-    response = G[0] @ along
-    if response.min() <= 0:
-        raise torn(*where)
-    w = c[1:, None] + G[1:] @ (along * (-c[0] / response))
-    return np.asarray(w[1] * _WAYS[0] - w[0] * _WAYS[1])
-
-
-def _pressing(G: Array, c: Array, mu: float, t: Array, where: tuple[str, float]) -> Array:
-    """Force of a contact that slides along t with its gap kept closed. Raises NotUnique in Painlevé's paradox."""
-    along = np.array([1.0, *(-mu * t)])
-    response = float(G[0] @ along)
-    if response <= 0:
-        raise torn(*where)
-    return np.asarray(-c[0] / response * along)
 
 
 def least_motion_for(W: Array, K: Array, violation: Array) -> Array:

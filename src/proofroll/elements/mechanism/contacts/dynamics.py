@@ -4,140 +4,98 @@ Between events each contact is ``open``, ``slip``s (one row, friction against th
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
+from proofroll.core.last_results import LastResults
 from proofroll.elements.mechanism.analysis import RANK
 from proofroll.elements.mechanism.contacts.acting import (
+    EXACT,
     OPEN,
     Acting,
     ContactMode,
     first_mode,
+    forbidding_rows,
     heading_of,
     held_directions,
     turned,
 )
-from proofroll.elements.mechanism.contacts.coulomb import contact_forces, least_motion_for, robust_forces
+from proofroll.elements.mechanism.contacts.coulomb import contact_forces, least_motion_for, returning, robust_forces
 from proofroll.elements.mechanism.contacts.geometry import BodyContact, pair_sums
 from proofroll.elements.mechanism.contacts.joint_laws import (
     JointContact,
     joint_contacts,
     mode_of_joints,
-    refuse_rubbing_stops,
+    off_stops,
 )
 from proofroll.elements.mechanism.contacts.sequences import groups_of, ordered, refuse_spread, sequences
+from proofroll.elements.mechanism.contacts.slide_rows import slide_row, turning_row
 from proofroll.elements.mechanism.contacts.start import STILL, closed_and_still, natural_scale, touches
+from proofroll.elements.mechanism.contacts.states import ContactsNow, ContactSolution
 from proofroll.elements.mechanism.contacts.touching import Touching, lying
-from proofroll.elements.mechanism.joint_coordinates import JointCoordinates, Solution
-from proofroll.elements.mechanism.kinematics import BodyMotion
+from proofroll.elements.mechanism.contacts.turning import (
+    TurningFriction,
+    moments_by_pressing,
+    pressed_by,
+    shut_by_pressing,
+    turning_frictions,
+)
+from proofroll.elements.mechanism.joint_coordinates import JointCoordinates
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.named_forces import named_forces
-from proofroll.elements.mechanism.rotations import Array, cross, frame_of_axis, skew
+from proofroll.elements.mechanism.rotations import Array, cross, frame_of_axis
 
 # Impulse, relative to the largest of an impact, that counts as none; a pressure nudged by 1e-6 makes such impulses.
 _NO_IMPULSE = 1e-4
 _ROUND_OFF = 1e-13  # of slides in a sequence of impacts, relative to the largest
 
 
-@dataclass(frozen=True)
-class ContactsNow:
-    """Kinematics and free accelerations of the contacts at one state, independent of the mode.
-
-    Attributes:
-        solution: of the mechanism without forces of contact.
-        W: accelerations caused by unit forces along the velocities, (nv, nv).
-        touching: geometry and rates of each contact.
-        J: derivative of each slide by the velocities, (contacts, 3, nv).
-        bias: rate of each slide where v̇ = 0, (contacts, 3).
-    """
-
-    solution: Solution
-    W: Array
-    touching: tuple[Touching, ...]
-    J: Array
-    bias: Array
-
-
-@dataclass(frozen=True)
-class ContactSolution:
-    """Accelerations and forces in a mode.
-
-    Attributes:
-        state: state of the contacts that they belong to.
-        mode: the mode, with lines of contacts as they lie now.
-        acceleration: v̇, (nv).
-        force: on body a of each contact [N], (contacts, 3); the smallest where they are not determinate.
-        determinate: True for each determinate component of ``force``, (contacts, 3).
-        determinate_sums: the same of the sum of forces of each pair with several contacts, (such pairs, 3).
-        slide_rate: rate of each slide [m/s²], (contacts, 3).
-        response: Painlevé's measure, above 0 in a possible motion: response to normal forces with friction over the
-            response without.
-        splits: ways to split a load that contacts share: changes of the normal forces, (contacts, ways).
-        spread: change of v̇ with these, the whole of unit length.
-    """
-
-    state: ContactsNow
-    mode: ContactMode
-    acceleration: Array
-    force: Array
-    determinate: Any
-    determinate_sums: Any
-    slide_rate: Array
-    response: float
-    splits: Array
-    spread: float
-
-    def lasts(self, mode: ContactMode) -> float:
-        """Time until an open contact closes at constant acceleration [s]; infinite: never."""
-        times = [np.inf]
-        for own, touch, rate in zip(mode, self.state.touching, self.slide_rate, strict=True):
-            if own.kind == "open":
-                opening = touch.normal @ rate + touch.normal_rate @ touch.slide
-                roots = np.roots([opening / 2, touch.normal @ touch.slide, touch.gap])
-                times += [root.real for root in roots if root.imag == 0 < root.real]
-        return min(times)
-
-
 class ContactDynamics:
-    """A mechanism in the coordinates of its tree with its contacts: those between bodies, then laws of joints."""
+    """A mechanism in the coordinates of its tree with its contacts: of bodies, laws of joints, friction of turning."""
 
     def __init__(self, mechanism: Mechanism) -> None:
         self.mechanism, self.equations = mechanism, JointCoordinates(mechanism)
         self._of_joints = joint_contacts(self.equations.switched)
-        self.contacts: tuple[BodyContact | JointContact, ...] = (*mechanism.contacts, *self._of_joints)
+        self._turning = turning_frictions(mechanism.contacts)
+        self.contacts: tuple[BodyContact | JointContact | TurningFriction, ...] = (
+            *mechanism.contacts,
+            *self._of_joints,
+            *self._turning,
+        )
         self.friction = np.array([contact.friction for contact in self.contacts])
+        self._static = np.array([contact.static for contact in self.contacts])
         self._bounds = np.array([contact.bound for contact in self.contacts])
-        self.sums = np.pad(pair_sums(mechanism.contacts), ((0, 0), (0, len(self._of_joints))))
+        others = len(self.contacts) - len(mechanism.contacts)
+        self.sums = np.pad(pair_sums(mechanism.contacts), ((0, 0), (0, others)))
         index = mechanism.body_index
         self._bodies = [(index[contact.body_a], index[contact.body_b]) for contact in mechanism.contacts]
+        self._last = LastResults[tuple[bytes, bytes, float], ContactsNow](4)
 
     def at(self, q: Array, v: Array, time: float = 0.0) -> ContactsNow:
         """Kinematics and free accelerations for coordinates (nq) and velocities (nv) at a time [s]."""
+        return self._last.of((q.tobytes(), v.tobytes(), time), lambda: self._at(q.copy(), v.copy(), time))
+
+    def _at(self, q: Array, v: Array, time: float) -> ContactsNow:
         found = self.equations.solve(q, v, (), time=time)
         W: Array = np.asarray(np.linalg.inv(self.equations.inertial(found.motion)[1]), dtype=np.float64)
         if found.split is not None:
             W = W - found.split[0] @ found.split[0].T
         touching = touches(self.mechanism, found.motion)
-        parts = [self._row(found.motion, k, each) for k, each in enumerate(touching)]
+        parts = [slide_row(found.motion, self._bodies[k], each) for k, each in enumerate(touching)]
         for contact in self._of_joints:
             at = contact.joint.velocity
             touching += (contact.touching(float(q[contact.joint.coordinate]), float(v[at])),)
             parts.append((np.outer(contact.direction, np.eye(len(v))[at]), np.zeros(3)))
-        J, bias = (np.array(part) for part in zip(*parts, strict=True))
+        for friction in self._turning:
+            there = touching[friction.pressed_by]
+            turning, J, rate = turning_row(found.motion, self._bodies[friction.pressed_by])
+            touching += (friction.touching(there, turning),)
+            part = friction.part(there.normal)
+            parts.append((part @ J, part @ rate + friction.part_rate(there) @ turning))
+        J = np.array([row for row, _ in parts]).reshape(-1, 3, len(v))
+        bias = np.array([rate for _, rate in parts]).reshape(-1, 3)
         return ContactsNow(found, W, touching, J, bias)
-
-    def _row(self, motion: BodyMotion, k: int, found: Touching) -> tuple[Array, Array]:
-        """Derivative of a contact's slide by the velocities, (3, nv), and rate of the slide at v̇ = 0, (3,)."""
-        J, bias = np.zeros((3, motion.J.shape[2])), np.zeros(3)
-        for body, sign in zip(self._bodies[k], (1.0, -1.0), strict=True):
-            arm, w = found.place - motion.p_WB[body], motion.w_WB[body]
-            J += sign * (motion.J[body, :3] - skew(arm) @ motion.J[body, 3:])
-            turning = motion.bias[body, :3] + cross(motion.bias[body, 3:], arm)
-            # the point of contact moves over the body, to places with other velocities
-            bias += sign * (turning + cross(w, found.place_rate - motion.v_WB[body]))
-        return J, bias
 
     def solve(self, q: Array, v: Array, mode: ContactMode, time: float = 0.0) -> ContactSolution:
         """Accelerations and forces while each contact keeps the given mode, at a time [s].
@@ -155,8 +113,10 @@ class ContactDynamics:
         )
         rows, bias, along, owner = [np.zeros((0, state.W.shape[0]))], [np.zeros(0)], list[Array](), list[int]()
         force, known = np.zeros((len(mode), 3)), np.ones((len(mode), 3), dtype=bool)
+        turning = list[tuple[int, int, Array]]()
         for k, (own, found) in enumerate(zip(mode, state.touching, strict=True)):
-            directions = held_directions(own, found, presses=not self._bounds[k])
+            contact = self.contacts[k]
+            directions = held_directions(own, found, contact.presses)
             rows.append(directions @ state.J[k])
             bias.append(directions @ state.bias[k])
             owner += [k] * len(directions)
@@ -164,26 +124,36 @@ class ContactDynamics:
                 bias[-1] = bias[-1] + found.normal_rate @ found.slide
                 heading = self.heading(own, found) if self.friction[k] or self._bounds[k] else np.zeros(3)
                 force[k] = -self._bounds[k] * heading
-                directions = directions - self.friction[k] * heading
+                if contact.pressed_by is None:
+                    directions = directions - self.friction[k] * heading
+                else:
+                    turning.append((k, contact.pressed_by, -self.friction[k] * heading))
             along += list(directions)
         K, free = np.concatenate(rows), state.solution.acceleration
         free = free + state.W @ np.einsum("kin,ki->n", state.J, force)
         if not owner:
             summed = np.ones((len(self.sums), 3), dtype=bool)
-            return self._solution(state, mode, free, force, known, summed, 1.0, np.zeros((len(mode), 0)), 0.0)
+            none = np.zeros((len(mode), 3, 0))
+            return ContactSolution(state, mode, free, force, known, summed, response=1.0, shifts=none, spread=0.0)
         D = np.array([direction @ state.J[k] for direction, k in zip(along, owner, strict=True)])
+        owned = list(zip(owner, along, strict=True))
+        moments = moments_by_pressing(turning, owned, [each.normal for each in state.touching])
+        for k, place, moment in moments:
+            D[place] += moment @ state.J[k]
         S, wanted = K @ state.W @ D.T, -(K @ free + np.concatenate(bias))
         smooth = K @ state.W @ K.T
         values, vectors = np.linalg.eigh(smooth)
         weak = values < RANK * values[-1]
         z = np.linalg.lstsq(S, wanted, rcond=RANK)[0] if weak.any() else np.linalg.solve(S, wanted)
         ways = np.linalg.svd(S)[2][len(S) - weak.sum() :].T if weak.any() else np.zeros((len(S), 0))
-        splits, shifts = np.zeros((len(mode), ways.shape[1])), np.zeros((len(mode), 3, ways.shape[1]))
+        shifts = np.zeros((len(mode), 3, ways.shape[1]))
         for k, direction, size, loose in zip(owner, along, z, ways, strict=True):
             force[k] += size * direction
             shifts[k] += np.outer(direction, loose)
-            splits[k] += float(direction @ state.touching[k].normal) * loose
             known[k] &= np.abs(direction) * np.linalg.norm(loose) <= RANK
+        for k, place, moment in moments:
+            force[k] += z[place] * moment
+            shifts[k] += np.outer(moment, ways[place])
         summed = np.linalg.norm(np.einsum("pk,kiw->piw", self.sums, shifts), axis=2) <= RANK
         for k, (own, found) in enumerate(zip(mode, state.touching, strict=True)):
             if own.kind == "stick" and own.along is not None:  # across its line the joints hold it, too
@@ -193,27 +163,13 @@ class ContactDynamics:
         whole = vectors[:, ~weak]  # without what the split of a shared load changes
         response = float(np.linalg.det(whole.T @ S @ whole) / np.linalg.det(whole.T @ smooth @ whole))
         spread = float(np.linalg.norm(state.W @ (D.T @ ways)))
-        return self._solution(state, mode, free + state.W @ D.T @ z, force, known, summed, response, splits, spread)
+        free = free + state.W @ D.T @ z
+        return ContactSolution(state, mode, free, force, known, summed, response, shifts, spread)
 
     @staticmethod
     def heading(own: Acting, found: Touching) -> Array:
         """Unit direction in which a contact slips; its friction acts against it."""
         return heading_of(own, found)
-
-    @staticmethod
-    def _solution(
-        state: ContactsNow,
-        mode: ContactMode,
-        acceleration: Array,
-        force: Array,
-        known: Any,
-        summed: Any,
-        response: float,
-        splits: Array,
-        spread: float,
-    ) -> ContactSolution:
-        slide_rate = state.J @ acceleration + state.bias
-        return ContactSolution(state, mode, acceleration, force, known, summed, slide_rate, response, splits, spread)
 
     def rate(self, y: Array, mode: ContactMode) -> Array:
         """Right-hand side for the state (q, v, time)."""
@@ -239,28 +195,26 @@ class ContactDynamics:
 
     def eliminated(self, y: Array, mode: ContactMode) -> Array:
         """The state with violations of loops, closed contacts and unit quaternions removed."""
-        y = np.append(self.equations.eliminated(y[:-1], ()), y[-1])
-        q, v, time = self.parts(y)
-        closed = [k for k, own in enumerate(mode) if own.kind != "open"]
-        if not closed:
-            return y
-        state = self.at(q, v)
-        normals = np.array([state.touching[k].normal @ state.J[k] for k in closed])
+        (q, v, time), presses = self.parts(y), [contact.presses for contact in self.contacts]
+        closed = [k for k, own in enumerate(mode) if own.kind != "open" and presses[k]]
+        unit = self.equations.tree.normalised(q)
+        q = unit if np.abs(unit - q).max(initial=0.0) > EXACT else q
+        state = self.at(q, v, time)
         gaps = np.array([state.touching[k].gap for k in closed])
-        q = self.equations.tree.moved(q, -least_motion_for(state.W, normals, gaps))
-        state = self.at(q, v)
-        return np.concatenate([q, v - self._brought(state, v, mode), [time]])
-
-    def _brought(self, state: ContactsNow, v: Array, mode: ContactMode) -> Array:
-        """Velocities that closed contacts forbid, (nv): the part of v that violates their rows."""
-        rows = [np.zeros((0, len(v)))]
-        for k, own in enumerate(mode):
-            if own.kind == "stick":
-                rows.append(state.J[k])
-            elif own.kind == "slip":
-                rows.append(state.touching[k].normal[None] @ state.J[k])
-        K = np.concatenate(rows)
-        return least_motion_for(state.W, K, K @ v)
+        found, K = state.solution, forbidding_rows(mode, state.touching, state.J, presses)
+        left = [found.rows.residual, found.C @ v, gaps, K @ v]
+        if np.abs(np.concatenate(left)).max(initial=0.0) > EXACT:
+            y = np.append(self.equations.eliminated(y[:-1], ()), time)
+            if not len(K):
+                return y
+            (q, v, _), state = self.parts(y), self.at(*self.parts(y))
+            normals = np.array([state.touching[k].normal @ state.J[k] for k in closed]).reshape(-1, len(v))
+            gaps = np.array([state.touching[k].gap for k in closed])
+            q = self.equations.tree.moved(q, -least_motion_for(state.W, normals, gaps)) if closed else q
+            state = self.at(q, v, time)
+            K = forbidding_rows(mode, state.touching, state.J, presses)
+            v = v - least_motion_for(state.W, K, K @ v)
+        return np.concatenate([q, v, [time]])
 
     def begin(self) -> tuple[ContactMode, float]:
         """Mode at the start, and its margin to another one: inf, or 0 if it is not unique.
@@ -274,11 +228,17 @@ class ContactDynamics:
                  for c in self.contacts]  # fmt: skip
         lengths = np.where(turns, 1.0, scale.length)
         closed, still = closed_and_still(self.at(q, v).touching, lengths, scale.rate)
-        refuse_rubbing_stops(self.contacts, closed, 0.0)
+        closed = shut_by_pressing(self.contacts, closed)
         return self.decided(q, v, closed, still)
 
     def decided(
-        self, q: Array, v: Array, closed: Sequence[bool], still: Sequence[bool], time: float = 0.0
+        self,
+        q: Array,
+        v: Array,
+        closed: Sequence[bool],
+        still: Sequence[bool],
+        time: float = 0.0,
+        leaving: int | None = None,
     ) -> tuple[ContactMode, float]:
         """Mode that follows from the forces, and its margin to another one: inf, or 0 if it is not unique.
 
@@ -288,6 +248,7 @@ class ContactDynamics:
             closed: True for contacts whose gap is closed and does not open by its speed.
             still: True for those of them that do not slide either.
             time: at which drives and targets are taken [s].
+            leaving: contact that static friction no longer holds.
 
         Raises:
             NotUnique: a disc lies flat.
@@ -300,14 +261,28 @@ class ContactDynamics:
         frames = {k: frame_of_axis(state.touching[k].normal)[:, [2, 0, 1]] for k in which}
         J = np.concatenate([frames[k].T @ state.J[k] for k in which])
         c = J @ state.solution.acceleration + np.concatenate([frames[k].T @ state.bias[k] for k in which])
-        sliding: list[Array | None] = []
+        sliding, ways = list[Array | None](), off_stops(self.contacts, closed)
         for place, k in enumerate(which):
             found = state.touching[k]
-            c[3 * place] += found.normal_rate @ found.slide
-            across = frames[k][:, 1:].T @ found.slide
-            sliding.append(None if still[k] else across / np.linalg.norm(across))
+            if self.contacts[k].presses:
+                c[3 * place] += found.normal_rate @ found.slide
+            across = frames[k][:, 1:].T @ ways.get(k, found.slide)
+            sliding.append(None if still[k] and k not in ways else across / np.linalg.norm(across))
         G, names = J @ state.W @ J.T, [self.contacts[k].name for k in which]
-        force, done, same = robust_forces(G, c, self.friction[which], sliding, names, self._bounds[which], time)
+        static = self._static.copy()
+        if leaving is not None:
+            static[leaving] = self.friction[leaving]
+        force, done, same = robust_forces(
+            G,
+            c,
+            self.friction[which],
+            sliding,
+            names,
+            self._bounds[which],
+            time,
+            static=static[which],
+            pressed_by=pressed_by(self.contacts, which),
+        )
         mode, moves = [OPEN for _ in closed], (c + G @ force.ravel()).reshape(-1, 3)
         for place, k in enumerate(which):
             own = slice(3 * place, 3 * place + 3)
@@ -318,7 +293,13 @@ class ContactDynamics:
         return tuple(mode), np.inf if same else 0.0
 
     def struck(
-        self, q: Array, v: Array, closed: Sequence[int], restitution: Array, time: float = 0.0
+        self,
+        q: Array,
+        v: Array,
+        closed: Sequence[int],
+        restitution: Array,
+        time: float = 0.0,
+        sideways: Array | None = None,
     ) -> tuple[Array, Array, float]:
         """Velocities after an impact, by Newton's law of restitution and Coulomb's law with the slip after the impact.
 
@@ -328,6 +309,7 @@ class ContactDynamics:
             closed: contacts whose gaps are closed.
             restitution: of each of them.
             time: of the impact, for messages [s].
+            sideways: tangential restitution of each of them; None: none has any.
 
         Returns:
             The velocities, the impulses (closed, 3), and the margin to another outcome: inf, or 0 if it is not unique.
@@ -335,16 +317,16 @@ class ContactDynamics:
         Raises:
             NotUnique: several contacts press each other, so that the outcome depends on an order; or a disc lies flat.
         """
-        state = self.at(q, v)
+        state = self.at(q, v, time)
         self._refuse_flat(state, closed, time)
         frames = [frame_of_axis(state.touching[k].normal)[:, [2, 0, 1]] for k in closed]
         J = np.concatenate([frame.T @ state.J[k] for frame, k in zip(frames, closed, strict=True)])
-        c = J @ v
-        c[::3] += restitution * np.minimum(c[::3], 0.0)
+        sideways = np.zeros(len(closed)) if sideways is None else sideways
+        c = returning(J @ v, restitution, sideways)
         G, names = J @ state.W @ J.T, [self.contacts[k].name for k in closed]
         sliding = [None] * len(closed)
         impulse, done, same = robust_forces(
-            G, c, self.friction[list(closed)], sliding, names, time=time, least=_NO_IMPULSE
+            G, c, self.friction[list(closed)], sliding, names, None, time, _NO_IMPULSE, self._static[list(closed)]
         )
         speeds, scale = (J @ v)[::3], float(np.abs(J @ v).max())
         hit = (speeds < -STILL * scale) | (impulse[:, 0] > STILL * impulse[:, 0].max())
@@ -354,12 +336,12 @@ class ContactDynamics:
 
             def strike(response: Array, slides: Array, group: list[int]) -> Array:
                 of = np.array([closed[k] for k in group])
-                comes = slides.copy()
-                comes[::3] += restitution[group] * np.minimum(comes[::3], 0.0)
+                comes = returning(slides, restitution[group], sideways[group])
                 told = [names[k] for k in group]
                 near = _ROUND_OFF * scale / float(np.abs(comes).max())
                 none = [None] * len(of)
-                return contact_forces(response, comes, self.friction[of], none, told, None, time, near)[0].ravel()
+                laws = self.friction[of], none, told, None, time, near, self._static[of]
+                return contact_forces(response, comes, *laws)[0].ravel()
 
             outcomes = sequences(G, J @ v, groups, strike)
             jumps = state.W @ J.T @ np.vstack([impulse.ravel(), outcomes.impulses]).T
@@ -384,15 +366,20 @@ class ContactDynamics:
         """
         found, count = self.solve(q, v, mode, time), len(self._bodies)
         pressed = found.force[:count]
-        load = np.einsum("kin,ki->n", found.state.J[:count], pressed)
+        of_bodies = [k for k, contact in enumerate(self.contacts) if not isinstance(contact, JointContact)]
+        load = np.einsum("kin,ki->n", found.state.J[of_bodies], found.force[of_bodies])
         applied = np.zeros((len(self.mechanism.bodies) + 1, 6))
         for (a, b), each, force in zip(self._bodies, found.state.touching, pressed, strict=False):
             wrench = np.concatenate([force, cross(each.place, force)])
             applied[a] += wrench
             applied[b] -= wrench
+        for k, friction in enumerate(self._turning, count + len(self._of_joints)):
+            a, b = self._bodies[friction.pressed_by]
+            applied[a, 3:] += found.force[k]
+            applied[b, 3:] -= found.force[k]
         joints = mode_of_joints(self.equations.switched, self.contacts, mode)
         record = self.equations.sample(q, v, joints, time, load, applied)
-        loose = {c.joint.number for c, own in zip(self._of_joints, found.determinate[count:], strict=True)
+        loose = {c.joint.number for c, own in zip(self._of_joints, found.determinate[count:], strict=False)
                  if not own[c.direction != 0].all()}  # fmt: skip
         named = [item.field in {"friction", "stop"} and item.number in loose for item in named_forces(self.mechanism)]
         record["named"] = np.where(named, np.nan, record["named"])

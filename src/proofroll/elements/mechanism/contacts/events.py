@@ -9,8 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from proofroll.core.arrays import FloatArray
+from proofroll.core.bounces import Bounce
+from proofroll.core.columns import Columns
 from proofroll.core.element_abilities import SeenInRun
 from proofroll.core.events import Event
+from proofroll.elements.mechanism.contacts.bounces import sampled_bounces
 from proofroll.elements.mechanism.contacts.observables import (
     PRESSES,
     Followed,
@@ -74,6 +77,10 @@ class ContactWatch:
         speeds = np.maximum(np.abs(placed.v_WB).max(axis=(1, 2)), turning)
         seen = self._events(times[:count], follow_contacts(placed), pressed, speeds)
         return SeenInRun(count, self._reconciled(located or (), seen), None)
+
+    def bounces(self, columns: Columns) -> Sequence[Bounce]:
+        """See :class:`proofroll.core.element_abilities.TellsBounces`."""
+        return sampled_bounces(self._element.mechanism, columns)
 
     def _reconciled(self, located: Sequence[Event], seen: Sequence[Event]) -> Sequence[Event]:
         """The engine's own events of contacts, unless its samples show one that is not among them."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import ClassVar, Literal
 
@@ -15,16 +15,18 @@ from proofroll.core.errors import InputError, require_known
 from proofroll.elements.mechanism import checks, rotations
 from proofroll.elements.mechanism.checks import METRES, RADIANS, RATIO, WORLD, ZERO, Vector, Z
 from proofroll.elements.mechanism.contacts.shapes import (
-    Bore,
     CircleShape,
     EllipsoidShape,
     HalfSpace,
     Shape,
     SphereShape,
 )
+from proofroll.elements.mechanism.contacts.walls import Bore, BowlWall, ConeWall, CurvedWall, Shaft, TorusWall
 from proofroll.elements.mechanism.rotations import Array
 
-GeometryKind = Literal["sphere", "ellipsoid", "circle", "plane", "box", "bore"]
+GeometryKind = Literal[
+    "sphere", "ellipsoid", "circle", "plane", "box", "capsule", "cylinder", "bore", "shaft", "bowl", "cone", "torus"
+]
 # Fields that describe each kind of geometry, besides its position.
 _KEYS: Mapping[str, tuple[str, ...]] = {
     "sphere": ("radius",),
@@ -32,16 +34,24 @@ _KEYS: Mapping[str, tuple[str, ...]] = {
     "circle": ("radius", "normal"),
     "plane": ("normal",),
     "box": ("size", "orientation"),
+    "capsule": ("radius", "length", "axis"),
+    "cylinder": ("radius", "length", "axis"),
     "bore": ("radius", "axis"),
+    "shaft": ("radius", "axis"),
+    "bowl": ("radius",),
+    "cone": ("slope", "axis"),
+    "torus": ("ring_radius", "radius", "axis"),
 }
+# Walls that a sphere alone touches; all but a bowl have an axis.
+CURVED = ("bore", "shaft", "bowl", "cone", "torus")
 # Largest semi-axis of an ellipsoid over its smallest. The support function squares the ratio, which costs 1e-10 of the
 # height at 1e3; and a contact on a flat side is as stiff as that ratio.
 _FLATTEST = 1e3
-# Room of a sphere in a bore, relative to the bore's radius, that counts as none: digits of a file.
+# Room of a sphere in a wall, relative to the wall's radius, that counts as none: digits of a file.
 _ROOM = 1e-9
 _RULES = (
-    "only a plane with a sphere, ellipsoid, circle or box, a bore with a sphere, and two spheres have a rule; "
-    "choose one of these pairs"
+    "only a plane with a sphere, ellipsoid, circle, box, capsule or cylinder, a curved wall (bore, shaft, bowl, cone, "
+    "torus) with a sphere, and two spheres have a rule; choose one of these pairs"
 )
 
 
@@ -52,15 +62,23 @@ class Geometry:
     Attributes:
         name: unique among geometries.
         body: name of the body that carries it, or ``world``.
-        kind: a box touches with its eight vertices; a plane pairs with any other kind but a bore, a sphere also with
-            a sphere or a bore, an endless cylindrical hole that it moves in.
-        position: of its centre, or of any point of a plane or of a bore's axis, in the body's frame [m].
+        kind: a box touches with its eight vertices, a ``capsule`` with the spheres and a ``cylinder`` with the rims at
+            its two ends; a plane pairs with these, a sphere, ellipsoid or circle, a sphere also with a sphere or a
+            curved wall: ``bore``, an endless cylindrical hole; ``shaft``, an endless cylinder; ``bowl``, the inside of
+            a sphere; ``cone``, its inside; ``torus``, the outside of a ring of round wire.
+        position: of its centre, of a cone's tip, or of any point of a plane or of the axis of a bore or shaft, in the
+            body's frame [m].
         orientation: roll, pitch, yaw of an ellipsoid's or a box's axes in the body's frame [rad].
-        radius: of a sphere, circle or bore; a sphere of radius 0 is a vertex [m].
+        radius: of a sphere, circle, capsule, cylinder, bore, shaft, bowl or a torus's wire; a sphere of radius 0
+            is a vertex [m].
         axes: semi-axes of an ellipsoid, the largest at most 1000 times the smallest [m].
         normal: of a plane, out of the material, or of a circle's disc, in the body's frame; default: z.
-        axis: of a bore, in the body's frame; default: z.
+        axis: of a capsule, cylinder, bore, shaft, cone or torus, in the body's frame; a cone opens along it;
+            default: z.
         size: edges of a box [m].
+        slope: of a cone's wall from the plane across its axis, above 0 and below a right angle [rad].
+        length: of a capsule between the centres of its ends, of a cylinder between its ends [m].
+        ring_radius: of a torus, from its axis to the middle of its wire [m].
     """
 
     name: str
@@ -73,6 +91,9 @@ class Geometry:
     normal: Vector = field(default=Z, metadata=RATIO)
     axis: Vector = field(default=Z, metadata=RATIO)
     size: Vector | None = field(default=None, metadata=METRES)
+    slope: float | None = field(default=None, metadata=RADIANS)
+    ring_radius: float | None = field(default=None, metadata=METRES)
+    length: float | None = field(default=None, metadata=METRES)
 
     def __post_init__(self) -> None:
         where = f"geometries.{checks.name(self.name, 'geometries')}"
@@ -80,7 +101,7 @@ class Geometry:
         checks.read(self, where, checks.vector, "position", "orientation")
         checks.read(self, where, checks.axis, "normal", "axis")
         usual = {"orientation": ZERO, "normal": Z, "axis": Z}
-        for key in ("radius", "axes", "size", *usual):
+        for key in ("radius", "axes", "size", "slope", "ring_radius", "length", *usual):
             value, asked = getattr(self, key), key in _KEYS[self.kind]
             if not asked and value != usual.get(key):
                 raise InputError(f"{where}.{key}", value, f"{_a(self.kind)} has none; it has {_key_list(self.kind)}")
@@ -91,6 +112,12 @@ class Geometry:
             if self.kind != "sphere" and not radius:
                 raise InputError(f"{where}.radius", radius, f"a {self.kind} has a radius above 0; a vertex is a sphere")
             checks.assign(self, radius=radius)
+        if self.length is not None:
+            length = checks.number(f"{where}.length", self.length, at_least=0)
+            if not length:
+                raise InputError(f"{where}.length", length, "give one above 0; without it this is a sphere or a circle")
+            checks.assign(self, length=length)
+        self._check_walls(where)
         for key in ("axes", "size"):
             if getattr(self, key) is not None:
                 found = checks.vector(f"{where}.{key}", getattr(self, key))
@@ -101,10 +128,23 @@ class Geometry:
             advice = f"the largest may be at most {_FLATTEST:g} times the smallest; a flat disc is a circle"
             raise InputError(f"{where}.axes", self.axes, advice)
 
+    def _check_walls(self, where: str) -> None:
+        """Raises InputError for the numbers of a cone or torus that no such wall has."""
+        if self.slope is not None:
+            slope = checks.number(f"{where}.slope", self.slope, at_least=0)
+            if not 0 < slope < np.pi / 2:
+                raise InputError(f"{where}.slope", slope, "must lie between 0 and a right angle, pi/2")
+            checks.assign(self, slope=slope)
+        if self.ring_radius is not None:
+            ring = checks.number(f"{where}.ring_radius", self.ring_radius)
+            if not ring > (self.radius or 0.0):
+                raise InputError(f"{where}.ring_radius", ring, f"must be above that of the wire, {self.radius:g}")
+            checks.assign(self, ring_radius=ring)
+
     @cached_property
     def frame(self) -> Array:
-        """Axes in the body's frame, as columns; z is the normal of a plane or a circle, and the axis of a bore."""
-        if self.kind == "bore":
+        """Axes in the body's frame, as columns; z is the normal of a plane or a circle, or the ``axis``."""
+        if "axis" in _KEYS[self.kind]:
             return read_only(rotations.frame_of_axis(self.axis))
         if self.kind in {"plane", "circle"}:
             return read_only(rotations.frame_of_axis(self.normal))
@@ -112,20 +152,30 @@ class Geometry:
 
     @cached_property
     def shapes(self) -> tuple[Shape, ...]:
-        """Shapes that touch, in the body's frame: one, or the eight vertices of a box."""
+        """Shapes that touch, in the body's frame: one, the eight vertices of a box, or the ends of a long body."""
         centre = np.array(self.position)
         if self.kind == "plane":
             return (HalfSpace(centre, np.array(self.normal)),)
-        if self.kind == "bore":
-            return (Bore(centre, np.array(self.axis), self.radius or 0.0),)
+        if self.kind in CURVED:
+            return (self._curved(centre, np.array(self.axis)),)
         if self.kind == "box":
             corners = itertools.product((-0.5, 0.5), repeat=3)
             return tuple(SphereShape(centre + self.frame @ (np.array(self.size) * corner), 0.0) for corner in corners)
-        if self.kind == "circle":
-            return (CircleShape(centre, self.radius or 0.0, np.array(self.normal)),)
         if self.kind == "ellipsoid":
             return (EllipsoidShape(centre, np.array(self.axes), self.frame),)
-        return (SphereShape(centre, self.radius or 0.0),)
+        radius, half = self.radius or 0.0, 0.5 * (self.length or 0.0) * np.array(self.axis)
+        centres = (centre,) if self.length is None else (centre - half, centre + half)
+        if self.kind in {"circle", "cylinder"}:
+            normal = np.array(self.normal if self.kind == "circle" else self.axis)
+            return tuple(CircleShape(middle, radius, normal) for middle in centres)
+        return tuple(SphereShape(middle, radius) for middle in centres)
+
+    def _curved(self, point: Array, axis: Array) -> CurvedWall:
+        if self.kind == "cone":
+            return ConeWall(point, axis, self.slope or 0.0)
+        if self.kind == "torus":
+            return TorusWall(point, axis, self.ring_radius or 0.0, self.radius or 0.0)
+        return {"bore": Bore, "shaft": Shaft, "bowl": BowlWall}[self.kind](point, axis, self.radius or 0.0)
 
 
 @dataclass(frozen=True)
@@ -135,40 +185,79 @@ class Pair:
     Attributes:
         name: unique among pairs.
         geometries: names of the two; reported forces act on the body of the first.
-        friction: Coulomb's coefficient, the same for sticking and slipping.
+        friction: Coulomb's coefficient; inf: a pair that never slips. A file may give it as a table,
+            ``{static = 0.5, kinetic = 0.3}``.
         restitution: normal speed after an impact over that before it, from 0 to 1.
+        static_friction: coefficient while a contact sticks, at least that of a slip; left out: the same.
+        tangential_restitution: a contact that sticks in an impact leaves it with minus this part of its slip before,
+            as far as friction allows, from -1 to 1; 0: without slip.
+        rolling_resistance: largest moment against rolling over the normal force [m].
+        spinning_friction: largest moment against spin about the normal over the normal force [m].
     """
 
     name: str
     geometries: tuple[str, str]
     friction: float = field(metadata=RATIO)
     restitution: float = field(default=0.0, metadata=RATIO)
+    static_friction: float | None = field(default=None, metadata=RATIO)
+    tangential_restitution: float = field(default=0.0, metadata=RATIO)
+    rolling_resistance: float = field(default=0.0, metadata=METRES)
+    spinning_friction: float = field(default=0.0, metadata=METRES)
 
     def __post_init__(self) -> None:
         where = f"pairs.{checks.name(self.name, 'pairs')}"
         if len(self.geometries) != 2:
             raise InputError(f"{where}.geometries", self.geometries, "give the names of two")
         checks.assign(self, geometries=tuple(self.geometries))
-        checks.read(self, where, checks.number, "friction", "restitution", at_least=0)
+        checks.read(self, where, checks.number, "friction", at_least=0, bounded=False)
+        checks.read(self, where, checks.number, "rolling_resistance", "spinning_friction", at_least=0)
+        checks.read(self, where, checks.number, "restitution", at_least=0)
         if self.restitution > 1:
             advice = "no impact returns more than it takes; give 0 to 1"
             raise InputError(f"{where}.restitution", self.restitution, advice)
+        checks.read(self, where, checks.number, "tangential_restitution", at_least=-1)
+        if self.tangential_restitution > 1:
+            advice = "no impact returns more slip than it takes; give -1 to 1"
+            raise InputError(f"{where}.tangential_restitution", self.tangential_restitution, advice)
+        if self.static_friction is not None:
+            checks.read(self, where, checks.number, "static_friction", at_least=0)
+            if not 0 < self.friction <= self.static_friction:
+                advice = f"kinetic friction, {self.friction:g}, must lie above 0 and not above it"
+                raise InputError(f"{where}.static_friction", self.static_friction, advice)
+
+    @property
+    def static(self) -> float:
+        """Coefficient of a contact that sticks."""
+        return self.friction if self.static_friction is None else self.static_friction
+
+    def with_friction(self, friction: float, static: float | None = None) -> Pair:
+        """The pair with other coefficients; without ``static``, its static one changes by the same factor."""
+        if self.static_friction is None or not friction:
+            return replace(self, friction=friction, static_friction=None)
+        return replace(self, friction=friction, static_friction=static or self.static * friction / self.friction)
 
 
 @dataclass(frozen=True)
 class BodyContact:
-    """A possible contact of two bodies: of a pair, or of one vertex of a box in a pair.
+    """A possible contact of two bodies: of a pair, or of a vertex of a box or an end of a capsule or cylinder.
 
     Attributes:
-        name: of the pair; a box adds ``.1`` to ``.8``.
+        name: of the pair; a box adds ``.1`` to ``.8``, a capsule or cylinder ``.1`` and ``.2``.
         body_a, body_b: of the first and the second geometry.
         shape_a, shape_b: in the frames of these; one of them may be a wall.
         friction, restitution: of the pair.
         pair: its name.
+        static_friction: coefficient while it sticks; None: the same.
+        tangential_restitution: of the pair.
+        rolling_resistance, spinning_friction: of the pair [m].
         bound: largest friction without a normal force; always 0 between bodies [N].
+        presses: True, as it has a normal force.
+        pressed_by: None, as the force that bounds its friction is its own.
     """
 
     bound: ClassVar[float] = 0.0
+    presses: ClassVar[bool] = True
+    pressed_by: ClassVar[None] = None
     name: str
     body_a: str
     body_b: str
@@ -177,6 +266,15 @@ class BodyContact:
     friction: float
     restitution: float
     pair: str = ""
+    static_friction: float | None = None
+    tangential_restitution: float = 0.0
+    rolling_resistance: float = 0.0
+    spinning_friction: float = 0.0
+
+    @property
+    def static(self) -> float:
+        """Coefficient of the contact while it sticks."""
+        return self.friction if self.static_friction is None else self.static_friction
 
     @property
     def of_disc(self) -> bool:
@@ -202,24 +300,49 @@ def contacts_of(geometries: Sequence[Geometry], pairs: Sequence[Pair]) -> tuple[
             raise InputError(where, pair.geometries, advice)
         listed[frozenset(pair.geometries)] = pair.name
         kinds = {a.kind, b.kind}
-        if kinds in ({"plane"}, {"plane", "bore"}) or not (
-            "plane" in kinds or kinds in ({"sphere"}, {"sphere", "bore"})
-        ):
+        wall = next((geometry for geometry in (a, b) if geometry.kind in CURVED), None)
+        if wall is None:
+            ruled = kinds == {"sphere"} or ("plane" in kinds and kinds != {"plane"})
+        else:
+            ruled = kinds == {wall.kind, "sphere"}
+            _require_room(where, pair, wall, b if wall is a else a)
+        if not ruled:
             raise InputError(where, pair.geometries, _RULES)
-        if "bore" in kinds:
-            bore, ball = (a, b) if a.kind == "bore" else (b, a)
-            if (ball.radius or 0.0) >= (1 - _ROOM) * (bore.radius or 0.0):
-                advice = (
-                    f"a sphere of radius {ball.radius:g} m has no room in a bore of {bore.radius:g} m; make it smaller"
-                )
-                raise InputError(where, pair.geometries, advice)
         if kinds == {"sphere"} and not (a.radius or b.radius):
             raise InputError(where, pair.geometries, "two points have no direction between them; give one a radius")
+        _require_one_place(pair, kinds)
         touching = list(itertools.product(a.shapes, b.shapes))
         for number, (one, other) in enumerate(touching, 1):
             name = pair.name if len(touching) == 1 else f"{pair.name}.{number}"
-            found.append(BodyContact(name, a.body, b.body, one, other, pair.friction, pair.restitution, pair.name))
+            law = pair.friction, pair.restitution, pair.name, pair.static_friction, pair.tangential_restitution
+            turning = pair.rolling_resistance, pair.spinning_friction
+            found.append(BodyContact(name, a.body, b.body, one, other, *law, *turning))
     return tuple(found)
+
+
+def _require_one_place(pair: Pair, kinds: set[GeometryKind]) -> None:
+    """Raises InputError for friction against turning at the two ends of a capsule or cylinder."""
+    long_body = next(iter(kinds & {"capsule", "cylinder"}), None)
+    for key in ("rolling_resistance", "spinning_friction"):
+        if long_body and getattr(pair, key):
+            advice = f"a {long_body} touches at two ends, whose moments are not followed together; leave it out"
+            raise InputError(f"pairs.{pair.name}.{key}", getattr(pair, key), advice)
+
+
+def _require_room(where: str, pair: Pair, wall: Geometry, ball: Geometry) -> None:
+    """Raises InputError if a sphere has no room in a curved wall."""
+    inner = {"bore": wall.radius, "bowl": wall.radius, "torus": (wall.ring_radius or 0.0) - (wall.radius or 0.0)}
+    room = inner.get(wall.kind)
+    if room is not None and (ball.radius or 0.0) >= (1 - _ROOM) * room:
+        size = f"a sphere of radius {ball.radius:g} m has no room in a {wall.kind} of {room:g} m"
+        raise InputError(where, pair.geometries, f"{size}; make it smaller")
+
+
+def coefficients_of(contacts: Sequence[BodyContact]) -> dict[str, Array]:
+    """Coefficients of contacts by their names in :class:`.MechanismBuilt`."""
+    laws = {"friction": "friction", "restitution": "restitution", "static": "static"}
+    laws["tangential"] = "tangential_restitution"
+    return {f"contact_{name}": np.array([getattr(contact, law) for contact in contacts]) for name, law in laws.items()}
 
 
 def shared_pairs(contacts: Sequence[BodyContact]) -> dict[str, list[int]]:

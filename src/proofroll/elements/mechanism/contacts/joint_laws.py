@@ -6,12 +6,12 @@ holds along a line, or acts there with a constant force.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
 from proofroll.core.errors import Refused
-from proofroll.elements.mechanism.contacts.acting import ContactMode
-from proofroll.elements.mechanism.contacts.geometry import BodyContact
+from proofroll.elements.mechanism.contacts.acting import Acting, ContactMode, direction_of
 from proofroll.elements.mechanism.contacts.touching import Touching
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.elements.mechanism.switches import STOPPED, Mode, SwitchedJoint
@@ -32,6 +32,13 @@ class JointContact:
     joint: SwitchedJoint
     side: int
     friction: float = 0.0
+    tangential_restitution: ClassVar[float] = 0.0
+    pressed_by: ClassVar[None] = None
+
+    @property
+    def static(self) -> float:
+        """Coefficient while it sticks, as of its slip."""
+        return self.friction
 
     @property
     def name(self) -> str:
@@ -47,6 +54,11 @@ class JointContact:
     def bound(self) -> float:
         """Largest force of dry friction [N, N m]; 0: a stop."""
         return 0.0 if self.side else self.joint.friction
+
+    @property
+    def presses(self) -> bool:
+        """True for a stop."""
+        return bool(self.side)
 
     @property
     def restitution(self) -> float:
@@ -75,7 +87,33 @@ def joint_contacts(joints: Sequence[SwitchedJoint]) -> tuple[JointContact, ...]:
     return tuple(found)
 
 
-def refuse_rubbing_stops(contacts: Sequence[BodyContact | JointContact], closed: Sequence[bool], time: float) -> None:
+def off_stops(contacts: Sequence[object], closed: Sequence[bool]) -> dict[int, Array]:
+    """Direction off the stop of the dry friction of each joint that rests on one, by the number of that friction.
+
+    Stop and friction hold the joint together, by at least minus the bound of friction. So friction counts there as that
+    of a slip off the stop, and the force of the stop as what is left of both.
+    """
+    sides = {
+        contact.joint.number: contact.side
+        for contact, shut in zip(contacts, closed, strict=True)
+        if shut and isinstance(contact, JointContact) and contact.side
+    }
+    return {
+        k: sides[contact.joint.number] * _Y
+        for k, contact in enumerate(contacts)
+        if isinstance(contact, JointContact) and not contact.side and contact.joint.number in sides
+    }
+
+
+def rebounding(contacts: Sequence[object], mode: ContactMode, hit: int) -> ContactMode:
+    """Mode after a rebound on a contact; if that is a stop, the dry friction of its joint acts against the way off."""
+    ways = off_stops(contacts, [k == hit for k in range(len(mode))])
+    return tuple(
+        Acting("slip", direction_of(ways[k]), direction_of(ways[k])) if k in ways else own for k, own in enumerate(mode)
+    )
+
+
+def refuse_rubbing_stops(contacts: Sequence[object], closed: Sequence[bool], time: float) -> None:
     """Refuses a joint with dry friction that a stop holds from a time on [s].
 
     Raises:
@@ -90,9 +128,7 @@ def refuse_rubbing_stops(contacts: Sequence[BodyContact | JointContact], closed:
             )
 
 
-def mode_of_joints(
-    joints: Sequence[SwitchedJoint], contacts: Sequence[BodyContact | JointContact], mode: ContactMode
-) -> Mode:
+def mode_of_joints(joints: Sequence[SwitchedJoint], contacts: Sequence[object], mode: ContactMode) -> Mode:
     """Modes of the switched joints that a mode of contacts implies."""
     own = {joint.name: "free" for joint in joints}
     for contact, acting in zip(contacts, mode, strict=True):

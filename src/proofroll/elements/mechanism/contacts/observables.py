@@ -11,6 +11,7 @@ from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Diverged
 from proofroll.core.events import EVENT_ORDER
 from proofroll.core.observable import Observable, Role
+from proofroll.elements.mechanism.contacts.coulomb import largest_friction
 from proofroll.elements.mechanism.contacts.geometry import shared_pairs
 from proofroll.elements.mechanism.contacts.touching import Moving, touch
 from proofroll.elements.mechanism.signal import varies
@@ -86,10 +87,10 @@ def kept_laws(mechanism: Mechanism) -> frozenset[str]:
     """Names of the ``LAWS`` that hold for a mechanism with contacts, through any impact."""
     if not mechanism.contacts or mechanism.actuators or any(joint.torque for joint in mechanism.joints):
         return frozenset()
-    if any(varies(signal) for signal in mechanism.signals):
+    if mechanism.forces or any(varies(signal) for signal in mechanism.signals):
         return frozenset()
     ends = {name for contact in mechanism.contacts for name in (contact.body_a, contact.body_b)}
-    ends |= {name for spring in mechanism.springs for name in (spring.body_a, spring.body_b)}
+    ends |= {name for spring in mechanism.links for name in (spring.body_a, spring.body_b)}
     ends |= {name for loop in mechanism.loops for name in (loop.body_a, loop.body_b)}
     held = any(joint.kind != "free" and "world" in {joint.parent, joint.child} for joint in mechanism.joints)
     held = held or "world" in ends or bool(np.any(mechanism.gravity))
@@ -138,7 +139,12 @@ def contact_observables(mechanism: Mechanism, sizes: Mapping[str, float], least:
 
 
 def residuals(
-    found: Followed, pressed: FloatArray, friction: FloatArray, weight: float, speed: float
+    found: Followed,
+    pressed: FloatArray,
+    friction: FloatArray,
+    weight: float,
+    speed: float,
+    static: FloatArray | None = None,
 ) -> dict[str, FloatArray]:
     """Residuals of the contact laws and ``unpressed``, by name, shape (time, contacts).
 
@@ -147,10 +153,12 @@ def residuals(
     Args:
         found: the contacts along the motion.
         pressed: forces on their first bodies [N], shape (time, contacts, 3); NaN where not determinate.
-        friction: their coefficients, shape (contacts,).
+        friction: their coefficients while they slip, shape (contacts,).
         weight: of the mechanism [N].
         speed: natural speed, which scales slip against weight in the natural map [m/s].
+        static: coefficients while they stick; None: the same.
     """
+    friction = np.where(found.slip > SLIDES * speed, friction, friction if static is None else static)
     n, u_n = found.normal, np.sum(found.normal * found.slide, axis=-1)
     complete, given = np.all(np.isfinite(pressed), axis=-1), np.any(np.isfinite(pressed), axis=-1)
     N = normal_forces(found, pressed)
@@ -158,12 +166,13 @@ def residuals(
     T = np.where(complete[..., None], pressed - N[..., None] * n, 0.0)
     presses = np.asarray(PRESSES * weight < N)
     t = np.linalg.norm(T, axis=-1)
-    bound = friction * np.where(presses, N, 0.0)
+    bound = largest_friction(friction, np.where(presses, N, 0.0))
     slides = np.asarray(presses & complete & (found.slip > SLIDES * speed) & (friction > 0))
-    against = np.sum(T * u, axis=-1) / np.where(slides, bound * found.slip, 1.0)
+    against = np.sum(T * u, axis=-1) / (np.where(slides, bound, 1.0) * np.where(slides, found.slip, 1.0))
     # De Saxcé's correction makes the law a projection onto the cone: λ = P(λ − r (u + μ|u_t| n))
     r = weight / speed
-    pushed, pulled = N - r * (u_n + friction * found.slip), T - r * u
+    slipping = np.where(np.isinf(friction), 0.0, friction)  # of what never slips the cone is a half space
+    pushed, pulled = N - r * (u_n + slipping * found.slip), T - r * u
     length = np.linalg.norm(pulled, axis=-1)
     kept, holds = _onto_cone(pushed, length, friction)
     across = pulled * (holds / np.where(length > 0, length, 1.0))[..., None] - T
@@ -190,10 +199,12 @@ def normal_forces(found: Followed, pressed: FloatArray) -> FloatArray:
 
 def _onto_cone(N: FloatArray, T: FloatArray, friction: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Nearest point of the cone T ≤ μN to given normal forces and sizes of friction [N]: (normal force, friction)."""
-    within, beyond = friction * N >= T, -friction * T >= N
-    pressed = (N + friction * T) / (1 + friction**2)
+    finite = np.where(np.isinf(friction), 0.0, friction)
+    within = largest_friction(friction, N) >= T
+    beyond = np.where(np.isinf(friction), N <= 0, -finite * T >= N)
+    pressed = (N + finite * T) / (1 + finite**2)
     kept = np.where(within, N, np.where(beyond, 0.0, pressed))
-    return kept, np.where(within, T, np.where(beyond, 0.0, friction * pressed))
+    return kept, np.where(within, T, np.where(beyond, 0.0, finite * pressed))
 
 
 def given_forces(mechanism: Mechanism, samples: Sequence[MechanismSample]) -> FloatArray:

@@ -10,6 +10,7 @@ from typing import Protocol
 
 import numpy as np
 
+from proofroll.elements.mechanism.contacts.walls import CurvedWall
 from proofroll.elements.mechanism.rotations import Array
 
 
@@ -63,6 +64,7 @@ class CircleShape:
     def support(self, d: Array) -> tuple[Array, Array]:
         """See :class:`ConvexShape`."""
         across = d - (d @ self.normal) * self.normal
+        across -= (across @ self.normal) * self.normal  # of a disc that is almost flat round-off is left
         length = float(np.linalg.norm(across))
         e = across / length if length else across
         flat = np.eye(3) - np.outer(self.normal, self.normal) - np.outer(e, e)
@@ -77,14 +79,5 @@ class HalfSpace:
     normal: Array
 
 
-@dataclass(frozen=True, eq=False)
-class Bore:
-    """Endless cylindrical hole in a body, around an axis of unit length through a point [m]."""
-
-    point: Array
-    axis: Array
-    radius: float
-
-
-Wall = HalfSpace | Bore
+Wall = HalfSpace | CurvedWall
 Shape = ConvexShape | Wall

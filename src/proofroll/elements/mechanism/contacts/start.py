@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import InputError
+from proofroll.core.last_results import kept
 from proofroll.elements.mechanism.contacts.touching import Moving, Touching, touch
 from proofroll.elements.mechanism.joint_coordinates import JointCoordinates, Solution
 from proofroll.elements.mechanism.kinematics import BodyMotion, Tree
@@ -83,6 +84,7 @@ def natural_length(mechanism: Mechanism, found: Solution) -> float:
     return float(length or nearest or (pull and _largest(motion.v_WB) ** 2 / pull))
 
 
+@kept
 def natural_scale(mechanism: Mechanism) -> Scale:
     """Natural length, and the faster of the rates of gravity and of the first motion.
 
@@ -145,6 +147,15 @@ def check_contacts(mechanism: Mechanism) -> None:
         if each.gap < -scale.gap:
             advice = f"they overlap by {-each.gap:.3g} m at the start; move one"
             raise InputError(f"pairs.{contact.name}", between, advice)
+        if each.gap <= scale.gap and not each.normal.any():
+            advice = "they touch at several points at once, without one normal; move one"
+            raise InputError(f"pairs.{contact.name}", between, advice)
+        slip = float(np.linalg.norm(each.slide - each.normal * (each.normal @ each.slide)))
+        if each.gap <= scale.gap and slip > scale.speed and np.isinf(contact.friction):
+            advice = (
+                f"they touch and slip at {slip:.3g} m/s, which friction = inf excludes; correct v0 or give a number"
+            )
+            raise InputError(f"pairs.{contact.name}.friction", contact.friction, advice)
         if each.flat and each.gap <= scale.gap:
             advice = "the disc lies flat and touches along its whole edge, not at one point; give it three spheres"
             raise InputError(f"pairs.{contact.name}", between, advice)

@@ -6,7 +6,8 @@ import numpy as np
 
 from proofroll.core.errors import NotUnique
 from proofroll.elements.mechanism.contacts.geometry import BodyContact
-from proofroll.elements.mechanism.contacts.shapes import Bore, CircleShape, ConvexShape, HalfSpace, SphereShape, Wall
+from proofroll.elements.mechanism.contacts.shapes import CircleShape, ConvexShape, HalfSpace, SphereShape, Wall
+from proofroll.elements.mechanism.contacts.walls import CurvedWall
 from proofroll.elements.mechanism.rotations import Array, cross
 
 # Sine of the angle between a disc and its plane up to which it lies flat: digits of a file.
@@ -65,6 +66,14 @@ def lying(name: str, time: float) -> NotUnique:
     )
 
 
+def torn(name: str, time: float) -> NotUnique:
+    """Error of Painlevé's paradox at a contact, from a time on [s]."""
+    return NotUnique(
+        f"{name} would not press but tear from t = {time:.6g} s on: its friction makes what follows not unique or not "
+        "possible (Painlevé)"
+    )
+
+
 def touch(contact: BodyContact, a: Moving, b: Moving) -> Touching:
     """Gap, normal, point of contact and rates of a contact at given motions of its bodies."""
     if isinstance(contact.shape_b, Wall):
@@ -90,23 +99,18 @@ def _on_wall(shape: ConvexShape, own: Moving, wall: Wall, other: Moving) -> _Lyi
     if isinstance(wall, HalfSpace):
         return _on_plane(shape, own, wall, other)
     assert isinstance(shape, SphereShape)  # alone has a rule
-    return _in_bore(shape, own, wall, other)
+    return _on_curve(shape, own, wall, other)
 
 
-def _in_bore(sphere: SphereShape, own: Moving, bore: Bore, other: Moving) -> _Lying:
-    """Numbers of :func:`_on_wall` in a bore, whose normal points to the axis."""
-    centre, foot = own.p + own.R @ sphere.centre, other.p + other.R @ bore.point
-    axis = other.R @ bore.axis
-    axis_rate = cross(other.w, axis)
-    d, d_rate = centre - foot, own.velocity(centre) - other.velocity(foot)
-    out = d - axis * (axis @ d)
-    out_rate = d_rate - axis_rate * (axis @ d) - axis * (axis_rate @ d + axis @ d_rate)
-    distance = float(np.linalg.norm(out))
-    length = distance or 1.0  # a trial step may lay the centre on the axis, where the normal is zero
-    n = -out / length
-    n_rate = -(out_rate - n * (n @ out_rate)) / length
+def _on_curve(sphere: SphereShape, own: Moving, wall: CurvedWall, other: Moving) -> _Lying:
+    """Numbers of :func:`_on_wall` on a curved wall."""
+    centre, axes = own.p + own.R @ sphere.centre, other.R @ wall.frame
+    near = wall.near(axes.T @ (centre - other.p - other.R @ wall.point))
+    n = axes @ near.normal
+    slides = own.velocity(centre) - other.velocity(centre)  # of the centre over the wall's body
+    n_rate = cross(other.w, n) + axes @ (near.bend @ (axes.T @ slides))
     place, rate = centre - sphere.radius * n, own.velocity(centre) - sphere.radius * n_rate
-    return bore.radius - sphere.radius - distance, n, n_rate, place, rate
+    return near.distance - sphere.radius, n, n_rate, place, rate
 
 
 def _on_plane(shape: ConvexShape, own: Moving, plane: HalfSpace, other: Moving) -> _Lying:

@@ -7,10 +7,14 @@ import numpy as np
 from proofroll.core.diagnosis.fitting import any_gravity
 from proofroll.core.diagnosis.lines import built_otherwise
 from proofroll.elements.mechanism.diagnosis import contacts
+from proofroll.elements.mechanism.diagnosis.applied_forces import of_applied_forces
+from proofroll.elements.mechanism.diagnosis.bookkeeping import of_bookkeeping
+from proofroll.elements.mechanism.diagnosis.bushings import of_bushings
 from proofroll.elements.mechanism.diagnosis.contacts_at_start import at_start
 from proofroll.elements.mechanism.diagnosis.equations import Change
 from proofroll.elements.mechanism.diagnosis.impacts import impacts, laws_of_impacts
 from proofroll.elements.mechanism.diagnosis.joint_laws import of_actuators, of_couplings, of_stops, soft_couplings
+from proofroll.elements.mechanism.diagnosis.motions import of_motions
 from proofroll.elements.mechanism.diagnosis.numbers import (
     FACTORS_OF_ALL,
     friction_of_each_joint,
@@ -45,6 +49,10 @@ HYPOTHESES: tuple[Any, ...] = (
     other_axis,
     axis_of_first_steps,
     *FACTORS_OF_ALL,
+    of_motions,
+    of_applied_forces,
+    of_bushings,
+    of_bookkeeping,
     of_actuators,
     of_couplings,
     soft_couplings,

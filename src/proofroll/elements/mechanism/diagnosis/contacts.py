@@ -2,12 +2,12 @@
 
 import functools
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from proofroll.core.arrays import FloatArray
+from proofroll.core.arrays import FloatArray, longest
 from proofroll.core.diagnosis import Cause, Evidence, hypothesis
 from proofroll.core.diagnosis.fitting import cached_on_evidence, change_by, factor_text
 from proofroll.core.diagnosis.samples import run_and_truth
@@ -15,6 +15,7 @@ from proofroll.core.diagnosis.vectors import ReportedVector
 from proofroll.elements.mechanism.contacts.observables import PRESSES, SLIDES, Followed, follow_contacts, normal_forces
 from proofroll.elements.mechanism.diagnosis.equations import is_motion, placed_of
 from proofroll.elements.mechanism.model import Mechanism
+from proofroll.elements.mechanism.placed import Placed
 
 # Least difference of forces and least overlap that point to another law, relative to the mechanism's force and size.
 FORCE, _SUNK = 1e-4, 1e-3
@@ -22,6 +23,7 @@ _OFF = 1e-3  # largest factor of friction that counts as zero
 _TURNS = 0.3  # rad: least turn of slip and friction that shows the shape of a cone
 _FEW = 3  # samples of friction from which a square does not fit by chance
 _ANGLES = np.linspace(0.0, np.pi / 2, 181)[:-1]
+_UNCONVEX = "no step mends it: set cone_correction=true where the engine has it, or take Coulomb's own law"
 _HELD = 1e-6  # slip speed of the truth that counts as sticking, relative to the mechanism's speed
 # A wrong contact changes all of the motion, so that no further cause of the motion is looked for.
 COVERS = ("motion", "contacts", "contact_forces", "normal_forces", "acceleration")
@@ -61,8 +63,9 @@ class SeenContact:
 
     @property
     def friction(self) -> FloatArray:
-        """Coefficient of each contact."""
-        return np.array([contact.friction for contact in self.mechanism.contacts])
+        """Coefficient of each contact; 0 of those that never slip, whose law has no number."""
+        friction = np.array([contact.friction for contact in self.mechanism.contacts])
+        return np.where(np.isinf(friction), 0.0, friction)
 
     @property
     def across(self) -> FloatArray:
@@ -83,7 +86,7 @@ class SeenContact:
     @property
     def moves_as_true(self) -> bool:
         """True if the slides of the contacts are the true ones: forces that differ there are only reported."""
-        return bool(np.abs(self.found.slide - self.true.slide).max() <= _SUNK * self.evidence.element.speed)
+        return bool(longest(self.found.slide - self.true.slide) <= _SUNK * self.evidence.element.speed)
 
     def has_true_friction(self, which: NDArray[np.bool_]) -> bool:
         """True if the friction, or the motion of all, is the true one: no law of friction explains an error."""
@@ -91,7 +94,7 @@ class SeenContact:
             return True
         force, normal = self.true_force[which], self.true.normal[which]
         true = force - np.sum(force * normal, axis=-1, keepdims=True) * normal
-        return bool(np.abs(self.T[which] - true).max() <= FORCE * self.evidence.element.force)
+        return bool(longest(self.T[which] - true) <= FORCE * self.evidence.element.force)
 
 
 @cached_on_evidence
@@ -101,20 +104,20 @@ def touch_of(evidence: Evidence) -> Iterator[SeenContact]:
     if pair is None or not element.mechanism.contacts or "contact_forces" not in pair[0] or not is_motion(pair[0]):
         return
     run, truth = pair
-    found = follow_contacts(placed_of(element.mechanism, run))
+    followed = follow_contacts(placed_of(element.mechanism, run))
     force = run["contact_forces"].to_numpy()
     if np.isnan(force[1:]).any():
         return
-    N = normal_forces(found, force)
+    N = normal_forces(followed, force)
     presses = np.asarray(PRESSES * element.force < N)
     presses[0] = False  # several engines know no force there
-    slides = presses & np.asarray(found.slip > SLIDES * element.speed)
+    slides = presses & np.asarray(followed.slip > SLIDES * element.speed)
     true = follow_contacts(placed_of(element.mechanism, truth))
-    u_n = np.sum(found.normal * found.slide, axis=-1)
+    u_n = np.sum(followed.normal * followed.slide, axis=-1)
     yield SeenContact(
         evidence,
         run["time"].to_numpy(),
-        found,
+        followed,
         force,
         N,
         u_n,
@@ -129,11 +132,11 @@ def touch_of(evidence: Evidence) -> Iterator[SeenContact]:
 def contact_forces(evidence: Evidence) -> Iterator[Cause]:
     """Hypothesis: contact forces are reported on the other body, in other axes, or at another time."""
     for touch in touch_of(evidence):
-        known = np.isfinite(touch.true_force[1:]).all(axis=(0, 2))
+        finite = np.isfinite(touch.true_force[1:]).all(axis=(0, 2))
         if not touch.moves_as_true:
             continue  # forces of another motion cannot be compared
-        reported, true = touch.force[1:, known], touch.true_force[1:, known]
-        if known.any() and "contact_forces" not in evidence.settled:
+        reported, true = touch.force[1:, finite], touch.true_force[1:, finite]
+        if finite.any() and "contact_forces" not in evidence.settled:
             what, least = "the force of a contact on its first body", evidence.element.force
             yield from ReportedVector("contact_forces", what, "N", reported, true, touch.time[1:], {}, least).causes(
                 evidence.step
@@ -149,15 +152,15 @@ def friction_factor(evidence: Evidence) -> Iterator[Cause]:
         names = [contact.name for contact in touch.mechanism.contacts]
         groups = [(list(range(len(names))), "all contacts"), *(([k], name) for k, name in enumerate(names))]
         for which, name in groups[: 1 if len(names) == 1 else None]:
-            at = touch.slides & (touch.friction > 0) & np.isin(range(len(names)), which)
-            T, full = touch.T[at], touch.against[at]
-            if len(T) < 2 or np.abs(T - full).max() <= FORCE * evidence.element.force or touch.has_true_friction(at):
+            sliding = touch.slides & (touch.friction > 0) & np.isin(range(len(names)), which)
+            T, full = touch.T[sliding], touch.against[sliding]
+            if len(T) < 2 or longest(T - full) <= FORCE * evidence.element.force or touch.has_true_friction(sliding):
                 continue
             factor = float(np.sum(T * full) / np.sum(full * full))
             off = abs(factor) <= _OFF
             says = f"friction of {name} is {'off' if off else factor_text(factor)}"
-            after = float(np.abs(T - (0.0 if off else factor) * full).max())
-            proof = "friction of what slides", "N", float(np.abs(T - full).max()), after
+            remainder = longest(T - (0.0 if off else factor) * full)
+            proof = "friction of what slides", "N", longest(T - full), remainder
             remedy, change = "give each pair its own coefficient", change_by(factor)
             yield contact_cause("friction", says, *proof, remedy, 0 if off else 1, change=change)
 
@@ -170,10 +173,10 @@ def left_out(evidence: Evidence) -> Iterator[Cause]:
         for k, contact in enumerate(touch.mechanism.contacts):
             sunk = float(touch.found.gap[:, k].min()) < -_SUNK * evidence.element.length
             if sunk and not touch.presses[:, k].any():
-                before, after = float(np.nanmax(np.abs(true[1:, k]))), float(np.abs(touch.N[1:, k]).max())
+                difference, remainder = float(np.nanmax(np.abs(true[1:, k]))), float(np.abs(touch.N[1:, k]).max())
                 says = f"the contact {contact.name} is left out"
                 force = f"normal force of {contact.name}"
-                yield contact_cause("left out", says, force, "N", before, after, "let the pair touch")
+                yield contact_cause("left out", says, force, "N", difference, remainder, "let the pair touch")
 
 
 @hypothesis(
@@ -192,19 +195,54 @@ def convex_cone(evidence: Evidence) -> Iterator[Cause]:
         # a flight from a closed gap: gap = w t - a t²/2 and its rate w - a t
         began = 2 * touch.found.gap[1, which] / (t[1] - t[0]) - touch.u_n[1, which]
         says, name = "convex cone: the sliding contact hops at u_n = μ|u_t|", "speed along the normal at the start"
-        after = float(np.abs(began - rises[which]).max())
-        remedy = "no step mends it: correct the normal rows (MuJoCo's preset tuned), or take Coulomb's own law"
-        yield contact_cause("convex cone", says, name, "m/s", float(rises[which].max()), after, remedy)
+        remainder = float(np.abs(began - rises[which]).max())
+        yield contact_cause("convex cone", says, name, "m/s", float(rises[which].max()), remainder, _UNCONVEX)
+
+
+@hypothesis(
+    "convex cone from rest", "contacts that start to slide rise at μ times the acceleration of their slip, at time 0"
+)
+def convex_cone_from_rest(evidence: Evidence) -> Iterator[Cause]:
+    """Hypothesis: first accelerations of contacts at rest are those that the convex dual of Coulomb's law allows."""
+    mechanism, start = evidence.element.mechanism, evidence.element.start
+    lines = {str(line["quantity"]): line for line in evidence.lines}
+    names = ("acceleration", "angular acceleration")
+    moves = max(float(np.abs(values).max(initial=0.0)) for values in (start.v_WB, start.w_WB))
+    sizes = [np.size(lines[name][side]) for name in names if name in lines for side in ("found", "expected")]
+    if moves > 0 or not mechanism.contacts or sizes != 4 * [start.v_WB.size]:
+        return
+    of_run, of_scene = (
+        follow_contacts(replace(start, **_as_velocities(start, [lines[name][side] for name in names])))
+        for side in ("found", "expected")
+    )
+    friction = np.array([contact.friction for contact in mechanism.contacts])
+    rises, true = friction * of_run.slip[0], np.sum(of_scene.normal * of_scene.slide, axis=-1)[0]
+    least = _SUNK * float(np.linalg.norm(mechanism.gravity))
+    closed = np.abs(of_run.gap[0]) < _SUNK * evidence.element.length
+    which = closed & (rises > least) & (friction * of_scene.slip[0] > least) & (np.abs(true) < _SUNK * rises)
+    if which.any():
+        rate = np.sum(of_run.normal * of_run.slide, axis=-1)[0, which]
+        says = "convex cone: what starts to slide with the acceleration a rises with μa, and hops"
+        difference, remainder = float(rises[which].max()), float(np.abs(rate - rises[which]).max())
+        yield contact_cause(
+            "convex cone", says, "acceleration along the normal at time 0", "m/s^2", difference, remainder, _UNCONVEX
+        )
+
+
+def _as_velocities(start: Placed, rates: list[FloatArray]) -> dict[str, FloatArray]:
+    """Fields of a start whose velocities are these accelerations: of bodies at rest, contacts follow both alike."""
+    linear, angular = (np.reshape(np.array(rate, dtype=np.float64), start.v_WB.shape) for rate in rates)
+    return {"v_WB": linear, "w_WB": angular}
 
 
 @hypothesis("friction pyramid", "friction that turns lies on the sides of a square, |T1| + |T2| = μN, in every sample")
 def pyramid(evidence: Evidence) -> Iterator[Cause]:
     """Hypothesis: friction is bounded by a pyramid, whose axes are fitted by one angle, instead of a cone."""
     for touch in touch_of(evidence):
-        at = touch.slides & (touch.friction > 0)
-        if at.sum() > _FEW and not touch.has_true_friction(at):
-            forces = touch.T[at], touch.against[at], (touch.friction * touch.N)[at]
-            yield from _of_a_square(touch.found.normal[at], touch.across[at], *forces, evidence.element.force)
+        sliding = touch.slides & (touch.friction > 0)
+        if sliding.sum() > _FEW and not touch.has_true_friction(sliding):
+            forces = touch.T[sliding], touch.against[sliding], (touch.friction * touch.N)[sliding]
+            yield from _of_a_square(touch.found.normal[sliding], touch.across[sliding], *forces, evidence.element.force)
 
 
 def _of_a_square(
@@ -215,20 +253,22 @@ def _of_a_square(
     Arrays over samples: normals, slips [m/s], friction T and Coulomb's friction ``full`` [N], (samples, 3); its size
     [N], (samples,). Differences below a small part of ``least``, a natural force [N], count as none.
     """
-    if np.abs(n - n[0]).max() > FORCE:
+    if longest(n - n[0]) > FORCE:
         return
     e1 = np.eye(3)[np.argmin(np.abs(n[0]))]
     e1 = np.cross(n[0], e1) / np.linalg.norm(np.cross(n[0], e1))
     plane = np.array([e1, np.cross(n[0], e1)])
-    turned_by = max(np.ptp(np.unwrap(np.arctan2(*(each @ plane.T).T[::-1]))) for each in (u, T))
-    against = float(np.abs(T - full).max())
+    turned_by = max(np.ptp(np.unwrap(np.arctan2(*(vectors @ plane.T).T[::-1]))) for vectors in (u, T))
+    against = longest(T - full)
     if turned_by < _TURNS or against <= FORCE * least:
         return
     turned = np.array([[[np.cos(a), np.sin(a)], [-np.sin(a), np.cos(a)]] for a in _ANGLES])
     sides = np.abs(np.einsum("aij,kj->aki", turned, T @ plane.T)).sum(axis=-1)
-    after = float(np.abs(sides - bound).max(axis=1).min())
+    remainder = float(np.abs(sides - bound).max(axis=1).min())
     says = "friction pyramid: friction is bounded by a square about two axes, not by a circle"
-    yield contact_cause("pyramid", says, "friction of what slides", "N", against, after, "choose the elliptic cone", 1)
+    yield contact_cause(
+        "pyramid", says, "friction of what slides", "N", against, remainder, "choose the elliptic cone", 1
+    )
 
 
 @hypothesis(
@@ -243,19 +283,20 @@ def forces_at_start(evidence: Evidence) -> Iterator[Cause]:
     if line is None or line["holds"] or np.size(line["found"]) != np.prod(shape):
         return
     reported, true = np.reshape(line["found"], shape), np.reshape(line["expected"], shape)
-    known = np.isfinite(reported).all(axis=-1) & np.isfinite(true).all(axis=-1)
-    if all(other["holds"] for key, other in lines.items() if key != name) and known.any():
+    finite = np.isfinite(reported).all(axis=-1) & np.isfinite(true).all(axis=-1)
+    if all(other["holds"] for key, other in lines.items() if key != name) and finite.any():
         what = "the force of a contact on its first body"
-        values = reported[None, known], true[None, known], np.zeros(1)
+        values = reported[None, finite], true[None, finite], np.zeros(1)
         yield from ReportedVector("contact_forces", what, "N", *values, {}, element.force).causes(evidence.step)
-    found = follow_contacts(element.start)
-    n, friction = found.normal[0], np.array([contact.friction for contact in element.mechanism.contacts])
+    followed = follow_contacts(element.start)
+    n, friction = followed.normal[0], np.array([contact.friction for contact in element.mechanism.contacts])
+    friction = np.where(np.isinf(friction), 0.0, friction)
     N = np.sum(reported * n, axis=-1)
-    slides = known & (PRESSES * element.force < N) & (found.slip[0] > SLIDES * element.speed) & (friction > 0)
+    slides = finite & (PRESSES * element.force < N) & (followed.slip[0] > SLIDES * element.speed) & (friction > 0)
     if slides.sum() >= _FEW:
-        u = (found.slide[0] - n * np.sum(n * found.slide[0], axis=-1)[:, None])[slides]
+        u = (followed.slide[0] - n * np.sum(n * followed.slide[0], axis=-1)[:, None])[slides]
         bound, T = (friction * N)[slides], (reported - N[:, None] * n)[slides]
-        full = -u * (bound / found.slip[0][slides])[:, None]
+        full = -u * (bound / followed.slip[0][slides])[:, None]
         yield from _of_a_square(n[slides], u, T, full, bound, element.force)
 
 
@@ -276,8 +317,8 @@ def creep(evidence: Evidence) -> Iterator[Cause]:
         used = np.linalg.norm(touch.T[sticks], axis=-1) / (touch.friction * touch.N)[sticks]
         speed = float(np.sum(slip * used) / np.sum(used * used))
         says = f"contacts that stick creep at {speed:.3g} m/s times T/(μN): friction is regularised"
-        after = float(np.abs(slip - speed * used).max())
-        proof = "slip of what sticks", "m/s", float(slip.max()), after
+        remainder = float(np.abs(slip - speed * used).max())
+        proof = "slip of what sticks", "m/s", float(slip.max()), remainder
         yield contact_cause("creep", says, *proof, "make that speed smaller", 1)
 
 
@@ -285,6 +326,7 @@ HYPOTHESES = (
     contact_forces,
     forces_at_start,
     convex_cone,
+    convex_cone_from_rest,
     pyramid,
     friction_factor,
     left_out,

@@ -24,6 +24,7 @@ from proofroll.elements.mechanism.joint import WITH_QUATERNION
 from proofroll.elements.mechanism.kinematics import BodyMotion, Tree
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.placed import Placed
+from proofroll.elements.mechanism.point_loads import bushing_loads
 from proofroll.elements.mechanism.rotations import skews
 from proofroll.elements.mechanism.signal import breaks, value_at
 from proofroll.elements.mechanism.switches import switched_joints
@@ -162,12 +163,14 @@ class Change:
         mass, com, inertia: of the bodies; None: the mechanism's.
         gravity: [m/s²].
         damping, stiffness, torque, armature: factors on those of the joints.
+        bushings: factor on the loads of bushings.
         springs, spring_damping: factors on stiffness and damping of the springs.
         weight_at_origin: True if weights act at the origins of the bodies' frames.
         added_damping, added_armature: additional damping and armature along each velocity of the tree, (nv).
         friction: factor on the dry friction of moving joints, of all or along each velocity, (nv).
         effort: effort of an actuator as a function of itself, time, coordinate and rate.
         gyroscopic: factor on ω × I ω.
+        factors_of_forces: factors on some of the applied forces, by their index.
         coupling: mask of entries of the mass matrix that are lost, (nv, nv).
     """
 
@@ -180,6 +183,7 @@ class Change:
     stiffness: float = 1.0
     torque: float = 1.0
     armature: float = 1.0
+    bushings: float = 1.0
     springs: float = 1.0
     spring_damping: float = 1.0
     weight_at_origin: bool = False
@@ -188,6 +192,7 @@ class Change:
     friction: FloatArray | float = 1.0
     effort: Callable[[Actuator, float, float, float], float] = Actuator.effort
     gyroscopic: float = 1.0
+    factors_of_forces: tuple[tuple[int, float], ...] = ()
     coupling: FloatArray | None = None
 
     def balance(self, states: MechanismStates, i: int) -> FloatArray:
@@ -227,7 +232,8 @@ class Change:
         for joint, at_q, at_v in zip(mechanism.joints, m.q_slices, m.v_slices, strict=True):
             if joint.stiffness:
                 acts[at_v] -= self.stiffness * joint.stiffness * (state.q[at_q] - joint.rest)
-        acts = acts + self._spring_loads(states, state)
+        acts = acts + self._spring_loads(states, state) + self._bushing_loads(motion)
+        acts = acts + self._applied_loads(states, state)
         return np.array([sum(terms), acts, sum(map(np.abs, terms)) + np.abs(acts)])
 
     def _spring_loads(self, states: MechanismStates, state: MechanismState) -> FloatArray:
@@ -241,8 +247,34 @@ class Change:
             along = (p_b - p_a) / length
             stretched = self.springs * spring.stiffness * (length - spring.length)
             damped = self.spring_damping * spring.damping * float(along @ (v_b - v_a))
-            found += (stretched + damped) * along @ (J_a - J_b)
+            further = 0.0
+            if spring.force is not None:
+                further = self.springs * float(spring.force.pull(length, float(along @ (v_b - v_a))))
+            found += (stretched + damped + further) * along @ (J_a - J_b)
         return found
+
+    def _bushing_loads(self, motion: BodyMotion) -> FloatArray:
+        """Loads of bushings along each velocity, shape (nv,)."""
+        found: FloatArray = np.zeros(self.mechanism.nv)
+        for i, arm, force, moment in bushing_loads(self.mechanism, motion):
+            found += np.concatenate([force, moment + cross(arm, force)]) @ motion.J[i]
+        return self.bushings * found
+
+    def _applied_loads(self, states: MechanismStates, state: MechanismState) -> FloatArray:
+        """Applied forces and moments along each velocity, shape (nv,)."""
+        load: FloatArray = np.zeros(self.mechanism.nv)
+        index, motion, factors = self.mechanism.body_index, state.motion, dict(self.factors_of_forces)
+        for number, applied in enumerate(self.mechanism.forces):
+            acting, reacting = index[applied.body], index[applied.reaction]
+            size = factors.get(number, 1.0) * np.array(applied.at(state.t), dtype=float)
+            size = motion.R_WB[acting] @ size if applied.frame == "body" else size
+            if applied.kind == "moment":
+                load += size @ (motion.J[acting, 3:] - motion.J[reacting, 3:])
+                continue
+            place, _, J_a, _ = states.tree.point(motion, applied.body, np.array(applied.position))
+            back = motion.R_WB[reacting].T @ (place - motion.p_WB[reacting])
+            load += size @ (J_a - states.tree.point(motion, applied.reaction, back)[2])
+        return load
 
 
 def placed_of(mechanism: Mechanism, dataset: Any) -> Placed:

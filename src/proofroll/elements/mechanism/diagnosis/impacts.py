@@ -50,37 +50,39 @@ def impacts(evidence: Evidence) -> Iterator[Cause]:
         law = [contact.restitution for contact in touch.mechanism.contacts]
         names = [contact.name for contact in touch.mechanism.contacts]
         met = [
-            (k, one)
+            (k, impact)
             for k in range(len(law))
-            for one in _met(touch.time, touch.found.gap[:, k], touch.u_n[:, k], ~touch.presses[:, k])
+            for impact in _met(touch.time, touch.found.gap[:, k], touch.u_n[:, k], ~touch.presses[:, k])
         ]
         if not met:
             continue
-        delays, delay_bars, seen, seen_bars = np.array([one[2:] for _, one in met]).T
+        delays, delay_bars, seen, seen_bars = np.array([impact[2:] for _, impact in met]).T
         size = float(np.abs(delays).max())
         if evidence.step and size > _DELAY * evidence.step:
             steps = np.round(2 * np.mean(delays) / evidence.step) / 2
             says = f"impacts come {delay_text(float(np.mean(delays)), evidence.step)}"
-            after = float(np.max(np.abs(delays - steps * evidence.step) + delay_bars))
-            proof = "time of impacts", "s", size, after
+            remainder = float(np.max(np.abs(delays - steps * evidence.step) + delay_bars))
+            proof = "time of impacts", "s", size, remainder
             remedy = "let the impact act in the step in which the gap closes"
             closes = CLOSES * min(1.0, evidence.step / size)  # any delay is near some multiple of half a step
             yield contact_cause("late impact", says, *proof, remedy, 1, closes=closes, explains=len(met))
-        own = np.array([law[k] for k, _ in met])
-        before = float(np.abs(seen - own).max())
-        if before <= _RATIO:
+        coefficients = np.array([law[k] for k, _ in met])
+        difference = float(np.abs(seen - coefficients).max())
+        if difference <= _RATIO:
             continue
         of_each = sorted({k for k, _ in met})
         for order in itertools.permutations(of_each):
             moved = dict(zip(of_each, order, strict=True))
-            after = float(np.max(np.abs(seen - [law[moved[k]] for k, _ in met]) + seen_bars))
+            remainder = float(np.max(np.abs(seen - [law[moved[k]] for k, _ in met]) + seen_bars))
             swaps = "; ".join(f"{names[a]} has that of {names[b]}" for a, b in moved.items() if a != b)
             says = f"restitution is of another pair: {swaps}"
-            yield contact_cause("restitution", says, "restitution", "1", before, after, "give each pair its own")
-        factor = float(seen @ own / (own @ own)) if own.any() else np.nan
+            yield contact_cause(
+                "restitution", says, "restitution", "1", difference, remainder, "give each pair its own"
+            )
+        factor = float(seen @ coefficients / (coefficients @ coefficients)) if coefficients.any() else np.nan
         says = f"restitution of all pairs is {factor_text(factor)}"
-        after = float(np.max(np.abs(seen - factor * own) + seen_bars))
-        proof = "restitution", "1", before, after
+        remainder = float(np.max(np.abs(seen - factor * coefficients) + seen_bars))
+        proof = "restitution", "1", difference, remainder
         remedy, change = _REMEDY, change_by(factor)
         yield contact_cause("restitution", says, *proof, remedy, 1, explains=len(met), change=change)
 
@@ -112,18 +114,22 @@ def _met(t: FloatArray, gap: FloatArray, rate: FloatArray, free: Any) -> Iterato
         if not (free[k - 1 : k + 3].all() and rate[k] < 0 < rate[k + 1]):
             continue
         flights, off, off_rate = [], 0.0, 0.0
-        for at, other in ((k, k - 1), (k + 1, k + 2)):
-            a, since = (rate[at] - rate[other]) / (t[at] - t[other]), t[other] - t[at]
-            flights.append(np.poly1d([a / 2, rate[at] - a * t[at], gap[at] - rate[at] * t[at] + a * t[at] ** 2 / 2]))
-            misfit = abs(gap[at] + rate[at] * since + a * since**2 / 2 - gap[other])
+        for index, next_k in ((k, k - 1), (k + 1, k + 2)):
+            a, since = (rate[index] - rate[next_k]) / (t[index] - t[next_k]), t[next_k] - t[index]
+            flights.append(
+                np.poly1d(
+                    [a / 2, rate[index] - a * t[index], gap[index] - rate[index] * t[index] + a * t[index] ** 2 / 2]
+                )
+            )
+            misfit = abs(gap[index] + rate[index] * since + a * since**2 / 2 - gap[next_k])
             off, off_rate = off + _OFF * misfit, off_rate + _OFF_RATE * misfit / abs(since)
-        before, after = flights
+        flight_in, flight_out = flights
         real = _REAL * (t[k + 1] - t[k])
-        closes = [r.real for r in before.roots if abs(r.imag) < real and t[k] <= r.real <= 2 * t[k + 1] - t[k]]
-        meets = [r.real for r in (before - after).roots if abs(r.imag) < real and t[k] <= r.real <= t[k + 1]]
+        closes = [r.real for r in flight_in.roots if abs(r.imag) < real and t[k] <= r.real <= 2 * t[k + 1] - t[k]]
+        meets = [r.real for r in (flight_in - flight_out).roots if abs(r.imag) < real and t[k] <= r.real <= t[k + 1]]
         if closes and meets:
-            when = min(meets, key=lambda at: abs(at - min(closes)))
-            fell, rose = before.deriv()(when), after.deriv()(when)
+            when = min(meets, key=lambda index: abs(index - min(closes)))
+            fell, rose = flight_in.deriv()(when), flight_out.deriv()(when)
             bars = off / abs(fell), off_rate / abs(fell)
             yield _Impact(k, when, when - min(closes), bars[0], float(-rose / fell), bars[1])
 
@@ -159,47 +165,47 @@ def laws_of_impacts(evidence: Evidence) -> Iterator[Cause]:
         true_presses = np.asarray(PRESSES * least < normal_forces(touch.true, touch.true_force))
         seen = list(_struck(mechanism, evidence.run, touch.found, touch.presses))
         true = list(_struck(mechanism, evidence.truth, touch.true, true_presses))
-        own = float(np.max(np.abs(_missed(mechanism, true)), initial=0.0))
-        before = float(np.max(np.abs(_missed(mechanism, seen)), initial=0.0))
-        if not max(_JUMP * evidence.element.speed, ABOVE * own) < before < np.inf:
+        true_error = float(np.max(np.abs(_missed(mechanism, true)), initial=0.0))
+        difference = float(np.max(np.abs(_missed(mechanism, seen)), initial=0.0))
+        if not max(_JUMP * evidence.element.speed, ABOVE * true_error) < difference < np.inf:
             continue
         residuals = Residuals(
             functools.partial(_missed, struck=seen),
-            *("velocities after impacts", "m/s", before, CLOSES, COVERS, mechanism),
+            *("velocities after impacts", "m/s", difference, CLOSES, COVERS, mechanism),
             functools.partial(_others, mechanism),
         )
         says, remedy = "convex cone: contacts part after an impact by μ|u_t| too fast", "take Coulomb's own law"
-        after = float(np.max(np.abs(_missed(mechanism, seen, convex=True))))
-        yield contact_cause("convex cone", says, residuals.quantity, residuals.unit, before, after, remedy)
+        remainder = float(np.max(np.abs(_missed(mechanism, seen, convex=True))))
+        yield contact_cause("convex cone", says, residuals.quantity, residuals.unit, difference, remainder, remedy)
         for law in ("friction", "restitution"):
             factor = residuals.fit(functools.partial(_scaled, mechanism, law), 1.0)
             model, says = _scaled(mechanism, law, factor), f"{law} of impacts is {factor_text(factor)}"
             yield residuals.cause(f"{law} of impacts", says, model, _REMEDY, 1, change_by(factor))
         for plane in (geometry for geometry in mechanism.geometries if geometry.kind == "plane"):
 
-            def missed(by: FloatArray, plane: Geometry = plane, own: Residuals[Mechanism] = residuals) -> FloatArray:
-                return own.left(_with_turned_plane(own.plain, plane, by))
+            def missed(by: FloatArray, plane: Geometry = plane, source: Residuals[Mechanism] = residuals) -> FloatArray:
+                return source.left(_with_turned_plane(source.plain, plane, by))
 
             by = least_squares_parameters(missed, np.zeros(2), 1.0)
-            after, off = float(np.max(np.abs(missed(by)))), float(np.linalg.norm(by))
+            remainder, off = float(np.max(np.abs(missed(by)))), float(np.linalg.norm(by))
             says, remedy = f"the normal of {plane.name} is turned by {off:.4g} rad", "look at the axes of geometries"
-            explains = int(np.sum(np.abs(missed(np.zeros(2))) > CLOSES * before))
-            proof = "normal of a plane", says, residuals.quantity, residuals.unit, before, after, remedy, 2
-            yield contact_cause(*proof, explains=explains, change=np.inf if after <= _EXACT * before else off)
+            explains = int(np.sum(np.abs(missed(np.zeros(2))) > CLOSES * difference))
+            proof = "normal of a plane", says, residuals.quantity, residuals.unit, difference, remainder, remedy, 2
+            yield contact_cause(*proof, explains=explains, change=np.inf if remainder <= _EXACT * difference else off)
 
 
-def _struck(mechanism: Mechanism, dataset: Any, found: Followed, presses: Any) -> Iterator[_Struck]:
+def _struck(mechanism: Mechanism, dataset: Any, followed: Followed, presses: Any) -> Iterator[_Struck]:
     """Impacts of a run, or of the truth, while no other contact presses."""
     placed, dynamics = placed_of(mechanism, dataset), ContactDynamics(mechanism)
     mass = sum(body.mass for body in mechanism.bodies)
-    t, w, u_n = placed.time, placed.w_WB, np.sum(found.normal * found.slide, axis=-1)
-    for contact in range(found.gap.shape[1]):
-        for each in _met(t, found.gap[:, contact], u_n[:, contact], ~presses[:, contact]):
-            k = each.k
+    t, w, u_n = placed.time, placed.w_WB, np.sum(followed.normal * followed.slide, axis=-1)
+    for contact in range(followed.gap.shape[1]):
+        for impact in _met(t, followed.gap[:, contact], u_n[:, contact], ~presses[:, contact]):
+            k = impact.k
             others = np.delete(u_n[k : k + 2], contact, axis=1)
             if presses[k - 1 : k + 3].any() or ((others[0] < 0) & (others[1] > 0)).any():
                 continue
-            time, gaps, rates = each.time, found.gap[:, contact], u_n[:, contact]
+            time, gaps, rates = impact.time, followed.gap[:, contact], u_n[:, contact]
             for _ in range(_ROUNDS):  # Gauss-Newton: bodies are in one place, and their velocities jump
                 (p, v), (p_after, v_after) = (
                     _extrapolated(t, placed.p_WB, placed.v_WB, i, j, time) for i, j in ((k, k - 1), (k + 1, k + 2))
@@ -214,12 +220,12 @@ def _struck(mechanism: Mechanism, dataset: Any, found: Followed, presses: Any) -
             spins = [w[i] + (w[i] - w[j]) / (t[i] - t[j]) * (time - t[i]) for i, j in ((k, k - 1), (k + 1, k + 2))]
             R = Rotation.from_rotvec((time - t[k]) * (w[k] + spins[0]) / 2) * Rotation.from_matrix(placed.R_WB[k, :-1])
             turns = np.roll(R.as_quat(), 1, axis=-1)
-            (q, before), (_, after) = (
+            (q, v_in), (_, v_out) = (
                 Placed(mechanism, np.array([time]), p[None], velocity[None], spin[None], turns[None]).of_tree()
                 for velocity, spin in zip((v, v_after), spins, strict=True)
             )
-            root = np.linalg.cholesky(np.linalg.inv(dynamics.at(q[0], before[0]).W)).T / np.sqrt(mass)
-            yield _Struck(contact, q[0], before[0], after[0], root)
+            root = np.linalg.cholesky(np.linalg.inv(dynamics.at(q[0], v_in[0]).W)).T / np.sqrt(mass)
+            yield _Struck(contact, q[0], v_in[0], v_out[0], root)
 
 
 def _extrapolated(
@@ -238,20 +244,20 @@ def _missed(model: Mechanism | None, struck: Sequence[_Struck], convex: bool = F
     """
     if model is None:
         return np.full(1, np.inf)
-    dynamics, found = ContactDynamics(model), [np.zeros(0)]
-    for each in struck:
-        contact, state = dynamics.contacts[each.contact], dynamics.at(each.q, each.before)
-        n, J = state.touching[each.contact].normal, state.J[each.contact]
-        comes, slip = abs(float(n @ J @ each.before)), 0.0
+    dynamics, parts = ContactDynamics(model), [np.zeros(0)]
+    for impact in struck:
+        contact, state = dynamics.contacts[impact.contact], dynamics.at(impact.q, impact.before)
+        n, J = state.touching[impact.contact].normal, state.J[impact.contact]
+        comes, slip = abs(float(n @ J @ impact.before)), 0.0
         for _ in range(_CONTRACTIONS if convex else 1):
-            e = np.array([contact.restitution + contact.friction * slip / comes])
+            e = np.array([contact.restitution + (contact.friction * slip / comes if slip else 0.0)])
             try:
-                after, _, _ = dynamics.struck(each.q, each.before, [each.contact], e)
+                v_out, _, _ = dynamics.struck(impact.q, impact.before, [impact.contact], e)
             except NotUnique:
                 return np.full(1, np.inf)
-            slip = float(np.linalg.norm(np.cross(n, J @ after)))
-        found.append(each.root @ (each.after - after))
-    return np.concatenate(found)
+            slip = float(np.linalg.norm(np.cross(n, J @ v_out)))
+        parts.append(impact.root @ (impact.after - v_out))
+    return np.concatenate(parts)
 
 
 def _scaled(mechanism: Mechanism, law: str, factor: float) -> Mechanism | None:
@@ -275,6 +281,6 @@ def _others(mechanism: Mechanism) -> list[Mechanism]:
               for law in ("friction", "restitution")]  # fmt: skip
     for k, body in enumerate(mechanism.bodies):
         inertia: Any = np.asarray(body.inertia) / 2
-        for other in (replace(body, mass=body.mass / 2), replace(body, inertia=inertia)):
-            halved.append(replace(mechanism, bodies=(*mechanism.bodies[:k], other, *mechanism.bodies[k + 1 :])))
+        for body_changed in (replace(body, mass=body.mass / 2), replace(body, inertia=inertia)):
+            halved.append(replace(mechanism, bodies=(*mechanism.bodies[:k], body_changed, *mechanism.bodies[k + 1 :])))
     return halved

@@ -83,13 +83,13 @@ def of_actuators(evidence: Evidence) -> Iterator[Cause]:
     ]
     remedy = "look at gains, gear and limit of the actuators: the limit clamps the whole effort, at the joint"
     for residuals in residuals_of(evidence) if actuators else ():
-        known = [
+        states = [
             residuals.cause(f"actuators: {name}", f"the engine {says}", Change(mechanism, effort=effort), remedy, 0)
             for asked, name, says, effort in rules
             if asked
         ]
-        yield from known
-        unlimited = any(cause.proven and "no limit" in cause.says for cause in known)
+        yield from states
+        unlimited = any(cause.proven and "no limit" in cause.says for cause in states)
         for asked, what, law in numbers:
             if not asked or (unlimited and what == "the limits"):  # any limit that is large enough
                 continue
@@ -116,12 +116,12 @@ def of_couplings(evidence: Evidence) -> Iterator[Cause]:
 
     A ratio that closes the difference but for round-off is no error of a step, however near to the scene's.
     """
-    mechanism, found = evidence.element.mechanism, run_and_truth(evidence)
+    mechanism, pair = evidence.element.mechanism, run_and_truth(evidence)
     if not mechanism.couplings:
         return
     moving: FloatArray | None = None
-    if found is not None and is_motion(found[0]):
-        moving = placed_of(mechanism, found[0]).of_tree()[1]
+    if pair is not None and is_motion(pair[0]):
+        moving = placed_of(mechanism, pair[0]).of_tree()[1]
     elif (start := of_start(evidence)) is not None:
         moving = start.v_rates[0][None]
     if moving is None:
@@ -130,19 +130,19 @@ def of_couplings(evidence: Evidence) -> Iterator[Cause]:
         if coupling.joints:
             continue
         a, b = (moving[:, mechanism.place_of(joint)[1]] for joint in (coupling.joint_a, coupling.joint_b))
-        own, alone = coupling.ratio, len(a) < 2
+        ratio_true, alone = coupling.ratio, len(a) < 2
         square = float(a @ a)
-        ratio = float(a @ b) / square if square else own
-        before, after = (float(np.max(np.abs(b - x * a))) for x in (own, ratio))
-        if not above_round_off(before, float(np.max(np.abs(b), initial=0.0))):
+        ratio = float(a @ b) / square if square else ratio_true
+        difference, remainder = (float(np.max(np.abs(b - x * a))) for x in (ratio_true, ratio))
+        if not above_round_off(difference, float(np.max(np.abs(b), initial=0.0))):
             continue
         if alone:
-            before, after = (_off_at_start(mechanism, k, x, moving[0]) for x in (own, ratio))
-        says = f"the coupling {coupling.name} has the ratio {ratio:.6g}, not {own:.6g}"
+            difference, remainder = (_off_at_start(mechanism, k, x, moving[0]) for x in (ratio_true, ratio))
+        says = f"the coupling {coupling.name} has the ratio {ratio:.6g}, not {ratio_true:.6g}"
         remedy = "the scene's ratio is that of joint_b's rate to joint_a's"
         name = "accelerations at time 0" if alone else f"rate of {coupling.joint_b} by its coupling"
-        what = name, "1/s^2" if alone else "1/s", before, after
-        change = np.inf if after <= CLOSES_EXACTLY * before else change_by(ratio / own)
+        what = name, "1/s^2" if alone else "1/s", difference, remainder
+        change = np.inf if remainder <= CLOSES_EXACTLY * difference else change_by(ratio / ratio_true)
         count = len(moving[0]) if alone else None
         yield Cause(f"ratio of {coupling.name}", says, *what, remedy, 1, _COVERS, explains=count, change=change)
 
@@ -182,20 +182,20 @@ def soft_couplings(evidence: Evidence) -> Iterator[Cause]:
     def accelerations(softness: FloatArray) -> FloatArray:
         return np.asarray(free - response @ np.linalg.solve(rows @ response + np.diag(softness), rows @ free))
 
-    before = float(np.max(np.abs(accelerations(np.zeros(len(rows))) - rates)))
-    if not above_round_off(before, float(np.max(np.abs(rates)))):
+    difference = float(np.max(np.abs(accelerations(np.zeros(len(rows))) - rates)))
+    if not above_round_off(difference, float(np.max(np.abs(rates)))):
         return
     for whose, estimate in estimates:
         part = least_squares_parameter(lambda x, of=estimate: accelerations(x * of) - rates, _SOFT, _SOFT)  # type: ignore[misc]  # bound now
-        after = float(np.max(np.abs(accelerations(part * estimate) - rates)))
-        if part <= 0 or after > CLOSES_EXACTLY * before:
+        remainder = float(np.max(np.abs(accelerations(part * estimate) - rates)))
+        if part <= 0 or remainder > CLOSES_EXACTLY * difference:
             continue
         says = f"each coupling is soft and yields to its force by {part:.4g} times {whose}"
         remedy = (
             f"make the couplings stiffer (their impedance is {1 / (1 + part):.4g}; 1 is rigid), give light joints an "
             "armature, or relate heavy joints by one coupling without the light ones"
         )
-        what = "accelerations at time 0", "1/s^2", before, after
+        what = "accelerations at time 0", "1/s^2", difference, remainder
         yield Cause("soft couplings", says, *what, remedy, 1, _COVERS, explains=len(rates), change=part)
         return
 
@@ -229,44 +229,44 @@ def of_stops(evidence: Evidence) -> Iterator[Cause]:
     Its place is where the joint rests, or where it rebounds. The latter counts only if the true joint rebounds at its
     stop, for contacts of bodies and other stops turn joints back, too.
     """
-    mechanism, found = evidence.element.mechanism, run_and_truth(evidence)
-    if found is None or not is_motion(found[0]) or not any(joint.limits for joint in mechanism.joints):
+    mechanism, pair = evidence.element.mechanism, run_and_truth(evidence)
+    if pair is None or not is_motion(pair[0]) or not any(joint.limits for joint in mechanism.joints):
         return
-    if not is_one_motion(*found, evidence.element.length):
+    if not is_one_motion(*pair, evidence.element.length):
         return
-    (seen, speeds), (true, rates) = (placed_of(mechanism, dataset).of_tree() for dataset in found)
-    times = np.asarray(found[0]["time"], dtype=float)
+    (seen, speeds), (true, rates) = (placed_of(mechanism, dataset).of_tree() for dataset in pair)
+    times = np.asarray(pair[0]["time"], dtype=float)
     for joint in mechanism.joints:
         if not joint.limits:
             continue
-        at, rated = mechanism.place_of(joint.name)
-        turns, expected = (_rebounds(times, q[:, at], v[:, rated]) for q, v in ((seen, speeds), (true, rates)))
+        place, rated = mechanism.place_of(joint.name)
+        turns, expected = (_rebounds(times, q[:, place], v[:, rated]) for q, v in ((seen, speeds), (true, rates)))
         for limit, side in zip(joint.limits, (1.0, -1.0), strict=True):
-            size = max(abs(limit), float(np.ptp(true[:, at]))) or joint.limits[1] - joint.limits[0]
-            rests = (np.abs(true[:, at] - limit) <= _STILL * size) & (np.abs(rates[:, rated]) <= _STILL * size)
-            does, off, own = "rests", seen[rests, at] - limit, list[_Rebound]()
+            size = max(abs(limit), float(np.ptp(true[:, place]))) or joint.limits[1] - joint.limits[0]
+            rests = (np.abs(true[:, place] - limit) <= _STILL * size) & (np.abs(rates[:, rated]) <= _STILL * size)
+            does, off, rebounds = "rests", seen[rests, place] - limit, list[_Rebound]()
             if len(off) < 2:
-                own = [each for each in turns if each.side == side]
-                does, off = "turns back", np.array([each.place - limit for each in own])
-                theirs = [abs(each.place - limit) for each in expected if each.side == side]
+                rebounds = [rebound for rebound in turns if rebound.side == side]
+                does, off = "turns back", np.array([rebound.place - limit for rebound in rebounds])
+                theirs = [abs(rebound.place - limit) for rebound in expected if rebound.side == side]
                 if not theirs or max(theirs) > _AT_STOP * size:
                     continue
             if not len(off) or not above_round_off(float(np.max(np.abs(off))), size):
                 continue
             shift = float(np.median(off))
-            before, after, count = float(np.max(np.abs(off))), float(np.max(np.abs(off - shift))), len(off)
-            fastest = max((each.speed for each in own), default=float(np.max(np.abs(speeds[:, rated]))))
+            difference, remainder, count = float(np.max(np.abs(off))), float(np.max(np.abs(off - shift))), len(off)
+            fastest = max((rebound.speed for rebound in rebounds), default=float(np.max(np.abs(speeds[:, rated]))))
             # A method turns back, or comes to rest, where a step ends; one that chooses its steps ends them at samples.
             # Several rebounds tell no more: with e = 1, flights after a fall from rest last whole numbers of steps.
             if abs(shift) <= _REACHES * (evidence.step or float(np.max(np.diff(times)))) * fastest:
                 continue
             if count == 1:
-                before, after = (own[0].missed(x, joint.restitution) for x in (limit, limit + shift))
+                difference, remainder = (rebounds[0].missed(x, joint.restitution) for x in (limit, limit + shift))
                 count = 2  # place and rate
             says = f"the joint {joint.name} {does} at {limit + shift:.6g}, not at its stop at {limit:.6g}"
             remedy = "look at the place of the stop, at the joint's zero, and at how far the stop gives way"
             unit = "rad" if joint.kind == "revolute" else "m"
-            what, change = (f"{joint.name} at its stop", unit, before, after), abs(shift) / size
+            what, change = (f"{joint.name} at its stop", unit, difference, remainder), abs(shift) / size
             yield Cause(f"stop of {joint.name}", says, *what, remedy, 1, _COVERS, explains=count, change=change)
 
 
@@ -308,19 +308,19 @@ def _rebounds(t: FloatArray, q: FloatArray, v: FloatArray) -> list[_Rebound]:
     """Rebounds of a coordinate, each where the parabolas through the samples before and after it meet."""
     from scipy.optimize import brentq
 
-    found = []
+    rebounds = []
     steps, changes = np.diff(t), np.diff(v)
     for k in range(1, len(steps) - 1):
         if v[k] * v[k + 1] >= 0 or abs(changes[k]) < _JUMPS * max(abs(changes[k - 1]), abs(changes[k + 1])):
             continue
-        h, before, after = steps[k], changes[k - 1] / steps[k - 1], changes[k + 1] / steps[k + 1]
-        first = np.array([q[k], v[k], before / 2])
-        second = np.array([q[k + 1] - h * v[k + 1] + h * h * after / 2, v[k + 1] - h * after, after / 2])
+        h, slope_in, slope_out = steps[k], changes[k - 1] / steps[k - 1], changes[k + 1] / steps[k + 1]
+        state = np.array([q[k], v[k], slope_in / 2])
+        second = np.array([q[k + 1] - h * v[k + 1] + h * h * slope_out / 2, v[k + 1] - h * slope_out, slope_out / 2])
 
-        def apart(x: float, difference: FloatArray = first - second) -> float:
+        def apart(x: float, difference: FloatArray = state - second) -> float:
             return float(difference @ (1.0, x, x * x))
 
         if apart(0.0) * apart(h) < 0:
-            place = float(first @ (1.0, x := brentq(apart, 0.0, h), x * x))
-            found.append(_Rebound(first, second, place, float(np.sign(v[k + 1])), h))
-    return found
+            place = float(state @ (1.0, x := brentq(apart, 0.0, h), x * x))
+            rebounds.append(_Rebound(state, second, place, float(np.sign(v[k + 1])), h))
+    return rebounds

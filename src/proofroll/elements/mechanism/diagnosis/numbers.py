@@ -114,6 +114,13 @@ FACTORS_OF_ALL: tuple[Any, ...] = (
         "give the springs their stiffness, damping and free length",
     ),
     factor_of_all(
+        "bushings",
+        "the bushings",
+        lambda m, x: Change(m, bushings=x),
+        lambda m: bool(m.bushings),
+        "give the bushings their stiffness and damping",
+    ),
+    factor_of_all(
         "gyroscopic terms",
         "the gyroscopic moments w x I w",
         lambda m, x: Change(m, gyroscopic=x),
@@ -131,12 +138,12 @@ def of_each_body(evidence: Evidence) -> Iterator[Cause]:
     inertia, com = (np.array([getattr(body, key) for body in mechanism.bodies]) for key in ("inertia", "com"))
     for residuals in residuals_of(evidence):
         for i, body in enumerate(mechanism.bodies if len(mechanism.bodies) > 1 else ()):
-            one = np.arange(len(mass)) == i
+            which = np.arange(len(mass)) == i
 
-            for what, own in (("mass", mass), ("inertia", inertia)):
+            for what, values in (("mass", mass), ("inertia", inertia)):
 
-                def change(x: float, what: str = what, own: FloatArray = own, one: Any = one) -> Change:
-                    scaled = (np.where(one, x, 1.0) * own.T).T
+                def change(x: float, what: str = what, values: FloatArray = values, which: Any = which) -> Change:
+                    scaled = (np.where(which, x, 1.0) * values.T).T
                     return Change(mechanism, **{what: scaled})  # type: ignore[arg-type]  # an array by its name
 
                 factor, number = best(residuals, change)
@@ -194,13 +201,15 @@ def _about_origin(
 def friction_of_each_joint(evidence: Evidence) -> Iterator[Cause]:
     """Hypothesis: one of several joints has dry friction with a factor."""
     mechanism = evidence.element.mechanism
-    rough = [(joint, at) for joint, at in zip(mechanism.joints, mechanism.v_slices, strict=True) if joint.friction]
+    rough = [
+        (joint, columns) for joint, columns in zip(mechanism.joints, mechanism.v_slices, strict=True) if joint.friction
+    ]
     for residuals in residuals_of(evidence) if len(rough) > 1 else ():
-        for joint, at in rough:
-            one = np.eye(mechanism.nv)[at].sum(axis=0)
+        for joint, columns in rough:
+            which = np.eye(mechanism.nv)[columns].sum(axis=0)
 
-            def change(x: float, one: FloatArray = one) -> Change:
-                return Change(mechanism, friction=1 + (x - 1) * one)
+            def change(x: float, which: FloatArray = which) -> Change:
+                return Change(mechanism, friction=1 + (x - 1) * which)
 
             factor, number = best(residuals, change)
             if possible(factor, signed=True):
@@ -224,40 +233,44 @@ def of_each_joint(evidence: Evidence) -> Iterator[Cause]:
     inertia = np.diag(equations.inertial(equations.tree.at(q, v))[1])
     for residuals in residuals_of(evidence):
         joints = zip(mechanism.joints, mechanism.v_slices, strict=True)
-        each = [(f"the joint {joint.name}", np.eye(mechanism.nv)[at].sum(axis=0)) for joint, at in joints]
-        own = {key: [getattr(j, key) for j in mechanism.joints for _ in range(j.nv)] for key in ("armature", "damping")}
-        if len(each) > 1:
-            each = [("every joint", np.ones(mechanism.nv)), *each]
-        for where, which in each:
+        choices = [(f"the joint {joint.name}", np.eye(mechanism.nv)[columns].sum(axis=0)) for joint, columns in joints]
+        numbers = {
+            key: [getattr(j, key) for j in mechanism.joints for _ in range(j.nv)] for key in ("armature", "damping")
+        }
+        if len(choices) > 1:
+            choices = [("every joint", np.ones(mechanism.nv)), *choices]
+        for owner, which in choices:
             for what, has in (("an armature (rotor inertia)", "armature"), ("damping", "damping")):
                 key = f"added_{has}"
-                at = residuals.left(Change(mechanism))
-                slope = residuals.left(Change(mechanism, **{key: which})) - at
+                columns = residuals.left(Change(mechanism))
+                slope = residuals.left(Change(mechanism, **{key: which})) - columns
                 square = float(slope @ slope)
                 if not square:
                     continue
-                value = -float(slope @ at) / square
-                if np.any(own[has] + value * which < 0):
+                value = -float(slope @ columns) / square
+                if np.any(numbers[has] + value * which < 0):
                     continue
-                says = f"{where} has {what} of {value:.4g} more than the scene gives it"
+                says = f"{owner} has {what} of {value:.4g} more than the scene gives it"
                 size = value * {"armature": 1.0, "damping": evidence.element.natural_time}[has]
                 remedy = f"set {has} of the joints yourself, also where it is zero"
                 change = Change(mechanism, **{key: value * which})
                 if _by_scheme(evidence, change):
                     continue
                 part = abs(size) / float(np.min(inertia[which > 0]))
-                yield residuals.cause(f"{what} in {where}", says, change, remedy, 1, part)
+                yield residuals.cause(f"{what} in {owner}", says, change, remedy, 1, part)
 
 
 def _by_scheme(evidence: Evidence, change: Change) -> bool:
     """True if a change is damping alone, no more than a first-order scheme adds by itself at the engine's step.
 
-    The stiffness is that of springs and servos, or of a swing with the mechanism's natural time.
+    Steps that are not known, as of an engine that adapts them, may be as long as the interval between samples. The
+    stiffness is that of springs and servos, or of a swing with the mechanism's natural time.
     """
     mechanism = evidence.element.mechanism
-    own = np.array([joint.damping for joint in mechanism.joints for _ in range(joint.nv)])
-    added = (change.damping - 1.0) * own + change.added_damping
-    if not evidence.step or np.any(added < 0) or not np.any(added > 0):
+    damping = np.array([joint.damping for joint in mechanism.joints for _ in range(joint.nv)])
+    added = (change.damping - 1.0) * damping + change.added_damping
+    step = evidence.step or (0.0 if evidence.run is None else float(np.diff(evidence.run["time"].to_numpy()).max()))
+    if np.any(added < 0) or not np.any(added > 0):
         return False
     equations = JointCoordinates(mechanism)
     inertia = np.diag(equations.inertial(equations.tree.at(*mechanism.start()))[1])
@@ -265,4 +278,4 @@ def _by_scheme(evidence: Evidence, change: Change) -> bool:
     for actuator in mechanism.actuators:
         stiffness[mechanism.place_of(actuator.joint)[1]] += actuator.gear**2 * actuator.kp
     stiffness = np.maximum(stiffness, inertia / evidence.element.natural_time**2)
-    return bool(np.all(added <= _FIRST_ORDER * evidence.step * stiffness))
+    return bool(np.all(added <= _FIRST_ORDER * step * stiffness))

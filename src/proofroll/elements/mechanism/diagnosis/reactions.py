@@ -68,8 +68,8 @@ class Reactions:
 
     def _of_other_joints(self) -> Iterator[Cause]:
         """Hypothesis: reactions are reported at other joints than their own."""
-        given, true = self.reported.reported, self.reported.true
-        off = np.abs(given[:, :, None] - true[:, None])
+        reported, true = self.reported.reported, self.reported.true
+        off = np.abs(reported[:, :, None] - true[:, None])
         shared = np.any(np.isfinite(off), axis=(0, 3))
         distance = np.where(shared, np.max(np.nan_to_num(off), axis=(0, 3)), np.inf)
         order = linear_sum_assignment(np.minimum(distance, _FAR * self.reported.size))[1].tolist()
@@ -86,11 +86,11 @@ class Reactions:
         """Hypothesis: moments are about the centre of mass of the child, or about the world's origin."""
         coms = {body.name: body.com for body in self.mechanism.bodies}
         ends = [self.mechanism.connections[k] for k in self.which]
-        at = np.stack([self.placed.point(end.b, end.position_b) for end in ends], axis=1)
+        places = np.stack([self.placed.point(end.b, end.position_b) for end in ends], axis=1)
         centre = np.stack([self.placed.point(end.b, coms.get(end.b, (0, 0, 0))) for end in ends], axis=1)
-        for where, arm in (("centre of mass of the child", at - centre), ("origin of the world", at)):
+        for point_words, arm in (("centre of mass of the child", places - centre), ("origin of the world", places)):
             moved = self.reported.true + product(skews(arm.reshape(-1, 3)).reshape(*arm.shape, 3), self.force)
-            says = f"torque is the moment about the {where}, not at the joint"
+            says = f"torque is the moment about the {point_words}, not at the joint"
             yield self.reported.cause("point of moment", says, moved, "give the moment at the joint")
 
 
@@ -110,8 +110,8 @@ def _reactions(
     bodies = element.mechanism.body_index
     force = element.mechanism.mass * element.first_motion.scale
     for kind, unit, what in _KINDS:
-        known = np.isfinite(true[kind])
-        heard = np.all(np.isfinite(reported[kind]) | ~known, axis=(0, 2)) & np.any(known, axis=(0, 2))
+        finite = np.isfinite(true[kind])
+        heard = np.all(np.isfinite(reported[kind]) | ~finite, axis=(0, 2)) & np.any(finite, axis=(0, 2))
         which = np.flatnonzero(heard).tolist()
         if not which or f"{kind}s" in evidence.settled:
             continue
@@ -119,9 +119,9 @@ def _reactions(
             name: np.stack([placed.R_WB[:, bodies[ends[k].b if name == BODY else ends[k].a]] for k in which], axis=1)
             for name in (BODY, PARENT)
         }
-        own = np.where(known, reported[kind], np.nan)[:, which], true[kind][:, which]
+        both = np.where(finite, reported[kind], np.nan)[:, which], true[kind][:, which]
         least = force if kind == "force" else force * element.length
-        vector = ReportedVector(kind, what, unit, *own, placed.time, frames, least, bars.get(kind, 0.0))
+        vector = ReportedVector(kind, what, unit, *both, placed.time, frames, least, bars.get(kind, 0.0))
         yield Reactions(vector, which, placed, true["force"][:, which])
 
 
@@ -131,25 +131,27 @@ def _reactions(
 )
 def reactions(evidence: Evidence) -> Iterator[Cause]:
     """Hypotheses on forces and moments of joints and loops along the run, where they are determinate."""
-    found = run_and_truth(evidence)
-    if found is None:
+    pair = run_and_truth(evidence)
+    if pair is None:
         return
-    run, truth = (data.isel(time=slice(1, None)) for data in found)
-    names = [each.name for each in evidence.element.mechanism.connections]
+    run, truth = (data.isel(time=slice(1, None)) for data in pair)
+    names = [connection.name for connection in evidence.element.mechanism.connections]
     reported, true = ({kind: _stacked(data, kind, names) for kind, _, _ in _KINDS} for data in (run, truth))
     bars = {kind: _bar(truth, f"{kind}s") for kind, _, _ in _KINDS}
-    for each in _reactions(evidence, placed_of(evidence.element.mechanism, truth), reported, true, bars):
-        causes = [cause for cause in each.causes(evidence.step) if cause.proven]
-        if causes and not (forced_otherwise(evidence, each.reported) and _may_be_motion(evidence, run, each)):
+    for connection in _reactions(evidence, placed_of(evidence.element.mechanism, truth), reported, true, bars):
+        causes = [cause for cause in connection.causes(evidence.step) if cause.proven]
+        if causes and not (
+            forced_otherwise(evidence, connection.reported) and _may_be_motion(evidence, run, connection)
+        ):
             yield from causes
 
 
-def _may_be_motion(evidence: Evidence, run: Any, found: Reactions) -> bool:
+def _may_be_motion(evidence: Evidence, run: Any, seen: Reactions) -> bool:
     """False if the motion is nearly right, and reactions at the run's own states are the true ones.
 
     Of contacts, friction, stops and what is given over time the state alone does not tell the forces.
     """
-    mechanism, true = found.mechanism, found.reported.true
+    mechanism, true = seen.mechanism, seen.reported.true
     driven = any(isinstance(signal, Formula | Table) for signal in mechanism.signals)
     if driven or mechanism.contacts or switched_joints(mechanism) or not is_motion(run):
         return True
@@ -160,9 +162,9 @@ def _may_be_motion(evidence: Evidence, run: Any, found: Reactions) -> bool:
         samples = [equations.sample(q, v, time=t) for q, v, t in zip(*placed.of_tree(), placed.time, strict=True)]
     except Diverged:  # at a singular pose
         return True
-    forces, moments = np.split(np.array([sample["wrench"] for sample in samples])[:, found.which], 2, axis=-1)
-    own = forces if found.reported.name == "force" else moments
-    return known_difference(np.where(np.isnan(true), np.nan, own), true) > CLOSES * found.reported.before
+    forces, moments = np.split(np.array([sample["wrench"] for sample in samples])[:, seen.which], 2, axis=-1)
+    reference = forces if seen.reported.name == "force" else moments
+    return known_difference(np.where(np.isnan(true), np.nan, reference), true) > CLOSES * seen.reported.before
 
 
 @hypothesis(
@@ -183,8 +185,8 @@ def reactions_at_start(evidence: Evidence) -> Iterator[Cause]:
         true[kind] = np.reshape(line["expected"], shape) if line is not None else empty
         if line is not None and line["holds"]:
             reported[kind] = np.full(shape, np.nan)
-    for each in _reactions(evidence, evidence.element.start, reported, true, {}):
-        yield from each.causes(evidence.step)
+    for kind_of in _reactions(evidence, evidence.element.start, reported, true, {}):
+        yield from kind_of.causes(evidence.step)
 
 
 def _stacked(data: Any, kind: str, names: list[str]) -> FloatArray:

@@ -67,40 +67,42 @@ def residuals_of(evidence: Evidence) -> Iterator[Residuals[Change]]:
     seen, true = of_run(mechanism, evidence.run, part), of_run(mechanism, evidence.truth, part)
     if not seen.consistent:
         return
-    own = np.abs(true.left(plain))
-    tells = own < _TELLS  # e.g. the free spin of a body about its axis leaves only round-off to balance
-    at = np.abs(seen.left(plain))
-    if at.shape != own.shape or not tells.any():
+    true_sizes = np.abs(true.left(plain))
+    tells = true_sizes < _TELLS  # e.g. the free spin of a body about its axis leaves only round-off to balance
+    sizes = np.abs(seen.left(plain))
+    if sizes.shape != true_sizes.shape or not tells.any():
         return
-    before, floor = float(np.max(at[tells])), float(np.max(own[tells]))
-    if np.isfinite(before) and before > ABOVE * floor:
-        first = of_start(evidence, derived=True)
-        allowed = CLOSES * before + _KNOWN * _doubt(evidence, first)
-        contradicted = partial(contradicts_first_steps, first, allowed)
-        yield _residuals_at(seen, "along the run", before, CLOSES, contradicted, tells)
+    difference, floor = float(np.max(sizes[tells])), float(np.max(true_sizes[tells]))
+    if np.isfinite(difference) and difference > ABOVE * floor:
+        at_start = of_start(evidence, derived=True)
+        allowed = CLOSES * difference + _KNOWN * _doubt(evidence, at_start)
+        contradicted = partial(contradicts_first_steps, at_start, allowed)
+        yield _residuals_at(seen, "along the run", difference, CLOSES, contradicted, tells)
 
 
-def contradicts_first_steps(first: MechanismStates | None, allowed: float, change: Change) -> bool:
+def contradicts_first_steps(at_start: MechanismStates | None, allowed: float, change: Change) -> bool:
     """True if the first steps do not balance with a change of the mechanism.
 
     Where nearly the whole load is left, the change asks for accelerations of another order of magnitude than those that
     were seen; then no doubt about these is an excuse, unless they balance as little with the scene's own numbers.
 
     Args:
-        first: state and accelerations of the first steps; None: there are none.
+        at_start: state and accelerations of the first steps; None: there are none.
         allowed: largest relative imbalance that their error explains.
         change: of the mechanism.
     """
-    if first is None:
+    if at_start is None:
         return False
-    left, own = (float(np.max(np.abs(first.left(item)), initial=0.0)) for item in (change, Change(first.mechanism)))
-    return not left <= min(allowed, max(_UNBALANCED, own))
+    left, plain_left = (
+        float(np.max(np.abs(at_start.left(item)), initial=0.0)) for item in (change, Change(at_start.mechanism))
+    )
+    return not left <= min(allowed, max(_UNBALANCED, plain_left))
 
 
 def balanced_at_start(start: MechanismStates) -> Residuals[Change]:
     """Residuals at time 0, for the accelerations of the certificate."""
-    before = float(np.max(np.abs(start.left(Change(start.mechanism))), initial=0.0))
-    return _residuals_at(start, "at time 0", before, 1e3 * CLOSES_EXACTLY)
+    difference = float(np.max(np.abs(start.left(Change(start.mechanism))), initial=0.0))
+    return _residuals_at(start, "at time 0", difference, 1e3 * CLOSES_EXACTLY)
 
 
 def _doubt(evidence: Evidence, start: MechanismStates | None) -> float:
@@ -113,8 +115,8 @@ def _doubt(evidence: Evidence, start: MechanismStates | None) -> float:
 
 def _residuals_at(
     states: MechanismStates,
-    at: str,
-    before: float,
+    place: str,
+    difference: float,
     closes: float,
     contradicted: Callable[[Change], bool] = lambda _: False,
     tells: Any = slice(None),
@@ -124,9 +126,9 @@ def _residuals_at(
     def left(change: Change | None) -> FloatArray:
         return np.asarray(states.left(change or plain)[tells])
 
-    quantity = f"balance of the equations of motion {at}, relative,"
+    quantity = f"balance of the equations of motion {place}, relative,"
     covers = ("motion", *COVERED)
-    return Residuals(left, quantity, "1", before, closes, covers, plain, lambda: _others(plain), contradicted)
+    return Residuals(left, quantity, "1", difference, closes, covers, plain, lambda: _others(plain), contradicted)
 
 
 def _others(plain: Change) -> list[Change]:
@@ -134,12 +136,15 @@ def _others(plain: Change) -> list[Change]:
     mechanism = plain.mechanism
     mass = np.array([body.mass for body in mechanism.bodies])
     inertia = np.array([body.inertia for body in mechanism.bodies])
-    found = [replace(plain, gravity=np.array(mechanism.gravity) + axis) for axis in np.eye(3)]
-    for one in np.eye(len(mass)):
-        found += [replace(plain, mass=mass * (1 + one)), replace(plain, inertia=inertia * (1 + one)[:, None, None])]
-    for one in np.eye(sum(joint.nv for joint in mechanism.joints)):
-        found += [replace(plain, added_armature=one), replace(plain, added_damping=one)]
-    return found
+    changes = [replace(plain, gravity=np.array(mechanism.gravity) + axis) for axis in np.eye(3)]
+    for which in np.eye(len(mass)):
+        changes += [
+            replace(plain, mass=mass * (1 + which)),
+            replace(plain, inertia=inertia * (1 + which)[:, None, None]),
+        ]
+    for which in np.eye(sum(joint.nv for joint in mechanism.joints)):
+        changes += [replace(plain, added_armature=which), replace(plain, added_damping=which)]
+    return changes
 
 
 def best(residuals: Residuals[Change], change: Callable[[float], Change]) -> tuple[float, int]:
@@ -147,15 +152,15 @@ def best(residuals: Residuals[Change], change: Callable[[float], Change]) -> tup
 
     With a single equation any factor would fit, so that only factors of known mistakes are tried.
     """
-    at = residuals.left(change(1.0))
-    slope = residuals.left(change(2.0)) - at
+    plain_left = residuals.left(change(1.0))
+    slope = residuals.left(change(2.0)) - plain_left
 
     def left_by(factor: float) -> float:
-        left: FloatArray = at + (factor - 1.0) * slope
+        left: FloatArray = plain_left + (factor - 1.0) * slope
         return float(np.max(np.abs(left), initial=0.0))
 
-    known = min(FACTORS, key=left_by)
-    if residuals.single_equation or left_by(known) <= residuals.closes * residuals.before:
-        return known, 0
+    usual = min(FACTORS, key=left_by)
+    if residuals.single_equation or left_by(usual) <= residuals.closes * residuals.before:
+        return usual, 0
     square = float(slope @ slope)
-    return (1.0 - float(slope @ at) / square if square else 1.0), 1
+    return (1.0 - float(slope @ plain_left) / square if square else 1.0), 1

@@ -31,10 +31,10 @@ def other_axis(evidence: Evidence) -> Iterator[Cause]:
     """Hypothesis: a joint turns about another axis than the scene's."""
     mechanism = evidence.element.mechanism
     yield from _axes_at_start(evidence)
-    found = run_and_truth(evidence)
-    if found is None or not is_motion(found[0]):
+    pair = run_and_truth(evidence)
+    if pair is None or not is_motion(pair[0]):
         return
-    placed = placed_of(mechanism, found[0])
+    placed = placed_of(mechanism, pair[0])
     for joint in mechanism.joints:
         if joint.kind != "revolute":
             continue
@@ -42,22 +42,26 @@ def other_axis(evidence: Evidence) -> Iterator[Cause]:
         turning = placed.w_WB[:, child] - placed.spin(joint.parent)
         seen = np.einsum("tji,tj->ti", placed.R_WB[:, parent], turning)
         axis = joint.parent_frame[:, 2]
-        own = np.linalg.svd(seen)[2][0]
-        own = own * np.sign(own @ axis or 1.0)
-        before, after = (float(np.max(np.linalg.norm(seen - np.outer(seen @ n, n), axis=-1))) for n in (axis, own))
-        if above_round_off(before, float(np.max(np.abs(seen)))) and _turns_about(placed, parent, child, own, axis):
-            says = f"the joint {joint.name} turns about ({_shown(own)}) of its parent, not about ({_shown(axis)})"
+        fitted = np.linalg.svd(seen)[2][0]
+        fitted = fitted * np.sign(fitted @ axis or 1.0)
+        difference, remainder = (
+            float(np.max(np.linalg.norm(seen - np.outer(seen @ n, n), axis=-1))) for n in (axis, fitted)
+        )
+        if above_round_off(difference, float(np.max(np.abs(seen)))) and _turns_about(
+            placed, parent, child, fitted, axis
+        ):
+            says = f"the joint {joint.name} turns about ({_shown(fitted)}) of its parent, not about ({_shown(axis)})"
             covered = ("p_WB", "v_WB", "w_WB", "q_WB", "motion", "force", "torque")
-            what = (f"turning of {joint.name} across its axis", "rad/s", before, after)
-            change = float(np.linalg.norm(own - axis))
+            what = (f"turning of {joint.name} across its axis", "rad/s", difference, remainder)
+            change = float(np.linalg.norm(fitted - axis))
             yield Cause(f"axis of {joint.name}", says, *what, _REMEDY, 2, covered, change=change)
 
 
-def _turns_about(placed: Placed, parent: int, child: int, own: FloatArray, axis: FloatArray) -> bool:
-    """True if the poses turn about ``own`` and not about ``axis``, so that not only the spin is reported wrongly."""
+def _turns_about(placed: Placed, parent: int, child: int, seen: FloatArray, axis: FloatArray) -> bool:
+    """True if the poses turn about ``seen`` and not about ``axis``, so that not only the spin is reported wrongly."""
     relative = np.swapaxes(placed.R_WB[:, parent], 1, 2) @ placed.R_WB[:, child]
     turns = relative @ relative[0].T
-    moved, unmoved = (float(np.max(np.linalg.norm(turns @ n - n, axis=-1))) for n in (own, axis))
+    moved, unmoved = (float(np.max(np.linalg.norm(turns @ n - n, axis=-1))) for n in (seen, axis))
     return moved <= CLOSES * unmoved
 
 
@@ -67,13 +71,15 @@ def _axes_at_start(evidence: Evidence) -> Iterator[Cause]:
     joints = evidence.element.mechanism.joints
     if line is None or len(line["found"]) != 3 * len(joints):
         return
-    found, expected = (np.reshape(line[key], (-1, 3)) for key in ("found", "expected"))
-    off = np.nan_to_num(np.max(np.abs(found - expected), axis=1))
+    axes, expected = (np.reshape(line[key], (-1, 3)) for key in ("found", "expected"))
+    off = np.nan_to_num(np.max(np.abs(axes - expected), axis=1))
     for i, joint in enumerate(joints):
-        both = f"({_shown(found[i])}) in the world, not ({_shown(expected[i])})"
+        both = f"({_shown(axes[i])}) in the world, not ({_shown(expected[i])})"
         says = f"the joint {joint.name} was built with the axis {both}"
-        after = float(np.max(np.delete(off, i), initial=0.0))
-        yield Cause("joint axis", says, "joint axes at time 0", "1", float(np.max(off)), after, _REMEDY, 0, ("motion",))
+        remainder = float(np.max(np.delete(off, i), initial=0.0))
+        yield Cause(
+            "joint axis", says, "joint axes at time 0", "1", float(np.max(off)), remainder, _REMEDY, 0, ("motion",)
+        )
 
 
 @hypothesis(
@@ -95,39 +101,39 @@ def axis_of_first_steps(evidence: Evidence) -> Iterator[Cause]:
         parent, child = (mechanism.body_index[name] for name in (joint.parent, joint.child))
         above = np.zeros(3) if parent == len(w) else w[parent]
         R_P, R_C = start.R_WB[0, parent], start.R_WB[0, child]
-        own = R_P.T @ (rate[child] - rate[parent] - np.cross(above, w[child] - above))
-        size = float(np.linalg.norm(own))
+        axis_seen = R_P.T @ (rate[child] - rate[parent] - np.cross(above, w[child] - above))
+        size = float(np.linalg.norm(axis_seen))
         if not size:
             continue
         axis = joint.parent_frame[:, 2]
-        own = own / size * np.sign(own @ axis or 1.0)
-        other = replace(
+        axis_seen = axis_seen / size * np.sign(axis_seen @ axis or 1.0)
+        turned = replace(
             joint,
-            axis=tuple(R_C.T @ R_P @ own),
+            axis=tuple(R_C.T @ R_P @ axis_seen),
             orientation=tuple(Rotation.from_matrix(R_P.T @ R_C).as_euler("xyz")),
             q0=(0.0,),
             rest=joint.rest - joint.q0[0],
         )
-        joints = (*mechanism.joints[:index], other, *mechanism.joints[index + 1 :])
+        joints = (*mechanism.joints[:index], turned, *mechanism.joints[index + 1 :])
         try:
             expected = _first(type(element)(replace(mechanism, joints=joints)))
         except InputError:  # its loops do not close
             continue
-        before, after = (_apart(lines, each) for each in ({}, expected))  # in tolerances
-        seen = before > 1
-        left = float(np.max((after / np.where(seen, before, 1.0))[seen], initial=0.0))
-        says = f"the joint {joint.name} turns about ({_shown(own)}) of its parent, not about ({_shown(axis)})"
-        largest = float(np.max(before))
+        difference, remainder = (_apart(lines, values) for values in ({}, expected))  # in tolerances
+        seen = difference > 1
+        left = float(np.max((remainder / np.where(seen, difference, 1.0))[seen], initial=0.0))
+        says = f"the joint {joint.name} turns about ({_shown(axis_seen)}) of its parent, not about ({_shown(axis)})"
+        largest = float(np.max(difference))
         what = ("first motion and reactions, in tolerances,", "1", largest, left * largest)
         covered = ("motion", *COVERED)
-        explains, change = int(np.sum(seen)), float(np.linalg.norm(own - axis))
+        explains, change = int(np.sum(seen)), float(np.linalg.norm(axis_seen - axis))
         yield Cause(f"axis of {joint.name}", says, *what, _REMEDY, 2, covered, explains=explains, change=change)
 
 
 def _first(element: Any) -> dict[str, FloatArray]:
     """Expected values of the lines of the certificate that depend on joint axes."""
-    found, wrench = element.first_motion, element.first_wrench
-    accelerations = {"acceleration": found.acceleration, "angular acceleration": found.angular_acceleration}
+    motion, wrench = element.first_motion, element.first_wrench
+    accelerations = {"acceleration": motion.acceleration, "angular acceleration": motion.angular_acceleration}
     return {"forces": wrench[:, :3], "torques": wrench[:, 3:], **accelerations} | {
         f"{name}{OF_FIRST_STEPS}": values for name, values in accelerations.items()
     }
@@ -179,13 +185,13 @@ def _ancestry(mechanism: Mechanism) -> FloatArray:
     """Mask of pairs of velocities whose joints are ancestor and descendant in the tree, (nv, nv)."""
     above = {joint.child: joint for joint in mechanism.joints}
     slices = dict(zip((joint.name for joint in mechanism.joints), mechanism.v_slices, strict=True))
-    found = np.zeros((mechanism.nv, mechanism.nv))
+    mask = np.zeros((mechanism.nv, mechanism.nv))
     for joint in mechanism.joints:
         parent = above.get(joint.parent)
         while parent is not None:
-            found[slices[joint.name], slices[parent.name]] = found[slices[parent.name], slices[joint.name]] = 1.0
+            mask[slices[joint.name], slices[parent.name]] = mask[slices[parent.name], slices[joint.name]] = 1.0
             parent = above.get(parent.parent)
-    return found
+    return mask
 
 
 @hypothesis(
@@ -207,13 +213,13 @@ def loop_lacks_row(evidence: Evidence) -> Iterator[Cause]:
     if np.max(opened) <= _OPEN * evidence.element.length:
         return
     for k, loop in enumerate(mechanism.loops):
-        own = rows[0].loop == k
-        lost = np.flatnonzero(own & (opened > CLOSES * np.max(opened)))
+        of_loop = rows[0].loop == k
+        lost = np.flatnonzero(of_loop & (opened > CLOSES * np.max(opened)))
         if not len(lost) or np.max(np.abs(seen.left(Change(mechanism), tuple(lost.tolist())))) > _BALANCED:
             continue
-        after = float(np.max(np.delete(opened, lost), initial=0.0))
+        remainder = float(np.max(np.delete(opened, lost), initial=0.0))
         many = "a row" if len(lost) == 1 else f"{len(lost)} of its rows"
         says = f"the loop {loop.name} lacks {many}: it opens there freely, and holds less than a {loop.kind} joint"
-        remedy = f"a {loop.kind} loop has {int(np.sum(own))} rows; a point that is held gives three of them"
+        remedy = f"a {loop.kind} loop has {int(np.sum(of_loop))} rows; a point that is held gives three of them"
         covered = ("motion", *COVERED)
-        yield Cause("missing row", says, "opening of loops", "m", float(np.max(opened)), after, remedy, 0, covered)
+        yield Cause("missing row", says, "opening of loops", "m", float(np.max(opened)), remainder, remedy, 0, covered)

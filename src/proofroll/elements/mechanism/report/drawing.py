@@ -7,9 +7,11 @@ from scipy.spatial import ConvexHull
 from scipy.spatial.transform import Rotation
 
 from proofroll.core.arrays import FloatArray
-from proofroll.elements.mechanism.contacts.shapes import Bore, HalfSpace, Wall
+from proofroll.elements.mechanism.contacts.shapes import HalfSpace, Shape, SphereShape, Wall
 from proofroll.elements.mechanism.contacts.start import TOUCHING, touches
+from proofroll.elements.mechanism.contacts.walls import BowlWall, CurvedWall
 from proofroll.elements.mechanism.element import MechanismElement
+from proofroll.elements.mechanism.joint import DISTANCE
 from proofroll.elements.mechanism.kinematics import Tree
 from proofroll.elements.mechanism.rotations import frame_of_axis
 from proofroll.report.pen import Drawing, View, across, circle, unit
@@ -23,6 +25,7 @@ _OBLIQUE = (0.45, -0.85, 0.35)  # direction towards the viewer for spatial mecha
 _STROKE = 10.0  # half of the stroke that marks a stop [px]
 _FARTHEST = 10.0  # farthest stop that is drawn, relative to the mechanism's length, or its angle [rad]
 _TEETH = 8  # of the zigzag of a spring
+_BLOCK = 9.0 * np.array([(1, 1), (-1, 1), (-1, -1), (1, -1), (1, 1)])  # outline of a bushing [px]
 _OUTLINE, _PATCH = 97, 0.6  # points of a shape's outline; half of a plane's patch, over the mechanism's length
 
 # Pairs of corners of a box whose edges are 2 long.
@@ -42,6 +45,11 @@ def mechanism_drawing(element: MechanismElement) -> Drawing:
     for spring in mechanism.springs:
         ends = place(spring.body_a, spring.position_a), place(spring.body_b, spring.position_b)
         picture.path(_zigzag(at(np.stack(ends))), "thin")
+    for bushing in mechanism.bushings:
+        middle = at(place(bushing.body_a, bushing.position_a))
+        both = np.stack([middle, at(place(bushing.body_b, bushing.position_b))])
+        picture.path(_zigzag(both) if np.linalg.norm(both[1] - both[0]) > _NEAR else middle + _BLOCK, "thin")
+        _name(picture, middle, bushing.name, "letter", (0.0, 24.0))
     ends_of = mechanism.fastened
     for body in mechanism.bodies:
         com = place(body.name, body.com)
@@ -53,9 +61,11 @@ def mechanism_drawing(element: MechanismElement) -> Drawing:
         if each.kind == "free":
             continue
         here, there = place(each.a, each.position_a), place(each.b, each.position_b)
-        if each.kind == "prismatic":  # the line on which the child slides
+        if each.kind in {"prismatic", "cylindrical"}:  # the line on which the child slides
             way = there - here if np.linalg.norm(there - here) else 0.2 * element.length * _axis(element, number)
             picture.path(at(np.stack([here - 0.3 * way, there + 0.3 * way])), "axis")
+        if each.kind == DISTANCE:
+            picture.path(at(np.stack([here, there])), "line")
         picture.disc(at(there).tolist(), _JOINT, "ghost" if number >= len(mechanism.joints) else "wall")
         named.setdefault(tuple(np.round(at(there)).astype(int).tolist()), []).append(each.name)
     for (x, y), names in named.items() if len(mechanism.connections) <= _MOST_NAMES else ():
@@ -100,10 +110,12 @@ def _shapes(picture: Drawing, at: View, element: MechanismElement) -> None:
                 middle = np.mean([one.place for one in touching], axis=0)
                 middle = middle - n * (n @ (middle - p - R @ shape.point))
                 outline = middle + _PATCH * _reach(element) * np.array([x + y, y - x, -x - y, x - y, x + y])
-            elif isinstance(shape, Bore):  # the circle at the height of the contact
+            elif isinstance(shape, BowlWall) and _is_vertex(contact.shape_a, contact.shape_b):  # a cable
+                outline = np.stack([p + R @ shape.point, each.place])
+            elif isinstance(shape, CurvedWall):  # the circle about its axis through the contact
                 axis, foot = R @ shape.axis, p + R @ shape.point
-                x, y = frame_of_axis(axis)[:, :2].T * shape.radius
                 middle = foot + axis * (axis @ (each.place - foot))
+                x, y = frame_of_axis(axis)[:, :2].T * float(np.linalg.norm(each.place - middle))
                 outline = circle(middle, x, y, np.linspace(0.0, 2 * np.pi, _OUTLINE))
             else:
                 outline = np.array([p + R @ shape.support(R.T @ d)[0] for d in rim])
@@ -121,6 +133,10 @@ def _shapes(picture: Drawing, at: View, element: MechanismElement) -> None:
         hull = _hull(np.array([com, *np.concatenate(paths)]))
         if len(paths) > 1 or np.any(np.all(hull == com, axis=1)):  # else the body is drawn by its only shape
             picture.path(hull, "line")
+
+
+def _is_vertex(*shapes: Shape) -> bool:
+    return any(isinstance(shape, SphereShape) and not shape.radius for shape in shapes)
 
 
 def _boxes(picture: Drawing, at: View, element: MechanismElement) -> None:

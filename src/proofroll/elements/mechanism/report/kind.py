@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
@@ -11,7 +11,8 @@ from proofroll.core.observable import Observable, Role
 from proofroll.core.scene import Scene
 from proofroll.elements.mechanism.capabilities import ALL_LOOPS, FORCES, MechanismCapability
 from proofroll.elements.mechanism.element import MechanismElement, the_mechanism
-from proofroll.report.kinds import ReportKind
+from proofroll.elements.mechanism.matrices import Matrices, matrices_of, velocity_names
+from proofroll.report.kinds import EquationMatrices, ReportKind
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -76,6 +77,21 @@ class MechanismReport(ReportKind):
     def curves(scene: Scene, truth: xr.Dataset) -> Sequence[Observable]:
         """Forces and torques of joints and loops that change most; tables judge their arrays as a whole."""
         return _reactions(the_mechanism(scene), truth)
+
+    @staticmethod
+    def matrices(scene: Scene, built: Any) -> EquationMatrices | None:
+        """Matrices at the start, of the tree or of an engine's model."""
+        mechanism = the_mechanism(scene).mechanism
+        true = matrices_of(mechanism)
+        built_matrices = true if built is None else Matrices(*(getattr(built, name) for name in Matrices._fields))
+        off: dict[str, float] = {}
+        for name, true_values, part in zip("Mhg", true, built_matrices, strict=True):
+            if built is not None and part is not None:
+                off[name] = float(
+                    np.max(np.abs(part - true_values), initial=0.0) / (np.max(np.abs(true_values), initial=0.0) or 1.0)
+                )
+        M, h, g = (None if part is None else np.asarray(part).tolist() for part in built_matrices)
+        return EquationMatrices(velocities=velocity_names(mechanism), M=M, h=h, g=g, differences=off)
 
     @staticmethod
     def replay() -> ReplayKind:

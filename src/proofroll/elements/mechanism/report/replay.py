@@ -54,7 +54,11 @@ def draw_mechanism(replayed: Replayed) -> tuple[dict[str, Any], list[int], Packe
     element = the_mechanism(replayed.scene)
     mechanism, length = element.mechanism, element.length
     bodies, rods = [*element.bodies, WORLD], _rods(element)
-    joints = [(each.name, each.b, each.position_b) for each in mechanism.connections if each.kind != "free"]
+    joints = [
+        (connection.name, connection.b, connection.position_b)
+        for connection in mechanism.connections
+        if connection.kind != "free"
+    ]
     # The force of a contact is drawn at the middle of the shape that is no wall; undetermined forces are not drawn.
     touching = [_touching(contact) for contact in mechanism.contacts]
     joints += [
@@ -113,9 +117,9 @@ def draw_mechanism(replayed: Replayed) -> tuple[dict[str, Any], list[int], Packe
         "contacts": len(touching),
         "slips": SLIDES * element.speed,
         "shapes": [_shape(geometry, index[geometry.body], element, com) for geometry in mechanism.geometries],
-        "springs": [[index[s.body_a], s.position_a, index[s.body_b], s.position_b] for s in mechanism.springs]
+        "springs": [[index[s.body_a], s.position_a, index[s.body_b], s.position_b] for s in mechanism.links]
                    + [[index[j.parent], j.position, index[j.child], j.child_position]
-                      for j in mechanism.joints if j.kind in {"prismatic", "planar"}],
+                      for j in mechanism.joints if j.kind in {"prismatic", "cylindrical", "planar"}],
         "falls": any(joint.kind == "free" for joint in mechanism.joints),
     }  # fmt: skip
     return dict(plain(case)), [motion.time.size for motion in ghosts], numbers
@@ -124,11 +128,11 @@ def draw_mechanism(replayed: Replayed) -> tuple[dict[str, Any], list[int], Packe
 def _rods(element: MechanismElement) -> dict[str, list[list[Vector]]]:
     """Ends of the rods of each body [m]: from its centre of mass to its fastenings, and between its vertices."""
     mechanism = element.mechanism
-    rods = {body.name: [[body.com, at] for at in mechanism.fastened[body.name]] for body in mechanism.bodies}
+    rods = {body.name: [[body.com, place] for place in mechanism.fastened[body.name]] for body in mechanism.bodies}
     for body in mechanism.bodies:
-        own = [item for item in mechanism.geometries if item.body == body.name and item.kind == "sphere"]
-        vertices = [item.position for item in own if item.position != body.com] if len(own) > 1 else []
-        rods[body.name] += [[body.com, at] for at in vertices]
+        spheres = [item for item in mechanism.geometries if item.body == body.name and item.kind == "sphere"]
+        vertices = [item.position for item in spheres if item.position != body.com] if len(spheres) > 1 else []
+        rods[body.name] += [[body.com, place] for place in vertices]
         rods[body.name] += [list(ends) for ends in itertools.combinations(vertices, 2)]
     return rods
 
@@ -156,7 +160,7 @@ def _touching(contact: BodyContact) -> tuple[str, Vector, float]:
 
 def _shape(geometry: Geometry, body: int, element: MechanismElement, com: FloatArray) -> dict[str, Any]:
     """Numbers of a geometry: its frame in its body's frame, and half sizes [m]; a plane is drawn as a patch."""
-    at, frame, half = (
+    place, frame, half = (
         np.array(geometry.position),
         geometry.frame,
         np.array(geometry.axes or (geometry.radius or 0,) * 3),
@@ -165,22 +169,41 @@ def _shape(geometry: Geometry, body: int, element: MechanismElement, com: FloatA
         half = np.array(geometry.size) / 2
     if geometry.kind == "circle":
         half[2] = _FLAT * half[0]
-    if geometry.kind == "bore":
-        foot, axis = at, frame[:, 2]
+    if geometry.kind == "cylinder":
+        half[2] = (geometry.length or 0.0) / 2
+    if geometry.kind in {"bore", "shaft"}:
+        foot, axis = place, frame[:, 2]
         along = (com - foot) @ axis if geometry.body == WORLD else np.zeros(1)
-        at, half[2] = foot + along.mean() * axis, np.ptp(along) / 2 + half[0]
+        place, half[2] = foot + along.mean() * axis, np.ptp(along) / 2 + half[0]
     if geometry.kind == "plane":
         if geometry.body == WORLD:  # centred below the moving bodies
             middle, n = com.mean(axis=(0, 1)), frame[:, 2]
-            at, reach = middle - n * (n @ (middle - at)), element.length + float(np.ptp(com, axis=0).max())
+            place, reach = middle - n * (n @ (middle - place)), element.length + float(np.ptp(com, axis=0).max())
         else:  # as large as the initial distance to the bodies that it may touch
             pairs = [pair.geometries for pair in element.mechanism.pairs if geometry.name in pair.geometries]
-            owner = {each.name: element.mechanism.body_index[each.body] for each in element.mechanism.geometries}
+            owner = {
+                geometry_of.name: element.mechanism.body_index[geometry_of.body]
+                for geometry_of in element.mechanism.geometries
+            }
             meets = [owner[name] for pair in pairs for name in pair if owner[name] not in {-1, body}]
             reach = float(np.max(np.linalg.norm(com[0, meets] - com[0, body], axis=-1), initial=0.0))
         half = np.array([_PATCH * reach, _PATCH * reach, 0.0])
+    if geometry.kind == "cone":  # as long as the motion is high
+        reach = float((np.linalg.norm(com - place, axis=-1) if geometry.body == WORLD else np.ones(1)).max())
+        half = reach * np.array([math.cos(geometry.slope or 0.0)] * 2 + [math.sin(geometry.slope or 0.0)])
+    if geometry.kind == "torus":
+        half = np.full(3, geometry.ring_radius)
     turn = Rotation.from_matrix(frame).as_quat()
-    return {"body": body, "kind": geometry.kind, "at": at.tolist(), "turn": turn.tolist(), "half": half.tolist()}
+    shape: dict[str, Any] = {
+        "body": body,
+        "kind": geometry.kind,
+        "at": place.tolist(),
+        "turn": turn.tolist(),
+        "half": half.tolist(),
+    }
+    if geometry.kind == "capsule" and geometry.radius:
+        shape["long"] = (geometry.length or 0.0) / geometry.radius
+    return shape | {"wire": (geometry.radius or 0.0) / geometry.ring_radius} if geometry.ring_radius else shape
 
 
 def _readings(element: MechanismElement) -> list[tuple[str, str]]:
@@ -231,9 +254,9 @@ def _orientations(grid: FloatArray, q: FloatArray, w: FloatArray, times: FloatAr
     axis = axis / np.maximum(np.linalg.norm(axis, axis=1, keepdims=True), 1e-300)
     whole = np.round((np.sum(spun * axis, axis=1, keepdims=True) - angle) / (2 * np.pi))
     turn = turn + 2 * np.pi * whole * axis
-    at = np.clip(np.searchsorted(grid, times, side="right") - 1, 0, grid.size - 2)
-    part = (times - grid[at]) / np.diff(grid)[at]
-    turned = Rotation.from_rotvec(part[:, None] * turn[at]) * stored[at]
+    index = np.clip(np.searchsorted(grid, times, side="right") - 1, 0, grid.size - 2)
+    part = (times - grid[index]) / np.diff(grid)[index]
+    turned = Rotation.from_rotvec(part[:, None] * turn[index]) * stored[index]
     return np.asarray(turned.as_quat(scalar_first=True))
 
 

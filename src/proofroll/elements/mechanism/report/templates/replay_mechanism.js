@@ -66,12 +66,17 @@ replayed.mechanism = (replay) => {
       groups[body].add(mesh);
       return mesh;
     });
-    for (const { body, kind, at, turn, half } of shown.shapes) {
-      const wall = ["plane", "bore"].includes(kind);
+    for (const { body, kind, at, turn, half, wire, long } of shown.shapes) {
+      const wall = ["plane", "bore", "shaft", "bowl", "cone", "torus"].includes(kind);
       if (!Math.max(...half) || (ghost && wall)) continue;
       const unit = { plane: () => new T.PlaneGeometry(2, 2), box: () => new T.BoxGeometry(2, 2, 2),
         circle: () => new T.CylinderGeometry(1, 1, 2, 48).rotateX(Math.PI / 2),
-        bore: () => new T.CylinderGeometry(1, 1, 2, 48, 1, true).rotateX(Math.PI / 2) }[kind] || (() => new T.SphereGeometry(1, 32, 20));
+        cylinder: () => new T.CylinderGeometry(1, 1, 2, 48).rotateX(Math.PI / 2),
+        capsule: () => new T.CapsuleGeometry(1, long, 16, 32).rotateX(Math.PI / 2),
+        bore: () => new T.CylinderGeometry(1, 1, 2, 48, 1, true).rotateX(Math.PI / 2),
+        shaft: () => new T.CylinderGeometry(1, 1, 2, 48, 1, true).rotateX(Math.PI / 2),
+        cone: () => new T.ConeGeometry(1, 1, 48, 1, true).rotateX(-Math.PI / 2).translate(0, 0, 0.5),
+        torus: () => new T.TorusGeometry(1, wire, 16, 64) }[kind] || (() => new T.SphereGeometry(1, 32, 20));
       const paint = { color: wall ? colour("--wall") : tone, transparent: true, opacity: ghost ? 0.15 : wall ? 0.5 : 0.25 };
       const mesh = new T.Mesh(unit(), new T.MeshPhongMaterial({ ...paint, depthWrite: false, side: T.DoubleSide }));
       mesh.position.set(...at);
@@ -81,7 +86,7 @@ replayed.mechanism = (replay) => {
       // Lines make the rotation of round shapes visible: a radius on a disc, two great circles on others.
       const round = (from, to) => Array.from({ length: 65 }, (_, k) => from.clone().multiplyScalar(Math.cos((Math.PI * k) / 32)).addScaledVector(to, Math.sin((Math.PI * k) / 32)));
       const [x, y, z] = [[1, 0, 0], [0, 1, 0], [0, 0, 1]].map((axis) => new T.Vector3(...axis));
-      const lines = { circle: [[new T.Vector3(), x]], sphere: [round(x, z), round(y, z)], ellipsoid: [round(x, z), round(y, z)] }[kind] || [];
+      const lines = { circle: [[new T.Vector3(), x]], cylinder: [[z, z.clone().add(x)]], capsule: [round(x, y), round(y, x)], sphere: [round(x, z), round(y, z)], ellipsoid: [round(x, z), round(y, z)] }[kind] || [];
       for (const line of lines) mesh.add(new T.Line(new T.BufferGeometry().setFromPoints(line), new T.LineBasicMaterial({ color: tone, transparent: true, opacity: ghost ? 0.4 : 0.8 })));
     }
     groups.forEach((group) => group.traverse((item) => { item.renderOrder = ghost ? 3 : 0; }));

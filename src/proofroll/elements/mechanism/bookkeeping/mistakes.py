@@ -1,0 +1,194 @@
+"""Mistakes of bookkeeping between two programs that run one robot under one controller, as changes of its law."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+
+from proofroll.core.diagnosis.fitting import least_squares_parameter
+from proofroll.elements.mechanism.bookkeeping.law import ControlLaw
+from proofroll.elements.mechanism.rotations import Array
+
+# Layers of a record, each computed from the ones before; a record shows a mistake at one of them.
+LAYERS = {
+    "instants": "times at which the controller acts, from its rate",
+    "observation": "from the state",
+    "action": "from the observation, by the policy",
+    "target": "from the action",
+    "effort": "from the target and the state",
+    "acceleration": "from the effort, in the air",
+    "motion": "from the start, by motions under the controller, in the air",
+}
+
+
+_TOLD = 1e-3  # least part of the largest offset of a pose that is told
+
+
+@dataclass(frozen=True)
+class Mistake:
+    """A mistake of bookkeeping.
+
+    Attributes:
+        id: name of its kind, equal for all sizes.
+        words: clause that names it, perhaps with ``{size}``.
+        layer: of :data:`LAYERS`, where a record shows it.
+        changed: law with the mistake, for a size.
+        sized: True if its size is a number to be fitted, 1 being right.
+        starts: sizes from which a fit begins.
+        numbers: count of further fitted numbers.
+    """
+
+    id: str
+    words: str
+    layer: str
+    changed: Callable[[ControlLaw, float], ControlLaw]
+    sized: bool = False
+    starts: tuple[float, ...] = (0.95,)
+    numbers: int = 0
+
+    def sentence(self, size: float) -> str:
+        """The mistake with its size."""
+        return self.words.format(size=f"{round(size, 12):.5g}")
+
+
+def mistakes(law: ControlLaw) -> list[Mistake]:
+    """All mistakes that change a law, in the order of layers."""
+    return sorted(_mistakes(law), key=lambda item: list(LAYERS).index(item.layer))
+
+
+def _mistakes(law: ControlLaw) -> Iterator[Mistake]:
+    for steps, words in ((1, "longer"), (-1, "shorter")):
+        said = f"the time between two instants of the controller is one step {words}"
+        yield _fixed("decimation", said, "instants", extra_steps=steps)
+    if law.policy is not None:
+        yield from _of_policy(law)
+    elif any(law.pose):
+        yield _fixed("pose_missing", "the default pose is missing", "target", targets=(0.0,) * len(law.joints))
+    yield _fixed("late", "targets act one instant late", "target", delay=law.delay + 1)
+    for k, joint in enumerate(law.joints):
+        signs = law.signs.copy()
+        signs[k] *= -1
+        yield _fixed("joint_sign", f"the target of {joint} has the other sign", "target", signs=signs)
+    for gain, words in (("kp", "kp"), ("kd", "kd")):
+        if getattr(law, gain).any():
+            yield _sized(gain, f"{words} is {{size}} of the right one", "effort", gain)
+    if np.isfinite(law.limit).any():
+        yield _fixed("clamp_missing", "efforts have no limit", "effort", limit=np.full(len(law.joints), np.inf))
+        yield _sized("clamp", "the limit of efforts is {size} of the right one", "effort", "limit", (0.8, 0.5, 1.2))
+    if np.any(law.reductions != 1):
+        words = "efforts are those of motors, divided by the reductions of the robot's file"
+        yield _fixed("reduction", words, "effort", effort_factor=law.effort_factor / law.reductions)
+    yield _fixed("state_before", "servos see the state of the step before", "effort", lag=law.lag + 1)
+    if law.armature.any():
+        yield _sized("armature", "the armature is {size} of the right one", "acceleration", "armature", (0.9, 0.2))
+    else:
+        yield Mistake("armature", "there is an armature of {size} kg m²", "acceleration", _armed, True, (1e-4, 1e-2))
+    yield _sized("gravity", "gravity is {size} of the right one", "acceleration", "gravity")
+
+
+def _of_policy(law: ControlLaw) -> Iterator[Mistake]:
+    """Mistakes of observations and actions."""
+    for words, order in orders(law.joints):
+        yield _fixed(
+            "observed_order", f"joints are observed in another order ({words})", "observation", observed_order=order
+        )
+    yield _fixed(
+        "quaternion",
+        "the quaternion of the base is read as w, x, y, z, and is x, y, z, w",
+        "observation",
+        scalar_last=True,
+    )
+    yield _fixed(
+        "gravity_sign", "the observed gravity has the other sign", "observation", gravity_sign=-law.gravity_sign
+    )
+    yield _fixed(
+        "velocity_frame",
+        "the velocity of the base is observed in the base's axes",
+        "observation",
+        velocity_in_body=True,
+    )
+    yield _fixed(
+        "spin_frame",
+        "the angular velocity of the base is observed in the world's axes",
+        "observation",
+        spin_in_world=True,
+    )
+    for words, order in orders(law.joints):
+        yield _fixed("joint_order", f"actions are for joints in another order ({words})", "target", action_order=order)
+    yield _fixed("pose_missing", "the default pose is missing", "target", pose=np.zeros(len(law.joints)))
+    yield _sized("scale", "the scale of actions is {size} of the right one", "target", "scale", (0.95, 1.9))
+
+
+def _fixed(name: str, words: str, layer: str, **changes: object) -> Mistake:
+    return Mistake(name, words, layer, lambda law, _: law.change(**changes))
+
+
+def _sized(name: str, words: str, layer: str, attribute: str, starts: tuple[float, ...] = (0.95,)) -> Mistake:
+    return Mistake(name, words, layer, partial(_scaled, attribute), True, starts)
+
+
+def _scaled(attribute: str, law: ControlLaw, size: float) -> ControlLaw:
+    return law.change(**{attribute: size * getattr(law, attribute)})
+
+
+def _armed(law: ControlLaw, size: float) -> ControlLaw:
+    return law.change(armature=law.armature + size)
+
+
+def orders(joints: tuple[str, ...]) -> Iterator[tuple[str, tuple[int, ...]]]:
+    """Orders in which programs list joints, other than the given one, each with words.
+
+    Names consist of parts, ``FL_HFE``: of a limb and of a place in it. Limbs are swapped, or places come first.
+    """
+    seen = {tuple(range(len(joints)))}
+    for words, order in _orders(joints):
+        if order not in seen:
+            seen.add(order)
+            yield words, order
+
+
+def _orders(joints: tuple[str, ...]) -> Iterator[tuple[str, tuple[int, ...]]]:
+    numbers = range(len(joints))
+    parts = [joint.replace("-", "_").split("_") for joint in joints]
+    limbs, places = [item[0] for item in parts], ["_".join(item[1:]) for item in parts]
+    for words, keys in (("place by place", places), ("limb by limb", limbs)):
+        ranks = {key: rank for rank, key in enumerate(dict.fromkeys(keys))}
+        yield words, tuple(sorted(numbers, key=lambda k: ranks[keys[k]]))
+    yield "by the alphabet", tuple(sorted(numbers, key=lambda k: joints[k]))
+    yield "reversed", tuple(reversed(numbers))
+    members = {limb: [k for k in numbers if limbs[k] == limb] for limb in dict.fromkeys(limbs)}
+    names = list(members)
+    for at, one in enumerate(names):
+        for two in names[at + 1 :]:
+            if len(members[one]) == len(members[two]):
+                yield f"{one} and {two} swapped", _swapped(joints, [(members[one], members[two])])
+    if len(names) > 3 and len(names) % 2 == 0 and len({len(item) for item in members.values()}) == 1:
+        pairs = [(members[a], members[b]) for a, b in zip(names[::2], names[1::2], strict=True)]
+        yield "neighbouring limbs swapped", _swapped(joints, pairs)
+
+
+def _swapped(joints: tuple[str, ...], pairs: list[tuple[list[int], list[int]]]) -> tuple[int, ...]:
+    order = list(range(len(joints)))
+    for one, two in pairs:
+        for a, b in zip(one, two, strict=True):
+            order[a], order[b] = order[b], order[a]
+    return tuple(order)
+
+
+def offsets_told(joints: tuple[str, ...], offsets: Array) -> str:
+    """Words for a default pose that is off, with the joints whose part is not round-off."""
+    large = np.abs(offsets) > _TOLD * np.abs(offsets).max()
+    each = zip(joints, offsets.tolist(), large.tolist(), strict=True)
+    return "the default pose is another: " + ", ".join(f"{joint} {off:+.4g}" for joint, off, counts in each if counts)
+
+
+def fitted(residual: Callable[[float], Array], start: float) -> float:
+    """Size, 0 or more, for which a vector of residuals is smallest; the start if it leads nowhere.
+
+    ``residual``: of a size; NaN: it cannot be computed.
+    """
+    part = least_squares_parameter(lambda part: residual(start * max(part, 0.0)), 1.0, 1.0)
+    return start * max(part, 0.0)
