@@ -248,7 +248,8 @@ def _refuse_many(stretches: Sequence[Span], until: float) -> None:
     Raises:
         Diverged: the durations of the last stretches predict more than _MOST stretches until ``until`` [s].
     """
-    if len(stretches) % _LOOK:
+    stretches = [stretch for stretch in stretches if stretch.guard is not None]  # breaks are known, and no changes
+    if not stretches or len(stretches) % _LOOK:
         return
     last, end = stretches[-_LOOK:], stretches[-1].end
     spans = [last[_LOOK // 2].start - last[0].start, end - last[_LOOK // 2].start]

@@ -33,7 +33,7 @@ def normal_force_per_mass(body: RollingBall, p_WB: FloatArray, v_WB: FloatArray)
 
 
 @dataclass(frozen=True)
-class Bounce:
+class Rebound:
     """State after an impact from which the ball leaves the wall again.
 
     Attributes:
@@ -63,7 +63,7 @@ class Landed:
     slip: FloatArray | None
 
 
-def landing_outcome(body: RollingBall, route: Route, flight: BallStretch) -> Bounce | Landed | None:
+def landing_outcome(body: RollingBall, route: Route, flight: BallStretch) -> Rebound | Landed | None:
     """Outcome of a landing: a bounce, or lasting contact.
 
     A ball that leaves each impact with e times its speed bounces infinitely often in a finite time. Below the speed
@@ -89,7 +89,7 @@ def landing_outcome(body: RollingBall, route: Route, flight: BallStretch) -> Bou
     e1 = body.surface.normal(p)
     approach, weight = float(v @ e1), normal_force_per_mass(body, p, v - (v @ e1) * e1)
     if e * approach > _LOW * natural or weight < 0:
-        return Bounce((p, *route.impact(body, p, v, w, e, e_t)), bool(e * approach > _SEEN * natural))
+        return Rebound((p, *route.impact(body, p, v, w, e, e_t)), bool(e * approach > _SEEN * natural))
     bounced = np.isinf(body.contact.mu_static) and e_t == 1 and 0 < e < 1
     if bounced and _slip(body, v, w, e1) is not None:
         raise Refused(

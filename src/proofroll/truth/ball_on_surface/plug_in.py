@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
+from proofroll.core.dataset import ENDS
 from proofroll.core.element import Element
 from proofroll.core.errors import Diverged, InputError
-from proofroll.core.events import with_events
 from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.element import BallOnSurface, rolling_ball
 from proofroll.elements.ball_on_surface.mechanics import always_pressed
@@ -51,7 +51,7 @@ class BallOnSurfaceTruth:
             message = "the ball comes to a point where its wall has no curvature, as at the apex of a cone"
             raise Diverged(f"{message}; start further off") from None
         if "sticking" in result and BallCapability.SLIPPING_START not in element.requires:
-            first = onset(scene, float(times[-1]))
+            first = onset(scene, min(float(times[-1]), float(result.attrs.get(ENDS, np.inf))))
             result.attrs["onset"] = json.dumps(dataclasses.asdict(first))
             if first.verdict == "ill-posed":
                 # A disagreement of the routes is recorded there already, with its time.
@@ -84,7 +84,7 @@ def truth(scene: Scene, times: FloatArray) -> xr.Dataset:
 
     Raises:
         Diverged: a route could not be integrated, or a value is not finite.
-        Refused: the ball leaves the wall and lands on it again.
+        Refused: no motion is known from time 0 on.
     """
     body, bounded = rolling_ball(scene), BallCapability.BOUNDED_FRICTION in scene.requires
     times = np.asarray(times, dtype=np.float64)
@@ -94,9 +94,8 @@ def truth(scene: Scene, times: FloatArray) -> xr.Dataset:
     stepped = not by_series or BallCapability.ORIENTATION in scene.requires
     stepped = stepped and closed_form(body, times[:1]) is None
     if bounded or stepped or body.gap0 or not (always_pressed(body) or stays_on(body, float(times[-1]))):
-        result, events = stick_slip(scene, times)
-        result = result if bounded else result.drop_vars("sticking")
-        return with_events(result, events) if bounded or events else result
+        result, _ = stick_slip(scene, times)
+        return result if bounded else result.drop_vars("sticking")
 
     def first(at: FloatArray) -> BallMotion:
         return closed_form(body, at) or rolling.reduced(body, at)

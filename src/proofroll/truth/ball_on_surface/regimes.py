@@ -5,6 +5,7 @@ from enum import IntEnum
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
+from proofroll.core.errors import Refused
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.surfaces import Cylinder
 from proofroll.truth.ball_on_surface.flight import normal_force_per_mass
@@ -22,9 +23,15 @@ class Regime(IntEnum):
 
 
 def classify(body: RollingBall, until: float) -> tuple[Regime, int, float]:
-    """Regime of the ball until ``until`` [s], the number of its slips, and the time of the first [s] (nan: never)."""
+    """Regime of the ball until ``until`` [s], the number of its slips, and the time of the first [s] (nan: never).
+
+    Raises:
+        Refused: the motion is not known so far, unless a landing ends it.
+    """
     route = first_route(body)
     path = follow(body, route, until)
+    if path.ended:
+        raise Refused(path.ended)
     slips = [time for kind, time in path.events if kind == "slip"]
     first = slips[0] if slips else float("nan")
     last = path.stretches[-1]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
@@ -150,13 +151,15 @@ class Path:
     Attributes:
         stretches: in order, from time 0.
         events: kind and time [s] of each change.
-        lands: time of a landing with unknown outcome, where the path ends [s]; None: there is none.
+        end: time from which the motion is not known [s]; inf: it reaches all times asked for.
+        ended: reason why it ends there, as a clause; empty: a landing whose outcome the contact does not say.
         blurs: time of an event [s] -> its uncertainty [s], for events that both routes find by the same method.
     """
 
     stretches: list[BallStretch]
     events: list[tuple[EventKind, float]]
-    lands: float | None = None
+    end: float = math.inf
+    ended: str = ""
     blurs: dict[float, float] = field(default_factory=dict)
 
     def motion(self, times: FloatArray, route: str) -> BallMotion:

@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
+from proofroll.core.bounces import IMPACTS, Bounce, Course, exact_bounces, with_bars, with_bounces
+from proofroll.core.dataset import ENDED, ENDS
 from proofroll.core.errors import Diverged, Refused
-from proofroll.core.events import Event
+from proofroll.core.events import Event, with_events
 from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.element import rolling_ball
-from proofroll.elements.ball_on_surface.mechanics import always_pressed, natural_speed
-from proofroll.elements.ball_on_surface.model import RollingBall
+from proofroll.elements.ball_on_surface.mechanics import always_pressed, bouncing_bodies, course_of, natural_speed
+from proofroll.elements.ball_on_surface.model import BallCapability, RollingBall
 from proofroll.truth import SAFETY
 from proofroll.truth.ball_on_surface import taylor
 from proofroll.truth.ball_on_surface.error_bars import dataset_of, put_error_bars
@@ -37,8 +40,9 @@ def first_route(body: RollingBall) -> Route:
 
 
 def stays_on(body: RollingBall, until: float) -> bool:
-    """True if the ball stays on the wall until ``until`` [s], by the first route."""
-    return all(kind != "lift_off" for kind, _ in follow(body, first_route(body), until).events)
+    """True if the ball is known to stay on the wall until ``until`` [s], by the first route."""
+    path = follow(body, first_route(body), until)
+    return not np.isfinite(path.end) and all(kind != "lift_off" for kind, _ in path.events)
 
 
 def stick_slip(scene: Scene, times: FloatArray) -> tuple[xr.Dataset, list[Event]]:
@@ -46,29 +50,30 @@ def stick_slip(scene: Scene, times: FloatArray) -> tuple[xr.Dataset, list[Event]
 
     Returns:
         Dataset of :func:`.error_bars.dataset_of`, each variable with the attribute ``error_bar`` in its own unit, and
-        ``sticking`` (bool per sample; a sample at an event belongs to the later stretch); events up to the last sample,
+        ``sticking`` (bool per sample; a sample at an event belongs to the later stretch), with its events if friction
+        is bounded or there are some, and energies and heights of bounces; events up to the last sample,
         each with a bracket that contains both routes. If relative changes of the parameters by
         :data:`proofroll.truth.conditioning.MOVE` (:func:`with_changes`) change the events, the attribute ``ill_posed``
         says from which time on; only earlier events are returned, and error bars cover the difference of the routes.
+        Where the motion is not known to the last time, the dataset has the samples before its end, and says when and
+        why it ends (:data:`proofroll.core.dataset.ENDS`).
 
     Raises:
-        Diverged: a route could not be integrated.
-        Refused: the ball leaves the wall and lands on it again.
+        Diverged, Refused: a route follows no motion from time 0 on.
     """
-    body = rolling_ball(scene)
+    body, bounded = rolling_ball(scene), BallCapability.BOUNDED_FRICTION in scene.requires
     times = np.asarray(times, dtype=np.float64)
     until = float(times[-1])
     routes: tuple[Route, Route] = (first_route(body), Implicit(body))
     paths = [follow(body, route, until) for route in routes]
-    if paths[0].lands is not None:
-        # A ball that starts in the air has not left the wall.
-        leaves = f"leaves the wall at t = {paths[0].events[-1][1]:.9g} s and " if paths[0].events else ""
-        raise Refused(
-            f"the ball {leaves}lands at t = {paths[0].lands:.9g} s; "
-            "a restitution law would be needed (restitution of the contact), so end the run before it lands"
-        )
-    first, second = (path.events for path in paths)
     pace = body.ball.radius / natural_speed(body)
+    shorter = min(paths, key=lambda path: path.end)
+    if end := np.isfinite(shorter.end):
+        until = shorter.end
+        inside = times < until - MOVE * max(until, pace)
+        inside[0] = True
+        times = times[inside]
+    first, second = (path.events for path in paths)
     number, known = in_common(first, second, pace, until)
     why = "the two routes to the truth disagree about it"
     posed, well = _unmoved(body, paths[1], pace, until)
@@ -87,12 +92,42 @@ def stick_slip(scene: Scene, times: FloatArray) -> tuple[xr.Dataset, list[Event]
     )
     put_error_bars(result, check, _FLOOR)
     result.attrs["second_route"] = routes[1].name
+    if end:
+        result.attrs |= {ENDS: shorter.end, ENDED: shorter.ended or _landing(shorter)}
     if not known:
         after = events[-1].time if events else 0.0
         result.attrs["ill_posed"] = (
             f"ill-posed: what happens after {after:.9g} s hangs on the last digits of the parameters: {why}"
         )
+    if bounded or events:
+        result = with_bounces(with_events(result, events), _bounces(body, paths, events, until))
     return result, events
+
+
+def _bounces(body: RollingBall, paths: Sequence[Path], events: Sequence[Event], until: float) -> list[Bounce]:
+    """Energies and heights of the impacts among the events, with error bars from both routes."""
+    found = []
+    for path in paths:
+
+        def sampled(times: FloatArray, path: Path = path) -> Course:
+            motion = path.motion(times, "")
+            return course_of(body, times, motion.p_WB, motion.v_WB, motion.w_WB)
+
+        own = [Event(kind, time, time, time) for kind, time in path.events[: len(events)]]
+        found.append(exact_bounces(sampled, own, bouncing_bodies(body), until))
+    bounces = with_bars(found[0], found[1], SAFETY, _FLOOR)
+    impacts = [event.time for event in events if event.kind in IMPACTS]
+    return [replace(item, time=time) for item, time in zip(bounces, impacts, strict=False)]
+
+
+def _landing(path: Path) -> str:
+    """Reason why a path ends at a landing, as a clause."""
+    # A ball that starts in the air has not left the wall.
+    leaves = f"leaves the wall at t = {path.events[-1][1]:.9g} s and " if path.events else ""
+    return (
+        f"the ball {leaves}lands at t = {path.end:.9g} s; a restitution law would be needed (restitution of the "
+        "contact), so end the run before it lands"
+    )
 
 
 def with_changes(body: RollingBall, part: float) -> RollingBall:
@@ -135,6 +170,7 @@ def _unmoved(body: RollingBall, own: Path, pace: float, until: float) -> tuple[i
         others = [follow(ball, Implicit(ball), until) for ball in (with_changes(body, -MOVE), with_changes(body, MOVE))]
     except (Diverged, Refused):
         return 0, False  # a changed ball has no known motion to the end
+    until = min(until, *(path.end for path in others))
     return well_posed_events(story(own), [story(path) for path in others], pace, until)
 
 

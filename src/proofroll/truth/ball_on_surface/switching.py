@@ -4,6 +4,7 @@ A :class:`Route` integrates one stretch at a time and reports why it ended; this
 :func:`proofroll.truth.hybrid.follow` chains the stretches.
 """
 
+import math
 from dataclasses import dataclass
 from typing import cast
 
@@ -21,7 +22,7 @@ from proofroll.elements.ball_on_surface.mechanics import (
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.motion import BallMotion
 from proofroll.truth import hybrid
-from proofroll.truth.ball_on_surface.flight import Bounce, fly, landing_outcome, normal_force_per_mass
+from proofroll.truth.ball_on_surface.flight import Rebound, fly, landing_outcome, normal_force_per_mass
 from proofroll.truth.ball_on_surface.route import BallStretch, End, Path, Route, World
 from proofroll.truth.hybrid import Transition
 
@@ -60,18 +61,16 @@ RESTS = Mode(sticking=True, rests=True)
 
 
 def follow(body: RollingBall, route: Route, until: float) -> Path:
-    """Path from time 0 to ``until`` [s].
+    """Path from time 0 to ``until`` [s], or to an earlier time from which the motion is not known.
 
     Raises:
-        Refused: the ball slips to and fro ever faster.
-        Diverged: a route makes no progress.
+        Refused, Diverged: no motion is known from time 0 on.
     """
     path = hybrid.follow(SwitchedBall(body, route), until)
-    if path.ended:
-        raise Refused(path.ended)
     events = [(cast(EventKind, event.kind), event.time) for event in path.happenings]
     blurs = {event.time: event.blur for event in path.happenings if event.blur}
-    return Path(list(path.stretches), events, None if path.known else path.stretches[-1].end, blurs)
+    end = math.inf if path.known else path.stretches[-1].end
+    return Path(list(path.stretches), events, blurs=blurs, end=end, ended=path.ended)
 
 
 class SwitchedBall:
@@ -140,7 +139,7 @@ class SwitchedBall:
         outcome = landing_outcome(self.body, self.route, stretch)
         if outcome is None:
             return Transition(stretch.state, None, ())
-        if isinstance(outcome, Bounce):
+        if isinstance(outcome, Rebound):
             return Transition(stretch.state, Mode(flight=outcome.world), (("bounce", ""),) if outcome.seen else ())
         state = self.route.at(*outcome.world)
         state = state if outcome.slip is not None else self.route.nudged(state, outcome.world[1])

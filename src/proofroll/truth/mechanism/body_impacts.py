@@ -1,20 +1,39 @@
 """Impacts in route 2: in turn, of a contact by roots of a polynomial, of contacts at one time by projections."""
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
 from proofroll.core.errors import Refused
 from proofroll.elements.mechanism.analysis import RANK
+from proofroll.elements.mechanism.contacts.coulomb import largest_friction, returning
 from proofroll.elements.mechanism.contacts.sequences import refuse_spread, sequences
 from proofroll.elements.mechanism.rotations import Array
+from proofroll.truth.mechanism.contact_guards import Touchable
 
 _HELD = 1e-9  # margin, relative to friction's bound, above which a contact slides
 _ROUNDS, _SETTLED = 100_000, 1e-15  # projections at most, and change of a slide, relative to the largest, at the end
 _REAL = 1e-7  # imaginary part of a root, relative to its size, up to which it is real
 
 
-def impulse_of_a_contact(G: Array, slide: Array, friction: float, restitution: float) -> Array | None:
+class ImpactLaw(NamedTuple):
+    """Laws of a contact in an impact.
+
+    Attributes:
+        contact: its name and coefficients of friction.
+        restitution: of the normal speed.
+        sideways: of the slip.
+    """
+
+    contact: Touchable
+    restitution: float
+    sideways: float
+
+
+def impulse_of_a_contact(
+    G: Array, slide: Array, friction: float, restitution: float, static: float | None = None, sideways: float = 0.0
+) -> Array | None:
     """Impulse of an impact of one contact by Newton's and Coulomb's laws, (3,); None: no slip is against its friction.
 
     With slip in the direction t after the impact, the impulse is N (1, −μ t) with N from the normal speed. That the
@@ -23,16 +42,22 @@ def impulse_of_a_contact(G: Array, slide: Array, friction: float, restitution: f
     Args:
         G: changes of its slide by unit impulses, (3, 3).
         slide: before the impact, the first component along the normal, (3,).
-        friction: coefficient.
+        friction: coefficient of the slip.
         restitution: of the normal speed.
+        static: coefficient of a contact that sticks; None: as of the slip.
+        sideways: restitution of the slip.
     """
+    static = friction if static is None else static
+    slide = np.array([slide[0], *((1 + sideways) * slide[1:])])
     aim = -(1 + restitution) * slide[0]
     if not friction:
         return np.array([aim / G[0, 0], 0.0, 0.0])
     wanted = np.array([aim, *-slide[1:]])
     held = np.asarray(np.linalg.lstsq(G, wanted, rcond=RANK)[0], dtype=np.float64)
     rests = np.abs(G @ held - wanted).max() <= _HELD * np.abs(wanted).max()
-    if rests and np.linalg.norm(held[1:]) <= friction * held[0] * (1 + _HELD):
+    if np.isinf(friction):
+        return held if rests and held[0] >= 0 else None
+    if rests and np.linalg.norm(held[1:]) <= static * held[0] * (1 + _HELD):
         return held
     # slip · (G_nn − μ G_nt·t) = u + V t, as a function of t = (c, s)
     u = slide[1:] * G[0, 0] + aim * G[1:, 0]
@@ -68,7 +93,7 @@ def _refined(angle: float, form: tuple[float, ...]) -> float:
     return float(angle)
 
 
-def impulses_of_a_group(G: Array, slides: Array, friction: Array, laws: Array) -> Array | None:
+def impulses_of_a_group(G: Array, slides: Array, laws: Sequence[ImpactLaw]) -> Array | None:
     """Impulses of contacts struck at one time, (3 contacts,), by Moreau's law; None: they are not found.
 
     They are the fixed point of a projection onto the cones of friction, with De Saxcé's correction of the slides:
@@ -77,16 +102,20 @@ def impulses_of_a_group(G: Array, slides: Array, friction: Array, laws: Array) -
     Args:
         G: changes of the slides by unit impulses, (3 contacts, 3 contacts); first components are along the normals.
         slides: before the impact, (3 contacts,).
-        friction: coefficients.
-        laws: coefficients of restitution.
+        laws: of each contact.
     """
-    aims = slides.copy()
-    aims[::3] += laws * np.minimum(slides[::3], 0.0)
+    friction, static = (np.array([getattr(law.contact, name) for law in laws]) for name in ("friction", "static"))
+    aims = returning(slides, np.array([law.restitution for law in laws]), np.array([law.sideways for law in laws]))
     r, size = 1 / float(np.linalg.eigvalsh(G)[-1]), float(np.abs(aims).max())
     impulses = np.linalg.lstsq(G, -aims, rcond=RANK)[0]
+    N, T = impulses[::3], np.linalg.norm(impulses.reshape(-1, 3)[:, 1:], axis=1)
+    within = (N >= 0).all() and (largest_friction(static, N) * (1 + _HELD) >= T).all()
+    if within and np.abs(G @ impulses + aims).max() <= _HELD * size:
+        return np.asarray(impulses)
+    slipping = np.where(np.isinf(friction), 0.0, friction)  # of what never slips the cone is a half space
     for _ in range(_ROUNDS):
         u = aims + G @ impulses
-        u[::3] += friction * np.linalg.norm(u.reshape(-1, 3)[:, 1:], axis=1)
+        u[::3] += slipping * np.linalg.norm(u.reshape(-1, 3)[:, 1:], axis=1)
         projected = _onto_cones((impulses - r * u).reshape(-1, 3), friction).ravel()
         if np.abs(G @ (projected - impulses)).max() <= _SETTLED * size:
             return projected
@@ -97,8 +126,10 @@ def impulses_of_a_group(G: Array, slides: Array, friction: Array, laws: Array) -
 def _onto_cones(forces: Array, friction: Array) -> Array:
     """Nearest vectors within the cones of friction, (contacts, 3)."""
     N, T = forces[:, 0], np.linalg.norm(forces[:, 1:], axis=1)
+    unbounded = np.isinf(friction)
+    friction = np.where(unbounded, 0.0, friction)
     pressed = np.maximum((N + friction * T) / (1 + friction**2), 0.0)
-    inside = friction * N >= T
+    inside = np.where(unbounded, N > 0, friction * N >= T)
     normal, across = np.where(inside, N, pressed), np.where(inside, T, friction * pressed)
     return np.column_stack([normal, forces[:, 1:] * (across / np.where(T > 0, T, 1.0))[:, None]])
 
@@ -107,9 +138,7 @@ def impulses_in_turn(
     G: Array,
     slides: Array,
     groups: Sequence[list[int]],
-    friction: Sequence[float],
-    laws: Sequence[float],
-    names: Sequence[str],
+    laws: Sequence[ImpactLaw],
     time: float,
 ) -> Array:
     """Impulses of groups struck in turn, (3 contacts,): of all orders, those farthest from their mean.
@@ -118,9 +147,7 @@ def impulses_in_turn(
         G: changes of all slides by unit impulses, (3 contacts, 3 contacts); first components are along the normals.
         slides: before the impact, (3 contacts,).
         groups: indices of contacts that are struck together.
-        friction: coefficient of each contact.
-        laws: coefficient of restitution of each contact.
-        names: of the contacts, for messages.
+        laws: of each contact.
         time: for messages [s].
 
     Raises:
@@ -129,17 +156,18 @@ def impulses_in_turn(
 
     def strike(response: Array, own: Array, group: list[int]) -> Array:
         if len(group) == 1:
-            impulses = impulse_of_a_contact(response, own, friction[group[0]], laws[group[0]])
+            law = laws[group[0]]
+            contact, e = law.contact, law.restitution
+            impulses = impulse_of_a_contact(response, own, contact.friction, e, contact.static, law.sideways)
         else:
-            mu, e = (np.array([values[k] for k in group]) for values in (friction, laws))
-            impulses = impulses_of_a_group(response, own, mu, e)
+            impulses = impulses_of_a_group(response, own, [laws[k] for k in group])
         if impulses is None:
-            named = " and ".join(names[k] for k in group)
+            named = " and ".join(laws[k].contact.name for k in group)
             raise Refused(f"no impulses of {named} at t = {time:.6g} s keep all inequalities of an impact")
         return impulses
 
     outcomes = sequences(G, slides, groups, strike)
     jumps = G @ outcomes.impulses.T
-    refuse_spread(jumps, outcomes, names, time)
+    refuse_spread(jumps, outcomes, [law.contact.name for law in laws], time)
     apart = np.abs(jumps - jumps.mean(axis=1, keepdims=True)).max(axis=0)
     return np.asarray(outcomes.impulses[int(np.argmax(apart))])

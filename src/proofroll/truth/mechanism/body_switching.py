@@ -4,6 +4,7 @@ import itertools
 from collections.abc import Iterator, Sequence
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import NotUnique, Refused
@@ -15,7 +16,8 @@ from proofroll.truth.mechanism.joint_stretches import JointStretches, guard_valu
 from proofroll.truth.mechanism.maximal_coordinates import NumericEquations
 from proofroll.truth.mechanism.maximal_equations import Switched
 
-_MOST = 6  # largest number of joints at rest at the same time: each has up to three candidate modes
+_MOST = 6  # largest number of joints at rest of which all modes are tried: each has up to three
+_ROUNDS = 20  # exchanges of modes at most, for each joint at rest
 SLACK = 1e-9  # violation of an inequality, relative to the forces involved, up to which it counts as kept
 
 
@@ -34,10 +36,25 @@ class SwitchedBodies(JointStretches):
         self._driven = [mechanism.joint_index[actuator.joint] for actuator in self.limited]
         super().__init__(len(equations.equations.start()) + 1, tolerance)
 
+    @property
+    def start(self) -> Array:
+        """State at time 0."""
+        return np.append(self.equations.equations.start(), 0.0)
+
+    def bodies(self, state: Array) -> tuple[Array, Array, Array, Array]:
+        """Places, velocities, quaternions and angular velocities of all bodies, world axes."""
+        views = self.equations.equations.at(self.equations.normalised(state[:-1]).tolist()).views[:-1]
+        R, r, v, w = (np.array([getattr(view, name) for view in views], float) for name in ("R", "r", "v", "w"))
+        coms = np.array([body.com for body in self.equations.equations.mechanism.bodies])
+        arm = np.einsum("nij,nj->ni", R, coms)
+        return r - arm, v - np.cross(w, arm), Rotation.from_matrix(R).as_quat(scalar_first=True), w
+
     def begin(self) -> Transition[Mode]:
         """See the protocol."""
-        state = np.append(self.equations.equations.start(), 0.0)
-        mode, margin = self._decided(state, [False] * len(self.joints))
+        state = self.start
+        # on a body that moves, rates of joints at rest are of round-off
+        joints = self.equations.equations.mechanism.joints
+        mode, margin = self._decided(state, [not any(joints[number].v0) for number in self._numbers])
         return Transition(state, mode, (), margin)
 
     def _law(self, state: Array, mode: Mode) -> StretchLaw:
@@ -46,7 +63,7 @@ class SwitchedBodies(JointStretches):
             lambda y: np.append(equations.rate(float(y[-1]), y[:-1]), 1.0),
             lambda y: self._guards(equations, y, mode),
             lambda y: np.append(equations.eliminated(y[:-1]), y[-1]),
-            noise_of(self.joints, self.limited, mode, self._along(state)[0], self._wanted(state)),
+            noise_of(self.joints, self.limited, mode, *self._along(state), self._wanted(state)),
             near_stops(self.joints, mode),
         )
 
@@ -135,10 +152,10 @@ class SwitchedBodies(JointStretches):
             for k, joint in enumerate(self.joints)
         ]
         open_ = [k for k, choice in enumerate(choices) if len(choice) > 1]
-        if len(open_) > _MOST:
-            raise Refused(f"{len(open_)} joints with friction or stops come to rest at once; at most {_MOST} are tried")
         if not open_:
             return tuple(choice[0] for choice in choices) + efforts, np.inf
+        if len(open_) > _MOST:
+            return self._exchanged(state, choices, efforts, open_)
         best, redundant = tuple[float, Mode]((-np.inf, ())), False
         for joints in itertools.product(*choices):
             mode = joints + efforts
@@ -154,6 +171,32 @@ class SwitchedBodies(JointStretches):
         if best[0] < -SLACK:
             raise Refused("no mode of the joints with friction or stops keeps all its inequalities")
         return best[1], max(best[0], 0.0)
+
+    def _exchanged(
+        self, state: Array, choices: Sequence[Sequence[str]], efforts: Mode, open_: Sequence[int]
+    ) -> tuple[Mode, float]:
+        """Mode and margin of many joints at rest, found by changing one joint's mode at a time.
+
+        The first joint whose inequality is violated starts to move, or is held again (Murty's least index).
+
+        Raises:
+            Refused: no mode is found, or friction and joints hold a coordinate twice.
+        """
+        joints = [choice[0] for choice in choices]
+        for _ in range(_ROUNDS * len(open_)):
+            mode = (*joints, *efforts)
+            equations = self.equations.switched(state[:-1], self.switched(mode))
+            if equations.rank < self.equations.rank + sum(own in HOLDING for own in mode):
+                raise Refused(REDUNDANT)
+            force, acceleration = self.holding(equations, state, mode), self._accelerations(equations, state)
+            kept = {k: self._kept(k, mode[k], float(force[k]), float(acceleration[k]), state) for k in open_}
+            wrong = next((k for k in open_ if kept[k] < -SLACK), None)
+            if wrong is None:
+                return mode, max(min(kept.values()), 0.0)
+            held = joints[wrong] in HOLDING
+            pushed = self.joints[wrong].moving(1.0 if float(force[wrong]) < 0 else -1.0)
+            joints[wrong] = pushed if held and pushed in choices[wrong] else choices[wrong][0 if not held else -1]
+        raise Refused(f"no mode of {len(open_)} joints with friction or stops at rest keeps all its inequalities")
 
     def _kept(self, which: int, mode: str, force: float, acceleration: float, state: Array) -> float:
         """Margin of a joint's inequality, relative to the forces involved; negative: it is violated."""

@@ -43,7 +43,7 @@ def closed_form(mechanism: Mechanism) -> ClosedForm | None:
     """Closed form of a mechanism's motion, or None if none is known here."""
     switched = any(joint.friction or joint.armature or joint.limits for joint in mechanism.joints)
     driven = mechanism.actuators or mechanism.couplings or any(map(varies, mechanism.signals))
-    plain = not switched and not mechanism.springs and not driven
+    plain = not (switched or mechanism.springs or mechanism.bushings or mechanism.forces or driven)
     if not plain:
         return None
     for recognised in (_oscillators, _swinging, _free_body, _heavy_top):

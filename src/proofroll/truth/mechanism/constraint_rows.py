@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from proofroll.elements.mechanism.joint import FACTS
+from proofroll.elements.mechanism.joint import DISTANCE, FACTS
 from proofroll.truth.mechanism.maximal_bodies import AXES, BodyInScalars, GeneralBody, Planar
 from proofroll.truth.scalars import Scalar, add, cross, dot, is_zero, minus, mul, plus, product, scaled, sub, turned
 
@@ -16,7 +16,10 @@ _Wrench = tuple[Sequence[Scalar], Sequence[Scalar]]
 
 @dataclass(frozen=True)
 class Connection:
-    """A joint or loop between bodies a and b: its places from the centres of mass and frames (rows), in body axes."""
+    """A joint or loop between bodies a and b: its places from the centres of mass and frames (rows), in body axes.
+
+    ``length``: of a loop that holds a distance [m].
+    """
 
     kind: str
     a: int
@@ -25,6 +28,7 @@ class Connection:
     place_b: Sequence[float]
     frame_a: Sequence[Sequence[float]]
     frame_b: Sequence[Sequence[float]]
+    length: float = 0.0
 
 
 @dataclass
@@ -81,6 +85,17 @@ class ConstraintRows:
     def of(self, number: int) -> list[ConstraintRow]:
         """All rows of a joint or loop."""
         c, a, b, arm_a, arm_b, d, towards = self._apart(number)
+        if c.kind == DISTANCE:  # (d·d/L - L)/2
+            slide = minus(speed_at(b, arm_b), speed_at(a, arm_a))
+            along = scaled(1.0 / c.length, d)
+            residual = mul(0.5, sub(dot(along, d), float(c.length)))
+            bias = add(mul(1.0 / c.length, dot(slide, slide)), dot(along, towards))
+            on_a = scaled(-1.0, cross(arm_a, along))
+            return [
+                self.row(
+                    number, residual, bias, (along, cross(arm_b, along)), (scaled(-1.0, along), on_a), (along, NONE)
+                )
+            ]
         A, B = columns(product(a.R, c.frame_a)), columns(product(b.R, c.frame_b))
         rows = []
         facts = FACTS[c.kind]

@@ -1,6 +1,5 @@
 """Route 2 of a mechanism whose bodies touch: separate bodies, contact modes found by trial."""
 
-import itertools
 from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
@@ -11,25 +10,28 @@ from proofroll.elements.mechanism.contacts.acting import (
     OPEN,
     Acting,
     ContactMode,
-    Direction,
+    direction_of,
     first_mode,
     following,
+    modes_of,
     slip_velocity,
 )
-from proofroll.elements.mechanism.contacts.joint_laws import refuse_rubbing_stops
+from proofroll.elements.mechanism.contacts.joint_laws import off_stops
 from proofroll.elements.mechanism.contacts.sequences import groups_of
 from proofroll.elements.mechanism.contacts.start import closed_and_still
 from proofroll.elements.mechanism.contacts.touching import Touching
+from proofroll.elements.mechanism.contacts.turning import shut_by_pressing
 from proofroll.elements.mechanism.rotations import Array, cross, frame_of_axis
 from proofroll.truth.hybrid import Transition
-from proofroll.truth.mechanism.body_impacts import impulses_in_turn
+from proofroll.truth.mechanism.body_impacts import ImpactLaw, impulses_in_turn
 from proofroll.truth.mechanism.body_switching import SLACK
-from proofroll.truth.mechanism.contact_balance import balanced, cone_loads
+from proofroll.truth.mechanism.contact_balance import balanced, held_together
 from proofroll.truth.mechanism.contact_body_symbols import BodySymbols
 from proofroll.truth.mechanism.contact_equations import BodiesSolution, BodiesState, ContactEquations
-from proofroll.truth.mechanism.contact_guards import AT_REST, SLIP_ENDED, SolvedContacts, pressing, sharing
-from proofroll.truth.mechanism.contact_stretches import ContactStretches, modes_of
+from proofroll.truth.mechanism.contact_guards import SLIP_ENDED, SolvedContacts, pressing, sharing
+from proofroll.truth.mechanism.contact_stretches import ContactStretches
 from proofroll.truth.mechanism.contact_taylor import ModeSymbols
+from proofroll.truth.mechanism.contact_trials import consistent, follow, next_trial
 
 _MOST = 6  # largest number of closed contacts of which all modes are tried: each has up to four
 _PIVOTS = 4  # exchanges at most of a search by pivots, for each contact
@@ -56,32 +58,40 @@ class ContactBodies(ContactStretches):
         """See the protocol."""
         state = np.append(self.equations.equations.equations.start(), 0.0)
         closed, still = closed_and_still(self.equations.at(state).touching, np.ones(len(self.contacts)), 1.0)
-        refuse_rubbing_stops(self.contacts, closed, 0.0)
+        closed = shut_by_pressing(self.contacts, closed)
         state = self.equations.eliminated(state, modes_of(closed, still))
         mode, margin = self._decided(state, closed, still)
         return Transition(state, mode, (), margin)
 
-    def _decided(self, state: Array, closed: Sequence[bool], still: Sequence[bool]) -> tuple[ContactMode, float]:
-        bodies = self.equations.at(state)
+    def _decided(
+        self, state: Array, closed: Sequence[bool], still: Sequence[bool], leaving: int | None = None
+    ) -> tuple[ContactMode, float]:
+        if not any(closed):
+            return tuple(OPEN for _ in closed), np.inf
+        bodies, ways = self.equations.at(state), off_stops(self.contacts, closed)
+        still = [rests and k not in ways for k, rests in enumerate(still)]
 
         def trial(mode: ContactMode, headings: Sequence[Array | None]) -> BodiesSolution:
             directed = [
-                own if heading is None or own.along is not None else Acting("slip", None, _direction(heading))
+                own if heading is None or own.along is not None else Acting("slip", None, direction_of(heading))
                 for own, heading in zip(mode, headings, strict=True)
             ]
             return self.equations.accelerated(bodies, tuple(directed))
 
         if (
-            any(closed)
-            and list(still) == list(closed)
-            and (balanced(self.equations, bodies, closed) or self._held_together(bodies, closed))
+            list(still) == list(closed)
+            and leaving is None
+            and not any(
+                shut and contact.pressed_by is not None for shut, contact in zip(closed, self.contacts, strict=True)
+            )
+            and (balanced(self.equations, bodies, closed) or held_together(self.equations, bodies, closed))
         ):
             own = zip(self._own(bodies, closed), self._rubs, strict=True)
             return tuple(
                 each if rub or each.kind == "open" else each._replace(kind="slip") for each, rub in own
             ), np.inf
         free = float(np.abs(bodies.J @ np.linalg.solve(bodies.mass, bodies.force)).max())
-        best = self._tried(bodies, closed, still, trial, free)[0]
+        best = self._tried(bodies, closed, still, trial, free, leaving)[0]
         return self._completed(bodies, closed, still, best, free)
 
     def _completed(
@@ -101,7 +111,7 @@ class ContactBodies(ContactStretches):
         idle = [
             k
             for k, own in enumerate(mode)
-            if closed[k] and own.kind == "open" and solution.parting[k] <= SLACK * size and not self.equations.bounds[k]
+            if closed[k] and own.kind == "open" and solution.parting[k] <= SLACK * size and self.contacts[k].presses
         ]
         if not idle:
             return mode, kept
@@ -118,7 +128,7 @@ class ContactBodies(ContactStretches):
         moves = full.spread > RANK or apart > SLACK * max(free, float(np.abs(full.moved).max()))
         if moves or not set(idle) <= set(shares):
             return mode, kept
-        normals = pressing(tuple(whole), bodies.touching, full.force, full.splits)
+        normals = pressing(tuple(whole), bodies.touching, full.force, full.splits)[self.equations.pressing]
         margins = [
             self._kept(k, own, still[k], bodies, full, float(normals[k]), free)
             for k, own in enumerate(whole)
@@ -126,35 +136,19 @@ class ContactBodies(ContactStretches):
         ]
         return tuple(whole), max(0.0, min(margins))
 
-    def _held_together(self, bodies: BodiesState, closed: Sequence[bool]) -> bool:
-        """True if contacts share loads, and forces within their cones let all of them stick while bodies move."""
-        from scipy.optimize import nnls
-
-        if sum(closed) < _SHARING or self.equations.bounds.any():
-            return False
-        which = np.flatnonzero(closed)
-        held = np.concatenate(bodies.J[which])
-        if np.linalg.matrix_rank(held @ np.linalg.solve(bodies.mass, held.T), RANK, hermitian=True) == len(held):
-            return False
-        rows = np.concatenate([bodies.C, held])
-        rates = np.concatenate([bodies.of_joints, bodies.bias[which].ravel()])
-        loads = np.column_stack([bodies.C.T, -bodies.C.T, *cone_loads(self.equations, bodies, closed)])
-        inertial = np.linalg.solve(bodies.mass, np.column_stack([bodies.force, loads]))
-        aims = -(rows @ inertial[:, 0] + rates)
-        size = max(float(np.linalg.norm(aims)), AT_REST)
-        return bool(nnls(rows @ inertial[:, 1:], aims, maxiter=100 * loads.shape[1])[1] <= SLACK * size)
-
-    def _struck(self, state: Array, closed: Sequence[bool], laws: Sequence[float]) -> tuple[Array, list[bool], float]:
+    def _struck(
+        self, state: Array, closed: Sequence[bool], laws: Sequence[float], sideways: Sequence[float]
+    ) -> tuple[Array, list[bool], float]:
         bodies = self.equations.at(state)
         which = np.flatnonzero(closed).tolist()
         ways, G = self.equations.coupled_responses(bodies, which)
         slides = np.concatenate(
             [frame_of_axis(bodies.touching[k].normal)[:, [2, 0, 1]].T @ bodies.touching[k].slide for k in which]
         )
-        friction, names = [float(self.equations.friction[k]) for k in which], [self.contacts[k].name for k in which]
+        struck = [ImpactLaw(self.contacts[k], laws[k], sideways[k]) for k in which]
         together = self.equations.mechanism.together
         groups = groups_of([self.contacts[k].pair for k in which], slides, together=together)
-        impulses = impulses_in_turn(G, slides, groups, friction, [laws[k] for k in which], names, float(state[-1]))
+        impulses = impulses_in_turn(G, slides, groups, struck, float(state[-1]))
         e = self.equations.equations.equations
         state = state.copy()
         state[e.nx : e.nx + e.nu] += ways @ impulses
@@ -178,17 +172,24 @@ class ContactBodies(ContactStretches):
         still: Sequence[bool],
         trial: Trial,
         free: float,
+        leaving: int | None = None,
     ) -> list[tuple[float, BodiesSolution, ContactMode]]:
         """Candidate modes that violate no inequality, best first: relative margin, solution, mode.
 
         ``free``: largest slide, or rate of a slide, without forces, to which margins are relative if those with forces
-        are less.
+        are less; ``leaving``: contact that static friction no longer holds.
 
         Raises:
             Refused: there is none, or it is not found.
         """
         count = sum(closed)
-        choices = [list(self._candidates(k, own, still[k], bodies)) for k, own in enumerate(self._own(bodies, closed))]
+        ways = off_stops(self.contacts, closed)
+        slips = [ways.get(k, slip_velocity(touch)) for k, touch in enumerate(bodies.touching)]
+        choices = [
+            list(self._candidates(k, own, still[k], slips[k])) for k, own in enumerate(self._own(bodies, closed))
+        ]
+        if leaving is not None:
+            choices[leaving] = [option for option in choices[leaving] if option.kind != "stick"]
         exchanged = self._exchanged(bodies, choices, still, trial, free)
         if exchanged is not None and (count > _MOST or (exchanged[0] > _CLEAR and not exchanged[1].loose)):
             return [exchanged]
@@ -198,12 +199,12 @@ class ContactBodies(ContactStretches):
                 "all inequalities of contact, as where contacts that begin to slip share a load"
             )
         unique, shared = (list[tuple[float, BodiesSolution, ContactMode]]() for _ in range(2))
-        for mode in itertools.product(*choices):
+        for mode in consistent(self.contacts, choices):
             attempt = self._headed(bodies, mode, still, trial)
             if attempt is None:
                 continue
             solution, headed = attempt
-            normals = pressing(headed, bodies.touching, solution.force, solution.splits)
+            normals = pressing(headed, bodies.touching, solution.force, solution.splits)[self.equations.pressing]
             apart = (
                 self._kept(k, headed[k], still[k], bodies, solution, float(normals[k]), free)
                 for k in range(len(mode))
@@ -234,7 +235,7 @@ class ContactBodies(ContactStretches):
             if attempt is None:
                 return None
             solution, headed = attempt
-            normals = pressing(headed, bodies.touching, solution.force, solution.splits)
+            normals = pressing(headed, bodies.touching, solution.force, solution.splits)[self.equations.pressing]
             kept = [
                 self._kept(k, headed[k], still[k], bodies, solution, float(normals[k]), free)
                 if len(options) > 1
@@ -249,40 +250,27 @@ class ContactBodies(ContactStretches):
                 (k for k, value in enumerate(kept) if value <= worst + SLACK),
                 key=lambda k: float(bodies.touching[k].normal @ solution.force[k]),
             )
-            mode[k] = self._next(k, headed[k], choices[k], solution, float(normals[k]))
+            mode[k] = next_trial(self.contacts[k], headed[k], choices[k], solution.force[k], float(normals[k]))
+            follow(self.contacts, mode, choices)
         return None
 
-    def _next(
-        self,
-        k: int,
-        own: Acting,
-        options: Sequence[Acting],
-        solution: BodiesSolution,
-        normal: float,
-    ) -> Acting:
-        """Next trial of a contact whose present one violates an inequality."""
-        if own.kind == "open":
-            return options[1]
-        if normal < 0 and options[0].kind == "open":
-            return OPEN
-        if own.kind == "slip":
-            return next(option for option in options if option.kind == "stick")
-        slips = [option for option in options if option.kind == "slip"]
-        return next((slip for slip in slips if slip.along and np.dot(slip.along, solution.force[k]) < 0), slips[-1])
-
-    def _candidates(self, k: int, own: Acting, still: bool, bodies: BodiesState) -> Iterator[Acting]:
-        """Candidate modes of a contact."""
+    def _candidates(self, k: int, own: Acting, still: bool, slip: Array) -> Iterator[Acting]:
+        """Candidate modes of a contact; ``slip``: along its slip, of any length."""
         mu, bound = self.equations.friction[k], self.equations.bounds[k]
-        if own.kind == "open" or not bound:
+        if own.kind == "open" or self.contacts[k].presses:
             yield OPEN
         if own.kind == "open":
             return
+        if not still and np.isinf(mu):
+            name = self.contacts[k].name
+            raise Refused(f"{name} would slip, but has friction = inf; give it a number")
         if not still or not (mu or bound):
-            u = slip_velocity(bodies.touching[k])
-            x, y, z = (u / (float(np.linalg.norm(u)) or 1.0)).tolist()
+            x, y, z = (slip / (float(np.linalg.norm(slip)) or 1.0)).tolist()
             yield Acting("slip", None if own.along is None else (x, y, z), (x, y, z))
             return
         yield Acting("stick", own.along)
+        if np.isinf(mu):
+            return
         if own.along is None:
             yield Acting("slip")
         else:
@@ -335,7 +323,9 @@ class ContactBodies(ContactStretches):
             size = float(np.abs(solution.slide).max()) or 1.0
             ahead = all(float(way @ solution.slide[k]) > 0 for k, way in ways.items())
             if np.abs(answer.fun).max() <= SLACK * size and ahead:
-                headed = (Acting("slip", None, _direction(ways[k])) if k in ways else own for k, own in enumerate(mode))
+                headed = (
+                    Acting("slip", None, direction_of(ways[k])) if k in ways else own for k, own in enumerate(mode)
+                )
                 return solution, tuple(headed)
         return None
 
@@ -353,14 +343,15 @@ class ContactBodies(ContactStretches):
         each, mu, bound = bodies.touching[k], float(self.equations.friction[k]), float(self.equations.bounds[k])
         size_f, size_s = float(np.abs(solution.force).max()), max(float(np.abs(solution.slide).max()), free) or 1.0
         if own.kind == "open":
-            return float(solution.parting[k]) / size_s
+            return float(solution.parting[k]) / size_s if self.contacts[k].pressed_by is None else np.inf
         normal = np.inf if bound else normal
         if not size_f:
             return np.inf
         if own.kind == "stick":
             force = solution.force[k]
             held = float(np.linalg.norm(force - each.normal * (each.normal @ force)))
-            return min(normal, (bound or mu * normal) - held) / size_f
+            most = bound or self.equations.static[k] * normal
+            return min(normal, most - held if np.isfinite(mu) else np.inf) / size_f
         if not still or not (mu or bound):
             return normal / size_f
         assert own.heading is not None  # known by now
@@ -374,7 +365,7 @@ class ContactBodies(ContactStretches):
     def _touching(self, state: Array) -> Sequence[Touching]:
         return self.equations.at(state).touching
 
-    def _solved(self, state: Array, mode: ContactMode) -> SolvedContacts:
+    def _solution(self, state: Array, mode: ContactMode) -> SolvedContacts:
         bodies = self.equations.at(self.equations.equations.normalised(state))
         solution = self.equations.accelerated(bodies, mode)
         return SolvedContacts(
@@ -387,9 +378,5 @@ class ContactBodies(ContactStretches):
             solution.response,
             solution.splits,
             solution.spread,
+            solution.shifts,
         )
-
-
-def _direction(vector: Array) -> Direction:
-    x, y, z = (float(component) for component in vector)
-    return x, y, z

@@ -7,7 +7,8 @@ from typing import Any, NamedTuple
 
 from proofroll.elements.mechanism.contacts.acting import ContactMode
 from proofroll.elements.mechanism.contacts.joint_laws import JointContact
-from proofroll.elements.mechanism.signal import Table
+from proofroll.elements.mechanism.contacts.turning import TurningFriction
+from proofroll.elements.mechanism.signal import Held, Table
 from proofroll.truth.mechanism.constraint_rows import ConstraintRow
 from proofroll.truth.mechanism.contact_equations import ContactEquations
 from proofroll.truth.mechanism.contact_scalars import ScalarMotion, ScalarTouch, floats, known_shapes, touch_in_scalars
@@ -22,14 +23,16 @@ from proofroll.truth.mechanism.contact_symbols import (
 )
 from proofroll.truth.mechanism.maximal_bodies import AXES, BodyInScalars
 from proofroll.truth.mechanism.maximal_equations import Switched
+from proofroll.truth.mechanism.turning_symbols import TurningMoments, of_turning, resisted, resisted_rate
 from proofroll.truth.scalars import Scalar, add, cross, dot, is_zero, minus, mul, plus, scaled, sub, turned
 
 
 class _Now(NamedTuple):
-    """Bodies, and rates of the joints whose laws are contacts, at one instant."""
+    """Bodies, rates of joints whose laws are contacts, and what presses each friction of turning, at one instant."""
 
     views: Sequence[BodyInScalars]
     laws: Sequence[ConstraintRow]
+    pressing: Sequence[ScalarTouch] = ()
 
 
 class BodySymbols:
@@ -43,6 +46,8 @@ class BodySymbols:
         self._kept = equations.equations.independent_rows()
         self._touchings = len(equations.mechanism.contacts)
         self._laws = [each for each in equations.contacts if isinstance(each, JointContact)]
+        self._frictions = [each for each in equations.contacts if isinstance(each, TurningFriction)]
+        self._alone = self._touchings + len(self._laws)  # contacts without friction against turning
 
     @property
     def covers(self) -> bool:
@@ -50,7 +55,7 @@ class BodySymbols:
         bodies = self._bodies
         shapes = all(map(known_shapes, bodies.mechanism.contacts))
         laws = any(joint.armature for joint in bodies.mechanism.joints)
-        tables = any(isinstance(signal, Table) for signal in bodies.mechanism.signals)
+        tables = any(isinstance(signal, Held | Table) for signal in bodies.mechanism.signals)
         return shapes and not bodies.light and not laws and not tables
 
     def solved(
@@ -74,28 +79,39 @@ class BodySymbols:
         numbers = [law.joint.number for law in self._laws]
         at = _Now(now.views, e.rate_rows(state[:-1], numbers, functions))
         touching = [*self._touching(now.views, functions), *self._of_joints(state, at)]
+        turns = [(friction, touching[friction.pressed_by]) for friction in self._frictions]
+        touching += [of_turning(friction, touch, self._relative(friction, at)) for friction, touch in turns]
+        at = at._replace(pressing=[touch for _, touch in turns])
         joints = [now.rows[k] for k in self._kept]
         held = [(row.coefficients, row.bias) for row in joints]
         lines = [
-            start if start is None or k >= self._touchings else self._line(k, touching[k], start, at, held, functions)
+            start
+            if start is None or self._touchings <= k < self._alone
+            else self._line(k, touching[k], start, at, held, functions)
             for k, start in enumerate(began)
         ]
         rows, pushes, aims = [row for row, _ in held], [row for row, _ in held], [sub(0.0, bias) for _, bias in held]
         force = list(now.force)
         owner: list[tuple[int, Vector]] = []
+        contacts, root = self._equations.contacts, functions["sqrt"]
+        turning = TurningMoments(mode, contacts, touching, lines, root)
+
+        def row_of(k: int, direction: Vector) -> Row:
+            return self._row(k, touching[k], direction, at)
+
         for k, (own, touch, line) in enumerate(zip(mode, touching, lines, strict=True)):
             if own.kind == "open":
                 continue
-            part = rows_of(own.kind, touch, line, self._equations.contacts[k], functions["sqrt"])
+            part = rows_of(own.kind, touch, line, contacts[k], root)
             rate = self._bias(k, touch, at)
             if line is not None and own.kind == "slip" and (bound := float(self._equations.bounds[k])):
                 for n, value in self._row(k, touch, scaled(-bound, line), at).items():
                     force[n] = add(force[n], value)
             for direction, along in zip(part.directions, part.along, strict=True):
                 rows.append(self._row(k, touch, direction, at))
-                pushes.append(self._row(k, touch, along, at))
-                turning = dot(touch.normal_rate, touch.slide) if own.kind == "slip" else 0.0
-                aims.append(sub(sub(0.0, dot(direction, rate)), turning))
+                pushes.append(turning.pushed(self._row(k, touch, along, at), len(owner), k, along, row_of))
+                beyond = dot(touch.normal_rate, touch.slide) if own.kind == "slip" else 0.0
+                aims.append(sub(sub(0.0, dot(direction, rate)), beyond))
                 owner.append((k, along))
         (answer,), pivots = self._eliminated(rows, pushes, [[*force, *aims]])
         response: Scalar = 1.0
@@ -108,6 +124,7 @@ class BodySymbols:
             own_force = forces[k]
             assert own_force is not None  # its owner is closed
             forces[k] = plus(own_force, scaled(size, along))
+        turning.add_to(forces, answer[e.nu + len(held) :])
         moved = [plus(self._moved(k, touch, answer, at), self._bias(k, touch, at)) for k, touch in enumerate(touching)]
         return SolvedSymbols(
             [*now.rate, *answer[: e.nu], *now.angle_rate], touching, lines, forces, response, moved, limits
@@ -145,6 +162,16 @@ class BodySymbols:
     def _row(self, k: int, touch: ScalarTouch, direction: Vector, now: _Now) -> Row:
         """Coefficients, along the velocities, of a contact's slide in a direction."""
         row: Row = {}
+        if k >= self._alone:
+            friction, pressing = self._frictions[k - self._alone], now.pressing[k - self._alone]
+            way = resisted(friction, pressing, direction)
+            for body, sign in zip(self._equations.pairs[friction.pressed_by], (1.0, -1.0), strict=True):
+                if body < 0:
+                    continue
+                entries = self._bodies.bodies[body].projected(now.views[body], [0.0, 0.0, 0.0], scaled(sign, way))
+                for at, entry in enumerate(entries, self._bodies.u_slices[body].start):
+                    row[at] = add(row.get(at, 0.0), entry)
+            return {at: entry for at, entry in row.items() if not is_zero(entry)}
         if k >= self._touchings:
             part = dot(floats(self._laws[k - self._touchings].direction), direction)
             moves = now.laws[k - self._touchings].coefficients
@@ -159,6 +186,10 @@ class BodySymbols:
                 row[at] = add(row.get(at, 0.0), entry)
         return {at: entry for at, entry in row.items() if not is_zero(entry)}
 
+    def _relative(self, friction: TurningFriction, now: _Now) -> Vector:
+        """Angular velocity of the first body of a contact relative to the second."""
+        return minus(*(now.views[body].w for body in self._equations.pairs[friction.pressed_by]))
+
     def _moved(self, k: int, touch: ScalarTouch, u: Sequence[Scalar], now: _Now) -> list[Scalar]:
         """Slide of a contact by velocities u, or its rate by accelerations."""
         rows = [self._row(k, touch, axis, now) for axis in AXES]
@@ -166,6 +197,9 @@ class BodySymbols:
 
     def _bias(self, k: int, touch: ScalarTouch, now: _Now) -> Vector:
         """Rate of a contact's slide while the velocities stay."""
+        if k >= self._alone:
+            friction, pressing = self._frictions[k - self._alone], now.pressing[k - self._alone]
+            return resisted_rate(friction, pressing, self._relative(friction, now))
         if k >= self._touchings:
             return scaled(now.laws[k - self._touchings].bias, floats(self._laws[k - self._touchings].direction))
         a, b = (now.views[body] for body in self._equations.pairs[k])

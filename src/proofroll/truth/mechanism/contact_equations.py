@@ -5,10 +5,19 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from proofroll.elements.mechanism.contacts.acting import ContactMode, heading_of, held_directions, turned
+from proofroll.core.last_results import LastResults
+from proofroll.elements.mechanism.contacts.acting import (
+    EXACT,
+    ContactMode,
+    forbidding_rows,
+    heading_of,
+    held_directions,
+    turned,
+)
 from proofroll.elements.mechanism.contacts.geometry import BodyContact
 from proofroll.elements.mechanism.contacts.joint_laws import JointContact, joint_contacts, mode_of_joints
 from proofroll.elements.mechanism.contacts.touching import Moving, Touching, touch
+from proofroll.elements.mechanism.contacts.turning import TurningFriction, moments_by_pressing, turning_frictions
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.rotations import Array, cross, frame_of_axis
 from proofroll.elements.mechanism.switches import HOLDING, STOPPED, switched_joints
@@ -16,6 +25,7 @@ from proofroll.truth.mechanism.maximal_coordinates import RANK, NumericEquations
 from proofroll.truth.mechanism.maximal_equations import Switched
 
 _AXES = np.eye(3)
+_KEPT = 4  # states whose rows and loads are kept
 
 
 @dataclass(frozen=True)
@@ -28,6 +38,7 @@ class BodiesState:
         bias: rate of each sliding velocity at u̇ = 0, (contacts, 3).
         C, of_joints: independent rows of joints and loops, (rows, nu), and their biases.
         mass, force: mass matrix and loads: M u̇ = force + forces of joints and contacts.
+        residual: violations of all rows of joints and loops.
         u: velocities, (nu).
         centres: centres of mass of the bodies, and the world's origin, (bodies + 1, 3).
     """
@@ -39,6 +50,7 @@ class BodiesState:
     of_joints: Array
     mass: Array
     force: Array
+    residual: Array
     u: Array
     centres: Array
 
@@ -57,6 +69,7 @@ class BodiesSolution:
         loose: True if the forces are not unique.
         splits: ways to split a load that contacts share: changes of the normal forces, (contacts, ways).
         spread: change of ``moved`` with these, the whole of unit length.
+        shifts: changes of all forces with these, (contacts, 3, ways).
     """
 
     mode: ContactMode
@@ -68,6 +81,7 @@ class BodiesSolution:
     loose: bool
     splits: Array
     spread: float
+    shifts: Array
 
 
 class ContactEquations:
@@ -76,17 +90,29 @@ class ContactEquations:
     def __init__(self, mechanism: Mechanism, equations: NumericEquations) -> None:
         self.mechanism, self.equations, self._switched = mechanism, equations, switched_joints(mechanism)
         self._of_joints = joint_contacts(self._switched)
-        self.contacts: tuple[BodyContact | JointContact, ...] = (*mechanism.contacts, *self._of_joints)
+        self._turning = turning_frictions(mechanism.contacts)
+        self.contacts: tuple[BodyContact | JointContact | TurningFriction, ...] = (
+            *mechanism.contacts,
+            *self._of_joints,
+            *self._turning,
+        )
         self.friction = np.array([contact.friction for contact in self.contacts])
+        self.static = np.array([contact.static for contact in self.contacts])
         self.bounds = np.array([contact.bound for contact in self.contacts])
+        # contact whose normal force bounds the friction of each
+        self.pressing = [k if (by := c.pressed_by) is None else by for k, c in enumerate(self.contacts)]
         index = mechanism.body_index
         self.pairs = [(index[contact.body_a], index[contact.body_b]) for contact in mechanism.contacts]
         self._com = [np.array(body.com) for body in mechanism.bodies] + [np.zeros(3)]
         self._limited = {k: actuator for k, actuator in enumerate(mechanism.actuators) if actuator.limit is not None}
+        self._last = LastResults[bytes, BodiesState](_KEPT)
         self._driven = [mechanism.joint_index[actuator.joint] for actuator in self._limited.values()]
 
     def at(self, state: Array) -> BodiesState:
         """Rows and loads of the bodies at a state: coordinates, velocities, angles, and last the time [s]."""
+        return self._last.of(state.tobytes(), lambda: self._at(state.copy()))
+
+    def _at(self, state: Array) -> BodiesState:
         e = self.equations.equations
         constrained, C, bias, half, force = self.equations.loaded(state[:-1], float(state[-1]), self.clamped(state))
         bodies = []
@@ -116,10 +142,25 @@ class ContactEquations:
             touching += (contact.touching(float(q), float(v)),)
             J[k][:, list(row.coefficients)] = np.outer(contact.direction, list(row.coefficients.values()))
             rates[k] = contact.direction * float(row.bias)
+        for friction in self._turning:
+            k, there = len(touching), touching[friction.pressed_by]
+            turns, relative = np.zeros((3, e.nu)), np.zeros(3)
+            for body, sign in zip(self.pairs[friction.pressed_by], (1.0, -1.0), strict=True):
+                if body < 0:
+                    continue
+                view = constrained.views[body]
+                relative += sign * np.array(view.w, dtype=float)
+                for row, axis in zip(turns, _AXES, strict=True):
+                    entries = e.bodies[body].projected(view, [0.0, 0.0, 0.0], axis.tolist())
+                    row[e.u_slices[body]] += sign * np.array(entries, dtype=float)
+            touching += (friction.touching(there, relative),)
+            J[k] = friction.part(there.normal) @ turns
+            rates[k] = friction.part_rate(there) @ relative
         mass = np.asarray(np.linalg.inv(half @ half.T), dtype=np.float64)
         C, bias = _independent(C, bias, self.equations.rank)
         centres = np.array([view.r for view in constrained.views], dtype=float)
-        return BodiesState(touching, J, rates, C, bias, mass, force, state[e.nx : e.nx + e.nu], centres)
+        residual = np.array([row.residual for row in constrained.rows], dtype=float)
+        return BodiesState(touching, J, rates, C, bias, mass, force, residual, state[e.nx : e.nx + e.nu], centres)
 
     def accelerated(self, state: BodiesState, mode: ContactMode) -> BodiesSolution:
         """Accelerations and forces while each contact keeps its mode."""
@@ -162,8 +203,8 @@ class ContactEquations:
     def _held(self, state: BodiesState, mode: ContactMode) -> list[Array]:
         """Directions in which each contact constrains the sliding velocity."""
         return [
-            held_directions(own, each, presses=not bound)
-            for own, each, bound in zip(mode, state.touching, self.bounds, strict=True)
+            held_directions(own, each, contact.presses)
+            for own, each, contact in zip(mode, state.touching, self.contacts, strict=True)
         ]
 
     def _solved(
@@ -179,18 +220,25 @@ class ContactEquations:
     ) -> BodiesSolution:
         """Solution x of M x − Cᵀλ − Dᵀz = right, C x = of_joints, K x = wanted."""
         rows, along, aims, owner = [state.C], [state.C], [of_joints], list[tuple[int, Array]]()
-        force = np.zeros((len(mode), 3))
+        force, turning = np.zeros((len(mode), 3)), list[tuple[int, int, Array]]()
         for k, held in enumerate(self._held(state, mode)):
             rows.append(held @ state.J[k])
             aims.append(wanted[k])
             heading = headings[k] if mode[k].kind == "slip" else None
-            rubs = np.zeros(3) if heading is None else heading
-            force[k] = -self.bounds[k] * rubs
-            directions = held - self.friction[k] * rubs
+            directions = held
+            by = self.contacts[k].pressed_by
+            if heading is not None and by is not None:
+                turning.append((k, by, -self.friction[k] * heading))
+            elif heading is not None:
+                force[k] = -self.bounds[k] * heading
+                directions = held - self.friction[k] * heading
             along.append(directions @ state.J[k])
             owner += [(k, direction) for direction in directions]
         right = right + np.einsum("kin,ki->n", state.J, force)
         K, D = np.concatenate(rows), np.concatenate(along)
+        moments = moments_by_pressing(turning, owner, [each.normal for each in state.touching])
+        for k, place, moment in moments:
+            D[len(state.C) + place] += moment @ state.J[k]
         nu, count = len(state.u), len(K)
         none = np.zeros((count, count))
         # Scaled by the inertia of each velocity and by the norm of each row, so a small body's moment does not count as
@@ -210,21 +258,29 @@ class ContactEquations:
         if rank < count:
             ways = units[:, None] * np.linalg.svd(system)[2][nu + rank :].T
             ways /= np.linalg.norm(ways[nu:], axis=0)
-        splits = np.zeros((len(mode), ways.shape[1]))
+        splits, shifts = np.zeros((len(mode), ways.shape[1])), np.zeros((len(mode), 3, ways.shape[1]))
         for (k, direction), size, way in zip(owner, z, ways[nu + len(state.C) :], strict=True):
             force[k] += size * direction
+            shifts[k] += np.outer(direction, way)
             splits[k] += float(direction @ state.touching[k].normal) * way
+        for k, place, moment in moments:
+            force[k] += z[place] * moment
+            shifts[k] += np.outer(moment, ways[nu + len(state.C) + place])
         slide = state.J @ x + bias
         parting = np.array([each.normal @ rate for each, rate in zip(state.touching, slide, strict=True)]) + beyond
         spread = float(np.linalg.norm(ways[:nu]))
-        return BodiesSolution(mode, x, force, slide, parting, response, rank < count, splits, spread)
+        return BodiesSolution(mode, x, force, slide, parting, response, rank < count, splits, spread, shifts)
 
     def applied(self, state: BodiesState, force: Array) -> tuple[Array, Array]:
         """Forces of contacts between bodies, and wrenches on the bodies about their centres of mass, (bodies, 6)."""
+        moments = force[len(force) - len(self._turning) :]
         wrenches, force = np.zeros((len(self.mechanism.bodies) + 1, 6)), force[: len(self.pairs)]
         for pair, each, push in zip(self.pairs, state.touching, force, strict=False):
             for body, sign in zip(pair, (1.0, -1.0), strict=True):
                 wrenches[body] += sign * np.concatenate([push, cross(each.place - state.centres[body], push)])
+        for friction, moment in zip(self._turning, moments, strict=True):
+            for body, sign in zip(self.pairs[friction.pressed_by], (1.0, -1.0), strict=True):
+                wrenches[body, 3:] += sign * moment
         return force, wrenches[:-1]
 
     def rate(self, state: Array, mode: ContactMode) -> Array:
@@ -268,20 +324,27 @@ class ContactEquations:
     def eliminated(self, state: Array, mode: ContactMode) -> Array:
         """State without violations of joint rows, closed contacts and unit quaternions."""
         e = self.equations.equations
+        unit = np.append(self.equations.normalised(state[:-1]), state[-1])
+        state = unit if np.abs(unit - state).max() > EXACT else state
+        presses, bodies = [contact.presses for contact in self.contacts], self.at(state)
+        closed = [k for k, own in enumerate(mode) if own.kind != "open" and presses[k]]
+        gaps = np.array([bodies.touching[k].gap for k in closed])
+        slides = forbidding_rows(mode, bodies.touching, bodies.J, presses) @ bodies.u
+        left = np.abs(np.concatenate([bodies.residual, bodies.C @ bodies.u, gaps, slides])).max(initial=0.0)
+        if left <= EXACT:
+            return state
         state = np.append(self.equations.eliminated(state[:-1]), state[-1])
-        closed = [k for k, own in enumerate(mode) if own.kind != "open"]
-        if not closed:
+        if not len(slides):
             return state
         bodies = self.at(state)
-        normals = np.array([bodies.touching[k].normal @ bodies.J[k] for k in closed])
-        gaps = np.array([bodies.touching[k].gap for k in closed])
-        back = _least_motion(bodies, normals, gaps)
-        state[: e.nx] -= self.equations.moving(state[: e.nx], back)
-        state = self.equations.normalised(state)
-        bodies = self.at(state)
-        sticking = [bodies.J[k] for k in closed if mode[k].kind == "stick"]
-        sliding = [bodies.touching[k].normal[None] @ bodies.J[k] for k in closed if mode[k].kind == "slip"]
-        K = np.concatenate([*sticking, *sliding])
+        if closed:
+            normals = np.array([bodies.touching[k].normal @ bodies.J[k] for k in closed])
+            gaps = np.array([bodies.touching[k].gap for k in closed])
+            back = _least_motion(bodies, normals, gaps)
+            state[: e.nx] -= self.equations.moving(state[: e.nx], back)
+            state = self.equations.normalised(state)
+            bodies = self.at(state)
+        K = forbidding_rows(mode, bodies.touching, bodies.J, presses)
         state[e.nx : e.nx + e.nu] -= _least_motion(bodies, K, K @ bodies.u)
         return state
 

@@ -10,8 +10,9 @@ from proofroll.core.arrays import FloatArray
 from proofroll.elements.mechanism.analysis import RANK
 from proofroll.elements.mechanism.contacts.acting import FAINT, Acting, ContactMode, heading_of, slip_velocity
 from proofroll.elements.mechanism.contacts.geometry import BodyContact
-from proofroll.elements.mechanism.contacts.joint_laws import JointContact
+from proofroll.elements.mechanism.contacts.joint_laws import JointContact, off_stops
 from proofroll.elements.mechanism.contacts.touching import FLAT, Touching
+from proofroll.elements.mechanism.contacts.turning import TurningFriction
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.truth.mechanism.followed_paths import time_accuracy
 
@@ -19,8 +20,10 @@ from proofroll.truth.mechanism.followed_paths import time_accuracy
 # routes stop there, so that they do not integrate the round-off of a state at rest.
 AT_REST, STANDS = 1e-13, 1e-9
 SLIP_ENDED = 1e-11  # slip speed that remains when a slip below FAINT is extrapolated to rest
+_UNLOADED = 1e-11  # normal force, in natural units, that is round-off where a contact leaves
 # Value of Painlevé's measure (1 without friction) that counts as zero.
 LEAST_RESPONSE = 1e-3
+_STRAIGHT = 1e-10  # moment of friction about the centre of pressure, relative to the load, that counts as zero
 _FEW = 6  # contacts that share a load, up to which all groups of them are tried
 TURNED = 0.5  # cosine of the angle by which a line may turn in a stretch
 # Speed, in natural units, by which slips may differ that share a load: round-off leaves 4e-15 of parallel ones.
@@ -29,7 +32,7 @@ _TOGETHER = 1e-13  # relative to the mechanism's size: gaps of contacts of a fac
 _DIGITS = 1e-14  # relative to the mechanism's size: round-off of a gap that has just opened
 
 
-Touchable = BodyContact | JointContact
+Touchable = BodyContact | JointContact | TurningFriction
 
 
 class ContactGuard(NamedTuple):
@@ -59,6 +62,7 @@ class SolvedContacts(NamedTuple):
         response: Painlevé's measure, 1 without friction.
         splits: ways to split a load that contacts share: changes of the normal forces, (contacts, ways).
         spread: change of the acceleration with these, the whole of unit length.
+        shifts: changes of all forces with these, (contacts, 3, ways).
     """
 
     touching: Sequence[Touching]
@@ -70,18 +74,21 @@ class SolvedContacts(NamedTuple):
     response: float
     splits: Array
     spread: float
+    shifts: Array
 
 
 def guards_of(contacts: Sequence[Touchable], mode: ContactMode) -> list[ContactGuard]:
     """Guards of a mode, in an order that both routes share."""
     guards: list[ContactGuard] = []
+    on_stops = off_stops(contacts, [own.kind != "open" for own in mode])
     for k, (contact, own) in enumerate(zip(contacts, mode, strict=True)):
         if own.kind == "open":
-            guards.append(ContactGuard(k, "close"))
+            if contact.pressed_by is None:
+                guards.append(ContactGuard(k, "close"))
             continue
-        if not contact.bound:
+        if contact.presses:
             guards.append(ContactGuard(k, "lift"))
-        if contact.friction or contact.bound:
+        if (contact.friction or contact.bound) and np.isfinite(contact.friction) and k not in on_stops:  # else it stays
             guards.append(ContactGuard(k, "still" if own.kind == "slip" else "break"))
         if own.along is not None and contact.friction:  # a joint that rubs has none, and its line never turns
             guards.append(ContactGuard(k, "turn"))
@@ -120,9 +127,71 @@ def guard_value(
         return _stopping(own, touch)
     if guard.kind == "lift":
         return -float(normals[guard.contact])
-    force, contact = solved.force[guard.contact], contacts[guard.contact]
-    normal = float(touch.normal @ force)
-    return float(np.linalg.norm(force - normal * touch.normal)) - (contact.bound or contact.friction * normal)
+    return _beyond_its_bound(guard.contact, contacts, solved)
+
+
+def _beyond_its_bound(k: int, contacts: Sequence[Touchable], solved: SolvedContacts) -> float:
+    """Guard of a sticking contact: its friction beyond its bound, or that of all contacts that slip with it."""
+    whole = whole_grip(contacts, solved, k)
+    if whole is not None:
+        return float(np.linalg.norm(whole.friction)) - contacts[k].static * whole.normal
+    force, contact, touch = solved.force[k], contacts[k], solved.touching[k]
+    by = contact.pressed_by
+    normal = float(touch.normal @ force) if by is None else float(solved.touching[by].normal @ solved.force[by])
+    if by is not None:
+        return float(np.linalg.norm(force)) - contact.static * normal
+    return float(np.linalg.norm(force - normal * touch.normal)) - (contact.bound or contact.static * normal)
+
+
+class WholeGrip(NamedTuple):
+    """Friction of several sticking contacts of two bodies that begin to slip together, in one direction.
+
+    Attributes:
+        contacts: their indices.
+        friction: sum of their friction on the first body, (3).
+        normal: sum of their normal forces.
+    """
+
+    contacts: list[int]
+    friction: Array
+    normal: float
+
+
+def whole_grip(contacts: Sequence[Touchable], solved: SolvedContacts, k: int) -> WholeGrip | None:
+    """Grip of all contacts that share their friction with the sticking contact ``k``.
+
+    The friction of each foot of a box is not determinate. Their sum is at most μ times the sum of their normal
+    forces, and reaches that bound where each has its own bound, in one direction: of friction in proportion to the
+    normal forces, which acts at the centre of pressure. Where the sum acts there, too, the feet hold up to the bound.
+
+    None: the friction of ``k`` is determinate, or the sum is not or acts elsewhere, so that the body begins to turn.
+    """
+    one, ways = contacts[k], solved.shifts.shape[2]
+    if not ways or not isinstance(one, BodyContact) or solved.mode[k].kind != "stick":
+        return None
+    normal, among = solved.touching[k].normal, []
+    for number, (contact, own, touch) in enumerate(zip(contacts, solved.mode, solved.touching, strict=True)):
+        same = isinstance(contact, BodyContact) and (contact.body_a, contact.body_b) == (one.body_a, one.body_b)
+        alike = same and (contact.friction, contact.static) == (one.friction, one.static)
+        alike = alike and float(touch.normal @ normal) > 1 - RANK
+        if alike and own.kind == "stick":
+            among.append(number)
+    places = np.array([solved.touching[number].place for number in among])
+    forces, shifts = solved.force[among], solved.shifts[among]
+    moments = np.cross(places[:, :, None], shifts, axisa=1, axisb=1, axisc=1)
+    size = max(1.0, float(np.abs(places).max()))
+    pressed = forces @ normal
+    total = float(pressed.sum())
+    alone = np.abs(shifts[among.index(k)]).max() <= RANK
+    if len(among) < 2 or alone or total <= 0:
+        return None
+    if np.abs(shifts.sum(axis=0)).max() > RANK or np.abs(moments.sum(axis=0)).max() > RANK * size:
+        return None
+    friction = forces - pressed[:, None] * normal
+    turning = float(normal @ np.cross(places - pressed @ places / total, friction).sum(axis=0))
+    if abs(turning) > _STRAIGHT * total * size:
+        return None
+    return WholeGrip(among, friction.sum(axis=0), total)
 
 
 def _undecided(contacts: Sequence[Touchable], solved: SolvedContacts) -> float:
@@ -134,6 +203,12 @@ def _undecided(contacts: Sequence[Touchable], solved: SolvedContacts) -> float:
     rubbing = zip(solved.mode, contacts, solved.touching, strict=True)
     speeds = (slip_velocity(each) for own, contact, each in rubbing if own.kind == "slip" and contact.friction)
     return solved.spread * max(float(np.linalg.norm(speed)) for speed in speeds) - SHARED
+
+
+def leaves(contact: Touchable, k: int, solved: SolvedContacts) -> bool:
+    """True if a contact that friction no longer holds leaves: without a load along it, round-off makes it slip."""
+    pressed = float(solved.touching[k].normal @ solved.force[k])
+    return contact.presses and not solved.splits.shape[1] and pressed <= _UNLOADED
 
 
 def sharing(splits: Array) -> list[int]:

@@ -8,7 +8,6 @@ from typing import NamedTuple
 
 from proofroll.elements.mechanism.contacts.geometry import BodyContact
 from proofroll.elements.mechanism.contacts.shapes import (
-    Bore,
     CircleShape,
     ConvexShape,
     EllipsoidShape,
@@ -16,8 +15,12 @@ from proofroll.elements.mechanism.contacts.shapes import (
     SphereShape,
     Wall,
 )
+from proofroll.elements.mechanism.contacts.walls import CurvedWall
 from proofroll.elements.mechanism.rotations import Array
-from proofroll.truth.scalars import Scalar, add, cross, dot, minus, plus, scaled, sub, turned, turned_back
+from proofroll.truth.scalars import Scalar, cross, dot, minus, plus, product, scaled, sub, turned, turned_back
+
+# Square of a sine far below that of a flat disc (touching.FLAT): a disc exactly flat in flight has numbers.
+_LEAST = 1e-32
 
 Vector = Sequence[Scalar]
 Root = Callable[[Scalar], Scalar]
@@ -86,25 +89,20 @@ def _on_wall(shape: ConvexShape, body: ScalarMotion, wall: Wall, other: ScalarMo
     if isinstance(wall, HalfSpace):
         return _on_plane(shape, body, wall, other, root)
     assert isinstance(shape, SphereShape)  # alone has a rule
-    return _in_bore(shape, body, wall, other, root)
+    return _on_curve(shape, body, wall, other)
 
 
-def _in_bore(sphere: SphereShape, body: ScalarMotion, bore: Bore, other: ScalarMotion, root: Root) -> _Lying:
+def _on_curve(sphere: SphereShape, body: ScalarMotion, wall: CurvedWall, other: ScalarMotion) -> _Lying:
     centre = plus(body.p, turned(body.R, floats(sphere.centre)))
-    foot = plus(other.p, turned(other.R, floats(bore.point)))
-    axis = turned(other.R, floats(bore.axis))
-    axis_rate = cross(other.w, axis)
-    d, d_rate = minus(centre, foot), minus(body.velocity(centre), other.velocity(foot))
-    along = dot(axis, d)
-    out = minus(d, scaled(along, axis))
-    turning = add(dot(axis_rate, d), dot(axis, d_rate))
-    out_rate = minus(minus(d_rate, scaled(along, axis_rate)), scaled(turning, axis))
-    distance = root(dot(out, out))
-    n = scaled(-1.0 / distance, out)
-    n_rate = scaled(-1.0 / distance, minus(out_rate, scaled(dot(n, out_rate), n)))
+    axes = product(other.R, [floats(row) for row in wall.frame])
+    foot = plus(other.p, turned(other.R, floats(wall.point)))
+    distance, normal, bend = wall.near_in_scalars(turned_back(axes, minus(centre, foot)))
+    n = turned(axes, normal)
+    slides = minus(body.velocity(centre), other.velocity(centre))
+    n_rate = plus(cross(other.w, n), turned(axes, turned(bend, turned_back(axes, slides))))
     place = minus(centre, scaled(sphere.radius, n))
     rate = minus(body.velocity(centre), scaled(sphere.radius, n_rate))
-    return sub(bore.radius - sphere.radius, distance), n, n_rate, place, rate
+    return sub(distance, sphere.radius), n, n_rate, place, rate
 
 
 def _on_plane(shape: ConvexShape, body: ScalarMotion, plane: HalfSpace, other: ScalarMotion, root: Root) -> _Lying:
@@ -128,7 +126,8 @@ def _support(
     if isinstance(shape, CircleShape):
         axis = turned(R, floats(shape.normal))
         beside = plus(scaled(-1.0, n), scaled(dot(n, axis), axis))
-        length = root(dot(beside, beside))
+        beside = minus(beside, scaled(dot(beside, axis), axis))  # of a disc that is almost flat round-off is left
+        length = root(dot(beside, beside) + _LEAST)
         e = scaled(1.0 / length, beside)
         flat = minus(minus(turning, scaled(dot(axis, turning), axis)), scaled(dot(e, turning), e))
         return plus(centre, scaled(shape.radius, e)), scaled(shape.radius / length, flat)
@@ -155,5 +154,5 @@ def _two_spheres(one: SphereShape, a: ScalarMotion, two: SphereShape, b: ScalarM
 
 def known_shapes(contact: BodyContact) -> bool:
     """True if both shapes have a rule here."""
-    rules = SphereShape | EllipsoidShape | CircleShape | HalfSpace | Bore
+    rules = SphereShape | EllipsoidShape | CircleShape | HalfSpace | CurvedWall
     return isinstance(contact.shape_a, rules) and isinstance(contact.shape_b, rules)

@@ -13,10 +13,19 @@ import numpy as np
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Diverged
-from proofroll.elements.mechanism.contacts.acting import FAINT, OPEN, Acting, ContactMode, changes, slip_velocity
-from proofroll.elements.mechanism.contacts.coulomb import torn
-from proofroll.elements.mechanism.contacts.joint_laws import refuse_rubbing_stops
-from proofroll.elements.mechanism.contacts.touching import Touching, lying
+from proofroll.core.last_results import LastResults
+from proofroll.elements.mechanism.contacts.acting import (
+    FAINT,
+    Acting,
+    ContactMode,
+    changes,
+    headed,
+    modes_of,
+    slip_velocity,
+)
+from proofroll.elements.mechanism.contacts.joint_laws import rebounding
+from proofroll.elements.mechanism.contacts.touching import Touching, lying, torn
+from proofroll.elements.mechanism.contacts.turning import opened, shut_by_pressing
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.elements.mechanism.signal import varies
@@ -31,23 +40,27 @@ from proofroll.truth.mechanism.contact_guards import (
     faint_time,
     guard_value,
     guards_of,
+    leaves,
     noise_of,
     pressing,
     sharing,
     striking,
+    whole_grip,
 )
 from proofroll.truth.mechanism.contact_taylor import CompiledMode, CompiledModes, CompiledStretch, ModeSymbols
 from proofroll.truth.mechanism.followed_paths import CLOSE
 from proofroll.truth.mechanism.planar_slip import BegunSlip, begun_slip, leading
 from proofroll.truth.mechanism.stretches import Stretches
+from proofroll.truth.picard import PicardSteps
 
+_KEPT = 4  # solutions that are kept
 _AHEAD = 1e-9  # time step, relative to the natural time, after which an effort is compared with its limit
 _CLAMPED = 1e-9  # difference of an effort from its limit, relative to the limit, up to which it starts at the limit
 # Difference of compiled accelerations from others, relative to the largest, up to which they are the same: the
 # direction of a slip of 2e-8 is known to 1e-8.
 _SAME_RATES = 1e-6
-# Integration of a slip to rest: decrease of its logarithm per step, steps at most, and slip speed at the end.
-_DECAY, _MOST_DECAYS, _NOTHING = 0.25, 120, 1e-12
+# Integration of a slip to rest: decrease of its logarithm in a step, and slip speed at the end.
+_DECAY, _NOTHING = 2.0, 1e-12
 
 
 class _Equations(Protocol):
@@ -78,6 +91,7 @@ class ContactStretches(Stretches[ContactMode]):
         super().__init__(length + 1, tolerance)
         self._equations, self.contacts, self._size = equations, equations.contacts, size
         self._timed = any(map(varies, equations.mechanism.signals))
+        self._last = LastResults[tuple[bytes, ContactMode], SolvedContacts](_KEPT)
         self._used: dict[str, None] = {}
         symbols = self._symbols()
         self._compiled = (
@@ -93,8 +107,12 @@ class ContactStretches(Stretches[ContactMode]):
         """Equations in symbols; None: the route has none."""
         return None
 
-    @abstractmethod
     def _solved(self, state: Array, mode: ContactMode) -> SolvedContacts:
+        """Motion and forces at a state."""
+        return self._last.of((state.tobytes(), mode), lambda: self._solution(state, mode))
+
+    @abstractmethod
+    def _solution(self, state: Array, mode: ContactMode) -> SolvedContacts:
         """Motion and forces at a state."""
 
     @abstractmethod
@@ -102,17 +120,25 @@ class ContactStretches(Stretches[ContactMode]):
         """Geometry and sliding velocity of each contact at a state."""
 
     @abstractmethod
-    def _decided(self, state: Array, closed: Sequence[bool], still: Sequence[bool]) -> tuple[ContactMode, float]:
-        """Mode that follows from the forces, and its relative margin from another mode."""
+    def _decided(
+        self, state: Array, closed: Sequence[bool], still: Sequence[bool], leaving: int | None = None
+    ) -> tuple[ContactMode, float]:
+        """Mode that follows from the forces, and its relative margin from another mode.
+
+        ``leaving``: contact that static friction no longer holds.
+        """
 
     @abstractmethod
-    def _struck(self, state: Array, closed: Sequence[bool], laws: Sequence[float]) -> tuple[Array, list[bool], float]:
+    def _struck(
+        self, state: Array, closed: Sequence[bool], laws: Sequence[float], sideways: Sequence[float]
+    ) -> tuple[Array, list[bool], float]:
         """State after an impact, contacts that stay closed, and the relative margin from another outcome.
 
         Args:
             state: before the impact.
             closed: contacts that may take impulses.
             laws: restitution of each contact in this impact.
+            sideways: tangential restitution of each.
         """
 
     def _law(self, state: Array, mode: ContactMode) -> StretchLaw:
@@ -183,15 +209,17 @@ class ContactStretches(Stretches[ContactMode]):
 
     def _by_symbols(self, state: Array, mode: ContactMode) -> CompiledMode | None:
         """Compiled mode, if all parts of the mechanism have a rule in symbols and no load is shared."""
-        compiled = None if self._compiled is None else self._compiled.of(mode, self._clamped(state, mode))
+        solved = self._solved(state, mode)
+        if self._compiled is None or solved.splits.shape[1]:
+            return None
+        compiled = self._compiled.of(mode, self._clamped(state, mode))
         if compiled is None:
             return None
-        solved = self._solved(state, mode)
         rates = compiled.values(state[None], mode)[2][0]
         place = len(state) - 1 - len(solved.acceleration) - self._after_velocities
         apart = np.abs(rates[place : place + len(solved.acceleration)] - solved.acceleration).max()
         agrees = apart <= _SAME_RATES * max(1.0, float(np.abs(solved.acceleration).max()))
-        return compiled if agrees and not solved.splits.shape[1] else None
+        return compiled if agrees else None
 
     def _clamped(self, state: Array, mode: ContactMode) -> tuple[int, ...]:
         """Sign of each effort that is at its limit in a stretch from a state, 0 of others, of those with a limit."""
@@ -211,31 +239,31 @@ class ContactStretches(Stretches[ContactMode]):
         return super().within(stretch, times)
 
     def _spent(self, state: Array, mode: ContactMode, k: int, stretch: Stretch[ContactMode]) -> Array:
-        """State at the end of a slip below FAINT, by a Runge-Kutta method in the logarithm of the slip speed.
+        """State at the end of a slip below FAINT, by collocation in the logarithm of the slip speed.
 
         The slower a slip, the faster it turns: its equations are stiff in time, and smooth in that logarithm.
         """
         if mode[k].along is not None:
             return state
-        compiled = stretch.by if isinstance(stretch, CompiledStretch) else None
 
-        def decay(y: Array) -> tuple[float, Array]:
-            """Slip speed, and change of the state until the slip would stop at its present rate."""
-            if compiled is not None:
-                return compiled.decay(y, mode, k)
+        def one(y: Array) -> tuple[float, Array]:
             touching = self._touching(y)
-            now = tuple(_headed(own, each) for own, each in zip(mode, touching, strict=True))
+            now = tuple(headed(own, each) for own, each in zip(mode, touching, strict=True))
             change = faint_time(touching[k], self._solved(y, now).slide_rate[k]) * self._equations.rate(y, now)
             return float(np.linalg.norm(slip_velocity(touching[k]))), change
 
-        for _ in range(_MOST_DECAYS):
-            speed, one = decay(state)
-            if speed < _NOTHING:
-                break
-            two = decay(state + _DECAY / 2 * one)[1]
-            three = decay(state + _DECAY / 2 * two)[1]
-            state = state + _DECAY / 6 * (one + 2 * two + 2 * three + decay(state + _DECAY * three)[1])
-        return np.asarray(state + decay(state)[1])
+        def decay(states: Array) -> tuple[Array, Array]:
+            """Slip speeds, and changes of states (state, places) until the slip would stop at its present rate."""
+            speeds, changes = zip(*map(one, states.T), strict=True)
+            return np.array(speeds), np.array(changes).T
+
+        compiled = stretch.by if isinstance(stretch, CompiledStretch) else None
+        function = decay if compiled is None else compiled.decay_of(mode, k)
+        steps, place = PicardSteps(lambda states: function(states)[1]), 0.0
+        last = float(np.log(np.maximum(function(state[:, None])[0], _NOTHING) / _NOTHING)[0])
+        while place < last:
+            place, state, _ = steps.step(place, state, min(last, place + _DECAY))
+        return np.asarray(state + function(state[:, None])[1][:, 0])
 
     def _kicked(self, time: float, state: Array, mode: ContactMode) -> tuple[Array, float]:
         """State and time shortly after a slip in the plane starts from rest, when it has a direction."""
@@ -252,51 +280,68 @@ class ContactStretches(Stretches[ContactMode]):
         if stretch.guard is None or stretch.guard >= len(guards):  # a break of the rates, an effort, a slip begun
             return Transition(stretch.last, stretch.mode, ())
         k, kind = guards[stretch.guard]
-        mode, name = list(stretch.mode), self.contacts[k].name
+        name = self.contacts[k].name
         if kind == "tear":
             slipping = zip(self.contacts, stretch.mode, strict=True)
             raise torn(next(c.name for c, own in slipping if own.kind == "slip" and c.friction), stretch.end)
         if kind == "flat":
             raise lying(name, stretch.end)
+        solved = self._solved(stretch.last, stretch.mode)
         if kind == "turn":
-            return Transition(stretch.last, self._solved(stretch.last, stretch.mode).mode, ())
-        if kind == "share" or (kind == "lift" and k in sharing(self._solved(stretch.last, stretch.mode).splits)):
+            return Transition(stretch.last, solved.mode, ())
+        if kind == "share" or (kind == "lift" and k in sharing(solved.splits)):
             # No split of the load is left, or each moves another way.
             return Transition(stretch.last, None, (), margin=0.0)
-        if kind == "lift":
-            mode[k] = OPEN
-            return Transition(stretch.last, tuple(mode), (("lift_off", name),))
+        if kind == "lift" or (kind == "break" and leaves(self.contacts[k], k, solved)):
+            return Transition(stretch.last, opened(self.contacts, stretch.mode, k), (("lift_off", name),))
         if kind == "break":
-            mode[k] = self._leaving(stretch.last, stretch.mode, k)
-            return Transition(stretch.last, tuple(mode), (("slip", name),))
+            return self._broken(stretch, k)
         return self._stopped(stretch) if kind == "still" else self._impact(stretch, k)
 
-    def _leaving(self, state: Array, mode: ContactMode, k: int) -> Acting:
-        """Slip that starts at the bound of friction, opposite to the friction that held."""
+    def _broken(self, stretch: Stretch[ContactMode], k: int) -> Transition[ContactMode]:
+        """Transition where friction no longer holds a contact; of a slip with less friction all forces jump."""
+        contacts, mode = self.contacts, list(stretch.mode)
+        if contacts[k].static > contacts[k].friction:
+            return self._after(stretch, stretch.last, [own.kind != "open" for own in mode], (), leaving=k)
+        leaving = self._leaving(stretch.last, stretch.mode, k)
+        for number, own in leaving.items():
+            mode[number] = own
+        return Transition(stretch.last, tuple(mode), tuple(("slip", contacts[number].name) for number in leaving))
+
+    def _leaving(self, state: Array, mode: ContactMode, k: int) -> dict[int, Acting]:
+        """Slip that starts at the bound of friction, opposite to the friction that held, of each contact that slips."""
         solved = self._solved(state, mode)
-        line = solved.mode[k].along
-        if line is None:
-            return leading(mode[k], solved, k)
-        sign = -1.0 if np.dot(line, solved.force[k]) > 0 else 1.0
-        x, y, z = (sign * component for component in line)
-        return Acting("slip", (x, y, z), (x, y, z))
+        whole = whole_grip(self.contacts, solved, k)
+        slipping, held = ([k], solved.force[k]) if whole is None else (whole.contacts, whole.friction)
+        found = {}
+        for number in slipping:
+            line = solved.mode[number].along
+            if line is None:
+                found[number] = leading(mode[number], solved.touching[number].normal, held)
+                continue
+            sign = -1.0 if np.dot(line, held) > 0 else 1.0
+            x, y, z = (sign * component for component in line)
+            found[number] = Acting("slip", (x, y, z), (x, y, z))
+        return found
 
     def _impact(self, stretch: Stretch[ContactMode], hit: int) -> Transition[ContactMode]:
         """Transition at an impact."""
         contacts, touching, law = self.contacts, self._touching(stretch.last), self.contacts[hit].restitution
         hits = striking(stretch.mode, touching, hit, stretch.end, self._size)
-        # dry friction of joints gives no impulse
+        # dry friction of joints and of turning gives no impulse
         closed = [
-            (own.kind != "open" or k in hits) and not contact.bound
+            (own.kind != "open" or k in hits) and contact.presses
             for k, (own, contact) in enumerate(zip(stretch.mode, contacts, strict=True))
         ]
         laws = [contact.restitution if k in hits else 0.0 for k, contact in enumerate(contacts)]
+        sideways = [contact.tangential_restitution if k in hits else 0.0 for k, contact in enumerate(contacts)]
         speed, delay = -float(touching[hit].normal @ touching[hit].slide), 0.0
-        state, stays, margin = self._struck(stretch.last, closed, laws)
+        state, stays, margin = self._struck(stretch.last, closed, laws, sideways)
         if self._settles(hit, speed, law):
-            pull = -float(touching[hit].normal @ self._solved(state, stretch.mode).slide_rate[hit])
-            delay = self._bouncing(self.contacts[hit].name, speed * law, pull, law)
-            state, stays, margin = self._struck(stretch.last, closed, [0.0] * len(closed))
+            modes, normal = (rebounding(contacts, stretch.mode, hit), stretch.mode), touching[hit].normal
+            pull, falling = (-float(normal @ self._solved(state, mode).slide_rate[hit]) for mode in modes)
+            delay = self._bouncing(self.contacts[hit].name, speed * law, pull, law, max(falling, 0.0))
+            state, stays, margin = self._struck(stretch.last, closed, [0.0] * len(closed), [0.0] * len(closed))
         stays = [stay or bool(contact.bound) for stay, contact in zip(stays, contacts, strict=True)]
         settled = [bool(delay) and contacts[k].pair == contacts[hit].pair for k in hits]
         happened = tuple(
@@ -327,17 +372,18 @@ class ContactStretches(Stretches[ContactMode]):
         margin: float = np.inf,
         delay: float = 0.0,
         stopped: float = SLIP_ENDED,
+        leaving: int | None = None,
     ) -> Transition[ContactMode]:
         """Transition to the mode that follows from the forces; contacts not faster than ``stopped`` are at rest."""
-        refuse_rubbing_stops(self.contacts, closed, stretch.end)
+        closed = shut_by_pressing(self.contacts, closed)
         slips = [float(np.linalg.norm(slip_velocity(each))) for each in self._touching(state)]
         still = [shut and slip <= stopped for shut, slip in zip(closed, slips, strict=True)]
         state = self._equations.eliminated(state, modes_of(closed, still))
-        mode, sure = self._decided(state, closed, still)
+        mode, sure = self._decided(state, closed, still, leaving)
         # A slip in the plane may have turned since it began: its sense is that of the last step.
         sliding = self._touching(stretch.visited[-1][1] if stretch.visited else stretch.first)
         was = tuple(
-            own._replace(along=own.along or _headed(own, each).heading)
+            own._replace(along=own.along or headed(own, each).heading)
             for own, each in zip(stretch.mode, sliding, strict=True)
         )
         changed = changes(self.contacts, was, mode, self._stands(state, mode))
@@ -351,19 +397,3 @@ class ContactStretches(Stretches[ContactMode]):
             return False
         solved = self._solved(state, mode)
         return float(np.abs(solved.velocity).max()) <= AT_REST and float(np.abs(solved.acceleration).max()) <= STANDS
-
-
-def _headed(own: Acting, touch: Touching) -> Acting:
-    """Mode of a contact with the present direction of its slip in the plane, however slow."""
-    slip = slip_velocity(touch)
-    if own.kind != "slip" or own.along is not None or not slip.any():
-        return own
-    x, y, z = (slip / np.linalg.norm(slip)).tolist()
-    return own._replace(heading=(x, y, z))
-
-
-def modes_of(closed: Sequence[bool], still: Sequence[bool]) -> ContactMode:
-    """Modes of contacts: stick if closed and still, slip if only closed, else open."""
-    return tuple(
-        Acting("stick" if stands else "slip" if shut else "open") for shut, stands in zip(closed, still, strict=True)
-    )

@@ -92,8 +92,10 @@ def rows_of(
     contact: Touchable,
     root: Callable[[Scalar], Scalar],
 ) -> HeldRows:
-    """Rows of a closed contact or law of a joint; dry friction of a joint holds its line, and has no normal."""
-    if contact.bound:
+    """Rows of a closed contact or law of a joint; dry friction of a joint and of turning has no normal."""
+    if contact.pressed_by is not None and kind == "slip":
+        return HeldRows([], [])
+    if contact.bound or contact.pressed_by is not None:
         assert line is not None  # it has one coordinate
         return HeldRows([line], [line]) if kind == "stick" else HeldRows([], [])
     return held_rows(kind, touch, line, float(contact.friction), root)
@@ -123,10 +125,12 @@ def guard_symbols(
             return sub(FAINT, size(touch.across(touch.slide))) if line is None else sub(0.0, dot(line, touch.slide))
         if guard.kind in {"lift", "break"}:
             assert force is not None  # the contact is closed
-            normal = dot(touch.normal, force)
+            pressed = force if (by := contacts[k].pressed_by) is None else solved.forces[by]
+            assert pressed is not None  # with what presses
+            normal = dot(touch.normal if by is None else solved.touching[by].normal, pressed)
             if guard.kind == "lift":
                 return sub(0.0, normal)
-            bound = float(contacts[k].bound) or mul(float(contacts[k].friction), normal)
+            bound = float(contacts[k].bound) or mul(float(contacts[k].static), normal)
             return sub(size(touch.across(force)), bound)
         plain = {
             "close": sub(0.0, touch.gap),

@@ -1,6 +1,9 @@
 """Stretches of bodies that touch by compiled Taylor series (heyoka, an extra): one integrator and its guards per mode.
 
 A stretch that has no rule in symbols, as where contacts share a load, takes the path without compilation.
+
+Where contacts slip in the plane, the variable of integration s makes time run slower as a slip u stops: dt = |u| ds; of
+several, dt = ds / √(Σ u⁻²). A direction of slip turns ever faster in time before the stop; in s the motion is smooth.
 """
 
 from __future__ import annotations
@@ -15,7 +18,7 @@ import numpy as np
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Diverged
-from proofroll.core.event_location import locate_rise_within, lowest, points_within
+from proofroll.core.event_location import locate_rise_within, points_within
 from proofroll.core.stalling import StepCount, StepWatch
 from proofroll.elements.mechanism.contacts.acting import ContactMode
 from proofroll.elements.mechanism.rotations import Array
@@ -24,7 +27,8 @@ from proofroll.truth.mechanism.contact_guards import Touchable, guards_of
 from proofroll.truth.mechanism.contact_symbols import SolvedSymbols, Vector, guard_symbols, slip_symbols, turning_slip
 from proofroll.truth.mechanism.maximal_equations import FUNCTIONS
 from proofroll.truth.mechanism.run_time_constants import Constants, Symbol
-from proofroll.truth.picard import Inside, PicardSteps
+from proofroll.truth.mechanism.turning_symbols import follows
+from proofroll.truth.picard import PicardSteps
 from proofroll.truth.scalars import Scalar
 
 try:
@@ -32,10 +36,19 @@ try:
 except ImportError:  # no wheel for this platform
     heyoka = None
 
-# Least slip speed over that at the start of a step, below which it stops in the step; and part of the way to the stop
-# after which the next step begins.
-_STOPS, _BEFORE_STOP = 1e-3, 0.9
-_KEPT = 8  # arrays of parameters
+_CORRECTIONS = 6  # of Newton's method for the variable of integration at a time, at most
+
+
+class Inside(Protocol):
+    """States within a step of an integrator."""
+
+    def __call__(self, places: FloatArray, /) -> FloatArray:
+        """States at values of the variable of integration, shape (state, places)."""
+
+    def at_points(self) -> FloatArray:
+        """States at :func:`proofroll.core.event_location.points_within` of the step, shape (state, points)."""
+
+
 _TakeStep = Callable[[float, Array, float], tuple[float, Array, Inside]]
 
 
@@ -59,13 +72,21 @@ class ModeSymbols(Protocol):
 
 @dataclass(frozen=True)
 class CompiledStretch(Stretch[ContactMode]):
-    """A stretch that a compiled mode integrated; its states come from the same mode."""
+    """A stretch that a compiled mode integrated, with its steps."""
 
     by: CompiledMode | None = None
+    steps: Sequence[ModeStep] = ()
 
 
-class _Step(NamedTuple):
-    """A step: start and end [s], first and last state, states at times within, and guards at points of it."""
+class ModeStep(NamedTuple):
+    """A step.
+
+    Attributes:
+        start, end: values of the variable of integration.
+        first, last: states.
+        inside: states within.
+        guards: values at points of the step, (points, guards).
+    """
 
     start: float
     end: float
@@ -73,6 +94,22 @@ class _Step(NamedTuple):
     last: Array
     inside: Inside
     guards: Array
+
+
+class _Series(NamedTuple):
+    """States within a step from a start, by Taylor series, shape (state, orders)."""
+
+    start: float
+    length: float
+    series: Array
+    powers: Array  # (orders, 1)
+
+    def __call__(self, places: FloatArray) -> FloatArray:
+        return np.asarray(self.series @ (places - self.start) ** self.powers)
+
+    def at_points(self) -> FloatArray:
+        """See the protocol."""
+        return self(points_within(self.start, self.start + self.length))
 
 
 class CompiledModes:
@@ -89,7 +126,7 @@ class CompiledModes:
 
         None: heyoka is missing, or a part of the mechanism has no rule in symbols.
         """
-        if not self._covers:
+        if not self._covers or not follows(mode, self._contacts):
             return None
         key = clamped, tuple((own.kind, own.along is not None) for own in mode)
         if key not in self._modes:
@@ -119,9 +156,10 @@ def _compiled(expressions: Sequence[Any], state: Sequence[Any], by_collocation: 
     key = (get_ident(), by_collocation, *map(hash, expressions))
     if key not in _MODES:
         values = heyoka.cfunc(expressions, state, compact_mode=True, opt_level=0)
-        rates = list(zip(state, expressions[-len(state) :], strict=True))
-        start = np.zeros(len(state))
-        integrator = None if by_collocation else heyoka.taylor_adaptive(rates, start, compact_mode=True, opt_level=0)
+        integrator = None
+        if not by_collocation:
+            system, start = list(zip(state, expressions[-len(state) :], strict=True)), np.zeros(len(state))
+            integrator = heyoka.taylor_adaptive(system, start, compact_mode=True, opt_level=0)
         _MODES[key] = _Compiled(values, integrator)
         if len(_MODES) > _MOST_MODES:
             _MODES.popitem(last=False)
@@ -157,42 +195,40 @@ class CompiledMode:
         self._count, self._slips, self._lined = len(guards), len(slips), lined
         expressions = [constants.symbol(value) for value in values]
         self._constants = constants.values
+        squares = expressions[len(guards) : len(guards) + len(slips) : 3]
+        if squares:
+            inverse = [1.0 / square for square in squares]
+            pace = heyoka.sqrt(squares[0]) if len(squares) == 1 else 1.0 / heyoka.sqrt(heyoka.sum(inverse))
+            expressions += [pace * rate for rate in expressions[-len(state) :]]
         self._values, self._integrator = _compiled(expressions, state, by_collocation)
-        self._pars: dict[tuple[ContactMode, int], Array] = {}
 
-    def _at_points(self, mode: ContactMode, inside: Inside, start: float, end: float) -> tuple[Array, Array]:
-        """Guards and numbers of slips at the points of a step, (points, …).
+    def _guards(self, pars: Array, states: Array) -> Array:
+        """Guards at states (state, places), (places, guards).
 
         Raises:
             Diverged: one is not finite.
         """
-        guards, slips, _ = self.values(inside(points_within(start, end)), mode)
+        guards = self._called(states, pars)[: self._count].T
         if not np.isfinite(guards).all():
-            raise Diverged(f"a guard is not finite near t = {start:.6g} s")
-        return guards, slips
+            raise Diverged(f"a guard is not finite near t = {states[-1, 0]:.6g} s")
+        return guards
 
     def _parameters(self, mode: ContactMode) -> Array:
         """Run-time parameters: directions of the lines at the start of a mode, and the numbers of the scene."""
-        return np.concatenate([[x for k in self._lined for x in mode[k].along or ()], self._constants])
+        own = [x for k in self._lined for x in mode[k].along or ()]
+        return np.concatenate([own, self._constants])[: self._values.nparams]
 
     def values(self, states: Array, mode: ContactMode) -> tuple[Array, Array, Array]:
         """Guards, numbers of slips and rates of states (times, state), each (times, …)."""
-        found = self._called(states, mode)
-        first = self._count + self._slips
-        return found[: self._count].T, found[self._count : first].T, found[first:].T
+        found, first = self._called(states.T, self._parameters(mode)), self._count + self._slips
+        return found[: self._count].T, found[self._count : first].T, found[first : first + states.shape[1]].T
 
-    def _called(self, states: Array, mode: ContactMode) -> Array:
-        """Guards, numbers of slips and rates in rows, of states (times, state)."""
-        inputs = np.ascontiguousarray(states.T)
-        if not self._values.nparams:
+    def _called(self, states: Array, pars: Array) -> Array:
+        """Guards, numbers of slips, rates and, last, rates in the variable of integration, of states (state, times)."""
+        inputs = np.ascontiguousarray(states)
+        if not len(pars):
             return np.asarray(self._values(inputs))
-        key = mode if self._lined else (), len(states)
-        if key not in self._pars:
-            if len(self._pars) > _KEPT:
-                self._pars.clear()
-            pars = self._parameters(mode)[: self._values.nparams]
-            self._pars[key] = np.repeat(pars[:, None], len(states), axis=1)
-        return np.asarray(self._values(inputs, pars=self._pars[key]))
+        return np.asarray(self._values(inputs, pars=np.repeat(pars[:, None], inputs.shape[1], axis=1)))
 
     def walk(self, law: StretchLaw, mode: ContactMode, time: float, state: Array, until: float) -> Stretch[ContactMode]:
         """Stretch from a time and state to the first rise of a guard, or to ``until`` [s].
@@ -202,97 +238,117 @@ class CompiledMode:
         """
         if not until > time:
             return Stretch(time, time, mode, state, state, None)
-        count, watch = StepCount(time, until), StepWatch()
-        visited, grazes = list[tuple[float, Array]](), list[float]()
-        last = state
-        for step in self._steps(mode, time, state, until):
-            visited.append((step.start, step.first))
-            count.took(step.end)
-            watch.took(step.end, step.end - step.start, landing=step.end == until)
+        count, watch, pars = StepCount(time, until), StepWatch(), self._parameters(mode)
+        steps, grazes, visited, rise = list[ModeStep](), list[float](), list[tuple[float, Array]](), None
+        for step in self._steps(pars, state, until):
+            leaving, crests = not steps, list[float]()
+            steps.append(step)
+            visited.append((float(step.first[-1]), step.first))
+            count.took(float(step.last[-1]))
+            watch.took(float(step.last[-1]), step.end - step.start, landing=step.last[-1] == until)
             rise = locate_rise_within(
-                lambda times, step=step: self.values(step.inside(times), mode)[0],  # type: ignore[misc]
+                lambda places, step=step: self._called(step.inside(places), pars)[: self._count].T,  # type: ignore[misc]
                 step.start,
                 step.end,
                 law.noise,
-                step.start == time,
+                leaving,
                 law.near,
-                grazes,
+                crests,
                 step.guards,
             )
+            grazes += step.inside(np.array(crests))[-1].tolist() if crests else []
             if rise is not None:
-                last = law.corrected(step.inside(np.array([rise[0]]))[0])
-                return CompiledStretch(time, rise[0], mode, state, last, rise[1], visited, grazes, self)
-            last = step.last
-        last = law.corrected(last)
-        return CompiledStretch(time, until, mode, state, last, None, visited, grazes, self)
+                break
+        last = steps[-1].last if rise is None else steps[-1].inside(np.array([rise[0]]))[:, 0]
+        end, guard = (until, None) if rise is None else (float(last[-1]), rise[1])
+        return CompiledStretch(time, end, mode, state, law.corrected(last), guard, visited, grazes, self, steps)
 
-    def _steps(self, mode: ContactMode, time: float, state: Array, until: float) -> Iterator[_Step]:
-        """Steps of the integrator; one that a slip would stop in ends before.
+    def _steps(self, pars: Array, state: Array, until: float) -> Iterator[ModeStep]:
+        """Steps of the integrator to a time [s].
 
         Raises:
             Diverged: a step fails.
         """
-        step = self._collocation(mode) if self._by_collocation else self._series(mode)
-        while time < until:
-            end, last, inside = step(time, state, until)
-            guards, slips = self._at_points(mode, inside, time, end)
-            if self._slips and (stop := self._stop(slips, time, end)) is not None:
-                end = time + _BEFORE_STOP * (stop - time)
-                last = inside(np.array([end]))[0]
-                guards, _ = self._at_points(mode, inside, time, end)
-            yield _Step(time, end, state, last, inside, guards)
-            time, state = end, last
+        step = self._collocation(pars) if self._by_collocation else self._series(pars)
+        place = float(state[-1])
+        while state[-1] < until:
+            end, last, inside = step(place, state, np.inf if self._slips else until)
+            states = inside.at_points()
+            if last[-1] > until and self._slips:
+                (end,) = self._places(pars, place, end, inside, np.array([until]))
+                last = inside(np.array([end]))[:, 0]
+                states = inside(points_within(place, end))
+            if last[-1] >= until or (not self._slips and end >= until):
+                last[-1] = until
+            yield ModeStep(place, end, state, last, inside, self._guards(pars, states))
+            place, state = end, last
 
-    def _collocation(self, mode: ContactMode) -> _TakeStep:
-        return PicardSteps(lambda states: self.values(states, mode)[2]).step
+    def _places(self, pars: Array, start: float, end: float, inside: Inside, times: FloatArray) -> FloatArray:
+        """Values of the variable of integration at times [s] within a step."""
+        if not self._slips:
+            return times
+        places = np.interp(times, inside.at_points()[-1], points_within(start, end))
+        for _ in range(_CORRECTIONS):
+            states = inside(places)
+            moved = np.clip(places + (times - states[-1]) / self._called(states, pars)[-1], start, end)
+            done = np.abs(moved - places).max() <= 4 * np.spacing(np.abs(places).max())
+            places = moved
+            if done:
+                break
+        return np.asarray(places)
 
-    def _series(self, mode: ContactMode) -> _TakeStep:
+    def _collocation(self, pars: Array) -> _TakeStep:
+        function, tiled = self._values, dict[int, dict[str, Array]]()
+
+        def rates(states: Array) -> Array:
+            count = states.shape[1]
+            if count not in tiled:
+                tiled[count] = {"pars": np.repeat(pars[:, None], count, axis=1)} if len(pars) else {}
+            return np.asarray(function(np.ascontiguousarray(states), **tiled[count])[-len(states) :])
+
+        return PicardSteps(rates).step
+
+    def _series(self, pars: Array) -> _TakeStep:
         integrator = self._integrator
         powers = np.arange(integrator.order + 1)[:, None]
         if len(integrator.pars):
-            integrator.pars[:] = self._parameters(mode)[: len(integrator.pars)]
+            integrator.pars[:] = pars[: len(integrator.pars)]
 
-        def step(time: float, state: Array, until: float) -> tuple[float, Array, Inside]:
-            integrator.state[:], integrator.time = state, time
-            integrator.step(max_delta_t=until - time, write_tc=True)
+        def step(start: float, state: Array, until: float) -> tuple[float, Array, Inside]:
+            integrator.state[:], integrator.time = state, start
+            integrator.step(max_delta_t=until - start, write_tc=True)
             end = float(integrator.time)
-            if not np.isfinite(integrator.state).all() or not end > time:
-                raise Diverged(f"Taylor series stop at t = {time:.6g} s")
-            series = np.array(integrator.tc)
-
-            def inside(times: Array) -> Array:
-                return np.asarray((series @ (times - time) ** powers).T)
-
+            if not np.isfinite(integrator.state).all() or not end > start:
+                raise Diverged(f"Taylor series stop at t = {state[-1]:.6g} s")
+            inside = _Series(start, end - start, np.array(integrator.tc), powers)
             return until if until - end < np.spacing(until) else end, np.array(integrator.state), inside
 
         return step
 
-    def _stop(self, slips: Array, start: float, end: float) -> float | None:
-        """Time within a step at which a slip in the plane stops [s], beyond which its series mean another friction.
+    def decay_of(self, mode: ContactMode, k: int) -> Callable[[Array], tuple[Array, Array]]:
+        """Function of states (state, places): slip speeds of a contact, and changes until the slip would stop so."""
+        pars, place = self._parameters(mode), self._count + 3 * self._turning.index(k)
+        first = self._count + self._slips
 
-        A slip that stops nearly straight reverses in its series, without any sign of it but its speed. ``slips``: their
-        numbers at the points of the step.
-        """
-        found = (lowest(slips[:, number] / slips[0, number], start, end) for number in range(0, self._slips, 3))
-        return min((stop[0] for stop in found if stop is not None and stop[1] < _STOPS**2), default=None)
+        def decay(states: Array) -> tuple[Array, Array]:
+            found = self._called(states, pars)
+            square, along, rate = found[place : place + 3]
+            return np.sqrt(square), np.maximum(0.0, -along / rate) * found[first : first + len(states)]
 
-    def decay(self, state: Array, mode: ContactMode, k: int) -> tuple[float, Array]:
-        """Slip speed of a contact, and change of the state until that slip would stop at its present rate."""
-        _, slips, rates = self.values(state[None], mode)
-        square, along, rate = slips[0, (place := 3 * self._turning.index(k)) : place + 3]
-        return float(np.sqrt(square)), max(0.0, -along / rate) * rates[0]
+        return decay
 
-    def within(self, law: StretchLaw, stretch: Stretch[ContactMode], times: FloatArray) -> FloatArray:
+    def within(self, law: StretchLaw, stretch: CompiledStretch, times: FloatArray) -> FloatArray:
         """States at increasing times [s] within a stretch that this mode integrated, shape (times, state)."""
         begun, first = stretch.visited[0]
         states = np.empty((len(times), len(first)))
-        early = times <= begun
+        early, pars = times <= begun, self._parameters(stretch.mode)
         states[early] = first + (times[early] - begun)[:, None] * self.values(first[None], stretch.mode)[2]
-        at = int(early.sum())
-        if at < len(times):
-            for step in self._steps(stretch.mode, begun, first, float(times[-1])):
-                stop = int(np.searchsorted(times, step.end, side="right"))
-                if stop > at:
-                    states[at:stop] = step.inside(times[at:stop])
-                    at = stop
+        number = int(early.sum())
+        for step in stretch.steps:
+            stop = int(np.searchsorted(times, step.last[-1], side="right"))
+            if stop > number:
+                places = self._places(pars, step.start, step.end, step.inside, times[number:stop])
+                states[number:stop] = step.inside(places).T
+                number = stop
+        states[number:] = stretch.last
         return np.array([law.corrected(state) for state in states])

@@ -5,7 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from proofroll.elements.mechanism.contacts.acting import ContactMode
-from proofroll.elements.mechanism.contacts.dynamics import ContactDynamics, ContactSolution
+from proofroll.elements.mechanism.contacts.dynamics import ContactDynamics
+from proofroll.elements.mechanism.contacts.states import ContactSolution
 from proofroll.elements.mechanism.contacts.touching import Touching
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.truth.hybrid import Transition
@@ -36,10 +37,13 @@ class ContactTree(ContactStretches):
         state = self.dynamics.eliminated(np.concatenate([*self.dynamics.mechanism.start(), [0.0]]), mode)
         return Transition(state, mode, (), margin)
 
-    def _struck(self, state: Array, closed: Sequence[bool], laws: Sequence[float]) -> tuple[Array, list[bool], float]:
+    def _struck(
+        self, state: Array, closed: Sequence[bool], laws: Sequence[float], sideways: Sequence[float]
+    ) -> tuple[Array, list[bool], float]:
         (q, v, time), which = self.dynamics.parts(state), np.flatnonzero(closed).tolist()
-        after, impulse, margin = self.dynamics.struck(q, v, which, np.array([laws[k] for k in which]), time)
-        stays, touching = list(closed), self.dynamics.at(q, after).touching
+        normal, tangential = (np.array([law[k] for k in which]) for law in (laws, sideways))
+        after, impulse, margin = self.dynamics.struck(q, v, which, normal, time, tangential)
+        stays, touching = list(closed), self.dynamics.at(q, after, time).touching
         for pressed, k in zip(impulse[:, 0] > 0, which, strict=True):
             leaves = float(touching[k].normal @ touching[k].slide) > SLIP_ENDED
             stays[k] = not laws[k] if pressed else not leaves
@@ -52,7 +56,7 @@ class ContactTree(ContactStretches):
     def _touching(self, state: Array) -> Sequence[Touching]:
         return self.dynamics.at(*self.dynamics.parts(state)).touching
 
-    def _solved(self, state: Array, mode: ContactMode) -> SolvedContacts:
+    def _solution(self, state: Array, mode: ContactMode) -> SolvedContacts:
         solution, v = self._forces(state, mode), self.dynamics.parts(state)[1]
         return SolvedContacts(
             solution.state.touching,
@@ -64,8 +68,11 @@ class ContactTree(ContactStretches):
             solution.response,
             solution.splits,
             solution.spread,
+            solution.shifts,
         )
 
-    def _decided(self, state: Array, closed: Sequence[bool], still: Sequence[bool]) -> tuple[ContactMode, float]:
+    def _decided(
+        self, state: Array, closed: Sequence[bool], still: Sequence[bool], leaving: int | None = None
+    ) -> tuple[ContactMode, float]:
         q, v, time = self.dynamics.parts(state)
-        return self.dynamics.decided(q, v, closed, still, time)
+        return self.dynamics.decided(q, v, closed, still, time, leaving)

@@ -5,16 +5,17 @@ Velocities of bodies are in their own axes, where those of a free body are the c
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
 from typing import Any
 
 from proofroll.elements.mechanism.contacts.acting import ContactMode
 from proofroll.elements.mechanism.contacts.dynamics import ContactDynamics
 from proofroll.elements.mechanism.contacts.joint_laws import JointContact
+from proofroll.elements.mechanism.contacts.turning import TurningFriction
 from proofroll.elements.mechanism.joint import AXES
 from proofroll.elements.mechanism.model import Mechanism
-from proofroll.elements.mechanism.signal import Table, value_at
+from proofroll.elements.mechanism.prescribed import moved
+from proofroll.elements.mechanism.signal import Held, Table, value_at
 from proofroll.truth.mechanism.contact_scalars import ScalarMotion, ScalarTouch, floats, known_shapes, touch_in_scalars
 from proofroll.truth.mechanism.contact_symbols import (
     Row,
@@ -26,6 +27,9 @@ from proofroll.truth.mechanism.contact_symbols import (
     rows_of,
 )
 from proofroll.truth.mechanism.maximal_bodies import clean
+from proofroll.truth.mechanism.tree_loads import NONE as _NONE
+from proofroll.truth.mechanism.tree_loads import MovingBody, add_point_loads
+from proofroll.truth.mechanism.turning_symbols import TurningMoments, of_turning, resisted, resisted_rate
 from proofroll.truth.scalars import (
     Scalar,
     add,
@@ -42,37 +46,8 @@ from proofroll.truth.scalars import (
     turned_back,
 )
 
-_NONE = (0.0, 0.0, 0.0)
 _AXES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 _Matrix = Sequence[Vector]
-
-
-@dataclass
-class _Moving:
-    """A body: place of its frame and rotation in the world; the rest in its own axes, of its frame's origin.
-
-    Attributes:
-        p, R: place and rotation by rows.
-        v, w: velocity and angular velocity.
-        a, turning: their rates where v̇ = 0, without gravity.
-        move, turn: derivative of velocity and angular velocity by each velocity of the tree that moves the body.
-    """
-
-    p: Vector
-    R: _Matrix
-    v: Vector
-    w: Vector
-    a: Vector
-    turning: Vector
-    move: dict[int, Vector]
-    turn: dict[int, Vector]
-
-    def at(self, arm: Vector) -> tuple[dict[int, Vector], Vector]:
-        """Derivative of the velocity, and acceleration at v̇ = 0, of the material at an arm, in the body's axes."""
-        move: dict[int, Vector] = {
-            n: plus(self.move.get(n, _NONE), cross(self.turn.get(n, _NONE), arm)) for n in self.move | self.turn
-        }
-        return move, plus(self.a, cross(self.turning, arm), cross(self.w, cross(self.w, arm)))
 
 
 class TreeSymbols:
@@ -91,7 +66,7 @@ class TreeSymbols:
         """True if all parts of the mechanism have a rule here."""
         m = self._mechanism
         shapes = all(map(known_shapes, m.contacts))
-        tables = any(isinstance(signal, Table) for signal in m.signals)
+        tables = any(isinstance(signal, Held | Table) for signal in m.signals)
         return shapes and not (m.loops or m.couplings or tables)
 
     def solved(
@@ -107,20 +82,7 @@ class TreeSymbols:
         q, v = state[: m.nq], state[m.nq : -1]
         bodies, rates = _tree(m, q, v, functions)
         mass, load, limits = self._inertial(bodies, q, v, state[-1], clamped, functions)
-        motions = [ScalarMotion(body.p, body.R, turned(body.R, body.v), turned(body.R, body.w)) for body in bodies]
-        touching = [
-            touch_in_scalars(contact, motions[a], motions[b], functions["sqrt"])
-            for contact, (a, b) in zip(m.contacts, self._pairs, strict=True)
-        ]
-        slides = [
-            _slide(touch, [(bodies[a], motions[a], 1.0), (bodies[b], motions[b], -1.0)])
-            for touch, (a, b) in zip(touching, self._pairs, strict=True)
-        ]
-        for contact in self._dynamics.contacts[len(m.contacts) :]:
-            assert isinstance(contact, JointContact)  # they come after those of bodies
-            n = contact.joint.velocity
-            touching.append(of_joint(contact, q[contact.joint.coordinate], v[n]))
-            slides.append(({n: floats(contact.direction)}, _NONE))
+        touching, slides = self._contacts(bodies, q, v, functions["sqrt"])
         for k, start in enumerate(began[len(m.contacts) :], len(m.contacts)):
             bound = float(self._dynamics.contacts[k].bound)
             if start is not None and mode[k].kind == "slip" and bound:  # dry friction, which is as large as it can be
@@ -131,24 +93,30 @@ class TreeSymbols:
         aims: list[Scalar] = []
         pushes: list[Row] = []
         owner: list[tuple[int, Vector]] = []
+        contacts, root = self._dynamics.contacts, functions["sqrt"]
+        turning = TurningMoments(mode, contacts, touching, lines, root)
+
+        def row_of(k: int, direction: Vector) -> Row:
+            return _along(slides[k][0], direction)
+
         for k, (own, touch, line) in enumerate(zip(mode, touching, lines, strict=True)):
             if own.kind == "open":
                 continue
-            part = rows_of(own.kind, touch, line, self._dynamics.contacts[k], functions["sqrt"])
-            turning = dot(touch.normal_rate, touch.slide) if own.kind == "slip" else 0.0
+            part = rows_of(own.kind, touch, line, contacts[k], root)
+            beyond = dot(touch.normal_rate, touch.slide) if own.kind == "slip" else 0.0
             for direction, along in zip(part.directions, part.along, strict=True):
                 rows.append(_along(slides[k][0], direction))
-                pushes.append(_along(slides[k][0], along))
-                aims.append(sub(sub(0.0, dot(direction, slides[k][1])), turning))
+                pushes.append(turning.pushed(row_of(k, along), len(owner), k, along, row_of))
+                aims.append(sub(sub(0.0, dot(direction, slides[k][1])), beyond))
                 owner.append((k, along))
-        responses, _ = eliminated(mass, [_dense(push, m.nv) for push in pushes])
+        responses, _ = eliminated(mass, [self._free(push) for push in pushes])
         acting = [_applied(rows, response) for response in responses]
         system: list[Row] = [{j: each[i] for j, each in enumerate(acting)} for i in range(len(rows))]
         right = [sub(aim, value) for aim, value in zip(aims, _applied(rows, free), strict=True)]
         (sizes,), pivots = eliminated(system, [right])
         response: Scalar = 1.0
         if any(own.kind == "slip" and mu for own, mu in zip(mode, self._dynamics.friction, strict=True)):
-            plain, _ = eliminated(mass, [_dense(row, m.nv) for row in rows])
+            plain, _ = eliminated(mass, [self._free(row) for row in rows])
             smooth = [_applied(rows, each) for each in plain]
             _, others = eliminated([{j: each[i] for j, each in enumerate(smooth)} for i in range(len(rows))], [])
             for one, other in zip(pivots, others, strict=True):
@@ -160,8 +128,40 @@ class TreeSymbols:
             assert force is not None  # its owner is closed
             forces[k] = plus(force, scaled(size, along))
             moved = plus(moved, scaled(size, each))
+        turning.add_to(forces, sizes)
         slide_rates = [plus(_moved(J, moved), bias) for J, bias in slides]
         return SolvedSymbols([*rates, *moved], touching, lines, forces, response, slide_rates, limits)
+
+    def _contacts(
+        self,
+        bodies: Sequence[MovingBody],
+        q: Sequence[Scalar],
+        v: Sequence[Scalar],
+        root: Callable[[Scalar], Scalar],
+    ) -> tuple[list[ScalarTouch], list[tuple[dict[int, Vector], Vector]]]:
+        """All contacts, and of each slide the derivative by the velocities and the rate at v̇ = 0."""
+        m = self._mechanism
+        motions = [ScalarMotion(body.p, body.R, turned(body.R, body.v), turned(body.R, body.w)) for body in bodies]
+        touching = [
+            touch_in_scalars(contact, motions[a], motions[b], root)
+            for contact, (a, b) in zip(m.contacts, self._pairs, strict=True)
+        ]
+        slides: list[tuple[dict[int, Vector], Vector]] = [
+            _slide(touch, [(bodies[a], motions[a], 1.0), (bodies[b], motions[b], -1.0)])
+            for touch, (a, b) in zip(touching, self._pairs, strict=True)
+        ]
+        for contact in self._dynamics.contacts[len(m.contacts) :]:
+            if isinstance(contact, TurningFriction):
+                pair = self._pairs[contact.pressed_by]
+                touch, J, rate = _turning(contact, touching[contact.pressed_by], *(bodies[body] for body in pair))
+                touching.append(touch)
+                slides.append((J, rate))
+                continue
+            assert isinstance(contact, JointContact)  # they come after those of bodies
+            n = contact.joint.velocity
+            touching.append(of_joint(contact, q[contact.joint.coordinate], v[n]))
+            slides.append(({n: floats(contact.direction)}, _NONE))
+        return touching, slides
 
     def _lines(
         self,
@@ -178,9 +178,7 @@ class TreeSymbols:
         """
         lines, bodies = list(began), len(self._mechanism.contacts)
         turning = {k: start for k, start in enumerate(began[:bodies]) if start is not None}
-        pushes = [
-            _dense(_along(slides[k][0], touching[k].across(start)), self._mechanism.nv) for k, start in turning.items()
-        ]
+        pushes = [self._free(_along(slides[k][0], touching[k].across(start))) for k, start in turning.items()]
         (free, *answers), _ = eliminated(mass, [load, *pushes])
         for k, answer in zip(turning, answers, strict=True):
             way = touching[k].across(_moved(slides[k][0], answer))
@@ -189,7 +187,7 @@ class TreeSymbols:
 
     def _inertial(
         self,
-        bodies: Sequence[_Moving],
+        bodies: Sequence[MovingBody],
         q: Sequence[Scalar],
         v: Sequence[Scalar],
         time: Scalar,
@@ -231,34 +229,24 @@ class TreeSymbols:
                 limits.append(limit_guard(wanted, float(actuator.bound), sign, functions["sqrt"]))
                 wanted = sign * float(actuator.bound) if sign else wanted
             load[n] = add(load[n], wanted)
-        self._stretch(bodies, load, functions)
+        add_point_loads(m, bodies, load, time, functions)
+        for joint, _, n in m.prescribed:
+            assert joint.motion is not None  # as of all prescribed ones
+            mass[n], load[n] = {n: 1.0}, moved(joint.motion, time, functions).acceleration
         return mass, load, limits
 
-    def _stretch(self, bodies: Sequence[_Moving], load: list[Scalar], functions: Any) -> None:
-        """Adds the forces of springs between bodies to the loads."""
-        index = self._mechanism.body_index
-        for spring in self._mechanism.springs:
-            ends = []
-            for name, position in ((spring.body_a, spring.position_a), (spring.body_b, spring.position_b)):
-                body, arm = bodies[index[name]], clean(position)
-                speed = turned(body.R, plus(body.v, cross(body.w, arm)))
-                ends.append((body, arm, plus(body.p, turned(body.R, arm)), speed))
-            (_, _, from_a, slow), (_, _, to_b, fast) = ends
-            d = minus(to_b, from_a)
-            length = functions["sqrt"](dot(d, d))
-            pull = mul(float(spring.stiffness), sub(1.0, float(spring.length) / length))
-            if spring.damping:
-                pull = add(pull, mul(float(spring.damping), dot(minus(fast, slow), d) / (length * length)))
-            for (body, arm, _, _), sign in zip(ends, (1.0, -1.0), strict=True):
-                force = turned_back(body.R, scaled(sign, scaled(pull, d)))
-                for n, way in body.at(arm)[0].items():
-                    load[n] = add(load[n], dot(way, force))
+    def _free(self, row: Row) -> list[Scalar]:
+        """Loads along the velocities; those along prescribed ones move nothing."""
+        held = {n for _, _, n in self._mechanism.prescribed}
+        return [0.0 if n in held else row.get(n, 0.0) for n in range(self._mechanism.nv)]
 
 
-def _tree(m: Mechanism, q: Sequence[Scalar], v: Sequence[Scalar], functions: Any) -> tuple[list[_Moving], list[Scalar]]:
+def _tree(
+    m: Mechanism, q: Sequence[Scalar], v: Sequence[Scalar], functions: Any
+) -> tuple[list[MovingBody], list[Scalar]]:
     """Bodies, the world last, and rates of the coordinates."""
-    ground = _Moving(_NONE, _AXES, _NONE, _NONE, _NONE, _NONE, {}, {})
-    bodies: list[_Moving] = [ground] * (len(m.bodies) + 1)
+    ground = MovingBody(_NONE, _AXES, _NONE, _NONE, _NONE, _NONE, {}, {})
+    bodies: list[MovingBody] = [ground] * (len(m.bodies) + 1)
     rates: list[Scalar] = []
     index = m.body_index
     for joint, at_q, at_v in zip(m.joints, m.q_slices, m.v_slices, strict=True):
@@ -298,9 +286,9 @@ def _tree(m: Mechanism, q: Sequence[Scalar], v: Sequence[Scalar], functions: Any
         velocity = plus(velocity, slide)
         place = plus(parent.p, turned(parent.R, to_joint))
         R = product(parent.R, across)
-        at_joint = _Moving(place, R, velocity, w, a, turning, move, turn)
+        at_joint = MovingBody(place, R, velocity, w, a, turning, move, turn)
         moved, a_origin = at_joint.at(from_joint)
-        bodies[index[joint.child]] = _Moving(
+        bodies[index[joint.child]] = MovingBody(
             plus(place, turned(R, from_joint)),
             R,
             plus(velocity, cross(w, from_joint)),
@@ -318,8 +306,8 @@ def _pose(kind: str, q: Sequence[Scalar], functions: Any) -> tuple[Vector, _Matr
     """Pose of frame B in frame A: origin, and rotation by rows."""
     if kind == "revolute":
         return _NONE, _about_z(q[0], functions)
-    if kind == "prismatic":
-        return (0.0, 0.0, q[0]), _AXES
+    if kind in {"prismatic", "cylindrical"}:
+        return (0.0, 0.0, q[0]), _AXES if kind == "prismatic" else _about_z(q[1], functions)
     if kind == "universal":
         c, s = functions["cos"](q[1]), functions["sin"](q[1])
         return _NONE, product(_about_z(q[0], functions), ((1.0, 0.0, 0.0), (0.0, c, -s), (0.0, s, c)))
@@ -354,7 +342,9 @@ def _coordinate_rates(kind: str, q: Sequence[Scalar], v: Sequence[Scalar], S: _M
     return [*turned(S, v[:3]), *turning] if kind == "free" else turning
 
 
-def _slide(touch: ScalarTouch, pair: Sequence[tuple[_Moving, ScalarMotion, float]]) -> tuple[dict[int, Vector], Vector]:
+def _slide(
+    touch: ScalarTouch, pair: Sequence[tuple[MovingBody, ScalarMotion, float]]
+) -> tuple[dict[int, Vector], Vector]:
     """Derivative of a contact's slide by the velocities, and its rate at v̇ = 0, in world axes."""
     J: dict[int, Vector] = {}
     rate: Vector = _NONE
@@ -369,6 +359,23 @@ def _slide(touch: ScalarTouch, pair: Sequence[tuple[_Moving, ScalarMotion, float
     return J, rate
 
 
+def _turning(
+    friction: TurningFriction, touch: ScalarTouch, a: MovingBody, b: MovingBody
+) -> tuple[ScalarTouch, dict[int, Vector], Vector]:
+    """Friction against turning as a contact, its slide's derivative by the velocities, and its rate at v̇ = 0."""
+    J: dict[int, Vector] = {}
+    turning, rate = (
+        minus(*(turned(body.R, part) for body, part in of))
+        for of in (((a, a.w), (b, b.w)), ((a, a.turning), (b, b.turning)))
+    )
+    for body, sign in ((a, 1.0), (b, -1.0)):
+        for n, way in body.turn.items():
+            J[n] = plus(J.get(n, _NONE), scaled(sign, turned(body.R, way)))
+    J = {n: resisted(friction, touch, way) for n, way in J.items()}
+    rate = plus(resisted(friction, touch, rate), resisted_rate(friction, touch, turning))
+    return of_turning(friction, touch, turning), J, rate
+
+
 def _moved(J: dict[int, Vector], v: Sequence[Scalar]) -> list[Scalar]:
     return [add(*(mul(value[axis], v[n]) for n, value in J.items())) for axis in range(3)]
 
@@ -376,10 +383,6 @@ def _moved(J: dict[int, Vector], v: Sequence[Scalar]) -> list[Scalar]:
 def _along(J: dict[int, Vector], direction: Vector) -> Row:
     values = {n: dot(way, direction) for n, way in J.items()}
     return {n: value for n, value in values.items() if not is_zero(value)}
-
-
-def _dense(row: Row, count: int) -> list[Scalar]:
-    return [row.get(n, 0.0) for n in range(count)]
 
 
 def _applied(rows: Sequence[Row], vector: Sequence[Scalar]) -> list[Scalar]:

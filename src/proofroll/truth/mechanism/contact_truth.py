@@ -1,8 +1,12 @@
 """Truth of a mechanism whose bodies touch, by two routes that share the root finder of guards and the shapes."""
 
+from dataclasses import replace
+
 import numpy as np
 
+from proofroll.core.errors import Refused
 from proofroll.elements.mechanism.analysis import RANK
+from proofroll.elements.mechanism.commands import has_held
 from proofroll.elements.mechanism.contacts.acting import ContactMode, kinds
 from proofroll.elements.mechanism.contacts.dynamics import ContactDynamics
 from proofroll.elements.mechanism.contacts.geometry import pair_sums
@@ -12,6 +16,7 @@ from proofroll.elements.mechanism.rotations import Array
 from proofroll.elements.mechanism.signal import breaks
 from proofroll.truth.hybrid import HybridPath, Stretch, first_close, states_of
 from proofroll.truth.mechanism.contact_bodies import ContactBodies
+from proofroll.truth.mechanism.contact_bounces import body_poses, contact_bounces, tree_poses
 from proofroll.truth.mechanism.contact_equations import ContactEquations
 from proofroll.truth.mechanism.contact_tree import ContactTree
 from proofroll.truth.mechanism.error_bars import TwoRouteMotion, check_start, on_same_turns
@@ -40,6 +45,8 @@ def contact_truth(mechanism: Mechanism, times: Array) -> TwoRouteMotion:
         Diverged: a route stopped.
     """
     refuse_uncovered(mechanism)
+    if has_held(mechanism):
+        raise Refused("no route of the truth follows contacts under held targets yet; it follows them in the air")
     units = natural_units(mechanism)
     with units.errors_in_seconds():
         return _in_units(mechanism, units, times / units.time)
@@ -84,7 +91,7 @@ def _in_units(mechanism: Mechanism, units: Units, times: Array) -> TwoRouteMotio
         left = _in_si(mechanism, units, early), cut[1]
     assert first.pressed is not None  # of a mechanism with contacts
     assert first.sums is not None  # of a mechanism with contacts
-    return two_route_motion(
+    motion = two_route_motion(
         mechanism,
         paths,
         first.record,
@@ -98,6 +105,9 @@ def _in_units(mechanism: Mechanism, units: Units, times: Array) -> TwoRouteMotio
         until=until * units.time,
         cut=left,
     )
+    by_routes = (tree, paths[0], tree_poses(tree)), (bodies, paths[1], body_poses(second))
+    last = min(until, *(path.stretches[-1].end for path in paths))
+    return replace(motion, bounces=contact_bounces(own, by_routes, motion.events, units, last))
 
 
 def _by_the_tree(tree: ContactTree, path: HybridPath[Stretch[ContactMode]], times: Array) -> Routed:
@@ -141,4 +151,4 @@ def _shared_load(dynamics: ContactDynamics, path: HybridPath[Stretch[ContactMode
 def _size(dynamics: ContactDynamics) -> float:
     """Largest distance of a contact from the origin at the start, at least the natural length, which is 1."""
     touching = dynamics.at(*dynamics.mechanism.start()).touching
-    return max(1.0, *(float(np.abs(each.place).max()) for each in touching))
+    return max([1.0, *(float(np.abs(each.place).max()) for each in touching)])

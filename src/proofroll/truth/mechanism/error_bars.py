@@ -6,9 +6,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from proofroll.core.bounces import Bounce
 from proofroll.core.errors import Refused
 from proofroll.core.events import Event
 from proofroll.elements.mechanism.joint_coordinates import JointCoordinates
+from proofroll.elements.mechanism.link_forces import link_values, works
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.placed import Placed
 from proofroll.elements.mechanism.record import Record, record_of
@@ -58,13 +60,15 @@ class TwoRouteMotion:
     end: float = np.inf
     ended: str = ""
     sums: Array | None = None
+    bounces: Sequence[Bounce] = ()
 
 
 def fields_with_bars(mechanism: Mechanism, record: Record) -> dict[str, Array]:
-    """Fields with an error bar: those of the record, and tracked points and energy, which follow from the poses."""
+    """Fields with an error bar: those of the record, and what follows from them, as energy."""
     placed = record.placed(mechanism)
     fields = {name: getattr(record, name) for name in JUDGED}
-    return fields | {"points": placed.points, "energy": placed.energy()}
+    derived = {"links": link_values(placed), "work": works(placed, record.named)}
+    return fields | {"points": placed.points, "energy": placed.energy()} | derived
 
 
 def round_off(fields: Mapping[str, Array], placed: Placed) -> dict[str, Array]:
@@ -101,8 +105,8 @@ def on_same_turns(mechanism: Mechanism, guide: Record, other: Record) -> Record:
         if joint.kind in {"spherical", "free"}:
             quaternion = slice(at.stop - 4, at.stop)
             q[:, quaternion] = _same_sign(guide.q[:, quaternion], q[:, quaternion])
-        elif joint.kind in {"revolute", "universal", "planar"}:
-            angles = slice(at.stop - 1, at.stop) if joint.kind == "planar" else at
+        elif joint.kind in {"revolute", "cylindrical", "universal", "planar"}:
+            angles = at if joint.kind == "universal" else slice(at.stop - 1, at.stop)
             q[:, angles] += 2 * np.pi * np.round((guide.q[:, angles] - q[:, angles]) / (2 * np.pi))
     return replace(other, q_WB=q_WB, q=q)
 

@@ -25,6 +25,9 @@ TOLERANCES = 1e-14, 3e-14
 # Relative margin of a decision below which uncertainties of the parameters may change it.
 CLOSE = 1e-9
 
+# Accuracies of a time by which the second route is followed beyond an early end of the first, to see its reason, too.
+_BEHIND = 10
+
 FollowedPath = HybridPath[Stretch[Any]]
 
 
@@ -43,9 +46,14 @@ def refuse_uncovered(mechanism: Mechanism) -> None:
 def followed(
     first: HybridRoute[ModeT], second: HybridRoute[ModeT], until: float, kinks: Sequence[float]
 ) -> tuple[HybridPath[Stretch[ModeT]], HybridPath[Stretch[ModeT]]]:
-    """Paths of two routes to ``until``, in natural units; ``kinks``: times at which the rates are not smooth."""
+    """Paths of two routes to ``until``, in natural units; ``kinks``: times at which the rates are not smooth.
+
+    Where the first ends early the second is not followed beyond that end, for the truth ends there, too.
+    """
     one = follow(first, until, kinks, CLOSE)
-    return one, follow(second, until, kinks, CLOSE, first_close([one], CLOSE))
+    end = until if one.known else one.stretches[-1].end
+    last = min(until, end + _BEHIND * time_accuracy(end))
+    return one, follow(second, last, kinks, CLOSE, first_close([one], CLOSE))
 
 
 class Routed(NamedTuple):
@@ -205,13 +213,15 @@ def _of_a_step(mechanism: Mechanism, record: Record, units: Units) -> dict[str, 
     ones = {name: np.ones_like(getattr(record, name)[:1]) for name in JUDGED}
     natural = units.record(mechanism, replace(record, time=record.time[:1], residual=record.residual[:1], **ones))
     sizes = {name: float(largest(getattr(natural, name))[0]) for name in ones}
-    sizes |= {"points": units.length, "energy": units.force * units.length}
+    sizes |= dict.fromkeys(("energy", "work"), units.force * units.length) | {"points": units.length}
     spin, speed = (float(np.abs(each).max(initial=0.0)) for each in (record.w_WB, record.v_WB))
     quadratic = 2 * max(1.0, units.time * spin, units.time * speed / units.length)
     sizes |= {
         "wrench": quadratic * sizes["wrench"],
         "pressed": quadratic * units.force,
         "sums": quadratic * units.force,
+        "links": quadratic * sizes["wrench"]
+        + max((link.stiffest for link in mechanism.links), default=0.0) * units.length,
     }
     return {name: TOLERANCES[0] * size for name, size in sizes.items()}
 
@@ -266,7 +276,12 @@ def _alike(
         else:
             break
     apart = left[0] + left[1]
-    return pairs, apart if all(left) else [stretch for stretch in apart if not _instant(stretch)]
+    if all(left):
+        return pairs, apart
+    apart = [stretch for stretch in apart if not _instant(stretch)]
+    while pairs and apart and kinds(apart[0].mode) == kinds(one.stretches[pairs[-1][0]].mode):
+        del apart[0]  # one route divides what the other follows in one stretch to the last time
+    return pairs, apart
 
 
 def _parted(one: FollowedPath, two: FollowedPath, kinds: Callable[[Any], Any]) -> float:

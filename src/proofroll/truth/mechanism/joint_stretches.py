@@ -44,6 +44,16 @@ class JointStretches(Stretches[Mode]):
     def _along(self, state: Array) -> tuple[Array, Array]:
         """Coordinates and rates of the switched joints."""
 
+    def jumped(self, stretch: Stretch[Mode]) -> Transition[Mode]:
+        """Transition at the end of a stretch where forces jump: the mode is decided anew."""
+        holding = [k for k, own in enumerate(stretch.mode[: len(self.joints)]) if own in HOLDING]
+        state = np.append(stretch.last[:-1], stretch.end)
+        state, mode, margin = self._at_rest(stretch, state, holding)
+        count = len(self.joints)
+        pairs = zip(self.limited, stretch.mode[count:], mode[count:], strict=True)
+        jumps = [effort_event(item, now) for item, before, now in pairs if now != before]
+        return Transition(state, mode, (*changes(self.joints, stretch.mode, mode), *jumps), margin)
+
     def change(self, stretch: Stretch[Mode]) -> Transition[Mode]:
         """See the protocol."""
         if stretch.guard is None:  # at a break of the rates
@@ -167,15 +177,22 @@ def order_decides(
 
 
 def noise_of(
-    joints: tuple[SwitchedJoint, ...], actuators: Actuators, mode: Mode, q: Array, wanted: Sequence[float]
+    joints: tuple[SwitchedJoint, ...], actuators: Actuators, mode: Mode, q: Array, v: Array, wanted: Sequence[float]
 ) -> FloatArray:
-    """Round-off of the guards of a stretch that starts at joint coordinates q; zero away from stops and limits."""
+    """Round-off of the guards of a stretch that starts at joint coordinates q and rates v.
+
+    It is zero away from stops, limits and rest: the force that makes a joint slip is at its bound, so that round-off
+    decides its first acceleration.
+    """
     noise = []
     for number, kind in guards_of(joints, mode):
         if number >= len(joints):
             actuator = actuators[number - len(joints)]
             apart = abs(abs(wanted[number - len(joints)]) - actuator.bound)
             noise.append(_DIGITS * float(np.spacing(actuator.bound)) if apart <= _NEAR * actuator.bound else 0.0)
+            continue
+        if kind == "still":
+            noise.append(_STILL if abs(v[number]) <= _STILL else 0.0)
             continue
         at = {"low": joints[number].low, "high": joints[number].high}.get(kind)
         leaves = at is not None and abs(q[number] - at) <= _NEAR * max(1.0, abs(at))

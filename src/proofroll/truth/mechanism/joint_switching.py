@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from proofroll.core.arrays import FloatArray
 from proofroll.elements.mechanism.joint_coordinates import JointCoordinates
@@ -24,21 +25,25 @@ class SwitchedTree(JointStretches):
         self._nq = equations.mechanism.nq
         super().__init__(self._nq + equations.mechanism.nv + 1, tolerance)
 
+    @property
+    def start(self) -> Array:
+        """State at time 0."""
+        return np.append(np.concatenate(self.equations.mechanism.start()), 0.0)
+
     def begin(self) -> Transition[Mode]:
         """See the protocol."""
-        state = np.append(np.concatenate(self.equations.mechanism.start()), 0.0)
+        state = self.start
         mode, margin = self.equations.decided(*self._parts(state), 0.0)
         return Transition(state, mode, (), margin)
 
     def _law(self, state: Array, mode: Mode) -> StretchLaw:
         q, v = self._parts(state)
-        at_q = [joint.coordinate for joint in self.joints]
         corrected = self.equations.followed(mode)
         return StretchLaw(
             lambda y: np.append(self.equations.rate(float(y[-1]), y[:-1], mode), 1.0),
             lambda y: self._guards(y, mode),
             lambda y: np.append(corrected(y[:-1]), y[-1]),
-            noise_of(self.joints, self.limited, mode, q[at_q], self._wanted(float(state[-1]), q, v)),
+            noise_of(self.joints, self.limited, mode, *self._along(state), self._wanted(float(state[-1]), q, v)),
             near_stops(self.joints, mode),
         )
 
@@ -68,6 +73,12 @@ class SwitchedTree(JointStretches):
             delay = self._bouncing(joint.name, rebound, pull, joint.restitution, falling)
         decided, after = self.equations.decided(q, v, stretch.end)
         return state, decided, min(margin, after), delay
+
+    def bodies(self, state: Array) -> tuple[Array, Array, Array, Array]:
+        """Places, velocities, quaternions and angular velocities of all bodies, world axes."""
+        motion = self.equations.tree.at(*self._parts(state))
+        turned = Rotation.from_matrix(motion.R_WB[:-1]).as_quat(scalar_first=True)
+        return motion.p_WB[:-1], motion.v_WB[:-1], turned, motion.w_WB[:-1]
 
     def holding(self, state: Array, mode: Mode) -> Array:
         """Force of dry friction or of a stop along each switched joint's coordinate, N or N m."""

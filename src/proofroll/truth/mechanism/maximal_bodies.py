@@ -184,8 +184,9 @@ def _moved(joint: Joint, q: Array, v: Array) -> tuple[Array, Rotation, Array, Ar
     e1, e2, e3 = joint.child_frame.copy().T
     if joint.kind == "revolute":
         return none, Rotation.from_rotvec(q[0] * e3), none, v[0] * e3
-    if joint.kind == "prismatic":
-        return q[0] * e3, still, v[0] * e3, none
+    if joint.kind in {"prismatic", "cylindrical"}:
+        angle, spin = (0.0, 0.0) if joint.kind == "prismatic" else (q[1], v[1])
+        return q[0] * e3, Rotation.from_rotvec(angle * e3), v[0] * e3, spin * e3
     if joint.kind == "universal":
         first = Rotation.from_rotvec(q[0] * e3)
         return none, first * Rotation.from_rotvec(q[1] * e1), none, v[0] * e3 + v[1] * first.apply(e1)
@@ -221,7 +222,9 @@ def _plane(mechanism: Mechanism) -> Array | None:
     placed = placed_bodies(mechanism)
     axes = [(joint, placed[joint.child].R.apply(joint.child_frame[:, 2].copy())) for joint in mechanism.joints]
     normals = [axis for joint, axis in axes if joint.kind in {"revolute", "planar"}]
-    if not normals or any(joint.kind in {"universal", "spherical", "free"} for joint in mechanism.joints):
+    if not normals or any(
+        joint.kind in {"cylindrical", "universal", "spherical", "free"} for joint in mechanism.joints
+    ):
         return None
     normal = normals[0]
     for joint, axis in axes:

@@ -99,7 +99,7 @@ class NumericEquations:
         """Least singular value of some rows at a state, relative to that of all rows without the redundant ones."""
         C = self._weighted(state)
         whole, chosen = (np.linalg.svd(matrix, compute_uv=False) for matrix in (C, C[list(rows)]))
-        return float(chosen[-1] / whole[self.rank - 1])
+        return float(chosen[-1] / whole[self.rank - 1]) if self.rank else 1.0  # all rows may be round-off
 
     def _weighted(self, state: Array) -> Array:
         """Rows at a state, with velocities weighted by inertia."""
@@ -158,9 +158,9 @@ class NumericEquations:
         A, (half, _) = self._matrix(constrained.rows), self._driven(constrained)
         e = self.equations
         u = state[e.nx : e.nx + e.nu]
-        target = np.append(np.zeros(len(A) - len(held)), after)
-        inverse = np.linalg.pinv(A @ half, RANK)
-        change = inverse @ (target - A @ u)
+        inverse, opening = np.linalg.pinv(A @ half, RANK), constrained.opening(A @ u)
+        opening[len(A) - len(held) :] -= after
+        change = -inverse @ opening
         return u + half @ change, (inverse.T @ change)[len(A) - len(held) :]
 
     def along(self, state: Array, joints: Sequence[int]) -> tuple[Array, Array]:
@@ -204,13 +204,12 @@ class NumericEquations:
         u = state[e.nx : e.nx + e.nu]
         back = -solved.into @ (solved.back @ solved.residual)
         state[: e.nx] += self.moving(state[: e.nx], back)
-        u -= solved.into @ (solved.back @ (solved.C @ u))
+        u -= solved.into @ (solved.back @ solved.equations.opening(solved.C @ u))
         return self.normalised(state)
 
     def beside(self, state: Array, by: float) -> Array:
         """State displaced by about ``by``, m and rad, with velocities changed by that fraction, as the rows allow."""
-        e, state = self.equations, state.copy()
-        # all different, by the golden ratio
+        e, state = self.equations, state.copy()  # all ways differ, by the golden ratio
         ways = by * (1.0 + np.modf(np.arange(1, e.nu + 1) * 0.6180339887498949)[0])
         state[: e.nx] += self.moving(state[: e.nx], ways)
         state[e.nx : e.nx + e.nu] *= 1.0 + ways
@@ -306,9 +305,8 @@ class MaximalCoordinates:
         Raises:
             Diverged: an integration stops.
         """
-        lean = self.lean
-        start = lean.equations.start()
-        starts = (start, lean.beside(start, BESIDE))
+        lean, start = self.lean, self.lean.equations.start()
+        starts = start, lean.beside(start, BESIDE)
         try:
             one, other = (self.taylor_states(times, start=each) for each in starts)
         except Missing:
@@ -350,6 +348,7 @@ class MaximalCoordinates:
         equations = self._whole if switched is None else self._whole.switched(whole, switched)
         solved = equations.solve(whole, time, applied)
         u = whole[self._whole.equations.nx :][: self._whole.equations.nu]
+        opening = solved.equations.opening(solved.C @ u)
         n = len(self.mechanism.bodies)
         arms = [np.array(view.R) @ body.com for view, body in zip(views, self.mechanism.bodies, strict=False)]
         return {
@@ -361,7 +360,7 @@ class MaximalCoordinates:
             "v": [],
             "wrench": self._wrenches(solved),
             "named": self._named(solved, switched or Switched()),
-            "residual": np.array([np.abs(solved.residual).max(initial=0.0), np.abs(solved.C @ u).max(initial=0.0)]),
+            "residual": np.array([np.abs(solved.residual).max(initial=0.0), np.abs(opening).max(initial=0.0)]),
         }
 
     def _complete(self, views: list[BodyInScalars], angles: Array) -> Array:
@@ -390,9 +389,10 @@ class MaximalCoordinates:
     def _named(self, solved: Solved, switched: Switched) -> Array:
         fields = {name: np.zeros(count) for name, count in lengths(self.mechanism).items()}
         fields["effort"][:] = solved.equations.efforts
-        held = len(solved.multipliers) - len(switched.held)
-        fields["coupling"][:] = solved.multipliers[held - len(fields["coupling"]) : held]
-        holding = dict(zip(switched.held, solved.multipliers[held:], strict=True))
+        fields["coupling"][:] = solved.multipliers[solved.equations.coupled]
+        driven = [self.mechanism.joint_index[joint.name] for joint, _, _ in self.mechanism.prescribed]
+        fields["drive"][driven] = solved.multipliers[solved.equations.moved]
+        holding = dict(zip(switched.held, solved.multipliers[solved.equations.moved.stop :], strict=True))
         for number, joint in enumerate(self.mechanism.joints):
             force = holding.get(number, switched.push.get(number, 0.0))
             on = joint_force_shares(number in switched.stopped, joint.friction, force)

@@ -5,7 +5,8 @@ They are written once in plain additions and multiplications, for numbers, long 
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -14,10 +15,13 @@ from scipy.linalg import block_diag
 from proofroll.core.arrays import slices
 from proofroll.elements.mechanism.checks import WORLD
 from proofroll.elements.mechanism.drives import Coupling
+from proofroll.elements.mechanism.joint import Joint
 from proofroll.elements.mechanism.model import Mechanism
+from proofroll.elements.mechanism.prescribed import moved
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.elements.mechanism.signal import FUNCTIONS as SMOOTH
 from proofroll.elements.mechanism.signal import value_at
+from proofroll.truth.mechanism.bushing_scalars import bushing_load
 from proofroll.truth.mechanism.constraint_rows import NONE, Connection, ConstraintRow, ConstraintRows, columns, speed_at
 from proofroll.truth.mechanism.maximal_bodies import GROUND, BodyInScalars, clean, made_bodies, placed_bodies
 from proofroll.truth.scalars import Scalar, add, cross, dot, is_zero, minus, mul, plus, product, scaled, sub, turned
@@ -64,6 +68,7 @@ class ConstrainedEquations:
         drives: armature of joints.
         holders: the rows of bodies without inertia, as drives: as all rows are satisfied, they change only M, and make
             it invertible.
+        coupled, moved: slices of the rows of couplings, and of prescribed motions.
     """
 
     rows: list[ConstraintRow]
@@ -75,6 +80,14 @@ class ConstrainedEquations:
     efforts: list[Scalar]
     drives: list[Drive]
     holders: list[Drive]
+    coupled: slice
+    moved: slice
+
+    def opening(self, rates: Array) -> Array:
+        """Rates at which the rows are violated, from those of their coordinates; motions hold the acceleration only."""
+        violated = rates.copy()
+        violated[self.moved] = 0.0
+        return violated
 
 
 class MaximalEquations:
@@ -102,13 +115,15 @@ class MaximalEquations:
         index = mechanism.body_index
         self._com = {WORLD: np.zeros(3)} | {body.name: np.array(body.com) for body in mechanism.bodies}
         self.connections = [
-            self.connection(c.kind, c.a, c.b, c.position_a, c.position_b, c.frame_a, c.frame_b)
+            self.connection(c.kind, c.a, c.b, c.position_a, c.position_b, c.frame_a, c.frame_b, c.length)
             for c in mechanism.connections
         ]
-        self._ends = [
+        ends = [
             (index[s.body_a], self._place(s.body_a, s.position_a), index[s.body_b], self._place(s.body_b, s.position_b))
-            for s in mechanism.springs
+            for s in mechanism.links
         ]
+        self._ends, self._bushed = ends[: len(mechanism.springs)], ends[len(mechanism.springs) :]
+        self._forced = [(index[f.body], self._place(f.body, f.position), index[f.reaction]) for f in mechanism.forces]
         self._driving: dict[int, list[int]] = {}
         for number, actuator in enumerate(mechanism.actuators):
             self._driving.setdefault(mechanism.joint_index[actuator.joint], []).append(number)
@@ -123,6 +138,10 @@ class MaximalEquations:
 
     def start(self) -> Array:
         """Coordinates, velocities and integrated angles at the start, one after the other."""
+        return self._start.copy()
+
+    @cached_property
+    def _start(self) -> Array:
         placed = placed_bodies(self.mechanism)
         starts = [
             body.start(placed[data.name], np.array(data.com))
@@ -140,7 +159,7 @@ class MaximalEquations:
     ) -> ConstrainedEquations:
         """Equations for a state laid out as by :meth:`start`, in any scalars; quaternions must have unit length.
 
-        Rows of couplings come after those of connections; rows of held ``switched`` joints come last.
+        Rows of couplings come after those of connections, then those of motions; of held ``switched`` joints last.
         """
         switched = switched or Switched()
         x, u, angles = state[: self.nx], state[self.nx : self.nx + self.nu], state[self.nx + self.nu :]
@@ -174,17 +193,11 @@ class MaximalEquations:
                 law, rates = self._law(number, connection, views, own, force, effort, acts)
                 laws.append(law)
                 angle_rate += rates
-        for spring, (a, place_a, b, place_b) in zip(self.mechanism.springs, self._ends, strict=True):
-            arm_a, arm_b = turned(views[a].R, place_a), turned(views[b].R, place_b)
-            d = minus(plus(views[b].r, arm_b), plus(views[a].r, arm_a))
-            length = functions["sqrt"](dot(d, d))
-            pull = spring.stiffness * (1.0 - spring.length / length)
-            if spring.damping:
-                slide = minus(speed_at(views[b], arm_b), speed_at(views[a], arm_a))
-                pull = add(pull, mul(spring.damping, dot(slide, d) / (length * length)))
-            self._apply(force, views, a, scaled(pull, d), arm_a)
-            self._apply(force, views, b, scaled(-1.0, scaled(pull, d)), arm_b)
+        self._add_point_loads(force, views, functions, time)
+        coupled = slice(len(rows), len(rows) + len(self.mechanism.couplings))
+        moved_rows = slice(coupled.stop, coupled.stop + len(self.mechanism.prescribed))
         rows += [self._coupled(made, coupling) for coupling in self.mechanism.couplings]
+        rows += [self._prescribed(made, joint, time, functions) for joint, _, _ in self.mechanism.prescribed]
         rows += [made.of_rate(number, self.mechanism.joints[number].kind) for number in switched.held]
         drives = [
             Drive(made.of_rate(number, joint.kind), float(joint.armature))
@@ -196,7 +209,19 @@ class MaximalEquations:
             for row in rows
             if self._light & {self.connections[row.connection].a, self.connections[row.connection].b}
         ]
-        return ConstrainedEquations(rows, force, rate, angle_rate, views, laws, efforts, drives, holders)
+        return ConstrainedEquations(
+            rows=rows,
+            force=force,
+            rate=rate,
+            angle_rate=angle_rate,
+            views=views,
+            laws=laws,
+            efforts=efforts,
+            drives=drives,
+            holders=holders,
+            coupled=coupled,
+            moved=moved_rows,
+        )
 
     def projected(self, views: Sequence[BodyInScalars], applied: Array) -> Array:
         """Generalised forces along u of forces and moments about the centres of mass, world axes, (bodies, 6)."""
@@ -223,6 +248,14 @@ class MaximalEquations:
             row = row.less(-factor, other)
         return row
 
+    def _prescribed(
+        self, made: ConstraintRows, joint: Joint, time: Scalar, functions: Mapping[str, Any]
+    ) -> ConstraintRow:
+        """Row of a prescribed acceleration; the start satisfies it between places and rates."""
+        assert joint.motion is not None  # as of all prescribed ones
+        row = made.of_rate(self.mechanism.joint_index[joint.name], joint.kind)
+        return replace(row, residual=0.0, bias=sub(row.bias, moved(joint.motion, time, functions).acceleration))
+
     def _views(self, state: Sequence[Scalar], functions: Mapping[str, Any]) -> list[BodyInScalars]:
         """Poses and velocities of all bodies, the ground last."""
         x, u = state[: self.nx], state[self.nx : self.nx + self.nu]
@@ -233,13 +266,21 @@ class MaximalEquations:
         return [*views, GROUND]
 
     def connection(
-        self, kind: str, a: str, b: str, at_a: Sequence[float], at_b: Sequence[float], frame_a: Array, frame_b: Array
+        self,
+        kind: str,
+        a: str,
+        b: str,
+        at_a: Sequence[float],
+        at_b: Sequence[float],
+        frame_a: Array,
+        frame_b: Array,
+        length: float = 0.0,
     ) -> Connection:
         """Connection of two named bodies, from its places and axes in their frames."""
         index = self.mechanism.body_index
         places = (self._place(a, at_a), self._place(b, at_b))
-        frames = ([clean(row) for row in frame] for frame in (frame_a, frame_b))
-        return Connection(kind, index[a], index[b], *places, *frames)
+        A, B = ([clean(row) for row in frame] for frame in (frame_a, frame_b))
+        return Connection(kind, index[a], index[b], *places, A, B, length)
 
     def _place(self, body: str, position: Sequence[float]) -> list[float]:
         return [float(value) for value in np.array(position) - self._com[body]]
@@ -259,6 +300,40 @@ class MaximalEquations:
         entries = self.bodies[body].projected(views[body], push, plus(cross(arm, push), moment))
         for at, entry in enumerate(entries, self.u_slices[body].start):
             force[at] = add(force[at], entry)
+
+    def _add_point_loads(
+        self, force: list[Scalar], views: list[BodyInScalars], functions: Mapping[str, Any], time: Scalar
+    ) -> None:
+        """Adds springs, bushings and applied forces to the loads along u."""
+        for spring, (a, place_a, b, place_b) in zip(self.mechanism.springs, self._ends, strict=True):
+            arm_a, arm_b = turned(views[a].R, place_a), turned(views[b].R, place_b)
+            d = minus(plus(views[b].r, arm_b), plus(views[a].r, arm_a))
+            length = functions["sqrt"](dot(d, d))
+            stretch: Scalar = spring.stiffness * (1.0 - spring.length / length)
+            if spring.damping:
+                slide = minus(speed_at(views[b], arm_b), speed_at(views[a], arm_a))
+                stretch = add(stretch, mul(spring.damping, dot(slide, d) / (length * length)))
+            if spring.force is not None:
+                slide = minus(speed_at(views[b], arm_b), speed_at(views[a], arm_a))
+                stretch = add(stretch, spring.force.pull(length, dot(slide, d) / length, functions) / length)
+            self._apply(force, views, a, scaled(stretch, d), arm_a)
+            self._apply(force, views, b, scaled(-1.0, scaled(stretch, d)), arm_b)
+        for bushing, (a, place_a, b, place_b) in zip(self.mechanism.bushings, self._bushed, strict=True):
+            arm_a, arm_b = turned(views[a].R, place_a), turned(views[b].R, place_b)
+            d = minus(plus(views[b].r, arm_b), plus(views[a].r, arm_a))
+            slide = minus(speed_at(views[b], arm_b), speed_at(views[a], arm_a))
+            motion = (d, slide, minus(views[b].w, views[a].w), views[a].w)
+            pull, turn = bushing_load(bushing, views[a].R, views[b].R, motion, functions)
+            self._apply(force, views, b, pull, arm_b, turn)
+            self._apply(force, views, a, scaled(-1.0, pull), plus(arm_a, d), scaled(-1.0, turn))
+        for applied, (a, place, b) in zip(self.mechanism.forces, self._forced, strict=True):
+            load = applied.at(time, functions)
+            load = turned(views[a].R, load) if applied.frame == "body" else load
+            push, moment = (load, NONE) if applied.kind == "force" else (NONE, load)
+            arm = turned(views[a].R, place)
+            self._apply(force, views, a, push, arm, moment)
+            back = minus(plus(views[a].r, arm), views[b].r)
+            self._apply(force, views, b, scaled(-1.0, push), back, scaled(-1.0, moment))
 
     def _law(
         self,

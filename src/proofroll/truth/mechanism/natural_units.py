@@ -24,6 +24,7 @@ from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.named_forces import named_forces
 from proofroll.elements.mechanism.record import Record
 from proofroll.elements.mechanism.signal import FUNCTIONS, Formula, Table
+from proofroll.elements.mechanism.spring_law import SpringLaw
 
 _TIME = re.compile(r"(?<=\bt = )[\d.e+-]+(?= s\b)")  # times in messages of routes
 
@@ -80,8 +81,11 @@ class Units(NamedTuple):
             joints=each(si.joints),
             loops=each(si.loops),
             springs=each(si.springs),
+            bushings=each(si.bushings),
+            forces=each(si.forces),
             points=each(si.points),
             geometries=each(si.geometries),
+            pairs=each(si.pairs),
             actuators=tuple(self._own(actuator, slides[actuator.joint]) for actuator in si.actuators),
             couplings=tuple(couplings),
             gravity=self._valued(si.gravity, "m/s^2"),
@@ -102,13 +106,14 @@ class Units(NamedTuple):
             return tuple(self._valued(each, own) for each, own in zip(value, unit, strict=True))
         if isinstance(value, tuple):
             return tuple(self._valued(each, unit) for each in value)
-        if isinstance(value, _InUnits):
-            return replace(value, second=value.second * self.time, factor=value.factor / self.size(unit))
         if isinstance(value, Formula):
-            return _InUnits(value.text, value.numbers, self.time, 1 / self.size(unit))
+            second, factor = (value.second, value.factor) if isinstance(value, _InUnits) else (1.0, 1.0)
+            return _InUnits(value.text, value.numbers, second * self.time, factor / self.size(unit))
+        if value is None or isinstance(value, SpringLaw):
+            return value and value.scaled(self.length, self.length / self.time, self.size(unit))
         if isinstance(value, Table):
-            return Table(self._valued(value.times, "s"), self._valued(value.values, unit))
-        return None if value is None else value / self.size(unit)
+            return Table(self._valued(value.times, "s"), self._valued(value.values, unit), value.hold)
+        return value / self.size(unit)
 
     def record(self, mechanism: Mechanism, own: Record) -> Record:
         """Record in SI units, from one in these units; ``mechanism`` is in SI units."""

@@ -70,9 +70,8 @@ class _Nodes:
         self.derivative = np.array([chebyshev.chebval(points, s) for s in slopes]).T @ self.to_series * 2
 
 
-def leading(own: Acting, solved: SolvedContacts, k: int) -> Acting:
-    """Mode in which contact ``k`` leaves rest in its plane, against the friction that held it; ``own``: before."""
-    force, normal = solved.force[k], solved.touching[k].normal
+def leading(own: Acting, normal: Array, force: Array) -> Acting:
+    """Mode in which a contact leaves rest in its plane, against the ``force`` that held it; ``own``: before."""
     held = force - normal * (normal @ force)
     x, y, z = (-held / np.linalg.norm(held)).tolist()
     return own._replace(kind="slip", heading=(x, y, z), leads=True)
@@ -91,10 +90,12 @@ def begun_slip(
 ) -> BegunSlip:
     """First instants of the slip that leads in a mode, from a time [s] on, at most to ``until`` [s].
 
+    Contacts of one face that lead together slip in one direction.
+
     Args:
         time: of the start.
         state: at the start.
-        mode: in which a contact leads.
+        mode: in which one or more contacts lead.
         until: at most.
         rate: of a state in a mode.
         solve: motion and forces of a state in a mode.
@@ -136,7 +137,7 @@ def _settled(
         c, s = np.cos(angle), np.sin(angle)
         x, y_, z = (c * ahead + s * aside).tolist()
         own = mode[k]._replace(heading=(x, y_, z))
-        now = (*mode[:k], own, *mode[k + 1 :])
+        now = tuple(each._replace(heading=(x, y_, z)) if each.leads else each for each in mode)
         return own, np.array([x, y_, z]), c * aside - s * ahead, solve(y, now), rate(y, now)
 
     # response of the slide across to the angle of friction

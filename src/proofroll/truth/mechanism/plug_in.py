@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
+from proofroll.core.bounces import with_bounces
 from proofroll.core.dataset import ENDED, ENDS
 from proofroll.core.element import Element
 from proofroll.core.errors import NotUnique
@@ -15,8 +16,9 @@ from proofroll.core.events import with_events
 from proofroll.core.observable import Role
 from proofroll.elements.mechanism.contacts.geometry import shared_pairs
 from proofroll.elements.mechanism.contacts.observables import PRESSES, SLIDES
-from proofroll.elements.mechanism.dataset import columns
+from proofroll.elements.mechanism.dataset import UNDETERMINED, columns
 from proofroll.elements.mechanism.element import MechanismElement
+from proofroll.elements.mechanism.link_forces import coarseness
 from proofroll.elements.mechanism.named_forces import FIELDS, named_forces
 from proofroll.elements.mechanism.placed import Placed
 
@@ -30,10 +32,10 @@ _BARS = {
     "energy_change": "energy", "drift": "drift", "gaps": "gap", "slips": "slip", "normal_forces": "pressed",
     "contact_forces": "pressed", "pair_forces": "sums", "penetration": "gap", "contact_pull": "pressed",
     "cone_excess": "pressed",
-    "hop_speed": "slip", "energy_gain": "energy",
+    "hop_speed": "slip", "energy_gain": "energy", "bushing_forces": "links", "bushing_torques": "links",
 }  # fmt: skip
 _POSES = ("p_WB", "v_WB", "w_WB", "q_WB")
-_PREFIXES = {"q.": "q", "v.": "v", "force.": "wrench", "torque.": "wrench"}
+_PREFIXES = {"work.": "work", "q.": "q", "v.": "v", "force.": "wrench", "torque.": "wrench"}
 _PREFIXES |= dict.fromkeys((f"{field}." for field in FIELDS), "named")
 
 
@@ -61,10 +63,10 @@ class MechanismTruth:
         wrench = np.stack([record.wrench[..., :3], record.wrench[..., 3:]], axis=1)
         pressed = np.zeros((len(times), 0, 3)) if motion.pressed is None else motion.pressed
         dataset = columns(
-            element, record.placed(element.mechanism), wrench, pressed, record.named, motion.sums
+            element, record.placed(element.mechanism), wrench, pressed, record.named, motion.sums, UNDETERMINED
         ).dataset()
         points = [point.name for point in element.mechanism.points]
-        of_contacts = {
+        fields_of = {
             f"{kind}.{contact.name}{axis}": field
             for contact in element.mechanism.contacts
             for kind, axes, field in (
@@ -74,15 +76,23 @@ class MechanismTruth:
             )
             for axis in axes
         }
+        fields_of |= {f"force.{spring.name}": "links" for spring in element.mechanism.springs}
+        fields_of |= {
+            f"{kind}.{bushing.name}.{letter}": "links"
+            for bushing in element.mechanism.bushings
+            for kind in ("force", "torque")
+            for letter in "xyz"
+        }
         pairs = shared_pairs(element.mechanism.contacts)
-        of_contacts |= {f"force.{name}.{letter}": "sums" for name in pairs for letter in "xyz"}
+        fields_of |= {f"force.{name}.{letter}": "sums" for name in pairs for letter in "xyz"}
         place, turn, velocity, spin = (motion.bars[field] for field in ("p_WB", "q_WB", "v_WB", "w_WB"))
         # at the end of a body's arm; a quaternion changes by half the angle
         bars = motion.bars | {"gap": place + 2 * element.length * turn}
+        bars["work"] = motion.bars["work"] + coarseness(record.placed(element.mechanism), record.named)
         bars |= {"slip": velocity + element.length * spin + 2 * element.speed * turn}
         for name, variable in dataset.data_vars.items():
             field = (
-                of_contacts.get(str(name))
+                fields_of.get(str(name))
                 or _BARS.get(str(name))
                 or next((v for k, v in _PREFIXES.items() if str(name).startswith(k)), None)
             )
@@ -106,7 +116,9 @@ class MechanismTruth:
             dataset.attrs |= {ENDS: motion.end, ENDED: motion.ended}
         if any(notes):
             dataset.attrs["ill_posed"] = "; ".join(filter(None, notes))
-        return with_events(dataset, motion.events) if element.mechanism.has_events else dataset
+        if not element.mechanism.has_events:
+            return dataset
+        return with_bounces(with_events(dataset, motion.events), motion.bounces)
 
 
 def _laws_alone(element: MechanismElement, times: FloatArray, reason: str) -> xr.Dataset:

@@ -28,6 +28,7 @@ class Constants:
     def __init__(self, parameter: Callable[[int], Any], first: int, number: Callable[[float], Any]) -> None:
         self._parameter, self._first, self._number = parameter, first, number
         self._indices: dict[float, int] = {}
+        self._functions: dict[str, Callable[[Any], Any]] = {}
 
     @property
     def values(self) -> Array:
@@ -44,8 +45,13 @@ class Constants:
         return self._parameter(self._first + self._indices.setdefault(value, len(self._indices)))
 
     def functions(self, names: Mapping[str, Callable[[Any], Any]]) -> dict[str, Callable[[Any], Any]]:
-        """Functions of symbols, from those of expressions."""
-        return {name: self._of_symbols(function) for name, function in names.items()}
+        """Functions of symbols, from those of expressions; symbols know them from then on."""
+        self._functions |= {name: self._of_symbols(function) for name, function in names.items()}
+        return self._functions
+
+    def applied(self, name: str, x: Any) -> Any:
+        """Function of a symbol, by its name."""
+        return self._functions[name](x)
 
     def _of_symbols(self, function: Callable[[Any], Any]) -> Callable[[Any], Any]:
         return lambda x: Symbol(function(self.symbol(x)), self)
@@ -58,6 +64,10 @@ class Symbol:
 
     def __init__(self, expression: Any, constants: Constants) -> None:
         self.expression, self._constants = expression, constants
+
+    def applied(self, name: str) -> Any:
+        """Function of this expression, by its name."""
+        return self._constants.applied(name, self)
 
     def _with(self, other: Any, operation: Callable[[Any, Any], Any]) -> Symbol:
         return Symbol(operation(self.expression, self._constants.symbol(other)), self._constants)

@@ -47,6 +47,7 @@ def stiff(equations: JointCoordinates, until: float) -> bool:
     """True if a damper's time constant is far below the run's length [s] and the fastest swing's period."""
     mechanism = equations.mechanism
     dampers = [item.damping for item in mechanism.springs] + [item.damping for item in mechanism.joints]
+    dampers += [damping for bushing in mechanism.bushings for damping in bushing.damping]
     if not any(dampers + [item.kd for item in mechanism.actuators]):
         return False
     state = np.concatenate(mechanism.start())

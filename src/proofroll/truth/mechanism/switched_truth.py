@@ -1,10 +1,12 @@
 """Truth of a mechanism with friction, stops or effort limits, by two routes that share the root finder of guards."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
 from proofroll.core.errors import Diverged, Refused
+from proofroll.elements.mechanism.commands import has_held
 from proofroll.elements.mechanism.joint import Joint
 from proofroll.elements.mechanism.joint_coordinates import JointCoordinates
 from proofroll.elements.mechanism.model import Mechanism
@@ -26,9 +28,11 @@ from proofroll.truth.mechanism.followed_paths import (
     times_known,
     two_route_motion,
 )
+from proofroll.truth.mechanism.held_route import HeldPath, HeldRoute
 from proofroll.truth.mechanism.joint_switching import SwitchedTree
 from proofroll.truth.mechanism.maximal_coordinates import MaximalCoordinates
 from proofroll.truth.mechanism.natural_units import Units, natural_units
+from proofroll.truth.mechanism.signal_poles import NEAR, first_pole
 from proofroll.truth.mechanism.smooth_truth import find_truth
 
 # rad, natural lengths, or part of a limit: distance from a stop or a limit beyond which it surely does not act; more
@@ -45,6 +49,17 @@ def truth_of(mechanism: Mechanism, times: Array) -> TwoRouteMotion:
         NotUnique: the laws of contact leave more than one motion, or none.
     """
     times, mechanism = np.asarray(times, dtype=float), _with_stops_at_start(mechanism)
+    if (pole := first_pole(mechanism, float(times[-1]))) is None:
+        return _truth_of(mechanism, times)
+    known = times[times < (1 - NEAR) * pole.time]
+    if not len(known):
+        raise Refused(pole.clause)
+    motion = _truth_of(mechanism, known)
+    return motion if motion.ended else replace(motion, end=pole.time, ended=pole.clause)
+
+
+def _truth_of(mechanism: Mechanism, times: Array) -> TwoRouteMotion:
+    """Truth at times at which all formulas have finite values; for errors see :func:`truth_of`."""
     try:
         return contact_truth(mechanism, times) if mechanism.contacts else _without_contacts(mechanism, times)
     except Diverged as stopped:
@@ -54,6 +69,7 @@ def truth_of(mechanism: Mechanism, times: Array) -> TwoRouteMotion:
 def _without_contacts(mechanism: Mechanism, times: Array) -> TwoRouteMotion:
     """Truth of a mechanism without contacts, by the simplest method that covers its switching."""
     equations, kinks = JointCoordinates(mechanism), breaks(mechanism.signals)
+    kinks = kinks or ([0.0] if has_held(mechanism) else [])
     if not (equations.switches or kinks) or mechanism.unmodelled:
         return find_truth(mechanism, times)
     units = natural_units(mechanism)
@@ -109,35 +125,56 @@ def _narrower(mechanism: Mechanism) -> Mechanism:
 
 def _switched(mechanism: Mechanism, units: Units, own: Mechanism, times: Array) -> TwoRouteMotion:
     """Truth at times in natural units; ``own`` is the mechanism in these units."""
-    equations, second = JointCoordinates(own), MaximalCoordinates(own)
+    held = tuple(HeldPath(mechanism, units, own) for _ in range(2)) if has_held(mechanism) else ()
+    plain = [values.own for values in held] or [own, own]
+    equations, second = JointCoordinates(plain[0]), MaximalCoordinates(plain[1])
     check_start(equations, second, units.length)
     tree, bodies = (
         SwitchedTree(equations, TOLERANCES[0]),
         SwitchedBodies(second.lean, equations.switched, TOLERANCES[1]),
     )
     until, kinks = float(times[-1]), breaks(own.signals)
-    paths = followed(tree, bodies, until, kinks)
-    times = times_known(paths, times)
+    routes: tuple[Any, Any] = (tree, bodies)
+    if held:
+        kinks = sorted({*kinks, *held[0].breaks(until)})
+        routes = (
+            HeldRoute(tree, held[0], tree.start, tree.bodies),
+            HeldRoute(bodies, held[1], bodies.start, bodies.bodies),
+        )
+    paths = followed(*routes, until, kinks)
+    if held:
+        paths = routes[0].completed(paths[0]), routes[1].completed(paths[1])
+    if held and any(item.kind == "settle" for item in paths[0].happenings):
+        raise Refused("no route of the truth follows rebounds to their end under held targets yet")
+    times = asked = times_known(paths, times)
+    for values in held:
+        times = values.on_instants(times)
     stretches = paths[0].stretch_at(times)
     others = counterparts(paths, stretches)
-    one, cut = _by_the_tree(tree, paths[0], times), cut_early(tree.early(), paths[0], until, kinks, times)
+    states = states_of(routes[0], paths[0], times, stretches), states_of(routes[1], paths[1], times, others)
+    for values in held:
+        values.finish()
+    one = _by_the_tree(tree, paths[0], times, states[0])
+    cut = None if held else cut_early(tree.early(), paths[0], until, kinks, times)
     modes = [bodies.switched(paths[1].stretches[number].mode) for number in others]
-    two = on_same_turns(own, one, second.recorded(times, states_of(bodies, paths[1], times, others)[:, :-1], modes))
-    routes = ("joint coordinates, DOP853, modes by complementarity", "maximal coordinates, DOP853, modes by trial")
+    two = on_same_turns(own, one, second.recorded(times, states[1][:, :-1], modes))
+    names = ("joint coordinates, DOP853, modes by complementarity", "maximal coordinates, DOP853, modes by trial")
     reason = "a change of the parameters within their accuracy changes which joints hold or hit a stop"
     left = None
     if cut is not None:
-        early = on_same_turns(own, one, _by_the_tree(tree, cut[0], times))
+        sampled = states_of(tree, cut[0], times, cut[0].stretch_at(times))
+        early = on_same_turns(own, one, _by_the_tree(tree, cut[0], times, sampled))
         left = Routed(units.record(mechanism, early)), cut[1]
-    one, two = units.record(mechanism, one), units.record(mechanism, two)
-    return two_route_motion(mechanism, paths, one, two, routes, reason, units, until=until * units.time, cut=left)
+    # samples at instants are at the times that were asked for, to the last bit
+    one, two = (units.record(mechanism, replace(record, time=asked)) for record in (one, two))
+    return two_route_motion(mechanism, paths, one, two, names, reason, units, until=until * units.time, cut=left)
 
 
-def _by_the_tree(tree: SwitchedTree, path: HybridPath[Stretch[Mode]], times: Array) -> Record:
-    """Motion of the first route along a path, in natural units."""
+def _by_the_tree(tree: SwitchedTree, path: HybridPath[Stretch[Mode]], times: Array, states: Array) -> Record:
+    """Motion of the first route along a path with these states, in natural units."""
     stretches, nq = path.stretch_at(times), tree.equations.mechanism.nq
     samples = [
         tree.equations.sample(state[:nq], state[nq:-1], path.stretches[number].mode, float(state[-1]))
-        for state, number in zip(states_of(tree, path, times, stretches), stretches, strict=True)
+        for state, number in zip(states, stretches, strict=True)
     ]
     return record_of(times, samples)
