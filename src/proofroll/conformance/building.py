@@ -108,9 +108,9 @@ def samples_are_well_formed(subject: Subject) -> None:
     """Check: samples hold finite arrays of the right shapes and declared precision; orientations start as identity."""
     start = subject.build()
     (element,) = subject.scene.elements
-    first = start.sample()
-    _well_formed(first, element, "at time 0")
-    orientation = first.q_WB
+    at_start = start.sample()
+    _well_formed(at_start, element, "at time 0")
+    orientation = at_start.q_WB
     # An orientation that can be asked for is relative to the start; any other is checked by the certificate.
     if orientation is not None and "orientation" in element.askable:
         identity = float(np.max(np.abs(np.abs(orientation) - [1, 0, 0, 0])))
@@ -120,27 +120,27 @@ def samples_are_well_formed(subject: Subject) -> None:
     moved = subject.at(subject.span(1)).sample()
     _well_formed(moved, element, "after a step")
     for name in REQUIRED if precision_of(subject.settings) == "double" else ():
-        before, after = (getattr(sample, name) for sample in (first, moved))
+        old_values, new_values = (getattr(sample, name) for sample in (at_start, moved))
         require(
-            not in_single_precision(after[after != before]),
+            not in_single_precision(new_values[new_values != old_values]),
             f"after a step every number of {name} is one of single precision (float32), though settings say double, or "
             f"nothing: {SAY_SINGLE}",
         )
     for name in element.sample_type.widths:
-        lost = getattr(first, name) is not None and getattr(moved, name) is None
+        lost = getattr(at_start, name) is not None and getattr(moved, name) is None
         require(not lost, f"{name} is there at time 0, and not later; only time 0 may lack one")
 
 
 def _well_formed(sample: Sample, element: Element, when: str) -> None:
-    wanted, bodies = element.sample_type, len(element.bodies)
-    require(isinstance(sample, wanted), f"sample() gave {type(sample).__name__} instead of {wanted.__name__} {when}")
-    one = bodies == 1 and np.ndim(sample.p_WB) == np.ndim(sample.v_WB) == 1  # one body needs no axis of bodies
-    for name, size in wanted.widths.items():
+    kind, bodies = element.sample_type, len(element.bodies)
+    require(isinstance(sample, kind), f"sample() gave {type(sample).__name__} instead of {kind.__name__} {when}")
+    single = bodies == 1 and np.ndim(sample.p_WB) == np.ndim(sample.v_WB) == 1  # one body needs no axis of bodies
+    for name, size in kind.widths.items():
         value = getattr(sample, name)
         if value is None and name not in REQUIRED:
             continue
         require(isinstance(value, np.ndarray), f"{name} is {type(value).__name__} instead of an array {when}")
-        shape = (size,) if one else (bodies, size)
+        shape = (size,) if single else (bodies, size)
         require(value.shape == shape, f"{name} has the shape {value.shape} instead of {shape} {when}")
         require(value.dtype == np.float64, f"{name} is of type {value.dtype} instead of float64 {when}")
         require(np.all(np.isfinite(value)), f"{name} is {value} {when}")
@@ -152,14 +152,14 @@ def _well_formed(sample: Sample, element: Element, when: str) -> None:
 def reading_back_changes_nothing(subject: Subject) -> None:
     """Check: ``built()`` and ``sample()`` are repeatable and change nothing, and later steps change no sample."""
     engine = subject.build()
-    first = engine.sample()
-    before = bits(first)
+    sample = engine.sample()
+    old_bits = bits(sample)
     engine.built()
     engine.built()
-    require(bits(engine.sample()) == before, "sample() gives other numbers after built()")
+    require(bits(engine.sample()) == old_bits, "sample() gives other numbers after built()")
     t = subject.span(1)
     engine.advance(t)
     # A shared buffer may be overwritten only by the next sample, of this engine or of another one.
     moved, alone = bits(engine.sample()), bits(subject.at(t).sample())
-    require(bits(first) == before, "the arrays of a sample change with later steps: return copies")
+    require(bits(sample) == old_bits, "the arrays of a sample change with later steps: return copies")
     require(moved == alone, "a run whose engine was sampled at time 0 ends elsewhere than one that was not")

@@ -113,20 +113,20 @@ def failure_text(error: Exception) -> str:
     return str(error) if isinstance(error, AssertionError) else f"{type(error).__name__}: {error}"
 
 
-def checks(engine: Any, known: Mapping[str, str] | None = None, *, apart: bool = False) -> list[Check]:
+def checks(engine: Any, accepted: Mapping[str, str] | None = None, *, apart: bool = False) -> list[Check]:
     """All checks of an engine: those of each formulation on all scenes whose requirements it provides.
 
     Args:
         engine: the engine's class.
-        known: names of checks that are known to fail -> reason; ``*`` stands for any text, as in
+        accepted: names of checks that are known to fail -> reason; ``*`` stands for any text, as in
             ``order_is_as_declared[free-*]``. A name that fits no check, or whose check passes, is an error.
         apart: True to run the checks of each formulation and preset in a separate process, for an engine that changes
             settings of its whole process, as JAX its precision; the class must be importable by its name.
 
     Raises:
-        ValueError: a name in ``known`` fits no check.
+        ValueError: a name in ``accepted`` fits no check.
     """
-    patterns = dict(known or {})
+    patterns = dict(accepted or {})
     all_runs = runs(engine)
     if apart:
         all_runs = ((name, partial(_run_apart, engine, name)) for name, _ in all_runs)
@@ -150,7 +150,7 @@ def _run_apart(engine: Any, name: str) -> None:
         how, text = _processes[key].submit(_outcome, engine, name).result()
     except BrokenProcessPool:
         del _processes[key]
-        raise AssertionError("its process ended without a word, as an engine's own crash ends it") from None
+        raise AssertionError("its process ended without a message, as after a crash of the engine") from None
     if how == _SKIPPED:
         raise SkipTest(text)
     if how == _FAILED:
@@ -194,9 +194,9 @@ def runs(engine: Any) -> Iterator[tuple[str, Callable[[], None]]]:
     for formulation, presets in engine.presets.items():
         for preset, settings in presets.items():
             # Checks of the adapter come first: their failures may cause those of the motion.
-            first = cache(partial(_first, engine, settings))
+            start = cache(partial(_first, engine, settings))
             for check in _OF_PRESETS:
-                yield f"{check.__name__}[{formulation}-{preset}]", partial(_on_first, first, check)
+                yield f"{check.__name__}[{formulation}-{preset}]", partial(_on_first, start, check)
             for own_scenes, of_found in ((scenes(), _OF_SCENES), (truth_scenes(), _OF_TRUTHS)):
                 for (name, scene), check in itertools.product(own_scenes.items(), of_found):
                     if not checked_on(engine, formulation, scene):
@@ -217,8 +217,8 @@ def _first(engine: Any, settings: Any) -> Subject | None:
     return None
 
 
-def _on_first(first: Callable[[], Subject | None], check: Callable[[Subject], None]) -> None:
-    subject = first()
+def _on_first(start: Callable[[], Subject | None], check: Callable[[Subject], None]) -> None:
+    subject = start()
     if subject is None:
         raise SkipTest("every scene is refused")
     check(subject)

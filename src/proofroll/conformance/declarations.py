@@ -64,33 +64,33 @@ def presets_are_complete(engine: Any) -> None:
         unknown = set(presets) - {"default", "matched", "tuned"}
         require(not unknown, f"{formulation} has the preset {unknown}; only default, matched and tuned have a meaning")
         for preset, settings in presets.items():
-            where = f"presets[{formulation!r}][{preset!r}]"
-            require(settings.formulation == formulation, f"{where}.formulation is {settings.formulation!r}")
-            require(settings.preset == preset, f"{where}.preset is {settings.preset!r}")
+            place = f"presets[{formulation!r}][{preset!r}]"
+            require(settings.formulation == formulation, f"{place}.formulation is {settings.formulation!r}")
+            require(settings.preset == preset, f"{place}.preset is {settings.preset!r}")
             again = resolve_settings(engine, json.loads(json.dumps(dataclasses.asdict(settings))))
-            require(again == settings, f"{where} is {again} after it was written as JSON and read")
+            require(again == settings, f"{place} is {again} after it was written as JSON and read")
 
 
 def resolution_and_order_are_told(engine: Any) -> None:
     """Check: each preset names the setting that trades speed for accuracy, if any; only a step has an order."""
     for formulation, presets in engine.presets.items():
         for preset, settings in presets.items():
-            where = f"presets[{formulation!r}][{preset!r}]"
+            place = f"presets[{formulation!r}][{preset!r}]"
             if settings.resolution is None:
-                require(settings.order is None, f"{where}.order is {settings.order!r}; without a step there is none")
+                require(settings.order is None, f"{place}.order is {settings.order!r}; without a step there is none")
                 continue
             require(
-                settings.resolution in {"dt", "rtol"}, f"{where}.resolution is {settings.resolution!r}, not dt or rtol"
+                settings.resolution in {"dt", "rtol"}, f"{place}.resolution is {settings.resolution!r}, not dt or rtol"
             )
             value = getattr(settings, settings.resolution, None)
             usable = isinstance(value, float) and math.isfinite(value) and value > 0
-            require(usable, f"{where}.{settings.resolution} is {value!r} instead of a positive number")
+            require(usable, f"{place}.{settings.resolution} is {value!r} instead of a positive number")
             order = settings.order
             if settings.resolution == "dt":
                 whole = isinstance(order, int) and not isinstance(order, bool) and order > 0
-                require(whole or order is None, f"{where}.order is {order!r}, neither a whole order nor None")
+                require(whole or order is None, f"{place}.order is {order!r}, neither a whole order nor None")
             else:
-                require(order is None, f"{where}.order is {order!r}; with a tolerance there is none")
+                require(order is None, f"{place}.order is {order!r}; with a tolerance there is none")
 
 
 def precision_is_told(engine: Any) -> None:
@@ -98,14 +98,14 @@ def precision_is_told(engine: Any) -> None:
     for formulation, presets in engine.presets.items():
         for preset, settings in presets.items():
             declared = getattr(settings, "precision", "double")
-            where = f"presets[{formulation!r}][{preset!r}].precision"
-            require(declared in EPSILON, f"{where} is {declared!r}, not single or double")
+            place = f"presets[{formulation!r}][{preset!r}].precision"
+            require(declared in EPSILON, f"{place} is {declared!r}, not single or double")
 
 
 def bad_settings_give_one_line(engine: Any) -> None:
     """Check: an unknown or invalid setting gives one line with its name, not a traceback."""
-    first = next(iter(next(iter(engine.presets.values())).values()))
-    chosen, resolution = {"formulation": first.formulation, "preset": first.preset}, first.resolution
+    preset = next(iter(next(iter(engine.presets.values())).values()))
+    chosen, resolution = {"formulation": preset.formulation, "preset": preset.preset}, preset.resolution
     bad: list[tuple[str, object]] = [("no_such_setting", 1), ("formulation", "no_such"), ("preset", "no_such")]
     if resolution is not None:
         bad += [(resolution, value) for value in (0, -1.0, math.nan, math.inf, "text", None)]

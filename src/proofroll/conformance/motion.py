@@ -41,8 +41,8 @@ _DEARER = 10.0
 def advance_is_repeatable(subject: Subject) -> None:
     """Check: the same scene built twice moves the same, to the last bit."""
     t = subject.span(1)
-    first, second = subject.at(t).sample(), subject.at(t).sample()
-    require(bits(first) == bits(second), f"two runs of one scene differ by {subject.distance(first, second):.2g}")
+    sample, repeated = subject.at(t).sample(), subject.at(t).sample()
+    require(bits(sample) == bits(repeated), f"two runs of one scene differ by {subject.distance(sample, repeated):.2g}")
 
 
 def advance_in_two_parts(subject: Subject) -> None:
@@ -106,9 +106,9 @@ def _seconds(subject: Subject, short: float, long: float) -> tuple[float, ...]:
 def engines_do_not_disturb_each_other(subject: Subject) -> None:
     """Check: two engines alive at once, if possible with different scenes, move as they do alone."""
     t = subject.span(2)
-    other = _other(subject)
-    alone = [bits(each.at(t).sample()) for each in (subject, other)]
-    together = [subject.build(), other.build()]
+    neighbour = _other(subject)
+    alone = [bits(item.at(t).sample()) for item in (subject, neighbour)]
+    together = [subject.build(), neighbour.build()]
     for engine in together:
         engine.advance(t)
     for name, engine, expected in zip(("first", "second"), together, alone, strict=True):
@@ -118,11 +118,11 @@ def engines_do_not_disturb_each_other(subject: Subject) -> None:
 def _other(subject: Subject) -> Subject:
     """The engine on another scene that it represents; if there is none, the same subject."""
     for scene in [*truth_scenes().values(), *scenes().values()]:
-        other = replace(subject, scene=scene)
+        neighbour = replace(subject, scene=scene)
         if scene.digest != subject.scene.digest and checked_on(subject.engine, subject.settings.formulation, scene):
             with suppress(SkipTest):
-                other.build()
-                return other
+                neighbour.build()
+                return neighbour
     return subject
 
 
@@ -131,32 +131,34 @@ def velocities_are_the_rates(subject: Subject) -> None:
     start = subject.span(1)
     h = subject.span(1, at_least=1e-4)
     engine = subject.at(start)
-    before = engine.sample()
+    early = engine.sample()
     engine.advance(start + h)
-    after = engine.sample()
+    late = engine.sample()
     # differences of two rounded positions and orientations over a short time
     roundings = ROUNDINGS * subject.epsilon / h
-    rounding = {"v_WB": roundings * max(1.0, float(np.max(np.abs(after.p_WB)))), "w_WB": roundings}
-    for name, rate, one, other in (
-        ("v_WB", (after.p_WB - before.p_WB) / h, before.v_WB, after.v_WB),
-        ("w_WB", _spin(before.q_WB, after.q_WB, h), before.w_WB, after.w_WB),
+    rounding = {"v_WB": roundings * max(1.0, float(np.max(np.abs(late.p_WB)))), "w_WB": roundings}
+    for name, rate, start_value, end_value in (
+        ("v_WB", (late.p_WB - early.p_WB) / h, early.v_WB, late.v_WB),
+        ("w_WB", _spin(early.q_WB, late.q_WB, h), early.w_WB, late.w_WB),
     ):
         if rate is None:
             continue
-        mean = (one + other) / 2
+        mean = (start_value + end_value) / 2
         # A semi-implicit step moves with the velocity at one of its ends, the trapezoidal rule has an error of
         # (ω h)²/12, and a soft contact may vibrate with its step.
-        allowed = float(np.linalg.norm(other - one)) / 2 + 1e-2 * float(np.linalg.norm(mean)) + rounding[name]
+        allowed = (
+            float(np.linalg.norm(end_value - start_value)) / 2 + 1e-2 * float(np.linalg.norm(mean)) + rounding[name]
+        )
         difference = float(np.linalg.norm(rate - mean))
         require(difference <= allowed, f"{name} is {mean}, but the state changes at the rate {rate}")
 
 
-def _spin(before: object, after: object, h: float) -> np.ndarray | None:
+def _spin(start_q: object, end_q: object, h: float) -> np.ndarray | None:
     """Mean angular velocity in the world [rad/s] between orientations ``h`` [s] apart, or None without any."""
-    if before is None or after is None:
+    if start_q is None or end_q is None:
         return None
-    one, other = (Rotation.from_quat(np.asarray(q), scalar_first=True) for q in (before, after))
-    return np.asarray((other * one.inv()).as_rotvec() / h)
+    start_turn, end_turn = (Rotation.from_quat(np.asarray(q), scalar_first=True) for q in (start_q, end_q))
+    return np.asarray((end_turn * start_turn.inv()).as_rotvec() / h)
 
 
 def order_is_as_declared(subject: Subject) -> None:
@@ -170,19 +172,21 @@ def order_is_as_declared(subject: Subject) -> None:
     # A step may be so short that only round-off is left, or so long that no order shows yet. The search decides that
     # without using the declared order.
     while _FINEST <= factor <= _COARSEST and factor not in seen:
-        first, second = _orders(subject, end, factor)
+        coarse_order, fine_order = _orders(subject, end, factor)
         dt = subject.settings.dt * factor
-        round_off = math.isnan(second)
-        seen[factor] = f"{'no more than round-off' if round_off else f'{first:.2f}, {second:.2f}'} at dt = {dt:g}"
+        round_off = math.isnan(fine_order)
+        seen[factor] = (
+            f"{'no more than round-off' if round_off else f'{coarse_order:.2f}, {fine_order:.2f}'} at dt = {dt:g}"
+        )
         exact &= round_off
         if round_off:
             factor *= 2
-        elif abs(first - second) > _SETTLED:
+        elif abs(coarse_order - fine_order) > _SETTLED:
             factor /= 2
         else:
             require(
-                abs(second - declared) <= _ORDER_TOLERANCE,
-                f"the declared order is {declared}, the observed one {second:.2f} at dt = {dt:g}",
+                abs(fine_order - declared) <= _ORDER_TOLERANCE,
+                f"the declared order is {declared}, the observed one {fine_order:.2f} at dt = {dt:g}",
             )
             return
     if exact:

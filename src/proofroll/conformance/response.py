@@ -65,7 +65,7 @@ def moves_as_the_truth(subject: Subject) -> None:
     beside = _beside_events(subject.scene, step or 0.0, true)
     for name, values in moved.items():
         error, change = (
-            float(np.max(np.abs(values - other))) / sizes[name] for other in (true[name].to_numpy()[1:], finer[name])
+            float(np.max(np.abs(values - exact))) / sizes[name] for exact in (true[name].to_numpy()[1:], finer[name])
         )
         # Round-off is relative to the value, which may be many times its change by gravity.
         size = float(np.max(np.abs(true[name].to_numpy()))) / sizes[name]
@@ -108,11 +108,11 @@ def _sizes(scene: Scene, length: float, true: xr.Dataset) -> dict[str, float]:
         start = element.first_motion
         pull = (start.pull or start.scale) if start else element.length / element.natural_time**2
         fall = pull * length
-        own = {"p_WB": fall * length / 2, "v_WB": fall, "w_WB": fall / element.length}
-        responses |= {scene.label(element, name): size for name, size in own.items()}
-    wanted = [name for name, item in scene.observables.items() if item.role == Role.REACTION and item.headline]
+        lengths = {"p_WB": fall * length / 2, "v_WB": fall, "w_WB": fall / element.length}
+        responses |= {scene.label(element, name): size for name, size in lengths.items()}
+    names = [name for name, item in scene.observables.items() if item.role == Role.REACTION and item.headline]
     sizes = scales(scene, true)
-    return {name: size for name, size in (responses | {name: sizes[name] for name in wanted}).items() if name in true}
+    return {name: size for name, size in (responses | {name: sizes[name] for name in names}).items() if name in true}
 
 
 def _beside_events(scene: Scene, step: float, true: xr.Dataset) -> dict[str, float]:
@@ -123,14 +123,16 @@ def _beside_events(scene: Scene, step: float, true: xr.Dataset) -> dict[str, flo
     """
     distances: dict[str, float] = {}
     for element in scene.elements:
-        at = np.array([event.time for event in events_of(part(scene, element, true)) if event.time > _MOMENT])
-        if not at.size or not step:
+        times_of_events = np.array(
+            [event.time for event in events_of(part(scene, element, true)) if event.time > _MOMENT]
+        )
+        if not times_of_events.size or not step:
             continue
-        around = np.unique([0.0, *(at - _MOMENT), *(at + _MOMENT)])
-        own = part(scene, element, _trajectory(scene.digest, tuple(around.tolist())))
-        before, after = (np.searchsorted(around, at + moment) for moment in (-_MOMENT, _MOMENT))
-        rates = {name: own[name].to_numpy() for name in ("v_WB", "w_WB") if name in own}
-        jumps = {name: float(np.max(np.abs(values[after] - values[before]))) for name, values in rates.items()}
+        around = np.unique([0.0, *(times_of_events - _MOMENT), *(times_of_events + _MOMENT)])
+        values_around = part(scene, element, _trajectory(scene.digest, tuple(around.tolist())))
+        early, late = (np.searchsorted(around, times_of_events + moment) for moment in (-_MOMENT, _MOMENT))
+        rates = {name: values_around[name].to_numpy() for name in ("v_WB", "w_WB") if name in values_around}
+        jumps = {name: float(np.max(np.abs(values[late] - values[early]))) for name, values in rates.items()}
         if "v_WB" in rates:
             turn = step * float(np.max(np.abs(rates["v_WB"]))) / element.length
             errors = {"p_WB": step * jumps["v_WB"], **{name: turn * jump for name, jump in jumps.items()}}

@@ -136,9 +136,9 @@ class Subject:
             )
         return max(distance, ROUNDINGS * self.epsilon)
 
-    def distance(self, one: Sample, other: Sample) -> float:
+    def distance(self, sample: Sample, rival: Sample) -> float:
         """Largest difference of two states, in units of the scene (:meth:`scaled`)."""
-        return float(np.max(np.abs(self.scaled(one) - self.scaled(other))))
+        return float(np.max(np.abs(self.scaled(sample) - self.scaled(rival))))
 
     def scaled(self, sample: Sample) -> FloatArray:
         """Position, velocity and angular velocity of a sample in units of the scene, shape (numbers,)."""

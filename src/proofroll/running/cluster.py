@@ -24,7 +24,7 @@ from typing import Any, TypeVar
 from proofroll.core.errors import InputError, Missing, ProofrollError
 from proofroll.files.data_folders import data_folder
 from proofroll.files.scene_file import read_scene_file, scene_folder
-from proofroll.files.scene_sources import source_of
+from proofroll.files.scene_sources import parts_of, source_of
 from proofroll.running import cluster_task
 from proofroll.running.case import Case, Result, Status
 from proofroll.running.memory import VARIABLE, memory_limit
@@ -66,8 +66,8 @@ class Cluster:
         memory = memory_limit() if VARIABLE in os.environ else None
         self._asked = cluster_task.Asked(uuid.uuid4().hex[:12], cluster_task.installed(), memory)
         self._task = task
-        self._client, own = _connected(address)
-        self._close = weakref.finalize(self, _end, self._client, own, self._asked.command)
+        self._client, started = _connected(address)
+        self._close = weakref.finalize(self, _end, self._client, started, self._asked.command)
         self._room = threading.Condition()
         self._sent: dict[Any, tuple[Case, Arrived]] = {}
         self._threads, self._counted = 0, -_COUNTED
@@ -196,8 +196,8 @@ class Cluster:
             if not isinstance(error, KilledWorker):
                 failed(self._gone(error))
             elif len(sent) > 1:  # one of them killed its workers: find it by fetching each alone
-                for one in sent:
-                    self._fetch([one], failed)
+                for sent_future in sent:
+                    self._fetch([sent_future], failed)
             else:
                 lost = f"each of {error.allowed_failures + 1} workers of the cluster that ran it was lost"
                 ((_, case, arrived),) = sent
@@ -232,11 +232,15 @@ def _made(content: dict[str, Any], data: bytes | None, path: Path) -> Result:
 def _files(case: Case) -> dict[str, bytes]:
     """Files of a scene that is not part of proofroll, by name, to be sent to the workers; its folder or robot file."""
     if (source := source_of(case.scene)) is not None:
+        if parts_of(case.scene)[1]:
+            raise InputError(
+                "--scheduler", case.scene, "a controller's file is not sent to other machines; leave it out"
+            )
         return {source[1].name: source[1].read_bytes()}
     if not case.scene or (folder := scene_folder(case.scene)).parent == data_folder("models"):
         return {}
-    own = {"scene.toml": (folder / "scene.toml").read_bytes()}
-    return own | {name: (folder / name).read_bytes() for name in read_scene_file(case.scene).files}
+    contents = {"scene.toml": (folder / "scene.toml").read_bytes()}
+    return contents | {name: (folder / name).read_bytes() for name in read_scene_file(case.scene).files}
 
 
 def _connected(address: str) -> tuple[Any, Any]:
@@ -261,24 +265,24 @@ def _connected(address: str) -> tuple[Any, Any]:
         if not count:
             raise InputError("--scheduler", address, "give at least one worker: local:1")
         with interrupt_held():
-            own = LocalCluster(
+            started = LocalCluster(
                 n_workers=count,
                 threads_per_worker=1,
                 dashboard_address="127.0.0.1:0",
                 memory_limit=None,
                 silence_logs=logging.CRITICAL + 1,
             )
-            return Client(own, timeout=_STARTS, set_as_default=False), own
+            return Client(started, timeout=_STARTS, set_as_default=False), started
     except (OSError, ValueError) as error:
         text = " ".join(str(error).split())[:120]
         raise InputError("--scheduler", address, f"no Dask scheduler answers there ({text})") from None
 
 
-def _end(client: Any, own: Any, command: str) -> None:
+def _end(client: Any, started: Any, command: str) -> None:
     """Disconnects from a cluster, after ending the command's processes there or the cluster that was started here."""
     with contextlib.suppress(Exception):
-        if client.status == "running" and own is None:
+        if client.status == "running" and started is None:
             client.run(cluster_task.end, command, on_error="ignore")
         client.close(timeout=_PATIENCE)
-        if own is not None:
-            own.close(timeout=_PATIENCE)
+        if started is not None:
+            started.close(timeout=_PATIENCE)

@@ -70,8 +70,8 @@ def installed() -> dict[str, str]:
         if extra is None or extra[1] in extras:
             names.add(distribution_of(text))
     root = Path(proofroll.__file__).parent
-    own = {"python": platform.python_version(), "proofroll's code": digest([root / "engines", root / "truth"])}
-    return own | dict.fromkeys(sorted(names, key=str.lower), "absent") | versions_of(names)
+    packages = {"python": platform.python_version(), "proofroll's code": digest([root / "engines", root / "truth"])}
+    return packages | dict.fromkeys(sorted(names, key=str.lower), "absent") | versions_of(names)
 
 
 def run_case(asked: Asked, content: dict[str, Any], files: Mapping[str, bytes]) -> tuple[dict[str, Any], bytes | None]:
@@ -141,12 +141,17 @@ def end(command: str) -> None:
 def _workers_of(asked: Asked) -> Workers:
     """Processes of a command, after its versions were compared; closes those of the longest unused commands."""
     with _lock:
-        known = asked.command in _workers
-    if not known:
-        own = installed()
-        other = [name for name in {**asked.installed, **own} if asked.installed.get(name) != own.get(name)]
-        if other:
-            raise unfit(*({name: known.get(name, "absent") for name in other} for known in (asked.installed, own)))
+        is_running = asked.command in _workers
+    if not is_running:
+        here = installed()
+        differing = [name for name in {**asked.installed, **here} if asked.installed.get(name) != here.get(name)]
+        if differing:
+            raise unfit(
+                *(
+                    {name: is_running.get(name, "absent") for name in differing}
+                    for is_running in (asked.installed, here)
+                )
+            )
     with _lock:
         workers = _workers.setdefault(asked.command, Workers(asked.memory, _ENGINES))
         _workers.move_to_end(asked.command)
@@ -159,8 +164,8 @@ def _workers_of(asked: Asked) -> Workers:
 def _check(asked: Asked, case: Case, workers: Workers) -> None:
     """Raises Unfit unless the engine, with all that decides its results, and the scene are the same on this machine."""
     engine = case.engine
-    known = asked.command, engine.name, engine.code
-    if known not in _same:
+    key = asked.command, engine.name, engine.code
+    if key not in _same:
         (facts,) = resolve([(engine.name, engine.settings)], workers)
         if isinstance(facts, EngineFacts):
             there = {engine.name: f"{facts.version} (code {facts.code})"}
@@ -171,7 +176,7 @@ def _check(asked: Asked, case: Case, workers: Workers) -> None:
         here = {engine.name: f"{engine.version} (code {engine.code})"}
         if here != there:
             raise unfit(here, there)
-        _same.add(known)
+        _same.add(key)
     digest = load_scene(case.scene, asks=case.asks, **case.parameters).digest
     if digest != case.scene_digest:
         raise unfit({f"scene {case.scene}": case.scene_digest}, {f"scene {case.scene}": digest})
@@ -179,6 +184,10 @@ def _check(asked: Asked, case: Case, workers: Workers) -> None:
 
 def unfit(here: Mapping[str, str], there: Mapping[str, str]) -> Unfit:
     """Error that names the differing versions: ``here`` on the command's machine, ``there`` on this one."""
-    one, other = (", ".join(f"{name} {value}" for name, value in versions.items()) for versions in (here, there))
-    fault = f"a worker of the cluster, on {socket.gethostname()}, has other versions: here {one}; there {other}"
+    here_text, there_text = (
+        ", ".join(f"{name} {value}" for name, value in versions.items()) for versions in (here, there)
+    )
+    fault = (
+        f"a worker of the cluster, on {socket.gethostname()}, has other versions: here {here_text}; there {there_text}"
+    )
     return Unfit(f"{fault}; install the same on both")

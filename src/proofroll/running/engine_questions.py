@@ -148,8 +148,8 @@ def lent_workers(workers: Workers | None) -> Iterator[Workers]:
     if workers is not None:
         yield workers
         return
-    own = Workers()
+    new_workers = Workers()
     try:
-        yield own
+        yield new_workers
     finally:
-        own.close()
+        new_workers.close()

@@ -80,13 +80,13 @@ def find(name: str, label: str) -> Environment | None:
 
 def shown_name(engine: str) -> str:
     """Short ``NAME@PLACE``: a path of a Python becomes the label of its environment, or the name of its folder."""
-    name, where = plain_name(engine), place_of(engine)
-    if os.sep not in where:
+    name, place = plain_name(engine), place_of(engine)
+    if os.sep not in place:
         return engine
-    path = Path(os.path.abspath(Path(where).expanduser()))
-    known = (item.label for item in remembered() if path in {item.python, item.folder / "venv"})
+    path = Path(os.path.abspath(Path(place).expanduser()))
+    labels = (item.label for item in remembered() if path in {item.python, item.folder / "venv"})
     folder = path.parent.parent if path.parent.name == "bin" else path
-    return f"{name}@{next(known, folder.name)}"
+    return f"{name}@{next(labels, folder.name)}"
 
 
 def folder_of(name: str, label: str) -> Path:
@@ -103,10 +103,10 @@ def remove(engine: str) -> None:
         InputError: there is none.
         ProofrollError: the folder cannot be deleted.
     """
-    known = [f"{item.name}@{item.label}" for item in remembered()]
+    labels = [f"{item.name}@{item.label}" for item in remembered()]
     folder = folder_of(plain_name(engine), place_of(engine)) if place_of(engine) else None
     if folder is None or not folder.is_dir():
-        there_are = f"choose from {choices(known)}" if known else "there is none"
+        there_are = f"choose from {choices(labels)}" if labels else "there is none"
         raise InputError("environment", engine, f"no such environment is remembered; {there_are}")
     with making(folder):
         delete(folder)

@@ -106,8 +106,8 @@ def used(settings: Any) -> dict[str, Any]:
 
 def truth_version() -> str:
     """Versions of proofroll and of the libraries that integrate the truth."""
-    known = {"proofroll": proofroll.__version__} | versions_of(("numpy", "scipy", "heyoka"), version_of)
-    return ", ".join(f"{name} {version}" for name, version in known.items())
+    packages = {"proofroll": proofroll.__version__} | versions_of(("numpy", "scipy", "heyoka"), version_of)
+    return ", ".join(f"{name} {version}" for name, version in packages.items())
 
 
 def libraries(engine: str) -> dict[str, str]:

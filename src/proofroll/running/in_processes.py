@@ -25,8 +25,8 @@ def in_processes(function: Callable[[Item], Found], items: Sequence[Item], worke
             # Not pool.map: when interrupted it cancels the rest, and the pool complains when its processes are killed.
             with interrupt_held():
                 futures = [pool.submit(function, item) for item in items]
-            for one in futures:
-                yield one.result()
+            for future in futures:
+                yield future.result()
         except BaseException:
             for process in active_children():
                 process.kill()

@@ -83,8 +83,8 @@ def python_at(engine: str) -> Path:
         return remembered.python
     command = shutil.which(place)
     if command is None:
-        known = choices(item.label for item in environments.remembered() if item.name == name)
-        there_are = f"there are {known}" if known else "there is none of this engine"
+        labels = choices(item.label for item in environments.remembered() if item.name == name)
+        there_are = f"there are {labels}" if labels else "there is none of this engine"
         advice = f"no environment has this label ({there_are}); {_install(engine)}"
         raise InputError("engine", engine, advice)
     return Path(command)

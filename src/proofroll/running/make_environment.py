@@ -102,14 +102,14 @@ def _require_plausible(name: str, requirements: Sequence[str]) -> None:
 
     An engine that nothing here announces may come with a requirement; not with the package of a known engine.
     """
-    known = engine_names()
-    packages = {package_of(item) or item for item in known}
-    if name in known or not (
-        get_close_matches(name, known) or all(distribution_of(text.strip()) in packages for text in requirements)
+    names = engine_names()
+    packages = {package_of(item) or item for item in names}
+    if name in names or not (
+        get_close_matches(name, names) or all(distribution_of(text.strip()) in packages for text in requirements)
     ):
         return
     advice = (
-        f"there is no such engine; choose one of {', '.join(known)}, or install the package that announces it here, too"
+        f"there is no such engine; choose one of {', '.join(names)}, or install the package that announces it here, too"
     )
     raise InputError("engine", name, advice)
 
@@ -146,12 +146,12 @@ def _made(
 ) -> Environment:
     venv = folder / "venv"
     with tempfile.TemporaryDirectory() as wheels:
-        wanted = [*_carried(name, Path(wheels)), *requirements]
+        asked = [*_carried(name, Path(wheels)), *requirements]
         tell(f"making {venv}")
         uv = shutil.which("uv")
         try:
             if uv:
-                _install_by_uv(uv, venv, base, wanted, tell)
+                _install_by_uv(uv, venv, base, asked, tell)
             else:
                 raise ProofrollError("there is no uv")
         except ProofrollError as error:
@@ -159,7 +159,7 @@ def _made(
                 tell(f"{error}; trying pip")
             environments.delete(folder)
             folder.mkdir(parents=True)
-            _install_by_pip(venv, base, wanted, tell)
+            _install_by_pip(venv, base, asked, tell)
     tell(f"importing {name}")
     python = venv / "bin" / "python"
     try:
@@ -171,7 +171,7 @@ def _made(
     return Environment(name, label, folder, version, list(requirements), interpreter, packages)
 
 
-def _install_by_pip(venv: Path, base: Path, wanted: Sequence[str], tell: Callable[[str], None]) -> None:
+def _install_by_pip(venv: Path, base: Path, packages: Sequence[str], tell: Callable[[str], None]) -> None:
     """Installs packages into the environment by pip.
 
     The pip of this Python serves if the environment has the same Python; otherwise one is installed there first.
@@ -184,14 +184,14 @@ def _install_by_pip(venv: Path, base: Path, wanted: Sequence[str], tell: Callabl
         _call([base, "-m", "venv", venv])
         command = [target, "-m", "pip"]
     tell("installing by pip")
-    _call([*command, "install", "--quiet", "--only-binary", ":all:", *wanted])
+    _call([*command, "install", "--quiet", "--only-binary", ":all:", *packages])
 
 
-def _install_by_uv(uv: str, venv: Path, base: Path, wanted: Sequence[str], tell: Callable[[str], None]) -> None:
+def _install_by_uv(uv: str, venv: Path, base: Path, packages: Sequence[str], tell: Callable[[str], None]) -> None:
     _call([uv, "venv", "--quiet", "--python", base, venv])
     tell("installing by uv")
     target = str(venv / "bin" / "python")
-    _call([uv, "pip", "install", "--quiet", "--python", target, "--only-binary", ":all:", *wanted])
+    _call([uv, "pip", "install", "--quiet", "--python", target, "--only-binary", ":all:", *packages])
 
 
 def _interpreter(python: str) -> Path:

@@ -16,8 +16,8 @@ from proofroll.core.scene import Scene
 
 def versions(engine: str, version: str) -> dict[str, str]:
     """Versions of the engine, of proofroll, Python, numpy and scipy."""
-    own = {"proofroll": proofroll.__version__, "python": platform.python_version()}
-    return {engine: version} | own | {name: version_of(name) for name in ("numpy", "scipy")}
+    packages = {"proofroll": proofroll.__version__, "python": platform.python_version()}
+    return {engine: version} | packages | {name: version_of(name) for name in ("numpy", "scipy")}
 
 
 # Version of an installed package; cached, as reading it takes a millisecond and every run needs it.
@@ -26,11 +26,11 @@ version_of = cache(metadata.version)
 
 def versions_of(names: Iterable[str], read: Callable[[str], str] = metadata.version) -> dict[str, str]:
     """Versions of those of the named packages that are installed, each by ``read``."""
-    known = {}
+    found_versions = {}
     for name in names:
         with contextlib.suppress(metadata.PackageNotFoundError):
-            known[name] = read(name)
-    return known
+            found_versions[name] = read(name)
+    return found_versions
 
 
 def manifest(

@@ -44,9 +44,9 @@ def memory_limit() -> float:
 def resident_gb(process: int) -> float:
     """Resident memory of a process and its descendants [GB]; 0 where the system has no ``/proc``."""
     pages = 0
-    for one in (process, *descendants(process)):
+    for member in (process, *descendants(process)):
         with contextlib.suppress(OSError, ValueError, IndexError):  # it has just ended
-            pages += int(Path(f"/proc/{one}/statm").read_text(encoding="ascii").split()[1])
+            pages += int(Path(f"/proc/{member}/statm").read_text(encoding="ascii").split()[1])
     return pages * os.sysconf("SC_PAGE_SIZE") / GB
 
 

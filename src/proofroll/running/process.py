@@ -62,8 +62,8 @@ def status_of(error: ProofrollError) -> Status:
     """Status of a case whose engine gave this error in place of a result."""
     if isinstance(error, WorkerDied):
         return error.status
-    known = {InputError: Status.REFUSED, Missing: Status.MISSING}
-    return next((status for kind, status in known.items() if isinstance(error, kind)), Status.CRASHED)
+    statuses = {InputError: Status.REFUSED, Missing: Status.MISSING}
+    return next((status for kind, status in statuses.items() if isinstance(error, kind)), Status.CRASHED)
 
 
 def end_all() -> None:
@@ -311,9 +311,9 @@ def _starved(process: int) -> float:
     time less this one still ends it. 0 where the system does not count.
     """
     longest = 0
-    for one in (process, *descendants(process)):
+    for member in (process, *descendants(process)):
         with contextlib.suppress(OSError, ValueError, IndexError):  # it has just ended, or there is no such file
-            for task in Path(f"/proc/{one}/task").iterdir():
+            for task in Path(f"/proc/{member}/task").iterdir():
                 longest = max(longest, int((task / "schedstat").read_text(encoding="ascii").split()[1]))
     return longest * 1e-9
 

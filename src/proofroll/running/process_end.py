@@ -33,13 +33,13 @@ def interrupt_held() -> Iterator[None]:
 
     main = threading.current_thread() is threading.main_thread()
     handled = [number for number in INTERRUPTS if main and callable(signal.getsignal(number))]
-    before = {number: signal.signal(number, wait) for number in handled}
+    handlers = {number: signal.signal(number, wait) for number in handled}
     signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         yield
     finally:
         signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
-        for number, handler in before.items():
+        for number, handler in handlers.items():
             signal.signal(number, handler)
         for late in waiting:  # also after an error, or it would be lost
             signal.raise_signal(late)

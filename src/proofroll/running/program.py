@@ -223,13 +223,13 @@ def engine(name: str) -> type[Program]:
         ) from None
 
 
-def _require_values(where: str, values: Mapping[str, Any]) -> None:
+def _require_values(place: str, values: Mapping[str, Any]) -> None:
     """Raises ProofrollError for the first invalid setting of a preset."""
     for key, value in values.items():
         if not isinstance(value, (bool, int, float, str)):
-            raise ProofrollError(f"{where}: {key} = {json.dumps(value)}: give a number, a text, true or false")
+            raise ProofrollError(f"{place}: {key} = {json.dumps(value)}: give a number, a text, true or false")
         if key in _RESOLUTIONS and (isinstance(value, (bool, str)) or not 0 < value < math.inf):
-            raise ProofrollError(f"{where}: {key} = {json.dumps(value)}: give a positive number")
+            raise ProofrollError(f"{place}: {key} = {json.dumps(value)}: give a positive number")
 
 
 def _settings(formulations: Mapping[str, Any]) -> type[Any]:
@@ -239,12 +239,12 @@ def _settings(formulations: Mapping[str, Any]) -> type[Any]:
         for preset in item["presets"].values():
             values |= preset
     orders = {key: item.get("order") for key, item in formulations.items()}
-    first = next(iter(formulations))
-    fields: list[Any] = [("formulation", str, first), ("preset", str, next(iter(formulations[first]["presets"])))]
+    usual = next(iter(formulations))
+    fields: list[Any] = [("formulation", str, usual), ("preset", str, next(iter(formulations[usual]["presets"])))]
     fields += [
         (key, float if isinstance(value, (int, float)) and not isinstance(value, bool) else type(value), value)
         for key, value in values.items()
     ]
     resolution = next((key for key in _RESOLUTIONS if key in values), None)
-    own = {"resolution": resolution, "order": property(lambda self: orders[self.formulation])}
-    return dataclasses.make_dataclass("Settings", fields, frozen=True, namespace=own)
+    members = {"resolution": resolution, "order": property(lambda self: orders[self.formulation])}
+    return dataclasses.make_dataclass("Settings", fields, frozen=True, namespace=members)

@@ -19,7 +19,7 @@ from proofroll.core.engine import Sample
 from proofroll.core.engine_abilities import TellsRemarks
 from proofroll.core.errors import Diverged, lack_behind
 from proofroll.core.events import Event, wrong_bracket
-from proofroll.core.multi_element import AnySample, arrays, copied, events_of_engine, sample_of
+from proofroll.core.multi_element import AnySample, arrays, asking, copied, events_of_engine, sample_of
 from proofroll.core.scene import Scene
 
 if TYPE_CHECKING:
@@ -89,11 +89,12 @@ def record(
     times = np.array(sorted({*asked.tolist(), *(set(map(float, counting)) - off)}))
     watches = [(element, element.watch(scene.asks)) for element in scene.elements if isinstance(element, WatchesRuns)]
     for t in sorted({*times[1:].tolist(), *off}):
-        before, start = time.process_time(), time.perf_counter()
+        begin, start, asking_before = time.process_time(), time.perf_counter(), asking(engine)
         try:
             engine.advance(t)
-            wall += time.perf_counter() - start
-            inside += time.process_time() - before
+            more = asking(engine)
+            wall += time.perf_counter() - start - more[0] + asking_before[0]
+            inside += time.process_time() - begin - more[1] + asking_before[1]
             sample = _finite(engine.sample(), t, scene)
             _require_state(scene, samples[0], sample, t)
         except Diverged as error:
@@ -119,8 +120,10 @@ def record(
     failure = (None if ended else failure) or next(filter(None, (*lacking, *wrong)), None)
     reached = times[: len(samples)]
     last = reached[np.isin(reached, asked)][-1]
-    taken = dict(zip(reached.tolist(), samples, strict=True)) | {at: one for at, one in between.items() if at < last}
-    columns = columns_of(scene, np.array(sorted(taken)), [taken[at] for at in sorted(taken)])
+    taken = dict(zip(reached.tolist(), samples, strict=True)) | {
+        between_time: state for between_time, state in between.items() if between_time < last
+    }
+    columns = columns_of(scene, np.array(sorted(taken)), [taken[between_time] for between_time in sorted(taken)])
     columns = off_grid_apart(scene, columns, asked, np.array(sorted(between)))
     for owner, own_events in events:
         columns = add_events(scene, owner, columns, own_events)
@@ -135,8 +138,8 @@ def _conclusions(
     events: list[tuple[Element, Sequence[Event]]] = []
     ended: str | None = None
     for element, watch in watches:
-        own = [sample_of(scene, element, sample) for sample in samples]
-        seen = watch.conclude(times, own, events_of_engine(engine, element))
+        states = [sample_of(scene, element, sample) for sample in samples]
+        seen = watch.conclude(times, states, events_of_engine(engine, element))
         del samples[seen.samples :]
         if seen.events is not None:
             events.append((element, seen.events))
@@ -163,18 +166,18 @@ def _finite(sample: AnySample, t: float, scene: Scene) -> AnySample:
     return copied(sample)
 
 
-def _require_state(scene: Scene, first: AnySample, sample: AnySample, t: float) -> None:
+def _require_state(scene: Scene, start: AnySample, sample: AnySample, t: float) -> None:
     """Raises Diverged if a sample lacks a state variable that the first sample has."""
     for element in scene.elements:
-        before, now = sample_of(scene, element, first), sample_of(scene, element, sample)
+        start_state, now = sample_of(scene, element, start), sample_of(scene, element, sample)
         for name in Sample.widths:
-            if getattr(now, name) is None and getattr(before, name) is not None:
+            if getattr(now, name) is None and getattr(start_state, name) is not None:
                 raise Diverged(f"{name} is given at 0 s and not at {t:g} s")
 
 
-def require_unit(q_WB: FloatArray, where: str) -> None:
-    """Raises Diverged, naming the length and ``where``, unless quaternions, shape (…, 4), have unit length."""
+def require_unit(q_WB: FloatArray, place: str) -> None:
+    """Raises Diverged, naming the length and ``place``, unless quaternions, shape (…, 4), have unit length."""
     lengths = np.sqrt(np.sum(q_WB**2, axis=-1)).ravel()
     worst = float(lengths[np.argmax(np.abs(lengths - 1))])
     if abs(worst - 1) > _UNIT:
-        raise Diverged(f"q_WB has length {worst:.4g} {where}; give unit quaternions, scalar first")
+        raise Diverged(f"q_WB has length {worst:.4g} {place}; give unit quaternions, scalar first")

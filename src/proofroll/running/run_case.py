@@ -23,11 +23,11 @@ from proofroll.running.time_case import clean_runs
 
 def run(case: dict[str, Any], out: str) -> dict[str, Any]:
     """Runs a case, writes its trajectory to ``out``, and returns its result as a dictionary."""
-    spent, wanted = _TimeAccounts(), Case.from_dict(case)
+    spent, asked = _TimeAccounts(), Case.from_dict(case)
     gc.freeze()  # exclude loaded modules from collection, which would take as long as a short case
     try:
-        answer = dataclasses.asdict(_run(wanted, Path(out), spent)) | {"interpreter": sys.executable}
-        _require_untouched(wanted.engine.name)
+        answer = dataclasses.asdict(_run(asked, Path(out), spent)) | {"interpreter": sys.executable}
+        _require_untouched(asked.engine.name)
     finally:
         gc.collect()  # the next case of this process starts clean
         gc.freeze()  # exclude modules loaded by this case, too

@@ -120,10 +120,10 @@ class Runner:
             if case.key in asked:
                 return 0
             asked.add(case.key)
-            wanted = not self.fresh or case.key in self._run_here
-            stored = self.store.get(case) if wanted else None
+            is_new = not self.fresh or case.key in self._run_here
+            stored = self.store.get(case) if is_new else None
             if stored is None or self._lacks_speed(case, stored):
-                if wanted and stored is None and self.store.has(case):
+                if is_new and stored is None and self.store.has(case):
                     self.damaged.add(case.key)
                 shared.add(case)
                 return 1
@@ -286,7 +286,7 @@ def _counted(budget: TimeBudget | None, worker: Worker, case: Case, limit: float
     """Result of a case whose processor time is charged to the budget; beyond its share the case is left out."""
     if budget is None:
         return _ask(worker, case, limit, out)
-    before = worker.used
+    used_before = worker.used
     try:
         return _ask(worker, case, limit, out)
     except WorkerDied as error:
@@ -294,7 +294,7 @@ def _counted(budget: TimeBudget | None, worker: Worker, case: Case, limit: float
             raise WorkerDied(Status.LEFT_OUT, budget.sentence) from None
         raise
     finally:
-        budget.end(case.key, worker.used - before, lost=worker.used == before)
+        budget.end(case.key, worker.used - used_before, lost=worker.used == used_before)
 
 
 def result_without_answer(case: Case, error: ProofrollError) -> Result:

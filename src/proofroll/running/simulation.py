@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import dataclasses
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from proofroll.core import multi_element
 from proofroll.core.certificate import first_difference
+from proofroll.core.commanded import commanded
 from proofroll.core.dataset import truth_message
 from proofroll.core.engine import fixed_step
 from proofroll.core.errors import InputError, Refused
@@ -16,6 +18,7 @@ from proofroll.core.scene import Scene
 from proofroll.core.time_grid import EVERY, off_grid, require_whole_steps, sampling_interval, time_grid
 from proofroll.core.turns import samples_between
 from proofroll.files.scene_file import load_scene
+from proofroll.files.scene_sources import with_control
 from proofroll.running.identity import truth_version
 from proofroll.running.manifest import manifest, versions
 from proofroll.running.recording import record
@@ -62,6 +65,7 @@ def simulate(
     *,
     until: float = 2.0,
     every: float | None = None,
+    control: str | Path | None = None,
     **settings: Any,
 ) -> xr.Dataset:
     """Trajectory of a scene in an engine, with units on every variable.
@@ -71,6 +75,7 @@ def simulate(
         engine: ``truth``, ``name``, ``name[key=value,…]``, or the class, which no package needs to announce.
         until: last time [s].
         every: sampling interval [s]; by default 0.01 s, or the nearest whole number of steps.
+        control: path of a controller's file, for a scene that is the path of a robot file.
         **settings: e.g. ``formulation="chart", dt=1e-4``.
 
     Returns:
@@ -83,6 +88,10 @@ def simulate(
         Missing: the engine is not installed.
         Refused: the engine cannot represent the scene, or its model contradicts it (certificate).
     """
+    if control is not None:
+        if not isinstance(scene, str):
+            raise InputError("control", control, "it is for the path of a robot file; this scene is loaded already")
+        scene = with_control(scene, Path(control))
     if isinstance(scene, str):
         scene = load_scene(scene)
     spec = parse_engine(engine) if isinstance(engine, str) else None
@@ -116,6 +125,8 @@ def simulate(
 
 def simulate_built(engine: Any, scene: Scene, *, until: float = 2.0, every: float | None = None) -> xr.Dataset:
     """Trajectory of an engine that was built by the caller and is at time 0; see :func:`simulate`."""
+    if len(scene.elements) == 1:  # whoever built it alone left the controller of the scene out
+        engine = commanded(engine, scene.elements[0], None)
     recording = record(engine, scene, time_grid(until, EVERY if every is None else every))
     status = "done" if recording.failure is None else "diverged"
     return recording.dataset.assign_attrs(status=status, message=recording.message(until))

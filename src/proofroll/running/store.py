@@ -40,7 +40,7 @@ class Store:
         self.folder = folder
         self._held: WeakValueDictionary[str, StoredTrajectory] = WeakValueDictionary()
         absolute = folder.absolute()
-        if made := [each for each in (absolute, *absolute.parents) if not each.exists()]:
+        if made := [missing for missing in (absolute, *absolute.parents) if not missing.exists()]:
             atexit.register(_remove_empty, made)
         try:
             folder.mkdir(parents=True, exist_ok=True)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from proofroll.core.arrays import largest_difference
 from proofroll.core.errors import Diverged, Refused
-from proofroll.core.multi_element import AnySample, build, sample_of
+from proofroll.core.multi_element import AnySample, asking, build, sample_of
 from proofroll.core.number_format import number
 from proofroll.core.scene import Scene
 from proofroll.running.case import Case
@@ -43,10 +43,10 @@ def time_once(case: dict[str, Any], seconds: float) -> dict[str, Any]:
     from proofroll.core.truth import truth
     from proofroll.running.loading import engine_and_settings, scene_of
 
-    wanted, clock = Case.from_dict(case), time.perf_counter
-    scene = scene_of(wanted)
-    times = time_grid(wanted.until, wanted.every)
-    kind, settings = (None, None) if wanted.engine.name == "truth" else engine_and_settings(wanted)
+    asked, clock = Case.from_dict(case), time.perf_counter
+    scene = scene_of(asked)
+    times = time_grid(asked.until, asked.every)
+    kind, settings = (None, None) if asked.engine.name == "truth" else engine_and_settings(asked)
     elapsed = simulated = 0.0
     start = clock()
     while elapsed < seconds and clock() - start < _MOST_BUILDING * seconds:
@@ -88,10 +88,10 @@ def clean_runs(kind: Any, scene: Scene, settings: Any, recording: Recording) -> 
     last = float(recording.columns["time"].values[-1])
     stops, timed, runs = [t for t in recording.passed if t <= last], CleanRuns(), list[_CleanRun]()
     while len(runs) < _TIMED_RUNS and timed.wall < _TIMED_SECONDS:
-        engine, before = build(kind, scene, settings), time.process_time()
+        engine, begin = build(kind, scene, settings), time.process_time()
         run = _clean_run(engine, stops, _ENOUGH_SECONDS)
         runs.append(run)
-        timed.processor += time.process_time() - before
+        timed.processor += time.process_time() - begin
         timed.wall += run.wall
         apart = _apart(scene, run.sample, recording.passed[run.t])
         if apart > _SAME:
@@ -128,12 +128,13 @@ def is_put_off(advancing: float, sampling: float, usual: float) -> bool:
     return sampling > max(_LEAST_SECONDS, _PART * advancing, _PUT_OFF * usual)
 
 
-def _apart(scene: Scene, one: AnySample, other: AnySample) -> float:
+def _apart(scene: Scene, sample: AnySample, rival: AnySample) -> float:
     """Largest distance of the bodies in two samples, relative to the size of their element."""
     pairs = [
-        (element.length, sample_of(scene, element, one), sample_of(scene, element, other)) for element in scene.elements
+        (element.length, sample_of(scene, element, sample), sample_of(scene, element, rival))
+        for element in scene.elements
     ]
-    return max(largest_difference(first.p_WB, second.p_WB) / length for length, first, second in pairs)
+    return max(largest_difference(state.p_WB, second.p_WB) / length for length, state, second in pairs)
 
 
 @dataclass(frozen=True)
@@ -153,7 +154,7 @@ def _clean_run(engine: Any, stops: Iterable[float], enough: float) -> _CleanRun:
     ends after ``enough`` wall time [s], which measures a rate as well as ten times as much would.
     """
     clock = time.perf_counter
-    start, t = clock(), 0.0
+    start, t, asked = clock(), 0.0, asking(engine)[0]
     for t in stops:
         engine.advance(t)
         if clock() - start > enough:
@@ -161,4 +162,4 @@ def _clean_run(engine: Any, stops: Iterable[float], enough: float) -> _CleanRun:
     advanced = clock()
     sample = engine.sample()
     end = clock()
-    return _CleanRun(t, end - start, end - advanced, sample)
+    return _CleanRun(t, end - start - asking(engine)[0] + asked, end - advanced, sample)

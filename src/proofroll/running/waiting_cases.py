@@ -51,15 +51,21 @@ class WaitingCases:
         """
         with self._changed:
             while not self._closed:
-                at = min((number for number, groups in self._by_engine.items() if any(groups.values())), default=None)
-                if at is not None:
-                    groups = self._by_engine[at]
+                number_of_group = min(
+                    (number for number, groups in self._by_engine.items() if any(groups.values())), default=None
+                )
+                if number_of_group is not None:
+                    groups = self._by_engine[number_of_group]
                     group = groups.get(engine or "")
                     if not group:
-                        fresh = [cases for name, cases in groups.items() if cases and (at, name) not in self._begun]
+                        fresh = [
+                            cases
+                            for name, cases in groups.items()
+                            if cases and (number_of_group, name) not in self._begun
+                        ]
                         group = max(fresh or groups.values(), key=len)
                     case = group.popleft()
-                    self._begun.add((at, case.engine.name))
+                    self._begun.add((number_of_group, case.engine.name))
                     return case
                 self._changed.wait()
             return None

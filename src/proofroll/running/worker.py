@@ -91,19 +91,23 @@ def _answer(request: dict[str, Any]) -> dict[str, Any]:
 
 def write(case: dict[str, Any], what: str) -> dict[str, Any]:
     """Text of the ``reproducer`` or ``model_file`` that an engine writes for a case, or why it writes none."""
+    from proofroll.core.element_abilities import HoldsTargets
     from proofroll.core.engine_abilities import Reproduces, WritesModels
     from proofroll.running.loading import engine_and_settings, scene_of
 
-    wanted = Case.from_dict(case)
-    kind, settings = engine_and_settings(wanted)
+    asked = Case.from_dict(case)
+    kind, settings = engine_and_settings(asked)
     ability, lacking = {
-        "reproducer": (Reproduces, f"{wanted.engine.name} offers no program of its own"),
+        "reproducer": (Reproduces, f"{asked.engine.name} offers no program of its own"),
         "model_file": (WritesModels, "it writes no file of its model"),
     }[what]
     if not isinstance(kind, ability):
         return {"message": lacking}
+    scene = scene_of(asked)
+    if any(isinstance(element, HoldsTargets) and element.commands() for element in scene.elements):
+        return {"message": "proofroll sets the targets of its controller between steps, and a program alone does not"}
     try:
-        return {"text": getattr(kind, what)(scene_of(wanted), settings)}
+        return {"text": getattr(kind, what)(scene, settings)}
     except (Refused, Diverged) as error:
         return {"message": str(error)}
 
@@ -120,9 +124,9 @@ def call(function: str, arguments: dict[str, Any]) -> dict[str, Any]:
 
 def one_line(error: BaseException) -> str:
     """Type and text of an exception in one line, with the line of the engine's adapter that raised it."""
-    text, where = " ".join(str(error).split()), raised_at(error)
+    text, line = " ".join(str(error).split()), raised_at(error)
     summary = f"{type(error).__name__}: {text}"[:400] if text else type(error).__name__
-    return f"{summary} ({where})" if where else summary
+    return f"{summary} ({line})" if line else summary
 
 
 if __name__ == "__main__":

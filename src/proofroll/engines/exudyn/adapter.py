@@ -5,7 +5,8 @@ wall that moves, or that no rigid motion slides along itself, :mod:`world_coordi
 :mod:`rolling_disc` and :mod:`contact`. The first and the last let the ball slip. In all but the first the ball is a
 rigid body; its orientation is always in the model, as Euler parameters of its node.
 
-Mechanisms are bodies in redundant coordinates (:mod:`redundant`) or its kinematic tree (:mod:`tree`).
+Mechanisms are bodies in redundant coordinates (:mod:`redundant`), with contacts of spheres (:mod:`spheres`) or discs
+that roll (:mod:`discs`), or its kinematic tree (:mod:`tree`).
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -19,9 +20,10 @@ from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.elements.ball_on_surface.model import ALL_OF_A_BALL, ROLLS, BallCapability, RollingBall
 from proofroll.elements.mechanism.capabilities import MechanismCapability
 from proofroll.elements.mechanism.sampling import mechanism_of
-from proofroll.engines.exudyn import redundant, spheres, tree
+from proofroll.engines.exudyn import discs, redundant, spheres, tree
 from proofroll.engines.exudyn.carrier import Carrier
 from proofroll.engines.exudyn.contact import PenaltyContact
+from proofroll.engines.exudyn.discs import Discs
 from proofroll.engines.exudyn.generic import Generic
 from proofroll.engines.exudyn.integration import ExudynModel
 from proofroll.engines.exudyn.local_frame import slides
@@ -42,6 +44,7 @@ OF_BALLS: Mapping[str, Callable[[RollingBall, ExudynSettings], ExudynModel]] = {
 OF_MECHANISMS: Mapping[str, type[Redundant | KinematicTree]] = {
     "redundant": Redundant,
     "spheres": Spheres,
+    "discs": Discs,
     "tree": KinematicTree,
 }
 _HELD = "its constraint holds the ball on the wall"
@@ -69,9 +72,13 @@ class Exudyn:
         "contact": ALL_OF_A_BALL | {BallCapability.IMPACTS},
         "redundant": redundant.PROVIDES,
         "spheres": spheres.PROVIDES,
+        "discs": discs.PROVIDES,
         "tree": tree.PROVIDES,
     }
-    made_for: ClassVar[Mapping[str, frozenset[str]]] = {"spheres": frozenset({MechanismCapability.CONTACT})}
+    made_for: ClassVar[Mapping[str, frozenset[str]]] = {
+        "spheres": frozenset({MechanismCapability.CONTACT}),
+        "discs": frozenset({MechanismCapability.UNBOUNDED_FRICTION}),
+    }
     lacking: ClassVar[Mapping[str, Mapping[str, str]]] = {
         "generic": {
             BallCapability.ORIENTATION: "the spin of generic is a quasi-velocity, the rate of no orientation",
@@ -85,6 +92,7 @@ class Exudyn:
         "rolling_disc": _ROLLS_AT_REST,
         "redundant": redundant.LACKING,
         "spheres": spheres.LACKING,
+        "discs": discs.LACKING,
         "tree": tree.LACKING,
     }
     settings: ClassVar[type[ExudynSettings]] = ExudynSettings
@@ -96,12 +104,13 @@ class Exudyn:
         "contact": Level.CONTACT,
         "redundant": Level.CONSTRAINT,
         "spheres": Level.CONTACT,
+        "discs": Level.CONSTRAINT,
         "tree": Level.CONSTRAINT,
     }
     terms: ClassVar[Sequence[Term]] = (
         Term(
             "new Jacobian at every step",
-            ("carrier", "rolling_disc", "contact", "redundant", "spheres"),
+            ("carrier", "rolling_disc", "contact", "redundant", "spheres", "discs"),
             {"jacobian": "step"},
             {"jacobian": "reused"},
             "lets Newton's method end after two or three iterations where an old Jacobian needs seven",
@@ -124,7 +133,7 @@ class Exudyn:
         """See :class:`proofroll.core.engine_abilities.TellsCaveats`; a step that halves itself has no order."""
         caveats = []
         if settings.preset == "default" and not settings.halvings:
-            caveats = ["Exudyn's adaptive step, which it has on by default, is off, so that the step is the one given"]
+            caveats = ["the adaptive step, Exudyn's default, is off"]
         if settings.formulation == "spheres":
             caveats.append("radii and softness of the spheres follow proofroll's own contact forces at the start")
         return "; ".join(caveats)
@@ -176,7 +185,7 @@ class Exudyn:
         from proofroll.engines.exudyn.reproducer import mechanism_source, source
 
         model = cls.build(scene, settings)
-        if settings.formulation == "spheres":
+        if settings.formulation in {"spheres", "discs"}:
             raise Refused("programs hold no contacts between bodies yet")
         if settings.formulation in OF_MECHANISMS:
             return mechanism_source(model, mechanism_of(scene), settings)

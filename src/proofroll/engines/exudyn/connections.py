@@ -8,15 +8,20 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from proofroll.core.errors import Refused
 from proofroll.elements.mechanism import WORLD, Joint, Mechanism
+from proofroll.elements.mechanism.joint import DISTANCE
 from proofroll.elements.mechanism.model import JointOrLoop
+from proofroll.elements.mechanism.parts import Force, Spring
 from proofroll.elements.mechanism.rotations import Array, cross
+from proofroll.elements.mechanism.signal import varies
 from proofroll.engines.exudyn.native import Output, data_node, exu, items
 
 # 1 for each of three translations and three rotations that Exudyn's joint locks, in the axes of its first frame.
 _HELD = {
     "fixed": (1, 1, 1, 1, 1, 1),
     "prismatic": (1, 1, 0, 1, 1, 1),
+    "cylindrical": (1, 1, 0, 1, 1, 0),
     "universal": (1, 1, 1, 0, 1, 0),
     "planar": (0, 0, 1, 1, 1, 0),
 }
@@ -25,7 +30,14 @@ _IN_PLANE = (1, 1, 0, 0, 0, 0)
 # The two axes, one of each frame, that each rotational row keeps perpendicular. Components of ``TorqueLocal`` are the
 # multipliers of these rows, not a moment. Found from residuals of the rows; Exudyn's documents do not describe it.
 _THREE, _TWO = ((2, 1), (2, 0), (0, 1)), ((2, 0), (2, 1))
-_ROWS = {"fixed": _THREE, "prismatic": _THREE, "revolute": _TWO, "planar": _TWO, "universal": (None, (0, 2))}
+_ROWS = {
+    "fixed": _THREE,
+    "prismatic": _THREE,
+    "revolute": _TWO,
+    "cylindrical": _TWO,
+    "planar": _TWO,
+    "universal": (None, (0, 2)),
+}
 
 
 class Connected(NamedTuple):
@@ -55,8 +67,63 @@ def add_springs(system: Any, mechanism: Mechanism, marker: Callable[[str, Any], 
                 stiffness=spring.stiffness,
                 damping=spring.damping,
                 referenceLength=spring.length,
+                **({} if spring.force is None else {"springForceUserFunction": _pull_of(spring)}),
             )
         )
+
+
+def _pull_of(spring: Spring) -> Callable[..., float]:
+    """Pull of a spring as Exudyn's function of its elongation and the rate of this."""
+
+    def pull(system: Any, t: float, item: int, longer: float, rate: float, *law: float) -> float:  # noqa: ARG001 -- Exudyn's signature
+        return float(spring.pull(longer + spring.length, rate))
+
+    return pull
+
+
+def add_forces(
+    system: Any, mechanism: Mechanism, marker: Callable[[str, Any], Any], turns: Mapping[str, Array] | None = None
+) -> None:
+    """Adds applied forces and moments.
+
+    Args:
+        system: Exudyn's system.
+        mechanism: with the forces.
+        marker: makes Exudyn's marker at a place in a body's frame.
+        turns: body name -> rotation from the body's axes to its marker's; None: they are the same.
+
+    Raises:
+        Refused: a force has a reaction on a body: this adapter has loads at places that do not move in their body.
+    """
+    for applied in mechanism.forces:
+        if applied.reaction != WORLD and (applied.kind == "force" or applied.frame == "body"):
+            advice = "Exudyn's loads act on one body; one that follows another body is not built in this adapter"
+            raise Refused(f"{applied.name} presses back on {applied.reaction}: {advice}")
+        load = items.LoadForceVector if applied.kind == "force" else items.LoadTorqueVector
+        follows = applied.frame == "body"
+        turn = np.eye(3) if turns is None or not follows else turns[applied.body]
+        moving = any(map(varies, applied.value))
+        for body, sign in ((applied.body, 1.0), (applied.reaction, -1.0)):
+            if body == WORLD:
+                continue
+            varying = {"loadVectorUserFunction": _values_of(applied, sign * turn)} if moving else {}
+            system.AddLoad(
+                load(
+                    markerNumber=marker(body, applied.position),
+                    loadVector=[float(value) for value in sign * turn @ applied.at(0.0)],
+                    bodyFixed=follows,
+                    **varying,
+                )
+            )
+
+
+def _values_of(applied: Force, turn: Array) -> Callable[..., list[float]]:
+    """Components of a force, turned, as Exudyn's function of time."""
+
+    def values(system: Any, t: float, vector: list[float]) -> list[float]:  # noqa: ARG001 -- Exudyn's signature
+        return [float(value) for value in turn @ applied.at(t)]
+
+    return values
 
 
 class Connections:
@@ -111,6 +178,8 @@ class Connections:
             item, rows = items.ObjectJointGeneric(constrainedAxes=_IN_PLANE, markerNumbers=markers), ()
         elif kind == "revolute":
             item = items.ObjectJointRevoluteZ(markerNumbers=markers)
+        elif kind == DISTANCE:
+            item = items.ObjectConnectorDistance(markerNumbers=markers, distance=between.length)
         elif kind != "free":
             item = items.ObjectJointGeneric(constrainedAxes=_HELD[kind], markerNumbers=markers)
         constraint = None if item is None else self._system.AddObject(item)
@@ -148,7 +217,12 @@ class Connections:
         """Force [N] and moment [N m] of a joint or loop on the second body at its marker, world axes."""
         system, (A, B) = self._system, self.axes(made)
         force, torque = np.zeros(3), np.zeros(3)
-        if made.between.kind == "spherical":
+        if made.between.kind == DISTANCE:  # a pull
+            now = exu.ConfigurationType.Current
+            a, b = (np.array(system.GetMarkerOutput(marker, Output.Position, now)) for marker in made.markers)
+            pull = float(np.ravel(system.GetObjectOutput(made.constraint, Output.Force))[0])
+            force -= pull * (b - a) / made.between.length
+        elif made.between.kind == "spherical":
             force -= system.GetObjectOutput(made.constraint, Output.Force)
         elif made.constraint is not None:
             force -= A @ system.GetObjectOutput(made.constraint, Output.ForceLocal)

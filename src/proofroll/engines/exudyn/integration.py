@@ -1,6 +1,8 @@
 """Exudyn's own implicit time integration, driven from sample to sample without losing its state."""
 
-from collections.abc import Mapping, Sequence
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -99,23 +101,30 @@ class Integration:
         dependent: bool = False,
         impacts: bool = False,
         mass: float = 1.0,
+        moved: Callable[[float], Mapping[Any, float]] | None = None,
     ) -> None:
         """Initialises the solver in the initial configuration of an assembled system, at the time ``at`` [s].
 
-        For ``turning`` see :func:`consistent_start`; without it, Exudyn finds the start itself. For ``dependent``,
-        ``impacts`` and ``mass`` see :func:`simulation_settings`.
+        For ``turning`` and ``moved`` (at a time) see :func:`consistent_start`; without them, Exudyn finds the start
+        itself. For ``dependent``, ``impacts`` and ``mass`` see :func:`simulation_settings`.
 
         Raises:
             Refused: the engine does not accept the model.
         """
         self.t = at
+        self._again: Callable[[float], Integration] = lambda t: Integration(
+            system, settings, at=t, dependent=dependent, impacts=impacts, mass=mass, moved=moved
+        )
         self.complaint: str | None = None
         self.events: list[Event] = []
         self.dt = settings.dt
         self.system = system
         self.options = simulation_settings(settings, dependent=dependent, impacts=impacts, mass=mass)
         explicit = settings.integrator in EXPLICIT
-        start = None if turning is None else consistent_start(system, settings, turning)
+        pushed = moved(at) if moved else {}
+        start = None
+        if turning is not None or any(pushed.values()):
+            start = consistent_start(system, settings, turning or {}, pushed, dependent=dependent)
         self.solver = exu.MainSolverExplicit() if explicit else exu.MainSolverImplicitSecondOrder()
         if start is not None:
             self.options.timeIntegration.generalizedAlpha.computeInitialAccelerations = False
@@ -131,6 +140,17 @@ class Integration:
         self.solver.timer = timer
         if start is not None:
             system.systemData.SetAECoordinates(start[1], exu.ConfigurationType.Current)
+
+    def again(self) -> Integration:
+        """A new run from the present state, whose accelerations and multipliers belong to the present forces.
+
+        An implicit method keeps accelerations from step to step; after a jump of forces those before it would cost it
+        its second order.
+        """
+        data, initial = self.system.systemData, exu.ConfigurationType.Initial
+        for name in ("ODE2Coordinates", "ODE2Coordinates_t", "ODE1Coordinates", "AECoordinates", "DataCoordinates"):
+            getattr(data, f"Set{name}")(getattr(data, f"Get{name}")(), initial)
+        return self._again(self.t)
 
     def advance(self, t: float) -> None:
         """Moves the system to time ``t`` [s], or to where a user function of the system stops it after a step."""
@@ -192,16 +212,22 @@ def initial_matrices(
 
 
 def consistent_start(
-    system: Any, settings: ExudynSettings, turning: Mapping[Any, FloatArray]
+    system: Any,
+    settings: ExudynSettings,
+    turning: Mapping[Any, FloatArray],
+    moved: Mapping[Any, float] | None = None,
+    *,
+    dependent: bool = False,
 ) -> tuple[FloatArray, FloatArray]:
     """Accelerations of the coordinates and multipliers at time 0 of an assembled system.
 
     A constraint at velocity level, C q̇ = 0, has the derivative C q̈ = -Ċ q̇. For the constraints used here, Exudyn
     leaves out the right side, and the trapezoidal rule would keep the wrong multipliers as an undamped oscillation. So
     the accelerations and multipliers that Exudyn finds are corrected, by its own matrices, for the missing right side:
-    ``turning``, constraint -> -Ċ q̇ of its rows.
+    ``turning``, constraint -> -Ċ q̇ of its rows. Of a place that moves Exudyn leaves out the acceleration: ``moved``,
+    constraint -> what its row lacks.
     """
-    mass, jacobian, _ = initial_matrices(system, settings)
+    mass, jacobian, _ = initial_matrices(system, settings, dependent=dependent)
     data = system.systemData
     start = np.concatenate([data.GetODE2Coordinates_tt(), data.GetAECoordinates()])
     n = len(mass)
@@ -209,8 +235,10 @@ def consistent_start(
     for item, expected in turning.items():
         rows = np.array(data.GetObjectLTGAE(item))
         missing[n + rows] = expected - jacobian[n + rows] @ start
+    for item, acceleration in (moved or {}).items():
+        missing[n + np.array(data.GetObjectLTGAE(item))] = acceleration
     jacobian[:n, :n] += mass
-    start += np.linalg.solve(jacobian, missing)
+    start += np.linalg.lstsq(jacobian, missing, rcond=None)[0] if dependent else np.linalg.solve(jacobian, missing)
     return start[:n], start[n:]
 
 

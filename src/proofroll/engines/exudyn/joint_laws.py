@@ -1,4 +1,4 @@
-"""Laws along coordinates of joints: dry friction and stops, actuators, drives in time, couplings, armature.
+"""Laws along coordinates of joints: dry friction and stops, actuators, drives in time, couplings, motions, armature.
 
 Friction and stops are Exudyn's ``CoordinateSpringDamperExt``. Friction is a bristle: a spring and damper that slips at
 the friction's force. A stop is a spring and damper. Their stiffness and damping, which the scene does not have, stop
@@ -15,6 +15,7 @@ import numpy as np
 from proofroll.elements.mechanism import Body, Joint, Mechanism
 from proofroll.elements.mechanism.drives import Actuator
 from proofroll.elements.mechanism.named_forces import joint_force_shares, lengths
+from proofroll.elements.mechanism.prescribed import moved
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.elements.mechanism.signal import value_at, varies
 from proofroll.engines.exudyn.native import Output, add_renamed, data_node, items
@@ -62,6 +63,9 @@ class JointLaws:
             item = self._coupled([self._coordinate(first), self._coordinate(second)], -factor, coupling.place)
             self._add(item, first, factor=1.0, field="coupling", entry=entry)
             self._add(item, second, factor=factor)
+        for joint, _, _ in mechanism.prescribed:
+            number = mechanism.joint_index[joint.name]
+            self._add(self._moved(joint), joint.name, field="drive", entry=number)
 
     def _add(self, item: Any, joint: str, **others: Any) -> None:
         self._laws.append(JointLaw(item, self._mechanism.joint_index[joint], **others))
@@ -126,6 +130,28 @@ class JointLaws:
         """Adds a constraint: first coordinate = ``ratio`` times the second + ``offset``."""
         item = items.ObjectConnectorCoordinate(markerNumbers=markers, offset=-offset)
         return add_renamed(self._system, item, ratio, "factor1", "factorValue1")
+
+    def _moved(self, joint: Joint) -> Any:
+        """Adds a constraint that moves a joint's coordinate as prescribed; Exudyn asks for its rate, too."""
+        signal = joint.motion
+        assert signal is not None  # as of all prescribed ones
+
+        def place(system: Any, t: float, item: int, offset: float) -> float:  # noqa: ARG001 -- Exudyn's signature
+            return float(moved(signal, t).place)
+
+        def rate(system: Any, t: float, item: int, offset: float) -> float:  # noqa: ARG001 -- Exudyn's signature
+            return float(moved(signal, t).rate)
+
+        return self._system.AddObject(
+            items.ObjectConnectorCoordinate(
+                markerNumbers=self._ends(joint.name), offsetUserFunction=place, offsetUserFunction_t=rate
+            )
+        )
+
+    def accelerations(self, t: float) -> dict[Any, float]:
+        """Acceleration that each constraint of a prescribed motion asks for at a time [s], by Exudyn's object."""
+        moving = {law.item: self._mechanism.joints[law.number].motion for law in self._laws if law.field == "drive"}
+        return {item: float(moved(signal, t).acceleration) for item, signal in moving.items() if signal is not None}
 
     def _rotor(self, joint: Joint) -> Any:
         """Adds a rotor with the inertia of the joint's armature, constrained to the joint's coordinate."""

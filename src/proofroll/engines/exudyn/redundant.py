@@ -3,7 +3,7 @@
 Bodies are referenced at their centres of mass.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from itertools import zip_longest
 from typing import Any, ClassVar
 
@@ -13,6 +13,7 @@ from proofroll.core.engine import Regularised
 from proofroll.core.errors import Refused
 from proofroll.elements.mechanism import WORLD, Mechanism, Tree
 from proofroll.elements.mechanism.capabilities import ALL_JOINTS, ALL_LOOPS, FORCES, MechanismCapability, require
+from proofroll.elements.mechanism.commands import drive
 from proofroll.elements.mechanism.loop_points import is_planar
 from proofroll.elements.mechanism.rotations import Array, quaternion_rate, to_quaternion
 from proofroll.elements.mechanism.sampling import (
@@ -24,7 +25,8 @@ from proofroll.elements.mechanism.sampling import (
     unsaid,
 )
 from proofroll.elements.mechanism.signal import varies
-from proofroll.engines.exudyn.connections import Connections, add_springs
+from proofroll.engines.exudyn.bushings import add_bushings
+from proofroll.engines.exudyn.connections import Connections, add_forces, add_springs
 from proofroll.engines.exudyn.integration import ExudynModel, Integration, initial_matrices
 from proofroll.engines.exudyn.joint_laws import JointLaws
 from proofroll.engines.exudyn.native import Output, add_rigid_body, exu, items, rigid_body
@@ -32,7 +34,17 @@ from proofroll.engines.exudyn.settings import ExudynSettings
 
 _OF_JOINTS = {
     MechanismCapability[name]
-    for name in ("JOINT_FRICTION", "STOPS", "ACTUATORS", "SATURATION", "SIGNALS", "COUPLINGS", "ARMATURE")
+    for name in (
+        "JOINT_FRICTION",
+        "STOPS",
+        "ACTUATORS",
+        "SATURATION",
+        "SIGNALS",
+        "HELD",
+        "COUPLINGS",
+        "ARMATURE",
+        "MOTIONS",
+    )
 }
 PROVIDES = frozenset(ALL_JOINTS | ALL_LOOPS | FORCES | _OF_JOINTS | {MechanismCapability.REDUNDANT})
 LACKING: Mapping[str, str] = {
@@ -72,13 +84,24 @@ class Redundant(ExudynModel):
             for between, joint in zip_longest(mechanism.connections, mechanism.joints)  # loops follow the joints
         ]
         add_springs(self.system, mechanism, self.marker)
+        add_bushings(self.system, mechanism, self.marker)
+        add_forces(self.system, mechanism, self.marker)
         self._laws = JointLaws(self.system, mechanism, self._connections.coordinate, settings.dt)
         self._add_contacts(mechanism, settings)
         self.system.Assemble()
-        self._rows = self._constraint_rows(settings)
+        rows, self._rows = self._constraint_rows(settings)
         self._rank = row_rank(self._rows)
-        dependent = self._rank < len(self._rows)
-        self.integration = Integration(self.system, settings, dependent=dependent, mass=mechanism.mass)
+        dependent = row_rank(rows) < len(rows)
+        turning = self._turning()
+        self.integration = Integration(
+            self.system, settings, turning, dependent=dependent, mass=mechanism.mass, moved=self._laws.accelerations
+        )
+
+    def drive(self, values: Array) -> None:
+        """See :class:`proofroll.core.engine_abilities.TakesTargets`."""
+        drive(self._mechanism, values)
+        if self.integration.t:
+            self.integration = self.integration.again()
 
     def marker(self, body: str, position: Any) -> Any:
         """Adds a marker at a place in a body's frame [m]."""
@@ -104,11 +127,24 @@ class Redundant(ExudynModel):
     def _add_contacts(self, mechanism: Mechanism, settings: ExudynSettings) -> None:
         """Adds contacts; this formulation has none."""
 
-    def _constraint_rows(self, settings: ExudynSettings) -> Array:
-        """Constraint Jacobian on Exudyn's velocities, shape (rows, velocities), without the zero rows of free axes."""
+    def _turning(self) -> Mapping[Any, Array] | None:
+        """Rates that Exudyn leaves out of constraints of contacts, see :func:`.integration.consistent_start`."""
+        return None
+
+    def _contact_rows(self) -> Sequence[int]:
+        """Numbers of the constraints that are contacts."""
+        return ()
+
+    def _constraint_rows(self, settings: ExudynSettings) -> tuple[Array, Array]:
+        """Constraint Jacobian on Exudyn's velocities, shape (rows, velocities), without the zero rows of free axes.
+
+        Of all constraints, and of joints and loops alone.
+        """
         mass, jacobian, _ = initial_matrices(self.system, settings, dependent=True)
         rows = jacobian[len(mass) :, : len(mass)]
-        return np.asarray(rows[np.abs(rows).max(axis=1, initial=0.0) > 0])
+        acts = np.abs(rows).max(axis=1, initial=0.0) > 0
+        joints = acts & ~np.isin(np.arange(len(rows)), self._contact_rows())
+        return rows[acts], rows[joints]
 
     def _over_bodies(self, output: Any) -> Array:
         """Exudyn's output variable at the origins of all body frames, a row for each body."""
@@ -164,7 +200,7 @@ class Redundant(ExudynModel):
                 ]
             ),
             joint_axis=axes,
-            gravity=np.array(loads[0]["loadVector"]) if loads else np.zeros(3),
+            gravity=np.array(loads[0]["loadVector"]),
             rows=len(self._rows),
             rank=self._rank,
             mobility=self._rows.shape[1] - self._rank,
@@ -182,7 +218,7 @@ def _turns(mechanism: Mechanism) -> dict[str, Array]:
     """
     turns = {WORLD: np.eye(3)} | {body.name: np.eye(3) for body in mechanism.bodies}
     laws = any(joint.friction or joint.limits or joint.armature or varies(joint.torque) for joint in mechanism.joints)
-    if laws or mechanism.actuators or mechanism.couplings:
+    if laws or mechanism.actuators or mechanism.couplings or mechanism.prescribed:
         for joint in mechanism.joints:  # parents first
             turns[joint.child] = turns[joint.parent] @ joint.parent_frame @ joint.child_frame.T
     return turns
@@ -194,10 +230,7 @@ def _matrix(six: Any) -> Array:
 
 
 def _check(mechanism: Mechanism) -> None:
-    """Raises Refused for bodies without mass and for forces in universal joints, which no capability covers."""
-    for body in mechanism.bodies:
-        if not body.mass:
-            raise Refused(f"{body.name} has no mass; in redundant coordinates each body needs one")
+    """Raises Refused for forces in universal joints, which no capability covers."""
     for joint in mechanism.joints:
         if joint.kind == "universal" and (joint.stiffness or joint.damping or joint.friction):
             raise Refused(f"Exudyn has no torsional spring, damper or friction for the two angles of {joint.name}")

@@ -65,9 +65,9 @@ class ExudynRobots:
         arrays = evaluate(request, joints, dofs, at)
         mass, com, inertia = tree.body_numbers()
         return Reading(
-            joints, dofs, mass, com, inertia,
-            {name: np.array([frame[name][0] for frame in frames]) for name in joints},
-            {name: np.array([frame[name][1] for frame in frames]) for name in joints},
+            joints=joints, dofs=dofs, mass=mass, com=com, inertia=inertia,
+            position={name: np.array([frame[name][0] for frame in frames]) for name in joints},
+            rotation={name: np.array([frame[name][1] for frame in frames]) for name in joints},
             **arrays,
         )  # fmt: skip
 

@@ -19,7 +19,8 @@ class ExudynSettings:
             built-in joints only), ``rolling_disc`` (the engine's rolling-disc joint, re-aimed at every iterate) or
             ``contact`` (its contact with a hollow sphere that follows the ball; penalty and regularised friction); of
             mechanisms: ``redundant`` (bodies in redundant coordinates, joints as constraints), ``spheres`` (the same
-            with its penalty contacts of spheres) or ``tree`` (its kinematic tree in joint coordinates).
+            with its penalty contacts of spheres), ``discs`` (with its rolling-disc joint for circles on planes) or
+            ``tree`` (its kinematic tree in joint coordinates).
         preset: name of the preset that supplies the other values.
         dt: fixed time step [s].
         integrator: ``generalized_alpha`` (constraints at position level, index 3) or ``trapezoidal_index2``
@@ -38,7 +39,9 @@ class ExudynSettings:
             ``contact`` only.
     """
 
-    formulation: Literal["generic", "carrier", "rolling_disc", "contact", "redundant", "spheres", "tree"] = "generic"
+    formulation: Literal["generic", "carrier", "rolling_disc", "contact", "redundant", "spheres", "discs", "tree"] = (
+        "generic"
+    )
     preset: Literal["default", "matched", "tuned"] = "matched"
     dt: Annotated[float, Gt(0)] = 1e-4
     integrator: Literal["generalized_alpha", "trapezoidal_index2", "rk44", "rk67"] = "trapezoidal_index2"
@@ -109,7 +112,7 @@ CONTACT_ONLY: Mapping[str, tuple[str, ...]] = {
 # Exudyn's adaptive step: see ``simulation_settings``.
 
 
-def _default(formulation: Literal["generic", "carrier", "rolling_disc", "redundant"]) -> ExudynSettings:
+def _default(formulation: Literal["generic", "carrier", "rolling_disc", "redundant", "discs"]) -> ExudynSettings:
     # The tolerance of 1e-8 matters: with rolling resistance it moves z by about 1e-6 m at dt = 1e-3, and leaves noise
     # of 0.3 N in the carrier's F2. With rigid bodies, ρ = 0.9 stops being stable where the ball turns by more than
     # about 0.3 rad per step.
@@ -181,6 +184,11 @@ PRESETS: Mapping[str, Mapping[str, ExudynSettings]] = {
         "matched": ExudynSettings(
             "spheres", "matched", 1e-3, "generalized_alpha", 0.9, 1e-8, "step", 10, 1e6, 1e-4, None
         ),
+    },
+    "discs": {
+        "default": _default("discs"),
+        # The joint constrains velocities; the trapezoidal rule tells forces that are some per cent off at any step.
+        "matched": ExudynSettings("discs", "matched", 1e-3, "generalized_alpha", 0.9, 1e-10, "step"),
     },
     "tree": {
         "default": ExudynSettings("tree", "default", 1e-3, "rk44"),

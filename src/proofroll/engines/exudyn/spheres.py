@@ -29,9 +29,14 @@ from proofroll.engines.exudyn.redundant import Redundant
 from proofroll.engines.exudyn.settings import ExudynSettings
 
 _CAPABILITY = MechanismCapability
-PROVIDES = redundant.PROVIDES | {_CAPABILITY.CONTACT, _CAPABILITY.CONTACT_FRICTION}
+PROVIDES = (redundant.PROVIDES | {_CAPABILITY.CONTACT, _CAPABILITY.CONTACT_FRICTION}) - {_CAPABILITY.MOTIONS}
 LACKING: Mapping[str, str] = {
     **redundant.LACKING,
+    _CAPABILITY.UNBOUNDED_FRICTION: "this model gives a contact a coefficient, and creeps by friction_zone with any",
+    _CAPABILITY.STATIC_FRICTION: "this formulation gives a contact one coefficient",
+    _CAPABILITY.SLIP_REBOUNDS: "this formulation has no rebounds",
+    _CAPABILITY.MOTIONS: "this formulation reads the force of a drive without that of contacts",
+    _CAPABILITY.TURNING_FRICTION: "this formulation gives a contact no moment",
     _CAPABILITY.CONTACT_REBOUNDS: "its restitution is a damping that comes near it with ever shorter steps alone",
 }
 # m: distance from the centre of the triangle that stands for a plane to its sides.
@@ -184,4 +189,6 @@ def _check(contact: BodyContact) -> None:
         if isinstance(shape, SphereShape) and not shape.radius:
             raise Refused(f"a corner touches in {contact.name}; Exudyn's contacts are of spheres with a radius")
         if not isinstance(shape, SphereShape | HalfSpace):
-            raise Refused(f"{contact.name} has a shape that is no sphere and no plane, which Exudyn's contacts lack")
+            raise Refused(
+                f"{contact.name} has a shape that is no sphere and no plane, of which this formulation makes no contact"
+            )

@@ -12,22 +12,25 @@ import numpy as np
 from proofroll.core.errors import Diverged
 from proofroll.elements.mechanism import WORLD, Joint
 from proofroll.elements.mechanism.capabilities import ALL_JOINTS, ALL_LOOPS, FORCES, MechanismCapability, require
+from proofroll.elements.mechanism.commands import drive
 from proofroll.elements.mechanism.rotations import Array, to_quaternion
 from proofroll.elements.mechanism.sampling import MechanismBuilt, MechanismSample, mechanism_of
-from proofroll.engines.exudyn.connections import add_springs
+from proofroll.engines.exudyn.bushings import add_bushings
+from proofroll.engines.exudyn.connections import add_forces, add_springs
 from proofroll.engines.exudyn.integration import ExudynModel, Integration
 from proofroll.engines.exudyn.joint_laws import JointLaws
 from proofroll.engines.exudyn.native import Output, add_kinematic_tree, exu, items
 from proofroll.engines.exudyn.settings import ExudynSettings
 
 _KNOWN = {MechanismCapability.REVOLUTE, MechanismCapability.PRISMATIC}
-_DRIVES = {MechanismCapability.ACTUATORS, MechanismCapability.SATURATION, MechanismCapability.SIGNALS}
+_DRIVES = {MechanismCapability[name] for name in ("ACTUATORS", "SATURATION", "SIGNALS", "HELD")}
 PROVIDES: frozenset[str] = frozenset(_KNOWN | FORCES | _DRIVES)
 LACKING: Mapping[str, str] = {
     **dict.fromkeys(ALL_JOINTS - _KNOWN, "a joint of Exudyn's kinematic tree has exactly one coordinate"),
     **dict.fromkeys(ALL_LOOPS, "Exudyn's explicit integrators take no constraints"),
     MechanismCapability.JOINT_FRICTION: "this model has no friction in joints",
     MechanismCapability.COUPLINGS: "Exudyn's explicit integrators take no constraints",
+    MechanismCapability.MOTIONS: "Exudyn's explicit integrators take no constraints",
     MechanismCapability.ARMATURE: "Exudyn's kinematic tree has no inertia of drives",
 }
 _TYPES = {"revolute": exu.JointType.RevoluteZ, "prismatic": exu.JointType.PrismaticZ}
@@ -50,6 +53,9 @@ class KinematicTree(ExudynModel):
         self._tree = self._add_tree()
         self._ground = self.system.CreateGround()
         add_springs(self.system, mechanism, self.marker)
+        turns = {name: R for name, (R, _) in self._frames.items()}
+        add_bushings(self.system, mechanism, self.marker, turns)
+        add_forces(self.system, mechanism, self.marker, turns)
         self._laws = JointLaws(self.system, mechanism, self._coordinate, settings.dt)
         origins = [(self._link[body.name], self._in_link(body.name, np.zeros(3))) for body in mechanism.bodies]
         self._sensors = {name: self._add_sensors(name, origins) for name in _READ}
@@ -94,6 +100,12 @@ class KinematicTree(ExudynModel):
     def _in_link(self, body: str, position: Array) -> list[float]:
         R, p = self._frames[body]
         return [float(x) for x in p + R @ position]
+
+    def drive(self, values: Array) -> None:
+        """See :class:`proofroll.core.engine_abilities.TakesTargets`."""
+        drive(self._mechanism, values)
+        if self.integration.t:
+            self.integration = self.integration.again()
 
     def marker(self, body: str, position: Any) -> Any:
         """Adds a marker at a place in a body's frame [m]."""

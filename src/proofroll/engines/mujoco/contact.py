@@ -40,9 +40,9 @@ def foreseen_normal_force(data: Any, N: float) -> float:
     """
     t = float(data.time)
     memory = data.userdata
-    last, before, N_before, slope = memory[:MEMORY].tolist()
-    if last > before:
-        slope = (N - N_before) / (last - before)
+    last, time_before, N_before, slope = memory[:MEMORY].tolist()
+    if last > time_before:
+        slope = (N - N_before) / (last - time_before)
     memory[0], memory[1], memory[2], memory[3] = t, last, N, slope  # faster than a slice
     return max(float(N + slope * (t - last)), 0.0)
 

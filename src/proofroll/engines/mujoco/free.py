@@ -118,11 +118,11 @@ class Free(Formulation):
         mujoco.mju_quatZ2Vec(data.mocap_quat[0], -e1)
         if self.resistance.f:
             foreseen = foreseen_normal_force(data, N)
-            torque, along = data.xfrc_applied[self._ball, 3:], rates[:3].tolist()
-            if self._half and self.resistance.stops(foreseen, math.hypot(*along)):
+            torque, spin = data.xfrc_applied[self._ball, 3:], rates[:3].tolist()
+            if self._half and self.resistance.stops(foreseen, math.hypot(*spin)):
                 self.resistance.stop(torque, foreseen, e1.tolist(), data.qvel[:3].tolist())
             else:
-                self.resistance.apply(torque, foreseen, e1.tolist(), along)
+                self.resistance.apply(torque, foreseen, e1.tolist(), spin)
         return rates, trend, N
 
     def _edit(self, data: Any, rates: FloatArray, trend: FloatArray, N: float) -> None:
@@ -147,7 +147,7 @@ class Free(Formulation):
         rows = contact.frame.reshape(3, 3) @ cross(w, e1_rate) * -self._radius
         v = rates[:3] + self._lead * trend[:3]
         rows[0] = v @ gradient @ v
-        first = contact.efc_address
+        row = contact.efc_address
         if self._wall_rate is not None:
             # Damping and rate belong to the velocity relative to the wall's, which is W × (p + a e1).
             e1 = -contact.frame[:3] if contact.geom[1] == self._geom else contact.frame[:3]
@@ -155,8 +155,8 @@ class Free(Formulation):
             gained = cross(self._wall_rate, rates[:3] + self._radius * e1_rate)
             tangents = contact.frame.reshape(3, 3)[1:]
             rows[1:] += tangents @ gained
-            data.efc_aref[first + 1 : first + 3] += data.efc_KBIP[first + 1, 1] * (tangents @ velocity)
-        data.efc_aref[first : first + contact.dim] += self._share * rows[: contact.dim]
+            data.efc_aref[row + 1 : row + 3] += data.efc_KBIP[row + 1, 1] * (tangents @ velocity)
+        data.efc_aref[row : row + contact.dim] += self._share * rows[: contact.dim]
 
 
 class Facets(Formulation):
@@ -248,7 +248,7 @@ def _reach(body: RollingBall, axis: FloatArray) -> float:
     rate = float(np.linalg.norm(turning))
     if rate == 0:
         return math.inf if axis @ body.gravity else 0.0
-    along, spin = float(axis @ body.v0), float(body.surface.normal(body.p0) @ body.w0)
+    speed, spin = float(axis @ body.v0), float(body.surface.normal(body.p0) @ body.w0)
     square = r / (1 + r) * rate**2
     middle = (abs(float(axis @ body.gravity)) + r * rate * body.ball.radius * abs(spin)) / (1 + r) / square
-    return abs(float(axis @ body.p0)) + middle + math.hypot(middle, along / math.sqrt(square))
+    return abs(float(axis @ body.p0)) + middle + math.hypot(middle, speed / math.sqrt(square))

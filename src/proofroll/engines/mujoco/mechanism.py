@@ -1,17 +1,19 @@
 """A mechanism in MuJoCo: its start, its steps, samples of its state, and the certificate read from its model."""
 
-from collections.abc import Mapping
+import contextlib
+from collections.abc import Iterator, Mapping
 from typing import Any, ClassVar
 
 import mujoco
 import numpy as np
 
-from proofroll.core.arrays import cross
+from proofroll.core.arrays import cross, longest
 from proofroll.core.engine import Regularised
 from proofroll.core.errors import Refused
-from proofroll.elements.mechanism import Joint, Mechanism
+from proofroll.elements.mechanism import WORLD, Joint, Mechanism
 from proofroll.elements.mechanism.capabilities import ALL_JOINTS, FORCES, MechanismCapability, require
-from proofroll.elements.mechanism.joint import child_in_parent
+from proofroll.elements.mechanism.commands import drive
+from proofroll.elements.mechanism.joint import DISTANCE, child_in_parent
 from proofroll.elements.mechanism.named_forces import named_forces
 from proofroll.elements.mechanism.rotations import Array, to_quaternion
 from proofroll.elements.mechanism.sampling import (
@@ -23,8 +25,11 @@ from proofroll.elements.mechanism.sampling import (
     row_rank,
     unsaid,
 )
-from proofroll.elements.mechanism.signal import Signal, value_at, varies
+from proofroll.elements.mechanism.signal import Held, Signal, value_at, varies
 from proofroll.engines.mujoco import mechanism_model
+from proofroll.engines.mujoco.applied_loads import AppliedLoads
+from proofroll.engines.mujoco.equation_matrices import equation_matrices
+from proofroll.engines.mujoco.prescribed_motions import PrescribedMotions
 from proofroll.engines.mujoco.running import SteppedModel, compiled, forget_callbacks, mass_matrix, silent
 from proofroll.engines.mujoco.settings import MujocoSettings, check
 
@@ -36,21 +41,21 @@ _MARGIN = 1.1
 PROVIDES = (
     ALL_JOINTS
     | FORCES
-    | {_CAPABILITY.FIXED_LOOP, _CAPABILITY.REVOLUTE_LOOP, _CAPABILITY.SPHERICAL_LOOP, _CAPABILITY.REDUNDANT}
-    | {_CAPABILITY.JOINT_FRICTION, _CAPABILITY.ARMATURE, _CAPABILITY.STOPS}
+    | {_CAPABILITY.FIXED_LOOP, _CAPABILITY.REVOLUTE_LOOP, _CAPABILITY.SPHERICAL_LOOP, _CAPABILITY.DISTANCE_LOOP}
+    | {_CAPABILITY.REDUNDANT, _CAPABILITY.JOINT_FRICTION, _CAPABILITY.ARMATURE, _CAPABILITY.STOPS}
     | {
         _CAPABILITY.ACTUATORS,
         _CAPABILITY.SATURATION,
         _CAPABILITY.COUPLINGS,
         _CAPABILITY.COUPLINGS_OF_MANY,
         _CAPABILITY.SIGNALS,
+        _CAPABILITY.HELD,
+        _CAPABILITY.MOTIONS,
     }
 )
 _NO_ROWS = "MuJoCo's equality constraints hold points or whole frames together, and no single angle or direction"
 LACKING: Mapping[str, str] = {
-    _CAPABILITY.PRISMATIC_LOOP: _NO_ROWS,
-    _CAPABILITY.UNIVERSAL_LOOP: _NO_ROWS,
-    _CAPABILITY.PLANAR_LOOP: _NO_ROWS,
+    **{MechanismCapability[f"{kind}_LOOP"]: _NO_ROWS for kind in ("PRISMATIC", "CYLINDRICAL", "UNIVERSAL", "PLANAR")},
     _CAPABILITY.MASSLESS: "MuJoCo needs a positive definite mass matrix of the tree alone",
     _CAPABILITY.REBOUNDS: "MuJoCo's limits have no restitution but that of a spring of their own",
 }
@@ -83,10 +88,18 @@ class MujocoMechanism(SteppedModel):
         self._named = bool(named_forces(mechanism))
         self._gears = [actuator.gear for actuator in mechanism.actuators]
         couplings = map(mechanism_model.coupling_name, mechanism.couplings)
-        equalities = {self._model.equality(name).id: k for k, name in enumerate(couplings)}
+        equalities = {self._model.equality(name).id: ("coupling", k) for k, name in enumerate(couplings)}
+        for joint, _, _ in mechanism.prescribed:
+            equality = self._model.equality(mechanism_model.motion_name(joint)).id
+            equalities[equality] = "drive", mechanism.joint_index[joint.name]
         single = {self._model.joint(joint.name).id: k for k, joint in enumerate(mechanism.joints) if joint.nq == 1}
         dofs = {int(self._model.jnt_dofadr[own]): k for own, k in single.items()}
         self._numbers = single, dofs, equalities
+        self._armature = self._model.dof_armature.copy()
+        extra = mechanism_model.damping_armatures(mechanism, settings)
+        for joint in (joint for joint in mechanism.joints if joint.name in extra):
+            for part in map(self._model.joint, mechanism_model.part_names(joint)):
+                self._armature[part.dofadr[0] :][: len(part.armature)] = joint.armature
         self._at_rest = np.full((2, len(mechanism.joints)), np.nan)
         self._at_rest[:, list(single.values())] = 0.0
         # Sensors give the reactions, and only samples need them: in every step they would cost 5 to 20 % of it.
@@ -95,8 +108,12 @@ class MujocoMechanism(SteppedModel):
             self._start(joint)
         signals = _signals(self._model, mechanism)
         self._moving = signals
-        self._drive(self._model, self._data)
-        self._moving = [item for item in signals if varies(item[0])]
+        index = {body.name: number for body, number in zip(mechanism.bodies, self._bodies, strict=True)} | {WORLD: 0}
+        self._loads = AppliedLoads(self._model, mechanism, index)
+        self._motions = PrescribedMotions(self._model, mechanism)
+        self._drive_at_pose(self._data)
+        self._moving = [item for item in signals if varies(item[0]) and not isinstance(item[0], Held)]
+        self._set = [(signal, field, index) for signal, field, index in signals if isinstance(signal, Held)]
         with silent():
             mujoco.mj_forward(self._model, self._data)
 
@@ -106,8 +123,11 @@ class MujocoMechanism(SteppedModel):
         Raises:
             Refused: a drive or the target of an actuator changes in time: MuJoCo keeps these in the state.
         """
-        if self._moving:
-            raise Refused("a drive or a target that changes is set from outside in every step, and in no MJCF")
+        if self._moving or self._set or self._loads.any or self._motions:
+            advice = "is set from outside in every step, and in no MJCF"
+            raise Refused(
+                f"an applied force, a bushing, a prescribed motion, and a drive or target that changes, {advice}"
+            )
         spec = mechanism_model.write(self._mechanism, self._settings)
         drives = mechanism_model.add_constant_drives(spec, self._mechanism)
         control = np.append(self._data.ctrl, np.zeros(drives))
@@ -137,11 +157,14 @@ class MujocoMechanism(SteppedModel):
             self._data.qfrc_applied[first] = joint.torque
 
     def _run(self, steps: int) -> None:
-        """Makes ``steps`` steps; sets changing drives and targets before each, with RK4 before each of its stages."""
-        if not self._moving:
+        """Makes ``steps`` steps; sets changing drives and targets before each, with RK4 before each of its stages.
+
+        Applied forces depend on poses, which MuJoCo computes within a step: they are set there.
+        """
+        if not (self._moving or self._loads.any or self._motions):
             super()._run(steps)
-        elif self._settings.integrator == "RK4":
-            mujoco.set_mjcb_control(self._drive)
+        elif self._settings.integrator == "RK4" or self._loads.any:
+            mujoco.set_mjcb_control(self._drive_in_step)
             try:
                 super()._run(steps)
             finally:
@@ -149,12 +172,33 @@ class MujocoMechanism(SteppedModel):
         else:
             for _ in range(steps):
                 self._drive(self._model, self._data)
+                self._motions.apply(self._data)
                 mujoco.mj_step(self._model, self._data)
+
+    def drive(self, values: Array) -> None:
+        """See :class:`proofroll.core.engine_abilities.TakesTargets`."""
+        drive(self._mechanism, values)
+        for signal, field, index in self._set:
+            getattr(self._data, field)[index] = signal.value
 
     def _drive(self, _: Any, data: Any) -> None:
         """Sets drives and targets to their values at the time of ``data``."""
         for signal, field, index in self._moving:
             getattr(data, field)[index] = float(value_at(signal, data.time))
+        if self._loads.any:
+            self._loads.apply(data)
+
+    def _drive_in_step(self, model: Any, data: Any) -> None:
+        self._drive(model, data)
+        self._motions.apply_in_step(data)
+
+    def _drive_at_pose(self, data: Any) -> None:
+        """Sets drives, targets and applied forces for the state of ``data``, whose poses may be old."""
+        if self._loads.any:
+            for stage in (mujoco.mj_kinematics, mujoco.mj_comPos, mujoco.mj_comVel):
+                stage(self._model, data)
+        self._drive(self._model, data)
+        self._motions.apply(data)
 
     def sample(self) -> MechanismSample:
         """See :class:`proofroll.core.engine.Engine`."""
@@ -175,22 +219,23 @@ class MujocoMechanism(SteppedModel):
         )
 
     def _along(self, data: Any) -> dict[str, Array]:
-        """Efforts of actuators, and forces of couplings, dry friction and stops, along coordinates [N or N m]."""
+        """Efforts of actuators, forces of couplings, motions, dry friction and stops, along coordinates [N or N m]."""
         model, (single, dofs, equalities) = self._model, self._numbers
         friction, stop = self._at_rest.copy()
-        coupling = np.zeros(len(equalities))
+        held = {"coupling": np.zeros(len(self._mechanism.couplings)), "drive": np.full(len(friction), np.nan)}
         kinds = data.efc_type[: data.nefc].tolist()
         rows = self._rows(data, data.nefc) if kinds else None
         for row, (kind, own) in enumerate(zip(kinds, data.efc_id[: data.nefc].tolist(), strict=True)):
             force = float(data.efc_force[row])
             if kind == _ROW.mjCNSTR_EQUALITY and own in equalities:
-                coupling[equalities[own]] = force
+                field, number = equalities[own]
+                held[field][number] = force
             elif kind == _ROW.mjCNSTR_FRICTION_DOF and own in dofs:
                 friction[dofs[own]] = force
             elif kind == _ROW.mjCNSTR_LIMIT_JOINT and own in single and rows is not None:
                 # a stop pushes up where the coordinate has a positive sign in its row
                 stop[single[own]] += force * float(np.sign(rows[row, int(model.jnt_dofadr[own])]))
-        return {"effort": data.actuator_force * self._gears, "coupling": coupling, "friction": friction, "stop": stop}
+        return {"effort": data.actuator_force * self._gears, **held, "friction": friction, "stop": stop}
 
     def _reactions(self, data: Any) -> tuple[Array, Array]:
         """Forces [N] and moments about the joint [N m] of joints and loops on the child, world axes.
@@ -209,6 +254,11 @@ class MujocoMechanism(SteppedModel):
                 continue
             force[count + number] = torque[count + number] = 0.0
             origin = data.site(f"loop{number}b0").xpos
+            if loop.kind == DISTANCE:
+                along = origin - data.site(f"loop{number}a0").xpos
+                equality = mujoco.mj_name2id(self._model, mujoco.mjtObj.mjOBJ_EQUALITY, f"loop{number}.0")
+                force[count + number] = data.efc_force[rows[equality]] * along / np.linalg.norm(along)
+                continue
             for point in range(2):
                 equality = mujoco.mj_name2id(self._model, mujoco.mjtObj.mjOBJ_EQUALITY, f"loop{number}.{point}")
                 if equality < 0:
@@ -228,6 +278,8 @@ class MujocoMechanism(SteppedModel):
         rows = self._rows(data, data.ne)
         rank = row_rank(rows)
         accelerations = self._accelerations(data)
+        with self._without_steps():
+            M, h, g = equation_matrices(self._mechanism, model, data)
         return MechanismBuilt(
             mass=model.body_mass[bodies].copy(),
             com=model.body_ipos[bodies].copy(),
@@ -235,6 +287,9 @@ class MujocoMechanism(SteppedModel):
             joint_position=np.array([data.site(f"{number}").xpos for number in range(len(joints))]),
             joint_axis=np.array([self._axis(data, joint) for joint in joints]),
             gravity=model.opt.gravity.copy(),
+            mass_matrix=M,
+            velocity_forces=h,
+            gravity_forces=g,
             rows=len(rows),
             rank=rank,
             mobility=int(model.nv) - rank,
@@ -285,11 +340,12 @@ class MujocoMechanism(SteppedModel):
         because = f"loops are soft, of impedance {at_rest:g} at rest; hard ones would change that much"
         regularised = {}
         for name, hard in self._accelerations(data).items():
-            difference = float(np.abs(hard - soft[name]).max() / max(np.abs(hard).max(), np.finfo(float).tiny))
+            difference = longest(hard - soft[name]) / max(longest(hard), np.finfo(float).tiny)
             regularised[name] = Regularised(_MARGIN * difference + DEPENDENT, because)
-        if self._mechanism.couplings:
+        if self._mechanism.couplings or self._mechanism.prescribed:
             hard_forces = self._forces(data)
-            least = DEPENDENT * float(np.abs(hard_forces["couplings"]).max()) or 1.0
+            along = [np.abs(hard_forces[name]).max() for name in ("couplings", "drives") if name in hard_forces]
+            least = DEPENDENT * float(max(along)) or 1.0
             for name, hard in hard_forces.items():
                 difference = float(np.nanmax(np.abs(hard - forces[name])))
                 size = max(float(np.nanmax(np.abs(hard))), least)
@@ -297,19 +353,37 @@ class MujocoMechanism(SteppedModel):
         return regularised
 
     def _forces(self, data: Any) -> dict[str, Array]:
-        """Reactions of joints and forces of couplings, from accelerations and forces of rows."""
+        """Reactions of joints, forces of couplings and of motions, from accelerations and forces of rows."""
         mujoco.mj_rnePostConstraint(self._model, data)
         self._model.opt.disableflags &= ~_NO_SENSORS
         mujoco.mj_sensorAcc(self._model, data)
         self._model.opt.disableflags |= _NO_SENSORS
         force, torque = self._reactions(data)
-        return {"forces": force, "torques": torque, "couplings": self._along(data)["coupling"]}
+        along, driven = (
+            self._along(data),
+            [self._mechanism.joint_index[k.name] for k, _, _ in self._mechanism.prescribed],
+        )
+        found = {"forces": force, "torques": torque, "couplings": along["coupling"], "drives": along["drive"][driven]}
+        return {name: values for name, values in found.items() if values.size}
 
     def _evaluate(self, data: Any) -> None:
-        self._drive(self._model, data)
+        self._drive_at_pose(data)
         self._model.opt.disableflags &= ~_NO_SENSORS
-        self._forward(data)
+        with self._without_steps():
+            self._forward(data)
         self._model.opt.disableflags |= _NO_SENSORS
+
+    @contextlib.contextmanager
+    def _without_steps(self) -> Iterator[None]:
+        """Takes away the armature of implicit damping: it belongs to a step, and not to the forces of a state."""
+        model = self._model
+        kept = model.dof_armature.copy(), model.dof_M0.copy()
+        model.dof_M0 -= model.dof_armature - self._armature  # the mass matrix of bodies on one simple joint
+        model.dof_armature[:] = self._armature
+        try:
+            yield
+        finally:
+            model.dof_armature[:], model.dof_M0[:] = kept
 
     def _forward(self, data: Any) -> None:
         super()._evaluate(data)
@@ -317,8 +391,8 @@ class MujocoMechanism(SteppedModel):
 
 def _signals(model: Any, mechanism: Mechanism) -> list[tuple[Signal, str, int]]:
     """Signals (targets of actuators, drives that vary), each with the field of MjData that it sets and its index."""
-    signals = [(item.target, "ctrl", number) for number, item in enumerate(mechanism.actuators)]
-    for joint in mechanism.joints:
-        if varies(joint.torque):
-            signals.append((joint.torque, "qfrc_applied", int(model.joint(joint.name).dofadr[0])))
-    return signals
+    drives = [(joint.torque, joint.name) for joint in mechanism.joints if varies(joint.torque)]
+    return [
+        *((item.target, "ctrl", number) for number, item in enumerate(mechanism.actuators)),
+        *((torque, "qfrc_applied", int(model.joint(name).dofadr[0])) for torque, name in drives),
+    ]

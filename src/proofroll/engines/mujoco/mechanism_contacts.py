@@ -14,7 +14,6 @@ from proofroll.core.errors import Refused
 from proofroll.elements.mechanism import WORLD, Mechanism
 from proofroll.elements.mechanism.contacts.geometry import BodyContact
 from proofroll.elements.mechanism.contacts.shapes import (
-    Bore,
     CircleShape,
     EllipsoidShape,
     HalfSpace,
@@ -23,11 +22,12 @@ from proofroll.elements.mechanism.contacts.shapes import (
 )
 from proofroll.elements.mechanism.contacts.start import touches
 from proofroll.elements.mechanism.contacts.touching import Moving
+from proofroll.elements.mechanism.contacts.walls import CurvedWall
 from proofroll.elements.mechanism.kinematics import Tree
 from proofroll.elements.mechanism.rotations import Array, cross, frame_of_axis, to_quaternion
 from proofroll.elements.mechanism.sampling import DEPENDENT
 from proofroll.engines.mujoco.friction import NEAR_CONE, check_coefficients
-from proofroll.engines.mujoco.settings import MujocoSettings
+from proofroll.engines.mujoco.settings import UNBOUNDED_FRICTION, MujocoSettings
 
 # m; MuJoCo has no sphere of radius 0.
 _VERTEX = 1e-12
@@ -40,22 +40,24 @@ _WIDE, _DEEP = 1e3, 1.0
 _MARGIN = 1e-9
 # m: margin within which contacts are searched to be read back, so large that every one is found.
 _FAR = 1e6
-# A row of slip is corrected only above the speed that friction stops in this many steps.
-_STEPS = 3.5
+# Factor on rates of the step before, so that their errors open no contact. With twice the rate, contacts that stick
+# beside others that slide would swing with a period of two steps.
+_LEAD = 1.1
 
 
 def check_contacts(mechanism: Mechanism, settings: MujocoSettings) -> None:
     """Refuses the first contact that MuJoCo would silently change or cannot represent."""
     moving = _moving(mechanism)
     for contact in mechanism.contacts:
-        check_coefficients([contact.friction], settings, "a contact")
+        check_coefficients([_coefficient(contact)], settings, "a contact")
         sides = ((contact.body_a, contact.shape_a), (contact.body_b, contact.shape_b))
-        for (body, shape), (_, other) in (sides, sides[::-1]):
-            if isinstance(shape, Bore):
+        for (body, shape), (_, partner) in (sides, sides[::-1]):
+            if isinstance(shape, CurvedWall):
                 raise Refused(
-                    f"{contact.name} is in a bore; MuJoCo's shapes are convex, and facets are another surface"
+                    f"{contact.name} has the wall {shape.kind}; this adapter builds convex geoms alone, as facets are "
+                    "another surface"
                 )
-            if isinstance(shape, HalfSpace) and body in moving and not isinstance(other, SphereShape):
+            if isinstance(shape, HalfSpace) and body in moving and not isinstance(partner, SphereShape):
                 raise Refused(
                     f"the plane of {contact.name} moves with {body}; MuJoCo's planes stand, and a box in its place "
                     "meets spheres alone exactly"
@@ -83,11 +85,16 @@ def _set_pair_law(pair: Any, contact: BodyContact, settings: MujocoSettings) -> 
     Friction has its own ``solreffriction``, or the slip would be reversed too.
     """
     pair.condim = 3 if contact.friction else 1
-    pair.friction = (contact.friction, contact.friction, 0.0, 0.0, 0.0)
+    pair.friction = (_coefficient(contact), _coefficient(contact), 0.0, 0.0, 0.0)
     settings.soften(pair)
     if contact.restitution:
         pair.solref = (-1.0, -(1 + contact.restitution) / settings.dt)
         pair.solreffriction = (-1e-9, -1 / settings.dt)
+
+
+def _coefficient(contact: BodyContact) -> float:
+    """Coefficient of a contact in MuJoCo, which has no unbounded friction."""
+    return min(contact.friction, UNBOUNDED_FRICTION)
 
 
 def _set_shape(geom: Any, shape: Shape, moves: bool) -> None:
@@ -100,7 +107,7 @@ def _set_shape(geom: Any, shape: Shape, moves: bool) -> None:
         else:
             geom.type, geom.size, geom.pos = mujoco.mjtGeom.mjGEOM_PLANE, (0.0, 0.0, 1.0), shape.point
         return
-    assert not isinstance(shape, Bore)  # refused
+    assert not isinstance(shape, CurvedWall)  # refused
     geom.pos = shape.centre
     if isinstance(shape, SphereShape):
         geom.type, geom.size = mujoco.mjtGeom.mjGEOM_SPHERE, (max(shape.radius, _VERTEX), 0.0, 0.0)
@@ -144,7 +151,7 @@ class Contacts:
         # Geom -> number of its contact, and 1 if the geom is body a's or -1 if it is body b's.
         self._of_geom = {a: (k, 1.0) for k, (a, _) in enumerate(self._geoms)}
         self._of_geom |= {b: (k, -1.0) for k, (_, b) in enumerate(self._geoms)}
-        self._weight = float(np.linalg.norm(mechanism.gravity))
+        self._normal_rows: dict[int, list[Array]] = {}
 
     def forces(self, data: Any) -> Array:
         """Forces on body a of each contact in the world [N], shape (contacts, 3)."""
@@ -157,22 +164,52 @@ class Contacts:
             total[number] += sign * (contact.frame.reshape(3, 3).T @ wrench[:3])
         return total
 
-    def correct(self, data: Any) -> None:
-        """Subtracts from the normal rows the lift that MuJoCo's convex cone gives to slip; the cone must be elliptic.
+    def correct(self, data: Any, rows: Array) -> None:
+        """Subtracts from the normal rows what lifts contacts in MuJoCo and not in mechanics; the cone must be elliptic.
 
-        MuJoCo's friction is the dual of a convex cone: a row that decelerates the slip s by b s adds mu b s to the
-        normal acceleration, and the contact hops; mu b s is subtracted. To be called after the reference accelerations
-        and before the forces.
+        Friction in MuJoCo is the dual of a convex cone: friction rows that miss their reference accelerations by r add
+        mu r to the normal acceleration, and the contact hops. With the damping b of the slip s, r = b s + ds/dt; ds/dt
+        is that of the evaluation before. Where r would be negative, friction ends the slip, and nothing is lifted. The
+        second lift is the turning of the normal row (J̇v), which MuJoCo leaves out; it follows from the row of the step
+        before (:meth:`remember`). Rates that press a contact instead are left to it.
+
+        Args:
+            data: MuJoCo's data after its reference accelerations and before its forces.
+            rows: Jacobian of all rows, shape (nefc, nv).
         """
-        dt = self._model.opt.timestep
+        dt, rates = self._model.opt.timestep, rows @ data.qacc
         for index in range(data.ncon):
             contact = data.contact[index]
             row, mu = int(contact.efc_address), float(contact.friction[0])
-            if row < 0 or contact.dim == 1:
+            if row < 0:
                 continue
-            slip = float(np.hypot(*data.efc_vel[row + 1 : row + 3]))
-            if slip > _STEPS * mu * self._weight * dt:
-                data.efc_aref[row] -= mu * data.efc_KBIP[row + 1, 1] * slip
+            turns = [rows[row] - previous for previous in self._normal_rows.get(self._number(contact), ())]
+            if turns:  # a pair that meets in several points: the nearest row
+                turning = float(min(turns, key=np.linalg.norm) @ data.qvel) / dt
+                data.efc_aref[row] -= _LEAD * max(turning, 0.0)
+            friction = slice(row + 1, row + contact.dim)
+            slip = float(np.linalg.norm(data.efc_vel[friction]))
+            if contact.dim == 1:
+                continue
+            # from rest a slip starts along its acceleration
+            slip_rates = rates[friction] if slip == 0 else data.efc_vel[friction]
+            size = float(np.linalg.norm(slip_rates))
+            rate = float(slip_rates @ rates[friction]) / size if size else 0.0
+            damped = float(data.efc_KBIP[row + 1, 1]) * slip
+            if damped + rate > 0:
+                data.efc_aref[row] -= mu * (damped + _LEAD * max(rate, 0.0))
+
+    def remember(self, data: Any, rows: Array) -> None:
+        """Keeps the normal rows of a step for :meth:`correct` in the next one; the same arguments."""
+        self._normal_rows = {}
+        for index in range(data.ncon):
+            contact = data.contact[index]
+            if contact.efc_address >= 0:
+                self._normal_rows.setdefault(self._number(contact), []).append(rows[int(contact.efc_address)])
+
+    def _number(self, contact: Any) -> int:
+        """Number of the mechanism's contact to which MuJoCo's contact belongs."""
+        return self._of_geom[int(contact.geom[1])][0]
 
     def add_turning(self, data: Any) -> None:
         """Adds J̇v, which MuJoCo leaves out of the rows of contacts, to the reference accelerations at the start."""
@@ -183,18 +220,18 @@ class Contacts:
             contact = data.contact[index]
             row = int(contact.efc_address)
             number, sign = self._of_geom[int(contact.geom[1])]
-            own, each = mechanism.contacts[number], touching[number]
+            contact_of_scene, touch = mechanism.contacts[number], touching[number]
             missing = np.zeros(3)
-            for body, side in ((own.body_a, 1.0), (own.body_b, -1.0)):
+            for body, side in ((contact_of_scene.body_a, 1.0), (contact_of_scene.body_b, -1.0)):
                 k = mechanism.body_index[body]
-                mujoco.mj_jacDot(self._model, data, rate, None, each.place, self._model.body(body).id)
+                mujoco.mj_jacDot(self._model, data, rate, None, touch.place, self._model.body(body).id)
                 moving = Moving(motion.p_WB[k], motion.R_WB[k], motion.v_WB[k], motion.w_WB[k])
-                along_body = each.place_rate - moving.velocity(each.place)
+                along_body = touch.place_rate - moving.velocity(touch.place)
                 missing += side * (rate @ data.qvel + cross(moving.w, along_body))
-            along = sign * contact.frame.reshape(3, 3) @ missing
-            along[0] += float(each.normal_rate @ each.slide)
+            shift = sign * contact.frame.reshape(3, 3) @ missing
+            shift[0] += float(touch.normal_rate @ touch.slide)
             if row >= 0:
-                data.efc_aref[row : row + contact.dim] -= along[: contact.dim]
+                data.efc_aref[row : row + contact.dim] -= shift[: contact.dim]
 
     def take_lift(self, data: Any, rates: Array) -> None:
         """Subtracts the lift of each contact whose force is on the cone, from the residual of its friction rows.

@@ -7,6 +7,7 @@ from typing import Any, ClassVar
 import mujoco
 import numpy as np
 
+from proofroll.core.arrays import longest
 from proofroll.core.engine import Regularised
 from proofroll.core.errors import Refused
 from proofroll.elements.mechanism.capabilities import MechanismCapability
@@ -29,7 +30,14 @@ _SOFT = (
     "would change that much"
 )
 PROVIDES = mechanism.PROVIDES | {_CAPABILITY.CONTACT, _CAPABILITY.CONTACT_FRICTION, _CAPABILITY.CONTACT_REBOUNDS}
-LACKING: Mapping[str, str] = mechanism.LACKING
+PROVIDES = (PROVIDES | {_CAPABILITY.UNBOUNDED_FRICTION}) - {_CAPABILITY.MOTIONS}
+LACKING: Mapping[str, str] = {
+    **mechanism.LACKING,
+    _CAPABILITY.STATIC_FRICTION: "this formulation gives a contact one coefficient",
+    _CAPABILITY.MOTIONS: "this formulation reads the force of a drive without that of contacts",
+    _CAPABILITY.TURNING_FRICTION: "this formulation builds contacts that slide (condim 3), not such that turn",
+    _CAPABILITY.SLIP_REBOUNDS: "this formulation sets restitution along the normal alone",
+}
 
 
 def family(settings: MujocoSettings) -> Mapping[str, str]:
@@ -43,14 +51,15 @@ class MujocoGeoms(MujocoMechanism):
     """Run of a mechanism with contacts; see :class:`proofroll.core.engine.Engine` for the methods."""
 
     provides: ClassVar[frozenset[str]] = PROVIDES
+    lacking: ClassVar[Mapping[str, str]] = LACKING
 
     def __init__(self, scene: Any, settings: MujocoSettings) -> None:
-        own = mechanism_of(scene)
-        check_contacts(own, settings)
-        if any(pair.restitution for pair in own.pairs):
+        mechanism = mechanism_of(scene)
+        check_contacts(mechanism, settings)
+        if any(pair.restitution for pair in mechanism.pairs):
             check_restitution(settings)
-        super().__init__(own, settings)
-        self._contacts = Contacts(self._model, own)
+        super().__init__(mechanism, settings)
+        self._contacts = Contacts(self._model, mechanism)
 
     def spec(self) -> Any:
         """MjSpec, whose keyframe ``start`` is time 0. Raises Refused if each step edits the contacts."""
@@ -63,9 +72,11 @@ class MujocoGeoms(MujocoMechanism):
             super()._run(steps)
             return
         for _ in range(steps):
-            self._drive(self._model, self._data)
             mujoco.mj_step1(self._model, self._data)
-            self._contacts.correct(self._data)
+            self._drive(self._model, self._data)
+            rows = self._rows(self._data, self._data.nefc)
+            self._contacts.correct(self._data, rows)
+            self._contacts.remember(self._data, rows)
             mujoco.mj_step2(self._model, self._data)
 
     def _forward(self, data: Any) -> None:
@@ -74,7 +85,7 @@ class MujocoGeoms(MujocoMechanism):
             return
         mujoco.mj_fwdPosition(self._model, data)
         mujoco.mj_fwdVelocity(self._model, data)
-        self._contacts.correct(data)
+        self._contacts.correct(data, self._rows(data, data.nefc))
         mujoco.mj_fwdActuation(self._model, data)
         mujoco.mj_fwdAcceleration(self._model, data)
         mujoco.mj_fwdConstraint(self._model, data)
@@ -88,17 +99,19 @@ class MujocoGeoms(MujocoMechanism):
     def built(self) -> MechanismBuilt:
         """See :class:`proofroll.core.engine.Engine`."""
         plain = super().built()
-        read = self._contacts.read(self._evaluated(), self._rows)
+        with self._without_steps():
+            read = self._contacts.read(self._evaluated(), self._rows)
         contacts = {f"contact_{name}": value for name, value in read._asdict().items()}
         if not self._evaluated().ncon:
             return replace(plain, **contacts)
         softened = dict(plain.regularised)
-        hard = self._hard(self._evaluated())
+        with self._without_steps():
+            hard = self._hard(self._evaluated())
         load = (1 - LARGEST_IMPEDANCE) * _OF_LOAD * float(np.linalg.norm(self._mechanism.gravity))
-        for name, wanted in hard.items():
-            size = float(np.abs(wanted).max()) or np.finfo(float).tiny
-            rest = load / float(np.abs(hard["acceleration"]).max() or np.finfo(float).tiny)
-            difference = float(np.abs(wanted - getattr(plain, name)).max()) / size
+        for name, expected in hard.items():
+            size = longest(expected) or np.finfo(float).tiny
+            rest = load / (longest(hard["acceleration"]) or np.finfo(float).tiny)
+            difference = longest(expected - getattr(plain, name)) / size
             softened[name] = Regularised(_MARGIN * difference + rest + DEPENDENT, _SOFT)
         return replace(plain, **contacts, regularised=softened)
 

@@ -7,14 +7,15 @@ where the mechanism is planar; in space a revolute loop needs two points of its 
 it freely, and no drift would reveal that.
 """
 
-from collections.abc import Sequence
 from typing import Any
 
 import mujoco
 import numpy as np
 
-from proofroll.elements.mechanism import WORLD, Body, Joint, Loop, Mechanism
+from proofroll.elements.mechanism import WORLD, Body, Joint, Mechanism
 from proofroll.elements.mechanism.drives import Actuator, Coupling
+from proofroll.elements.mechanism.joint import DISTANCE, WITH_QUATERNION
+from proofroll.elements.mechanism.kinematics import Tree
 from proofroll.elements.mechanism.loop_points import held_points
 from proofroll.elements.mechanism.rotations import to_quaternion
 from proofroll.elements.mechanism.signal import varies
@@ -28,6 +29,7 @@ PARTS: dict[str, tuple[tuple[Any, int], ...]] = {
     "fixed": (),
     "revolute": ((_HINGE, 2),),
     "prismatic": ((_SLIDE, 2),),
+    "cylindrical": ((_SLIDE, 2), (_HINGE, 2)),
     "universal": ((_HINGE, 2), (_HINGE, 0)),
     "spherical": ((_BALL, 2),),
     "planar": ((_SLIDE, 0), (_SLIDE, 1), (_HINGE, 2)),
@@ -59,14 +61,19 @@ def write(mechanism: Mechanism, settings: MujocoSettings) -> Any:
     option.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{settings.integrator.upper()}")
     # Without autoreset, a state that is not finite stays as it is instead of starting anew at time 0.
     option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
+    if settings.damping_armature:
+        option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_EULERDAMP)
     if not mechanism.contacts:
         option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONTACT)
-    bodies = {WORLD: spec.worldbody}
+    bodies, added = {WORLD: spec.worldbody}, damping_armatures(mechanism, settings)
     data = {body.name: body for body in mechanism.bodies}
     for number, joint in enumerate(mechanism.joints):
         bodies[joint.child] = _add_body(spec, bodies[joint.parent], number, joint, data[joint.child], settings)
+        for name in part_names(joint) if joint.name in added else ():
+            spec.joint(name).armature += added[joint.name]
     for number, loop in enumerate(mechanism.loops):
-        _add_loop(spec, bodies, number, loop, held_points(mechanism, loop), settings)
+        add = _add_strut if loop.kind == DISTANCE else _add_loop
+        add(spec, bodies, number, mechanism, settings)
     for number, spring in enumerate(mechanism.springs):
         tendon = spec.add_tendon(name=f"spring{number}")
         for end, body, position in (("a", spring.body_a, spring.position_a), ("b", spring.body_b, spring.position_b)):
@@ -78,18 +85,37 @@ def write(mechanism: Mechanism, settings: MujocoSettings) -> Any:
         _add_actuator(spec, actuator)
     for coupling in mechanism.couplings:
         settings.soften(_add_coupling(spec, coupling))
+    for joint, _, _ in mechanism.prescribed:
+        moves = spec.add_equality(
+            name=motion_name(joint), type=mujoco.mjtEq.mjEQ_JOINT, objtype=mujoco.mjtObj.mjOBJ_JOINT
+        )
+        moves.name1, moves.data[:5] = joint.name, (joint.q0[0], 0.0, 0.0, 0.0, 0.0)
+        settings.soften(moves)
     if mechanism.contacts:
         write_contacts(spec, bodies, mechanism, settings)
     return spec
+
+
+def damping_armatures(mechanism: Mechanism, settings: MujocoSettings) -> dict[str, float]:
+    """Joint -> armature that stands for its implicit damping, h (c + n² kd) [kg m² or kg]; empty: there is none.
+
+    A servo with a limit has none: while it is clamped, its damping acts on nothing.
+    """
+    if not settings.damping_armature:
+        return {}
+    damping = {joint.name: joint.damping for joint in mechanism.joints}
+    for actuator in mechanism.actuators:
+        damping[actuator.joint] += actuator.gear**2 * actuator.kd if actuator.limit is None else 0.0
+    return {name: settings.dt * value for name, value in damping.items() if value}
 
 
 def _add_coupling(spec: Any, coupling: Coupling) -> Any:
     """An equality of two joints, or of more joints through a fixed tendon whose length is held."""
     name = coupling_name(coupling)
     if len(coupling.terms) == 2:
-        (joint, _), (other, factor) = coupling.terms
+        (joint, _), (leader, factor) = coupling.terms
         added = spec.add_equality(name=name, type=mujoco.mjtEq.mjEQ_JOINT, objtype=mujoco.mjtObj.mjOBJ_JOINT)
-        added.name1, added.name2 = joint, other
+        added.name1, added.name2 = joint, leader
         added.data[:2] = coupling.place, -factor
         return added
     tendon = spec.add_tendon(name=name)
@@ -134,6 +160,11 @@ def _add_body(spec: Any, parent: Any, number: int, joint: Joint, body: Body, set
 def coupling_name(coupling: Coupling) -> str:
     """Name of a coupling's equality constraint."""
     return f"coupling.{coupling.name}"
+
+
+def motion_name(joint: Joint) -> str:
+    """Name of the equality constraint that moves a joint."""
+    return f"motion.{joint.name}"
 
 
 def _add_actuator(spec: Any, actuator: Actuator) -> None:
@@ -187,15 +218,36 @@ def _set_law(item: Any, stiffness: float, damping: float) -> None:
             setattr(item, name, value)
 
 
-def _add_loop(
-    spec: Any, bodies: dict[str, Any], number: int, loop: Loop, points: Sequence[float], settings: MujocoSettings
-) -> None:
+def _add_strut(spec: Any, bodies: dict[str, Any], number: int, mechanism: Mechanism, settings: MujocoSettings) -> None:
+    """A tendon between two sites whose length is held; MuJoCo holds it relative to that at qpos = 0."""
+    loop, name = mechanism.loops[number], f"loop{number}"
+    tendon = spec.add_tendon(name=name)
+    for end, body, position in (("a0", loop.body_a, loop.position_a), ("b0", loop.body_b, loop.position_b)):
+        bodies[body].add_site(name=f"{name}{end}", pos=position)
+        tendon.wrap_site(f"{name}{end}")
+    added = spec.add_equality(name=f"{name}.0", type=mujoco.mjtEq.mjEQ_TENDON, objtype=mujoco.mjtObj.mjOBJ_TENDON)
+    added.name1 = name
+    tree, q = Tree(mechanism), np.zeros(mechanism.nq)
+    for joint, place in zip(mechanism.joints, mechanism.q_slices, strict=True):
+        if joint.kind in WITH_QUATERNION:
+            q[place.stop - 4] = 1.0
+    motion = tree.at(q, np.zeros(mechanism.nv))
+    a, b = (
+        tree.point(motion, body, np.array(position))[0]
+        for body, position in ((loop.body_a, loop.position_a), (loop.body_b, loop.position_b))
+    )
+    added.data[0] = loop.length - float(np.linalg.norm(b - a))
+    settings.soften(added)
+
+
+def _add_loop(spec: Any, bodies: dict[str, Any], number: int, mechanism: Mechanism, settings: MujocoSettings) -> None:
+    loop = mechanism.loops[number]
     kind = mujoco.mjtEq.mjEQ_WELD if loop.kind == "fixed" else mujoco.mjtEq.mjEQ_CONNECT
-    for point, along in enumerate(points):
+    for point, place in enumerate(held_points(mechanism, loop)):
         names = [f"loop{number}{end}{point}" for end in "ab"]
         ends = ((loop.body_a, loop.position_a, loop.frame_a), (loop.body_b, loop.position_b, loop.frame_b))
         for name, (body, position, frame) in zip(names, ends, strict=True):
-            bodies[body].add_site(name=name, pos=position + along * frame[:, 2], quat=to_quaternion(frame))
+            bodies[body].add_site(name=name, pos=position + place * frame[:, 2], quat=to_quaternion(frame))
         added = spec.add_equality(name=f"loop{number}.{point}", type=kind, objtype=mujoco.mjtObj.mjOBJ_SITE)
         added.name1, added.name2 = names
         settings.soften(added)

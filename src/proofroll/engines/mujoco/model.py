@@ -86,9 +86,9 @@ def _written(body: RollingBall, name: str, formulation: str) -> str:
     Raises:
         Refused: the formulation needs a file, or two motions that slide the surface along itself, and there are none.
     """
-    known = {"name": name, "radius": body.ball.radius, "seen": _SEEN * body.ball.radius}
+    names = {"name": name, "radius": body.ball.radius, "seen": _SEEN * body.ball.radius}
     if formulation == "free":
-        return _FREE.format(**known)
+        return _FREE.format(**names)
     if formulation != "chart":
         raise Refused(f"{formulation} needs a wall made of MuJoCo's shapes, mujoco_{formulation}.xml beside the scene")
     if body.surface.generators is None:
@@ -97,8 +97,8 @@ def _written(body: RollingBall, name: str, formulation: str) -> str:
             "cylinders do: on a sphere they are singular at the bottom, elsewhere they would not follow the wall's "
             "curvature, and the J̇v that MuJoCo leaves out would remain; use free"
         )
-    first, second = (_JOINTS[generator.kind] for generator in body.surface.generators)
-    return _CHART.format(**known, first=first, second=second)
+    joint_1, joint_2 = (_JOINTS[generator.kind] for generator in body.surface.generators)
+    return _CHART.format(**names, first=joint_1, second=joint_2)
 
 
 def write_physics(spec: Any, body: RollingBall, settings: MujocoSettings) -> None:

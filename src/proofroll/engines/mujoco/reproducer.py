@@ -75,10 +75,10 @@ def source(xml: str, model: Any, data: Any, body: RollingBall, settings: MujocoS
         f"friction = {'BoundedFriction(model, BODY, SETTINGS)' if bounded else None}\n",
         f"formulation = {formulation.__name__}(model, BODY, SETTINGS, friction)\n",
     ]
-    wanted = [formulation, raise_if_fatal, *([BoundedFriction] if bounded else [])]
+    objects = [formulation, raise_if_fatal, *([BoundedFriction] if bounded else [])]
     evaluations = EVALUATIONS if contact.rolling_resistance else 1
     uses = ("run", "evaluate", "velocity_lag", "dt")
-    return cut_program(body, settings, wanted, uses, "".join([*read, _RUN]), EVALUATIONS=evaluations)
+    return cut_program(body, settings, objects, uses, "".join([*read, _RUN]), EVALUATIONS=evaluations)
 
 
 def mechanism_source(xml: str, mechanism: Mechanism) -> str:
@@ -110,12 +110,12 @@ def stepped(model: Any, data: Any, times: Iterable[float]) -> Iterator[float]:
     Raises:
         RuntimeError: MuJoCo warns.
     """
-    before = 0.0
+    last = 0.0
     for t in times:
-        steps = round((t - before) / model.opt.timestep)
+        steps = round((t - last) / model.opt.timestep)
         if steps:
             mujoco.mj_step(model, data, steps)
-        before = t
+        last = t
         if data.warning.number.any():
             raise RuntimeError(f"MuJoCo warns before {t:g} s that the state is not finite or huge")
         yield t
@@ -129,9 +129,9 @@ def followed(
     model.opt.enableflags |= int(mujoco.mjtEnableBit.mjENBL_ENERGY)
     data, now = mujoco.MjData(model), mujoco.MjData(model)
     mujoco.mj_resetDataKeyframe(model, data, 0)
-    bodies, at = [model.body(name).id for name, _ in places], np.array([place for _, place in places])
+    bodies, places_on_bodies = [model.body(name).id for name, _ in places], np.array([place for _, place in places])
     for _ in stepped(model, data, times):
         mujoco.mj_copyData(now, model, data)
         mujoco.mj_forward(model, now)
-        seen = now.xpos[bodies] + np.einsum("nij,nj->ni", now.xmat[bodies].reshape(-1, 3, 3), at)
+        seen = now.xpos[bodies] + np.einsum("nij,nj->ni", now.xmat[bodies].reshape(-1, 3, 3), places_on_bodies)
         yield seen, float(now.energy.sum()), float(np.abs(now.efc_pos[: now.ne]).max(initial=0.0))

@@ -90,13 +90,13 @@ class MujocoRobots:
         arrays = evaluate(request, joints, dofs, lambda k: _at(request, model, data, joints, dofs, k, frames))
         groups = {name: _group(model, body) for name, body in home.items()}
         return Reading(
-            joints,
-            dofs,
-            {name: body.mass for name, body in groups.items()},
-            {name: body.com for name, body in groups.items()},
-            {name: body.inertia for name, body in groups.items()},
-            {name: np.array([p[body] for p, _ in frames]) for name, body in home.items()},
-            {name: np.array([R[body].reshape(3, 3) for _, R in frames]) for name, body in home.items()},
+            joints=joints,
+            dofs=dofs,
+            mass={name: body.mass for name, body in groups.items()},
+            com={name: body.com for name, body in groups.items()},
+            inertia={name: body.inertia for name, body in groups.items()},
+            position={name: np.array([p[body] for p, _ in frames]) for name, body in home.items()},
+            rotation={name: np.array([R[body].reshape(3, 3) for _, R in frames]) for name, body in home.items()},
             coupled=_coupled(model, joints),
             remarks=tuple(f"option {name}={str(on).lower()}" for name, on in request.options.items()),
             **arrays,
@@ -215,12 +215,12 @@ def robot_of(model: Any) -> Robot:
         name, parent = names[index], names[int(model.body_parentid[index])]
         bodies[name] = body_of(model, index, name)
         position, rotation = np.array(model.body_pos[index]), matrix(model.body_quat[index])
-        first, count = int(model.body_jntadr[index]), int(model.body_jntnum[index])
+        begin, count = int(model.body_jntadr[index]), int(model.body_jntnum[index])
         if not count:
             joints.append(RobotJoint(f"({name})", "fixed", parent, name, position, rotation, np.array([0.0, 0.0, 1.0])))
-        for joint in range(first, first + count):
-            last = joint == first + count - 1
-            child = name if last else f"{name}/{joint - first}"
+        for joint in range(begin, begin + count):
+            last = joint == begin + count - 1
+            child = name if last else f"{name}/{joint - begin}"
             if not last:
                 bodies[child] = RobotBody(child, 0.0, np.zeros(3), np.zeros((3, 3)))
             joints.append(_joint(model, joint, parent, child, position, rotation, joint in driven))
@@ -291,10 +291,12 @@ def _mimics(model: Any) -> tuple[Mimic, ...]:
     """Linear couplings of joints; the comparison leaves out other constraints."""
     mimics, coupling = [], int(mujoco.mjtEq.mjEQ_JOINT)
     for index in range(model.neq):
-        first, other = int(model.eq_obj1id[index]), int(model.eq_obj2id[index])
+        joint_1, joint_2 = int(model.eq_obj1id[index]), int(model.eq_obj2id[index])
         factors = model.eq_data[index][:5]
-        if model.eq_type[index] == coupling and other >= 0 and model.eq_active0[index] and not np.any(factors[2:]):
-            mimics.append(Mimic(model.joint(first).name, model.joint(other).name, float(factors[1]), float(factors[0])))
+        if model.eq_type[index] == coupling and joint_2 >= 0 and model.eq_active0[index] and not np.any(factors[2:]):
+            mimics.append(
+                Mimic(model.joint(joint_1).name, model.joint(joint_2).name, float(factors[1]), float(factors[0]))
+            )
     return tuple(mimics)
 
 
@@ -336,15 +338,15 @@ def _site(model: Any, site: int) -> tuple[int, Array, Array]:
     return int(model.site_bodyid[site]), np.array(model.site_pos[site]), matrix(model.site_quat[site])
 
 
-def _held_sum(model: Any, first: int, second: int, data: Array) -> dict[str, float]:
+def _held_sum(model: Any, number: int, second: int, data: Array) -> dict[str, float]:
     """Coefficient of each joint in the sum that an equality of one or two fixed tendons holds; empty if it is none."""
     if second >= 0 and (np.any(data[2:5]) or not _fixed_tendon(model, second)):
         return {}
     terms: dict[str, float] = {}
-    for tendon, factor in ((first, 1.0), *(((second, -float(data[1])),) if second >= 0 else ())):
+    for tendon, factor in ((number, 1.0), *(((second, -float(data[1])),) if second >= 0 else ())):
         for joint, coefficient in _fixed_tendon(model, tendon):
             terms[joint] = terms.get(joint, 0.0) + factor * coefficient
-    return terms if _fixed_tendon(model, first) else {}
+    return terms if _fixed_tendon(model, number) else {}
 
 
 def _fixed_tendon(model: Any, tendon: int) -> list[tuple[str, float]]:

@@ -39,8 +39,9 @@ UNBOUNDED_FRICTION = 1e3
 LARGEST_PYRAMIDAL_FRICTION = 1.0
 # Settings of a contact; the formulation ``joints`` has none of them.
 _OF_CONTACT = ("cone", "friction", "friction_damping", "start", "curvature", "cone_correction", "condim")
-# Formulations of mechanisms, and those of the settings above that each has.
-OF_MECHANISMS: Mapping[str, tuple[str, ...]] = {"joints": (), "geoms": ("cone", "cone_correction")}
+# Settings of joints; formulations of mechanisms, and those of the settings above that each has.
+_OF_JOINTS = ("damping_armature",)
+OF_MECHANISMS: Mapping[str, tuple[str, ...]] = {"joints": _OF_JOINTS, "geoms": (*_OF_JOINTS, "cone", "cone_correction")}
 # Preload of a corrected contact as a part of the normal force, so that the next slip does not end the contact.
 PRELOAD = 0.01
 
@@ -79,9 +80,11 @@ class MujocoSettings:
         curvature: True if the adapter adds to the contact's reference acceleration the term J̇v, which MuJoCo leaves
             out (``free`` only).
         cone_correction: True if the adapter takes from the contact's reference acceleration, while the ball slips,
-            the lift that MuJoCo's convex cone gives it.
+            the lift that MuJoCo's convex cone gives it; in ``geoms`` the lift by the missing J̇v too.
         condim: dimensions of the contact's friction: 3 slides; 4 also resists turning about the normal, 6 also rolling,
             with MuJoCo's documented coefficients. No scene asks for either; they are there to be compared.
+        damping_armature: True if each joint has the armature h (c + kd) of its damper and servos in place of MuJoCo's
+            implicit damping: the same step without contact, and contacts see it (``joints``, ``geoms``).
     """
 
     formulation: Literal["free", "chart", "facets", "joints", "geoms"] = "chart"
@@ -97,6 +100,7 @@ class MujocoSettings:
     curvature: bool = False
     cone_correction: bool = False
     condim: Annotated[Literal[3, 4, 6], BeforeValidator(_digits_as_number)] = 3
+    damping_armature: bool = False
 
     @property
     def resolution(self) -> str:
@@ -106,8 +110,8 @@ class MujocoSettings:
     @property
     def unused(self) -> tuple[str, ...]:
         """See :class:`proofroll.core.engine.Settings`."""
-        own = OF_MECHANISMS.get(self.formulation, _OF_CONTACT)
-        return tuple(name for name in _OF_CONTACT if name not in own)
+        fields_of = OF_MECHANISMS.get(self.formulation, _OF_CONTACT)
+        return tuple(name for name in (*_OF_CONTACT, *_OF_JOINTS) if name not in fields_of)
 
     @property
     def order(self) -> int | None:
@@ -226,6 +230,9 @@ def _rules_of_mechanism(settings: MujocoSettings) -> Iterator[tuple[bool, str, s
     reason = "joints has no contact" if formulation == "joints" else f"{formulation} does not use it"
     for name in settings.unused:
         yield getattr(settings, name) != getattr(plain, name), name, f"{reason}; leave it out"
+    # The other integrators have the implicit damping of their own, or none.
+    explicit = settings.damping_armature and settings.integrator != "Euler"
+    yield explicit, "integrator", "damping_armature=true needs integrator=Euler"
     if settings.cone_correction:
         # mj_step1 and mj_step2, between which the contacts are edited, always make an Euler step.
         yield settings.integrator != "Euler", "integrator", "cone_correction=true needs integrator=Euler"
@@ -240,6 +247,7 @@ def _rules_of_contact(settings: MujocoSettings, bounded: bool) -> Iterator[tuple
     advice = f"with cone=pyramidal more than {LARGEST_PYRAMIDAL_FRICTION:g} makes the wall soft; set cone=elliptic"
     yield soft, "friction", advice
     yield corrects and formulation == "facets", "cone_correction", f"{unused} or chart"
+    yield settings.damping_armature, "damping_armature", "a ball has no joints with dampers; leave it out"
     # mj_step1 and mj_step2, between which the contact is edited, always make an Euler step.
     yield corrects and is_free and not is_euler, "integrator", "cone_correction=true needs integrator=Euler"
     if settings.friction_damping is not None:
@@ -331,8 +339,9 @@ PRESETS: Mapping[str, Mapping[str, MujocoSettings]] = {
         ),
         # The exact cone, and the hardest contact that MuJoCo allows. What slips still hops, at every step.
         "matched": MujocoSettings("geoms", "matched", integrator="Euler"),
-        # The lift of what slips is taken away: an edit of mjData.efc_aref that its manual does not describe.
-        "tuned": MujocoSettings("geoms", "tuned", integrator="Euler", cone_correction=True),
+        # The lift of what slips and what turns is taken away: an edit of mjData.efc_aref that its manual does not have.
+        # Dampers and servos are implicit by an armature, for MuJoCo's contacts do not see its implicit damping.
+        "tuned": MujocoSettings("geoms", "tuned", integrator="Euler", cone_correction=True, damping_armature=True),
     },
 }
 

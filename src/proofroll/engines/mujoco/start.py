@@ -76,20 +76,21 @@ def start(
         put_ball(model, data, body, depth)
         now = data.qvel.copy()
         for index in range(rounds):
-            before = data.qacc.copy()
-            data.qvel[:] = now - lag * before
+            last_rates = data.qacc.copy()
+            data.qvel[:] = now - lag * last_rates
             formulation.evaluate(data)
             if lag and index % 2:
                 # In a plain round the error contracts by ``share`` along the contact's rows and vanishes elsewhere.
                 # Extrapolation removes the first and brings errors elsewhere back with the other sign, so it
                 # alternates with plain rounds, and the last round is plain.
-                data.qacc[:] = (data.qacc - share * before) / (1 - share)
+                data.qacc[:] = (data.qacc - share * last_rates) / (1 - share)
 
     depth = 0.0 if body.gap0 else _TOUCHING * body.ball.radius
     if settings.start == "settled" and not body.flies:
         settled = _settled_depth(model, data, body, evaluate_at)
         # Bounded friction may lift the ball more than the load presses it: then it starts at the surface.
-        depth = settled if math.isinf(body.contact.mu_static) else max(settled, depth)
+        # At depth 0 the last digit decides whether they touch.
+        depth = settled if settled and math.isinf(body.contact.mu_static) else max(settled, depth)
     evaluate_at(depth)
 
 
@@ -122,12 +123,12 @@ def _settled_depth(model: Any, data: Any, body: RollingBall, evaluate_at: Callab
     Only the shape of the wall and the initial velocity enter, no force of the scene's: N follows from MuJoCo.
     """
     e1 = body.surface.normal(body.p0)
-    wanted = -float(body.v0 @ body.surface.normal_gradient(body.p0) @ body.v0)
+    bend = -float(body.v0 @ body.surface.normal_gradient(body.p0) @ body.v0)
 
     @cache
     def excess(depth: float) -> float:
         evaluate_at(depth)
-        return float(e1 @ accelerations(model, data)[0]) - wanted
+        return float(e1 @ accelerations(model, data)[0]) - bend
 
     low = upper = 1e-12 * body.ball.radius
     if excess(upper) <= 0:
@@ -142,7 +143,7 @@ def _settled_depth(model: Any, data: Any, body: RollingBall, evaluate_at: Callab
     at_low, at_upper, tries = excess(low), excess(upper), 0
     # The function is nearly linear, so by false position (the Illinois method: Dowell and Jarratt, BIT 11, 1971). Every
     # third step, and all later ones, bisect: that converges even if friction switches between two depths.
-    before = 0
+    last_force = 0
     while upper - low > closest and at_upper:
         tries += 1
         part = at_low / (at_low - at_upper) if tries % 3 and tries < _FALSE_POSITION else 0.5
@@ -151,8 +152,8 @@ def _settled_depth(model: Any, data: Any, body: RollingBall, evaluate_at: Callab
             middle = (low + upper) / 2
         off = excess(middle)
         if off > 0:
-            low, at_low, at_upper = middle, off, at_upper / (2 if before > 0 else 1)
+            low, at_low, at_upper = middle, off, at_upper / (2 if last_force > 0 else 1)
         else:
-            upper, at_upper, at_low = middle, off, at_low / (2 if before < 0 else 1)
-        before = 1 if off > 0 else -1
+            upper, at_upper, at_low = middle, off, at_low / (2 if last_force < 0 else 1)
+        last_force = 1 if off > 0 else -1
     return upper

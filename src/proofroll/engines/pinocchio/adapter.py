@@ -92,8 +92,8 @@ class Pinocchio:
     @staticmethod
     def caveat(settings: PinocchioSettings) -> str:
         """See :class:`proofroll.core.engine_abilities.TellsCaveats`: Pinocchio computes terms, it has no integrator."""
-        terms = "contact solver" if settings.solver else "terms"
-        return f"proofroll's own integrator on Pinocchio's {terms}, for Pinocchio brings none"
+        around = " around its contact solver" if settings.solver else ""
+        return f"integrated by proofroll{around} (Pinocchio has no integrator)"
 
     family = staticmethod(impulses.family)
 

@@ -97,9 +97,9 @@ class Composite(BallWithRows):
         drift[1] += a * (x3 * x + y3 * y + z3 * z)
         resistance = self._rest
         if self._f:
-            along = velocity.linear.tolist()
-            speed = math.hypot(*along)
-            moment = np.array(_cross(e1, along)) * (self._f / speed if speed else 0.0)
+            slide = velocity.linear.tolist()
+            speed = math.hypot(*slide)
+            moment = np.array(_cross(e1, slide)) * (self._f / speed if speed else 0.0)
             resistance = jacobian[3:].T.dot(moment)
         return ContactRows(frame, directions.dot(jacobian), drift, resistance)
 
@@ -122,24 +122,24 @@ class Composite(BallWithRows):
         pin.crba(self.model, data, q)
         return self._own.rows
 
-    def _accelerate_along(self, own: _AlongAxes, data: Any, q: FloatArray, v: FloatArray) -> FloatArray:
+    def _accelerate_along(self, terms: _AlongAxes, data: Any, q: FloatArray, v: FloatArray) -> FloatArray:
         """Result of :meth:`accelerate`, from constant terms along the ball's axes."""
-        drift = own.directions.dot(self._own_bias(data, q, v))
+        drift = terms.directions.dot(self._own_bias(data, q, v))
         # a ω × ė1 with ė1 = Ω × e1, where Ω is the carriage's angular velocity
-        first, second, spin, _, _ = v.tolist()
-        (x1, y1), (x2, y2), (x3, y3) = own.turns
-        lever = self._radius * (spin + x1 * first + y1 * second)
+        rate_1, rate_2, spin, _, _ = v.tolist()
+        (x1, y1), (x2, y2), (x3, y3) = terms.turns
+        lever = self._radius * (spin + x1 * rate_1 + y1 * rate_2)
         along2, along3 = drift.tolist()  # adding to array elements takes three times as long
-        drift[0] = along2 + lever * (x2 * first + y2 * second)
-        drift[1] = along3 + lever * (x3 * first + y3 * second)
+        drift[0] = along2 + lever * (x2 * rate_1 + y2 * rate_2)
+        drift[1] = along3 + lever * (x3 * rate_1 + y3 * rate_2)
         torque = self._rest
         if self._f:
-            (x2, y2), (x3, y3) = own.tangents
-            v2, v3 = x2 * first + y2 * second, x3 * first + y3 * second
+            (x2, y2), (x3, y3) = terms.tangents
+            v2, v3 = x2 * rate_1 + y2 * rate_2, x3 * rate_1 + y3 * rate_2
             speed = math.hypot(v2, v3)
             lever = self._f * self.normal_force(data) / speed if speed else 0.0
-            torque = own.by_moment.dot(np.array((0.0, -lever * v3, lever * v2)))
-        return pin.forwardDynamics(self.model, data, torque, own.rows, drift)  # type: ignore[no-any-return]  # it is an array
+            torque = terms.by_moment.dot(np.array((0.0, -lever * v3, lever * v2)))
+        return pin.forwardDynamics(self.model, data, torque, terms.rows, drift)  # type: ignore[no-any-return]  # it is an array
 
     def _transmitted(self, data: Any, e1: FloatArray) -> float:
         """Normal force N [N] from the wrench in the spherical joint that Pinocchio's last pass left in ``data``."""
@@ -174,16 +174,16 @@ class Composite(BallWithRows):
     def slide(self, data: Any, q: FloatArray, v: FloatArray, direction: FloatArray) -> SlidingContact:
         """See :class:`~proofroll.engines.pinocchio.ball_with_rows.BallWithRows`; friction acts as joint torques."""
         frame, rows, drift, resistance = self.rows(data, q, v)
-        e1, along = frame[:, 0], frame[:, 1:]
+        e1, tangents = frame[:, 0], frame[:, 1:]
         # Neither friction along the wall nor the joints can change N.
         normal_force = self._transmitted(data, e1)
-        friction = self.friction(normal_force, along.T @ direction)
+        friction = self.friction(normal_force, tangents.T @ direction)
         torque = rows.T @ friction
         if self._f:
             torque += normal_force * resistance
         acceleration = np.array(pin.aba(self.model, data, q, v, torque))
-        slip_rate = along @ (rows @ acceleration + drift)
-        return SlidingContact(acceleration, normal_force, along @ (rows @ v), slip_rate, along @ friction, e1)
+        slip_rate = tangents @ (rows @ acceleration + drift)
+        return SlidingContact(acceleration, normal_force, tangents @ (rows @ v), slip_rate, tangents @ friction, e1)
 
     def sliding_reaction(
         self, data: Any, q: FloatArray, v: FloatArray, direction: FloatArray

@@ -19,7 +19,7 @@ from proofroll.engines.pinocchio.joint_tree import JointTree
 
 _POINTS = {MechanismCapability.SPHERICAL_LOOP, MechanismCapability.REVOLUTE_LOOP}
 _NO_ROWS = "Pinocchio's rigid constraints hold points or whole frames together, and no single angle or direction"
-_COUPLINGS = {MechanismCapability[name] for name in ("COUPLINGS", "COUPLINGS_OF_MANY", "MASSLESS")}
+_COUPLINGS = {MechanismCapability[name] for name in ("COUPLINGS", "COUPLINGS_OF_MANY", "MASSLESS", "MOTIONS")}
 PROVIDES = (joint_tree.PROVIDES - ALL_LOOPS | _POINTS) - _COUPLINGS
 LACKING: Mapping[str, str] = {
     **joint_tree.LACKING,
@@ -35,21 +35,21 @@ class ConstraintDynamics:
     Attributes:
         constraints: Pinocchio's constraint models.
         proximal: accuracy, μ and maximum iterations of the proximal method.
-        on_couplings: forces of couplings; empty, as there are none.
+        on_couplings, on_motions: forces of couplings and of prescribed motions; empty, as there are none.
     """
 
     def __init__(self, tree: JointTree, proximal: float) -> None:
         """Builds the constraints; ``proximal`` is the regularisation μ of Pinocchio's proximal solver."""
-        self._tree, self._model, self.on_couplings = tree, tree.model, np.zeros(0)
+        self._tree, self._model, self.on_couplings, self.on_motions = tree, tree.model, np.zeros(0), np.zeros(0)
         self.proximal = _ACCURACY, proximal, _ITERATIONS
         self._proximal = pin.ProximalSettings(*self.proximal)
         self.constraints, self._loops = pin.StdVec_RigidConstraintModel(), []
         for number, (loop, (a, b)) in enumerate(zip(tree.mechanism.loops, tree.loops, strict=True)):
-            for along in held_points(tree.mechanism, loop):
+            for point in held_points(tree.mechanism, loop):
                 ends: list[Any] = []
                 for frame in (b, a) if self._first_is_b(loop) else (a, b):
                     on = self._model.frames[frame]
-                    ends += [on.parentJoint, on.placement * pin.SE3(np.eye(3), np.array([0.0, 0.0, along]))]
+                    ends += [on.parentJoint, on.placement * pin.SE3(np.eye(3), np.array([0.0, 0.0, point]))]
                 kind = pin.ContactType.CONTACT_3D
                 self.constraints.append(pin.RigidConstraintModel(kind, self._model, *ends, pin.LOCAL))
                 self._loops.append(number)
@@ -67,7 +67,7 @@ class ConstraintDynamics:
         """Joint acceleration, shape (nv,), overwritten by the next call."""
         tree, model = self._tree, self._model
         tau = tree.drives(q, v)
-        if tree.springs:  # constraintDynamics takes no external forces, so they act as joint torques
+        if tree.pushed:  # constraintDynamics takes no external forces, so they act as joint torques
             pin.forwardKinematics(model, data, q, v)
             pin.updateFramePlacements(model, data)
             rest = np.zeros(model.nv)

@@ -131,8 +131,8 @@ class ContactSteps:
             self._time = start + number * dt
             v, impulse, self._normal_force, status = self.kick()
             if status != self._status:
-                before = max(self._time - dt, 0.0)
-                self.happened.append(Event(status, 0.5 * (before + self._time), before, self._time))
+                last_time = max(self._time - dt, 0.0)
+                self.happened.append(Event(status, 0.5 * (last_time + self._time), last_time, self._time))
                 self._status = status
             self.started = True
             self._pressed = self._pressed or bool(impulse.any())
@@ -145,17 +145,17 @@ class ContactSteps:
         contact, q, v, f = self.contact, self.q, self.v, self._f
         model, data, span = contact.model, contact.data, self.span
         pin.computeJointJacobians(model, data, q)
-        place, along = q[:3].tolist(), v[:3].tolist()
-        gap, *triad, rx, ry, rz = self._surface.moving_triad(*place, *along)
+        place, velocity = q[:3].tolist(), v[:3].tolist()
+        gap, *triad, rx, ry, rz = self._surface.moving_triad(*place, *velocity)
         jacobian = contact.pose(place, triad)
         to_joints = contact.inverse.dot(jacobian.T)
         delassus = pin.DelassusOperatorDense(jacobian.dot(to_joints))
         # Shifts of the contact point's velocity along e2, -e3 and -e1; the last closes the gap within the step.
-        shift2, shift3, shift1 = 0.0, 0.0, self._closing(gap, triad, along)
+        shift2, shift3, shift1 = 0.0, 0.0, self._closing(gap, triad, velocity)
         if self.leapfrog:
             # Change due to the normal's turning in half a step: a ω × ė1, and the curvature of the path.
             _, _, _, x2, y2, z2, x3, y3, z3 = triad
-            vx, vy, vz = along
+            vx, vy, vz = velocity
             wx, wy, wz = contact.turned.dot(v[3:]).tolist()
             tx, ty, tz = wy * rz - wz * ry, wz * rx - wx * rz, wx * ry - wy * rx
             shift2 = self._lever * (x2 * tx + y2 * ty + z2 * tz)
@@ -164,7 +164,7 @@ class ContactSteps:
         if self._wall_rate is not None:  # wall velocity at the ball's position at the time of the new velocity
             x1, y1, z1, x2, y2, z2, x3, y3, z3 = triad
             ahead = (0.5 if self.leapfrog else 1.0) * self.dt
-            there = np.array(place) + ahead * np.array(along) + self._radius * np.array((x1, y1, z1))
+            there = np.array(place) + ahead * np.array(velocity) + self._radius * np.array((x1, y1, z1))
             carried = cross(self._wall_rate, there)
             shift2 -= float(carried @ (x2, y2, z2))
             shift3 += float(carried @ (x3, y3, z3))
@@ -173,10 +173,10 @@ class ContactSteps:
         torque, normal_force, centred = self._no_torque, self._normal_force, self.leapfrog and self.started
         for number in range(_REPEATS):
             if f:
-                torque = self.resistance(triad, along, normal_force, span)
+                torque = self.resistance(triad, velocity, normal_force, span)
             free = v + span * pin.aba(model, data, q, v, torque)
             impulse, normal, status = self._solved(delassus, jacobian.dot(free) + shift)
-            after = free + to_joints.dot(impulse)
+            v_new = free + to_joints.dot(impulse)
             normal /= span
             # On a plane N is right at once, but the direction of the resistance is not yet.
             if not f or (abs(normal - normal_force) <= _SETTLED * abs(normal) and (number or not centred)):
@@ -184,8 +184,8 @@ class ContactSteps:
             normal_force = normal
             # the resistance belongs to the present time, which with leapfrog is the middle of the kick
             if centred:
-                along = (0.5 * (v + after)[:3]).tolist()
-        return Kick(after, impulse, normal, status)
+                velocity = (0.5 * (v + v_new)[:3]).tolist()
+        return Kick(v_new, impulse, normal, status)
 
     def _closing(self, gap: float, triad: Sequence[float], v: Sequence[float]) -> float:
         """Largest speed [m/s] at which the ball may approach the wall: it closes the gap within the step.

@@ -168,17 +168,17 @@ class FreeFlyer(BallWithRows):
     def _slide(self, data: Any, q: FloatArray, v: FloatArray, direction: FloatArray) -> SlidingContact:
         """Sliding with the surface's row only; its column includes friction and rolling resistance per unit of N."""
         frame, rows, drift, resistance = self.rows(data, q, v)
-        e1, along = frame[:, 0], frame[:, 1:]
-        against = self.friction(1.0, along.T @ direction)  # per unit of N
+        e1, tangents = frame[:, 0], frame[:, 1:]
+        against = self.friction(1.0, tangents.T @ direction)  # per unit of N
         matrix = np.zeros((7, 7))
         matrix[:6, :6] = data.M
         matrix[:6, 6] = against @ rows[1:] + resistance - rows[0]
         matrix[6, :6] = rows[0]
         solution = np.linalg.solve(matrix, np.concatenate([-data.nle, -drift[:1]]))
         acceleration, normal_force = solution[:6], -float(solution[6])
-        slip_rate = along @ (rows[1:] @ acceleration + drift[1:])
-        friction = along @ (normal_force * against)
-        return SlidingContact(acceleration, normal_force, along @ (rows[1:] @ v), slip_rate, friction, e1)
+        slip_rate = tangents @ (rows[1:] @ acceleration + drift[1:])
+        friction = tangents @ (normal_force * against)
+        return SlidingContact(acceleration, normal_force, tangents @ (rows[1:] @ v), slip_rate, friction, e1)
 
     def slide(self, data: Any, q: FloatArray, v: FloatArray, direction: FloatArray) -> SlidingContact:
         """See :class:`~proofroll.engines.pinocchio.ball_with_rows.BallWithRows`."""

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
+from proofroll.core.arrays import longest
 from proofroll.core.engine import Regularised, whole_steps
 from proofroll.core.errors import Diverged
 from proofroll.elements.mechanism import WORLD, Mechanism
@@ -46,6 +47,9 @@ class ImpulseRun(MechanismRun):
                 raise Diverged(f"the state is not finite at t = {steps.t:.6g} s")
         steps.t = t
 
+    def _renew(self) -> None:
+        """Keeps the stepper, which evaluates all forces anew in each step."""
+
     def _kick(self) -> tuple[Array, Array, Array]:
         """Joint accelerations v̇, forces on body a of each contact [N], and forces of joint rows, in the next step.
 
@@ -66,11 +70,11 @@ class ImpulseRun(MechanismRun):
         self.tree.now = self.steps.t
         data = self._placed(acceleration)
         forces = self.tree.pulls(data)
-        for contact, each, force in zip(self.steps.contacts, touching, pressing, strict=True):
+        for contact, touch, force in zip(self.steps.contacts, touching, pressing, strict=True):
             for body, sign in ((contact.body_a, 1.0), (contact.body_b, -1.0)):
                 if body != WORLD:
                     frame = self.tree.body[self._mechanism.body_index[body]]
-                    self.tree.put(forces, data, frame, each.place, sign * force)
+                    self.tree.put(forces, data, frame, touch.place, sign * force)
         return data, q, v, acceleration, forces, np.zeros((2, 0, 3))
 
     def _placed(self, acceleration: Array) -> Any:
@@ -82,8 +86,8 @@ class ImpulseRun(MechanismRun):
 
     def sample(self) -> MechanismSample:
         """See :class:`proofroll.core.engine.Engine`; the forces are those of the next step."""
-        _, pressing, along = self._kick()
-        forces = self.steps.joints.along_joints(self.steps.q, along) if along.size else {}
+        _, pressing, joint_forces = self._kick()
+        forces = self.steps.joints.along_joints(self.steps.q, joint_forces) if joint_forces.size else {}
         return replace(super().sample(), contact_force=pressing if self.steps.contacts else None, **forces)
 
     def built(self) -> MechanismBuilt:
@@ -98,10 +102,10 @@ class ImpulseRun(MechanismRun):
         still, errors = self._accelerations(now, span), self.steps.unsure(span)
         off = [self._accelerations(now._replace(v=now.v + error), span) for error in errors]
         for name, value in hard.items():
-            size = float(np.abs(value).max()) or 1.0  # 1 if all accelerations are zero
+            size = longest(value) or 1.0  # 1 if all accelerations are zero
             others = twice[name], step[name], getattr(plain, name)
-            apart = sum(float(np.abs(value - other).max()) for other in others)
-            unsure = max((float(np.abs(each[name] - still[name]).max()) for each in off), default=0.0)
+            apart = sum(longest(value - rival) for rival in others)
+            unsure = max((longest(shifted[name] - still[name]) for shifted in off), default=0.0)
             tolerance = _MARGIN * (unsure + apart) / size
             softened[name] = Regularised(tolerance, _PARTS if self._settings.convex else _FOUND)
         return replace(plain, **self.steps.read() if self.steps.contacts else {}, regularised=softened)
@@ -114,6 +118,6 @@ class ImpulseRun(MechanismRun):
             for frame in self.tree.body
         ]
         return {
-            "acceleration": np.array([each.linear for each in accelerations]),
-            "angular_acceleration": np.array([each.angular for each in accelerations]),
+            "acceleration": np.array([item.linear for item in accelerations]),
+            "angular_acceleration": np.array([item.angular for item in accelerations]),
         }

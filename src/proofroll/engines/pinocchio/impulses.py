@@ -17,6 +17,7 @@ from proofroll.elements.mechanism.contacts.family import Family, of_contact
 from proofroll.elements.mechanism.contacts.start import natural_scale
 from proofroll.elements.mechanism.contacts.touching import Moving, Touching, touch
 from proofroll.elements.mechanism.rotations import Array, frame_of_axis
+from proofroll.engines.pinocchio.contact import LARGEST_FRICTION
 from proofroll.engines.pinocchio.joint_rows import JointRows
 from proofroll.engines.pinocchio.joint_tree import JointTree
 from proofroll.engines.pinocchio.plane_contact import solver_of
@@ -27,17 +28,26 @@ PROVIDES: frozenset[str] = (
     ALL_JOINTS
     | FORCES
     | {_CAPABILITY.ARMATURE, _CAPABILITY.CONTACT, _CAPABILITY.CONTACT_FRICTION, _CAPABILITY.CONTACT_REBOUNDS}
-    | {_CAPABILITY.ACTUATORS, _CAPABILITY.SATURATION, _CAPABILITY.SIGNALS}
+    | {_CAPABILITY.UNBOUNDED_FRICTION, _CAPABILITY.SLIP_REBOUNDS}
+    | {_CAPABILITY.ACTUATORS, _CAPABILITY.SATURATION, _CAPABILITY.SIGNALS, _CAPABILITY.HELD}
     | {_CAPABILITY.JOINT_FRICTION, _CAPABILITY.STOPS, _CAPABILITY.REBOUNDS}
 )
 _OF_A_TREE = "its steps are those of a tree with contacts"
-LACKING: Mapping[str, str] = dict.fromkeys(
-    ALL_LOOPS | {_CAPABILITY.COUPLINGS, _CAPABILITY.COUPLINGS_OF_MANY, _CAPABILITY.MASSLESS}, _OF_A_TREE
-)
+LACKING: Mapping[str, str] = {
+    **dict.fromkeys(
+        ALL_LOOPS | {_CAPABILITY.COUPLINGS, _CAPABILITY.COUPLINGS_OF_MANY, _CAPABILITY.MASSLESS}, _OF_A_TREE
+    ),
+    _CAPABILITY.STATIC_FRICTION: "this formulation gives a contact one coefficient",
+    _CAPABILITY.TURNING_FRICTION: "this formulation gives a contact no moment",
+}
 # Approach speed, in steps of gravity, below which nothing rebounds.
 _SOFT = 5.0
-# Fraction of a gap that a step by the midpoint rule closes; closing all of it would eject what has penetrated.
-_CLOSED = 0.1
+# Fraction c of a gap that a step h by the midpoint rule closes; closing all of it would eject what has penetrated. The
+# turning of a contact's rows (J̇v) leaves gaps of h² J̇v / 2c.
+_CLOSED = 0.5
+# Largest gap that counts as closed, in falls by gravity of one step: contacts may turn that many times faster than
+# gravity pulls before steps leave them open.
+_NEAR = 2.0
 # Part of the largest speed of a row that a speed along a normal has to be, to count.
 _SMALL = 1e-9
 # Ratio of the contact's mobility in two directions of the surface above which PGS returns a wrong impulse.
@@ -117,8 +127,8 @@ class ImpulseSteps:
         Raises:
             Diverged: PGS returns wrong ones.
         """
-        one, two = float(G[0, 0]), float(G[1, 1])
-        if self._settings.solver == "pgs" and self.contacts[k].friction and max(one, two) > _UNEQUAL * min(one, two):
+        G_1, G_2 = float(G[0, 0]), float(G[1, 1])
+        if self._settings.solver == "pgs" and self.contacts[k].friction and max(G_1, G_2) > _UNEQUAL * min(G_1, G_2):
             raise Diverged(
                 f"Pinocchio's PGS returns a wrong impulse where a contact gives way {_UNEQUAL:g} times as much in one "
                 f"direction as across it, as {self.contacts[k].name} does at {self.t:g} s; set solver=admm"
@@ -155,25 +165,26 @@ class ImpulseSteps:
         ahead = self.terms(pin.integrate(self._model, self.q, span * self.v), self.v, span)[0]
         shifts = np.zeros((len(self._returned), 3))
         shifts[: len(touching)] = (ahead - J) @ self.v
-        apart = [each.gap > self._touching for each in touching] + [False] * len(self.joints.friction)
+        apart = [touch.gap > self._touching for touch in touching] + [False] * len(self.joints.friction)
         shifts[apart + [not item.closed(self.q) for item in self.joints.stops], 2] = np.inf
         return self._solved(J, free, inverse, touching, shifts, span, convex=convex)
 
     def read(self) -> dict[str, Any]:
         """Normals, positions and friction of contact points in Pinocchio, with gaps of the shapes at its poses."""
         J, _, inverse, touching = self.terms(self.q, self.v, self._dt)
-        world = np.array([frame_of_axis(each.normal) for each in touching]) @ J
+        world = np.array([frame_of_axis(touch.normal) for touch in touching]) @ J
         solver, data = self._solver(tuple(range(len(self.contacts)))), self._data
         normal, place = np.zeros((2, len(touching), 3))
         for k, point in enumerate(solver.points):
             normal[k] = (data.oMi[point.joint1_id] * point.joint1_placement).rotation[:, 2]
             place[k] = (data.oMi[point.joint2_id] * point.joint2_placement).translation
         return {
-            "contact_gap": np.array([each.gap for each in touching]),
+            "contact_gap": np.array([touch.gap for touch in touching]),
             "contact_normal": normal,
             "contact_place": place,
             "contact_friction": np.array([point.getFriction() for point in solver.points]),
             "contact_restitution": self.restitution.copy(),
+            "contact_tangential": np.array([contact.tangential_restitution for contact in self.contacts]),
             "contact_response": np.einsum("kin,nm,ljm->kilj", world, inverse, world),
         }
 
@@ -185,8 +196,8 @@ class ImpulseSteps:
         tree, model, data = self._tree, self._model, self._data
         pin.forwardKinematics(model, data, q, v)
         pin.updateFramePlacements(model, data)
-        pulls = tree.pulls(data) if tree.springs else None
         tree.now = self.t + 0.5 * span * self._midpoint
+        pulls = tree.pulls(data) if tree.pushed else None
         tau = tree.drives(q, v)
         touching = [
             touch(contact, self._moving(contact.body_a), self._moving(contact.body_b)) for contact in self.contacts
@@ -198,8 +209,8 @@ class ImpulseSteps:
         pin.computeJointJacobians(model, data, q)
         J = np.zeros((len(touching), 3, model.nv))
         all_of = self._solver(tuple(range(len(touching))))
-        for k, each in enumerate(touching):
-            J[k] = self._posed(all_of, k, each)
+        for k, contact_touch in enumerate(touching):
+            J[k] = self._posed(all_of, k, contact_touch)
         return J, free, inverse, touching
 
     def unsure(self, span: float) -> Array:
@@ -220,14 +231,14 @@ class ImpulseSteps:
         velocity, pose = self._tree.velocity(data, frame), data.oMf[frame]
         return Moving(pose.translation.copy(), pose.rotation.copy(), velocity.linear, velocity.angular)
 
-    def _posed(self, solver: _Solver, own: int, there: Touching) -> Array:
-        """Poses the ``own``-th point of a solver and returns its rows, shape (3, nv)."""
-        point, data = solver.points[own], self._data
+    def _posed(self, solver: _Solver, number: int, there: Touching) -> Array:
+        """Poses the ``number``-th point of a solver and returns its rows, shape (3, nv)."""
+        point, data = solver.points[number], self._data
         place = pin.SE3(frame_of_axis(there.normal), there.place)
         point.joint1_placement = data.oMi[point.joint1_id].actInv(place)
         point.joint2_placement = data.oMi[point.joint2_id].actInv(place)
-        point.calc(self._model, data, solver.point_datas[own])
-        rows = point.jacobian(self._model, data, solver.point_datas[own])
+        point.calc(self._model, data, solver.point_datas[number])
+        rows = point.jacobian(self._model, data, solver.point_datas[number])
         return np.reshape(np.array(rows), (3, self._model.nv))
 
     def _solver(self, which: tuple[int, ...]) -> _Solver:
@@ -239,7 +250,7 @@ class ImpulseSteps:
                     contact = self.contacts[k]
                     b, a = (self._joint(body) for body in (contact.body_b, contact.body_a))
                     point = pin.PointContactConstraintModel(self._model, b, pin.SE3.Identity(), a, pin.SE3.Identity())
-                    point.setFriction(contact.friction)
+                    point.setFriction(min(contact.friction, LARGEST_FRICTION[self._settings.solver or "admm"]))
                     models.append(pin.ConstraintModel(point))
                 else:
                     models.append(rows[k - count].model)
@@ -257,22 +268,24 @@ class ImpulseSteps:
 
     def _shifts(self, J: Array, q: Array, v: Array, touching: Sequence[Touching]) -> Array:
         """Terms added to slip and gap velocities [m/s], shape (contacts + joint rows, 3); inf: the gap cannot close."""
-        first, dt = len(touching) + len(self.joints.friction), self._dt
+        begin, dt = len(touching) + len(self.joints.friction), self._dt
         shifts = np.zeros((len(self._returned), 3))
-        gaps = [(k, each.gap, float(J[k, 2] @ v)) for k, each in enumerate(touching)]
+        gaps = [(k, touch.gap, float(J[k, 2] @ v)) for k, touch in enumerate(touching)]
         speeds = self.joints.J[len(self.joints.friction) :] @ v
-        gaps += [(k, item.gap(q), float(speeds[k - first])) for k, item in enumerate(self.joints.stops, first)]
+        gaps += [(k, item.gap(q), float(speeds[k - begin])) for k, item in enumerate(self.joints.stops, begin)]
         for k, gap, approach in gaps:
             e = float(self._returned[k])
             hits = e and -e * approach > _SOFT * self._gravity * dt
             shifts[k, 2] = np.inf
             if self._midpoint:
-                if gap <= max(self._touching, self._gravity * dt**2):
-                    back = max(_CLOSED * gap / dt, -_SOFT * self._gravity * dt) if k >= first else _CLOSED * gap / dt
+                if gap <= max(self._touching, _NEAR * self._gravity * dt**2):
+                    back = max(_CLOSED * gap / dt, -_SOFT * self._gravity * dt) if k >= begin else _CLOSED * gap / dt
                     shifts[k, 2] = e * approach if hits else back
             else:
-                reached = gap + dt * (approach - dt * self._gravity) <= 0
-                shifts[k, 2] = e * approach if hits and reached else gap / dt
+                hits = hits and gap + dt * (approach - dt * self._gravity) <= 0
+                shifts[k, 2] = e * approach if hits else gap / dt
+            if hits and k < len(touching) and self.contacts[k].tangential_restitution:
+                shifts[k, :2] = self.contacts[k].tangential_restitution * (J[k, :2] @ v)
         return shifts
 
     def _solved(
@@ -292,12 +305,12 @@ class ImpulseSteps:
         of_blocks = [*shifts[:count], *shifts[count:, 2:]]
         rubs = count + len(self.joints.friction)
         gaps = [k for k in (*range(count), *range(rubs, len(blocks))) if np.isfinite(shifts[k, 2])]
-        impulse, along, which = np.zeros((count, 3)), np.zeros(len(blocks) - count), tuple(range(count, rubs))
+        impulse, along_rows, which = np.zeros((count, 3)), np.zeros(len(blocks) - count), tuple(range(count, rubs))
         changed = bool(which)
         while True:
             closing = {k for k in gaps if blocks[k][-1] @ v + shifts[k, 2] < 0}
             if closing <= set(which) and not changed:
-                return Impulses(v, impulse, along)
+                return Impulses(v, impulse, along_rows)
             which, changed = tuple(sorted({*which, *closing})), False
             solver = self._solver(which)
             rows = np.concatenate([blocks[k] for k in which])
@@ -313,12 +326,12 @@ class ImpulseSteps:
             # units of speed and impulse the problem is the same for all masses, steps and lengths.
             speed = max(float(np.abs(g[ends - 1]).max()), _SMALL * float(np.abs(g).max())) or 1.0
             unit = speed / float(np.diag(G).max())
-            for own, k in enumerate(which):
+            for row, k in enumerate(which):
                 if k < count:
-                    self._posed(solver, own, touching[k])
+                    self._posed(solver, row, touching[k])
                 elif k < rubs:
-                    solver.points[own].setTimeStep(span / unit)  # bounds are forces; the default step would be 1 s
-                    solver.points[own].calc(self._model, self._data, solver.point_datas[own])
+                    solver.points[row].setTimeStep(span / unit)  # bounds are forces; the default step would be 1 s
+                    solver.points[row].calc(self._model, self._data, solver.point_datas[row])
             solver.result.reset()
             solver.options.solve_ncp = not convex
             tolerance = float(self._settings.solver_tolerance or 0.0)
@@ -338,9 +351,9 @@ class ImpulseSteps:
                 )
             got = unit * np.array(solver.result.retrieveConstraintImpulses())
             v = free + to_joints @ got
-            impulse[:], along[:] = 0.0, 0.0
+            impulse[:], along_rows[:] = 0.0, 0.0
             for end, k in zip(ends, which, strict=True):
                 if k < count:
                     impulse[k] = frame_of_axis(touching[k].normal) @ got[end - 3 : end]
                 else:
-                    along[k - count] = got[end - 1]
+                    along_rows[k - count] = got[end - 1]

@@ -77,7 +77,7 @@ class JointRows:
 
         The force of a stop with an open gap is omitted: in a step that closes the gap it is an impulse.
         """
-        along = {"friction": np.full(self._count, np.nan), "stop": np.full(self._count, np.nan)}
+        forces = {"friction": np.full(self._count, np.nan), "stop": np.full(self._count, np.nan)}
         total = {joint.number: 0.0 for joint in self.switched}
         closed = {item.joint.number for item in self.stops if item.closed(q)}
         for item, size in zip((*self.friction, *self.stops), force, strict=True):
@@ -85,5 +85,5 @@ class JointRows:
                 total[item.joint.number] += item.sign * float(size)
         for joint in self.switched:
             on = joint_force_shares(joint.number in closed, joint.friction, total[joint.number])
-            along["friction"][joint.number], along["stop"][joint.number] = on
-        return along
+            forces["friction"][joint.number], forces["stop"][joint.number] = on
+        return forces

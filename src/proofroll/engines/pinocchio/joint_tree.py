@@ -12,8 +12,10 @@ import numpy as np
 import pinocchio as pin
 
 from proofroll.elements.mechanism import WORLD, Joint, Loop, Mechanism, Spring
+from proofroll.elements.mechanism.bushing import Bushing
 from proofroll.elements.mechanism.capabilities import ALL_JOINTS, ALL_LOOPS, FORCES, MechanismCapability
 from proofroll.elements.mechanism.light_joints import lacks_inertia
+from proofroll.elements.mechanism.prescribed import moved
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.elements.mechanism.signal import value_at, varies
 
@@ -25,9 +27,11 @@ _OF_JOINTS = {
         "ACTUATORS",
         "SATURATION",
         "SIGNALS",
+        "HELD",
         "COUPLINGS",
         "COUPLINGS_OF_MANY",
         "MASSLESS",
+        "MOTIONS",
     )
 }
 PROVIDES: frozenset[str] = ALL_JOINTS | ALL_LOOPS | FORCES | _OF_JOINTS
@@ -37,7 +41,7 @@ LACKING: Mapping[str, str] = {
 }
 _X, _Z = np.array([1.0, 0.0, 0.0]), np.array([0.0, 0.0, 1.0])
 # Column of the axis of rotation or translation among a joint's own velocities.
-AXIS_COLUMN = {"revolute": 0, "prismatic": 0, "universal": 0, "planar": 2}
+AXIS_COLUMN = {"revolute": 0, "prismatic": 0, "cylindrical": 1, "universal": 0, "planar": 2}
 
 
 class JointTree:
@@ -54,9 +58,10 @@ class JointTree:
         sprung: stiffness, rest, and slices of configuration and velocity, of each joint with a spring.
         varies: True if a drive or a target changes in time.
         now: time at which drives and targets are evaluated [s].
-        closed: True if there are loops or couplings.
+        own_velocities: True if velocities are those of the mechanism, with those of free bodies along their own axes.
+        closed: True if there are loops, couplings or prescribed motions.
         light: True if only loops or couplings give some joints inertia.
-        geared: Jacobian of the couplings for joint velocities, (couplings, nv).
+        geared: Jacobian of couplings, then of prescribed motions, for joint velocities, (couplings + motions, nv).
     """
 
     def __init__(self, mechanism: Mechanism, *, apart: bool = False) -> None:
@@ -90,6 +95,11 @@ class JointTree:
         self.body = [frames[body.name] for body in mechanism.bodies]
         self.loops = [self._ends(carried, loop, loop.frame_a, loop.frame_b) for loop in mechanism.loops]
         self.springs = [(spring, *self._ends(carried, spring, np.eye(3), np.eye(3))) for spring in mechanism.springs]
+        self._bushings = [(item, *self._ends(carried, item, np.eye(3), np.eye(3))) for item in mechanism.bushings]
+        frames[WORLD] = 0
+        self._forces = [(force, frames[force.body], frames[force.reaction]) for force in mechanism.forces]
+        self.pushed = bool(self.springs or self._bushings or self._forces)
+        self.own_velocities = not (apart and any(joint.kind == "free" for joint in mechanism.joints))
         self.q0, self.v0 = self._start()
         self._laws()
 
@@ -98,8 +108,8 @@ class JointTree:
         frame = pin.Frame(name, joint, 0, place, pin.FrameType.OP_FRAME, carried)
         return int(self.model.addFrame(frame, inertia is not None))
 
-    def _ends(self, carried: Any, item: Loop | Spring, A: Array, B: Array) -> tuple[int, int]:
-        """Frames at both ends of a loop or a spring, with axes A and B in the bodies."""
+    def _ends(self, carried: Any, item: Loop | Spring | Bushing, A: Array, B: Array) -> tuple[int, int]:
+        """Frames at both ends of a loop, spring or bushing, with axes A and B in the bodies."""
         (on_a, at_a), (on_b, at_b) = carried[item.body_a], carried[item.body_b]
         return (
             self._frame(f"{item.name} a", on_a, at_a * pin.SE3(A, np.array(item.position_a))),
@@ -109,6 +119,8 @@ class JointTree:
     def _joint_model(self, joint: Joint) -> Any:
         if joint.kind == "planar":  # pin.JointModelPlanar has cosine and sine, and velocities in the child
             return _composite(pin.JointModelPX(), pin.JointModelPY(), pin.JointModelRZ())
+        if joint.kind == "cylindrical":
+            return _composite(pin.JointModelPZ(), pin.JointModelRZ())
         if joint.kind == "free" and self._apart:
             return _composite(pin.JointModelTranslation(), pin.JointModelSpherical())
         return {
@@ -122,12 +134,12 @@ class JointTree:
     def _start(self) -> tuple[Array, Array]:
         q, v = self.mechanism.start()
         slices = zip(self.mechanism.joints, self.mechanism.q_slices, self.mechanism.v_slices, strict=True)
-        for joint, at, at_v in slices:
+        for joint, at_q, at_v in slices:
             if joint.kind in {"spherical", "free"}:  # Pinocchio writes the scalar last
-                q[at.stop - 4 : at.stop] = np.roll(q[at.stop - 4 : at.stop], -1)
+                q[at_q.stop - 4 : at_q.stop] = np.roll(q[at_q.stop - 4 : at_q.stop], -1)
             if joint.kind == "free" and self._apart:
-                along = slice(at_v.start, at_v.start + 3)
-                v[along] = pin.Quaternion(q[at.stop - 4 : at.stop]).matrix() @ v[along]
+                linear = slice(at_v.start, at_v.start + 3)
+                v[linear] = pin.Quaternion(q[at_q.stop - 4 : at_q.stop]).matrix() @ v[linear]
         return q, v
 
     def _laws(self) -> None:
@@ -139,27 +151,32 @@ class JointTree:
         sprung = zip(joints, self.mechanism.q_slices, self.mechanism.v_slices, strict=True)
         self.sprung = [(joint.stiffness, joint.rest, at_q, at_v) for joint, at_q, at_v in sprung if joint.stiffness]
         self._timed = [
-            (joint.torque, at)
-            for joint, at in zip(joints, self.mechanism.v_slices, strict=True)
+            (joint.torque, columns)
+            for joint, columns in zip(joints, self.mechanism.v_slices, strict=True)
             if varies(joint.torque)
         ]
         self._actuators = [(item, *self.mechanism.place_of(item.joint)) for item in self.mechanism.actuators]
         self.varies, self.now = any(map(varies, self.mechanism.signals)), 0.0
         self._constant = not (self.sprung or self.damping.any() or self._timed or self._actuators)
         couplings = self.mechanism.couplings
-        self.closed = bool(self.mechanism.loops or couplings)
+        moving = self.mechanism.prescribed
+        self.closed = bool(self.mechanism.loops or couplings or moving)
         self.light = lacks_inertia(self.mechanism)
-        self.geared = np.zeros((len(couplings), self.model.nv))
-        self._geared_q = np.zeros((len(couplings), self.model.nq))
+        self.geared = np.zeros((len(couplings) + len(moving), self.model.nv))
+        self._geared_q = np.zeros((len(couplings) + len(moving), self.model.nq))
         for number, coupling in enumerate(couplings):
             for joint, factor in coupling.terms:
                 at_q, at_v = self.mechanism.place_of(joint)
                 self._geared_q[number, at_q] = self.geared[number, at_v] = factor
-        self._offsets = np.array([coupling.place for coupling in couplings])
+        for number, (_, at_q, at_v) in enumerate(moving, len(couplings)):
+            self._geared_q[number, at_q] = self.geared[number, at_v] = 1.0
+        self._still = [(coupling.place, 0.0, 0.0) for coupling in couplings]
+        self._motions = [joint.motion for joint, _, _ in moving if joint.motion is not None]
 
-    def apart(self, q: Array) -> Array:
-        """Residual of each coupling: distance of its first joint from its place, rad or m."""
-        return np.asarray(self._geared_q @ q - self._offsets)
+    def apart(self, q: Array) -> tuple[Array, Array, Array]:
+        """Residual of each coupling and motion, the rate that it prescribes, and minus the acceleration, rad or m."""
+        aims = np.array([*self._still, *(moved(signal, self.now) for signal in self._motions)])
+        return np.asarray(self._geared_q @ q - aims[:, 0]), aims[:, 1], -aims[:, 2]
 
     def drives(self, q: Array, v: Array) -> Array:
         """Generalised forces of joints' springs, dampers, drives and actuators, shape (nv,); read-only."""
@@ -171,7 +188,7 @@ class JointTree:
         for signal, at_v in self._timed:
             tau[at_v] += value_at(signal, self.now)
         if self._actuators:
-            np.add.at(tau, [at for _, _, at in self._actuators], self.efforts(q, v))
+            np.add.at(tau, [column for _, _, column in self._actuators], self.efforts(q, v))
         return tau
 
     def efforts(self, q: Array, v: Array) -> Array:
@@ -179,20 +196,46 @@ class JointTree:
         return np.array([item.effort(self.now, float(q[at_q]), float(v[at_v])) for item, at_q, at_v in self._actuators])
 
     def pulls(self, data: Any) -> Any:
-        """Forces of springs on Pinocchio's joints, in their axes; positions and velocities come from ``data``."""
+        """Forces of springs, bushings and applied forces on Pinocchio's joints, in their axes.
+
+        Positions and velocities come from ``data``.
+        """
         forces = pin.StdVec_Force()
         for _ in range(self.model.njoints):
             forces.append(pin.Force.Zero())
         for spring, a, b in self.springs:
             between = data.oMf[b].translation - data.oMf[a].translation
             length = float(np.sqrt(between @ between))
-            along = between / length
+            direction = between / length
             pull = spring.stiffness * (length - spring.length)
-            if spring.damping:
+            if spring.damping or spring.force:
                 rate = self.velocity(data, b).linear - self.velocity(data, a).linear
-                pull += spring.damping * (along @ rate)
-            self.put(forces, data, a, data.oMf[a].translation, pull * along)
-            self.put(forces, data, b, data.oMf[b].translation, -pull * along)
+                pull += spring.damping * (direction @ rate)
+                if spring.force is not None:
+                    pull += spring.force.pull(length, float(direction @ rate))
+            self.put(forces, data, a, data.oMf[a].translation, pull * direction)
+            self.put(forces, data, b, data.oMf[b].translation, -pull * direction)
+        for bushing, a, b in self._bushings:
+            pose_a, pose_b = data.oMf[a], data.oMf[b]
+            moving_a, moving_b = self.velocity(data, a), self.velocity(data, b)
+            force, moment = bushing.load(
+                pose_a.rotation,
+                pose_b.rotation,
+                pose_b.translation - pose_a.translation,
+                moving_b.linear - moving_a.linear,
+                moving_a.angular,
+                moving_b.angular,
+            )
+            self.put(forces, data, b, pose_b.translation, force, moment)
+            self.put(forces, data, a, pose_b.translation, -force, -moment)
+        for applied, body, reaction in self._forces:
+            pose, load = data.oMf[body], np.array(applied.at(self.now), dtype=float)
+            load = pose.rotation @ load if applied.frame == "body" else load
+            place = pose.translation + pose.rotation @ applied.position
+            none = np.zeros(3)
+            force, moment = (load, none) if applied.kind == "force" else (none, load)
+            self.put(forces, data, body, place, force, moment)
+            self.put(forces, data, reaction, place, -force, -moment)
         return forces
 
     def velocity(self, data: Any, frame: int) -> Any:
@@ -205,12 +248,12 @@ class JointTree:
         They act at the world point ``place`` [m]; ``force`` [N], ``torque`` [N m].
         """
         joint = self.model.frames[frame].parentJoint
-        at = data.oMi[joint].inverse() * pin.SE3(np.eye(3), place)
-        forces[joint] = forces[joint] + at.act(pin.Force(force, np.zeros(3) if torque is None else torque))
+        placement = data.oMi[joint].inverse() * pin.SE3(np.eye(3), place)
+        forces[joint] = forces[joint] + placement.act(pin.Force(force, np.zeros(3) if torque is None else torque))
 
 
-def _composite(first: Any, *others: Any) -> Any:
-    composite = pin.JointModelComposite(first)
+def _composite(joint_1: Any, *others: Any) -> Any:
+    composite = pin.JointModelComposite(joint_1)
     for joint in others:
         composite.addJoint(joint)
     return composite

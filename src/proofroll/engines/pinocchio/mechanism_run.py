@@ -9,6 +9,7 @@ from proofroll.core.errors import Diverged
 from proofroll.core.integrators import INTEGRATORS
 from proofroll.core.stalling import Stalled
 from proofroll.elements.mechanism import Mechanism
+from proofroll.elements.mechanism.commands import drive
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.elements.mechanism.sampling import MechanismBuilt, MechanismSample, row_rank, unsaid
 from proofroll.elements.mechanism.words import pose
@@ -64,6 +65,7 @@ class MechanismMotion:
         if self._turns:
             q = pin.normalize(self._model, q)
         if self._eliminates:
+            self.tree.now = t
             q, v = self.rows.eliminated(self._data, q, v)
         return np.concatenate([q, v, y[self._end :]])
 
@@ -87,6 +89,15 @@ class MechanismRun(MechanismMotion):
 
     def _where(self) -> str:
         return f"; {pose(self._mechanism, self.sample())}"
+
+    def drive(self, values: Array) -> None:
+        """See :class:`proofroll.core.engine_abilities.TakesTargets`."""
+        drive(self._mechanism, values)
+        self._renew()
+
+    def _renew(self) -> None:
+        """Lets the integrator begin again, as it may keep rates of the values before."""
+        self.motion.restart()
 
     def _evaluated(self) -> tuple[Any, Array, Array, Array, Any, Array]:
         """Data of the present state, q, v, accelerations, forces on Pinocchio's joints, and on loops."""
@@ -119,7 +130,15 @@ class MechanismRun(MechanismMotion):
             joint_torque=torque,
             effort=self.tree.efforts(q, v) if self._mechanism.actuators else None,
             coupling=self.dynamics.on_couplings if self._mechanism.couplings else None,
+            drive=self._drives(),
         )
+
+    def _drives(self) -> Array:
+        """Forces that impose motions, by joint [N, N m]; NaN for joints without."""
+        forces = np.full(len(self._mechanism.joints), np.nan)
+        driven = [self._mechanism.joint_index[joint.name] for joint, _, _ in self._mechanism.prescribed]
+        forces[driven] = self.dynamics.on_motions
+        return forces
 
     def built(self) -> MechanismBuilt:
         """See :class:`proofroll.core.engine.Engine`."""
@@ -144,6 +163,7 @@ class MechanismRun(MechanismMotion):
             acceleration=np.array([acceleration.linear for acceleration in accelerations]),
             angular_acceleration=np.array([acceleration.angular for acceleration in accelerations]),
             mass_matrix_error=self._mass_matrix_error(q),
+            **self._matrices(q, v),
         )
 
     def _axes(self, q: Array) -> Array:
@@ -158,6 +178,21 @@ class MechanismRun(MechanismMotion):
                 column = J[:, self._model.joints[index].idx_v + AXIS_COLUMN[joint.kind]]
                 axes[number] = column[:3] if joint.kind == "prismatic" else column[3:]
         return axes
+
+    def _matrices(self, q: Array, v: Array) -> dict[str, Any]:
+        """Mass matrix, and forces of velocities and of gravity; empty where velocities are not those of the tree."""
+        if not self.tree.own_velocities:
+            return {}
+        model, data = self._model, self._model.createData()
+        M = np.reshape(pin.crba(model, data, q), (model.nv, model.nv))
+        weights = np.array(pin.computeGeneralizedGravity(model, data, q))
+        both = np.array(pin.nonLinearEffects(model, data, q, v))
+        upper = np.triu(M)
+        return {
+            "mass_matrix": upper + np.triu(M, 1).T,
+            "velocity_forces": both - weights,
+            "gravity_forces": weights,
+        }
 
     def _mass_matrix_error(self, q: Array) -> float:
         """Relative difference of the mass matrix of crba, used in the equations, from unit accelerations of rnea."""

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy.linalg.lapack import dgesdd, dpotrf, dtrtri
 
 from proofroll.core.arrays import cross
-from proofroll.elements.mechanism.joint import FACTS, rows_of
+from proofroll.elements.mechanism.joint import DISTANCE, LOOP_FACTS, rows_of
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.elements.mechanism.sampling import independent_anywhere
 from proofroll.engines.pinocchio.joint_tree import JointTree
@@ -26,7 +26,8 @@ class RowsAtState(NamedTuple):
     Attributes:
         residual: Φ.
         C: Jacobian with C v = Φ̇.
-        drift: Ċ v.
+        drift: Ċ v, of a prescribed motion less its acceleration.
+        rate: Φ̇ of the rows where they hold; 0.0 where all are constant.
         loop: index of the loop of each of its rows.
         force, torque: applied to body_b by a unit multiplier of each row.
     """
@@ -34,6 +35,7 @@ class RowsAtState(NamedTuple):
     residual: Array
     C: Array
     drift: Array
+    rate: Array | float
     loop: NDArray[np.intp]
     force: Array
     torque: Array
@@ -48,7 +50,7 @@ class Split(NamedTuple):
 
 
 class LoopRows:
-    """Rows of all loops of a tree, then of its couplings.
+    """Rows of all loops of a tree, then of its couplings, then of its prescribed motions.
 
     Attributes:
         rank: number of independent rows.
@@ -59,8 +61,13 @@ class LoopRows:
         kinds = [loop.kind for loop in tree.mechanism.loops]
         (self._point, self._axis), (self._angle, self._x, self._y) = rows_of(kinds)
         # True where a row's direction turns with body_a; coincident points need no such rows and use world axes
-        self._turning = np.array([len(FACTS[kinds[number]].translations) < 3 for number in self._point]).reshape(-1, 1)
+        self._turning = np.array(
+            [0 < len(LOOP_FACTS[kinds[number]].translations) < 3 for number in self._point]
+        ).reshape(-1, 1)
         self._fixed = np.eye(3)[self._axis]
+        struts = [kinds[number] == DISTANCE for number in self._point]
+        self._struts = np.flatnonzero(struts)
+        self._lengths = np.array([tree.mechanism.loops[number].length for number in self._point[self._struts]])
         self._loop = np.concatenate([self._point, self._angle])
         self._ends = np.array(tree.loops, dtype=np.intp).reshape(-1, 2).T
         data, rest = self._model.createData(), np.zeros(self._model.nv)
@@ -75,13 +82,14 @@ class LoopRows:
 
     def at(self, data: Any, q: Array, v: Array) -> RowsAtState:
         """Rows at a state; leaves positions, velocities and drifts of all frames in ``data``."""
-        if not self._tree.mechanism.couplings:
+        if not len(self._tree.geared):
             return self._of_loops(data, q, v)
-        rows, geared = self._of_loops(data, q, v), self._tree.geared
+        rows, (residual, rate, drift) = self._of_loops(data, q, v), self._tree.apart(q)
         return rows._replace(
-            residual=np.concatenate([rows.residual, self._tree.apart(q)]),
-            C=np.concatenate([rows.C, geared]),
-            drift=np.concatenate([rows.drift, np.zeros(len(geared))]),
+            residual=np.concatenate([rows.residual, residual]),
+            C=np.concatenate([rows.C, self._tree.geared]),
+            drift=np.concatenate([rows.drift, drift]),
+            rate=np.concatenate([np.zeros(len(rows.residual)), rate]),
         )
 
     def _of_loops(self, data: Any, q: Array, v: Array) -> RowsAtState:
@@ -93,22 +101,31 @@ class LoopRows:
         J, a, d, w_a, w_b = J_b - J_a, a_b - a_a, p_b - p_a, v_a[:, 3:], v_b[:, 3:]
         i, j, turning = self._point, self._angle, self._turning
         n = np.where(turning, A[i, :, self._axis], self._fixed)
-        x, y, first, then = A[j, :, self._x], B[j, :, self._y], len(n), len(n) + len(self._angle)
+        along_struts, strut = d[i[self._struts]], self._struts
+        sizes = np.sqrt((along_struts * along_struts).sum(1))
+        n[strut] = along_struts / sizes[:, None]
+        x, y, count, then = A[j, :, self._x], B[j, :, self._y], len(n), len(n) + len(self._angle)
         # ω × each direction, and again; the moments d × n and y × x. One call for all takes as long as one for each.
         spins = np.concatenate([w_a[i], w_a[j], w_b[j]])
         rates = cross(spins, np.concatenate([n, x, y]))
         bends = cross(spins, rates)
         moments = cross(np.concatenate([d[i], y]), np.concatenate([n, x]))
-        r, t = turning * moments[:first], moments[first:]
+        r, t = turning * moments[:count], moments[count:]
         C = _times(n, J[i, :3]) - _times(r, J_a[i, 3:])
-        along = 2 * rates[:first] * (v_b - v_a)[i, :3] + bends[:first] * d[i]
-        drift = n * a[i, :3] - r * a_a[i, 3:] + turning * along
-        x_rate, y_rate = rates[first:then], rates[then:]
-        turn = t * a[j, 3:] + bends[first:then] * y + x * bends[then:] + 2 * x_rate * y_rate
+        drift_along = 2 * rates[:count] * (v_b - v_a)[i, :3] + bends[:count] * d[i]
+        drift = n * a[i, :3] - r * a_a[i, 3:] + turning * drift_along
+        x_rate, y_rate = rates[count:then], rates[then:]
+        turn = t * a[j, 3:] + bends[count:then] * y + x * bends[then:] + 2 * x_rate * y_rate
+        residual, drifts = np.concatenate([n * d[i], x * y]).sum(1), np.concatenate([drift, turn]).sum(1)
+        if len(strut):
+            slide = (v_b - v_a)[i[strut], :3]
+            residual[strut] -= self._lengths
+            drifts[strut] += ((slide * slide).sum(1) - (n[strut] * slide).sum(1) ** 2) / sizes
         return RowsAtState(
-            np.concatenate([n * d[i], x * y]).sum(1),
+            residual,
             np.concatenate([C, _times(t, J[j, 3:])]),
-            np.concatenate([drift, turn]).sum(1),
+            drifts,
+            0.0,
             self._loop,
             np.concatenate([n, np.zeros_like(t)]),
             np.concatenate([np.zeros_like(n), t]),
@@ -155,7 +172,7 @@ class LoopRows:
         """State without violations of the loops, moved along the locked directions (Blajer 2002)."""
         rows = self.at(data, q, v)
         split = self.split(pin.crba(self._model, data, q), rows.C)
-        v = v - split.locked @ (split.back @ (rows.C @ v))
+        v = v - split.locked @ (split.back @ (rows.C @ v - rows.rate))
         return pin.integrate(self._model, q, -split.locked @ (split.back @ rows.residual)), v
 
 
@@ -169,19 +186,20 @@ class NullSpace:
 
     Attributes:
         on_couplings: force of each coupling on its first joint at the last call of :meth:`reactions`.
+        on_motions: force of each prescribed motion on its joint then.
     """
 
     def __init__(self, tree: JointTree, rows: LoopRows) -> None:
         self._tree, self._model, self._rows = tree, tree.model, rows
         self._rest = np.zeros(tree.model.nv)
-        self.on_couplings = np.zeros(0)
+        self.on_couplings = self.on_motions = np.zeros(0)
 
     def acceleration(self, data: Any, q: Array, v: Array) -> Array:
         """Joint acceleration, shape (nv,), overwritten by the next call."""
         tree, model = self._tree, self._model
         tau = tree.drives(q, v)
         if not tree.closed:
-            if not tree.springs:
+            if not tree.pushed:
                 acceleration: Array = pin.aba(model, data, q, v, tau)
                 return acceleration
             pin.forwardKinematics(model, data, q, v)
@@ -193,7 +211,7 @@ class NullSpace:
         """Acceleration, rows, and multipliers; of dependent rows, the multipliers of least norm."""
         tree, model = self._tree, self._model
         rows = self._rows.at(data, q, v)
-        pulls = tree.pulls(data) if tree.springs else None
+        pulls = tree.pulls(data) if tree.pushed else None
         M = pin.crba(model, data, q).copy()
         bias = pin.rnea(model, data, q, v, self._rest, pulls) if pulls else pin.rnea(model, data, q, v, self._rest)
         split = self._rows.split(M, rows.C)
@@ -213,7 +231,8 @@ class NullSpace:
             return acceleration, tree.pulls(data), on_loops
         acceleration, rows, multipliers = self._solved(data, q, v, tree.drives(q, v))
         forces = tree.pulls(data)
-        multipliers, self.on_couplings = np.split(multipliers, [len(rows.loop)])
+        moving = len(multipliers) - len(tree.mechanism.prescribed)
+        multipliers, self.on_couplings, self.on_motions = np.split(multipliers, [len(rows.loop), moving])
         np.add.at(on_loops[0], rows.loop, multipliers[:, None] * rows.force)
         np.add.at(on_loops[1], rows.loop, multipliers[:, None] * rows.torque)
         for (a, b), force, torque in zip(tree.loops, *on_loops, strict=True):

@@ -11,6 +11,7 @@ from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.reproducer_source import cut_program
 from proofroll.elements.mechanism.drives import Actuator
 from proofroll.elements.mechanism.loop_points import held_points
+from proofroll.elements.mechanism.parts import Force
 from proofroll.engines.pinocchio.contact import ContactSteps
 from proofroll.engines.pinocchio.mechanism_run import MechanismMotion, MechanismRun
 from proofroll.engines.pinocchio.rows_run import RowsRun
@@ -55,15 +56,16 @@ def source(body: RollingBall, settings: PinocchioSettings) -> str:
     if math.isfinite(body.contact.mu_static):
         raise Refused("the loop that switches between stick and slip around Pinocchio's terms is proofroll's")
     run = RowsRun(body, settings)
-    wanted = type(run.mechanism), type(run.motion)
-    mechanism, motion = (kind.__name__ for kind in wanted)
+    kinds = type(run.mechanism), type(run.motion)
+    mechanism, motion = (kind.__name__ for kind in kinds)
     text = _SEEN + _ROWS.format(mechanism=mechanism, motion=motion)
-    return cut_program(body, settings, wanted, ["advance", "orientation"], text)
+    return cut_program(body, settings, kinds, ["advance", "orientation"], text)
 
 
 _OF_A_MECHANISM = '''
 MECHANISM.start = lambda: (np.array(START[0]), np.array(START[1]))
 MECHANISM.place_of = PLACES_OF.get
+MECHANISM.prescribed = ()
 
 
 def seen(motion):
@@ -95,29 +97,35 @@ def mechanism_source(run: MechanismRun, settings: PinocchioSettings) -> str:
     """Program that runs a mechanism, with the dynamics of the settings.
 
     Raises:
-        Refused: drives change in time.
+        Refused: drives change in time, motions are prescribed, springs have a formula, or there are bushings.
     """
-    if run.tree.varies:
-        raise Refused("a program cannot have drives that change in time yet")
+    if any(spring.force for spring, _, _ in run.tree.springs):
+        raise Refused("a program cannot have springs with a force of their own yet")
+    if run.tree.mechanism.bushings:
+        raise Refused("a program cannot have bushings yet")
+    if run.tree.varies or run.tree.mechanism.prescribed:
+        raise Refused("a program cannot have drives that change in time, or prescribed motions, yet")
     mechanism: Any = run.tree.mechanism
     integrator = INTEGRATORS[settings.integrator]
-    wanted = [integrator, MechanismMotion, *([Actuator] if mechanism.actuators else [])]
+    parts = (*([Actuator] if mechanism.actuators else []), *([Force] if mechanism.forces else []))
+    kinds = [integrator, MechanismMotion, *parts]
     never = "ConstraintDynamics" if settings.proximal is None else "NullSpace"
     instead = {
         "checks": "class checks:\n    RATIO = {}",
         "lacks_inertia": f"def lacks_inertia(_):\n    return {run.tree.light}",
+        "moved": "def moved(signal, _):\n    return signal, 0.0, 0.0",
         "varies": "def varies(signal):\n    return False",
         "value_at": "def value_at(signal, *_):\n    return signal",
     }
     instead["INTEGRATORS"] = f"INTEGRATORS = {{{settings.integrator!r}: {integrator.__name__}}}"
     instead |= {never: f"{never} = None", "held_points": "def held_points(_, loop):\n    return HELD[loop.name]"}
     uses = ("advance", "motion", "tree", "rows", "at", "residual", "body", "sprung", "springs", "closed", "length")
-    cut = CutOut(wanted, uses, instead)
+    cut = CutOut(kinds, uses, instead)
     numbers = assignment(
         START=[part.tolist() for part in mechanism.start()],
         PLACES_OF={joint.name: mechanism.place_of(joint.name) for joint in mechanism.joints if joint.nq == 1},
         HELD={loop.name: held_points(mechanism, loop) for loop in mechanism.loops},
-        PLACES=[(mechanism.body_index[body], [float(x) for x in at]) for body, at in mechanism.followed],
+        PLACES=[(mechanism.body_index[body], [float(x) for x in place]) for body, place in mechanism.followed],
     )
-    given = f"MECHANISM = {cut.literal(mechanism)}\nSETTINGS = {cut.literal(settings)}\n"
-    return f"{cut.head}\n{cut.text}\n\n{numbers}{given}{_OF_A_MECHANISM}"
+    constants = f"MECHANISM = {cut.literal(mechanism)}\nSETTINGS = {cut.literal(settings)}\n"
+    return f"{cut.head}\n{cut.text}\n\n{numbers}{constants}{_OF_A_MECHANISM}"

@@ -74,9 +74,9 @@ class PinocchioRobots:
                 placed = model.frames[frame].placement.actInv(placed)
             mass[name], com[name], inertia[name] = float(placed.mass), np.array(placed.lever), np.array(placed.inertia)
         return Reading(
-            joints, dofs, mass, com, inertia,
-            {name: np.array([X.translation for X in placements]) for name, placements in frames.items()},
-            {name: np.array([X.rotation for X in placements]) for name, placements in frames.items()},
+            joints=joints, dofs=dofs, mass=mass, com=com, inertia=inertia,
+            position={name: np.array([X.translation for X in placements]) for name, placements in frames.items()},
+            rotation={name: np.array([X.rotation for X in placements]) for name, placements in frames.items()},
             remarks=("option mimic=true",) if reduced else (),
             **arrays,
         )  # fmt: skip
@@ -103,8 +103,12 @@ def _columns(request: Request, model: Any) -> list[tuple[str, int, int]]:
     for index in range(1, model.njoints):
         joint, name = model.joints[index], str(model.names[index])
         if index in twins:
-            first, number = twins[index]
-            columns += [(f"{part} ({number})", index, dof) for part, other, dof in list(columns) if other == first]
+            twin, number = twins[index]
+            columns += [
+                (f"{part} ({number})", index, dof)
+                for part, index_of_column, dof in list(columns)
+                if index_of_column == twin
+            ]
             continue
         if request.kind == "urdf" and name == "root_joint":
             name = request.base_joint
@@ -118,12 +122,12 @@ def _columns(request: Request, model: Any) -> list[tuple[str, int, int]]:
 
 def _twins(model: Any) -> dict[int, tuple[int, int]]:
     """Joints with the name of an earlier joint: index -> index of the first, and count among them from 2."""
-    first: dict[str, int] = {}
+    first_of: dict[str, int] = {}
     twins: dict[int, tuple[int, int]] = {}
     for index, name in enumerate(map(str, model.names)):
-        if name in first:
-            twins[index] = (first[name], 2 + sum(other == first[name] for other, _ in twins.values()))
-        first.setdefault(name, index)
+        if name in first_of:
+            twins[index] = (first_of[name], 2 + sum(twin == first_of[name] for twin, _ in twins.values()))
+        first_of.setdefault(name, index)
     return twins
 
 

@@ -85,24 +85,24 @@ class PinocchioSettings:
 
     def _rules(self) -> Iterator[tuple[bool, str, str]]:
         contact, integrator = self.formulation == "contact", self.integrator
-        solves, own = self.formulation in _WITH_SOLVER, OF_MECHANISMS.get(self.formulation)
+        solves, of_mechanisms = self.formulation in _WITH_SOLVER, OF_MECHANISMS.get(self.formulation)
         for name in ("solver", "solver_tolerance"):
-            given = getattr(self, name) is not None
+            is_set = getattr(self, name) is not None
             advice = f"{self.formulation} has no contact solver; leave it out, or take formulation=contact"
-            yield given and not solves, name, advice
-            yield solves and not given, name, f"{self.formulation} needs one; its presets have one"
+            yield is_set and not solves, name, advice
+            yield solves and not is_set, name, f"{self.formulation} needs one; its presets have one"
         yield self.convex and self.formulation != "impulses", "convex", "only impulses has it; leave it out"
         if contact:
             yield integrator not in _OF_CONTACT, "integrator", f"contact has {' and '.join(_OF_CONTACT)}"
             yield self.orientation is False, "orientation", "contact always turns the ball; leave it out"
-        elif own is None:
+        elif of_mechanisms is None:
             only = {"leapfrog": "contact", "midpoint": "impulses"}.get(integrator)
             yield only is not None, "integrator", f"only {only} has it"
         yield solves and self.projection, "projection", "what touches is put back by the solver; leave it out"
-        if own is not None:
+        if of_mechanisms is not None:
             advice = "a mechanism always has its orientations; leave it out"
             yield self.orientation is not None, "orientation", advice
-            yield integrator not in own, "integrator", f"{self.formulation} has {' and '.join(own)}"
+            yield integrator not in of_mechanisms, "integrator", f"{self.formulation} has {' and '.join(of_mechanisms)}"
         advice = "constraint_dynamics needs a number, and nothing else has one"
         yield (self.formulation == "constraint_dynamics") != (self.proximal is not None), "proximal", advice
         # A fixed step has dt and no rtol, an adaptive one rtol and no dt.

@@ -102,21 +102,21 @@ class AdaptiveStickSlip(Adaptive):
     def _turning(self, data: Any, y: FloatArray) -> tuple[SlidingContact, FloatArray]:
         """Frictionless motion, and the rate at which the direction of its slip_rate turns [1/s], shape (3,)."""
         free = self._slide(data, y, np.zeros(3))
-        along = unit(free.slip_rate)
-        ahead = y + self._span * self._sliding_rates(data, y, along)[0]
-        return free, (unit(self._slide(data, ahead, np.zeros(3)).slip_rate) - along) / self._span
+        direction = unit(free.slip_rate)
+        ahead = y + self._span * self._sliding_rates(data, y, direction)[0]
+        return free, (unit(self._slide(data, ahead, np.zeros(3)).slip_rate) - direction) / self._span
 
     def _direction(self, data: Any, y: FloatArray) -> FloatArray:
         """Direction of slip, which friction opposes, as a unit vector, shape (3,)."""
         if self._mode is FrictionLaw.SLIDING:
             return unit(self._slide(data, y, np.zeros(3)).slip)
         free, turning = self._turning(data, y)
-        along, strength = unit(free.slip_rate), math.sqrt(free.slip_rate @ free.slip_rate)
-        grip = strength - along @ self._slide(data, y, along).slip_rate
-        size = max(float(free.slip @ along), 0.0)
+        direction, strength = unit(free.slip_rate), math.sqrt(free.slip_rate @ free.slip_rate)
+        grip = strength - direction @ self._slide(data, y, direction).slip_rate
+        size = max(float(free.slip @ direction), 0.0)
         lag = size / (2 * strength - grip) if 2 * strength > grip else 0.0
         tangential = turning - (turning @ free.e1) * free.e1
-        return unit(along - lag * tangential)
+        return unit(direction - lag * tangential)
 
     def _sliding_rates(self, data: Any, y: FloatArray, direction: FloatArray) -> tuple[FloatArray, SlidingContact]:
         q, v = self._split(y)
@@ -154,8 +154,8 @@ class AdaptiveStickSlip(Adaptive):
                     return self._switch(stop, left, solver.y + left * solver.f)
                 longest = max(_APPROACH * left, 1e-300)
             self._make_step(solver, end, longest)
-            before, monitor = monitor, self._after_step(solver.y)
-            stop = self._stop(solver, before, monitor)
+            last_monitor, monitor = monitor, self._after_step(solver.y)
+            stop = self._stop(solver, last_monitor, monitor)
             if monitor[2] < -self._mechanism.faint:
                 self._leave(solver, stop)
             if stop is not None:
@@ -192,18 +192,18 @@ class AdaptiveStickSlip(Adaptive):
         beyond, normal_force = self._mechanism.excess(self._data, *self._split(y), self.mu_static)
         return beyond, 0.0, normal_force
 
-    def _stop(self, solver: Any, before: tuple[float, float, float], after: tuple[float, float, float]) -> Rise | None:
+    def _stop(self, solver: Any, old: tuple[float, float, float], new: tuple[float, float, float]) -> Rise | None:
         """End of the mode within the last step; None: it goes on."""
         if self._mode is FrictionLaw.STICKING:
             # The excess lies in [-1, 1] and its peaks are many steps wide, so far below zero no event is missed.
-            if max(before[0], after[0]) < -0.1 - abs(after[0] - before[0]):
+            if max(old[0], new[0]) < -0.1 - abs(new[0] - old[0]):
                 return None
             return locate_rise(solver, lambda y: np.array([self._excess(y) - _GRAZE]))
         if self._mode is FrictionLaw.CREEPING:
-            if after[0] >= self._handover:
+            if new[0] >= self._handover:
                 return locate_rise(solver, lambda y: np.array([self._speed(y)[0] - self._handover]))
             # Below zero by more than round-off, or the zero at the start would be found again.
-            if after[0] < -self._least and after[1] < 0:
+            if new[0] < -self._least and new[1] < 0:
                 return locate_rise(solver, lambda y: np.array([-self._speed(y)[0] - self._least]))
         return None
 
@@ -240,8 +240,8 @@ class AdaptiveStickSlip(Adaptive):
         self._mode = FrictionLaw.CREEPING
         free, turning = self._turning(self._data, y)
         rate = max(math.sqrt(turning @ turning), 1.0 / (_STEADY * self._turning_time))
-        along, strength = unit(free.slip_rate), math.sqrt(free.slip_rate @ free.slip_rate)
-        grip = strength - float(along @ self._slide(self._data, y, along).slip_rate)
+        direction, strength = unit(free.slip_rate), math.sqrt(free.slip_rate @ free.slip_rate)
+        grip = strength - float(direction @ self._slide(self._data, y, direction).slip_rate)
         self._handover = max(_HANDOVER * strength / rate, _LEAST_HANDOVER * grip * self._turning_time)
         self._least = _LEAST_FLOOR * grip * self._turning_time
         self._floor = max(_FLOOR * self._handover, self._least)
@@ -284,12 +284,12 @@ class FixedStickSlip(FixedStep):
             put_back = self._mechanism.project if self.sticking else self._mechanism.project_sliding
             self.q, self.v = put_back(self._data, self.q, self.v)
         if self.sticking:
-            before = self._excess
+            old_excess = self._excess
             self._excess, normal_force = self._mechanism.excess(self._data, self.q, self.v, self.mu_static)
             if self._excess <= 0:
                 self._must_press(time + self._dt, normal_force)
                 return
-            part = min(max(before / (before - self._excess), 0.0), 1.0) if before < 0 else 0.0
+            part = min(max(old_excess / (old_excess - self._excess), 0.0), 1.0) if old_excess < 0 else 0.0
             self.events.append(Event("slip", time + part * self._dt, time, time + self._dt))
             self.sticking = False
         self._free = self._without_friction()
@@ -300,11 +300,11 @@ class FixedStickSlip(FixedStep):
 
     def _must_press(self, time: float, normal_force: float) -> None:
         """Stores N [N]; ends the run if the wall would have to pull."""
-        before, self._normal_force = self._normal_force, normal_force
+        last_force, self._normal_force = self._normal_force, normal_force
         if normal_force >= -self._mechanism.faint:
             return
         low = max(time - self._dt, 0.0)
-        best = low + (time - low) * before / (before - normal_force) if before > 0 else low
+        best = low + (time - low) * last_force / (last_force - normal_force) if last_force > 0 else low
         best = max([best, *(event.time for event in self.events[-1:])])  # not before a slip in the same step
         self.events.append(Event("lift_off", best, low, time))
         raise left_the_wall(f"at {best:.6g} s")

@@ -44,6 +44,7 @@ class Projection:
     }
     lacking: ClassVar[Mapping[str, Mapping[str, str]]] = {
         **{name: {BallCapability.IMPACTS: "its constraint holds the ball on the wall"} for name in _OF_BALLS},
+        "dependent": mechanism.LACKING,
     }
     settings: ClassVar[type[ProjectionSettings]] = ProjectionSettings
     presets: ClassVar[Mapping[str, Mapping[str, ProjectionSettings]]] = PRESETS

@@ -43,11 +43,11 @@ class Excess(NamedTuple):
 
 
 def ends_of_efforts(
-    actuators: Iterable[Actuator], modes: Sequence[str], wanted: Sequence[float], first: int
+    actuators: Iterable[Actuator], modes: Sequence[str], efforts: Sequence[float], begin: int
 ) -> list[Excess]:
-    """Excess of the modes of efforts with a limit over their ends; ``first``: index of the first effort."""
+    """Excess of the modes of efforts with a limit over their ends; ``begin``: index of the first effort."""
     ends = list[Excess]()
-    for k, (actuator, mode, effort) in enumerate(zip(actuators, modes, wanted, strict=True), first):
+    for k, (actuator, mode, effort) in enumerate(zip(actuators, modes, efforts, strict=True), begin):
         over, under = effort - actuator.bound, -actuator.bound - effort
         if mode == "linear":
             ends += [Excess(k, "least", under), Excess(k, "greatest", over)]
@@ -129,9 +129,11 @@ class AlternatingMotion(ABC, Generic[ModeT]):
         stepper = self._stepper
         stepper.aim(t)
         while stepper.t < t:
-            stepper.step(min([t, *(at for at in self._breaks if at > stepper.t)]), np.inf)
+            stepper.step(min([t, *(instant for instant in self._breaks if instant > stepper.t)]), np.inf)
             beyond = [(end, self._beyond(end)) for end in self._excess(stepper.x)]
-            ended = [(self._crossing(end, at), end.which, end.kind) for end, at in beyond if at is not None]
+            ended = [
+                (self._crossing(end, instant), end.which, end.kind) for end, instant in beyond if instant is not None
+            ]
             if ended:
                 self._switch(*min(ended))
                 continue
@@ -142,7 +144,7 @@ class AlternatingMotion(ABC, Generic[ModeT]):
 
     def _excess_over(self, end: Excess, y: Array) -> Excess:
         """Excess of a state over one end of the mode."""
-        return next(other for other in self._excess(y) if other[:2] == end[:2])
+        return next(item for item in self._excess(y) if item[:2] == end[:2])
 
     def _beyond(self, end: Excess) -> float | None:
         """Time within the last step at which the mode had passed an end [s]; None: it had not.
@@ -154,12 +156,12 @@ class AlternatingMotion(ABC, Generic[ModeT]):
         def at(t: float) -> Excess:
             return self._excess_over(end, self._stepper.inside(t))
 
-        now, before = self._stepper.t, self._stepper.t_before
+        now, begin = self._stepper.t, self._stepper.t_before
         if end.closing > 0:
             return now if end.size > 0 else None
-        if end.size < end.closing * (now - before) or at(before).closing <= -_CLOSES * end.closing:
+        if end.size < end.closing * (now - begin) or at(begin).closing <= -_CLOSES * end.closing:
             return None
-        lowest = float(brentq(lambda t: at(t).closing, before, now))
+        lowest = float(brentq(lambda t: at(t).closing, begin, now))
         return lowest if at(lowest).size > 0 else None
 
     def _crossing(self, end: Excess, high: float) -> float:
@@ -177,5 +179,5 @@ class AlternatingMotion(ABC, Generic[ModeT]):
             raise Diverged(f"{self.alternates} alternate without end at t = {t:.6g} s")
         y, mode, happened = self._next(stepper.inside(t), which, kind)
         bracket = stepper.bracket(max(stepper.t_before, t - _ULPS * float(np.spacing(t))), t)
-        self.events += [Event(each, t, *bracket, name) for each, name in happened]
+        self.events += [Event(event_kind, t, *bracket, name) for event_kind, name in happened]
         self._enter(t, y, mode)

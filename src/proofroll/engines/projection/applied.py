@@ -34,7 +34,7 @@ class Applied:
     """Forces on the bodies except weight and reactions.
 
     Attributes:
-        springs: True if there are springs between points.
+        of_points: True if there are springs between points, bushings or applied forces.
         laws: True if joints have force laws.
         now: time at which drives and targets are evaluated [s].
         modes: mode of each effort with a limit, by the index of the actuator; an effort without a mode is clamped by
@@ -66,32 +66,60 @@ class Applied:
         # coordinates to evaluate, without a force law
         watched = {joint.number for joint in switched_joints(mechanism)}
         watched |= {number[name] for item in mechanism.couplings for name, _ in item.terms}
+        watched |= {number[joint.name] for joint, _, _ in mechanism.prescribed}
         axes = {k: "slide" if mechanism.joints[k].kind == "prismatic" else "z" for k in sorted(watched)}
         self._watched = {k: _Law(k, axis, 0.0, 0.0, 0.0, 0.0) for k, axis in axes.items()}
         turning = [law for law in self._watched.values() if law.axis != "slide"]
         self._angles |= {law: mechanism.joints[law.connection].q0[0] for law in turning}
         com = np.array([*(body.com for body in mechanism.bodies), (0.0, 0.0, 0.0)])
-        self._springs = [
-            (spring, (a, np.append(spring.position_a - com[a], 1.0)), (b, np.append(spring.position_b - com[b], 1.0)))
-            for spring in mechanism.springs
-            for a, b in [(index[spring.body_a] % (count + 1), index[spring.body_b] % (count + 1))]
+        ends = [
+            ((a, np.append(link.position_a - com[a], 1.0)), (b, np.append(link.position_b - com[b], 1.0)))
+            for link in mechanism.links
+            for a, b in [(index[link.body_a] % (count + 1), index[link.body_b] % (count + 1))]
         ]
-        self.springs = bool(self._springs)
+        count = len(mechanism.springs)
+        self._springs = [(spring, *both) for spring, both in zip(mechanism.springs, ends, strict=False)]
+        self._bushings = [(bushing, *both) for bushing, both in zip(mechanism.bushings, ends[count:], strict=True)]
+        self._forces = [
+            (force, index[force.body], np.append(force.position - com[index[force.body]], 1.0), index[force.reaction])
+            for force in mechanism.forces
+        ]
+        self.of_points = bool(self._springs or self._bushings or self._forces)
 
     def pulls(self, bodies: Bodies) -> Array:
-        """Forces of springs on the bodies, (bodies, 4, 4): matrices f pᵀ of a force f at p."""
+        """Loads of springs, bushings and applied forces on bodies, (bodies, 4, 4): matrices f pᵀ of a force f at p."""
         forces = np.zeros((len(bodies.pose), 4, 4), dtype=bodies.pose.dtype)
         for spring, (a, at_a), (b, at_b) in self._springs:
             place_a, place_b = bodies.pose[a] @ at_a, bodies.pose[b] @ at_b
             between = place_b - place_a
             length = (between @ between) ** 0.5
             pull = spring.stiffness * (length - spring.length)
-            if spring.damping:
-                rate = bodies.twist[b] @ place_b - bodies.twist[a] @ place_a
-                pull += spring.damping * (between @ rate) / length
+            if spring.damping or spring.force:
+                rate = between @ (bodies.twist[b] @ place_b - bodies.twist[a] @ place_a) / length
+                pull = spring.pull(length, rate)
             force = pull / length * between
             forces[a] += np.outer(force, place_a)
             forces[b] -= np.outer(force, place_b)
+        for bushing, (a, at_a), (b, at_b) in self._bushings:
+            place_a, place_b = bodies.pose[a] @ at_a, bodies.pose[b] @ at_b
+            slide = (bodies.twist[b] @ place_b - bodies.twist[a] @ place_a)[:3]
+            R_a, R_b = bodies.pose[a][:3, :3], bodies.pose[b][:3, :3]
+            w_a, w_b = (0.5 * bodies.twist[k][:3, :3].ravel() @ SKEW.T for k in (a, b))
+            force, moment = bushing.load(R_a, R_b, (place_b - place_a)[:3], slide, w_a, w_b)
+            acts = np.outer(np.append(force, 0.0), place_b)
+            acts[:3, :3] += 0.5 * np.cross(np.eye(3), moment)
+            forces[b] += acts
+            forces[a] -= acts
+        for applied, body, place, reaction in self._forces:
+            load = np.array(applied.at(self.now), dtype=float)
+            load = bodies.pose[body][:3, :3] @ load if applied.frame == "body" else load
+            if applied.kind == "force":
+                acts = np.outer(np.append(load, 0.0), bodies.pose[body] @ place)
+            else:
+                acts = np.zeros((4, 4), dtype=forces.dtype)
+                acts[:3, :3] = 0.5 * np.cross(np.eye(3), load)
+            forces[body] += acts
+            forces[reaction] -= acts
         return forces[:-1]
 
     def of_joints(self, ends: Ends) -> tuple[Array, Array]:
@@ -183,7 +211,11 @@ def _laws(number: int, joint: Joint) -> list[_Law]:
     if not (joint.stiffness or joint.damping or joint.torque) or joint.kind == "spherical":
         return []
     axes = {"revolute": ("z",), "prismatic": ("slide",), "universal": ("z", "x")}[joint.kind]
-    own = [_Law(number, axis, joint.stiffness, joint.rest, joint.damping, joint.constant_drive) for axis in axes]
+    laws_of_joint = [
+        _Law(number, axis, joint.stiffness, joint.rest, joint.damping, joint.constant_drive) for axis in axes
+    ]
     if varies(joint.torque):  # one axis has it
-        own.append(_Law(number, axes[0], 0.0, 0.0, 0.0, 0.0, lambda t, _q, _v: float(value_at(joint.torque, t))))
-    return own
+        laws_of_joint.append(
+            _Law(number, axes[0], 0.0, 0.0, 0.0, 0.0, lambda t, _q, _v: float(value_at(joint.torque, t)))
+        )
+    return laws_of_joint

@@ -177,20 +177,20 @@ class Stick(_Held):
                 trend = (self._friction.reserve(ahead) - reserve) / span
         if not self.halts:
             return Survey(cone, trend)
-        (v2, v3), along = kin.v[1:3], response.rate[1:3]
+        (v2, v3), slide = kin.v[1:3], response.rate[1:3]
         speed = math.hypot(v2, v3)
-        slowing = (v2 * along[0] + v3 * along[1]) / speed if speed else 0.0
+        slowing = (v2 * slide[0] + v3 * slide[1]) / speed if speed else 0.0
         longest = self._pace.reach * time_left(speed, slowing)
         return Survey((*cone, speed - self._pace.still), trend, longest=longest)
 
-    def glance(self, y: FloatArray, before: Survey, elapsed: float) -> Survey:
+    def glance(self, y: FloatArray, survey: Survey, elapsed: float) -> Survey:
         """Margins after a step of ``elapsed`` [s] without an evaluation of the equations, if only standstill ends it.
 
-        The deceleration of the centre is estimated from that step; ``before``: the margins at its start.
+        The deceleration of the centre is estimated from that step; ``survey``: the margins at its start.
         """
         speed = self._ball.speed(y)
         margin = speed - self._pace.still
-        growth = (margin - before.margins[0]) / elapsed
+        growth = (margin - survey.margins[0]) / elapsed
         return Survey((margin,), longest=self._pace.reach * time_left(speed, growth))
 
 

@@ -127,8 +127,8 @@ class Switching:
         return self.mode.survey(stepper.x)
 
     def _enter(self, mode: BallMode, t: float, y: FloatArray) -> None:
-        def accept(at: float, state: FloatArray) -> FloatArray:
-            self._check(at, mode.x(state))
+        def accept(time: float, state: FloatArray) -> FloatArray:
+            self._check(time, mode.x(state))
             return mode.eliminated(state) if self._eliminate else state
 
         self.mode = mode
@@ -145,13 +145,13 @@ class Switching:
             if survey.margins[index] < 0
         ]
         if not ends and self._survey.trend < 0 < survey.trend and self._may_dip(survey):
-            now, before = self.stepper.t, self.stepper.t_before
-            lowest = float(brentq(lambda t: self._at(t).trend, before, now, xtol=self._resolution(now)))
+            now, begin = self.stepper.t, self.stepper.t_before
+            lowest = float(brentq(lambda t: self._at(t).trend, begin, now, xtol=self._resolution(now)))
             if self._at(lowest).margins[survey.dips] < 0:
                 ends = [(*self._crossing(survey.dips, lowest), self.mode.exits[survey.dips])]
         if not ends:
             return None
-        low, high, exit_ = min(ends, key=lambda one: one[1])
+        low, high, exit_ = min(ends, key=lambda item: item[1])
         return exit_, low, high
 
     def _may_dip(self, survey: Survey) -> bool:

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from proofroll.core.arrays import cross
 from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.checks import Vector
-from proofroll.elements.mechanism.joint import rows_of
+from proofroll.elements.mechanism.joint import DISTANCE, rows_of
 from proofroll.elements.mechanism.rotations import Array
 
 # ω @ SKEW: the nine elements of the matrix ω ×. 0.5 * elements @ SKEW.T: ω of the antisymmetric part of any matrix.
@@ -106,6 +106,7 @@ class ProjectedConnections:
         count, index = len(mechanism.bodies), mechanism.body_index
         com = np.array([*(body.com for body in mechanism.bodies), (0.0, 0.0, 0.0)])
         self._kinds = [item.kind for item in mechanism.connections]
+        self._lengths = [item.length for item in mechanism.connections]
         cut = mechanism.connections
         self.a = np.array([index[item.a] % (count + 1) for item in cut], dtype=np.intp)
         self.b = np.array([index[item.b] % (count + 1) for item in cut], dtype=np.intp)
@@ -122,7 +123,7 @@ class ProjectedConnections:
 
     def constraints(self, chosen: slice = slice(None)) -> Constraints:
         """Constraint rows of some connections."""
-        return Constraints(self._kinds[chosen])
+        return Constraints(self._kinds[chosen], self._lengths[chosen])
 
     def on_bodies(self, bodies: Bodies, ends: Ends, owner: NDArray[np.intp], force: Array, torque: Array) -> Array:
         """Jacobian of rows for the velocities (v, ω in own axes) of all bodies, (rows, 6 bodies).
@@ -153,19 +154,24 @@ class Constraints:
         points: number of rows of points.
     """
 
-    def __init__(self, kinds: list[str]) -> None:
+    def __init__(self, kinds: list[str], lengths: list[float]) -> None:
         (self._point, self._axis), (self._angle, self._x, self._y) = rows_of(kinds)
         self.owner, self.points = np.concatenate([self._point, self._angle]), len(self._point)
+        self._struts = np.flatnonzero([kinds[number] == DISTANCE for number in self._point])
+        self._lengths = np.array(lengths)[self._point[self._struts]]
         self._sums = (self.owner == np.arange(len(kinds))[:, None]).astype(float)
 
     def at(self, ends: Ends) -> ConnectionRows:
         """Rows at one state."""
         i, j, points = self._point, self._angle, self.points
         n, x, y = ends.A[i, :, self._axis], ends.A[j, :, self._x], ends.B[j, :, self._y]
+        along = ends.d[i[self._struts]]
+        n[self._struts] = along / np.sqrt((along * along).sum(1))[:, None]
         t = cross(y, x)
         force, torque = np.zeros((2, len(self.owner), 3), dtype=n.dtype)
         force[:points], torque[points:] = n, t
         residual = np.concatenate([n * ends.d[i], x * y]).sum(1)
+        residual[self._struts] -= self._lengths
         form = np.zeros((len(self.owner), 4, 4), dtype=n.dtype)
         form[:points, :3, :3] = n[:, :, None] * ends.place[i][:, None, :]
         form[:points, :3, 3] = n
@@ -182,6 +188,11 @@ class Constraints:
         w = (ends.relative[:, :3, :3].reshape(-1, 9) @ SKEW.T) / 2
         turning = w[self._angle]
         of_points = (rows.force[:points] * cross(w, ends.e)[self._point]).sum(1)
+        if len(self._struts):
+            number = self._point[self._struts]
+            e, along = ends.e[number], ends.d[number]
+            across = (e * e).sum(1) - (rows.force[self._struts] * e).sum(1) ** 2
+            of_points[self._struts] += across / np.sqrt((along * along).sum(1))
         wx, wy = (turning * rows.x).sum(1), (turning * rows.y).sum(1)
         return np.concatenate([of_points, wx * wy - (turning * turning).sum(1) * rows.residual[points:]])
 

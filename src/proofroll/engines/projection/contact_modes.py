@@ -26,11 +26,11 @@ from proofroll.elements.mechanism.contacts.acting import (
     held_directions,
     slip_velocity,
 )
-from proofroll.elements.mechanism.contacts.coulomb import contact_forces, torn
-from proofroll.elements.mechanism.contacts.geometry import BodyContact
+from proofroll.elements.mechanism.contacts.coulomb import contact_forces, largest_friction
+from proofroll.elements.mechanism.contacts.geometry import BodyContact, coefficients_of
 from proofroll.elements.mechanism.contacts.joint_laws import JointContact, joint_contacts, refuse_rubbing_stops
 from proofroll.elements.mechanism.contacts.start import closed_and_still, natural_scale
-from proofroll.elements.mechanism.contacts.touching import Moving, Touching, touch
+from proofroll.elements.mechanism.contacts.touching import Moving, Touching, torn, touch
 from proofroll.elements.mechanism.rotations import Array, frame_of_axis
 from proofroll.elements.mechanism.signal import breaks, varies
 from proofroll.elements.mechanism.switches import switched_joints
@@ -38,6 +38,7 @@ from proofroll.engines.projection.alternating import AlternatingMotion, Excess, 
 from proofroll.engines.projection.dependent import DependentCoordinates, SolvedState
 from proofroll.engines.projection.elimination import Space
 from proofroll.engines.projection.elimination import solved as divided
+from proofroll.engines.projection.slip_directions import SlipDirections
 
 _RANK = 1e-10  # smallest singular value of independent contact rows, relative to the largest
 _OVERLAP = 1e-14  # overlap that is round-off, relative to the natural length
@@ -75,6 +76,7 @@ class ContactMotion(AlternatingMotion[ContactMode]):
         self.contacts: tuple[BodyContact | JointContact, ...] = (*self._bodies, *self._joints)
         self._index = mechanism.body_index
         self.friction = np.array([contact.friction for contact in self.contacts])
+        self._static = np.array([contact.static for contact in self.contacts])
         self._bounds = np.array([contact.bound for contact in self.contacts])
         self._rubs = self.friction + self._bounds > 0
         scale = natural_scale(mechanism)
@@ -85,6 +87,7 @@ class ContactMotion(AlternatingMotion[ContactMode]):
         turns = [mechanism.joints[each.joint.number].kind != "prismatic" for each in self._joints]
         # length of each contact's motion by 1 m, or by 1 rad
         self._arms = np.array([1.0] * len(self._bodies) + [scale.length if turn else 1.0 for turn in turns])
+        self._slipping = SlipDirections(step)
         self._timed = any(map(varies, mechanism.signals))
         self._faint = max(self._still, _REST * step * float(np.linalg.norm(mechanism.gravity)))
         self._limited = {k: item for k, item in enumerate(mechanism.actuators) if item.limit is not None}
@@ -168,11 +171,11 @@ class ContactMotion(AlternatingMotion[ContactMode]):
         rows, force = self._rows(now, mode), np.zeros((len(mode), 3))
         for k in np.flatnonzero(self._bounds).tolist():
             if mode[k].kind == "slip":
-                force[k] = -self._bounds[k] * self._heading(k, now.touching[k])
+                force[k] = -self._bounds[k] * self._slipping.heading(k, now.touching[k])
         if not rows:
             return force
         along = [
-            row - self.friction[k] * self._heading(k, now.touching[k]) if mode[k].kind == "slip" else row
+            row - self.friction[k] * self._slipping.heading(k, now.touching[k]) if mode[k].kind == "slip" else row
             for k, row in rows
         ]
         rate = now.rate + now.J @ np.einsum("nki,ki->n", now.response, force)
@@ -204,14 +207,6 @@ class ContactMotion(AlternatingMotion[ContactMode]):
         """State after a change of the velocities ν."""
         return np.append(self._equations.pushed(y[:-1], change), y[-1])
 
-    def _heading(self, k: int, there: Touching) -> Array:
-        """Direction of a slip; after the end of the slip within a step, the direction before."""
-        slip, toward = slip_velocity(there), self._toward[k]
-        speed = float(np.linalg.norm(slip))
-        if speed <= np.finfo(float).tiny:
-            return toward
-        return np.asarray(slip / speed if slip @ toward >= 0 else -slip / speed)
-
     def solve(self) -> tuple[SolvedState, Array, tuple[Touching, ...]]:
         """Equations of motion solved now, contact forces [N], (contacts, 3), and geometry of the contacts."""
         now = self.at(self._stepper.x)
@@ -236,8 +231,7 @@ class ContactMotion(AlternatingMotion[ContactMode]):
             "contact_gap": np.array([each.gap for each in touching]),
             "contact_normal": np.array([each.normal for each in touching]),
             "contact_place": np.array([each.place for each in touching]),
-            "contact_friction": self.friction[:count],
-            "contact_restitution": np.array([contact.restitution for contact in self._bodies]),
+            **coefficients_of(self._bodies),
             "contact_response": np.einsum("kin,nlj->kilj", now.J[:count], now.response[:, :count]),
         }
 
@@ -248,9 +242,7 @@ class ContactMotion(AlternatingMotion[ContactMode]):
 
     def _look(self, y: Array) -> None:
         """Stores the directions of slips, to detect reversals."""
-        for k, (own, there) in enumerate(zip(self.mode, self._touching(y[:-1]), strict=True)):
-            if own.kind == "slip":
-                self._toward[k] = self._heading(k, there)
+        self._slipping.look(float(y[-1]), self.mode, self._touching(y[:-1]))
 
     def _enter(self, t: float, x: Array, mode: ContactMode) -> None:
         opened = [k for k, own in enumerate(mode) if own.kind == "open" and self.mode[k].kind != "open"]
@@ -258,7 +250,7 @@ class ContactMotion(AlternatingMotion[ContactMode]):
             gaps = np.array([each.gap for each in self.at(x).touching])
             self._overlap[opened] = np.maximum(-gaps[opened], 0.0) + _OVERLAP * self._length
         x, self.mode = self._settled(x, mode), mode
-        self._toward = [np.array(own.heading or (0.0, 0.0, 0.0)) for own in mode]
+        self._slipping.begin(mode)
         self._look(x)
         super()._enter(t, x, mode)
 
@@ -276,9 +268,10 @@ class ContactMotion(AlternatingMotion[ContactMode]):
             if not self._bounds[k]:
                 ends.append(Excess(k, "lift_off", -N))
             if own.kind == "slip" and self._rubs[k]:
-                ends.append(Excess(k, "still", -float(slip_velocity(each) @ self._toward[k])))
+                ends.append(Excess(k, "still", self._slipping.passed(k, each)))
             elif own.kind == "stick":
-                beyond = float(np.linalg.norm(force[k] - N * each.normal)) - (self._bounds[k] or self.friction[k] * N)
+                bound = float(self._bounds[k] or largest_friction(self._static[k], N))
+                beyond = float(np.linalg.norm(force[k] - N * each.normal)) - bound if np.isfinite(bound) else -1.0
                 if beyond > 0 and shared > 1:
                     # forces shared by several contacts are not unique: others may hold what this one cannot
                     held = held or self._decided(
@@ -344,10 +337,11 @@ class ContactMotion(AlternatingMotion[ContactMode]):
         which = [k for k, own in enumerate(self.mode) if (own.kind != "open" or k == hit) and not self._bounds[k]]
         frames, J, response = self._framed(now, which)
         c = np.concatenate([frame.T @ now.touching[k].slide for frame, k in zip(frames, which, strict=True)])
-        speed, e = -c[3 * which.index(hit)], self.contacts[hit].restitution
+        place, law = 3 * which.index(hit), self.contacts[hit]
+        speed, e = -c[place], law.restitution
         settles = self._settles(hit, speed * self._arms[hit] / self._unit, e)
-        e = 0.0 if settles else e
-        c[3 * which.index(hit)] *= 1 + e
+        e, sideways = (0.0, 0.0) if settles else (e, law.tangential_restitution)
+        c[place : place + 3] *= [1 + e, 1 + sideways, 1 + sideways]
         impulse, _ = self._law(J @ response, c, which, [None] * len(which))
         x = self._pushed(x, response @ impulse.ravel())
         # by the speed, not the impulse: of a contact that the impact leaves alone that is round-off, of either sign
@@ -373,7 +367,7 @@ class ContactMotion(AlternatingMotion[ContactMode]):
         time = self.t if hasattr(self._stepper, "t") else 0.0
         try:
             at, names = list(which), [self.contacts[k].name for k in which]
-            return contact_forces(G, c, self.friction[at], sliding, names, self._bounds[at], time)
+            return contact_forces(G, c, self.friction[at], sliding, names, self._bounds[at], time, 0, self._static[at])
         except Refused as error:
             raise Diverged(str(error)) from None
 

@@ -23,6 +23,7 @@ import numpy as np
 from proofroll.core.arrays import cross
 from proofroll.core.errors import Refused
 from proofroll.elements.mechanism import Mechanism, Tree
+from proofroll.elements.mechanism.prescribed import moved
 from proofroll.elements.mechanism.rotations import Array, to_quaternion
 from proofroll.elements.mechanism.sampling import DEPENDENT, independent_anywhere
 from proofroll.elements.mechanism.switches import REDUNDANT
@@ -40,7 +41,7 @@ class SolvedState(NamedTuple):
         angular: angular accelerations in the bodies' own axes, (bodies, 3).
         forces: forces needed in addition to weight, as accelerations of :meth:`Elimination.forces`.
         rates: ν̇, (nv,).
-        multipliers: of the rows of loops, of couplings (forces on their second joints), and of held joints.
+        multipliers: of the rows of loops, of couplings (forces on their second joints), of motions, of held joints.
     """
 
     bodies: Bodies
@@ -61,7 +62,8 @@ class DependentCoordinates:
         nq, nv: numbers of coordinates and of velocities of the tree.
         gravity: its acceleration.
         start: state at time 0.
-        loop_rows, coupled: number of rows of loops, and of loops and couplings together.
+        loop_rows, coupled: number of rows of loops, and of loops, couplings and motions together.
+        moved: slice of the rows of prescribed motions.
         regularity: smallest relevant over largest singular value of these rows at the last solution; 1 without rows.
     """
 
@@ -85,12 +87,16 @@ class DependentCoordinates:
             (np.array([number[name] for name, _ in c.terms]), np.array([factor for _, factor in c.terms]), c.place)
             for c in mechanism.couplings
         ]
-        self._geared = np.zeros((len(self._couplings), self.nv))
-        for row, (joints, factors, _) in zip(self._geared, self._couplings, strict=True):
+        self._moved = [(number[joint.name], joint.motion or 0.0) for joint, _, _ in mechanism.prescribed]
+        self._geared = np.zeros((len(self._couplings) + len(self._moved), self.nv))
+        for row, (joints, factors, _) in zip(self._geared, self._couplings, strict=False):
             for joint, factor in zip(joints, factors, strict=True):
                 row[mechanism.v_slices[joint]] = factor
+        for row, (_, _, at_v) in zip(self._geared[len(self._couplings) :], mechanism.prescribed, strict=True):
+            row[at_v] = 1.0
         self.loop_rows = len(self._loop_rows.owner)
         self.coupled = self.loop_rows + len(self._geared)
+        self.moved = slice(self.coupled - len(self._moved), self.coupled)
         # the axes of other joints are fixed in one of the two bodies
         self._bent = any(joint.kind == "universal" for joint in mechanism.joints)
         self.gravity = np.array(mechanism.gravity)
@@ -161,14 +167,17 @@ class DependentCoordinates:
                 relative = relative - self._joint_rows.twists(rows, self._joint_rows.bending(ends, rows))
             if self.applied.laws:
                 loads = loads._replace(drives=drives + self.tree.of_joints(bodies, *self.applied.of_joints(ends)))
-        if self.applied.springs:
+        if self.applied.of_points:
             loads = loads._replace(pulls=self.applied.pulls(bodies))
         if self._locked or held:
             ends = self.connections.ends(bodies, self._loops_at)
             rows = self._loop_rows.at(ends)
             drift = self._loop_rows.bending(ends, rows)
             drift -= (rows.form * still[joints:][self._loop_rows.owner]).sum(1)
-            closing = partial(self._closed, rows, self._with_zeros(-drift, held), held)
+            wanted = self._with_zeros(-drift, held)
+            for row, (_, signal) in zip(range(*self.moved.indices(self.coupled)), self._moved, strict=True):
+                wanted[row] = moved(signal, self.applied.now).acceleration
+            closing = partial(self._closed, rows, wanted, held)
         motions, velocities, multipliers = self.tree.motions(bodies, relative, loads, closing)
         rates = inverse @ motions[..., :-1, :, :] @ pose
         linear = (pose @ (rates + bent))[..., :3, 3] + self.gravity
@@ -176,7 +185,7 @@ class DependentCoordinates:
         return SolvedState(bodies, linear, angular, rates + bent, velocities, multipliers)
 
     def _with_zeros(self, of_loops: Array, held: Sequence[int]) -> Array:
-        """Right-hand sides of all rows, (…, rows), from those of loops; zero for couplings and held joints."""
+        """Right-hand sides of all rows, (…, rows), from those of loops; zero for the others."""
         more = len(self._geared) + len(held)
         return np.concatenate([of_loops, np.zeros((*of_loops.shape[:-1], more))], axis=-1) if more else of_loops
 
@@ -214,7 +223,7 @@ class DependentCoordinates:
         return x
 
     def watched(self, x: Array) -> dict[int, tuple[float, float]]:
-        """Coordinate and velocity of each joint with dry friction, stops or a coupling, by its index."""
+        """Coordinate and velocity of each joint with dry friction, stops, a coupling or a motion, by its index."""
         return self.applied.watched(self.connections.ends(self.bodies(x), slice(0, self._joints)))
 
     def wanted(self, x: Array) -> list[float]:
@@ -222,12 +231,13 @@ class DependentCoordinates:
         return self.applied.wanted(self.connections.ends(self.bodies(x), slice(0, self._joints)))
 
     def _apart(self, bodies: Bodies) -> Array:
-        """Violations of couplings in coordinates and in velocities, (2, couplings)."""
+        """Violations of couplings and motions in coordinates and in velocities, (2, couplings + motions)."""
         at = self.applied.watched(self.connections.ends(bodies, slice(0, self._joints)))
         violations = [
             factors @ np.array([at[joint] for joint in joints]) - (place, 0.0)
             for joints, factors, place in self._couplings
         ]
+        violations += [np.array(at[joint]) - moved(signal, self.applied.now)[:2] for joint, signal in self._moved]
         return np.transpose(violations)
 
     def rates(self, x: Array, drives: Array | float = 0.0, held: Sequence[int] = ()) -> Array:
@@ -251,7 +261,7 @@ class DependentCoordinates:
         if self._locked or held:
             rows = self._loop_rows.at(self.connections.ends(bodies, self._loops_at))
             wanted = self._with_zeros(-np.stack([rows.residual, rows.rate]), held)
-            if self._couplings:
+            if len(self._geared):
                 wanted[:, self.loop_rows : self.coupled] = -self._apart(bodies)
             closing = partial(self._closed, rows, wanted, held)
         motion = self.tree.motions(bodies, relative, Loads(), closing)[0][:, :-1]
@@ -269,7 +279,7 @@ class DependentCoordinates:
         """Forces and moments on the child of each joint, and on body b of each loop, at their points, world axes."""
         bodies = solved.bodies
         forces = self.tree.forces(bodies, solved.forces)
-        if self.applied.springs:
+        if self.applied.of_points:
             forces -= self.applied.pulls(bodies)
         ends = self.connections.ends(bodies)
         force, torque = np.zeros((2, len(ends.d), 3))
@@ -294,13 +304,15 @@ class DependentCoordinates:
         return self.applied.efforts(self.connections.ends(bodies, slice(0, self._joints)))
 
     def constraint_rows(self, bodies: Bodies) -> Array:
-        """Jacobian of all connections and couplings for the velocities of the bodies, (rows, 6 bodies)."""
+        """Jacobian of all connections, couplings and motions for the velocities of the bodies, (rows, 6 bodies)."""
         ends, every = self.connections.ends(bodies), self.connections.constraints()
         rows, on_bodies = every.at(ends), partial(self.connections.on_bodies, bodies, ends)
         blocks = [on_bodies(every.owner, rows.force, rows.torque)]
         for joints, factors, _ in self._couplings:
             push, turn = self.applied.along(joints.tolist(), ends)
             blocks.append(factors @ on_bodies(joints, push, turn)[None])
+        for joint, _ in self._moved:
+            blocks.append(on_bodies(np.array([joint]), *self.applied.along([joint], ends)))
         return np.concatenate(blocks)
 
     def accept(self, x: Array) -> None:
@@ -316,7 +328,7 @@ class DependentCoordinates:
 
 
 def _rank_of_loops(mechanism: Mechanism) -> int:
-    if not mechanism.loops and not mechanism.couplings:
+    if not (mechanism.loops or mechanism.couplings or mechanism.prescribed):
         return 0
     tree, (q, v) = Tree(mechanism), mechanism.start()
 

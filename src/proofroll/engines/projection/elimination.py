@@ -22,6 +22,7 @@ DIRECTIONS: dict[str, list[tuple[bool, int, bool]]] = {
     "fixed": [],
     "revolute": [_TURN_B[2]],
     "prismatic": [_SLIDE_A[2]],
+    "cylindrical": [_SLIDE_A[2], _TURN_B[2]],
     "universal": [(True, 2, False), _TURN_B[0]],
     "spherical": _TURN_B,
     "planar": [*_SLIDE_A[:2], _TURN_B[2]],
@@ -84,15 +85,15 @@ class Elimination:
         self.turns = np.array([way[1] for way in ways], dtype=bool)
         self._own = np.zeros((len(ways), 4, 4))
         carriers = []
-        for own, (number, turns, axis, by_child) in zip(self._own, ways, strict=True):
+        for column, (number, turns, axis, by_child) in zip(self._own, ways, strict=True):
             ends = connections.at_b if by_child else connections.at_a
             carriers.append(int((connections.b if by_child else connections.a)[number]))
             direction, place = ends[number, :3, axis], ends[number, :3, 3]
             if turns:
-                own[:3, :3] = (direction @ SKEW).reshape(3, 3)
-                own[:3, 3] = -own[:3, :3] @ place
+                column[:3, :3] = (direction @ SKEW).reshape(3, 3)
+                column[:3, 3] = -column[:3, :3] @ place
             else:
-                own[:3, 3] = direction
+                column[:3, 3] = direction
         self.armature = np.array([joints[number].armature for number in self.joint.tolist()])
         self._carrier = np.array(carriers, dtype=np.intp)
         # bodies behind each velocity, and velocities before each body; none for the world
@@ -129,11 +130,11 @@ class Elimination:
         A force f at p is the matrix f pᵀ, a moment half of its cross-product matrix. Only the antisymmetric part of
         moments is kept: it vanishes exactly for a body that spins about a principal axis.
         """
-        own = acceleration @ self._inertia
-        turning = own[..., :3, :3]
-        own[..., :3, :3] = 0.5 * (turning - turning.swapaxes(-1, -2))
+        moments = acceleration @ self._inertia
+        turning = moments[..., :3, :3]
+        moments[..., :3, :3] = 0.5 * (turning - turning.swapaxes(-1, -2))
         pose = bodies.pose[:-1]
-        return np.asarray(pose @ own @ pose.swapaxes(1, 2))
+        return np.asarray(pose @ moments @ pose.swapaxes(1, 2))
 
     def motions(
         self, bodies: Bodies, relative: Array, loads: Loads, closing: Closing | None = None
@@ -150,11 +151,11 @@ class Elimination:
             Motions (…, bodies + 1, 4, 4), velocities (…, nv), and multipliers of the additional rows.
         """
         space = self.space(bodies)
-        given = _matrices(self._steps @ relative)
-        needed = self.forces(bodies, bodies.inverse[:-1] @ given[..., :-1, :, :] @ bodies.pose[:-1] + loads.bent)
+        matrices = _matrices(self._steps @ relative)
+        needed = self.forces(bodies, bodies.inverse[:-1] @ matrices[..., :-1, :, :] @ bodies.pose[:-1] + loads.bent)
         push = loads.drives - (space.S * (self._sums @ _flat(needed - loads.pulls))).sum(-1)
-        velocities, multipliers = (closing or _without_loops)(space, given, push)
-        return given + _matrices(self.moves @ (space.S * velocities[..., None])), velocities, multipliers
+        velocities, multipliers = (closing or _without_loops)(space, matrices, push)
+        return matrices + _matrices(self.moves @ (space.S * velocities[..., None])), velocities, multipliers
 
     def twists(self, bodies: Bodies, velocities: Array) -> Array:
         """Twists of the bodies for velocities (nv,), (bodies + 1, 4, 4)."""
@@ -197,10 +198,10 @@ class RowSplit:
         self.least = float(values[rank - 1] / values[0])
         self._locked, self._back = self._into @ Vt[:rank].T, U[:, :rank].T / values[:rank, None]
 
-    def __call__(self, push: Array, wanted: Array) -> tuple[Array, Array]:
+    def __call__(self, push: Array, rates: Array) -> tuple[Array, Array]:
         """Solution ν, λ of H ν = push + Cᵀλ and C ν = wanted, for several right-hand sides (nv, …) and (rows, …)."""
         free = self._into @ (self._into.T @ push)
-        normal = self._back @ (wanted - self._C @ free)
+        normal = self._back @ (rates - self._C @ free)
         return free + self._locked @ normal, self._back.T @ normal
 
 

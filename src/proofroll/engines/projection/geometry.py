@@ -131,8 +131,8 @@ def geometry_of(surface: Surface) -> Geometry:
     generators = surface.generators
     if generators is None:
         return GeneralSurface(surface)
-    first, second = generators
-    rotations = (first.kind, second.kind).count("rotation")
-    parallel = not np.any(np.abs(np.cross(first.axis, second.axis)) > 4 * np.finfo(float).eps)
+    motion_1, motion_2 = generators
+    rotations = (motion_1.kind, motion_2.kind).count("rotation")
+    parallel = not np.any(np.abs(np.cross(motion_1.axis, motion_2.axis)) > 4 * np.finfo(float).eps)
     commute = rotations == 0 or (rotations == 1 and parallel)
     return Uniform(surface, generators) if commute else GeneralSurface(surface)

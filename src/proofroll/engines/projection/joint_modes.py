@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from proofroll.core.errors import NotUnique, Refused
+from proofroll.core.events import Event
 from proofroll.core.integrators import Integrator
 from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.contacts.start import natural_scale
@@ -61,6 +62,19 @@ class SwitchedMotion(AlternatingMotion[Mode]):
             q[k] = np.clip(q[k], joint.low, joint.high)
         self._enter(0.0, start, self._decided(start, q, v))
 
+    def renew(self) -> None:
+        """Decides the mode anew, now, after forces have jumped."""
+        y, was = self._stepper.x, self.mode
+        q, v = self._joint_state(y)
+        mode, count, t = self._decided(y, q, v), len(self._joints), self.t
+        happened = [*changes(self._joints, was, mode)]
+        pairs = zip(self._limited.values(), was[count:], mode[count:], strict=True)
+        happened += [
+            ("release" if now == "linear" else "saturate", item.name) for item, old, now in pairs if now != old
+        ]
+        self.events += [Event(kind, t, t, t, name) for kind, name in happened if t > 0]
+        self._enter(t, y, mode)
+
     def solve(self, y: Array | None = None) -> SolvedState:
         """Equations of motion solved in the present mode, now or at a state with its time."""
         x = self._at(self._stepper.x if y is None else y)
@@ -69,12 +83,12 @@ class SwitchedMotion(AlternatingMotion[Mode]):
     def along_joints(self, count: int) -> dict[str, Array]:
         """Forces of dry friction and of stops along the coordinates of all joints, N or N m."""
         forces = self._holding(self.solve())
-        along = {"friction": np.full(count, np.nan), "stop": np.full(count, np.nan)}
+        by_law = {"friction": np.full(count, np.nan), "stop": np.full(count, np.nan)}
         for k, joint in enumerate(self._joints):
-            own = self.mode[k]
-            on = joint_force_shares(own in STOPPED, joint.friction, forces.get(k, joint.push(own)))
-            along["friction"][joint.number], along["stop"][joint.number] = on
-        return along
+            side = self.mode[k]
+            on = joint_force_shares(side in STOPPED, joint.friction, forces.get(k, joint.push(side)))
+            by_law["friction"][joint.number], by_law["stop"][joint.number] = on
+        return by_law
 
     def _holding(self, solved: SolvedState) -> dict[int, float]:
         """Holding forces of joints, by their indices among the switched ones."""
@@ -83,8 +97,8 @@ class SwitchedMotion(AlternatingMotion[Mode]):
     def _load(self, mode: Mode) -> Array:
         """Kinetic friction along the velocities ν."""
         load = np.zeros(self._equations.nv)
-        for joint, own in zip(self._joints, mode[: len(self._joints)], strict=True):
-            load[joint.velocity] = joint.push(own)
+        for joint, side in zip(self._joints, mode[: len(self._joints)], strict=True):
+            load[joint.velocity] = joint.push(side)
         return load
 
     def _enter(self, t: float, y: Array, mode: Mode) -> None:
@@ -113,19 +127,19 @@ class SwitchedMotion(AlternatingMotion[Mode]):
         """
         x, equations = self._at(y), self._equations
         equations.applied.modes = {}
-        wanted = zip(self._limited.values(), equations.wanted(x), strict=True)
-        efforts = [actuator.mode_of(effort) for actuator, effort in wanted]
+        limited = zip(self._limited.values(), equations.wanted(x), strict=True)
+        efforts = [actuator.mode_of(effort) for actuator, effort in limited]
         mode = [
             joint.moving(rate) if rate else joint.resting(place)
             for joint, place, rate in zip(self._joints, q.tolist(), v.tolist(), strict=True)
         ]
         still = held_joints(tuple(mode))
         if still:
-            moving = tuple("free" if k in still else own for k, own in enumerate(mode))
-            at = [self._joints[k].velocity for k in still]
-            free, response = equations.responses(x, self._load(moving), at)
+            moving = tuple("free" if k in still else joint_mode for k, joint_mode in enumerate(mode))
+            velocities = [self._joints[k].velocity for k in still]
+            free, response = equations.responses(x, self._load(moving), velocities)
             low, high = np.array([self._joints[k].bounds(mode[k]) for k in still]).T
-            for k, side in zip(still, _bounded(free[at], response[at], low, high)[1], strict=True):
+            for k, side in zip(still, _bounded(free[velocities], response[velocities], low, high)[1], strict=True):
                 if side:
                     mode[k] = self._joints[k].moving(-side)
         return (*mode, *efforts)
@@ -140,12 +154,12 @@ class SwitchedMotion(AlternatingMotion[Mode]):
         """
         rests = [k for k, joint in enumerate(self._joints) if not v[k] and joint.stop_at(q[k])]
         at_stop = sorted({hit, *rests})
-        at = [self._joints[k].velocity for k in at_stop]
-        _, response = self._equations.responses(self._at(y), np.zeros(self._equations.nv), at)
+        velocities = [self._joints[k].velocity for k in at_stop]
+        _, response = self._equations.responses(self._at(y), np.zeros(self._equations.nv), velocities)
         elastic = np.array([self._joints[k].restitution for k in at_stop])
         below = np.array([self._joints[k].stop_at(q[k]) == "low" for k in at_stop])
         low, high = np.where(below, 0.0, -np.inf), np.where(below, np.inf, 0.0)
-        impulse, side = _bounded((1 + elastic) * v[at_stop], response[at], low, high)
+        impulse, side = _bounded((1 + elastic) * v[at_stop], response[velocities], low, high)
         if np.count_nonzero(impulse) > 1 and elastic.any():
             raise NotUnique(
                 "an impact presses several stops at once: with restitution its outcome depends on their order"
@@ -168,16 +182,16 @@ class SwitchedMotion(AlternatingMotion[Mode]):
         forces = self._holding(self.solve(y)) if self._held else {}
         ends = list[Excess]()
         for k, joint in enumerate(self._joints):
-            own, place, rate = self.mode[k], float(q[k]), float(v[k])
+            side, place, rate = self.mode[k], float(q[k]), float(v[k])
             if k in forces:
-                low, high = joint.bounds(own)
+                low, high = joint.bounds(side)
                 ends += [Excess(k, "up", low - forces[k]), Excess(k, "down", forces[k] - high)]
                 continue
-            if own != "free":
-                ends.append(Excess(k, "still", -rate if own == "forward" else rate))
+            if side != "free":
+                ends.append(Excess(k, "still", -rate if side == "forward" else rate))
             ends += [Excess(k, "low", joint.low - place, -rate), Excess(k, "high", place - joint.high, rate)]
-        count, wanted = len(self._joints), self._equations.wanted(self._at(y))
-        return ends + ends_of_efforts(self._limited.values(), self.mode[count:], wanted, count)
+        count, efforts = len(self._joints), self._equations.wanted(self._at(y))
+        return ends + ends_of_efforts(self._limited.values(), self.mode[count:], efforts, count)
 
     def _next(self, y: Array, k: int, kind: str) -> tuple[Array, Mode, list[tuple[str, str]]]:
         was, happened = self.mode, list[tuple[str, str]]()
@@ -198,15 +212,15 @@ class SwitchedMotion(AlternatingMotion[Mode]):
     def _stopped(self, y: Array, k: int, kind: str) -> tuple[Array, Mode]:
         """State and mode after a joint has turned (``still``) or hit a stop."""
         joint, (q, v) = self._joints[k], self._joint_state(y)
-        at, change = joint.velocity, np.zeros(self._equations.nv)
+        column, change = joint.velocity, np.zeros(self._equations.nv)
         speed = float(v[k])
         if kind == "still":
-            v[k], change[at] = 0.0, -speed
+            v[k], change[column] = 0.0, -speed
         else:
             q[k] = joint.low if kind == "low" else joint.high
             change = self._struck(y, q, v, k)
             if self._settles(k, abs(speed) / self._units[k], joint.restitution):
-                v[k], change[at] = 0.0, -speed
+                v[k], change[column] = 0.0, -speed
         y = np.append(self._equations.pushed(self._at(y), change), y[-1])
         return y, self._decided(y, q, v)
 

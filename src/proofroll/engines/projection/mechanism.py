@@ -1,6 +1,6 @@
 """Formulation ``dependent``: run of a mechanism by the projection method, and its samples."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -12,6 +12,7 @@ from proofroll.core.events import Event
 from proofroll.core.integrators import INTEGRATORS, Integrator
 from proofroll.core.stalling import Stalled
 from proofroll.elements.mechanism.capabilities import ALL_JOINTS, ALL_LOOPS, FORCES, MechanismCapability, require
+from proofroll.elements.mechanism.commands import drive
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.elements.mechanism.sampling import (
     WITH_AXIS,
@@ -41,15 +42,21 @@ PROVIDES = frozenset(
         MechanismCapability.ACTUATORS,
         MechanismCapability.SATURATION,
         MechanismCapability.SIGNALS,
+        MechanismCapability.HELD,
+        MechanismCapability.MOTIONS,
         MechanismCapability.ARMATURE,
         MechanismCapability.JOINT_FRICTION,
         MechanismCapability.STOPS,
         MechanismCapability.REBOUNDS,
         MechanismCapability.CONTACT,
         MechanismCapability.CONTACT_FRICTION,
+        MechanismCapability.UNBOUNDED_FRICTION,
+        MechanismCapability.STATIC_FRICTION,
+        MechanismCapability.SLIP_REBOUNDS,
         MechanismCapability.CONTACT_REBOUNDS,
     }
 )
+LACKING: Mapping[str, str] = {MechanismCapability.TURNING_FRICTION: "this formulation gives a contact no moment"}
 # Regularity of the loops' rows, relative to the largest so far, that counts as singular: accelerations lose as many
 # digits as it has zeros. It is about a hundredth for loops that miss a singular pose by a hundredth of a radian.
 SINGULAR = 1e-6
@@ -60,19 +67,20 @@ class ProjectionMechanism:
 
     def __init__(self, scene: Any, settings: ProjectionSettings) -> None:
         mechanism = mechanism_of(scene)
-        require(mechanism, PROVIDES, {})
+        require(mechanism, PROVIDES, LACKING)
         self._timed = any(map(varies, mechanism.signals))
         limited = any(actuator.limit is not None for actuator in mechanism.actuators)
         switched = bool(switched_joints(mechanism)) or limited or bool(breaks(mechanism.signals))
-        if mechanism.contacts and (mechanism.loops or mechanism.couplings):
-            raise Refused("contacts are followed in trees, without loops and couplings")
-        if (switched or self._timed or mechanism.contacts) and settings.equations == "compiled":
+        if mechanism.contacts and (mechanism.loops or mechanism.couplings or mechanism.prescribed):
+            raise Refused("contacts are followed in trees, without loops, couplings and prescribed motions")
+        if mechanism.contacts and mechanism.cells:
+            raise Refused("contacts under held targets are not followed yet")
+        if (switched or self._timed or mechanism.contacts or mechanism.prescribed) and settings.equations == "compiled":
             raise Refused("equations that switch or change in time are not compiled; choose preset=matched")
-        for body in mechanism.bodies:
-            if not body.mass or np.linalg.eigvalsh(body.inertia)[0] <= 0:
-                raise Refused(
-                    f"{body.name} has no mass or no moment of inertia about an axis; here each body needs both"
-                )
+        if any(spring.force for spring in mechanism.springs) and settings.equations == "compiled":
+            raise Refused("formulas of springs are not compiled; choose preset=matched")
+        if mechanism.bushings and settings.equations == "compiled":
+            raise Refused("bushings are not compiled; choose preset=matched")
         self._mechanism, self._equations = mechanism, DependentCoordinates(mechanism)
         self._eliminates, self._most_regular = settings.eliminates, 0.0
         start = self._equations.start
@@ -114,6 +122,7 @@ class ProjectionMechanism:
     def _accepted(self, t: float, x: Array, held: Sequence[int] = ()) -> Array:
         if not np.isfinite(x.sum()):
             raise Diverged(f"the state is not finite at t = {t:.6g} s")
+        self._equations.applied.now = t
         if self._eliminates:
             x = self._equations.eliminated(x, held) if held else self._without_violations(x)
         self._equations.accept(x)
@@ -132,6 +141,14 @@ class ProjectionMechanism:
             raise Diverged(f"{error}, between t = {start:.6g} s and {t:.6g} s") from None
         except Stalled as error:
             raise Diverged(f"{error}; {pose(self._mechanism, self.sample())}") from None
+
+    def drive(self, values: Array) -> None:
+        """See :class:`proofroll.core.engine_abilities.TakesTargets`."""
+        drive(self._mechanism, values)
+        if self._switched is not None:
+            self._switched.renew()
+        elif isinstance(self._motion, Integrator):
+            self._motion.restart()
 
     def _solved(self) -> SolvedState:
         if self._touching:
@@ -160,10 +177,18 @@ class ProjectionMechanism:
             joint_force=force,
             joint_torque=torque,
             effort=equations.efforts(solved.bodies) if self._mechanism.actuators else None,
-            coupling=solved.multipliers[equations.loop_rows : equations.coupled] if self._mechanism.couplings else None,
+            coupling=solved.multipliers[equations.loop_rows : equations.moved.start],
+            drive=self._drives(solved),
             **(self._switched.along_joints(len(self._mechanism.joints)) if self._switched else {}),
             **(self._touching.sampled(len(self._mechanism.joints)) if self._touching else {}),
         )
+
+    def _drives(self, solved: SolvedState) -> Array:
+        """Forces that impose motions, by joint [N, N m]; NaN for joints without."""
+        forces = np.full(len(self._mechanism.joints), np.nan)
+        driven = [self._mechanism.joint_index[joint.name] for joint, _, _ in self._mechanism.prescribed]
+        forces[driven] = solved.multipliers[self._equations.moved]
+        return forces
 
     def built(self) -> MechanismBuilt:
         """See :class:`proofroll.core.engine.Engine`."""

@@ -112,23 +112,23 @@ class ProjectedBall:
         """Explicit form of the holonomic constraint at the state x."""
         n = self._coordinates
         state = x.tolist()
-        angles, (first, second, *r) = state[2:n], state[n:]
+        angles, (s_1, s_2, *r) = state[2:n], state[n:]
         frame, shape = self._geometry.at(state)
         (t2u, t2v, t3u, t3v), _, second_derivatives, (p1, p2, p3, q1, q2, q3) = shape
         uu1, uv1, vv1, uu2, uv2, vv2, uu3, uv3, vv3 = second_derivatives
-        uu, uv, vv = first * first, first * second, second * second
+        uu, uv, vv = s_1 * s_1, s_1 * s_2, s_2 * s_2
         drift = uu1 * uu + uv1 * uv + vv1 * vv, uu2 * uu + uv2 * uv + vv2 * vv, uu3 * uu + uv3 * uv + vv3 * vv
-        o1, o2, o3 = p1 * first + q1 * second, p2 * first + q2 * second, p3 * first + q3 * second
+        o1, o2, o3 = p1 * s_1 + q1 * s_2, p2 * s_1 + q2 * s_2, p3 * s_1 + q3 * s_2
         pose = self._orientation.pose(angles)
         w1, w2, w3 = self._orientation.angular_velocity(pose, r, frame)
-        v2, v3 = t2u * first + t2v * second, t3u * first + t3v * second
+        v2, v3 = t2u * s_1 + t2v * s_2, t3u * s_1 + t3v * s_2
         v = (0.0, v2, v3, w1, w2, w3)
         convected, carried = (-o1 * v3, o1 * v2), (0.0, 0.0)
         if self._wall_rate is not None:
             carried, gain2, gain3 = self._carried(matrix(frame), state[:2], self._wall_rate, (v2, v3), (o1, o2, o3))
             convected = convected[0] + gain2, convected[1] + gain3
         turned = (o2 * w3 - o3 * w2, o3 * w1 - o1 * w3, o1 * w2 - o2 * w1)
-        rates = (first, second, *self._orientation.rates(angles, r, frame))
+        rates = (s_1, s_2, *self._orientation.rates(angles, r, frame))
         return Kinematics(frame, shape, rates, r, pose, v, drift, convected, turned, carried)
 
     def _carried(
@@ -145,8 +145,8 @@ class ProjectedBall:
         """Speed of the centre [m/s]."""
         n = self._coordinates
         t2u, t2v, t3u, t3v = self._geometry.at(x[:2].tolist())[1].tangents
-        first, second = x[n : n + 2].tolist()
-        return math.hypot(t2u * first + t2v * second, t3u * first + t3v * second)
+        s_1, s_2 = x[n : n + 2].tolist()
+        return math.hypot(t2u * s_1 + t2v * s_2, t3u * s_1 + t3v * s_2)
 
     def weight(self, kin: Kinematics) -> Vector:
         """Gravity along e1, e2, e3 [m/s²]: applied force of a ball without rolling resistance, divided by its mass."""
@@ -198,11 +198,11 @@ class ProjectedBall:
 
     def velocity_rate(self, kin: Kinematics, acceleration: Sequence[float]) -> FloatArray:
         """Rate v̇ = D ṡ + Ḋ s for accelerations ṡ, shape (6,)."""
-        (t2u, t2v, t3u, t3v), (d1, d2, d3), (first, second, *spin) = kin.shape.tangents, kin.drift, acceleration
+        (t2u, t2v, t3u, t3v), (d1, d2, d3), (rate_1, rate_2, *spin) = kin.shape.tangents, kin.drift, acceleration
         still = self._orientation.acceleration(kin.pose, kin.r, (0.0, 0.0, 0.0), kin.turned, kin.frame)
-        spin = [one - other for one, other in zip(spin, still, strict=True)]  # ω̇ = A (ṙ - ṙ where ω̇ = 0)
+        spin = [turn - still_turn for turn, still_turn in zip(spin, still, strict=True)]  # ω̇ = A (ṙ - ṙ where ω̇ = 0)
         rotation = self._orientation.angular_velocity(kin.pose, spin, kin.frame)
-        return np.array((d1, t2u * first + t2v * second + d2, t3u * first + t3v * second + d3, *rotation))
+        return np.array((d1, t2u * rate_1 + t2v * rate_2 + d2, t3u * rate_1 + t3v * rate_2 + d3, *rotation))
 
     @staticmethod
     def contact_force(response: Response) -> FloatArray:
@@ -220,9 +220,9 @@ class ProjectedBall:
 
     def under(self, active: Active) -> ProjectedBall:
         """Same ball with other active rows of the non-holonomic constraints."""
-        other = copy.copy(self)
-        other.active = active
-        return other
+        twin = copy.copy(self)
+        twin.active = active
+        return twin
 
     def slip(self, kin: Kinematics) -> tuple[float, float]:
         """Slip velocity C v along e2 and e3, relative to the wall [m/s]."""
@@ -245,9 +245,9 @@ class ProjectedBall:
             w2, w3 = -lever * F3, lever * F2
         first2, first3, second2, second3 = kin.shape.inverse
         spin1, spin2, spin3 = self._orientation.solved(kin.pose, (0.0, w2, w3), kin.frame)
-        *q, first, second, r1, r2, r3 = x.tolist()
-        first, second = first - first2 * v2 - first3 * v3, second - second2 * v2 - second3 * v3
-        return np.array((*q, first, second, r1 - spin1, r2 - spin2, r3 - spin3))
+        *q, s_1, s_2, r1, r2, r3 = x.tolist()
+        s_1, s_2 = s_1 - first2 * v2 - first3 * v3, s_2 - second2 * v2 - second3 * v3
+        return np.array((*q, s_1, s_2, r1 - spin1, r2 - spin2, r3 - spin3))
 
 
 def start_and_scales(body: RollingBall, orientation: Orientation) -> tuple[FloatArray, FloatArray]:

@@ -78,9 +78,9 @@ class ProjectionSettings:
     @property
     def unused(self) -> tuple[str, ...]:
         """See :class:`proofroll.core.engine.Settings`."""
-        other = "dt" if self.resolution == "rtol" else "rtol"
-        own = {"euler": "singularity", "dependent": "equations"}.get(self.formulation)
-        return (other, *(name for name in ("singularity", "equations") if name != own))
+        idle = "dt" if self.resolution == "rtol" else "rtol"
+        idle_option = {"euler": "singularity", "dependent": "equations"}.get(self.formulation)
+        return (idle, *(name for name in ("singularity", "equations") if name != idle_option))
 
     @property
     def order(self) -> int | None:

@@ -53,10 +53,10 @@ class TaylorSeries(Series):
         pars = np.array(self._pars[: len(model.integrator.pars)])
         super().__init__(model.integrator, pars, x, self._look, accepted)
 
-    def _look(self, before: FloatArray, t: float, x: FloatArray) -> None:
+    def _look(self, old_state: FloatArray, t: float, x: FloatArray) -> None:
         self._trust(t, x)
         if self._resistance:
-            still_moving(self._along(before), t, self._along(x))
+            still_moving(self._along(old_state), t, self._along(x))
 
     def _along(self, x: FloatArray) -> FloatArray:
         """Velocity of the centre along the coordinates [m/s], shape (2,)."""

@@ -134,8 +134,8 @@ class Integrated(ReducedModel):
         self._motion.advance(t)
 
     def _accepted(self, t: float, x: FloatArray) -> FloatArray:
-        (before, y), self._last = self._last, (t, x)
-        if t < self._until and t - before < _STUCK * self._span:
+        (t_old, y), self._last = self._last, (t, x)
+        if t < self._until and t - t_old < _STUCK * self._span:
             raise Diverged(f"the step size fell to nothing at t = {t:.6g} s")
         if not np.all(np.isfinite(x)):
             raise Diverged(f"the state is not finite (NaN or overflow) at t = {t:.6g} s")
@@ -173,9 +173,9 @@ class Compiled(ReducedModel):
         self._evaluate = model.evaluate
         self._series = Series(model.integrator, pars, start_along_arc(body), self._check)
 
-    def _check(self, before: FloatArray, t: float, x: FloatArray) -> None:
+    def _check(self, old_state: FloatArray, t: float, x: FloatArray) -> None:
         if self._resistance:
-            still_moving(before[2:4], t, x[2:4])
+            still_moving(old_state[2:4], t, x[2:4])
 
     def advance(self, t: float) -> None:
         """See :class:`ReducedModel`."""
