@@ -116,9 +116,9 @@ def _interrupt(*_: object) -> None:
         from proofroll.running.process import end_all
 
         end_all()
-    for each in INTERRUPTS:
-        if callable(signal.getsignal(each)):
-            signal.signal(each, end_at_once)
+    for signal_name in INTERRUPTS:
+        if callable(signal.getsignal(signal_name)):
+            signal.signal(signal_name, end_at_once)
     raise KeyboardInterrupt
 
 

@@ -11,7 +11,7 @@ GROUPS = {
     "Ask": ("scenes", "run", "plot", "replay", "compare", "recommend", "report"),
     "Bring your own scene, engine or trajectory": ("new", "check", "judge", "export"),
     "Robots": ("robots",),
-    "Study": ("tradeoff", "stability", "ladder", "onset", "regimes", "figures"),
+    "Study": ("tradeoff", "stability", "ladder", "balance", "onset", "regimes", "figures"),
     "Maintain": ("engines", "versions", "findings", "cite", "bench", "drill"),
 }
 _OTHERS = "Others"

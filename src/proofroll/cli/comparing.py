@@ -44,6 +44,7 @@ def compare(
         ),
     ] = None,
     settings: options.Set = None,
+    control: options.Control = None,
     out: options.Out = Path("out"),
     fresh: options.Fresh = False,
     jobs: options.Jobs = None,
@@ -57,6 +58,8 @@ def compare(
 ) -> None:
     """Hold the engines of a comparison file against the truth; exit 1 if a verdict contradicts the file.
 
+    Exit 3 if an engine is missing or failed, or if nothing could be judged.
+
     Of a scene or a robot file every formulation that can represent it is run, and nothing is claimed. --set, --until,
     --every and --budget are for these: what 60 s of processor time do not suffice for is left out and named. An engine
     of --engine that has no row in the file gets one that claims nothing.
@@ -66,7 +69,7 @@ def compare(
     from proofroll.running.idle_workers import Workers
     from proofroll.studies.comparison.by_name import comparison_named
 
-    workers = Workers()
+    comparison, workers = options.controlled(comparison, control), Workers()
     with options.spinner(comparison):
         loaded = comparison_named(
             comparison, options.assignments(settings), workers, budget, scheduler, engine or [], until, every
@@ -111,9 +114,9 @@ def list_omitted_engines(comparisons: Sequence[Comparison], engines: Sequence[st
 
     rows = {item.name: {parse_engine(row.engine).name for row in item.rows} for item in comparisons}
     asked_for = {name: {name, plain_name(name)} for name in engines}
-    wanted = set(chain(*asked_for.values()))  # a comparison without any of them is refused elsewhere
+    asked = set(chain(*asked_for.values()))  # a comparison without any of them is refused elsewhere
     for name, either in asked_for.items():
-        without = [comparison for comparison, known in rows.items() if known & wanted and not known & either]
+        without = [comparison for comparison, present in rows.items() if present & asked and not present & either]
         if without:
             warning = f"{name} is left out of {', '.join(without)}: no row is of it"
             options.complain(f"{warning}; proofroll new comparison writes a file with one")
@@ -148,19 +151,19 @@ def outcomes_of(
     from proofroll.studies.comparison.compare import run_plan
     from proofroll.studies.comparison.planning import plan
 
-    before = processor_seconds() - spent
+    begin = processor_seconds() - spent
     with options.spinner(f"{stage}cases"):
         plans = [plan(comparison, engines, runner.workers) for comparison in comparisons]
     brief = [item.brief for item in plans]
-    grown = [(at, item.cases) for at, item in enumerate(plans) if len(item.truths) > len(brief[at].truths)]
+    grown = [(index, item.cases) for index, item in enumerate(plans) if len(item.truths) > len(brief[index].truths)]
     if budget:
-        runs = [(at, [case for cases in item.stages[:-1] for case in cases]) for at, item in enumerate(brief)]
-        ladders = [(at, item.stages[-1]) for at, item in enumerate(brief)]
+        runs = [(index, [case for cases in item.stages[:-1] for case in cases]) for index, item in enumerate(brief)]
+        ladders = [(index, item.stages[-1]) for index, item in enumerate(brief)]
         phases = [phase for phase in (runs, ladders, grown) if phase]
     else:
-        phases = [[*((at, item.cases) for at, item in enumerate(brief)), *grown]]
-    owner = {case.key: at for at, item in reversed([*enumerate(plans)]) for case in item.cases}
-    limit = TimeBudget(budget, processor_seconds() - before, owner) if budget else None
+        phases = [[*((index, item.cases) for index, item in enumerate(brief)), *grown]]
+    owner = {case.key: index for index, item in reversed([*enumerate(plans)]) for case in item.cases}
+    limit = TimeBudget(budget, processor_seconds() - begin, owner) if budget else None
     if limit and finished:
         limit.after += _PAGE
     with options.progress_bar(f"{stage}cases", total=len(owner)) as advance:
@@ -171,11 +174,11 @@ def outcomes_of(
         for phase in phases:
             running.run(phase, last=phase is phases[-1])
     if not finished:
-        for at in range(len(plans)):
-            running.judge(at)
+        for index in range(len(plans)):
+            running.judge(index)
     if runner.damaged:
         options.complain(f"{len(runner.damaged)} stored results were damaged and have been run again")
-    return [running.ended[at] for at in range(len(plans))]
+    return [running.ended[index] for index in range(len(plans))]
 
 
 class _Comparing:
@@ -207,21 +210,21 @@ class _Comparing:
         self._start, self._reused = time.monotonic(), runner.reused
         self._budget = limit.left if limit else 0.0
 
-    def judge(self, at: int) -> None:
+    def judge(self, index: int) -> None:
         """Judges a comparison by the cases that have been run so far."""
         from proofroll.running.case import Result, Status
         from proofroll.studies.comparison.compare import evaluate, left_out
 
-        self._judged[at] = self._known(at)
+        self._judged[index] = self._known(index)
         so_far = dict.fromkeys(self._keys, Result(Status.LEFT_OUT, "it has not been run yet")) | self.results
-        outcome = evaluate(self.plans[at].ended(left_out(so_far)), so_far, self.runner)
-        if self._judged[at] < len(self.plans[at].cases):
+        outcome = evaluate(self.plans[index].ended(left_out(so_far)), so_far, self.runner)
+        if self._judged[index] < len(self.plans[index].cases):
             outcome = replace(outcome, beyond_budget=[])  # missing cases are not left out yet
-        self.ended[at] = outcome
+        self.ended[index] = outcome
 
-    def _known(self, at: int) -> int:
+    def _known(self, index: int) -> int:
         """Number of a comparison's cases that have ended, also as cases of other comparisons."""
-        return sum(case.key in self.results for case in self.plans[at].cases)
+        return sum(case.key in self.results for case in self.plans[index].cases)
 
     def run(self, phase: _Phase, *, last: bool) -> None:
         """Runs the cases of one phase, in order, and judges each comparison when its cases have ended.
@@ -259,20 +262,20 @@ class _Comparing:
 
     def _awaited(self, phase: _Phase) -> list[tuple[int, set[str]]]:
         """Number of each comparison that has to be judged in a phase, and keys of its cases without a result."""
-        parts = [(at, {case.key for case in items} - self.results.keys()) for at, items in phase]
-        return [(at, keys) for at, keys in parts if keys or self._judged.get(at) != self._known(at)]
+        parts = [(index, {case.key for case in items} - self.results.keys()) for index, items in phase]
+        return [(index, keys) for index, keys in parts if keys or self._judged.get(index) != self._known(index)]
 
     def _judge_ended(self, awaited: list[tuple[int, set[str]]], *, last: bool) -> None:
         """Judges comparisons that await no case any more, and removes them from ``awaited``."""
         if self.finished is None:
             return
-        ended = [at for at, keys in awaited if not keys]
+        ended = [index for index, keys in awaited if not keys]
         awaited[:] = [part for part in awaited if part[1]]
-        for number, at in enumerate(ended, start=1):
-            before = time.process_time()
-            self.judge(at)
+        for number, index in enumerate(ended, start=1):
+            begin = time.process_time()
+            self.judge(index)
             self.finished(self.ended, last and not awaited and number == len(ended))
-            self._judging += time.process_time() - before
+            self._judging += time.process_time() - begin
             self._keep_for_the_end()
 
     def _keep_for_the_end(self) -> None:
@@ -288,13 +291,13 @@ class _Comparing:
         if self.limit and (used := self._budget - self.limit.left) > 0:
             # On a machine that does other things, too, processor time passes slower. The rest is judged in the end.
             left = min(left, (self.limit.left + self.limit.after) * (time.monotonic() - self._start) / used)
-        ended = sum(self._known(at) == len(item.cases) for at, item in enumerate(self.plans))
+        ended = sum(self._known(index) == len(item.cases) for index, item in enumerate(self.plans))
         of = f"{ended} of {many} comparisons ended, " if many > 1 else ""
         self.tell(f"{of}{f'about {float(written(left, 1)):g} s left, ' if ran else ''}{case.engine.name}")
 
 
 def exit_code(outcomes: list[Outcome]) -> int:
-    """Exit code: 3 if an engine was lost, 1 if a verdict contradicts its file, else 0."""
+    """Exit code: 3 if an engine was lost or nothing was judged, 1 if a verdict contradicts its file, else 0."""
     if any(outcome.lost for outcome in outcomes):
         return options.ENGINE
     return options.CONTRADICTED if any(outcome.contradictions for outcome in outcomes) else options.OK

@@ -24,14 +24,14 @@ def findings(
     from proofroll.report.terminal.findings import findings_list, findings_table
     from proofroll.studies.findings import FindingState, load_findings, run_findings
 
-    wanted = load_findings(engine or [])
+    chosen = load_findings(engine or [])
     if listed:
-        content: dict[str, Any] = {"findings": [dataclasses.asdict(item) for item in wanted]}
-        options.show(content, as_json, lambda: [findings_list(wanted)])
+        content: dict[str, Any] = {"findings": [dataclasses.asdict(item) for item in chosen]}
+        options.show(content, as_json, lambda: [findings_list(chosen)])
         return
     rows = []
-    with options.progress_bar("findings", total=len(wanted)) as advance:
-        for row in run_findings(wanted, python, time_limit):
+    with options.progress_bar("findings", total=len(chosen)) as advance:
+        for row in run_findings(chosen, python, time_limit):
             rows.append(row)
             advance(row.finding.name)
     counts = {state.value: sum(row.state == state for row in rows) for state in FindingState}

@@ -127,21 +127,21 @@ def _say(path: Path, *commands: str) -> None:
     sys.stdout.write("\n".join([f"{path} is written. Next:", *(f"  {command}" for command in commands), ""]))
 
 
-def _comparison(name: str, where: str, loaded: Scene) -> str:
+def _comparison(name: str, place: str, loaded: Scene) -> str:
     """Text of a comparison file: each engine that can run the scene, allowed one per cent of each motion."""
     from proofroll.files.scene_file import read_scene_file
     from proofroll.studies.comparison.default_comparison import able, bounds, times_of
 
-    until, every = times_of(read_scene_file(where))
+    until, every = times_of(read_scene_file(place))
     lines = (
         f'{_quoted(key)} = "{100 * item.value:g} %"\n'
         if item.relative
         else f'{_quoted(key)} = "{item.value:g} {item.unit}"\n'
         for key, item in bounds(loaded, every).items()
     )
-    rows = "".join(f'\n[[rows]]\nengine = "{text}"\ntolerance = "close"\n' for text in able(loaded, first=True))
+    rows = "".join(f'\n[[rows]]\nengine = "{text}"\ntolerance = "close"\n' for text in able(loaded, preferred=True))
     return (
-        f'title = "{name}"\nquestion = "Which engines agree with the truth?"\nscene = {_quoted(where)}\n'
+        f'title = "{name}"\nquestion = "Which engines agree with the truth?"\nscene = {_quoted(place)}\n'
         f"until = {until:g}\nevery = {every:g}\n\n"
         "# Every combination of these values is run: [vary], then parameter = [value, value].\n\n"
         "# How far an observable may be from the truth, and why.\n"

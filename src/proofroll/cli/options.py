@@ -83,7 +83,20 @@ Until = Annotated[
     float | None,
     typer.Option("--until", help="Last time [s]; by default 2, or the scene's duration where that is shorter."),
 ]
+Control = Annotated[
+    Path | None,
+    typer.Option("--control", help="TOML file of the controller of a robot file: gains, targets or policy, start."),
+]
 Set = Annotated[list[str] | None, typer.Option("--set", help="parameter=value in SI units; repeat.")]
+
+
+def controlled(scene: str, control: Path | None) -> str:
+    """Name of a scene under the controller of ``--control``; without the option the name of the scene."""
+    if control is None:
+        return scene
+    from proofroll.files.scene_sources import with_control
+
+    return with_control(scene, control)
 
 
 def new_runner(

@@ -34,6 +34,7 @@ def replay(
     scene: Annotated[
         str | None, typer.Option(help="The scene, or the path of its folder; by default where it lay at the run.")
     ] = None,
+    control: options.Control = None,
 ) -> None:
     """Show a run in motion beside the truth, as a page for a browser."""
     from proofroll.report.run.plot import read_run
@@ -43,6 +44,9 @@ def replay(
     target = trajectory.parent / f"{trajectory.stem}-replay.html" if out is None else out
     if target.suffix.lower() != ".html":
         raise InputError("--out", target, "a replay is a page: end the name of the file in .html")
+    if control is not None and scene is None:
+        raise InputError("--control", control, "name its robot file, too, by --scene; without both the run says them")
+    scene = scene if scene is None else options.controlled(scene, control)
     options.require_writable(target)
     options.require_pages()
     run = read_run(trajectory)

@@ -45,6 +45,7 @@ def recommend(
     ] = None,
     budget: Annotated[float | None, typer.Option(hidden=True)] = None,
     settings: options.Set = None,
+    control: options.Control = None,
     engine: Annotated[
         list[str] | None, typer.Option(help="Choose among these engines, name[key=value,…]; repeat.")
     ] = None,
@@ -73,8 +74,10 @@ def recommend(
     """
     if budget is not None:
         raise InputError("--budget", budget, "here it is --max-cost; elsewhere a budget is processor time")
-    found = out / "report.json"
-    given = {
+    if control is not None:
+        scenes = [options.controlled(scene, control) for scene in scenes]
+    report_file = out / "report.json"
+    requirements = {
         "--quantity": quantity,
         "--max-cost": max_cost,
         "--set": settings,
@@ -83,13 +86,13 @@ def recommend(
         "--measure": measure_first,
     }
     asked = len(scenes) > 1 or forces or report is not None
-    if asked or (not any(given.values()) and _is_in_report(scenes[0], found)):
-        for name, value in given.items():
+    if asked or (not any(requirements.values()) and _is_in_report(scenes[0], report_file)):
+        for name, value in requirements.items():
             if value:
                 raise InputError(name, value if value is not True else "given", "it is for one scene, without a report")
         from proofroll.report.changes import EarlierReport
 
-        stored = EarlierReport.read(report or found, "--report" if report else "stored report")
+        stored = EarlierReport.read(report or report_file, "--report" if report else "stored report")
         _from_report(scenes, tolerance, engine or [], stored, forces=forces, as_json=as_json)
     (scene,) = scenes
     from proofroll.core.plugins import engine_names, parse_engine, require_engine
@@ -105,8 +108,8 @@ def recommend(
     required = Requirements(question.quantity, _tolerance(tolerance, unit), _seconds(max_cost), tuple(engine or ()))
     ranges = ranges_of(question, over) if over is not None else None
     study = _stored_study(question, engine or [], claims, ranges, out, jobs, measure_first=measure_first)
-    known = {*study.absent, *(point.engine for point in study.points)}
-    not_measured = [] if engine else [name for name in engine_names() if name not in known]
+    names = {*study.absent, *(point.engine for point in study.points)}
+    not_measured = [] if engine else [name for name in engine_names() if name not in names]
     recommendation = replace(answered(study, required), not_measured=not_measured)
     options.show(recommendation, as_json, lambda: answer_lines(recommendation))
     raise typer.Exit(options.OK if recommendation.answer.choice and recommendation.affordable else options.CONTRADICTED)
@@ -139,14 +142,14 @@ def _from_report(
     lines = [line for line in lines if not engines or line.engine in engines]
     studies: dict[str, ChoiceStudy] = {}
     for name in [name for text in names for name in text.split(",")]:
-        own = [line for line in lines if name in {line.study, line.scene, line.group, *line.group.split()}]
-        if not own:
-            known = ", ".join(dict.fromkeys(line.group for line in lines))
-            lacking = f"has no such scene, comparison or group; the groups there are {known}"
+        of_name = [line for line in lines if name in {line.study, line.scene, line.group, *line.group.split()}]
+        if not of_name:
+            groups = ", ".join(dict.fromkeys(line.group for line in lines))
+            lacking = f"has no such scene, comparison or group; the groups there are {groups}"
             if is_scene(name) or named_file(name):
                 lacking = f"has no runs of it; proofroll report {name} makes them"
             raise InputError("scenes", name, f"{path} {lacking}")
-        studies |= {line.study: ChoiceStudy(line.study, "") for line in own}
+        studies |= {line.study: ChoiceStudy(line.study, "") for line in of_name}
     lines = [line for line in lines if line.study in studies]
     unit = _unit_of(lines)
     bound = _tolerance(tolerance, unit) if tolerance else Tolerance(FIRST_TOLERANCE, True)

@@ -46,7 +46,8 @@ def report(
         typer.Option(min=1, help="Processor-seconds; without names all comparisons there are, in folders too."),
     ] = None,
     only: Annotated[
-        str | None, typer.Option(help="Groups of scenes, as loops,contact: all comparisons of these, and no studies.")
+        str | None,
+        typer.Option(help="Groups of scenes or folders, as loops,peers: all comparisons of these, no studies."),
     ] = None,
     against: Annotated[
         Path | None,
@@ -80,7 +81,7 @@ def report(
     from proofroll.running.store import alone_in
     from proofroll.studies.comparison.by_name import comparison_named
 
-    before = _processor_seconds()
+    begin = _processor_seconds()
     if history:
         _show_history(history, out, as_json=as_json)
         return
@@ -89,8 +90,8 @@ def report(
     if budget and scheduler:
         raise InputError("--budget", budget, "what runs on a cluster has none; drop --scheduler")
     left_out = [] if studies or only or budget else further_comparison_names()
-    known = [*comparison_names(), *([] if left_out else further_comparison_names())]
-    names, parts = parts_of(studies, engine or []) if studies else (known, all_parts(engine or [], out))
+    all_names = [*comparison_names(), *([] if left_out else further_comparison_names())]
+    names, parts = parts_of(studies, engine or []) if studies else (all_names, all_parts(engine or [], out))
     if only:
         names, parts = _of_groups(names, only), []
     if assigned and (parts or not studies):
@@ -111,13 +112,13 @@ def report(
         with growing.resumable():
             outcomes: list[Outcome] = []
             if loaded:
-                stage, spent = _begin(1, total, "comparisons"), _processor_seconds() - before
+                stage, spent = _begin(1, total, "comparisons"), _processor_seconds() - begin
                 outcomes = outcomes_of(loaded, engine or [], runner, stage, growing.add, budget, spent)
         made = begun(outcomes, command, left_out=left_out)
         made.earlier = earlier
         missing = made.expect(parts, out, fresh=fresh)
         made.write(out)
-        rest = (lambda: budget - _processor_seconds() + before) if budget else None
+        rest = (lambda: budget - _processor_seconds() + begin) if budget else None
         unmade = _make_all(made, parts, missing, runner, out, rest)
         options.show(made.content, as_json, lambda: _shown(made.content, out))
     raise typer.Exit(_exit_code(made.content, exit_code(outcomes), unmade))
@@ -135,8 +136,8 @@ def _show_history(folder: Path, out: Path, *, as_json: bool) -> None:
 
     history = read_history(folder)
     write_history(history, out)
-    where = f"The history is in {out / 'history.html'}, the same content in {out / 'history.json'}."
-    options.show(history, as_json, lambda: [*history.lines(), where])
+    places = f"The history is in {out / 'history.html'}, the same content in {out / 'history.json'}."
+    options.show(history, as_json, lambda: [*history.lines(), places])
 
 
 class _Growing:
@@ -177,15 +178,15 @@ class _Growing:
             raise
 
     def _write(self) -> None:
-        ended = [self._ended[at] for at in sorted(self._ended)]
-        awaited = [item.title for at, item in enumerate(self._comparisons) if at not in self._ended]
+        ended = [self._ended[index] for index in sorted(self._ended)]
+        awaited = [item.title for index, item in enumerate(self._comparisons) if index not in self._ended]
         page = self._made(ended, awaited)
         page.expect(self._parts, self._out)
         page.write(self._out)
 
 
 def _of_groups(names: list[str], only: str) -> list[str]:
-    """Comparisons whose scene belongs to one of the groups, each given by its name or a word of it."""
+    """Comparisons whose scene belongs to one of the groups, each given by its name, a word of it, or their folder."""
     from proofroll.core.errors import InputError
     from proofroll.files.comparison_file import load_comparison
     from proofroll.report.kinds import group_of
@@ -198,6 +199,7 @@ def _of_groups(names: list[str], only: str) -> list[str]:
     chosen: set[str] = set()
     for word in (item.strip() for item in only.split(",")):
         matching = {name for name, group in groups.items() if word == group or word in group.split()}
+        matching |= {name for name in names if name.startswith(f"{word}/")}
         if not matching:
             raise InputError("--only", word, f"groups are {', '.join(dict.fromkeys(groups.values()))}")
         chosen |= matching
@@ -231,11 +233,11 @@ def _make_all(
 ) -> set[str]:
     """Makes the further studies that are missing; returns names of those for which a budget left no ``rest`` [s]."""
     keys = {part.key: part.words for part in parts}
-    first, unmade = 1 + bool(made.content.comparisons), set()
-    for number, (key, words) in enumerate(keys.items(), start=first):
-        wanted = [part for part in missing if part.key == key]
-        stage = _begin(number, len(keys) + first - 1, words if wanted else f"{words}: kept from before")
-        for part in wanted:
+    start, unmade = 1 + bool(made.content.comparisons), set()
+    for number, (key, words) in enumerate(keys.items(), start=start):
+        to_make = [part for part in missing if part.key == key]
+        stage = _begin(number, len(keys) + start - 1, words if to_make else f"{words}: kept from before")
+        for part in to_make:
             if rest and rest() <= 0:
                 unmade.add(part.head["name"])
                 made.leave_out(part, "Not run: the budget is used")

@@ -12,6 +12,7 @@ from proofroll.cli import options
 from proofroll.core.limits import RUN_TIME_LIMIT
 
 if TYPE_CHECKING:
+    from proofroll.report.run.run import RunContent
     from proofroll.running.case import Case
 
 
@@ -25,6 +26,7 @@ def run(
         ),
     ],
     settings: options.Set = None,
+    control: options.Control = None,
     until: options.Until = None,
     every: Annotated[
         float | None, typer.Option(help="Interval between samples [s]; by default 0.01, or near it in whole steps.")
@@ -33,12 +35,19 @@ def run(
         Path | None,
         typer.Option(help="Write the trajectory to this file, by its ending: nc (netCDF), csv, or npz (numpy)."),
     ] = None,
+    events: Annotated[
+        Path | None,
+        typer.Option(help="Write the events to this csv file, with energy and height of each bounce."),
+    ] = None,
     time_limit: Annotated[float, typer.Option(help="Wall seconds after which the run is ended.")] = RUN_TIME_LIMIT,
     ask: Annotated[list[str] | None, typer.Option(help="What is wanted besides the motion: orientation.")] = None,
     plot: Annotated[
         Path | None, typer.Option(help="Draw the run to this file, by its ending: html, svg, png or pdf.")
     ] = None,
     forces: Annotated[bool, typer.Option("--forces", help="Show all forces and moments, too.")] = False,
+    matrices: Annotated[
+        bool, typer.Option("--matrices", help="Show M, h and g of M v' + h + g = tau at the start, and run nothing.")
+    ] = False,
     as_json: options.Json = False,
 ) -> None:
     """Run one scene in one engine."""
@@ -48,6 +57,10 @@ def run(
     from proofroll.running.engine_questions import prepare
     from proofroll.running.idle_workers import Workers
 
+    scene = options.controlled(scene, control)
+    if matrices:
+        _show_matrices(scene, engine, options.assignments(settings), as_json)
+        return
     workers = Workers()  # one process resolves the settings and makes the run
     # It imports the engine while this process imports the modules that read scenes and results.
     preparing = threading.Thread(target=prepare, args=(engine, workers), daemon=True)
@@ -58,23 +71,16 @@ def run(
     chosen, asks = options.assignments(settings), tuple(dict.fromkeys(ask or []))
     scene_of_run(scene, chosen, asks)  # a mistyped name is answered before more is imported
 
-    from proofroll.core.errors import InputError
     from proofroll.core.time_grid import EVERY, time_grid
     from proofroll.files.scene_file import scene_names
-    from proofroll.files.trajectory_file import CSV, NETCDF, STORED, import_xarray, read, write
-    from proofroll.report.run.plot import draw_run, require_ending
+    from proofroll.files.scene_sources import resolved
+    from proofroll.files.trajectory_file import STORED
     from proofroll.report.run.run import run_content, run_lines
     from proofroll.running.runner import run_one
 
     if until is not None:
         time_grid(until, EVERY if every is None else every)
-    for option, file in (("--out", out), ("--plot", plot)):
-        if file is not None:
-            options.require_writable(file, option)
-    if out is not None and out.suffix not in (NETCDF, CSV, STORED):  # a scene.toml would be written over
-        raise InputError("--out", out, f"end the name of the file in {NETCDF}, {CSV} or {STORED}")
-    if plot is not None:
-        require_ending(plot, "--plot")
+    _require_files(out, events, plot)
     with options.spinner(f"{scene} in {engine}"):
         preparing.join()
         case = single_case(
@@ -92,15 +98,9 @@ def run(
         with options.spinner(f"{scene} in {case.engine.name}"):
             result = run_one(case, target, workers)
         content = run_content(case, result, target)
-        if (plot or out) is not None and result.trajectory is not None:
-            import_xarray()
-        if plot is not None and result.trajectory is not None:
-            draw_run(read(target), plot)
-            content = replace(content, plot=str(plot))
-        if out is not None and result.trajectory is not None:
-            own = {"scene_path": str(Path(scene).resolve())} if scene not in scene_names() else {}
-            write(read(target).assign_attrs(own), out)
-            content = replace(content, trajectory=str(out))
+        if result.trajectory is not None:
+            path_of_scene = {"scene_path": resolved(scene)} if scene not in scene_names() else {}
+            content = _written(content, target, path_of_scene, out=out, events=events, plot=plot)
     done = content.status == "done"
     if not done:
         options.complain(f"{content.engine} {content.status}: {content.message}{_shorter_step(scene, engine, case)}")
@@ -108,6 +108,77 @@ def run(
         options.show(content, as_json, lambda: run_lines(content, forces=forces))
     if not done or content.ends is not None:
         raise typer.Exit(options.ENGINE)
+
+
+def _show_matrices(scene: str, engine: str, settings: dict[str, str], as_json: bool) -> None:
+    """Prints the matrices of the equations of motion at the start, of the truth or of an engine's model.
+
+    Raises:
+        InputError: the scene has no such equations.
+    """
+    from proofroll.core.errors import InputError
+    from proofroll.report.kinds import kind_of
+    from proofroll.report.run.matrices import matrix_lines
+    from proofroll.running.simulation import build
+    from proofroll.studies.cases import scene_of_run
+
+    loaded = scene_of_run(scene, settings, ())
+    kind = kind_of(loaded)
+    built = None if engine == "truth" else build(loaded, engine).built()
+    content = None if kind is None else kind.matrices(loaded, built)
+    if content is None:
+        raise InputError("--matrices", scene, "it is for scenes of bodies and joints; name one of these")
+    options.show(content, as_json, lambda: matrix_lines(content))
+    if content.M is None:
+        options.complain(f"{engine} does not give the matrices of its equations")
+        raise typer.Exit(options.ENGINE)
+
+
+def _require_files(out: Path | None, events: Path | None, plot: Path | None) -> None:
+    """Raises InputError unless the files that a run is to write can be written and have an ending of their formats."""
+    from proofroll.core.errors import InputError
+    from proofroll.files.trajectory_file import CSV, NETCDF, STORED
+    from proofroll.report.run.plot import require_ending
+
+    for option, file in (("--out", out), ("--events", events), ("--plot", plot)):
+        if file is not None:
+            options.require_writable(file, option)
+    if out is not None and out.suffix not in (NETCDF, CSV, STORED):  # a scene.toml would be written over
+        raise InputError("--out", out, f"end the name of the file in {NETCDF}, {CSV} or {STORED}")
+    if events is not None and events.suffix != CSV:
+        raise InputError("--events", events, f"end the name of the file in {CSV}")
+    if plot is not None:
+        require_ending(plot, "--plot")
+
+
+def _written(
+    content: RunContent,
+    stored: Path,
+    attributes: dict[str, str],
+    *,
+    out: Path | None,
+    events: Path | None,
+    plot: Path | None,
+) -> RunContent:
+    """Content with the names of the files that are written here from the ``stored`` trajectory."""
+    from proofroll.files.atomic import replacing
+    from proofroll.files.trajectory_file import import_xarray, read, write
+    from proofroll.report.run.plot import draw_run
+    from proofroll.report.run.run import event_csv
+
+    if (plot or out) is not None:
+        import_xarray()
+    if plot is not None:
+        draw_run(read(stored), plot)
+        content = replace(content, plot=str(plot))
+    if out is not None:
+        write(read(stored).assign_attrs(attributes), out)
+        content = replace(content, trajectory=str(out))
+    if events is not None:
+        with replacing(events) as temporary:
+            temporary.write_text(event_csv(content))
+        content = replace(content, event_table=str(events))
+    return content
 
 
 def _shorter_step(scene: str, engine: str, case: Case) -> str:

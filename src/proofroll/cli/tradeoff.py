@@ -80,15 +80,15 @@ def question_of(
     path = Path(scene)
     claims = load_claims(path) if path.suffix == ".toml" and not is_scene(scene) else claims_for(scene)
     name = claims.scene if claims else scene
-    given = options.assignments(settings)
-    if claims and not given and until is None:
+    assigned = options.assignments(settings)
+    if claims and not assigned and until is None:
         quantity = quantities[0] if quantities else claims.quantity
         return claims, Question(name, claims.parameters, claims.until, quantity)
-    loaded = load_scene(name, **given)  # type: ignore[arg-type]  # text is checked and converted there
+    loaded = load_scene(name, **assigned)  # type: ignore[arg-type]  # text is checked and converted there
     length = length_of(name, until)
     require_length(length)
     quantity = quantities[0] if quantities else loaded.deciding
-    return None, Question(name, {key: loaded.parameters[key] for key in given}, length, quantity)
+    return None, Question(name, {key: loaded.parameters[key] for key in assigned}, length, quantity)
 
 
 def require_observables(question: Question, names: list[str]) -> None:

@@ -68,8 +68,8 @@ def versions(
             content = compare_versions(sides, comparisons, runner, rounds, advance)
     file = _keep(content, page(content), out)
     made = table if robot is None else robot_table
-    where = f"The page is in {file}.html."
-    options.show(content, as_json, lambda: [heading(content), made(content), *lines(content), where], widest=80)
+    place = f"The page is in {file}.html."
+    options.show(content, as_json, lambda: [heading(content), made(content), *lines(content), place], widest=80)
     if content.lost:
         raise typer.Exit(options.ENGINE)
     raise typer.Exit(options.CONTRADICTED if content.changed else options.OK)

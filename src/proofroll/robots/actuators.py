@@ -20,15 +20,15 @@ def scene_actuators(root: Element, robot: Robot) -> tuple[list[dict[str, Any]], 
     clauses = []
     for number, element in enumerate(item for part in root.findall("actuator") for item in part):
         name = element.get("name") or f"actuator{number}"
-        given = _given(root, element)
-        table = _table(element.tag, given) if given.get("joint") in single else None
-        other = next((one for one in actuators if one["joint"] == given.get("joint")), None)
-        if table is None or (other is not None and (merged := _merged(other, table)) is None):
+        attributes = _given(root, element)
+        table = _table(element.tag, attributes) if attributes.get("joint") in single else None
+        rival = next((row for row in actuators if row["joint"] == attributes.get("joint")), None)
+        if table is None or (rival is not None and (merged := _merged(rival, table)) is None):
             clauses.append(f"the actuator {element.tag} {name}")
-        elif other is None:
-            actuators.append({**table, "name": name, "joint": given["joint"]})
+        elif rival is None:
+            actuators.append({**table, "name": name, "joint": attributes["joint"]})
         else:
-            other.update(merged or {})
+            rival.update(merged or {})
     for item, of_joint in with_classes(root, "joint"):
         ends = floats(of_joint.get("actuatorfrcrange", ""))
         for table in [table for table in actuators if ends and table["joint"] == item.get("name")]:
@@ -54,14 +54,14 @@ def _given(root: Element, element: Element) -> dict[str, str]:
     return attributes | element.attrib
 
 
-def _table(tag: str, given: Mapping[str, str]) -> dict[str, Any] | None:
+def _table(tag: str, attributes: Mapping[str, str]) -> dict[str, Any] | None:
     """Kind, gains, gear, target and limit of an actuator; None: a scene cannot represent it."""
-    if tag not in _PLAIN or any(given.get(key, plain) != plain for key, plain in _OTHER.items()):
+    if tag not in _PLAIN or any(attributes.get(key, plain) != plain for key, plain in _OTHER.items()):
         return None
-    kp, kd = _gains(tag, given)
-    gear = (floats(given.get("gear", "")) or [1.0])[0]
-    low, high = _range(given, "ctrl") or (0.0, 0.0)
-    force = _range(given, "force")
+    kp, kd = _gains(tag, attributes)
+    gear = (floats(attributes.get("gear", "")) or [1.0])[0]
+    low, high = _range(attributes, "ctrl") or (0.0, 0.0)
+    force = _range(attributes, "force")
     if not gear or kp < 0 or kd < 0 or (force and force[0] != -force[1]) or (force and force[1] <= 0):
         return None
     actuator: dict[str, Any] = {"kind": "position" if kp else "velocity" if kd else "torque", "gear": gear}
@@ -72,33 +72,37 @@ def _table(tag: str, given: Mapping[str, str]) -> dict[str, Any] | None:
     return actuator | {"target": target} | ({"limit": force[1] * abs(gear)} if force else {})
 
 
-def _gains(tag: str, given: Mapping[str, str]) -> tuple[float, float]:
+def _gains(tag: str, attributes: Mapping[str, str]) -> tuple[float, float]:
     """Gains of position and velocity; negative ones for a law that a scene lacks."""
     if tag == "position":
-        return float(given.get("kp", 1.0)), float(given.get("kv", 0.0))
+        return float(attributes.get("kp", 1.0)), float(attributes.get("kv", 0.0))
     if tag == "velocity":
-        return 0.0, float(given.get("kv", 1.0))
-    bias = [*floats(given.get("biasprm", "")), 0.0, 0.0, 0.0]
-    if tag == "motor" or given.get("biastype", "none") == "none":
+        return 0.0, float(attributes.get("kv", 1.0))
+    bias = [*floats(attributes.get("biasprm", "")), 0.0, 0.0, 0.0]
+    if tag == "motor" or attributes.get("biastype", "none") == "none":
         return 0.0, 0.0
-    plain = given["biastype"] == "affine" and not bias[0]
+    plain = attributes["biastype"] == "affine" and not bias[0]
     return (-bias[1], -bias[2]) if plain else (-1.0, -1.0)
 
 
-def _merged(one: Mapping[str, Any], two: Mapping[str, Any]) -> dict[str, Any] | None:
+def _merged(actuator: Mapping[str, Any], two: Mapping[str, Any]) -> dict[str, Any] | None:
     """Merges a position actuator and a damper (target velocity 0) of one joint; None: it is another pair."""
-    by_kind = {item["kind"]: item for item in (one, two)}
-    if set(by_kind) != {"position", "velocity"} or one["gear"] != two["gear"] or {"limit"} & (one.keys() | two.keys()):
+    by_kind = {item["kind"]: item for item in (actuator, two)}
+    if (
+        set(by_kind) != {"position", "velocity"}
+        or actuator["gear"] != two["gear"]
+        or {"limit"} & (actuator.keys() | two.keys())
+    ):
         return None
     if by_kind["velocity"]["target"]:
         return None
     kd = by_kind["position"].get("kd", 0.0) + by_kind["velocity"]["kd"]
-    return {**by_kind["position"], "kd": kd, "name": one["name"], "joint": one["joint"]}
+    return {**by_kind["position"], "kd": kd, "name": actuator["name"], "joint": actuator["joint"]}
 
 
-def _range(given: Mapping[str, str], what: str) -> tuple[float, float] | None:
+def _range(attributes: Mapping[str, str], what: str) -> tuple[float, float] | None:
     """Range of a control (``ctrl``) or force; None: the file does not limit it."""
-    ends = floats(given.get(f"{what}range", ""))
-    if given.get(f"{what}limited") == "false" or len(ends) != 2:
+    ends = floats(attributes.get(f"{what}range", ""))
+    if attributes.get(f"{what}limited") == "false" or len(ends) != 2:
         return None
     return ends[0], ends[1]

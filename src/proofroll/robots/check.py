@@ -22,6 +22,7 @@ from proofroll.robots.layers import LAYERS, RobotTruth
 from proofroll.robots.lint import lint
 from proofroll.robots.meaning import USUAL, CheckSettings, moving_robot, source_of
 from proofroll.robots.mjcf_compiler import Compiler
+from proofroll.robots.model import RobotJoint
 from proofroll.robots.protocol import Request
 from proofroll.robots.records import DrawnBody, DrawnJoint, DrawnRobot, ImporterRow, RobotCheck, UsedTruth
 from proofroll.robots.robot_file import RobotFile
@@ -124,9 +125,9 @@ class _Checked:
             Missing: the engine is not installed.
         """
 
-        def ask(given: Path) -> reading.ReaderAnswer:
+        def ask(path: Path) -> reading.ReaderAnswer:
             with self._lent(spec) as (worker, folder):
-                request = self._request(options, given)
+                request = self._request(options, path)
                 return reading.ask(worker, spec.name, request, folder, self.settings.time_limit)
 
         try:
@@ -151,43 +152,43 @@ class _Checked:
             return None
         try:
             with self._lent(spec) as (worker, folder):
-                own = self._request(options, self.written)
-                given = reading.ask_as_written(worker, spec.name, own, self.path, folder, self.settings.time_limit)
+                request = self._request(options, self.written)
+                answer = reading.ask_as_written(worker, spec.name, request, self.path, folder, self.settings.time_limit)
         except WorkerDied as error:
             return f"its process ended ({error})"
-        return None if given is None else row_with_copy(given, importer)
+        return None if answer is None else row_with_copy(answer, importer)
 
     @contextmanager
     def _lent(self, spec: EngineSpec) -> Iterator[tuple[Worker, Path]]:
         with self.workers.lend(spec.name) as worker, tempfile.TemporaryDirectory(dir=self.folder) as folder:
             yield worker, Path(folder)
 
-    def _request(self, options: dict[str, bool], given: Path) -> Request:
+    def _request(self, options: dict[str, bool], path: Path) -> Request:
         robot, truth = self.truth.robot, self.truth
         children = {joint.name: joint.child for joint in robot.moving}
         return Request(
-            given, self.file.kind, self.settings.base, BASE_JOINT, options, children, truth.states, truth.torques,
+            path, self.file.kind, self.settings.base, BASE_JOINT, options, children, truth.states, truth.torques,
             robot.gravity, robot,
         )  # fmt: skip
 
 
-def _accepted(path: Path, given: Sequence[str]) -> set[str]:
+def _accepted(path: Path, causes: Sequence[str]) -> set[str]:
     """Ids of accepted causes: those given, and ``causes = ["..."]`` in the ``.accept.toml`` beside the robot's file."""
     beside = path.with_suffix(".accept.toml")
     written = read_toml(beside).get("causes", []) if beside.is_file() else []
     if not isinstance(written, list):
         raise InputError(f"{beside}: causes", written, 'write a list of causes, ["damping_left_out"]')
-    known = [item.id for item in hypotheses()]
-    for where, names in (("--accept", given), (f"{beside}: causes", written)):
+    ids = [item.id for item in hypotheses()]
+    for origin, names in (("--accept", causes), (f"{beside}: causes", written)):
         for name in names:
-            require_known(where, str(name), known, "there is no such cause; choose from")
-    return {*given, *written}
+            require_known(origin, str(name), ids, "there is no such cause; choose from")
+    return {*causes, *written}
 
 
 def bar_of(truth: RobotTruth) -> float:
     """Error bar of a truth: the largest relative difference of its two formulations."""
-    one, other = truth.dynamics, body_recursion(truth.robot, truth.states)
-    pairs = ((one.M, other.M), (one.g, other.g), (one.h, other.h))
+    first_terms, second_terms = truth.dynamics, body_recursion(truth.robot, truth.states)
+    pairs = ((first_terms.M, second_terms.M), (first_terms.g, second_terms.g), (first_terms.h, second_terms.h))
     return max(float(np.abs(a - b).max() / (np.abs(b).max() or 1.0)) for a, b in pairs)
 
 
@@ -198,9 +199,22 @@ def robot_drawing(truth: RobotTruth) -> DrawnRobot:
     upright = {joint.name: np.eye(3)[None] for joint in robot.moving}
     origin = {joint.name: np.zeros((1, 3)) for joint in robot.moving}
     still = {joint.name: np.zeros((1, joint.dofs)) for joint in robot.moving}
-    placed = poses(robot, RobotStates(zero, upright, origin, still, still))
-    return DrawnRobot(
-        robot.name,
-        [DrawnJoint(joint.name, joint.kind, joint.parent, joint.child) for joint in robot.joints],
-        {name: DrawnBody(placed[name][0][0].tolist(), body.mass) for name, body in robot.bodies.items()},
-    )
+    frames = poses(robot, RobotStates(zero, upright, origin, still, still))
+    placed = {name: (p[0], R[0]) for name, (p, R) in frames.items()}
+
+    def drawn_joint(joint: RobotJoint) -> DrawnJoint:
+        p, R = placed[joint.child]
+        return DrawnJoint(
+            name=joint.name,
+            kind=joint.kind,
+            parent=joint.parent,
+            child=joint.child,
+            position=(p + R @ joint.child_position).tolist(),
+            axis=(R @ joint.axis).tolist() if joint.dofs == 1 else None,
+        )
+
+    bodies = {}
+    for name, body in robot.bodies.items():
+        p, R = placed[name]
+        bodies[name] = DrawnBody(position=p.tolist(), centre=(p + R @ body.com).tolist(), mass=body.mass)
+    return DrawnRobot(robot.name, [drawn_joint(joint) for joint in robot.joints], bodies)

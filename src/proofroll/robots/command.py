@@ -78,17 +78,17 @@ def check(
     raise typer.Exit(options.OK if any(row.layers for row in content.engines) else options.ENGINE)
 
 
-def _partners(given: Sequence[str]) -> dict[str, str]:
+def _partners(texts: Sequence[str]) -> dict[str, str]:
     """Joint of the first file -> joint of the second, from ``joint=joint`` or files of such lines."""
     from proofroll.files.toml import read_toml
 
-    files = [text for text in given if "=" not in text]
-    written = [text for text in given if "=" in text]
+    files = [text for text in texts if "=" not in text]
+    written = [text for text in texts if "=" in text]
     for name in files:
-        for one, two in read_toml(Path(name)).items():
-            if not isinstance(two, str):
-                raise InputError(f"{name}: {one}", two, 'write the name of a joint in the second file, "..."')
-            written.append(f"{one}={two}")
+        for ours, theirs in read_toml(Path(name)).items():
+            if not isinstance(theirs, str):
+                raise InputError(f"{name}: {ours}", theirs, 'write the name of a joint in the second file, "..."')
+            written.append(f"{ours}={theirs}")
     return options.assignments(written, "--map")
 
 

@@ -89,10 +89,10 @@ class Search:
 
     def _proven(self, truth: RobotTruth, causes: tuple[RobotCause, ...]) -> _Step | None:
         """Step after applying causes that were found at fewer states; None: one of them changes nothing."""
-        known = {item.id: item for item in hypotheses()}
+        by_id = {item.id: item for item in hypotheses()}
         step: _Step | None = self._begun(truth)
         for cause in causes:
-            step = None if step is None else self._tried(step, known[cause.id], cause.layer)
+            step = None if step is None else self._tried(step, by_id[cause.id], cause.layer)
         return step
 
     def _begun(self, truth: RobotTruth) -> _Step:
@@ -142,9 +142,11 @@ class Search:
         if not differences(truth, reading, layer).get(layer, math.inf) <= most:
             return None
         left = differences(truth, reading)
-        known = ", ".join(f"{name} {versions}".strip() for name, versions in hypothesis.known.items())
-        before, after = step.found[layer], left[layer]
-        cause = RobotCause(hypothesis.id, hypothesis.name, layer, before, after, hypothesis.remedy, known)
+        versions_text = ", ".join(f"{name} {versions}".strip() for name, versions in hypothesis.known.items())
+        difference, remainder = step.found[layer], left[layer]
+        cause = RobotCause(
+            hypothesis.id, hypothesis.name, layer, difference, remainder, hypothesis.remedy, versions_text
+        )
         return _Step(truth, reading, left, (*step.causes, cause))
 
     def _rank(self, step: _Step, layer: str) -> tuple[int, float]:

@@ -67,12 +67,12 @@ strict(_File, Entry)
 def read_gallery(path: str | Path | None = None) -> list[Entry]:
     """Entries of the gallery's file. Raises InputError if it is invalid, or names an unknown cause."""
     path = Path(path or data_folder("comparisons") / "robots.toml")
-    known = sorted({REFUSES, CRASHED, OPEN, *(hypothesis.id for hypothesis in hypotheses())})
+    outcomes = sorted({REFUSES, CRASHED, OPEN, *(hypothesis.id for hypothesis in hypotheses())})
     entries = validated(_File, read_toml(path), path.name).robots
     for index, entry in enumerate(entries):
         for engine, causes in entry.engines.items():
             for cause in causes:
-                require_known(f"{path.name}: robots.{index}.engines.{engine}", cause, known)
+                require_known(f"{path.name}: robots.{index}.engines.{engine}", cause, outcomes)
     return entries
 
 
@@ -105,9 +105,9 @@ def gallery(
     for name in engines:
         reading.load_reader(parse_engine(name).name)
     rows = []
-    wanted, row = [entry for entry in entries if not names or entry.name in names], partial(_row, tuple(engines))
+    chosen, row = [entry for entry in entries if not names or entry.name in names], partial(_row, tuple(engines))
     with lent_workers(None) as workers:  # each engine is started once for all robots
-        for host, entry_row in cluster.map(row, wanted) if cluster else (("", row(entry, workers)) for entry in wanted):
+        for host, entry_row in cluster.map(row, chosen) if cluster else (("", row(entry, workers)) for entry in chosen):
             rows.append(dataclasses.replace(entry_row, ran_on=host))
             if progress is not None:
                 progress(entry_row.name)
@@ -116,18 +116,18 @@ def gallery(
 
 def _row(engines: Sequence[str], entry: Entry, workers: Workers | None = None) -> GalleryRow:
     path = locate(entry)
-    wanted = [name for name in entry.engines if parse_engine(name).name in reading.reader_names()]
+    names = [name for name in entry.engines if parse_engine(name).name in reading.reader_names()]
     if engines:
-        wanted = [name for name in wanted if name in engines or parse_engine(name).name in engines]
-    if path is None or not wanted:
+        names = [name for name in names if name in engines or parse_engine(name).name in engines]
+    if path is None or not names:
         return GalleryRow(entry.name, entry.package, None if path is None else str(path))
     readings, unexpected = [], []
-    for item in check(path, wanted, CheckSettings(base=entry.base), workers=workers).engines:
-        found = outcome(item)
-        readings.append(GalleryReading(item.engine, item.version, item.status, item.causes, item.message, found))
-        if item.status != "missing" and set(found) != set(entry.engines[item.engine]):
+    for item in check(path, names, CheckSettings(base=entry.base), workers=workers).engines:
+        outcomes = outcome(item)
+        readings.append(GalleryReading(item.engine, item.version, item.status, item.causes, item.message, outcomes))
+        if item.status != "missing" and set(outcomes) != set(entry.engines[item.engine]):
             expected = ", ".join(entry.engines[item.engine]) or "to hold the file"
-            unexpected.append(f"{item.named}: expected {expected}; found {', '.join(found) or 'holds the file'}")
+            unexpected.append(f"{item.named}: expected {expected}; found {', '.join(outcomes) or 'holds the file'}")
     return GalleryRow(entry.name, entry.package, str(path), readings, unexpected)
 
 

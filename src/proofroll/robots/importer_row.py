@@ -91,17 +91,17 @@ def importer_row(
 _SAME_MASS = 1e-4
 
 
-def row_with_copy(given: reading.AsWritten, row: ImporterRow) -> str:
+def row_with_copy(as_written: reading.AsWritten, row: ImporterRow) -> str:
     """Clause on an engine's reading of the unchanged file, compared with its reading of the copy."""
-    if given.whole is None:
-        return f"refused ({given.refused})"
+    if as_written.whole is None:
+        return f"refused ({as_written.refused})"
     if row.held is None:
         return "read"
-    (velocities, mass), (own, weight) = (dataclasses.astuple(item) for item in (given.whole, row.held))
-    if velocities == own and abs(mass - weight) <= _SAME_MASS * max(abs(mass), abs(weight)):
+    (velocities, mass), (inertias, weight) = (dataclasses.astuple(item) for item in (as_written.whole, row.held))
+    if velocities == inertias and abs(mass - weight) <= _SAME_MASS * max(abs(mass), abs(weight)):
         return "read"
     copy = f"held with {counted(velocities, 'velocities')} and {mass:.6g} kg"
-    return f"{copy}, the copy that is compared with {own} and {weight:.6g} kg"
+    return f"{copy}, the copy that is compared with {inertias} and {weight:.6g} kg"
 
 
 _Made = TypeVar("_Made")

@@ -135,15 +135,15 @@ _PASSIVE = {"damping", "friction", "stiffness", "rest"}
 _MOTION = [field.name for field in dataclasses.fields(RobotJoint) if field.name not in _PASSIVE]
 
 
-def _moves_alike(robot: Robot, other: Robot) -> bool:
+def _moves_alike(robot: Robot, rival: Robot) -> bool:
     """True if the robots differ only in passive forces and couplings."""
     return (
-        robot.bodies is other.bodies
-        and robot.gravity is other.gravity
-        and len(robot.joints) == len(other.joints)
+        robot.bodies is rival.bodies
+        and robot.gravity is rival.gravity
+        and len(robot.joints) == len(rival.joints)
         and all(
-            getattr(one, name) is getattr(two, name)
-            for one, two in zip(robot.joints, other.joints, strict=True)
+            getattr(joint, name) is getattr(two, name)
+            for joint, two in zip(robot.joints, rival.joints, strict=True)
             for name in _MOTION
         )
     )
@@ -181,8 +181,8 @@ def differences(truth: RobotTruth, reading: Reading, until: str = "") -> dict[st
         return off
     d = truth.dynamics
     off["mass matrix"] = _off(reading.M[:, theirs][:, :, theirs], _between(G, d.M), scales["mass matrix"])
-    for layer, own, expected_torque in (("gravity", reading.g, d.g), ("bias", reading.h, d.h)):
-        off[layer] = _off(own[:, theirs], expected_torque @ G, scales[layer])
+    for layer, torque, expected_torque in (("gravity", reading.g, d.g), ("bias", reading.h, d.h)):
+        off[layer] = _off(torque[:, theirs], expected_torque @ G, scales[layer])
     if reading.inverse is not None:
         off["inverse dynamics"] = _off(reading.inverse[:, theirs], truth.inverse @ G, scales["inverse dynamics"])
     if reading.forward is not None and not d.singular:
@@ -224,8 +224,8 @@ def _selection(robot: Robot, joints: Iterable[str], reduced: set[str]) -> Array:
 
 
 def _columns(reading: Reading, joints: list[str]) -> list[int]:
-    own = dict(zip(reading.joints, slices(reading.dofs), strict=True))
-    return [index for name in joints for index in range(own[name].start, own[name].stop)]
+    spans = dict(zip(reading.joints, slices(reading.dofs), strict=True))
+    return [index for name in joints for index in range(spans[name].start, spans[name].stop)]
 
 
 def _kinematics(truth: RobotTruth, reading: Reading, joints: list[str]) -> float:
@@ -244,8 +244,8 @@ def _apart(com: Array, mass: float, group: RobotBody, whole: float) -> float:
     return float(np.abs(mass * com - group.mass * group.com).max()) / whole
 
 
-def _off(given: Array, true: Array, scale: float) -> float:
-    return _largest([np.abs(given - true).max(initial=0.0) / scale])
+def _off(values: Array, true: Array, scale: float) -> float:
+    return _largest([np.abs(values - true).max(initial=0.0) / scale])
 
 
 def _largest(values: Iterable[float]) -> float:

@@ -24,9 +24,10 @@ _KNOWN = {
 
 def lint(file: RobotFile, robot: Robot) -> list[LintRemark]:
     """Remarks on a file and on its meaning, errors first."""
-    own = _urdf(file, robot) if file.kind == "urdf" else _mjcf(file)
+    format_remarks = _urdf(file, robot) if file.kind == "urdf" else _mjcf(file)
     remarks = [
-        LintRemark(*noticed) for noticed in (*own, *_bodies(file, robot), *_joints(robot), *implausible(file, robot))
+        LintRemark(*noticed)
+        for noticed in (*format_remarks, *_bodies(file, robot), *_joints(robot), *implausible(file, robot))
     ]
     return sorted(remarks, key=lambda remark: ("error", "warning", "note").index(remark.level))
 
@@ -34,30 +35,30 @@ def lint(file: RobotFile, robot: Robot) -> list[LintRemark]:
 def _bodies(file: RobotFile, robot: Robot) -> Iterator[_Noticed]:
     noun = "link" if file.kind == "urdf" else "body"
     for name, body in robot.bodies.items():
-        where = f"{noun} {name}"
+        place = f"{noun} {name}"
         if not np.any(body.inertia):
             continue
         if not body.mass:
-            yield "error", where, "it has inertia but no mass; engines invent different masses"
+            yield "error", place, "it has inertia but no mass; engines invent different masses"
         if body.impossible:
-            yield "error", where, f"its inertia {body.impossible}; correct it, for engines replace, refuse or take it"
+            yield "error", place, f"its inertia {body.impossible}; correct it, for engines replace, refuse or take it"
         elif body.moments[0] <= 0:
-            yield "warning", where, "its inertia has a principal moment of zero; some engines refuse that"
+            yield "warning", place, "its inertia has a principal moment of zero; some engines refuse that"
     for joint in robot.moving:
         if robot.groups[joint.name].mass:
             continue
-        if not any(robot.welded[other.parent][0] == joint.name for other in robot.moving):
+        if not any(robot.welded[follower.parent][0] == joint.name for follower in robot.moving):
             yield "error", f"joint {joint.name}", "it moves no mass: the mass matrix is singular"
 
 
 def _joints(robot: Robot) -> Iterator[_Noticed]:
     for joint in robot.moving:
-        where = f"joint {joint.name}"
+        place = f"joint {joint.name}"
         for name, value in (("damping", joint.damping), ("friction", joint.friction), ("armature", joint.armature)):
             if value < 0:
-                yield "error", where, f"negative {name} {value:g}"
+                yield "error", place, f"negative {name} {value:g}"
         if joint.lower is not None and joint.upper is not None and joint.lower > joint.upper:
-            yield "error", where, f"lower limit {joint.lower:g} is above the upper one {joint.upper:g}"
+            yield "error", place, f"lower limit {joint.lower:g} is above the upper one {joint.upper:g}"
     for name, what in (
         ("damping", "some engines leave it out of their dynamics"),
         ("friction", "engines leave it out or make it a soft constraint"),
@@ -92,25 +93,25 @@ def _urdf(file: RobotFile, robot: Robot) -> Iterator[_Noticed]:
     for element in file.root.iter():
         for child in element:
             if element.tag in _KNOWN and child.tag not in _KNOWN[element.tag]:
-                where = f"{element.tag} {element.get('name', '')}".strip()
-                yield "warning", where, f"the specification has no <{child.tag}> here"
+                place = f"{element.tag} {element.get('name', '')}".strip()
+                yield "warning", place, f"the specification has no <{child.tag}> here"
     for joint in file.root.findall("joint"):
         yield from _urdf_joint(joint)
 
 
 def _urdf_joint(joint: Element) -> Iterator[_Noticed]:
-    where, kind = f"joint {joint.get('name')}", joint.get("type")
+    place, kind = f"joint {joint.get('name')}", joint.get("type")
     axis, limit = joint.find("axis"), joint.find("limit")
     if axis is not None and kind not in {"fixed", "spherical"}:
         length = math.hypot(*numbers(axis, "xyz", "1 0 0", 3))
         if abs(length - 1) > _UNIT:
-            yield "warning", where, f"its axis has length {length:.6g}, not 1"
+            yield "warning", place, f"its axis has length {length:.6g}, not 1"
     if kind == "spherical":
-        yield "warning", where, "the specification has no spherical joints; few engines read them"
+        yield "warning", place, "the specification has no spherical joints; few engines read them"
     if kind in {"revolute", "prismatic"} and limit is None:
-        yield "warning", where, f"a {kind} joint needs <limit>; engines refuse it or take it as unlimited"
+        yield "warning", place, f"a {kind} joint needs <limit>; engines refuse it or take it as unlimited"
     if kind == "fixed" and joint.find("mimic") is not None:
-        yield "warning", where, "a fixed joint cannot follow another; some engines refuse the file"
+        yield "warning", place, "a fixed joint cannot follow another; some engines refuse the file"
 
 
 def _closed(file: RobotFile) -> Iterator[_Noticed]:

@@ -83,10 +83,10 @@ def _add(
     root = copy.deepcopy(root)
     root.tag = "mujoco"
     if root.find(".//include") is not None:
-        own = len(root.findall("worldbody"))
+        count = len(root.findall("worldbody"))
         _include(root, path, file.parent, inside, (file,))
         _merge_defaults(root)
-        if len(root.findall("worldbody")) > own:
+        if len(root.findall("worldbody")) > count:
             _merge_worlds(root)
     contained = names_files_inside(root, file.parent, inside)
     for part in ("actuator", "extension"):
@@ -142,19 +142,19 @@ def _merge_defaults(root: Element) -> None:
     must not follow an inner class.
     """
     whole, *others = root.findall("default") or [Element("default")]
-    for other in others:
-        inherits, plain = whole.find("default") is not None, [each for each in other if each.tag != "default"]
-        if other.get("class", "main") != whole.get("class", "main") or (inherits and plain):
-            whole = other
+    for included in others:
+        inherits, plain = whole.find("default") is not None, [child for child in included if child.tag != "default"]
+        if included.get("class", "main") != whole.get("class", "main") or (inherits and plain):
+            whole = included
             continue
-        for each in plain:
-            given = whole.find(each.tag)
-            if given is None or len(given) or len(each):
-                whole.append(each)
+        for child in plain:
+            present = whole.find(child.tag)
+            if present is None or len(present) or len(child):
+                whole.append(child)
             else:
-                given.attrib |= each.attrib
-        whole.extend(other.findall("default"))
-        root.remove(other)
+                present.attrib |= child.attrib
+        whole.extend(included.findall("default"))
+        root.remove(included)
 
 
 def _merge_worlds(root: Element) -> None:

@@ -61,8 +61,8 @@ def _classes(root: Element, tag: str) -> dict[str, dict[str, str]]:
     def collect(default: Element, outer: dict[str, str]) -> None:
         name = default.get("class", _MAIN)
         classes[name] = classes.get(name, {}) | outer
-        for given in default.findall(tag):
-            classes[name] |= given.attrib
+        for element in default.findall(tag):
+            classes[name] |= element.attrib
         for inner in default.findall("default"):
             collect(inner, classes[name])
 

@@ -91,7 +91,7 @@ def compiled_robot(worker: Worker, file: RobotFile, written: Path, time_limit: f
     for name, part in (*robot.bodies.items(), *joints, *((item.joint, item) for item in robot.mimics)):
         for key, value in vars(part).items():
             endless = not isinstance(value, str) and not np.isfinite(np.nan if value is None else value).all()
-            if endless and key not in {"lower", "upper"}:  # most joints have no limits
+            if endless and key not in {"lower", "upper", "effort", "speed"}:  # most joints have no limits
                 raise InputError(f"{file.path}: {key} of {name}", "nan", "numbers must be finite")
     return robot, Compiler(*answer["by"])
 

@@ -35,7 +35,7 @@ def remove_meshes(root: Element, shapes: Sequence[Classed], folder: Path, inside
     """
     inferred = any(compiler.get("inertiafromgeom") == "true" for compiler in root.iter("compiler"))
     meshes, strip = _mesh_folder(root, folder)
-    given = {name for mesh in root.iter("mesh") if mesh.get("vertex") and (name := _mesh_name(mesh))}
+    inline = {name for mesh in root.iter("mesh") if mesh.get("vertex") and (name := _mesh_name(mesh))}
     named = {_mesh_name(mesh): mesh for mesh in root.iter("mesh") if mesh.get("file")}
     if strip:
         for mesh in named.values():
@@ -44,13 +44,13 @@ def remove_meshes(root: Element, shapes: Sequence[Classed], folder: Path, inside
     used: set[str] = set()
     lost: Counter[Element] = Counter()
     for shape in shapes:
-        wanted, body = shape.given.get("mesh"), shape.body
-        if wanted is None:
+        mesh_name, body = shape.given.get("mesh"), shape.body
+        if mesh_name is None:
             continue
         weighed = body.tag == "body" and (inferred or body.find("inertial") is None)
-        target = required_file(meshes, named[wanted], inside) if weighed and wanted in named else None
-        if weighed and (wanted in given or (target is not None and target.is_file())):
-            used.add(wanted)
+        target = required_file(meshes, named[mesh_name], inside) if weighed and mesh_name in named else None
+        if weighed and (mesh_name in inline or (target is not None and target.is_file())):
+            used.add(mesh_name)
         else:
             shape.parent.remove(shape.element)
             lost[body] += weighed

@@ -75,6 +75,8 @@ class RobotJoint:
         stiffness: spring torque per coordinate [N m/rad or N/m].
         rest: coordinate at which the spring is at rest [rad or m].
         lower, upper: limits of the coordinate [rad or m]; None: there is none.
+        effort: largest size of its drive's effort [N m or N]; None: none is given.
+        speed: largest velocity of its drive [rad/s or m/s]; None: none is given.
         actuated: True if an actuator acts on the joint.
         turning: True if the armature of a free joint acts along the body's axes, False: along the world's.
     """
@@ -94,6 +96,8 @@ class RobotJoint:
     rest: float = 0.0
     lower: float | None = None
     upper: float | None = None
+    effort: float | None = None
+    speed: float | None = None
     actuated: bool = False
     turning: bool = False
 

@@ -29,7 +29,7 @@ def open_robot(path: Path, base: str = "fixed", root: Path | None = None, expand
     require_known("base", base, BASES)
     with error_location(str(path)):
         # Path.resolve() fails at a loop of links
-        inside, file = (Path(os.path.realpath(each)) for each in (path.parent if root is None else root, path))
+        inside, file = (Path(os.path.realpath(item)) for item in (path.parent if root is None else root, path))
         if not file.is_relative_to(inside):
             advice = f"{path.name} is in {file.parent}, not in this folder; name one that holds it with --root"
             raise InputError("--root", inside, advice)
@@ -37,12 +37,13 @@ def open_robot(path: Path, base: str = "fixed", root: Path | None = None, expand
 
 
 def _opened(path: Path, base: str, inside: Path, expand: Expand | None) -> RobotFile:
-    root = read_xml(path)
+    root, driven = read_xml(path), dict[str, float]()
     if root.tag == "robot":
         _require_plain(root, path)
         if base == "free":
             urdf.rename_world(root)
         contained = names_files_inside(root, path.resolve().parent, inside)
+        driven = urdf.driven_joints(root)
         kind, (root, remarks), body = "urdf", urdf.neutral_urdf(root), "link"
     elif root.tag in {"mujoco", "mujocoinclude"}:
         kind, (root, remarks, contained), body = "mjcf", mjcf.neutral_mjcf(root, path, inside, expand), "body"
@@ -51,7 +52,7 @@ def _opened(path: Path, base: str, inside: Path, expand: Expand | None) -> Robot
     count = sum(1 for _ in root.iter(body))
     if count > MOST_BODIES:
         raise InputError("file", path, f"it has {count} {body}s; at most {MOST_BODIES} are checked")
-    return RobotFile(path, kind, root, base, tuple(remarks), contained)
+    return RobotFile(path, kind, root, base, tuple(remarks), contained, driven)
 
 
 def _require_plain(root: Element, path: Path) -> None:

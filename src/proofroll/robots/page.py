@@ -11,7 +11,7 @@ import numpy as np
 from proofroll.report.pages import environment, rendered
 from proofroll.robots.layers import SHORT
 from proofroll.robots.records import AgainstCheck, RobotCheck
-from proofroll.robots.terminal import amount, sentences
+from proofroll.robots.terminal import amount, rounded_line, sentences
 
 if TYPE_CHECKING:
     import jinja2
@@ -19,12 +19,15 @@ if TYPE_CHECKING:
 # World directions to the right and upwards in the picture, which shows the robot from the front left and above.
 _RIGHT, _UP = np.array([-0.64, 0.77, 0.0]), np.array([-0.26, -0.22, 0.94])
 _SIZE = 400.0
+# Part of the square that stays free at each edge; half of the piece of an axis, relative to the robot; world's axes.
+_EDGE, _AXIS, _FRAME = 0.08, 0.09, 26.0
 
 
 def page(content: RobotCheck) -> str:
     """HTML page of a check; all text from the file and the engines is escaped."""
     pair = isinstance(content, AgainstCheck)
     parts = {"pair": pair, "short": SHORT, "skeleton": skeleton(content), "sentences": lambda row: list(sentences(row))}
+    parts["rounded_line"] = rounded_line
     return rendered(_templates(), "check.html", content=content, **parts)
 
 
@@ -36,27 +39,54 @@ def _templates() -> jinja2.Environment:
 
 
 def skeleton(content: RobotCheck) -> dict[str, Any]:
-    """The robot at rest coordinates as lines between the origins of its bodies, in a square of 400 units.
+    """The robot with all coordinates at 0, seen from the front left and above, in a square that it fills.
 
     Returns:
-        ``lines``: ends x1, y1, x2, y2, the joint's data, and ``wrong``: True if an engine differs there; ``marks``: x,
-        y, joint, body, and the engines in which the body differs or is absent; ``size``: side of the square.
+        ``lines``: x1, y1, x2, y2 of each joint from the origin of its parent over its position to the origin of its
+        child, the joint's data, and ``wrong``: True if an engine differs there; ``axes``: ends of a piece of each
+        axis; ``centres``: x, y, arm from the body's joint, body and mass of each centre of mass; ``marks``: x, y,
+        joint, body, and the engines in which the body differs or is absent; ``frame``: ends of the world's axes,
+        each with its name; ``size``: side of the square.
     """
-    flat = {name: np.array([_RIGHT, -_UP]) @ body.position for name, body in content.robot.bodies.items()}
-    points = np.array([*flat.values()])
-    low, span = points.min(axis=0), float(np.ptp(points, axis=0).max()) or 1.0
-    shift = (1 - np.ptp(points, axis=0) / span) / 2
-    place = {name: (0.06 + 0.88 * ((point - low) / span + shift)) * _SIZE for name, point in flat.items()}
+    robot = content.robot
+    points = [body.position for body in robot.bodies.values()]
+    points += [body.centre for body in robot.bodies.values() if body.mass > 0]
+    points += [joint.position for joint in robot.joints]
+    view = np.array([_RIGHT, -_UP])
+    extent = float(np.ptp(np.array(points) @ view.T, axis=0).max()) or 1.0
+    # The ends of axes belong to the picture, too: a robot of one body has an extent by them alone.
+    pieces = {
+        joint.name: np.array(joint.position) + np.outer([-_AXIS * extent, _AXIS * extent], joint.axis)
+        for joint in robot.joints
+        if joint.axis is not None
+    }
+    flat = np.concatenate([np.array(points), *pieces.values()]) @ view.T
+    low, spans = flat.min(axis=0), np.ptp(flat, axis=0)
+    span = float(spans.max()) or 1.0
+    shift = (1 - spans / span) / 2
+
+    def place(point: Any) -> list[float]:
+        inside = (view @ np.asarray(point) - low) / span + shift
+        return [float(value) for value in ((_EDGE + (1 - 2 * _EDGE) * inside) * _SIZE).round(1)]
+
     wrong: dict[str, list[str]] = {}
     for row in content.engines:
         for offending in row.offending:
             wrong.setdefault(offending, []).append(row.engine)
-    lines, marks = [], []
-    for joint in content.robot.joints:
-        x2, y2 = place[joint.child].round(1).tolist()
-        x1, y1 = place.get(joint.parent, place[joint.child]).round(1).tolist()
+    lines, marks, axes, centres = [], [], [], []
+    for joint in robot.joints:
+        child = robot.bodies[joint.child]
+        begin = place(robot.bodies[joint.parent].position if joint.parent in robot.bodies else joint.position)
+        middle, end = place(joint.position), place(child.position)
         engines = wrong.get(joint.name, [])
-        lines.append({"x1": x1, "y1": y1, "x2": x2, "y2": y2, **vars(joint), "wrong": bool(engines)})
+        lines.append({"points": [begin, middle, end], "at": middle, **vars(joint), "wrong": bool(engines)})
+        if joint.name in pieces:
+            axes.append(
+                {"ends": [place(point) for point in pieces[joint.name]], "kind": joint.kind, "name": joint.name}
+            )
+        if child.mass > 0:
+            centres.append({"at": place(child.centre), "arm": middle, "body": joint.child, "mass": child.mass})
         if engines:
-            marks.append({"x": x2, "y": y2, "joint": joint.name, "body": joint.child, "engines": engines})
-    return {"lines": lines, "marks": marks, "size": _SIZE}
+            marks.append({"at": middle, "joint": joint.name, "body": joint.child, "engines": engines})
+    tips = [(name, (view @ direction * _FRAME).tolist()) for name, direction in zip("xyz", np.eye(3), strict=True)]
+    return {"lines": lines, "axes": axes, "centres": centres, "marks": marks, "frame": tips, "size": _SIZE}

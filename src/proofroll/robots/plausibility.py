@@ -64,20 +64,24 @@ def _urdf_angles(file: RobotFile, robot: Robot) -> Iterator[tuple[str, str, str]
         for origin in owner.iter("origin"):
             turns = [abs(turn) for turn in floats(origin.get("rpy", "0"))]
             if max(turns) > _TURNS[0]:
-                where = f"{owner.tag} {owner.get('name')}"
-                yield "warning", where, f"rpy {origin.get('rpy')}: angles are radians"
+                place = f"{owner.tag} {owner.get('name')}"
+                yield "warning", place, f"rpy {origin.get('rpy')}: angles are radians"
 
 
 def _mjcf_joints(file: RobotFile) -> Iterator[tuple[str, str, str]]:
     degrees = not any(compiler.get("angle") == "radian" for compiler in file.root.iter("compiler"))
-    for joint, given in with_classes(file.root, "joint"):
-        where = f"joint {joint.get('name')}"
-        if given.get("type") == "free":
-            laws = [name for name in _LAWS if name not in joint.attrib and any(floats(given.get(name, "0")))]
+    for joint, attributes in with_classes(file.root, "joint"):
+        place = f"joint {joint.get('name')}"
+        if attributes.get("type") == "free":
+            laws = [name for name in _LAWS if name not in joint.attrib and any(floats(attributes.get(name, "0")))]
             if laws:
-                words = f"it inherits {' and '.join(f'{law} {given[law]}' for law in laws)} from a default class"
-                yield "warning", where, f"{words}, which acts on the flight of the body; write <freejoint/>"
-        elif given.get("type", "hinge") == "hinge" and degrees and "range" in given:
-            bounds = [abs(bound) for bound in floats(given["range"])]
+                words = f"it inherits {' and '.join(f'{law} {attributes[law]}' for law in laws)} from a default class"
+                yield "warning", place, f"{words}, which acts on the flight of the body; write <freejoint/>"
+        elif attributes.get("type", "hinge") == "hinge" and degrees and "range" in attributes:
+            bounds = [abs(bound) for bound in floats(attributes["range"])]
             if any(abs(bound - angle) < 0.005 for bound in bounds for angle in _IN_RADIANS):
-                yield "warning", where, f'range {given["range"]} is in degrees; radians need <compiler angle="radian"/>'
+                yield (
+                    "warning",
+                    place,
+                    f'range {attributes["range"]} is in degrees; radians need <compiler angle="radian"/>',
+                )

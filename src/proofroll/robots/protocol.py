@@ -165,7 +165,7 @@ class AtState:
 
 
 def evaluate(
-    request: Request, joints: tuple[str, ...], dofs: tuple[int, ...], at: Callable[[int], AtState]
+    request: Request, joints: tuple[str, ...], dofs: tuple[int, ...], state_at: Callable[[int], AtState]
 ) -> dict[str, Any]:
     """Arrays ``M``, ``g``, ``h``, ``inverse`` and ``forward`` of a :class:`Reading`, evaluated state by state.
 
@@ -173,12 +173,12 @@ def evaluate(
         request: the request.
         joints: the engine's moving joints in the order of its velocities.
         dofs: number of velocities of each.
-        at: puts the engine into the state of this index; its ``inverse`` and ``forward`` are called before the next.
+        state_at: puts the engine into the state of this index; ``inverse`` and ``forward`` are called before the next.
     """
     rows: dict[str, list[Array]] = {"M": [], "g": [], "h": [], "inverse": [], "forward": []}
     asked = [_stack(rates, joints, dofs) for rates in (request.states.acceleration, request.torques)]
     for index in range(request.states.count):
-        state = at(index)
+        state = state_at(index)
         acceleration, torque = (rates[index] for rates in asked)
         T = state.T
         rows["M"].append(T.T @ state.M @ T)
@@ -187,8 +187,8 @@ def evaluate(
         if state.inverse is not None:
             rows["inverse"].append(T.T @ np.asarray(state.inverse(T @ acceleration + state.drift)))
         if state.forward is not None:
-            own = np.asarray(state.forward(np.linalg.solve(T.T, torque)))
-            rows["forward"].append(np.asarray(np.linalg.solve(T, own - state.drift), dtype=np.float64))
+            reached = np.asarray(state.forward(np.linalg.solve(T.T, torque)))
+            rows["forward"].append(np.asarray(np.linalg.solve(T, reached - state.drift), dtype=np.float64))
     return {name: np.array(values) if values else None for name, values in rows.items()}
 
 

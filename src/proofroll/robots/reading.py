@@ -203,10 +203,10 @@ def write(file: RobotFile, folder: Path) -> Path:
     return target
 
 
-def options_of(given: Mapping[str, Any], engine: str) -> dict[str, bool]:
+def options_of(written: Mapping[str, Any], engine: str) -> dict[str, bool]:
     """Options of an engine as booleans. Raises InputError if a value is neither true nor false."""
     options = {}
-    for key, value in given.items():
+    for key, value in written.items():
         if str(value).lower() not in {"true", "false"}:
             raise InputError(f"{engine}: {key}", value, "write true or false")
         options[key] = str(value).lower() == "true"

@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
+from proofroll.report.labels import engine_title
 from proofroll.robots.explain import RobotCause
 from proofroll.robots.protocol import Whole
 from proofroll.robots.robot_file import LintRemark
@@ -57,13 +58,13 @@ class ImporterRow:
     @property
     def differs(self) -> bool:
         """True if the engine holds a different model, or none, for a reason that is not accepted."""
-        known = self.status == "explained" and (self.fed or self.accepted)
-        return self.status not in {"holds", "missing"} and not known
+        excused = self.status == "explained" and (self.fed or self.accepted)
+        return self.status not in {"holds", "missing"} and not excused
 
     @property
     def named(self) -> str:
         """The engine with its version."""
-        return f"{self.engine} {self.version or ''}".strip()
+        return f"{engine_title(self.engine)} {self.version or ''}".strip()
 
 
 @dataclass(frozen=True)
@@ -79,20 +80,26 @@ class UsedTruth:
 
 @dataclass(frozen=True)
 class DrawnBody:
-    """Position of a body at rest coordinates [m], and its mass [kg]."""
+    """Position of a body and of its centre of mass with all coordinates at 0 [m], and its mass [kg]."""
 
     position: list[float]
+    centre: list[float]
     mass: float
 
 
 @dataclass(frozen=True)
 class DrawnJoint:
-    """Name, kind and bodies of a joint."""
+    """Name, kind and bodies of a joint, its position with all coordinates at 0 [m], and the direction of its axis.
+
+    ``axis`` is None where the joint has none: it is fixed, spherical or free.
+    """
 
     name: str
     kind: str
     parent: str
     child: str
+    position: list[float]
+    axis: list[float] | None
 
 
 @dataclass(frozen=True)
@@ -137,7 +144,10 @@ class AgainstCheck(RobotCheck):
         against_by: clause on whose reading gives the second file its meaning.
         matched: joint of the first file -> its partner in the second.
         absent, added: moving joints that only the first file has, or only the second.
-        values: values of joints that differ.
+        values: values of joints that differ by more than the rounding of written digits.
+        rounded: values of joints that differ by at most one unit of the last digit with which one is written.
+        proposed: argument of ``--map`` that gives lonely joints partners of the same kind and place; empty: none does.
+        proposed_partners: joint of the first file -> the partner that it would have.
     """
 
     against: str
@@ -146,6 +156,9 @@ class AgainstCheck(RobotCheck):
     absent: list[str]
     added: list[str]
     values: list[UnlikeValue]
+    rounded: list[UnlikeValue]
+    proposed: str
+    proposed_partners: Mapping[str, str]
 
 
 @dataclass(frozen=True)

@@ -40,6 +40,8 @@ class RobotFile:
         base: support of the root of a URDF, ``fixed`` or ``free``; an MJCF has its own.
         remarks: remarks on omissions and changes.
         contained: True if all files that it names, textures included, lie in the folder that files are read from.
+        driven: joints to which transmissions of a URDF lead, with their reductions (turns of the motor per turn of the
+            joint); empty: it has none, and says nothing of drives.
     """
 
     path: Path
@@ -48,6 +50,7 @@ class RobotFile:
     base: str = "fixed"
     remarks: tuple[LintRemark, ...] = ()
     contained: bool = True
+    driven: Mapping[str, float] = dataclasses.field(default_factory=dict, hash=False)
 
 
 # Function: name -> content of a file (first) and of the files that it attaches -> content with macros written out.
@@ -142,7 +145,7 @@ def names_files_inside(root: Element, folder: Path, inside: Path) -> bool:
     """True if all files that are named lie in the folder ``inside`` or below, in every folder they may refer to."""
     folders = {folder, *(folder / element.get(key, "") for element in root.iter("compiler") for key in _FOLDERS)}
     names = {name for element in root.iter() for key in _FILES if (name := element.get(key)) and _ADDRESS not in name}
-    return all(file_inside(one, name, inside) is not None for one in folders for name in names)
+    return all(file_inside(place, name, inside) is not None for place in folders for name in names)
 
 
 def required_file(folder: Path, element: Element, inside: Path) -> Path:

@@ -1,84 +1,56 @@
-"""A robot file as a scene: its tree of links, released from a random pose under gravity.
+"""A robot file as a scene, released from a random pose under gravity.
 
-Links connected by fixed joints are one body, in the frame of the child of its moving joint. Constraints that close the
-tree are loops and couplings; joints in them start near the file's pose, at rest. Contacts and looks are left
-out; actuators of an MJCF act if the scene's parameter ``actuators`` is 1.
+Contacts and looks are left out; actuators of an MJCF act if the scene's parameter ``actuators`` is 1.
 """
 
-from collections.abc import Iterator, Mapping
-from functools import partial
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, ClassVar
-from xml.etree.ElementTree import Element, tostring
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
-from proofroll.core.errors import InputError
-from proofroll.elements.mechanism.joint import LAWS
-from proofroll.elements.mechanism.rotations import to_rpy
 from proofroll.robots.actuators import scene_actuators
-from proofroll.robots.meaning import opened, robot_of_text
-from proofroll.robots.model import NO_BODY, Array, Mimic, Robot, RobotJoint, RobotLoop, Tie
+from proofroll.robots.controlled import ControlledScenes
+from proofroll.robots.model import Robot
 from proofroll.robots.opening import BASES
 from proofroll.robots.robot_file import RobotFile
-from proofroll.robots.states import RobotStates, random_states
+from proofroll.robots.scene_tables import ENDINGS, SWITCH, ParameterRow, described, laws, read_robot, tables_of
+from proofroll.robots.states import random_states
 
 _DURATION = 1.0  # s: an arm falls through much of its reach, and few are chaotic so early
-_NEAR = 0.2  # part of a random coordinate that a guess of a closed pose is away from the file's pose, which is closed
-# Parameters: default, unit, meaning, bounds.
-_RELEASE: dict[str, tuple[float, str, str, dict[str, Any]]] = {
+_RELEASE: dict[str, ParameterRow] = {
     "seed": (0, "1", "which random pose and velocities the robot is released with", {"at_least": 0, "integer": True}),
     "speed": (1.0, "1", "largest random velocity of a joint in rad/s or m/s", {"at_least": 0}),
-}
-_SWITCH: dict[str, Any] = {"at_least": 0, "at_most": 1, "integer": True}
-_FACTORS = {
-    "damping": "damping of the joints in parts of the file's",
-    "friction": "dry friction of the joints in parts of the file's",
-    "armature": "armature of the joints in parts of the file's",
-    "stiffness": "stiffness of the joints in parts of the file's",
 }
 
 
 class RobotScenes:
     """Scenes from robot files; see :class:`proofroll.files.scene_sources.SceneSource`."""
 
-    endings: ClassVar[tuple[str, ...]] = (".urdf", ".xml")
+    endings: ClassVar[tuple[str, ...]] = ENDINGS
+
+    @staticmethod
+    def under(control: Path) -> Any:
+        """See :class:`proofroll.files.scene_sources.TakesControllers`."""
+        return ControlledScenes(control)
 
     @staticmethod
     def content(path: Path) -> dict[str, Any]:
         """Title, source and parameters of a robot's scene."""
-        file, robot = _robot(path, "fixed")
-        parameters = dict(_RELEASE)
-        gravity = float(np.linalg.norm(robot.gravity))
-        parameters["gravity"] = (gravity, "m/s^2", "acceleration of gravity", {"at_least": 0})
-        if file.kind == "urdf":
-            parameters["free_base"] = (0, "1", "whether nothing holds the root (1), or the world does (0)", _SWITCH)
-        for law, words in _FACTORS.items():
-            if any(getattr(joint, law) for joint in robot.moving):
-                parameters[law] = (1.0, "1", words, {"at_least": 0})
+        file, robot = read_robot(path, "fixed")
+        parameters = dict(_RELEASE) | _parameters(file, robot)
         left_out = ["contacts"]
         if any(len(part) for part in file.root.findall("actuator")):
             words = "whether the file's actuators act, with their controls at zero (1), or not (0)"
-            parameters["actuators"] = (0, "1", words, _SWITCH)
+            parameters["actuators"] = (0, "1", words, SWITCH)
             left_out.append("actuators (unless actuators=1)")
-        if any(joint.lower is not None or joint.upper is not None for joint in robot.moving):
-            parameters["limits"] = (0, "1", "whether the joints have their stops (1) or turn through them (0)", _SWITCH)
+        if "limits" in parameters:
             left_out.append("stops of joints (unless limits=1)")
-        parameters["couplings"] = (1, "1", "whether what couples joints besides the tree is asked for", _SWITCH)
-        if any(body.impossible for body in robot.bodies.values()):
-            words = "whether each link must be physically possible (1), or only all that a joint moves together (0)"
-            parameters["possible"] = (1, "1", words, _SWITCH)
         return {
             "title": f"{robot.name}, released from a random pose",
-            "source": f"{path.name}, {file.kind.upper()}",
             "reason": f"How engines move this robot; without {', '.join(left_out)}",
             "duration": _DURATION,
-            "parameters": {
-                name: {"value": value, "unit": unit, "meaning": words, "source": path.name, **bounds}
-                for name, (value, unit, words, bounds) in parameters.items()
-            },
-        }
+        } | described(file, parameters)
 
     @staticmethod
     def tables(path: Path, values: Mapping[str, float]) -> dict[str, Any]:
@@ -87,179 +59,26 @@ class RobotScenes:
         Raises:
             InputError: nothing in the file moves, or a link has an impossible inertia.
         """
-        file, robot = _robot(path, BASES[int(values.get("free_base", 0))])
-        if not robot.moving:
-            hint = "; try --set free_base=1" if file.kind == "urdf" and not values["free_base"] else ""
-            raise InputError("file", path, f"nothing in it moves{hint}")
-        for link, body in robot.bodies.items() if values.get("possible") else ():
-            if body.impossible:
-                advice = f"it {body.impossible}; correct it, or take what each joint moves as a whole by possible=0"
-                raise InputError(f"{path}: <link {link}> inertia", body.moments.tolist(), advice)
-        start = random_states(robot, 1, int(values["seed"]))
-        names = _names(robot)
-        held = bool(values["couplings"])
-        following = _following(robot) if held else frozenset()
-        gravity = robot.gravity if robot.gravity.any() else np.array([0.0, 0.0, -1.0])
-        bodies = [(names[joint.child], robot.groups[joint.name]) for joint in robot.moving]
-        carriers = {robot.welded[joint.parent][0] for joint in robot.moving}
+        file, robot = read_robot(path, BASES[int(values.get("free_base", 0))])
         acting, silent = scene_actuators(file.root, robot) if values.get("actuators") else ([], [])
-        return {
-            "gravity": {"magnitude": values["gravity"], "direction": gravity.tolist()},
-            "bodies": [
-                {"name": name, "mass": body.mass, "com": body.com.tolist(), "inertia": body.inertia.tolist()}
-                for name, body in bodies
-            ],
-            "joints": [
-                _joint(robot, joint, names, start, values) | (_guess(joint, start) if joint.name in following else {})
-                for joint in robot.moving
-            ],
-            "loops": [_loop(robot, loop, names) for loop in robot.loops] if held else [],
-            "points": [
-                {"name": name, "body": name, "position": body.com.tolist()}
-                for joint, (name, body) in zip(robot.moving, bodies, strict=True)
-                if joint.name not in carriers
-            ],
-            "actuators": acting,
-            "couplings": list(_coupled(robot)) if held else [],
-            "unmodelled": [
-                *(f"{what} (actuators=0 leaves all out)" for what in silent),
-                *(f"{what} (couplings=0 leaves it out)" for what in _couplings(file, robot) if held),
-                *(
-                    f"the {law} of the {joint.kind} joint {joint.name} ({law}=0 leaves all out)"
-                    for joint in robot.moving
-                    for law in _FACTORS
-                    if values.get(law, 0) * getattr(joint, law) and joint.kind not in LAWS[law]
-                ),
-            ],
-        }
+        clauses = [f"{what} (actuators=0 leaves all out)" for what in silent]
+        tables = tables_of(file, robot, random_states(robot, 1, int(values["seed"])), values)
+        return tables | {"actuators": acting, "unmodelled": [*clauses, *tables["unmodelled"]]}
+
+    @staticmethod
+    def judge_record(record: Path, robot: Path, control: Path, names: Mapping[str, str] | None = None) -> Any:
+        """See :class:`proofroll.files.scene_sources.JudgesRecords`."""
+        from proofroll.robots.control_judge import judge_record
+
+        return judge_record(record, robot, control, names)
 
 
-def _robot(path: Path, base: str) -> tuple[RobotFile, Robot]:
-    file = opened(path, base)
-    return file, robot_of_text(file.path, file.kind, base, tostring(file.root, "utf-8"))
-
-
-def _names(robot: Robot) -> dict[str, str]:
-    """Link -> name of its body in the scene; a link called ``world`` is renamed, as a scene has its own ``world``."""
-    names = {joint.child: joint.child for joint in robot.moving}
-    if "world" in names:
-        free = ("world_link" + "_" * number for number in range(len(robot.bodies) + 1))
-        names["world"] = next(name for name in free if name not in robot.bodies)
-    return names
-
-
-def _joint(
-    robot: Robot, joint: RobotJoint, names: Mapping[str, str], start: RobotStates, values: Mapping[str, float]
-) -> dict[str, Any]:
-    """Scene table of a joint; its ends are the scene's bodies, which may hold several links."""
-    home, p, R = robot.welded[joint.parent]
-    carrier = next((other.child for other in robot.moving if other.name == home), NO_BODY)
-    table: dict[str, Any] = {"name": joint.name, "kind": joint.kind}
-    table |= {"parent": "world" if home == NO_BODY else names[carrier], "child": names[joint.child]}
-    table["child_position"] = joint.child_position.tolist()
-    laws = {
-        law: values[law] * getattr(joint, law) for law in _FACTORS if joint.kind in LAWS[law] and getattr(joint, law)
+def _parameters(file: RobotFile, robot: Robot) -> dict[str, ParameterRow]:
+    """Parameters of a robot but for its start and its actuators."""
+    gravity = float(np.linalg.norm(robot.gravity))
+    parameters: dict[str, ParameterRow] = {
+        "gravity": (gravity, "m/s^2", "acceleration of gravity", {"at_least": 0}),
     }
-    v = values["speed"] * start.velocity[joint.name][0]
-    if joint.kind == "free":  # its coordinates are relative to the world, whatever its parent is
-        turned = start.rotation[joint.name][0]
-        q = [*start.position[joint.name][0], *_quaternion(turned)]
-        return table | laws | {"q0": q, "v0": [*(turned.T @ v[:3]), *(turned.T @ v[3:])]}
-    table["position"] = (p + R @ joint.position).tolist()
-    table["orientation"] = list(to_rpy(R @ joint.rotation))
-    if joint.kind == "spherical":
-        table |= {"q0": list(_quaternion(start.rotation[joint.name][0]))}
-    else:
-        table |= {"axis": joint.axis.tolist(), "q0": [float(start.angle[joint.name][0])], "rest": joint.rest}
-    table |= laws | {"v0": v.tolist()}
-    if values.get("limits") and joint.lower is not None and joint.upper is not None and joint.lower < joint.upper:
-        table["limits"] = [joint.lower, joint.upper]
-    return table
-
-
-def _quaternion(R: Array) -> Any:
-    return Rotation.from_matrix(R).as_quat(scalar_first=True).tolist()
-
-
-def _coupled(robot: Robot) -> Iterator[dict[str, Any]]:
-    """Tables of couplings for joints that follow another one."""
-    for mimic in robot.mimics:
-        if _follows(robot, mimic):
-            ends = {"joint_a": mimic.other, "joint_b": mimic.joint}
-            yield {"name": mimic.joint, **ends, "ratio": mimic.multiplier, "offset": mimic.offset}
-    for tie in filter(partial(_tied, robot), robot.ties):
-        yield {"name": tie.name, "joints": tie.joints, "coefficients": tie.coefficients, "offset": tie.value}
-
-
-def _follows(robot: Robot, mimic: Mimic) -> bool:
-    """True if a coupling of a scene can represent a mimic."""
-    dofs = {joint.name: joint.dofs for joint in robot.moving}
-    return bool(mimic.multiplier) and dofs.get(mimic.joint) == dofs.get(mimic.other) == 1
-
-
-def _tied(robot: Robot, tie: Tie) -> bool:
-    """True if a coupling of a scene can represent a tie."""
-    dofs = {joint.name: joint.dofs for joint in robot.moving}
-    return len(tie.joints) > 1 and all(tie.coefficients) and all(dofs.get(name) == 1 for name in tie.joints)
-
-
-def _following(robot: Robot) -> frozenset[str]:
-    """Moving joints whose start follows from loops and ties: those between the bodies of a loop, and those of a tie."""
-    by_child = {joint.child: joint for joint in robot.joints}
-
-    def carriers(body: str) -> set[str]:
-        found = set()
-        while body != NO_BODY:
-            joint = by_child[body]
-            body = joint.parent
-            found |= {joint.name} if joint.dofs else set()
-        return found
-
-    between = (carriers(loop.body_a) ^ carriers(loop.body_b) for loop in robot.loops)
-    tied = (set(tie.joints) for tie in robot.ties if _tied(robot, tie))
-    free = {joint.name for joint in robot.moving if joint.kind == "free"}
-    return frozenset(set().union(*between, *tied) - free)
-
-
-def _guess(joint: RobotJoint, start: RobotStates) -> dict[str, Any]:
-    """Keys of a joint whose start follows from loops: a guess near the pose of the file, where they are closed."""
-    if joint.kind == "spherical":
-        return {"dependent": True, "q0": [1.0, 0.0, 0.0, 0.0]}
-    return {"dependent": True, "q0": [_NEAR * float(start.angle[joint.name][0])]}
-
-
-def _loop(robot: Robot, loop: RobotLoop, names: Mapping[str, str]) -> dict[str, Any]:
-    """Scene table of a loop; its ends are the scene's bodies, which may hold several links."""
-    table: dict[str, Any] = {"name": loop.name, "kind": loop.kind}
-    turns = {}
-    for side, link, position in (("a", loop.body_a, loop.position_a), ("b", loop.body_b, loop.position_b)):
-        home, p, R = robot.welded[link]
-        carrier = next((joint.child for joint in robot.moving if joint.name == home), NO_BODY)
-        table |= {f"body_{side}": "world" if home == NO_BODY else names[carrier]}
-        table |= {f"position_{side}": (p + R @ position).tolist()}
-        turns[side] = R
-    if loop.kind == "fixed":
-        table["orientation"] = list(to_rpy(turns["a"] @ loop.rotation @ turns["b"].T))
-    return table
-
-
-def _couplings(file: RobotFile, robot: Robot) -> Iterator[str]:
-    """Clauses on what a scene leaves out: mimics, equality constraints, tendons, a viscous medium."""
-    for mimic in (mimic for mimic in robot.mimics if not _follows(robot, mimic)):
-        yield f"joint {mimic.joint} following {mimic.other} (mimic)"
-    if file.kind != "mjcf":
-        return
-    for name in (*robot.further, *(f"tendon {tie.name}" for tie in robot.ties if not _tied(robot, tie))):
-        yield f"the equality constraint {name}"
-    for tendons in file.root.iter("tendon"):
-        for item in tendons:
-            if any(item.get(key) not in {None, "0"} for key in ("stiffness", "damping", "frictionloss", "armature")):
-                yield f"the tendon {_called(item)}"
-    for option in file.root.iter("option"):
-        for key in ("density", "viscosity"):
-            if option.get(key) not in {None, "0"}:
-                yield f"a medium of {key} {option.get(key)}"
-
-
-def _called(item: Element) -> str:
-    return f"{item.tag} {item.get('name', '')}".strip()
+    if file.kind == "urdf":
+        parameters["free_base"] = (0, "1", "whether nothing holds the root (1), or the world does (0)", SWITCH)
+    return parameters | laws(robot)

@@ -43,7 +43,9 @@ class RobotStates:
 
     def first(self, count: int) -> RobotStates:
         """States restricted to the first ``count``."""
-        parts = {name: {joint: rows[:count] for joint, rows in each.items()} for name, each in vars(self).items()}
+        parts = {
+            name: {joint: rows[:count] for joint, rows in by_joint.items()} for name, by_joint in vars(self).items()
+        }
         return RobotStates(**parts)
 
     def stacked(self, rates: dict[str, Array], robot: Robot) -> Array:

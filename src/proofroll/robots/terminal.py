@@ -8,7 +8,7 @@ from rich.table import Column, Table
 from rich.text import Text
 
 from proofroll.core.number_format import counted, error
-from proofroll.report.labels import SYMBOLS
+from proofroll.report.labels import SYMBOLS, engine_title
 from proofroll.report.terminal.screen import numeric, plain_table, unbroken
 from proofroll.report.terminal.tables import STYLES
 from proofroll.robots.layers import SHORT
@@ -32,12 +32,12 @@ def check_parts(content: RobotCheck) -> Iterator[Table | str]:
 def table(content: RobotCheck) -> Table:
     """One line per engine: the difference at each layer that does not hold."""
     layers = numeric(*(SHORT[layer] for layer in content.layers))
-    first = "file" if isinstance(content, AgainstCheck) else "engine"
-    rows = plain_table(Column(first, no_wrap=True, max_width=20), *unbroken(""), *layers)
+    head = "file" if isinstance(content, AgainstCheck) else "engine"
+    rows = plain_table(Column(head, no_wrap=True, max_width=20), *unbroken(""), *layers)
     for row in content.engines:
         style = _COLOURS.get(row.status, "bold red")
         # The path of an interpreter would fill the column; the version identifies the engine.
-        name = row.engine.partition("@")[0] if "/" in row.engine else row.engine
+        name = engine_title(row.engine.partition("@")[0] if "/" in row.engine else row.engine)
         label = Text(one_line(f"{name} {row.version or ''}"), overflow="ellipsis")
         cells = (_cell(row.layers.get(layer)) for layer in content.layers)
         rows.add_row(label, Text(_MARKS.get(row.status, "!"), style=style), *cells)
@@ -70,9 +70,9 @@ def remark_lines(remarks: Sequence[LintRemark]) -> Iterator[str]:
     places: dict[tuple[str, str], list[str]] = {}
     for remark in remarks:
         places.setdefault((remark.level, remark.what), []).append(remark.where)
-    for (level, what), where in places.items():
-        more = f" and {len(where) - 2} more" if len(where) > 3 else ""
-        yield from wrapped(f"{level}: {', '.join(where[: 2 if more else 3])}{more}: {what}")
+    for (level, what), spots in places.items():
+        more = f" and {len(spots) - 2} more" if len(spots) > 3 else ""
+        yield from wrapped(f"{level}: {', '.join(spots[: 2 if more else 3])}{more}: {what}")
 
 
 def verdict_lines(content: RobotCheck) -> Iterator[str]:
@@ -80,7 +80,7 @@ def verdict_lines(content: RobotCheck) -> Iterator[str]:
     written: dict[str, list[str]] = {}
     for row in content.engines:
         if row.as_written:
-            written.setdefault(row.as_written, []).append(row.engine)
+            written.setdefault(row.as_written, []).append(engine_title(row.engine))
     if written:
         readings = "; ".join(f"{', '.join(names)}: {words}" for words, names in written.items())
         yield from wrapped(f"The file as it is: {readings}.")
@@ -92,21 +92,35 @@ def verdict_lines(content: RobotCheck) -> Iterator[str]:
 
 def against_lines(content: AgainstCheck) -> Iterator[str]:
     """Lines on partners of joints, joints that only one file has, and values that differ."""
-    first, second = (Path(name).name for name in (content.file, content.against))
-    if first == second:
-        first, second = content.file, content.against
-    yield from wrapped(f"what {second} says is {content.against_by}")
-    partners = [f"{one} is {two}" for one, two in content.matched.items() if one != two]
+    name_1, name_2 = (Path(name).name for name in (content.file, content.against))
+    if name_1 == name_2:
+        name_1, name_2 = content.file, content.against
+    yield from wrapped(f"what {name_2} says is {content.against_by}")
+    partners = [f"{ours} is {theirs}" for ours, theirs in content.matched.items() if ours != theirs]
     if partners:
         yield from wrapped(f"joints with another name there: {', '.join(partners)}")
-    for name, alone in ((first, content.absent), (second, content.added)):
+    for name, alone in ((name_1, content.absent), (name_2, content.added)):
         if alone:
             yield from wrapped(f"only in {name}: {', '.join(alone)}")
-    if content.absent and content.added:
+    if content.proposed:
+        pairs = ", ".join(f"{ours} is {theirs}" for ours, theirs in content.proposed_partners.items())
+        yield from wrapped(f"kinds and tree fit, names differ: try --map '{content.proposed}' ({pairs})")
+    elif content.absent and content.added:
         yield "joints of the same kind are matched by --map NAME=NAME"
     for value in content.values:
-        pair = (f"{_value(each)} in {name}" for each, name in ((value.here, first), (value.there, second)))
+        pair = (
+            f"{_value(value_there)} in {name}" for value_there, name in ((value.here, name_1), (value.there, name_2))
+        )
         yield from wrapped(f"joint {value.joint}: {value.quantity} {', '.join(pair)}")
+    if content.rounded:
+        yield from wrapped(rounded_line(content))
+
+
+def rounded_line(content: AgainstCheck) -> str:
+    """Sentence on the values that differ by the rounding of their last written digit."""
+    item = content.rounded[0]
+    example = f"{item.joint} {item.quantity} {item.here!r} and {item.there!r}"
+    return f"{counted(len(content.rounded), 'values')} differ by the last written digit alone: {example}"
 
 
 def _value(value: float | str | None) -> str:
@@ -154,7 +168,7 @@ def gallery_lines(content: GalleryContent) -> Iterator[str]:
         if row.file is None:
             yield from wrapped(f"{row.name}: not here: pip install {row.package}")
             continue
-        outcomes = (f"{item.engine}: {', '.join(item.outcome) or 'holds'}" for item in row.engines)
+        outcomes = (f"{engine_title(item.engine)}: {', '.join(item.outcome) or 'holds'}" for item in row.engines)
         yield from wrapped(f"{row.name}: {'; '.join(outcomes)}")
         for sentence in row.unexpected:
             yield from wrapped(f"!! {row.name}: {sentence}")

@@ -37,11 +37,11 @@ class Dynamics:
     @cached_property
     def singular(self) -> bool:
         """True if the mass matrix, every velocity scaled by its own inertia, has no inverse within round-off."""
-        own = np.sqrt(np.abs(np.diagonal(self.M, axis1=1, axis2=2)))
-        if not own.size or not own.min():
+        scales = np.sqrt(np.abs(np.diagonal(self.M, axis1=1, axis2=2)))
+        if not scales.size or not scales.min():
             return True
         try:  # Cholesky succeeds if all eigenvalues exceed the bound
-            np.linalg.cholesky(self.M / own[:, :, None] / own[:, None, :] - _SINGULAR * np.eye(own.shape[1]))
+            np.linalg.cholesky(self.M / scales[:, :, None] / scales[:, None, :] - _SINGULAR * np.eye(scales.shape[1]))
         except np.linalg.LinAlgError:
             return True
         return False
@@ -143,11 +143,11 @@ def world_jacobians(robot: Robot, states: RobotStates, frames: Frames | None = N
     return Dynamics(M + np.diag(armature(robot)), g, g + c + turned_armature(robot, v))
 
 
-def _summed(one: Array, other: Array) -> Array:
+def _summed(A: Array, B: Array) -> Array:
     """Sum of oneᵀ other over bodies, shape (states, any, any), of arrays of shape (bodies, states, 3, any)."""
-    left, right = (each.swapaxes(0, 1).reshape(each.shape[1], -1, each.shape[3]) for each in (one, other))
-    total = np.zeros((one.shape[1], one.shape[3], other.shape[3]))
-    rows = max(1, _ALONE // (one.shape[3] * other.shape[3]))
+    left, right = (array.swapaxes(0, 1).reshape(array.shape[1], -1, array.shape[3]) for array in (A, B))
+    total = np.zeros((A.shape[1], A.shape[3], B.shape[3]))
+    rows = max(1, _ALONE // (A.shape[3] * B.shape[3]))
     for start in range(0, left.shape[1], rows):
         total += left[:, start : start + rows].swapaxes(1, 2) @ right[:, start : start + rows]
     return total

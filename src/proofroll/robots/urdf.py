@@ -52,6 +52,23 @@ def neutral_urdf(root: Element) -> tuple[Element, list[LintRemark]]:
     return root, remarks
 
 
+def driven_joints(root: Element) -> dict[str, float]:
+    """Joints to which the transmissions of a URDF lead, with their reductions; 1 where none can be read."""
+    reductions = {}
+    for item in root.findall("transmission"):
+        for joint in item.findall("joint"):
+            if name := joint.get("name"):
+                reductions[name] = next((number for number in map(_reduction, item.iter("mechanicalReduction"))), 1.0)
+    return reductions
+
+
+def _reduction(element: Element) -> float:
+    try:
+        return float(element.text or "") or 1.0
+    except ValueError:
+        return 1.0
+
+
 def rename_world(root: Element) -> None:
     """Renames a root link called ``world``: some engines fix such a link to the ground."""
     carried = {child.get("link") for joint in root.iter("joint") for child in joint.findall("child")}
@@ -146,8 +163,8 @@ def _body(name: str, link: Element) -> tuple[RobotBody, dict[str, Any]]:
 def _joint(name: str, element: Element, links: dict[str, Element]) -> RobotJoint:
     kind = _KINDS.get(element.get("type", ""))
     if kind is None:
-        known = ", ".join(_KINDS)
-        raise InputError("type", element.get("type"), f"the check covers {known}")
+        kinds = ", ".join(_KINDS)
+        raise InputError("type", element.get("type"), f"the check covers {kinds}")
     ends = {}
     for end in ("parent", "child"):
         end_element = element.find(end)
@@ -170,7 +187,14 @@ def _joint(name: str, element: Element, links: dict[str, Element]) -> RobotJoint
         friction=0.0 if dynamics is None or kind == "fixed" else numbers(dynamics, "friction", "0", 1)[0],
         lower=numbers(limit, "lower", "0", 1)[0] if bounded and limit is not None else None,
         upper=numbers(limit, "upper", "0", 1)[0] if bounded and limit is not None else None,
+        effort=_of_drive(limit, "effort"),
+        speed=_of_drive(limit, "velocity"),
     )  # fmt: skip
+
+
+def _of_drive(limit: Element | None, key: str) -> float | None:
+    """Largest effort or velocity of a drive; None: none, or 0, which files write where they know none."""
+    return None if limit is None else numbers(limit, key, "0", 1)[0] or None
 
 
 def _ordered(joints: list[RobotJoint], links: dict[str, Element], base: str) -> tuple[RobotJoint, ...]:
@@ -213,16 +237,16 @@ def _direct(mimics: list[Mimic], robot: Robot) -> tuple[Mimic, ...]:
     kinds = {joint.name: joint.kind for joint in robot.moving}
     resolved = []
     for mimic in mimics:
-        factor, offset, other, seen = mimic.multiplier, mimic.offset, mimic.other, {mimic.joint}
-        while other in by_joint and other not in seen:
-            seen.add(other)
-            following = by_joint[other]
-            factor, offset, other = factor * following.multiplier, offset + factor * following.offset, following.other
-        if other not in {joint.name for joint in robot.joints}:
-            meant = [name for name in kinds if name != mimic.joint and name.endswith(other)]
+        factor, offset, leader, seen = mimic.multiplier, mimic.offset, mimic.other, {mimic.joint}
+        while leader in by_joint and leader not in seen:
+            seen.add(leader)
+            following = by_joint[leader]
+            factor, offset, leader = factor * following.multiplier, offset + factor * following.offset, following.other
+        if leader not in {joint.name for joint in robot.joints}:
+            meant = [name for name in kinds if name != mimic.joint and name.endswith(leader)]
             advice = f"; name the one that is meant, {choices(meant)}" if meant else "; name one that moves"
-            raise InputError(f"<joint {mimic.joint} mimic>", other, f"the file has no joint of this name{advice}")
-        if other in seen or kinds.get(other) not in {"revolute", "prismatic"}:
+            raise InputError(f"<joint {mimic.joint} mimic>", leader, f"the file has no joint of this name{advice}")
+        if leader in seen or kinds.get(leader) not in {"revolute", "prismatic"}:
             raise InputError(f"<joint {mimic.joint} mimic>", mimic.other, "name another joint that moves")
-        resolved.append(Mimic(mimic.joint, other, factor, offset))
+        resolved.append(Mimic(mimic.joint, leader, factor, offset))
     return tuple(resolved)

@@ -81,18 +81,18 @@ class RobotEvidence:
         root = copy.deepcopy(self.root)
         if not edit(root):
             return None
-        before, after = self.recompiled(self.root), self.recompiled(root)
-        robot = None if before is None or after is None else self.carried_over(before, with_weightless(after))
+        old, new = self.recompiled(self.root), self.recompiled(root)
+        robot = None if old is None or new is None else self.carried_over(old, with_weightless(new))
         return None if robot is None else EditedRobot.of(robot, root)
 
-    def carried_over(self, before: Robot, after: Robot) -> Robot | None:
-        """This robot with all values that differ from ``before`` to ``after``; None: none do."""
+    def carried_over(self, start: Robot, edited: Robot) -> Robot | None:
+        """This robot with all values that differ from ``start`` to ``edited``; None: none do."""
         robot = self.robot
-        bodies = [_moved(body, before.bodies.get(name), after.bodies.get(name)) for name, body in robot.bodies.items()]
-        old, new = ({joint.name: joint for joint in each.joints} for each in (before, after))
+        bodies = [_moved(body, start.bodies.get(name), edited.bodies.get(name)) for name, body in robot.bodies.items()]
+        old, new = ({joint.name: joint for joint in version.joints} for version in (start, edited))
         joints = tuple(_moved(joint, old.get(joint.name), new.get(joint.name)) for joint in robot.joints)
         parts = zip((*bodies, *joints), (*robot.bodies.values(), *robot.joints), strict=True)
-        if all(one is other for one, other in parts):
+        if all(part is rival for part, rival in parts):
             return None
         return robot.with_bodies(bodies).change(joints=joints)
 
@@ -104,11 +104,11 @@ def with_weightless(robot: Robot) -> Robot:
     return robot.with_bodies(RobotBody(name, 0.0, np.zeros(3), none) for name in light)
 
 
-def _moved(part: _Part, before: _Part | None, after: _Part | None) -> _Part:
-    """A body or joint with the values that differ from ``before`` to ``after``."""
-    if before is None or after is None:
+def _moved(part: _Part, old: _Part | None, new: _Part | None) -> _Part:
+    """A body or joint with the values that differ from ``old`` to ``new``."""
+    if old is None or new is None:
         return part
-    changed = {name: value for name, value in vars(after).items() if not np.array_equal(value, getattr(before, name))}
+    changed = {name: value for name, value in vars(new).items() if not np.array_equal(value, getattr(old, name))}
     return dataclasses.replace(part, **changed) if changed else part
 
 

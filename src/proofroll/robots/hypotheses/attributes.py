@@ -26,7 +26,7 @@ def _without(elements: Iterable[Element], *attributes: str) -> bool:
 
 def _defaults(root: Element, *tags: str) -> Iterable[Element]:
     """Elements of default classes."""
-    return (given for default in root.iter("default") for tag in tags for given in default.findall(tag))
+    return (element for default in root.iter("default") for tag in tags for element in default.findall(tag))
 
 
 @hypothesis({"pinocchio": "3.9.0 to 4.1.0"}, _REWRITE)
@@ -47,10 +47,12 @@ def euler_sequence_in_small_letters(evidence: RobotEvidence) -> Robot | None:
 
     def edit(root: Element) -> bool:
         capital = [
-            each for each in root.iter("compiler") if each.get("eulerseq", "") != each.get("eulerseq", "").lower()
+            compiler
+            for compiler in root.iter("compiler")
+            if compiler.get("eulerseq", "") != compiler.get("eulerseq", "").lower()
         ]
-        for each in capital:
-            each.set("eulerseq", each.get("eulerseq", "").lower())
+        for compiler in capital:
+            compiler.set("eulerseq", compiler.get("eulerseq", "").lower())
         return bool(capital)
 
     return evidence.edited(edit)
@@ -63,7 +65,7 @@ def inertia_groups_ignored(evidence: RobotEvidence) -> Robot | None:
 
 
 def _inertials(root: Element) -> list[tuple[str, Element]]:
-    return [(str(body.get("name")), given) for body in root.iter("body") for given in body.findall("inertial")]
+    return [(str(body.get("name")), inertial) for body in root.iter("body") for inertial in body.findall("inertial")]
 
 
 def _moments(inertial: Element) -> tuple[str, list[float]] | None:
@@ -85,26 +87,26 @@ def balance_ignored(evidence: RobotEvidence) -> Robot | None:
     if not _without(root.iter("compiler"), "balanceinertia"):
         return None
     for name, inertial in _inertials(root):
-        given = _moments(inertial)
-        if given is not None:
-            attribute, moments = given
+        principal = _moments(inertial)
+        if principal is not None:
+            attribute, moments = principal
             more[name] = 3 * max(map(abs, moments))
             raised = [moment + more[name] * (index < 3) for index, moment in enumerate(moments)]
             inertial.set(attribute, " ".join(map(repr, raised)))
-    before, after = evidence.recompiled(evidence.file.root), evidence.recompiled(root)
-    if before is None or after is None:
+    old, new = evidence.recompiled(evidence.file.root), evidence.recompiled(root)
+    if old is None or new is None:
         return None
     lowered = (
         dataclasses.replace(body, inertia=body.inertia - more.get(name, 0.0) * np.eye(3))
-        for name, body in after.bodies.items()
+        for name, body in new.bodies.items()
     )
-    written = [body for body in lowered if body.name in before.bodies and _other(body, before.bodies[body.name])]
-    return evidence.carried_over(before, before.with_bodies(written))
+    written = [body for body in lowered if body.name in old.bodies and _other(body, old.bodies[body.name])]
+    return evidence.carried_over(old, old.with_bodies(written))
 
 
-def _other(body: RobotBody, before: RobotBody) -> bool:
+def _other(body: RobotBody, written: RobotBody) -> bool:
     """True if an inertia changed by more than the round-off of adding and subtracting the same amount."""
-    return bool(np.abs(body.inertia - before.inertia).max() > 1e-9 * np.abs(body.inertia).max())
+    return bool(np.abs(body.inertia - written.inertia).max() > 1e-9 * np.abs(body.inertia).max())
 
 
 @hypothesis({"pinocchio": "3.9.0 to 4.1.0"}, "write the axis of axisangle with length 1, or a quaternion")
@@ -114,11 +116,11 @@ def axisangle_not_normalised(evidence: RobotEvidence) -> Reading | None:
     No robot has such a pose, so the proof is that the engine reads the file rightly with axes of length 1.
     """
     root, long = copy.deepcopy(evidence.file.root), False
-    for each in root.iter():
-        *axis, angle = (float(part) for part in each.get("axisangle", "0").split())
+    for element in root.iter():
+        *axis, angle = (float(part) for part in element.get("axisangle", "0").split())
         length = float(np.linalg.norm(axis))
         if length and abs(length - 1) > _UNIT:
-            each.set("axisangle", " ".join(repr(part) for part in (*(part / length for part in axis), angle)))
+            element.set("axisangle", " ".join(repr(part) for part in (*(part / length for part in axis), angle)))
             long = True
     return evidence.reread(root) if long else None
 
@@ -139,8 +141,8 @@ def meshes_weigh_one_kilogram(evidence: RobotEvidence) -> Robot | None:
             shapes = body.findall("geom")
             hits = collides.get(str(body.get("name")), [])
             for shape, weighs in zip(shapes, hits if len(hits) == len(shapes) else [True] * len(shapes), strict=True):
-                given = effective[id(shape)]
-                if weighs and (given.get("type") == "mesh" or given.get("mesh")):
+                classed = effective[id(shape)]
+                if weighs and (classed.get("type") == "mesh" or classed.get("mesh")):
                     _without([shape], "mesh", "density", "shellinertia")
                     shape.attrib |= {"type": "sphere", "size": repr(_UNIT_BALL), "mass": "1"}
                     touched = True

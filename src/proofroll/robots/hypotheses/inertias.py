@@ -15,7 +15,7 @@ def _suspects(evidence: RobotEvidence) -> Iterator[RobotBody]:
     """Bodies whose inertia differs in the engine and may count as impossible there, by whatever rule."""
     robot, reading = evidence.robot, evidence.reading
     scale = max((float(np.abs(group.inertia).max()) for group in robot.groups.values()), default=1.0)
-    other = {
+    unlike = {
         name
         for name, group in robot.groups.items()
         if name in reading.inertia and np.abs(reading.inertia[name] - group.inertia).max() > 1e-10 * scale
@@ -23,7 +23,7 @@ def _suspects(evidence: RobotEvidence) -> Iterator[RobotBody]:
     for name, (home, _, _) in robot.welded.items():
         body = robot.bodies.get(name)
         alone = sum(carrier == home for carrier, _, _ in robot.welded.values()) == 1
-        if body is not None and home in other:
+        if body is not None and home in unlike:
             impossible = body.breaks_triangle or body.moments[0] <= 0
             if alone or (impossible and np.any(body.inertia)) or (not body.mass and np.any(body.inertia)):
                 yield body
@@ -84,8 +84,8 @@ def mass_bounded(evidence: RobotEvidence) -> Robot | None:
         body = robot.bodies[joint.child]
         if body.mass < _MASS or np.linalg.eigvalsh(body.inertia)[0] < _MOMENT:
             # MuJoCo 4.0.0 puts the centre of mass of a link without <inertial> where its frame is in the parent's
-            given = robot.sources.get(body.name, {}).get("inertial", True)
-            small.append(_raised(body, body.com if given else joint.position))
+            has_inertial = robot.sources.get(body.name, {}).get("inertial", True)
+            small.append(_raised(body, body.com if has_inertial else joint.position))
     return robot.with_bodies(small) if small else None
 
 
@@ -103,12 +103,12 @@ def bounds_ignored(evidence: RobotEvidence) -> Robot | None:
     """Bounds on masses and inertias (boundmass, boundinertia) are ignored where a body has no <inertial>."""
     root = copy.deepcopy(evidence.root)
     bounded_from_below(root, replace=True)
-    before, lowered = evidence.recompiled(evidence.root), evidence.recompiled(root)
-    if before is None or lowered is None:
+    old, lowered = evidence.recompiled(evidence.root), evidence.recompiled(root)
+    if old is None or lowered is None:
         return None
-    given = {str(body.get("name")) for body in root.iter("body") if body.find("inertial") is not None}
-    bare = (body for name, body in lowered.bodies.items() if name not in given)
-    return evidence.carried_over(before, with_weightless(before.with_bodies(bare)))
+    with_inertial = {str(body.get("name")) for body in root.iter("body") if body.find("inertial") is not None}
+    bare = (body for name, body in lowered.bodies.items() if name not in with_inertial)
+    return evidence.carried_over(old, with_weightless(old.with_bodies(bare)))
 
 
 @hypothesis({"mujoco": "3.1.3 to 3.13.0"}, "update the engine, or write the inertia in the axes of the link with rpy 0")

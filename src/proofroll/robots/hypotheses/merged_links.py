@@ -56,10 +56,10 @@ def _principal(inertia: Array) -> tuple[Array, Array]:
         angle = np.arctan(tangent) * (1 if about == 1 else -1)
         axes = axes @ Rotation.from_rotvec(angle * np.eye(3)[about]).as_matrix()
     moments = np.diag(axes.T @ inertia @ axes).copy()
-    for first in (0, 1, 0):
-        if moments[first] + _SMALL < moments[first + 1]:
-            moments[[first, first + 1]] = moments[[first + 1, first]]
-            axes = axes @ Rotation.from_rotvec(np.pi / 2 * np.eye(3)[(first + 2) % 3]).as_matrix()
+    for column in (0, 1, 0):
+        if moments[column] + _SMALL < moments[column + 1]:
+            moments[[column, column + 1]] = moments[[column + 1, column]]
+            axes = axes @ Rotation.from_rotvec(np.pi / 2 * np.eye(3)[(column + 2) % 3]).as_matrix()
     return moments, axes
 
 

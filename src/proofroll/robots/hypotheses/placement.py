@@ -23,13 +23,13 @@ def body_placed_by_last_joint(evidence: RobotEvidence) -> Robot | None:
         chains.setdefault(body if extra.isdigit() else joint.child, []).append(index)
     joints = list(robot.joints)
     for chain in chains.values():
-        first, last = joints[chain[0]], joints[chain[-1]]
+        joint_1, last = joints[chain[0]], joints[chain[-1]]
         if len(chain) == 1:
             continue
-        p = first.position - first.rotation @ first.child_position
-        joints[chain[0]] = dataclasses.replace(first, position=first.child_position, rotation=np.eye(3))
-        placed = p + first.rotation @ last.child_position
-        joints[chain[-1]] = dataclasses.replace(last, position=placed, rotation=first.rotation)
+        p = joint_1.position - joint_1.rotation @ joint_1.child_position
+        joints[chain[0]] = dataclasses.replace(joint_1, position=joint_1.child_position, rotation=np.eye(3))
+        placed = p + joint_1.rotation @ last.child_position
+        joints[chain[-1]] = dataclasses.replace(last, position=placed, rotation=joint_1.rotation)
     return robot.change(joints=tuple(joints)) if len(chains) < len(joints) else None
 
 
@@ -117,8 +117,8 @@ def _one_of_several(joint: RobotJoint, robot: Robot) -> bool:
 def free_base_is_fixed(evidence: RobotEvidence) -> Robot | None:
     """A free base without mass is fixed to the world."""
     robot = evidence.robot
-    known = set(evidence.reading.joints)
-    lost = [joint for joint in robot.joints if joint.kind == "free" and joint.name not in known]
+    names = set(evidence.reading.joints)
+    lost = [joint for joint in robot.joints if joint.kind == "free" and joint.name not in names]
     if not lost:
         return None
     joints = (dataclasses.replace(joint, kind="fixed") if joint in lost else joint for joint in robot.joints)
@@ -144,7 +144,7 @@ def free_body_offset(evidence: RobotEvidence) -> Robot | None:
     """
     robot = evidence.robot
     joints = tuple(_offset(joint, robot) for joint in robot.joints)
-    changed = any(one is not other for one, other in zip(joints, robot.joints, strict=True))
+    changed = any(changed_joint is not unchanged for changed_joint, unchanged in zip(joints, robot.joints, strict=True))
     return robot.change(joints=joints) if changed else None
 
 
@@ -160,8 +160,8 @@ def root_pose_dropped(evidence: RobotEvidence) -> Robot | None:
     robot = evidence.robot
     if not robot.joints or robot.joints[0].kind != "fixed":
         return None
-    first = robot.joints[0]
-    if not np.any(first.position) and np.array_equal(first.rotation, np.eye(3)):
+    root_joint = robot.joints[0]
+    if not np.any(root_joint.position) and np.array_equal(root_joint.rotation, np.eye(3)):
         return None
-    dropped = dataclasses.replace(first, position=np.zeros(3), rotation=np.eye(3))
+    dropped = dataclasses.replace(root_joint, position=np.zeros(3), rotation=np.eye(3))
     return robot.change(joints=(dropped, *robot.joints[1:]))

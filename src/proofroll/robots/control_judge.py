@@ -1,0 +1,121 @@
+"""Judgement of a record of a robot under a controller, from any simulator or a real robot."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from proofroll.core.number_format import counted, error
+from proofroll.elements.mechanism.bookkeeping.law import ControlLaw
+from proofroll.elements.mechanism.bookkeeping.mistakes import LAYERS
+from proofroll.robots.control_layers import record_layers
+from proofroll.robots.control_record import ControlRecord, read_record
+from proofroll.robots.controlled import ControlledScenes
+from proofroll.robots.record_layer import Layer
+
+
+@dataclass(frozen=True)
+class RecordJudgement:
+    """Layers of a record.
+
+    Attributes:
+        record, robot, control: files.
+        base: ``free`` or ``fixed``, as the record has columns of a base or not.
+        rows: number of times.
+        step: mean interval between them [s].
+        layers: in their order.
+        remarks: sentences on limits of the robot file that the record passes.
+    """
+
+    record: str
+    robot: str
+    control: str
+    base: str
+    rows: int
+    step: float
+    layers: Sequence[Layer]
+    remarks: Sequence[str] = ()
+
+    @property
+    def agrees(self) -> bool:
+        """True if every layer that was looked at holds."""
+        return all(layer.holds for layer in self.layers)
+
+    @property
+    def looked_at(self) -> bool:
+        """True if at least one layer was looked at."""
+        return any(layer.residual is not None for layer in self.layers)
+
+    def lines(self) -> Iterator[str]:
+        """Lines of text: a headline, one for each layer, and the causes at the first that does not hold."""
+        first = next((layer for layer in self.layers if not layer.holds), None)
+        rows = f"{counted(self.rows, 'rows')} every {self.step:.4g} s, {self.base} base"
+        if not self.looked_at:
+            yield f"{self.record} ({rows}): no layer could be looked at"
+        elif first is None:
+            yield f"{self.record} ({rows}): every layer that was looked at holds"
+        else:
+            yield f"{self.record} ({rows}): the {first.name} is the first layer that does not hold"
+        for layer in self.layers:
+            yield f"  {_mark(layer)} {layer.name} ({LAYERS[layer.name]}): {_found(layer)}"
+            if layer is first:
+                yield from (f"       {cause.sentence}" for cause in layer.causes[:3])
+                if not layer.causes:
+                    yield "       no known mistake explains it"
+        yield from self.remarks
+
+
+def _mark(layer: Layer) -> str:
+    return "–" if layer.residual is None else "✓" if layer.holds else "✗"
+
+
+def _found(layer: Layer) -> str:
+    if layer.residual is None:
+        return layer.reason
+    where = "" if layer.holds else f", most in {layer.column} at {layer.time:.4g} s"
+    return f"off by {error(layer.residual)}, rounding {error(layer.bar)}{where}"
+
+
+def judge_record(record: Path, robot: Path, control: Path, names: Mapping[str, str] | None = None) -> RecordJudgement:
+    """Judges a record by layers, without a simulation; a robot whose record has columns of a base is free.
+
+    ``names``: column of the record -> its name here, perhaps with its unit, ``q.hip[deg]``.
+
+    Raises:
+        InputError: a file is wrong, or they do not fit.
+    """
+    read = read_record(record, names or {})
+    free = any(name.startswith("q_WB.") for name in read.columns)
+    model = ControlledScenes(control).of_record(robot, free=free)
+    law = ControlLaw.of(model.mechanism)
+    law = law.change(reductions=np.array([model.reductions.get(joint, 1.0) for joint in law.joints]))
+    layers = record_layers(read, law, model.mechanism, grounded=model.grounded)
+    return RecordJudgement(
+        record=str(record),
+        robot=str(robot),
+        control=str(control),
+        base="free" if free else "fixed",
+        rows=len(read.time),
+        step=_step(read),
+        layers=layers,
+        remarks=[*_too_fast(read, model.speeds)],
+    )
+
+
+def _too_fast(record: ControlRecord, speeds: Mapping[str, float]) -> Iterator[str]:
+    """A sentence for each joint that passes the velocity limit of its drive."""
+    for joint, limit in speeds.items():
+        sizes = np.abs(record.columns.get(f"v.{joint}", np.zeros(1)))
+        if sizes.max() > limit:
+            at = record.time[int(np.argmax(sizes > limit))]
+            yield (
+                f"v.{joint} passes the velocity limit {limit:.4g} of the robot's file at {at:.4g} s; a program that "
+                "clamps velocities moves it otherwise"
+            )
+
+
+def _step(record: ControlRecord) -> float:
+    return float(record.time[-1] - record.time[0]) / (len(record.time) - 1)

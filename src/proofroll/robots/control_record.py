@@ -1,0 +1,145 @@
+"""Record of a robot under a controller from any simulator or a real robot: a CSV with states, actions and efforts."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from decimal import Decimal
+from pathlib import Path
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from proofroll.core.errors import InputError, choices
+from proofroll.core.unit_conversion import in_si
+from proofroll.files.csv_table import read_csv
+from proofroll.robots.model import Array
+
+# Columns of the base with the names of their components, units and meaning.
+BASE: Mapping[str, str] = {"p_WB": "xyz", "q_WB": "wxyz", "v_WB": "xyz", "w_WB": "xyz"}
+OBSERVED = "observed"
+_SINGLE = 2.0**-24  # relative rounding of single precision
+_DOUBLE = 2.0**-53
+_DECIMALS = 8  # most decimals of a file that is written with a fixed number of them
+
+
+@dataclass(frozen=True)
+class ControlRecord:
+    """Columns of a record over time, in SI units.
+
+    Attributes:
+        path: of the file, for messages.
+        columns: name -> values; ``q.JOINT``, ``v.JOINT``, ``p_WB.x``, ``q_WB.w``, ``v_WB.x``, ``w_WB.x`` (of the base,
+            in world axes), ``observed.q.JOINT``, ``observed.gravity_B.x`` and so on, ``action.JOINT``,
+            ``target.JOINT``, ``effort.JOINT``; ``v_WB_B.x``, ``w_WB_B.x`` are velocities of the base in its own axes.
+        rounding: name -> largest rounding error of each value, with the shape of the column.
+        time: [s].
+    """
+
+    path: Path
+    columns: Mapping[str, Array]
+    rounding: Mapping[str, Array]
+    time: Array
+
+    def stacked(self, kind: str, names: Sequence[str]) -> Array | None:
+        """Columns ``kind.name`` beside each other, (times, names); None: the record has none of them.
+
+        Raises:
+            InputError: some of them are there, and others are not.
+        """
+        wanted = [f"{kind}.{name}" for name in names]
+        absent = [name for name in wanted if name not in self.columns]
+        if len(absent) == len(wanted):
+            return None
+        if absent:
+            raise InputError(str(self.path), absent[0], f"the record has no such column, but {choices(wanted)}")
+        return np.stack([self.columns[name] for name in wanted], axis=1)
+
+    def rounding_of(self, kind: str, names: Sequence[str]) -> Array:
+        """Rounding errors of the columns of :meth:`stacked`, (times, names)."""
+        return np.stack([self.rounding[f"{kind}.{name}"] for name in names], axis=1)
+
+    def rounded(self, generator: np.random.Generator) -> ControlRecord:
+        """The record with values, but not times, moved at random within their rounding, equal successive ones alike."""
+        moved = {}
+        for name, values in self.columns.items():
+            runs = np.concatenate([[0], np.cumsum(np.diff(values) != 0)])
+            moved[name] = values + self.rounding[name] * generator.uniform(-1, 1, values.shape)[runs]
+        return ControlRecord(self.path, moved, self.rounding, self.time)
+
+    def part(self, rows: Array) -> ControlRecord:
+        """The record at some rows."""
+        columns, rounding = (
+            {name: item[rows] for name, item in part.items()} for part in (self.columns, self.rounding)
+        )
+        return ControlRecord(self.path, columns, rounding, self.time[rows])
+
+
+def read_record(path: Path, names: Mapping[str, str]) -> ControlRecord:
+    """Record in a CSV file with the column ``time``; units of its header are converted to SI units.
+
+    ``names``: column of the file -> its name here, perhaps with its unit, ``q.hip[deg]``.
+
+    Raises:
+        InputError: there is no such file, or it is no table of numbers.
+    """
+    try:
+        dataset = read_csv(path.read_text(encoding="utf-8"), names)
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError("record", path, f"the file cannot be read: {error}") from None
+    except ValueError as error:
+        raise InputError("record", path, str(error)) from None
+    columns = {str(name): item.to_numpy().astype(float) for name, item in dataset.data_vars.items()}
+    units = {str(name): str(item.attrs["units"]) for name, item in dataset.variables.items() if "units" in item.attrs}
+    return record_of(dataset["time"].to_numpy().astype(float), columns, path, units)
+
+
+def record_of(
+    time: Array, columns: Mapping[str, Array], path: Path = Path("record"), units: Mapping[str, str] | None = None
+) -> ControlRecord:
+    """Record of columns; ``units``: column, or ``time`` -> its unit, where that need not be an SI unit.
+
+    Raises:
+        InputError: times do not grow, or a value is not finite.
+    """
+    if len(time) < 2 or not np.all(np.diff(time) > 0):
+        raise InputError(str(path), "time", "give two or more times that grow")
+    for name, values in columns.items():
+        if not np.isfinite(values).all():
+            row = int(np.flatnonzero(~np.isfinite(values))[0])
+            raise InputError(f"{path}: {name}", float(values[row]), f"it is not finite at t = {time[row]:g} s")
+    factors = {name: in_si(unit)[1] for name, unit in (units or {}).items()}
+    rounding = _roundings(columns)  # of the digits that are written
+    converted, rounding = (
+        {name: item * factors.get(name, 1.0) for name, item in part.items()} for part in (columns, rounding)
+    )
+    return _in_world(ControlRecord(path, converted, rounding, time * factors.get("time", 1.0)))
+
+
+def _in_world(record: ControlRecord) -> ControlRecord:
+    """The record with velocities of the base along the world's axes, which it may have along those of the base."""
+    columns, rounding = dict(record.columns), dict(record.rounding)
+    attitude = record.stacked("q_WB", "wxyz")
+    for name in ("v_WB", "w_WB"):
+        vectors = record.stacked(f"{name}_B", "xyz")
+        if vectors is None or attitude is None or f"{name}.x" in columns:
+            continue
+        turned = Rotation.from_quat(attitude, scalar_first=True).apply(vectors)
+        bars = record.rounding_of(f"{name}_B", "xyz").sum(axis=1)
+        bars = bars + 2 * record.rounding_of("q_WB", "wxyz").sum(axis=1) * np.linalg.norm(vectors, axis=1)
+        for k, axis in enumerate("xyz"):
+            columns[f"{name}.{axis}"], rounding[f"{name}.{axis}"] = turned[:, k], bars
+    return ControlRecord(record.path, columns, rounding, record.time)
+
+
+def _roundings(columns: Mapping[str, Array]) -> dict[str, Array]:
+    """Largest rounding error of each value: of the decimals or of the precision in which the file is written."""
+    values = np.concatenate([*columns.values(), np.zeros(1)])
+    places = max(-int(Decimal(repr(value)).normalize().as_tuple().exponent) for value in values.tolist())
+    with np.errstate(over="ignore"):
+        single = values.astype(np.float32)
+    texts = np.array([float(str(value)) for value in single])
+    if places <= _DECIMALS:
+        return {name: np.full(item.shape, 0.5 * 10.0**-places) for name, item in columns.items()}
+    relative = _SINGLE if np.all((values == single) | (values == texts)) else _DOUBLE
+    return {name: relative * np.abs(item) for name, item in columns.items()}
