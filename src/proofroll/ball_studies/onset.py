@@ -133,7 +133,7 @@ def onset_study(
     # end.
     soon = _soon(truth, until)
     answers = run(asked, soon)
-    late = [index for index, (result, first) in enumerate(answers) if first is None and result.status == Status.DONE]
+    late = [index for index, (result, slip) in enumerate(answers) if slip is None and result.status == Status.DONE]
     if late and soon < until:
         for index, answer in zip(late, run([asked[index] for index in late], until), strict=True):
             answers[index] = answer
@@ -143,9 +143,9 @@ def onset_study(
             status = status_of(facts_of_engine)
             rows.append(EngineOnset(name, spec.name, {}, status, str(facts_of_engine), None, None, "failed"))
             continue
-        result, first = next(answered)
-        apart = None if first is None or truth.time is None else first.time - truth.time
-        ended = (result.status, result.message, first, apart, onset_verdict(truth, result, first))
+        result, slip = next(answered)
+        apart = None if slip is None or truth.time is None else slip.time - truth.time
+        ended = (result.status, result.message, slip, apart, onset_verdict(truth, result, slip))
         rows.append(EngineOnset(name, spec.name, facts_of_engine.settings, *ended))
     return OnsetStudy(loaded.name, loaded.parameters, until, truth, rows)
 
@@ -165,7 +165,7 @@ def _first_slip(runner: Runner, case: Case, result: Result) -> Event | None:
     return next((event for event in events if event.kind == "slip"), None)
 
 
-def onset_verdict(truth: Onset, result: Result, first: Event | None) -> str:
+def onset_verdict(truth: Onset, result: Result, slip: Event | None) -> str:
     """Verdict on an engine's first slip: its bracket must overlap the truth's times for the uncertain μ and f."""
     if result.status == Status.REFUSED:
         return "refused"
@@ -173,10 +173,10 @@ def onset_verdict(truth: Onset, result: Result, first: Event | None) -> str:
         return "failed"
     if truth.verdict == "ill-posed":
         return "ill-posed"
-    if truth.time is None or first is None:
-        return "agree" if truth.time is None and first is None else "disagree"
+    if truth.time is None or slip is None:
+        return "agree" if truth.time is None and slip is None else "disagree"
     times = [time for time in (truth.time, truth.earliest, truth.latest) if time is not None]
-    return "agree" if first.time_low <= max(times) and first.time_high >= min(times) else "disagree"
+    return "agree" if slip.time_low <= max(times) and slip.time_high >= min(times) else "disagree"
 
 
 def summary(study: OnsetStudy) -> str:
@@ -197,14 +197,14 @@ def summary(study: OnsetStudy) -> str:
     return text
 
 
-def first_slip_texts(first: Event | None) -> tuple[str, str]:
+def first_slip_texts(slip: Event | None) -> tuple[str, str]:
     """Texts for a person: time of the first slip, and its bracket."""
-    if first is None:
+    if slip is None:
         return "no slip", ""
-    between = f"{first.time_low:.9g} … {first.time_high:.9g}"
-    if first.time > 0:
-        return f"{first.time:.9g}", between
-    return "from the start", between if first.time_high > _SMALLEST else ""
+    between = f"{slip.time_low:.9g} … {slip.time_high:.9g}"
+    if slip.time > 0:
+        return f"{slip.time:.9g}", between
+    return "from the start", between if slip.time_high > _SMALLEST else ""
 
 
 def _number(value: float | None) -> str:

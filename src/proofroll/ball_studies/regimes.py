@@ -100,9 +100,9 @@ def load_regimes(name: str) -> RegimesStudy:
     study = validated(RegimesStudy, content, path.name, name=path.stem)
     if not study.rolling_resistance:
         raise InputError(f"{path.name}: rolling_resistance", [], "give at least one value in m")
-    for axis, given in (("speed", study.speed), ("mu_static", study.mu_static)):
-        if not 1 <= given.count <= _MOST or not 0 < given.low <= given.high < math.inf:
-            shown = f"from {given.low:g} to {given.high:g}, {given.count} values"
+    for axis, values in (("speed", study.speed), ("mu_static", study.mu_static)):
+        if not 1 <= values.count <= _MOST or not 0 < values.low <= values.high < math.inf:
+            shown = f"from {values.low:g} to {values.high:g}, {values.count} values"
             raise InputError(f"{path.name}: {axis}", shown, f"give 0 < low <= high and a count of 1 to {_MOST}")
     with error_location(path.name):
         require_bounds("until", study.until, above=0)
@@ -165,14 +165,14 @@ def regime_map(
         hosts.add(host)
         if progress is not None:
             progress(len(mus))
-    regime, slips, first = np.moveaxis(np.array(rows).reshape(len(rows), len(mus), 3), -1, 0)
+    regime, slips, times = np.moveaxis(np.array(rows).reshape(len(rows), len(mus), 3), -1, 0)
     dims = ("speed", "mu_static")
     meaning = ", ".join(f"{item.value}: {item.name.lower().replace('_', ' ')}" for item in Regime)
     result = xr.Dataset(
         {
             "regime": (dims, regime.astype(np.int8), {"units": "1", "long_name": meaning}),
             "slips": (dims, slips.astype(np.int64), {"units": "1", "long_name": "how often a slip began"}),
-            "first_slip": (dims, first, {"units": "s", "long_name": "time of the first slip"}),
+            "first_slip": (dims, times, {"units": "s", "long_name": "time of the first slip"}),
         },
         coords={
             "speed": ("speed", np.asarray(speeds, dtype=np.float64), {"units": "m/s"}),

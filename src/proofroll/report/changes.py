@@ -131,29 +131,29 @@ class EarlierReport:
 
 def against(old: EarlierReport, lines: Iterable[TableLine], machine: str, versions: dict[str, str]) -> Against:
     """Changes from an earlier report to the lines of this one, in the studies that both have."""
-    before, after = runs_of(old.lines), runs_of(lines)
-    shared = {study for study, *_ in before} & {study for study, *_ in after}
+    old_runs, new_runs = runs_of(old.lines), runs_of(lines)
+    shared = {study for study, *_ in old_runs} & {study for study, *_ in new_runs}
     costs = old.machine == machine
-    drift, factor = _noise((_first(before[key]), _first(run)) for key, run in after.items() if key in before)
+    drift, factor = _noise((_first(old_runs[key]), _first(run)) for key, run in new_runs.items() if key in old_runs)
     changes = []
-    for key in dict.fromkeys([*after, *before]):
+    for key in dict.fromkeys([*new_runs, *old_runs]):
         study, place, run, *_ = key
         if study not in shared:
             continue
-        if key not in after or key not in before:
-            changes.append(RunChange(study, run, place, "gone" if key not in after else "new", []))
+        if key not in new_runs or key not in old_runs:
+            changes.append(RunChange(study, run, place, "gone" if key not in new_runs else "new", []))
             continue
-        differences = list(_changes(before[key], after[key], (drift, factor) if costs else None))
+        differences = list(_changes(old_runs[key], new_runs[key], (drift, factor) if costs else None))
         if differences:
             kinds = [kind for kind, _ in differences]
-            first = next(kind for kind in ("verdict", "value", "cost") if kind in kinds)
-            changes.append(RunChange(study, run, place, first, [text for _, text in differences]))
+            first_kind = next(kind for kind in ("verdict", "value", "cost") if kind in kinds)
+            changes.append(RunChange(study, run, place, first_kind, [text for _, text in differences]))
     others = {
         name: (version, versions[name])
         for name, version in old.versions.items()
         if name in versions and versions[name] != version
     }
-    both = sum(key in before for key in after)
+    both = sum(key in old_runs for key in new_runs)
     return Against(str(old.path), old.date, others, costs, drift, factor, both, changes)
 
 
@@ -164,20 +164,20 @@ def runs_of(lines: Iterable[TableLine]) -> dict[tuple[str, str, str, int], dict[
         size = step(line.resolution, line.step, 6)
         run = " ".join(filter(None, (line.engine, line.formulation, line.setting, size)))
         rows[line.study, line.place, run].setdefault(line.row, {})[line.quantity] = line
-    return {(*key, number): run for key, own in rows.items() for number, run in enumerate(own.values())}
+    return {(*key, number): run for key, of_row in rows.items() for number, run in enumerate(of_row.values())}
 
 
 def _changes(
-    before: dict[str, TableLine], after: dict[str, TableLine], noise: tuple[float, float] | None
+    old_lines: dict[str, TableLine], new_lines: dict[str, TableLine], noise: tuple[float, float] | None
 ) -> Iterator[tuple[str, str]]:
     """(kind, clause) of each change of a run."""
-    one, other = _first(before), _first(after)
-    if one.status != other.status:
-        yield "verdict", f"{one.status} → {other.status}: {other.message}".removesuffix(": ")
+    old_line, new_line = _first(old_lines), _first(new_lines)
+    if old_line.status != new_line.status:
+        yield "verdict", f"{old_line.status} → {new_line.status}: {new_line.message}".removesuffix(": ")
         return
     values = []
-    for name, new in after.items():
-        old = before.get(name)
+    for name, new in new_lines.items():
+        old = old_lines.get(name)
         if old is None:
             yield "verdict", f"{name} is new"
             continue
@@ -190,9 +190,9 @@ def _changes(
     if values:
         more = f", and of {len(values) - 1} more" if len(values) > 1 else ""
         yield "value", f"{max(values)[1]}{more}"
-    for name in before.keys() - after.keys():
+    for name in old_lines.keys() - new_lines.keys():
         yield "verdict", f"{name} is gone"
-    if noise is not None and (text := _cost(one, other, *noise)):
+    if noise is not None and (text := _cost(old_line, new_line, *noise)):
         yield "cost", text
 
 
@@ -241,10 +241,10 @@ def _noise(pairs: Iterable[tuple[TableLine, TableLine]]) -> tuple[float, float]:
 
 def _cost(old: TableLine, new: TableLine, drift: float, factor: float) -> str:
     """Clause on a cost whose intervals do not overlap; empty without such a change, or without intervals."""
-    one, other = _interval(old), _interval(new)
-    if one is None or other is None:
+    old_interval, new_interval = _interval(old), _interval(new)
+    if old_interval is None or new_interval is None:
         return ""
-    low, high = sorted(([drift * value for value in one], list(other)), key=lambda item: item[1])
+    low, high = sorted(([drift * value for value in old_interval], list(new_interval)), key=lambda item: item[1])
     if high[0] <= low[2] or high[1] < factor * low[1]:
         return ""
     between = [f"{number(line.cost)} ({number(line.cost_low)} to {number(line.cost_high)})" for line in (old, new)]

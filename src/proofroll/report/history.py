@@ -15,7 +15,7 @@ from proofroll.core.verdict import Verdict
 from proofroll.files.json_data import plain
 from proofroll.report.changes import Against, EarlierReport, against, runs_of
 from proofroll.report.figure import panels, svg_text
-from proofroll.report.labels import SYMBOLS
+from proofroll.report.labels import SYMBOLS, engine_title
 from proofroll.report.pages import element, environment, rendered
 from proofroll.report.terminal.tables import change_lines
 from proofroll.report.tradeoff.work_precision import SMALLEST
@@ -62,8 +62,8 @@ class History:
     def lines(self) -> Iterator[str]:
         """Lines for the terminal: changes from each report to the next."""
         for date, step in zip(self.dates[1:], self.steps, strict=True):
-            first, *rest = change_lines(step)
-            yield f"{date[:10]} {first[0].lower()}{first[1:]}"
+            head, *rest = change_lines(step)
+            yield f"{date[:10]} {head[0].lower()}{head[1:]}"
             yield from rest
 
 
@@ -103,22 +103,26 @@ def write_history(history: History, out: Path) -> None:
     ]
     order = [str(item) for item in Verdict]
     write_text(out / "history.json", json.dumps(plain(history), indent=1, allow_nan=False))
-    page = rendered(environment(), "history.html", history=history, pictures=pictures, symbols=SYMBOLS, order=order)
+    names = {"titles": {item.engine: engine_title(item.engine) for item in history.engines}, "symbols": SYMBOLS}
+    page = rendered(environment(), "history.html", history=history, pictures=pictures, order=order, **names)
     write_text(out / "history.html", page)
 
 
 def _engine(
     name: str, tables: Sequence[dict[Any, dict[str, TableLine]]], changed: set[tuple[str, str, str]]
 ) -> EngineHistory:
-    own = [{key: run for key, run in table.items() if next(iter(run.values())).engine == name} for table in tables]
-    versions = [next((line.version for run in table.values() for line in run.values()), "") for table in own]
+    of_engine = [
+        {key: run for key, run in table.items() if next(iter(run.values())).engine == name} for table in tables
+    ]
+    versions = [next((line.version for run in table.values() for line in run.values()), "") for table in of_engine]
     verdicts = [
-        dict(Counter(line.verdict for run in table.values() for line in run.values() if line.verdict)) for table in own
+        dict(Counter(line.verdict for run in table.values() for line in run.values() if line.verdict))
+        for table in of_engine
     ]
     runs = []
-    for key in dict.fromkeys(key for table in own for key in table):
+    for key in dict.fromkeys(key for table in of_engine for key in table):
         study, place, run, _ = key
-        both = [_numbers(table.get(key)) for table in own]
+        both = [_numbers(table.get(key)) for table in of_engine]
         title = f"{study}: {run}{f' at {place}' if place else ''}"
         runs.append(RunHistory(title, [x[0] for x in both], [x[1] for x in both], (study, run, place) in changed))
     return EngineHistory(name, versions, verdicts, runs)
@@ -136,7 +140,7 @@ def _drawn(engine: EngineHistory, dates: Sequence[str]) -> Figure:
     """Figure of errors and costs over the reports; runs that never changed are grey."""
     figure, drawn, _, _ = panels(2)
     figure.set_size_inches(10, 3.4)
-    at = range(len(dates))
+    places = range(len(dates))
     marks = [f"{date[:10]}\n{version or '–'}" for date, version in zip(dates, engine.versions, strict=True)]
     colours = iter([*_COLOURS, *["#000000"] * len(engine.runs)])
     for run in sorted(engine.runs, key=lambda item: item.changed):
@@ -144,11 +148,11 @@ def _drawn(engine: EngineHistory, dates: Sequence[str]) -> Figure:
         if run.changed:
             look = {"color": next(colours), "lw": 1.4, "marker": "o", "markersize": 3, "label": run.run}
         for panel, values in zip(drawn, (run.errors, run.costs), strict=True):
-            panel.plot(at, [float("nan") if value is None else max(value, SMALLEST) for value in values], **look)
+            panel.plot(places, [float("nan") if value is None else max(value, SMALLEST) for value in values], **look)
     if all(cost is None for run in engine.runs for cost in run.costs):
         drawn[1].text(0.5, 0.5, "no cost was measured by clean runs", ha="center", transform=drawn[1].transAxes)
     for panel, title in zip(drawn, ("largest error, in parts of its size", "cost [s/s]"), strict=True):
-        panel.set(yscale="log", title=title, xticks=list(at), xlim=(-0.2, len(dates) - 0.8))
+        panel.set(yscale="log", title=title, xticks=list(places), xlim=(-0.2, len(dates) - 0.8))
         panel.set_xticklabels(marks, rotation=0 if len(dates) < 7 else 60)
         panel.grid(which="major", color="0.92", lw=0.5)
     handles, labels = drawn[0].get_legend_handles_labels()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from functools import cache
 from typing import TYPE_CHECKING, Any, ClassVar, Protocol
 
@@ -23,6 +24,25 @@ if TYPE_CHECKING:
 GROUP = "proofroll.report_kinds"
 # Group of scenes whose kind names none.
 OTHER = "other scenes"
+
+
+@dataclass(frozen=True)
+class EquationMatrices:
+    """Terms of M v̇ + h + g = τ at the start.
+
+    Attributes:
+        velocities: names of the velocities v.
+        M: mass matrix, (nv, nv); None: the engine does not give it.
+        h: terms of velocities, (nv); None: as M.
+        g: minus the weights, (nv); None: as M.
+        differences: of M, h and g from the truth's, relative to the largest entry; empty for the truth itself.
+    """
+
+    velocities: list[str]
+    M: list[list[float]] | None
+    h: list[float] | None
+    g: list[float] | None
+    differences: dict[str, float]
 
 
 class ReportKind(Protocol):
@@ -81,6 +101,11 @@ class ReportKind(Protocol):
     def mark(content: ReportedComparison, curves: Sequence[PointCurves]) -> Sequence[PointCurves]:  # noqa: ARG004 -- as above
         """Curves of a comparison with the kind's marks added."""
         return curves
+
+    @staticmethod
+    def matrices(scene: Scene, built: Any) -> EquationMatrices | None:  # noqa: ARG004 -- for those who have any
+        """Matrices of the equations of motion at the start, the engine's if ``built`` is its model; None: no such."""
+        return None
 
     @staticmethod
     def replay() -> ReplayKind:

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import re
 import unicodedata
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
+from functools import cache
+from importlib.metadata import PackageNotFoundError
 from typing import TYPE_CHECKING, Any
 
-from proofroll.core.errors import InputError
+from proofroll.core.engine_abilities import title_of
+from proofroll.core.errors import InputError, ProofrollError
 from proofroll.core.number_format import number
-from proofroll.core.plugins import parse_engine
+from proofroll.core.plugins import load_engine, parse_engine
 
 if TYPE_CHECKING:
     from proofroll.core.verdict import Judgement
@@ -41,6 +45,23 @@ MEANINGS = {
     "differs": "not within tolerance: another limit, no limit shown, or one step only; each says which",
     "failed": "there is no result; the row says why. “missing”: the engine is not installed",
 }
+
+
+@cache
+def engine_title(engine: str) -> str:
+    """Name of an engine for readers, with the place or options that it has; its code name if it is not installed."""
+    code = re.split(r"[\[@]", engine, maxsplit=1)[0]
+    try:
+        title = title_of(load_engine(code))
+    except (ProofrollError, PackageNotFoundError):
+        title = code
+    return title + engine[len(code) :]
+
+
+def engine_words(engine: str, formulation: str | None = None) -> str:
+    """Engine and formulation for readers; an engine whose name ends with its formulation says it once."""
+    title = engine_title(engine)
+    return title if not formulation or title.endswith(f" {formulation}") else f"{title} {formulation}"
 
 
 def precision_words(precision: str) -> tuple[str, ...]:
@@ -121,14 +142,15 @@ def step(resolution: str | None, value: float | None, digits: int | None = None)
 
 def setting(row: Setting) -> str:
     """Formulation and preset of a row, or else its text in the comparison file."""
-    return " ".join(str(part) for part in (row.formulation, row.setting) if part) or str(row.engine)
+    formulation = engine_words(row.name, row.formulation).removeprefix(engine_title(row.name)).strip()
+    return " ".join(filter(None, (formulation, row.setting))) or str(row.engine)
 
 
 def names(rows: Sequence[Setting]) -> list[str]:
     """Unique short name of each row; its text in the comparison file if short names coincide."""
     short = []
     for row in rows:
-        words = [str(word) for word in (row.name, row.formulation, row.setting) if word]
+        words = [word for word in (engine_words(row.name, row.formulation), row.setting) if word]
         size = step(row.resolution, row.resolution_value)
         short.append(" ".join([*words, f"({size})"] if size else words))
     return [name if short.count(name) == 1 else str(row.engine) for name, row in zip(short, rows, strict=True)]
@@ -151,7 +173,7 @@ def setting_words(engine: str, facts: EngineFacts | SweptSetting) -> str:
 
 def name_of(point: SweptSetting) -> str:
     """Engine, formulation and setting of a point of a study."""
-    words = point.engine, point.settings.get("formulation"), setting_words(point.curve, point)
+    words = engine_words(point.engine, point.settings.get("formulation")), setting_words(point.curve, point)
     return " ".join(filter(None, words))
 
 
@@ -168,20 +190,6 @@ def with_caveat(name: str, caveat: str) -> str:
 def family_and_caveat(point: SweptSetting) -> str:
     """Family and caveat of a measured point, in one clause; empty without either."""
     return "; ".join(filter(None, (point.family, point.caveat)))
-
-
-def caveat_lines(rows: Sequence[Setting]) -> list[str]:
-    """Sentences on families and caveats of settings, each with the engines and their settings that have it."""
-    settings: dict[str, dict[str, list[str]]] = {}
-    for note, row in [*((row.family, row) for row in rows), *((row.caveat, row) for row in rows)]:
-        if note:
-            where = " ".join(str(part) for part in (row.formulation, row.setting) if part)
-            settings.setdefault(note, {}).setdefault(row.name, []).append(where)
-    lines = []
-    for note, engines in settings.items():
-        owners = (f"{name} {', '.join(dict.fromkeys(where))}" for name, where in engines.items())
-        lines.append(f"{note[0].upper()}{note[1:]}: {'; '.join(owners)}.")
-    return lines
 
 
 def settings_text(settings: dict[str, Any]) -> str:

@@ -21,7 +21,7 @@ _PLACES = re.compile(
     r'<(?:section|details|h[1-4])\b[^>]*? id="(?P<section>[^"]+)"'
     r'|<div class="scroll\b[^>]*? aria-label="(?P<label>[^"]*)"'
     r'|<thead>.*?</thead>|<tbody(?: data-engine="(?P<engine>[^"]*)")?>'
-    r'|<tr(?P<row>(?! class="group")[^>]*)>(?P<cell>.*?)(?P<rest></t[hd]>.*?</tr>)',
+    r'|<tr(?P<row>(?! class="(?:group|note)")[^>]*)>(?P<cell>.*?)(?P<rest></t[hd]>.*?</tr>)',
     re.DOTALL,
 )
 _KEY = re.compile(r"<td\b[^>]* data-key\b[^>]*>(.*?)</td>", re.DOTALL)
@@ -65,9 +65,9 @@ def unbroken(html: str) -> str:
     return "".join(pieces)
 
 
-def _kept_whole(found: re.Match[str]) -> str:
-    alone = " " not in found[1].strip()
-    return found[0] if alone else _EXPONENT.sub(r'<span class="whole">\g<0></span>', found[0])
+def _kept_whole(match: re.Match[str]) -> str:
+    alone = " " not in match[1].strip()
+    return match[0] if alone else _EXPONENT.sub(r'<span class="whole">\g<0></span>', match[0])
 
 
 def addressed(html: str) -> str:
@@ -76,25 +76,27 @@ def addressed(html: str) -> str:
     The id is made from the id of the section, the label of the table, and the texts of the first cell and of those with
     the attribute ``data-key``, so that the row has it again in a page of other runs.
     """
-    at = {"section": "", "label": "", "engine": ""}
+    context = {"section": "", "label": "", "engine": ""}
     taken: Counter[str] = Counter()
 
-    def address(found: re.Match[str]) -> str:
-        parts = found.groupdict()
+    def address(match: re.Match[str]) -> str:
+        parts = match.groupdict()
         if parts["cell"] is None:
-            at.update({name: parts[name] for name in at if parts[name] is not None})
-            if found[0].startswith(("<thead", "<tbody>")):
-                at["engine"] = ""
-            return found[0]
-        own = re.search(r' id="([^"]*)"', parts["row"])
+            context.update({name: parts[name] for name in context if parts[name] is not None})
+            if match[0].startswith(("<thead", "<tbody>")):
+                context["engine"] = ""
+            return match[0]
+        own_id = re.search(r' id="([^"]*)"', parts["row"])
         of = re.search(r' data-of="([^"]*)"', parts["row"])
         keys = " ".join([parts["cell"], *_KEY.findall(parts["rest"])])
-        name = f"{at['engine']} {of[1] if of else ''} {re.sub('<[^>]*>', '', keys)}"
-        address = ".".join(filter(None, (at["section"], slug(at["label"], _WORDS), slug(name, _WORDS) or "row")))
+        name = f"{context['engine']} {of[1] if of else ''} {re.sub('<[^>]*>', '', keys)}"
+        address = ".".join(
+            filter(None, (context["section"], slug(context["label"], _WORDS), slug(name, _WORDS) or "row"))
+        )
         taken[address] += 1
         address += f"-{taken[address]}" if taken[address] > 1 else ""
-        start = found[0].removesuffix(parts["rest"]) if own else f'<tr id="{address}"{parts["row"]}>{parts["cell"]}'
-        link = f'<a class="row" href="#{own[1] if own else address}" aria-label="link to this row"></a>'
+        start = match[0].removesuffix(parts["rest"]) if own_id else f'<tr id="{address}"{parts["row"]}>{parts["cell"]}'
+        link = f'<a class="row" href="#{own_id[1] if own_id else address}" aria-label="link to this row"></a>'
         return start + link + parts["rest"]
 
     return _PLACES.sub(address, html)
@@ -151,6 +153,6 @@ def element(text: str, prefix: str) -> str:
     start = re.sub(r' (?:xmlns(?::\w+)?|version|width|height)="[^"]*"', "", start)
     text = f'{start} aria-hidden="true">{rest}'  # the surrounding text describes it
     # Keeps only ids that are referred to, for equal images would share the others.
-    text = re.sub(r' id="([^"]*)"', lambda found: f' id="{prefix}{found[1]}"' if f"#{found[1]}" in text else "", text)
+    text = re.sub(r' id="([^"]*)"', lambda match: f' id="{prefix}{match[1]}"' if f"#{match[1]}" in text else "", text)
     text = re.sub(r'href="#', f'href="#{prefix}', text)
     return re.sub(r"url\(#", f"url(#{prefix}", text)

@@ -133,9 +133,11 @@ class Drawing:
         places = np.asarray(points, dtype=np.float64)
         self.path(places, look)
         tip = places[-1]
-        along = unit(tip - places[-2])
-        side = 0.36 * across(along)
-        self.path([tip, tip - _HEAD * (along + side), tip - _HEAD * (along - side)], f"{look}-head", closed=True)
+        direction = unit(tip - places[-2])
+        side = 0.36 * across(direction)
+        self.path(
+            [tip, tip - _HEAD * (direction + side), tip - _HEAD * (direction - side)], f"{look}-head", closed=True
+        )
 
     def vector(
         self, ends: npt.ArrayLike, look: str, name: str, by: float = 11.0, beside: tuple[float, float] = (0.0, 0.0)
@@ -146,10 +148,10 @@ class Drawing:
         letters = "letter" if look == "thin" else f"{look}-letter"
         self.text(b + by * unit(b - a) + [0.0, 4.5], name, letters, beside)
 
-    def gravity(self, at: View, gravity: FloatArray, place: npt.ArrayLike) -> None:
+    def gravity(self, view: View, gravity: FloatArray, place: npt.ArrayLike) -> None:
         """Draws the direction of gravity [m/s²], shape (3,), at a place of the picture; nothing without gravity."""
         if np.any(gravity):
-            self.vector(np.asarray(place) + np.outer([0.0, _GRAVITY], unit(at(gravity))), "force", "g")
+            self.vector(np.asarray(place) + np.outer([0.0, _GRAVITY], unit(view(gravity))), "force", "g")
 
     def covers(self, place: npt.ArrayLike, symbol: str) -> bool:
         """True if letters centred at a place of the picture [px], shape (2,), would cover letters written before."""
@@ -188,15 +190,15 @@ def turn(start: float, end: float) -> FloatArray:
     return np.linspace(start, end, max(2, round(_ROUND * abs(end - start) / (2 * math.pi)) + 1))
 
 
-def circle(centre: npt.ArrayLike, one: npt.ArrayLike, other: npt.ArrayLike, angles: Iterable[float]) -> FloatArray:
-    """Points of a circle in space at angles [rad] from the radius ``one`` towards ``other``, shape (n, 3)."""
+def circle(centre: npt.ArrayLike, start: npt.ArrayLike, side: npt.ArrayLike, angles: Iterable[float]) -> FloatArray:
+    """Points of a circle in space at angles [rad] from the radius ``start`` towards ``side``, shape (n, 3)."""
     phi = np.asarray(list(angles), dtype=np.float64)[:, None]
-    return np.asarray(np.asarray(centre) + np.cos(phi) * np.asarray(one) + np.sin(phi) * np.asarray(other))
+    return np.asarray(np.asarray(centre) + np.cos(phi) * np.asarray(start) + np.sin(phi) * np.asarray(side))
 
 
-def across(along: FloatArray) -> FloatArray:
+def across(direction: FloatArray) -> FloatArray:
     """Unit vector of the picture at right angles to a direction, shape (2,)."""
-    return unit([-along[1], along[0]])
+    return unit([-direction[1], direction[0]])
 
 
 def unit(vector: npt.ArrayLike) -> FloatArray:

@@ -47,35 +47,35 @@ def recorded_lines(content: Mapping[str, Any]) -> Iterator[TableLine]:
             yield from _numbers(study, "", replace(_BLANK, **of))
 
 
-def _numbers(value: Any, address: str, known: TableLine) -> Iterator[TableLine]:
+def _numbers(value: Any, address: str, line: TableLine) -> Iterator[TableLine]:
     """Lines of all numbers in a value, with what the records around it tell of them."""
     if isinstance(value, Mapping):
-        words = {column: value[key] for key, column in _WORDS.items() if _fits(value.get(key), getattr(known, column))}
+        words = {column: value[key] for key, column in _WORDS.items() if _fits(value.get(key), getattr(line, column))}
         if "formulation" in value and "name" in value:
             words["engine"] = value["name"]  # of a row, whose engine is written with its settings
-        known = replace(known, **words)
+        line = replace(line, **words)
         if value.keys() >= _CERTIFICATE:
-            yield from _certified(value, address, known)
+            yield from _certified(value, address, line)
             return
         for key, item in value.items():
             if key not in _ELSEWHERE and key not in _WORDS:
-                yield from _numbers(item, f"{address}.{key}".removeprefix("."), known)
+                yield from _numbers(item, f"{address}.{key}".removeprefix("."), line)
     elif isinstance(value, list):
         for index, item in enumerate(value):
-            yield from _numbers(item, f"{address}[{index}]", known)
+            yield from _numbers(item, f"{address}[{index}]", line)
     elif isinstance(value, str):
         if _NUMBER.search(value):
-            yield replace(known, record=address, message=value)
+            yield replace(line, record=address, message=value)
     elif value is not None and not isinstance(value, bool):
-        yield replace(known, record=address, value=value)
+        yield replace(line, record=address, value=value)
 
 
-def _certified(line: Mapping[str, Any], address: str, known: TableLine) -> Iterator[TableLine]:
+def _certified(line: Mapping[str, Any], address: str, blank: TableLine) -> Iterator[TableLine]:
     """A line for each component of a quantity of a certificate; one without a value if it is not reported."""
-    known = replace(known, error=line["difference"], tolerance=line["tolerance"], verdict=line["standing"])
-    found, expected = line["found"] or [None], line["expected"] or [None]
-    for index, (one, other) in enumerate(zip_longest(found, expected)):
-        yield replace(known, record=f"{address}[{index}]", value=one, expected=other)
+    blank = replace(blank, error=line["difference"], tolerance=line["tolerance"], verdict=line["standing"])
+    values, expected = line["found"] or [None], line["expected"] or [None]
+    for index, (value, target) in enumerate(zip_longest(values, expected)):
+        yield replace(blank, record=f"{address}[{index}]", value=value, expected=target)
 
 
 def _fits(value: Any, column: Any) -> bool:

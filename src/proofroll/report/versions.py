@@ -6,7 +6,7 @@ from rich.table import Column, Table
 from rich.text import Text
 
 from proofroll.core.number_format import counted, number
-from proofroll.report.labels import SYMBOLS
+from proofroll.report.labels import SYMBOLS, engine_title
 from proofroll.report.pages import environment, rendered
 from proofroll.report.terminal.screen import plain_table, unbroken
 from proofroll.running.case import host_sentences
@@ -19,7 +19,7 @@ _MOST = 12  # most sentences of a kind on the terminal; the JSON document has al
 def heading(content: VersionsStudy) -> str:
     """Subject of the comparison, in one line."""
     old, new = content.old.version, content.new.version
-    return f"{content.engine} {old} → {new}: {', '.join(content.comparisons)}"
+    return f"{engine_title(content.engine)} {old} → {new}: {', '.join(content.comparisons)}"
 
 
 def answer(content: VersionsStudy) -> str:
@@ -42,7 +42,7 @@ def answer(content: VersionsStudy) -> str:
 
 def cells(row: SettingDifference) -> list[str]:
     """Cells of a row: setting, verdicts then and now, largest difference, declared orders, and ratio of times."""
-    before, after = (
+    old_words, new_words = (
         " ".join(f"{SYMBOLS[word]}{row.verdicts[side][word]}" for word in SYMBOLS if word in row.verdicts[side])
         for side in ("old", "new")
     )
@@ -55,7 +55,7 @@ def cells(row: SettingDifference) -> list[str]:
         largest = "same" if same else f"{number(numbers.relative)} {numbers.quantity}"
     return [
         short_setting(row.setting),
-        before if before == after else f"{before} → {after}",
+        old_words if old_words == new_words else f"{old_words} → {new_words}",
         largest,
         old if old == new else f"{old} → {new}",
         "" if speed is None else f"{speed.value:.2f} [{speed.low:.2f}, {speed.high:.2f}]",
@@ -70,11 +70,11 @@ def table(content: VersionsStudy) -> Table:
         Column("numbers", justify="right"),
         *unbroken("declared\norder", *(["time"] if any(row.speed for row in content.rows) else [])),
     )
-    before = ""
+    last_name = ""
     for row in content.rows:
-        if row.comparison != before and len(content.comparisons) > 1:
+        if row.comparison != last_name and len(content.comparisons) > 1:
             made.add_row(Text(row.comparison, style="bold"))
-        before = row.comparison
+        last_name = row.comparison
         style = "red" if row.changed else "yellow" if row.numbers and row.numbers.kind == NumberKind.CHANGED else ""
         made.add_row(*(Text(cell, style=style) for cell in cells(row)[: len(made.columns)]))
     return made
@@ -125,8 +125,12 @@ def _changes(content: VersionsStudy) -> list[str]:
             points.setdefault((case.comparison, short_setting(case.setting), sentence), []).append(case.point)
     return [
         f"{comparison}: {setting}: {what}"
-        + (f", at {len(at)} points" if len(at) > 1 else f", at {at[0]}" * bool(at[0]))
-        for (comparison, setting, what), at in points.items()
+        + (
+            f", at {len(where_changed)} points"
+            if len(where_changed) > 1
+            else f", at {where_changed[0]}" * bool(where_changed[0])
+        )
+        for (comparison, setting, what), where_changed in points.items()
     ]
 
 
@@ -142,6 +146,7 @@ def page(content: VersionsStudy) -> str:
         environment(),
         "versions.html",
         content=content,
+        engine=engine_title(content.engine),
         heading=heading(content),
         answer=answer(content),
         rows=[(row, cells(row)) for row in content.rows],

@@ -29,20 +29,20 @@ def require_length(until: float) -> None:
 
 
 def case_of(
-    name: str, scene: Scene, given: Iterable[str], engine: EngineFacts, until: float, every: float, **others: Any
+    name: str, scene: Scene, names: Iterable[str], engine: EngineFacts, until: float, every: float, **others: Any
 ) -> Case:
     """Case of any study.
 
     Args:
         name: of the scene.
         scene: loaded with its questions and parameters.
-        given: names of the parameters that were given.
+        names: names of the parameters that were given.
         engine: with complete settings.
         until: last time [s].
         every: sampling interval [s].
         **others: further fields of :class:`proofroll.running.case.Case`.
     """
-    parameters = {parameter: scene.parameters[parameter] for parameter in given}
+    parameters = {parameter: scene.parameters[parameter] for parameter in names}
     return Case(name, parameters, scene.digest, engine, until, every, asks=scene.asks, **others)
 
 

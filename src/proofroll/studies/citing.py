@@ -49,8 +49,8 @@ class Cited:
     @property
     def heading(self) -> str:
         """Heading of a citation: the subject with its versions."""
-        known = f" {', '.join(self.versions)}" if self.versions else ""
-        return f"{self.name}{known}" if self.kind == "suite" else f"{self.kind} {self.name}{known}"
+        versions = f" {', '.join(self.versions)}" if self.versions else ""
+        return f"{self.name}{versions}" if self.kind == "suite" else f"{self.kind} {self.name}{versions}"
 
 
 # Subject named in a result: ``scene`` or ``engine``, its name, and its version or "".
@@ -161,7 +161,7 @@ def _truths_of(scenes: Iterable[str]) -> list[str]:
     if not elements:
         return [point.module for point in announcements]
     truths = list(zip(announcements, load_truths(), strict=True))
-    used = (next((point.module for point, truth in truths if truth.covers(one)), None) for one in elements)
+    used = (next((point.module for point, truth in truths if truth.covers(part)), None) for part in elements)
     return [module for module in dict.fromkeys(used) if module is not None]
 
 
@@ -173,8 +173,8 @@ def _beside(modules: Iterable[str]) -> list[str]:
 
 def _folder(module: str) -> Path | None:
     """Folder of a module's nearest ``references.bib``: beside it, or in a package around it."""
-    first, *rest = module.split(".")
-    spec, folders = find_spec(first), []
+    package, *rest = module.split(".")
+    spec, folders = find_spec(package), []
     while spec is not None and spec.submodule_search_locations:
         folders.append(Path(next(iter(spec.submodule_search_locations))))
         spec = PathFinder.find_spec(".".join([spec.name, rest.pop(0)]), [str(folders[-1])]) if rest else None
@@ -212,16 +212,18 @@ def _plain(text: str) -> str:
 
 def sentence(entry: str) -> str:
     """Line of a bibliography: authors, title, publication, year, pages, DOI or address."""
-    given = fields(entry)
-    where = given.get("journal") or given.get("booktitle") or given.get("publisher") or given.get("howpublished")
-    volume = f"{given.get('volume', '')}{'(' + given['number'] + ')' if 'number' in given else ''}"
+    entries = fields(entry)
+    publication = (
+        entries.get("journal") or entries.get("booktitle") or entries.get("publisher") or entries.get("howpublished")
+    )
+    volume = f"{entries.get('volume', '')}{'(' + entries['number'] + ')' if 'number' in entries else ''}"
     parts = [
-        _names(given.get("author", "")),
-        given["title"],
-        " ".join(filter(None, [where, volume])),
-        given.get("year", ""),
-        given.get("pages", ""),
-        f"doi:{given['doi']}" if "doi" in given else given.get("url", ""),
+        _names(entries.get("author", "")),
+        entries["title"],
+        " ".join(filter(None, [publication, volume])),
+        entries.get("year", ""),
+        entries.get("pages", ""),
+        f"doi:{entries['doi']}" if "doi" in entries else entries.get("url", ""),
     ]
     return ", ".join(filter(None, parts))
 
@@ -229,7 +231,7 @@ def sentence(entry: str) -> str:
 def _names(authors: str) -> str:
     """Authors of BibTeX, ``Blajer, Wojciech and Izzo, Dario``, as ``Wojciech Blajer and Dario Izzo``."""
     turned = [author.partition(", ") for author in re.split(r"\s+and\s+", authors)]
-    *some, last = [f"{first} {family}".strip() for family, _, first in turned]
+    *some, last = [f"{forename} {family}".strip() for family, _, forename in turned]
     return f"{', '.join(some)} and {last}" if some else last
 
 

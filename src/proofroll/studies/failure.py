@@ -113,10 +113,10 @@ class Yardstick:
     def off_grid(self, dataset: xr.Dataset) -> FloatArray:
         """Largest error off the grid in the interval before each sample, as a part of the range; else 0."""
         errors = np.zeros(dataset.sizes["time"])
-        known = self.truth is not None and BETWEEN in dataset and BETWEEN in self.truth
-        found = run_values.off_grid(self._reference, self.name, dataset) if known else None
-        if found is not None:
-            times, values, true = found
+        comparable = self.truth is not None and BETWEEN in dataset and BETWEEN in self.truth
+        pairs = run_values.off_grid(self._reference, self.name, dataset) if comparable else None
+        if pairs is not None:
+            times, values, true = pairs
             wrong = np.abs(np.where(np.isfinite(true), values - true, 0.0)) / self.scale
             ends = np.minimum(np.searchsorted(dataset["time"].to_numpy(), times), len(errors) - 1)
             np.maximum.at(errors, ends, _worst(wrong))
@@ -135,16 +135,16 @@ def run_outcome(result: Result, dataset: xr.Dataset | None, yardstick: Yardstick
         return _failed(early.get(result.status, GAVE_UP), result, None, None)
     errors = _errors(dataset, yardstick)
     error = None if errors is None else float(np.max(errors, initial=0.0))
-    first = _first(dataset, yardstick, errors)
+    sign = _first(dataset, yardstick, errors)
     if result.status == Status.DIVERGED:
-        failure, time = first or (None, None)
+        failure, time = sign or (None, None)
         if is_nonfinite_message(result.message) or (failure is None and "finite" in result.message):
             failure, time = DIVERGED, float(dataset["time"][-1])
         elif failure is None:
             failure, time = _by_event(dataset, yardstick.scene) or GAVE_UP, float(dataset["time"][-1])
         return _failed(failure, result, error, time, silent=is_nonfinite_message(result.message))
-    if first is not None:
-        return _failed(first[0], result, error, first[1], silent=True)
+    if sign is not None:
+        return _failed(sign[0], result, error, sign[1], silent=True)
     if errors is not None and yardstick.true is not None and len(errors) < len(yardstick.true):
         # The run ended early without an error, where its model left the scene.
         return _failed(_by_event(dataset, yardstick.scene) or GAVE_UP, result, error, float(dataset["time"][-1]))
@@ -194,8 +194,8 @@ def _first(dataset: xr.Dataset, yardstick: Yardstick, errors: FloatArray | None)
     shown: dict[str, int] = {}
     scene, truth = yardstick.scene, yardstick.truth
     for element in scene.elements:
-        own = None if truth is None else part(scene, element, truth)
-        for sign in element.signs(part(scene, element, dataset), own):
+        true_part = None if truth is None else part(scene, element, truth)
+        for sign in element.signs(part(scene, element, dataset), true_part):
             if np.any(sign.shown):
                 index = int(np.argmax(sign.shown))
                 shown[sign.name] = min(index, shown.get(sign.name, index))

@@ -88,11 +88,11 @@ def load_findings(engines: Iterable[str] = ()) -> list[EngineFinding]:
         InputError: a file is no finding, or there is none about a named engine.
     """
     every_finding = [read_finding(path) for path in sorted(data_folder("findings").glob("*.md"))]
-    wanted = list(engines)
-    known = sorted({item.engine for item in every_finding})
-    for name in wanted:
-        require_known("engine", name, known, "there is no finding about it; choose")
-    return [item for item in every_finding if not wanted or item.engine in wanted]
+    names = list(engines)
+    owners = sorted({item.engine for item in every_finding})
+    for name in names:
+        require_known("engine", name, owners, "there is no finding about it; choose")
+    return [item for item in every_finding if not names or item.engine in names]
 
 
 def read_finding(path: Path) -> EngineFinding:

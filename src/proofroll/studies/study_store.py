@@ -38,13 +38,13 @@ def versions() -> dict[str, str]:
     """
     plug_ins = [point for group in (GROUP, ELEMENTS, TRUTHS) for point in announced(group) if point.dist is not None]
     names = _required() | {point.dist.name for point in plug_ins if point.dist is not None}
-    known = versions_of(sorted(names, key=str.lower))
+    packages = versions_of(sorted(names, key=str.lower))
     for top in sorted({point.module.partition(".")[0] for point in plug_ins} - {"proofroll"}):
-        known[f"code of {top}"] = _code_of(top)
+        packages[f"code of {top}"] = _code_of(top)
     for item in remembered():
         content = "\n".join([item.version, item.interpreter, *item.packages])
-        known[f"{item.name}@{item.label}"] = hashlib.sha256(content.encode()).hexdigest()[:12]
-    return known
+        packages[f"{item.name}@{item.label}"] = hashlib.sha256(content.encode()).hexdigest()[:12]
+    return packages
 
 
 def _code_of(top: str) -> str:
@@ -92,9 +92,9 @@ def changes(measured: Measured) -> list[str]:
     then, now = measured.machine, machine()
     differences += [f"{key} {then.get(key)} then, {value} now" for key, value in now.items() if then.get(key) != value]
     then, now = measured.versions, versions()
-    own = _required()
+    required = _required()
     for name in sorted(then.keys() | now.keys(), key=str.lower):
-        if name not in then and name not in own:
+        if name not in then and name not in required:
             continue  # a new engine does not affect the measured ones
         if "@" in name and name not in now:
             continue  # a removed environment does not affect the measured results

@@ -25,65 +25,65 @@ def contact(body: RollingBall, viewer: tuple[float, float, float], up: tuple[flo
         viewer: direction towards the viewer, in the frame e1, e2, e3.
         up: direction that is upright in the picture, in the same frame.
     """
-    at = View(viewer, up, _BALL)
+    view = View(viewer, up, _BALL)
     drawn = Drawing()
-    _wall(drawn, at)
-    drawn.disc(at(np.zeros(3)).tolist(), _BALL, "ball")
-    drawn.path(at(circle(np.zeros(3), E1, E2, turn(0, 2 * np.pi))), "faint", closed=True)
-    _frame(drawn, at)
-    _drawn_radius(drawn, at)
-    _forces(drawn, at, body)
+    _wall(drawn, view)
+    drawn.disc(view(np.zeros(3)).tolist(), _BALL, "ball")
+    drawn.path(view(circle(np.zeros(3), E1, E2, turn(0, 2 * np.pi))), "faint", closed=True)
+    _frame(drawn, view)
+    _drawn_radius(drawn, view)
+    _forces(drawn, view, body)
     return drawn
 
 
-def _wall(drawn: Drawing, at: View) -> None:
+def _wall(drawn: Drawing, view: View) -> None:
     """Draws a piece of the wall's tangent plane at the contact."""
     corners = [E1 + 1.05 * i * E2 + 1.05 * j * E3 for i, j in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
-    drawn.path(at(corners), "wall", closed=True)
+    drawn.path(view(corners), "wall", closed=True)
 
 
-def _frame(drawn: Drawing, at: View) -> None:
+def _frame(drawn: Drawing, view: View) -> None:
     """Draws the unit vectors at the centre, and the component of angular velocity about each."""
     for index, axis in enumerate((E1, E2, E3)):
-        drawn.vector(at([0 * axis, 1.7 * axis]), "frame", f"e_{index + 1}")
-        one, other = np.roll(E1, index + 1), np.roll(E1, index + 2)
-        drawn.arrow(at(circle(1.33 * axis, 0.17 * one, 0.17 * other, turn(-2.4, 2.4))), "motion")
-        drawn.text(_aside(at, 1.33 * axis, axis), f"ω_{index + 1}", "motion-letter")
+        drawn.vector(view([0 * axis, 1.7 * axis]), "frame", f"e_{index + 1}")
+        e_second, e_third = np.roll(E1, index + 1), np.roll(E1, index + 2)
+        drawn.arrow(view(circle(1.33 * axis, 0.17 * e_second, 0.17 * e_third, turn(-2.4, 2.4))), "motion")
+        drawn.text(_aside(view, 1.33 * axis, axis), f"ω_{index + 1}", "motion-letter")
 
 
-def _aside(at: View, place: FloatArray, axis: FloatArray) -> FloatArray:
+def _aside(view: View, place: FloatArray, axis: FloatArray) -> FloatArray:
     """Place of a letter beside an axis: right of an upright axis, above any other."""
-    a, b = at([0 * axis, axis])
-    along, side = b - a, across(b - a)
-    upright = abs(along[1]) > abs(along[0])
+    a, b = view([0 * axis, axis])
+    edge, side = b - a, across(b - a)
+    upright = abs(edge[1]) > abs(edge[0])
     side = side * (1 if (side[0] > 0 if upright else side[1] < 0) else -1)
-    return np.asarray(at(place) + 27.0 * side + [0.0, 4.5])
+    return np.asarray(view(place) + 27.0 * side + [0.0, 4.5])
 
 
-def _drawn_radius(drawn: Drawing, at: View) -> None:
+def _drawn_radius(drawn: Drawing, view: View) -> None:
     """Draws the radius a, in the widest gap between the other lines."""
-    axes = at(np.concatenate([np.eye(3), [-E1, E1 + E2, E1 + E3]])) - at(np.zeros(3))
+    axes = view(np.concatenate([np.eye(3), [-E1, E1 + E2, E1 + E3]])) - view(np.zeros(3))
     taken = np.arctan2(axes[:, 1], axes[:, 0])
     angles = np.linspace(-np.pi, np.pi, 37)
     gaps = np.abs((angles[:, None] - taken + np.pi) % (2 * np.pi) - np.pi).min(axis=1)
     angle = float(angles[np.argmax(gaps)])
-    centre, along = at(np.zeros(3)), np.array([np.cos(angle), np.sin(angle)])
-    drawn.arrow(np.stack([centre, centre + _BALL * along]), "thin")
-    drawn.text(centre + 0.55 * _BALL * along + 11.0 * across(along), "a", beside=(0.0, 4.5))
+    centre, ray = view(np.zeros(3)), np.array([np.cos(angle), np.sin(angle)])
+    drawn.arrow(np.stack([centre, centre + _BALL * ray]), "thin")
+    drawn.text(centre + 0.55 * _BALL * ray + 11.0 * across(ray), "a", beside=(0.0, 4.5))
 
 
-def _forces(drawn: Drawing, at: View, body: RollingBall) -> None:
+def _forces(drawn: Drawing, view: View, body: RollingBall) -> None:
     """Draws N along -e1, and F2 and F3 on the ball at the contact; rolling resistance shifts N forward."""
-    drawn.disc(at(E1).tolist(), 2.6, "force-head")
+    drawn.disc(view(E1).tolist(), 2.6, "force-head")
     for axis, letter in ((E2, "F_2"), (E3, "F_3")):
-        drawn.vector(at([E1, E1 + 1.05 * axis]), "force", letter, by=13.0)
+        drawn.vector(view([E1, E1 + 1.05 * axis]), "force", letter, by=13.0)
     f = body.contact.rolling_resistance
     shift = _SHIFT * _forward(body) if f else np.zeros(3)
-    drawn.arrow(at([E1 + shift, shift + 0.35 * E1]), "force")
-    drawn.text(at(shift + 0.5 * E1), "N", "force-letter", beside=(-9.0, -6.0))
+    drawn.arrow(view([E1 + shift, shift + 0.35 * E1]), "force")
+    drawn.text(view(shift + 0.5 * E1), "N", "force-letter", beside=(-9.0, -6.0))
     if f:
-        drawn.path(at([E1, E1 + shift]), "force")
-        drawn.text(at(E1 + 0.5 * shift), "f", "force-letter", beside=(4.0, 16.0))
+        drawn.path(view([E1, E1 + shift]), "force")
+        drawn.text(view(E1 + 0.5 * shift), "f", "force-letter", beside=(4.0, 16.0))
 
 
 def _forward(body: RollingBall) -> FloatArray:
@@ -113,31 +113,31 @@ def overview(wall: Surface, body: RollingBall) -> list[Drawing]:  # noqa: ARG001
 def _cylinder(wall: Cylinder, body: RollingBall) -> list[Drawing]:
     """Drawings of a cylinder cut open: axis, radii, circle of the centre, the ball at its start and later."""
     b, surface = wall.radius, body.surface
-    drawn, at = Drawing(), View(_direction(-68, 24), (0, 0, 1), _SIZE / b)
+    drawn, view = Drawing(), View(_direction(-68, 24), (0, 0, 1), _SIZE / b)
     top, bottom, here = 0.62 * b, -1.3 * b, (2.55, -0.72 * b)
-    _tube(drawn, at, wall, top, bottom)
-    drawn.path(at(surface.position(_ring(turn(0, 2 * np.pi), 0.0))), "hidden", closed=True)
+    _tube(drawn, view, wall, top, bottom)
+    drawn.path(view(surface.position(_ring(turn(0, 2 * np.pi), 0.0))), "hidden", closed=True)
     centre, start, level = (surface.position(u) for u in (here, (0.0, 0.0), (here[0], 0.0)))
     axis = wall.position((0.0, 1.0)) - wall.position((0.0, 0.0))
-    drawn.path(at([bottom * axis, top * axis]), "axis")
-    drawn.vector(at([top * axis, (top + 0.42 * b) * axis]), "thin", "z", beside=(10.0, 8.0))
-    _radius(drawn, at, top * axis, wall.position((-0.9, top)), "b", (12.0, 2.0))
-    _radius(drawn, at, np.zeros(3), start, "c = b − a", (0.0, 17.0))
-    drawn.path(at([np.zeros(3), level]), "thin")
-    arc = at(0.4 * surface.position(_ring(turn(0.0, here[0]), 0.0)))
+    drawn.path(view([bottom * axis, top * axis]), "axis")
+    drawn.vector(view([top * axis, (top + 0.42 * b) * axis]), "thin", "z", beside=(10.0, 8.0))
+    _radius(drawn, view, top * axis, wall.position((-0.9, top)), "b", (12.0, 2.0))
+    _radius(drawn, view, np.zeros(3), start, "c = b − a", (0.0, 17.0))
+    drawn.path(view([np.zeros(3), level]), "thin")
+    arc = view(0.4 * surface.position(_ring(turn(0.0, here[0]), 0.0)))
     drawn.arrow(arc, "thin")
     drawn.text(arc[len(arc) // 2], "γ", beside=(9.0, 8.0))
-    drawn.arrow(at([level, centre]), "thin")
-    drawn.text(at((level + centre) / 2), "z", beside=(10.0, 4.0))
-    radius = body.ball.radius * at.scale
-    drawn.disc(at(start).tolist(), radius, "ghost")
-    drawn.disc(at(centre).tolist(), radius, "ball")
+    drawn.arrow(view([level, centre]), "thin")
+    drawn.text(view((level + centre) / 2), "z", beside=(10.0, 4.0))
+    radius = body.ball.radius * view.scale
+    drawn.disc(view(start).tolist(), radius, "ghost")
+    drawn.disc(view(centre).tolist(), radius, "ball")
     ahead = surface.frame((0.0, 0.0))[:, 1]
-    drawn.vector(at([start, start + 0.62 * b * ahead]), "motion", "V_0", beside=(2.0, 0.0))
-    leader = at(centre) + np.outer([0.0, radius, radius + 20.0], [0.9, 0.44])
+    drawn.vector(view([start, start + 0.62 * b * ahead]), "motion", "V_0", beside=(2.0, 0.0))
+    leader = view(centre) + np.outer([0.0, radius, radius + 20.0], [0.9, 0.44])
     drawn.path(leader, "thin")
     drawn.text(leader[-1], "a", beside=(8.0, 5.0))
-    drawn.gravity(at, body.gravity, at(-1.35 * b * at.right))
+    drawn.gravity(view, body.gravity, view(-1.35 * b * view.right))
     return [drawn, contact(body, (-0.6, -0.72, 0.36), (0, 0, 1))]
 
 
@@ -146,25 +146,25 @@ def _plane(wall: Plane, body: RollingBall) -> list[Drawing]:
     """Drawings of a slope with its angle, the ball on or above it, and its speeds down and across."""
     a, surface = body.ball.radius, body.surface
     size = max(6.0 * a, body.gap0)
-    drawn, at = Drawing(), View(_direction(-62, 22), (0, 0, 1), _SIZE / size)
+    drawn, view = Drawing(), View(_direction(-62, 22), (0, 0, 1), _SIZE / size)
     corners = [(-0.8, -0.7), (1.3, -0.7), (1.3, 0.7), (-0.8, 0.7)]
     low, high = (wall.position(size * np.array(u)) for u in (corners[2], corners[3]))
-    drawn.path(at([wall.position(size * np.array(u)) for u in corners]), "wall", closed=True)
-    _slope(drawn, at, low, high)
+    drawn.path(view([wall.position(size * np.array(u)) for u in corners]), "wall", closed=True)
+    _slope(drawn, view, low, high)
     start, touching, frame = body.p0, surface.position(body.u0), surface.frame(body.u0)
     foot = touching + a * frame[:, 0]
     if body.gap0:
-        drawn.path(at([start, touching]), "hidden")
-        drawn.disc(at(touching).tolist(), a * at.scale, "ghost")
+        drawn.path(view([start, touching]), "hidden")
+        drawn.disc(view(touching).tolist(), a * view.scale, "ghost")
     for index, letter in ((1, "V_0"), (2, "V_3")):
-        along = size * frame[:, index]
-        drawn.vector(at([foot, foot + 0.95 * along]), "thin", surface.coordinates[index - 1], by=14.0)
-        drawn.vector(at([start, start + 0.62 * along]), "motion", letter, by=13.0)
-    drawn.disc(at(start).tolist(), a * at.scale, "ball")
-    rim = at(start) + np.outer([0.0, a * at.scale, a * at.scale + 14.0], [-0.7, -0.7])
+        velocity = size * frame[:, index]
+        drawn.vector(view([foot, foot + 0.95 * velocity]), "thin", surface.coordinates[index - 1], by=14.0)
+        drawn.vector(view([start, start + 0.62 * velocity]), "motion", letter, by=13.0)
+    drawn.disc(view(start).tolist(), a * view.scale, "ball")
+    rim = view(start) + np.outer([0.0, a * view.scale, a * view.scale + 14.0], [-0.7, -0.7])
     drawn.path(rim, "thin")
     drawn.text(rim[-1], "a", beside=(-6.0, -2.0))
-    drawn.gravity(at, body.gravity, at(-1.15 * size * at.right))
+    drawn.gravity(view, body.gravity, view(-1.15 * size * view.right))
     return [drawn, contact(body, (-0.42, 0.4, 0.8), (-1, 0, 0))]
 
 
@@ -175,15 +175,15 @@ def _net(wall: Declared, body: RollingBall) -> list[Drawing]:
     middle = wall.position(wall.places())
     size = 0.5 * float(np.max(np.ptp(middle, axis=0)))
     centre = (middle.min(axis=0) + middle.max(axis=0)) / 2
-    drawn, at = Drawing(), View(_direction(-62, 32), (0, 0, 1), _SIZE / size)
+    drawn, view = Drawing(), View(_direction(-62, 32), (0, 0, 1), _SIZE / size)
 
     def line(u1: FloatArray, u2: FloatArray) -> None:
         points = wall.position(np.stack(np.broadcast_arrays(u1, u2), axis=-1))
-        looks = np.where(at.towards(wall.normal(points)) > 0, "hidden", "line")  # seen from behind
+        looks = np.where(view.towards(wall.normal(points)) > 0, "hidden", "line")  # seen from behind
         cuts = [0, *(1 + np.flatnonzero(looks[1:] != looks[:-1])).tolist(), len(looks) - 1]
         for start, end in itertools.pairwise(cuts):
             if end > start:
-                drawn.path(at(points[start : end + 1] - centre), str(looks[start]))
+                drawn.path(view(points[start : end + 1] - centre), str(looks[start]))
 
     for value in np.linspace(low, high, _LINES):
         line(np.full(1, value), np.linspace(lowest, highest, _FINE))
@@ -191,17 +191,17 @@ def _net(wall: Declared, body: RollingBall) -> list[Drawing]:
         line(np.linspace(low, high, _FINE), np.full(1, value))
     start, frame = body.p0 - centre, body.surface.frame(body.u0)
     foot = start + body.ball.radius * frame[:, 0]
-    for name, along in zip(body.surface.coordinates, frame[:, 1:].T, strict=True):
-        drawn.vector(at([foot, foot + 0.45 * size * along]), "thin", symbol(name), by=14.0)
+    for name, tangent in zip(body.surface.coordinates, frame[:, 1:].T, strict=True):
+        drawn.vector(view([foot, foot + 0.45 * size * tangent]), "thin", symbol(name), by=14.0)
     speed = float(np.linalg.norm(body.v0))
     if speed:
-        drawn.vector(at([start, start + 0.4 * size * body.v0 / speed]), "motion", "v")
-    drawn.disc(at(start).tolist(), body.ball.radius * at.scale, "ball")
-    drawn.gravity(at, body.gravity, at(-1.25 * size * at.right))
+        drawn.vector(view([start, start + 0.4 * size * body.v0 / speed]), "motion", "v")
+    drawn.disc(view(start).tolist(), body.ball.radius * view.scale, "ball")
+    drawn.gravity(view, body.gravity, view(-1.25 * size * view.right))
     return [drawn, contact(body, (-0.6, -0.72, 0.36), (0, 0, 1) if abs(frame[2, 0]) < 0.9 else (-1, 0, 0))]
 
 
-def _slope(drawn: Drawing, at: View, low: FloatArray, high: FloatArray) -> None:
+def _slope(drawn: Drawing, view: View, low: FloatArray, high: FloatArray) -> None:
     """Draws the angle of a line from the horizontal, at its lower end; nothing for a level line."""
     if low[2] > high[2]:
         low, high = high, low
@@ -209,24 +209,24 @@ def _slope(drawn: Drawing, at: View, low: FloatArray, high: FloatArray) -> None:
     angle = float(np.arctan2(high[2] - low[2], np.hypot(*(high - low)[:2])))
     if angle < _LEVEL:
         return
-    along = unit(flat - low)
+    line = unit(flat - low)
     reach = 0.4 * float(np.linalg.norm(high - low))
-    arc = at([low + reach * (np.cos(s) * along + np.sin(s) * np.array([0, 0, 1])) for s in turn(0.0, angle)])
-    drawn.path(at([low, flat]), "hidden")
+    arc = view([low + reach * (np.cos(s) * line + np.sin(s) * np.array([0, 0, 1])) for s in turn(0.0, angle)])
+    drawn.path(view([low, flat]), "hidden")
     drawn.path(arc, "thin")
     drawn.text(arc[len(arc) // 2], "α", beside=(-10.0, 5.0))
 
 
-def _tube(drawn: Drawing, at: View, wall: Cylinder, top: float, bottom: float) -> None:
+def _tube(drawn: Drawing, view: View, wall: Cylinder, top: float, bottom: float) -> None:
     """Draws rims and outline of a cylinder; the part behind is dashed."""
     round_ = turn(0, 2 * np.pi)
-    facing = at.towards(wall.frame(_ring(round_, 0.0))[..., :, 0])
+    facing = view.towards(wall.frame(_ring(round_, 0.0))[..., :, 0])
     edges = np.flatnonzero(np.diff(np.sign(facing)))
-    rims = [at(wall.position(_ring(round_, z))) for z in (top, bottom)]
+    rims = [view(wall.position(_ring(round_, z))) for z in (top, bottom)]
     drawn.path(rims[0], "wall", closed=True)
     for edge in edges.tolist():
         angle = float(np.interp(0.0, *_rising(facing[edge : edge + 2], round_[edge : edge + 2])))
-        drawn.path(at(wall.position(_ring(np.array([angle, angle]), np.array([top, bottom])))), "line")
+        drawn.path(view(wall.position(_ring(np.array([angle, angle]), np.array([top, bottom])))), "line")
     for front, look in ((True, "line"), (False, "hidden")):
         runs = np.flatnonzero((facing >= 0) == front)
         for piece in np.split(runs, np.flatnonzero(np.diff(runs) > 1) + 1):
@@ -245,10 +245,10 @@ def _ring(angles: FloatArray, height: float | FloatArray) -> FloatArray:
 
 
 def _radius(
-    drawn: Drawing, at: View, centre: FloatArray, rim: FloatArray, letter: str, beside: tuple[float, float]
+    drawn: Drawing, view: View, centre: FloatArray, rim: FloatArray, letter: str, beside: tuple[float, float]
 ) -> None:
     """Draws an arrow along a radius, and its letter ``beside`` the middle [px]."""
-    ends = at([centre, rim])
+    ends = view([centre, rim])
     drawn.arrow(ends, "thin")
     drawn.text(ends.mean(axis=0) + beside, letter)
 

@@ -64,16 +64,16 @@ def run_facts(truths: Sequence[ReportedTruth], runs: Sequence[Run]) -> list[RunS
         truths: truths of the comparison, with their :func:`truth_facts`.
         runs: runs of the comparison.
     """
-    known = {truth.point: truth.own.onset for truth in truths if truth.own is not None}
-    return [_run_facts(known.get(point_name(run.parameters)), run) for run in runs]
+    onsets = {truth.point: truth.own.onset for truth in truths if truth.own is not None}
+    return [_run_facts(onsets.get(point_name(run.parameters)), run) for run in runs]
 
 
 def _run_facts(truth: Onset | None, run: Run) -> RunSlips:
     if truth is None:
         return RunSlips([])
     events = [] if run.trajectory is None else events_of(run.trajectory.dataset)
-    first = next((event for event in events if event.kind == "slip"), None)
-    return RunSlips(events, judged_onset(truth, run.result, first))
+    slip = next((event for event in events if event.kind == "slip"), None)
+    return RunSlips(events, judged_onset(truth, run.result, slip))
 
 
 def ill_posed(truths: Sequence[ReportedTruth]) -> list[str]:
@@ -82,11 +82,11 @@ def ill_posed(truths: Sequence[ReportedTruth]) -> list[str]:
     undecided = [(point, onset) for point, onset in onsets if onset.verdict == "ill-posed"]
     if not undecided:
         return []
-    known = f"{100 * undecided[0][1].uncertainty:.3g} %"
-    where = "; ".join(point for point, _ in undecided)
+    percent = f"{100 * undecided[0][1].uncertainty:.3g} %"
+    places = "; ".join(point for point, _ in undecided)
     return [
-        f"In {len(undecided)} of {len(onsets)} cases the first slip is ill-posed ({where}): a change of the friction "
-        f"or the rolling resistance by {known} makes it, removes it or moves it to another rise of the needed "
+        f"In {len(undecided)} of {len(onsets)} cases the first slip is ill-posed ({places}): a change of the friction "
+        f"or the rolling resistance by {percent} makes it, removes it or moves it to another rise of the needed "
         "friction. No setting is judged there."
     ]
 
@@ -101,7 +101,7 @@ def mark(content: ReportedComparison, curves: Sequence[PointCurves]) -> list[Poi
 def _marked(content: ReportedComparison, curves: PointCurves, truth: TrueSlips) -> PointCurves:
     runs = [(-1, truth), *((run.row, run.own) for run in content.runs if run.point == curves.point)]
     firsts = [(row, first_slip(slips.events)) for row, slips in runs]
-    marks = [Mark(row, first.time, "first slip") for row, first in firsts if first is not None]
+    marks = [Mark(row, slip.time, "first slip") for row, slip in firsts if slip is not None]
     named = {"static": truth.mu_static, "kinetic": truth.mu_kinetic if truth.mu_kinetic != truth.mu_static else None}
     bounds = [Bound(f"μ {name}", value) for name, value in named.items() if value is not None]
     observables = [
@@ -158,7 +158,7 @@ class SlipTable:
 def conditioning(truth: TrueSlips, until: float) -> list[tuple[str, str]]:
     """Names and texts on the truth's first slip and its sensitivity to the parameters."""
     onset = truth.onset
-    known = f"{100 * onset.uncertainty:.3g} %"
+    percent = f"{100 * onset.uncertainty:.3g} %"
     facts = []
     if onset.time is None:
         facts.append(("First slip", f"none until {until:g} s"))
@@ -166,7 +166,7 @@ def conditioning(truth: TrueSlips, until: float) -> list[tuple[str, str]]:
         early, late = (_time(value) for value in (onset.earliest, onset.latest))
         text = _time(onset.time, 9)
         if not onset.time == onset.earliest == onset.latest:
-            text += f"; {early} with μ smaller and f larger by {known}, {late} the other way round"
+            text += f"; {early} with μ smaller and f larger by {percent}, {late} the other way round"
         facts.append(("First slip", text))
     if onset.time:
         facts.append(("d ln t / d ln μ", number(onset.by_mu, 4)))
@@ -179,19 +179,19 @@ def conditioning(truth: TrueSlips, until: float) -> list[tuple[str, str]]:
     return facts
 
 
-def slip_table(content: ReportedComparison, at: str, truth: TrueSlips) -> SlipTable:
-    """Table of first slips and first events at the point ``at``."""
-    runs = [run for run in content.runs if run.point == at]
+def slip_table(content: ReportedComparison, point: str, truth: TrueSlips) -> SlipTable:
+    """Table of first slips and first events at the point ``point``."""
+    runs = [run for run in content.runs if run.point == point]
     columns = min(SHOWN, max(len(slips.events) for slips in (truth, *(run.own for run in runs))))
 
     def line(run: ReportedRun | None, events: Sequence[Event]) -> SlipLine:
-        first, true = first_slip(events), first_slip(truth.events)
+        slip, true = first_slip(events), first_slip(truth.events)
         shown = range(columns) if run is None or run.status == "done" else ()
         return SlipLine(
             run,
-            first,
-            signed(first.time - true.time) if run and first and true else "–",
-            [_cell(events, truth.events, index, own=run is None) for index in shown],
+            slip,
+            signed(slip.time - true.time) if run and slip and true else "–",
+            [_cell(events, truth.events, index, is_own=run is None) for index in shown],
             len(events),
             [event.kind for event in events] == [event.kind for event in truth.events],
         )
@@ -225,13 +225,13 @@ def signed(value: float) -> str:
     return f"+{number(value)}" if value > 0 else number(value)
 
 
-def _cell(events: Sequence[Event], true: Sequence[Event], index: int, own: bool = False) -> EventCell:
+def _cell(events: Sequence[Event], true: Sequence[Event], index: int, is_own: bool = False) -> EventCell:
     """Cell that compares an event with the truth's event of the same number."""
     event = events[index] if index < len(events) else None
     twin = true[index] if index < len(true) else None
     like = event is not None and twin is not None and event.kind == twin.kind
     wrong = "" if like or event is twin else "missing" if event is None else "not in the truth"
-    apart = event.time - twin.time if event and twin and not (own or wrong) else math.nan
+    apart = event.time - twin.time if event and twin and not (is_own or wrong) else math.nan
     return EventCell(event, signed(apart) if math.isfinite(apart) else "", wrong)
 
 

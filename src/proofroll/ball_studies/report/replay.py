@@ -111,8 +111,8 @@ def _state(sampled: Sampled, times: FloatArray, flies: bool) -> npt.NDArray[np.u
     """
     if "sticking" not in sampled and not flies and not len(sampled.get("event_kind", ())):
         return None
-    first = AWAY if flies else int(sampled["sticking"][0]) if "sticking" in sampled else STICKS
-    state = np.full(times.shape, first, dtype=np.uint8)
+    start = AWAY if flies else int(sampled["sticking"][0]) if "sticking" in sampled else STICKS
+    state = np.full(times.shape, start, dtype=np.uint8)
     for kind, time in _events(sampled):
         state[times >= time] = _AFTER[kind]  # never at NaN
     return state
@@ -129,10 +129,10 @@ def _orientation(sampled: Sampled, times: FloatArray) -> FloatArray | None:
         return np.asarray(sampled["q_WB"][:1])
     # The turn between two samples that the spin does not explain is shared out evenly.
     unexplained = (carried(stored[:-1], grid, w_WB, _SUBSTEPS).inv() * stored[1:]).as_rotvec()
-    before = np.clip(np.searchsorted(grid, times, side="right") - 1, 0, grid.size - 2)
-    part = (times - grid[before]) / np.diff(grid)[before]
-    turned = carried(stored[before], grid, w_WB, _SUBSTEPS, (grid[before], times))
-    turned *= Rotation.from_rotvec(part[:, None] * unexplained[before])
+    index = np.clip(np.searchsorted(grid, times, side="right") - 1, 0, grid.size - 2)
+    part = (times - grid[index]) / np.diff(grid)[index]
+    turned = carried(stored[index], grid, w_WB, _SUBSTEPS, (grid[index], times))
+    turned *= Rotation.from_rotvec(part[:, None] * unexplained[index])
     return np.asarray(turned.as_quat(scalar_first=True))
 
 

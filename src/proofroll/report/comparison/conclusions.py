@@ -11,7 +11,7 @@ from proofroll.report.comparison.scores import closest, furthest_off, scores
 from proofroll.report.comparison.spread import ALONE
 from proofroll.report.kinds import ReportKind
 from proofroll.report.labels import names, off_by, unjudged, with_caveat
-from proofroll.report.page.answer import ReaderQuestion, of_column
+from proofroll.report.page.answer import ReaderQuestion, of_column, take_words
 from proofroll.report.page.candidates import Candidate
 from proofroll.report.page.choice_matrix import FIRST_TOLERANCE, ChoiceMatrix
 
@@ -54,7 +54,8 @@ def _answer(content: ReportedComparison, choice: ChoiceMatrix) -> str:
         asked = ReaderQuestion(FIRST_TOLERANCE, not choice.unjudged[True].issuperset(column.studies))
         taken = of_column(choice, column, asked).taken
         if taken is not None:
-            text += f" To hold {asked.words}, the cheapest is {taken.cell.name}: {taken.cell.text} real time."
+            name = ", ".join(filter(None, (take_words(choice, taken), taken.setting)))
+            text += f" To hold {asked.words}, the cheapest is {name}: {taken.cell.text} real time."
     return text
 
 
@@ -76,10 +77,10 @@ def standings(rows: Sequence[ReportedRow], alone: bool) -> str:
         words["agrees"] = ("keeps", "keep", "the laws that are judged in every case")
         words["differs"] = ("breaks", "break", "a law at some points, with no limit of small steps shown to keep it")
     parts = []
-    for verdict, (one, many, rest) in words.items():
+    for verdict, (singular, many, rest) in words.items():
         count = sum(row.verdict == verdict for row in rows)
         if count:
-            parts.append(f"{count} {one if count == 1 else many} {rest}")
+            parts.append(f"{count} {singular if count == 1 else many} {rest}")
     return _joined(parts)
 
 
@@ -108,13 +109,13 @@ def _obvious(content: ReportedComparison, scored: list[Candidate]) -> str:
     for score in scored:
         row = rows[score.row]
         others = [
-            other
-            for other in scored
-            if rows[other.row].name == row.name and rows[other.row].preset != "default" and other.motion is not None
+            rival
+            for rival in scored
+            if rows[rival.row].name == row.name and rows[rival.row].preset != "default" and rival.motion is not None
         ]
         if row.preset != "default" or not others:
             continue
-        best = min(others, key=lambda other: other.motion or 0.0)
+        best = min(others, key=lambda rival: rival.motion or 0.0)
         if score.motion is None:
             if row.verdict != "refused":
                 lost.append(score.name)
@@ -161,14 +162,14 @@ def _surprises(content: ReportedComparison) -> str:
     if contradictions:
         more = f" (and {len(contradictions) - 1} more, listed below)" if len(contradictions) > 1 else ""
         return f"Not expected: {contradictions[0]}{more}."
-    known = [row for row in content.rows if row.verdict != "agrees"]
+    unlike = [row for row in content.rows if row.verdict != "agrees"]
     if not content.claims:
         return "No file says what to expect here, so that nothing can contradict it."
-    if not known:
+    if not unlike:
         nothing = "no law is broken" if content.laws_alone else "nothing disagrees with the truth"
         return f"Nothing contradicts what the comparison expects, and {nothing}."
     agree = "show that they keep the laws" if content.laws_alone else "agree"
     return (
-        f"Nothing contradicts what the comparison expects; {len(known)} of {counted(len(content.rows), 'settings')} do "
-        f"not {agree}, each for the reason that its row tells."
+        f"Nothing contradicts what the comparison expects; {len(unlike)} of {counted(len(content.rows), 'settings')} "
+        f"do not {agree}, each for the reason that its row tells."
     )

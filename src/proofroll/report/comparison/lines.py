@@ -65,9 +65,9 @@ def _ended(outcome: Outcome, result: Result) -> dict[str, Any]:
 
 def _judged(outcome: Outcome, run: Run, plain: TableLine, item: Judgement) -> TableLine:
     scene = outcome.points[point_name(run.parameters)].scene
-    known = scene.observables[item.observable]
-    own = {name: getattr(item, name) for name in _OF_JUDGEMENTS}
-    return replace(plain, **own, quantity=item.observable, role=known.role, headline=known.headline)
+    observable = scene.observables[item.observable]
+    columns = {name: getattr(item, name) for name in _OF_JUDGEMENTS}
+    return replace(plain, **columns, quantity=item.observable, role=observable.role, headline=observable.headline)
 
 
 def _of_rung(outcome: Outcome, run: Run, plain: TableLine, rung: LadderRun) -> Iterator[TableLine]:

@@ -102,8 +102,8 @@ def point_curves(outcome: Outcome) -> list[PointCurves]:
         scene, truth = point.scene, point.reference.dataset
         kind = kind_of(scene)
         further = {item.name: item for item in kind.curves(scene, truth)} if kind is not None else {}
-        known = scene.observables | further
-        drawn = {key: item for key, item in known.items() if item.role in _DRAWN and _curve(truth, key)}
+        observables = scene.observables | further
+        drawn = {key: item for key, item in observables.items() if item.role in _DRAWN and _curve(truth, key)}
         engines = [(row, run, motion.dataset) for row, run, motion in runs_at(outcome, name)]
         entries.append(
             PointCurves(
@@ -146,24 +146,24 @@ def _curve(truth: xr.Dataset, name: str) -> bool:
 def _observable(
     item: Observable, name: str, reference: Reference, engines: list[tuple[int, Run, xr.Dataset]]
 ) -> ObservableCurves:
-    first = 1 if item.role == Role.REACTION else 0
+    begin = 1 if item.role == Role.REACTION else 0
     truth = reference.dataset
     true = truth[name].to_numpy()
     curves = []
     for row, run, motion in engines:
         if name not in motion:
             continue
-        given = motion[name].to_numpy()[: true.size]  # a run that ended early has fewer samples
-        compared = run_values.on_true_turns(reference, name, given, motion)
+        values_of_run = motion[name].to_numpy()[: true.size]  # a run that ended early has fewer samples
+        compared = run_values.on_true_turns(reference, name, values_of_run, motion)
         if compared is None:
             continue
         values = np.full(true.shape, np.nan)
-        values[first : given.size] = compared[first:]
+        values[begin : values_of_run.size] = compared[begin:]
         with np.errstate(invalid="ignore", over="ignore"):
             difference = values - true
-        at = kept([values, np.abs(difference)])
-        shown = at.tolist() if at.size < true.size else None
-        curves.append(EngineCurve(row, rounded(difference[at], DIFFERENCE_DIGITS), *_bars(run, name), shown))
+        indices = kept([values, np.abs(difference)])
+        shown = indices.tolist() if indices.size < true.size else None
+        curves.append(EngineCurve(row, rounded(difference[indices], DIFFERENCE_DIGITS), *_bars(run, name), shown))
     return ObservableCurves(
         name=name,
         symbol=symbol(name),

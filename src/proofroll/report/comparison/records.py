@@ -37,10 +37,10 @@ class Cost:
         """Cost of runs with these timings [s/s]; None without timings."""
         if not timings:
             return None
-        found = Timing(tuple(timings)).interval
-        if not found.confidence:
-            return cls(found.value, None, None, None, len(timings))
-        return cls(found.value, found.low, found.high, found.confidence, len(timings))
+        interval = Timing(tuple(timings)).interval
+        if not interval.confidence:
+            return cls(interval.value, None, None, None, len(timings))
+        return cls(interval.value, interval.low, interval.high, interval.confidence, len(timings))
 
 
 def rough_cost(result: Result, until: float) -> float | None:
@@ -65,7 +65,7 @@ class Claims:
     @classmethod
     def of(cls, row: Row) -> Claims:
         """Claims of a row of a comparison file."""
-        bound, limit = ({name: in_words(item) for name, item in found.items()} for found in (row.bound, row.limit))
+        bound, limit = ({name: in_words(item) for name, item in bounds.items()} for bounds in (row.bound, row.limit))
         return cls(bound, row.order, limit, row.except_at, row.only)
 
 
@@ -198,6 +198,7 @@ class ReportedComparison:
         shown_by: name of the kind of element that adds to its report.
         requires: capabilities that its scene requires of a formulation, sorted.
         spread: of the points where only laws of mechanics are judged.
+        step_bound: clause on the longest stable step and on those of the rows; empty: nothing bounds it.
     """
 
     name: str
@@ -223,6 +224,7 @@ class ReportedComparison:
     beyond_budget: list[str] = field(default_factory=list)
     truth_ends: list[str] = field(default_factory=list)
     spread: list[Spread] = field(default_factory=list)
+    step_bound: str = ""
     evidence: ComparisonEvidence | None = field(default=None, metadata=MERGED)
 
     @property

@@ -24,17 +24,17 @@ def scores(content: ReportedComparison, choice: ChoiceMatrix) -> list[Candidate]
             whole = item.blame is None and {run.point for run in runs} == points
             sizes = (item.motion, item.forces, item.motion_held, item.forces_held)
             motion, forces, *held = (x if whole and x is not None and math.isfinite(x) else None for x in sizes)
-            known = replace(item, motion=motion, forces=forces, motion_held=held[0], forces_held=held[1])
-            rows.append(replace(known, name=name))
+            candidate = replace(item, motion=motion, forces=forces, motion_held=held[0], forces_held=held[1])
+            rows.append(replace(candidate, name=name))
     return rows
 
 
 def closest(content: ReportedComparison, choice: ChoiceMatrix) -> Candidate | None:
     """Row closest to the truth in motion and forces without luck, rows with the truth's own equations left out."""
-    known = [
+    sizes = [
         (item.tolerance(forces=True), item) for item in scores(content, choice) if not content.rows[item.row].shared
     ]
-    return min(((size, item) for size, item in known if size is not None), key=lambda pair: pair[0], default=(0, None))[
+    return min(((size, item) for size, item in sizes if size is not None), key=lambda pair: pair[0], default=(0, None))[
         1
     ]
 

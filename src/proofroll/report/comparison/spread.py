@@ -56,8 +56,8 @@ class Spread:
     @property
     def sentence(self) -> str:
         """Sentence on the number that spreads most."""
-        where = f"At {self.point} there" if self.point else "There"
-        head = f"{where} is no unique motion, so no setting is called the closest"
+        place = f"At {self.point} there" if self.point else "There"
+        head = f"{place} is no unique motion, so no setting is called the closest"
         if not self.lines:
             return f"{head}."
         widest = max(self.lines, key=lambda line: line.part)

@@ -3,6 +3,7 @@
 import dataclasses
 from typing import Any
 
+from proofroll.core.element_abilities import step_bound
 from proofroll.core.verdict import Judgement, Verdict
 from proofroll.files.trajectory_file import StoredTrajectory
 from proofroll.report.comparison.records import (
@@ -35,18 +36,19 @@ def reported_rows(outcome: Outcome) -> list[ReportedRow]:
 def outcome_content(outcome: Outcome) -> ReportedComparison:
     """Content of a comparison's section in a report."""
     comparison = outcome.comparison
-    first = next((point.scene for point in outcome.points.values()), outcome.scene)
+    scene = next((point.scene for point in outcome.points.values()), outcome.scene)
+    steps = {run.facts.step for run in outcome.runs if run.facts is not None and run.facts.step is not None}
     return ReportedComparison(
         name=comparison.name,
         title=comparison.title,
         question=comparison.question,
         scene=comparison.scene,
-        group=group_of(first),
-        shown_by=kind_name(first),
-        requires=sorted(first.requires),
+        group=group_of(scene),
+        shown_by=kind_name(scene),
+        requires=sorted(scene.requires),
         observables={
             name: ShownObservable(item.unit, item.shown, item.role, item.headline, item.audit)
-            for name, item in first.observables.items()
+            for name, item in scene.observables.items()
         },
         until=comparison.until,
         every=comparison.every,
@@ -66,7 +68,7 @@ def outcome_content(outcome: Outcome) -> ReportedComparison:
             spread_of(
                 name,
                 outcome.points[name],
-                {row: own.dataset for row, _, own in runs_at(outcome, name)},
+                {row: stored.dataset for row, _, stored in runs_at(outcome, name)},
                 len(outcome.rows),
             )
             for name in outcome.laws_alone
@@ -74,15 +76,16 @@ def outcome_content(outcome: Outcome) -> ReportedComparison:
         budget=comparison.budget,
         beyond_budget=outcome.beyond_budget,
         truth_ends=_truth_ends(outcome),
+        step_bound=step_bound(scene.elements, steps),
     )
 
 
 def _truth_ends(outcome: Outcome) -> list[str]:
     """Sentences about truths that end early, one for each point of the parameters with such a truth."""
-    known = {name: point.reference for name, point in outcome.points.items() if point.reference is not None}
+    truths = {name: point.reference for name, point in outcome.points.items() if point.reference is not None}
     return [
         f"Not judged behind the end of the truth{at_point(outcome.points[name].case.parameters)}: {reference.ended}."
-        for name, reference in known.items()
+        for name, reference in truths.items()
         if reference.ended
     ]
 
@@ -99,7 +102,7 @@ def runs_at(outcome: Outcome, point: str) -> list[tuple[int, Run, StoredTrajecto
 
 def _row(runs: list[Run], until: float) -> ReportedRow:
     """Summary of a row over the points of the parameters, by the worst verdict and the largest cost."""
-    first = runs[0]
+    run_1 = runs[0]
     # A point where the question is ill-posed or not judged does not count against an engine.
     judged = [run for run in runs if run.verdict not in {Verdict.ILL_POSED, Verdict.NOT_JUDGED}] or runs
     names = list(dict.fromkeys(judgement.observable for run in judged for judgement in run.judgements))
@@ -107,7 +110,7 @@ def _row(runs: list[Run], until: float) -> ReportedRow:
     rough = [cost for run in runs if (cost := rough_cost(run.result, until)) is not None]
     reason, limit = _why(judged)
     return ReportedRow(
-        **settings_of(first),
+        **settings_of(run_1),
         verdict=max((run.verdict for run in judged), key=SEVERITY.index),
         verdicts={verdict.value: sum(run.verdict == verdict for run in runs) for verdict in Verdict},
         reason=reason,
@@ -116,12 +119,12 @@ def _row(runs: list[Run], until: float) -> ReportedRow:
         missing=sorted({name for run in runs for name in run.missing}),
         remarks=_remarks(runs),
         diagnosis=_diagnosis(runs),
-        expected=first.row.expect,
-        expected_for=first.row.expect_for,
-        because=first.row.because,
-        short=first.row.short,
-        tolerance=first.row.tolerance,
-        claims=Claims.of(first.row),
+        expected=run_1.row.expect,
+        expected_for=run_1.row.expect_for,
+        because=run_1.row.because,
+        short=run_1.row.short,
+        tolerance=run_1.row.tolerance,
+        claims=Claims.of(run_1.row),
         as_expected=not any(run.contradictions for run in runs),
         observables={name: _worst(judged, name) for name in names},
         seconds_per_second=max(timings, default=None),
@@ -138,17 +141,17 @@ def _why(runs: list[Run]) -> tuple[str, str]:
         if run.verdict == worst:
             guilty += [(run, item) for item in run.judgements] or [(run, None)]
     run, judgement = _furthest(guilty)
-    where = at_point(run.parameters)
+    place = at_point(run.parameters)
     limit = judgement.limit.value if judgement else ""
     if worst == Verdict.AGREES:
         return "", limit
     if worst == Verdict.INCOMPLETE:
         return f"agrees, but does not report {', '.join(run.missing)}", limit
     if worst == Verdict.REFUSED:  # the verdict already names a refusal
-        return f"{where.strip()}: {run.result.message}" if where else run.result.message, ""
+        return f"{place.strip()}: {run.result.message}" if place else run.result.message, ""
     if judgement is None or worst == Verdict.FAILED:
-        return f"{run.result.status}{where}: {run.result.message}", ""
-    return f"{judgement.observable}{where}: {judgement.reason}", limit
+        return f"{run.result.status}{place}: {run.result.message}", ""
+    return f"{judgement.observable}{place}: {judgement.reason}", limit
 
 
 def _remarks(runs: list[Run]) -> list[str]:
@@ -157,8 +160,8 @@ def _remarks(runs: list[Run]) -> list[str]:
     shown = [(run, item) for run in runs for item in run.judgements if item.remarks]
     if shown:
         run, item = max(shown, key=lambda pair: (pair[1].limit_error or 0.0) / pair[1].tolerance)
-        where = at_point(run.parameters)
-        remarks += [f"{item.observable}{where}: {remark}" for remark in item.remarks]
+        place = at_point(run.parameters)
+        remarks += [f"{item.observable}{place}: {remark}" for remark in item.remarks]
     # with other verdicts the reason names the floor
     floors = [(run, item) for run in runs for item in run.judgements if item.floor and item.verdict is Verdict.AGREES]
     if floors:
@@ -188,11 +191,11 @@ def _furthest(judged: list[tuple[Run, Judgement | None]]) -> tuple[Run, Judgemen
 
 def _worst(runs: list[Run], name: str) -> WorstJudgement:
     judged = [(run, next((item for item in run.judgements if item.observable == name), None)) for run in runs]
-    where, worst = _furthest(judged)
+    worst_run, worst = _furthest(judged)
     assert worst is not None  # names are those of judged observables
     largest = max(judgement.error for _, judgement in judged if judgement is not None)
-    known = {item.name: getattr(worst, item.name) for item in dataclasses.fields(worst)}
-    return WorstJudgement(**known, point=point_name(where.parameters), largest=largest)
+    values = {item.name: getattr(worst, item.name) for item in dataclasses.fields(worst)}
+    return WorstJudgement(**values, point=point_name(worst_run.parameters), largest=largest)
 
 
 def facts_of(run: Run) -> EngineFacts:

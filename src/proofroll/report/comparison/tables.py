@@ -12,9 +12,6 @@ from proofroll.report.comparison.records import Claims, Cost, ReportedComparison
 from proofroll.report.comparison.spread import Spread
 from proofroll.report.labels import names, symbol
 
-# Two rows count as one scheme if their errors differ by less than this relative part, in at least so many observables
-# whose error exceeds so many error bars of the truth.
-_SAME, _SEEN, _SEVERAL = 1e-3, 10.0, 2
 _COMPILES = 10.0  # s before the first step, beyond which the time is listed; to compile equations takes one or two
 
 
@@ -75,7 +72,7 @@ def costs(content: ReportedComparison) -> list[tuple[str, ReportedRun, ReportedR
     """Name of each timed row with its slowest and its fastest case."""
     lines = []
     for name, _, runs in content.lines():
-        timed = sorted((run.cost.median, at, run) for at, run in enumerate(runs) if run.cost)
+        timed = sorted((run.cost.median, index, run) for index, run in enumerate(runs) if run.cost)
         if timed:
             lines.append((name, timed[-1][-1], timed[0][-1]))
     return lines
@@ -92,17 +89,17 @@ def cost_title(cost: Cost | None) -> str:
         return "not timed"
     if cost.confidence is None:
         return "one clean run, so no interval is known"
-    known = f"{100 * cost.confidence:.3g} %"
-    return f"median of {cost.runs} clean runs; {cost_interval(cost)} s/s holds it with {known}"
+    percent = f"{100 * cost.confidence:.3g} %"
+    return f"median of {cost.runs} clean runs; {cost_interval(cost)} s/s holds it with {percent}"
 
 
 def cost_cell(of: ReportedRow | ReportedRun, cost: Cost | None) -> tuple[str, str]:
-    """Text of a cost [s/s], rough ones after ``~``, and a sentence that describes it."""
+    """Text of a cost [s/s], rough ones after ``≈``, and a sentence that describes it."""
     if of.seconds_per_second is not None:
         return number(of.seconds_per_second), cost_title(cost)
     if of.rough_cost is None:
         return "–", cost_title(None)
-    return f"~{number(of.rough_cost)}", "of one run beside which others ran: to a factor of about two"
+    return f"≈ {number(of.rough_cost)}", "of one run beside which others ran: to a factor of about two"
 
 
 def reasons(certificate: Iterable[Mapping[str, Any]]) -> dict[str, list[str]]:
@@ -146,7 +143,7 @@ def belief(content: ReportedComparison) -> list[Belief]:
                 name,
                 sum(bool(line["holds"]) for line in certificate),
                 len(certificate),
-                max(finite, key=lambda line: line["difference"] / line["tolerance"], default=None),
+                max(finite, key=_part_taken, default=None),
                 list(dict.fromkeys(line["quantity"] for line in certificate if line["because"])),
                 list(dict.fromkeys(not_reported(lines_of_all))),
                 next((row.observables[item] for item in audits if item in row.observables), None),
@@ -155,60 +152,18 @@ def belief(content: ReportedComparison) -> list[Belief]:
     return lines
 
 
-def causes(content: ReportedComparison) -> list[tuple[str, str, str]]:
-    """Name of each row with a proven cause of its difference, the cause, and its remedy."""
-    proven = ((name, told.cause) for name, row, _ in content.lines() for told in row.diagnosis)
-    return [(name, cause.sentence, cause.cause.remedy) for name, cause in proven]
+def _part_taken(line: Mapping[str, Any]) -> float:
+    """Part of its allowance that a certificate line takes; infinite for a difference where none is allowed."""
+    difference, allowed = abs(line["difference"]), line["tolerance"]
+    return difference / allowed if allowed else math.inf if difference else 0.0
 
 
 def remarks(content: ReportedComparison) -> list[tuple[str, str]]:
-    """(row, remark) for each remark."""
-    return [(name, text) for name, row, _ in content.lines() for text in row.remarks]
+    """(row, remark) for each remark but the one on equations of the truth, which is a closing note."""
+    return [(name, text) for name, row, _ in content.lines() for text in row.remarks if text != row.shared]
 
 
 def with_results(content: ReportedComparison, spread: Spread) -> list[tuple[int, str]]:
     """Number and name of each row that has numbers in a spread."""
-    known = {row for line in spread.lines for row, value in enumerate(line.values) if value is not None}
-    return [(row, name) for row, name in enumerate(names(content.rows)) if row in known]
-
-
-def one_scheme(content: ReportedComparison) -> list[str]:
-    """Sentences on rows of different engines with the same declared scheme, and on other rows with equal errors.
-
-    Codes with one scheme print the same digits, right or wrong; so do those with one wrong model.
-    """
-    schemes: dict[str, dict[str, ReportedRow]] = {}
-    groups: list[dict[str, ReportedRow]] = []
-    for name, row, _ in content.lines():
-        if row.scheme and row.resolution == "dt" and row.observables:
-            schemes.setdefault(row.scheme, {})[name] = row
-        group = next((each for each in groups if _same_digits(next(iter(each.values())), row)), None)
-        if group is None:
-            groups.append({name: row})
-        else:
-            group[name] = row
-    declared = {key: rows for key, rows in schemes.items() if len({row.name for row in rows.values()}) > 1}
-    alike = [
-        rows for rows in groups if len(rows) > 1 and not any(rows.keys() <= all_.keys() for all_ in declared.values())
-    ]
-    sentences = (
-        (
-            "Of one integration scheme, so no evidence for one another where they agree",
-            [f"{', '.join(rows)} ({scheme})" for scheme, rows in declared.items()],
-        ),
-        (
-            "Same step and errors to three digits, of one scheme or one wrong model, so no evidence for one another",
-            [", ".join(rows) for rows in alike],
-        ),
-    )
-    return [f"{words}: {'; '.join(found)}." for words, found in sentences if found]
-
-
-def _same_digits(one: ReportedRow, other: ReportedRow) -> bool:
-    """True if two rows have the same step and equal errors in all shared observables above the truth's error bars."""
-    if one.resolution != "dt" or (one.resolution, one.resolution_value) != (other.resolution, other.resolution_value):
-        return False
-    pairs = [(one.observables[name], other.observables[name]) for name in one.observables.keys() & other.observables]
-    seen = [(a.largest, b.largest) for a, b in pairs if max(a.largest, b.largest) > _SEEN * a.truth_error_bar]
-    alike = all(math.isfinite(a) and math.isclose(a, b, rel_tol=_SAME) for a, b in seen)
-    return len(seen) >= _SEVERAL and alike
+    rows = {row for line in spread.lines for row, value in enumerate(line.values) if value is not None}
+    return [(row, name) for row, name in enumerate(names(content.rows)) if row in rows]

@@ -1,14 +1,19 @@
 """Matrix of verdicts: a cell for each setting and observable, with verdict, error and a link to its evidence."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
+from proofroll.core.diagnosis.scene_diagnosis import Diagnosis
 from proofroll.core.number_format import counted as plural
 from proofroll.core.number_format import error, number
-from proofroll.core.verdict import Judgement
+from proofroll.core.verdict import Judgement, Verdict
 from proofroll.report.comparison.records import Cost, ReportedComparison, ReportedRow, ReportedRun
 from proofroll.report.comparison.tables import observables, seconds_before
 from proofroll.report.labels import SYMBOLS, symbol, unit, unjudged, verdict_text, verdict_word
+
+# Verdicts whose reason stands in the row: there are no numbers that would tell it.
+_TOLD = {Verdict.FAILED, Verdict.REFUSED, Verdict.ILL_POSED, Verdict.NOT_JUDGED, Verdict.ANOTHER_SCENE}
 
 
 @dataclass(frozen=True)
@@ -44,7 +49,7 @@ class MatrixLine:
 
     Attributes:
         href: link to its evidence.
-        message: of a failure.
+        notes: sentences below it: why there is no result or no judgement, proven causes with remedies, remarks.
         before: longest time before its first step [s].
     """
 
@@ -52,7 +57,7 @@ class MatrixLine:
     cells: dict[str, Cell]
     verdict_text: str
     href: str
-    message: str
+    notes: list[str]
     as_expected: bool
     cost: Cost | None
     before: float | None = None
@@ -70,15 +75,17 @@ class Matrix:
 def overview(content: ReportedComparison) -> Matrix:
     """Verdict matrix of a comparison: the worst verdict of each row over all points."""
     points = list(dict.fromkeys(run.point for run in content.runs))
-    lines, before = [], seconds_before(content)
+    lines, seconds = [], seconds_before(content)
     for index, row in enumerate(content.rows):
         runs = content.runs_of(index)
         worst = next((run for run in runs if run.verdict == row.verdict), runs[0])
         slowest = (run.cost for run in runs if run.cost and run.seconds_per_second == row.seconds_per_second)
         hrefs = {point: content.run_id(index, point) for point in points}
         cells = {name: Cell(item, hrefs[item.point], item.point) for name, item in row.observables.items()}
-        shown = (verdict_text(row, runs), hrefs[worst.point], row.message, row.as_expected, next(slowest, None))
-        lines.append(MatrixLine(row, cells, *shown, before=before.get(index)))
+        notes = _notes(row, row.reason, [told.cause for told in row.diagnosis])
+        notes += [f"* {remark}" for remark in row.remarks]
+        shown = (verdict_text(row, runs), hrefs[worst.point], notes, row.as_expected, next(slowest, None))
+        lines.append(MatrixLine(row, cells, *shown, before=seconds.get(index)))
     return _matrix(content, lines)
 
 
@@ -98,10 +105,16 @@ def at_point(content: ReportedComparison, name: str) -> Matrix:
         if run.point == name:
             href = content.run_id(run.row, name)
             cells = {judgement.observable: Cell(judgement, href) for judgement in run.judgements}
-            message = run.message if run.status != "done" else ""
-            shown = (verdict_word(run, [run]), href, message, not run.contradictions, run.cost, run.build_seconds)
+            notes = _notes(run, run.reason, run.diagnosis)
+            shown = (verdict_word(run, [run]), href, notes, not run.contradictions, run.cost, run.build_seconds)
             lines.append(MatrixLine(run, cells, *shown))
     return _matrix(content, lines)
+
+
+def _notes(of: ReportedRow | ReportedRun, reason: str, causes: Sequence[Diagnosis]) -> list[str]:
+    """Reason where there is no result or no judgement, and the proven causes of a difference with their remedies."""
+    reasons = [reason] if reason and of.verdict in _TOLD else []
+    return [*reasons, *(f"{item.sentence}: {item.cause.remedy}" for item in causes)]
 
 
 def _matrix(content: ReportedComparison, lines: list[MatrixLine]) -> Matrix:

@@ -235,20 +235,20 @@ def _of_terms(content: LadderContent) -> Iterator[str]:
     for judged_term in content.terms:
         groups.setdefault((judged_term.term, judged_term.verdict), []).append(judged_term)
     for (term, verdict), rows in groups.items():
-        where = ", ".join(label(row) for row in rows)
+        labels = ", ".join(label(row) for row in rows)
         largest = max((row.change for row in rows if row.change is not None), default=None)
         match verdict:
             case Need.NEEDED if largest is not None:
-                yield f"{term} is needed in {where}: leaving it out moves {name} by up to {number(largest)} {unit}."
+                yield f"{term} is needed in {labels}: leaving it out moves {name} by up to {number(largest)} {unit}."
             case Need.NEEDED:
-                yield f"{term} is needed in {where}: {rows[0].reason}."
+                yield f"{term} is needed in {labels}: {rows[0].reason}."
             case Need.HARMFUL:
-                yield f"{term} moves {name} away from the truth in {where}, by up to {number(largest)} {unit}."
+                yield f"{term} moves {name} away from the truth in {labels}, by up to {number(largest)} {unit}."
             case Need.NOT_NEEDED:
                 times = ", ".join(f"{label(row)} ({row.cost.value:.2f}×)" for row in rows if row.cost)
                 most = f"{name} moves by {number(largest, 1)} {unit} at most"
                 yield f"{term} is paid for but not needed in {times}: {most}."
             case Need.INHERENT:
-                yield f"{term}: it cannot be left out of {where}."
+                yield f"{term}: it cannot be left out of {labels}."
             case Need.NO_ANSWER:
                 yield f"{term}: {label(rows[0])} {rows[0].reason.removeprefix('with it: ')}."

@@ -41,17 +41,17 @@ def advice(
 
     Where forces are asked for and are not judged, the advice is for motion alone and says so.
     """
-    found = answer(matrix, tolerance, forces, engines)
-    answers = {item.column.key: item for item in (*found.kinds, *found.scenes)}
+    answered = answer(matrix, tolerance, forces, engines)
+    answers = {item.column.key: item for item in (*answered.kinds, *answered.scenes)}
     columns = [answers[column.key] for column in matrix.columns]
-    return [*(_of_column(matrix, found, item, engines) for item in columns), over_all(matrix, tolerance, forces)]
+    return [*(_of_column(matrix, answered, item, engines) for item in columns), over_all(matrix, tolerance, forces)]
 
 
 def _of_column(
-    matrix: ChoiceMatrix, found: FirstAnswer, item: ColumnAnswer, engines: Collection[str] | None
+    matrix: ChoiceMatrix, answered: FirstAnswer, item: ColumnAnswer, engines: Collection[str] | None
 ) -> Advised:
     """Advice for a column: the cheapest that holds the tolerance, the best of other engines, the effect of forces."""
-    column, asked = item.column, found.question
+    column, asked = item.column, answered.question
     name = column.name
     size = number(asked.tolerance)
     head = f"{column.title}{'' if column.whole else f' ({column.meaning})'} to {size}"
@@ -62,13 +62,13 @@ def _of_column(
         item = of_column(matrix, column, ReaderQuestion(asked.tolerance, False), engines)
     elif asked.forces:
         head += " with forces"
-    ran = [one for one in item.standings if one.cell.state != NO_RUN]
+    ran = [standing for standing in item.standings if standing.cell.state != NO_RUN]
     if not ran:
         return Advised(name, f"{head}: no engine was run.")
-    if all(one.cell.state == Verdict.NOT_JUDGED for one in ran):
+    if all(standing.cell.state == Verdict.NOT_JUDGED for standing in ran):
         return Advised(name, f"{head}: {NOT_REACHED}.")
     taken = item.taken
-    others = [_other(matrix, one, taken) for one in ran if one is not taken]
+    others = [_other(matrix, standing, taken) for standing in ran if standing is not taken]
     clauses = [f"take {_told(matrix, taken)} ({spent(taken)})" if taken else NOTHING, *others]
     changed = "" if asked.forces else _with_forces(matrix, column, asked.tolerance, taken, engines)
     sentence = f"{head}: {'; '.join(clauses)}.{changed}"
@@ -94,6 +94,7 @@ def over_all(matrix: ChoiceMatrix, tolerance: float, forces: bool) -> Advised:
         }
         for row in matrix.models
     }
+    named = {row.name: take_words(matrix, row) for row in matrix.models}
     missing = set(columns)
     steps: list[str] = []
     chosen: list[str] = []
@@ -103,7 +104,7 @@ def over_all(matrix: ChoiceMatrix, tolerance: float, forces: bool) -> Advised:
             break
         missing -= gained
         chosen.append(best)
-        steps.append(f"{best} {'holds it in' if not steps else 'brings it to'} {len(columns) - len(missing)}")
+        steps.append(f"{named[best]} {'holds it in' if not steps else 'brings it to'} {len(columns) - len(missing)}")
     asked = f"Over all, {counted(len(columns), 'scenes')}, to {number(tolerance)}{' with forces' if forces else ''}"
     left = ", ".join(item.title for name, item in columns.items() if name in missing)
     sentence = f"{asked}: {'; '.join(steps) or NOTHING}{f'; nothing holds it for {left}' if steps and left else ''}."
@@ -122,32 +123,32 @@ def _was_judged(matrix: ChoiceMatrix, column: ChoiceColumn, tolerance: float, fo
     return any(cell.state not in {NO_RUN, "cannot", Verdict.NOT_JUDGED} for cell in cells)
 
 
-def _told(matrix: ChoiceMatrix, one: EngineStanding) -> str:
-    setting = one.setting
-    return f"{take_words(matrix, one)}{f', {setting}' if setting else ''}{one.cell.share}"
+def _told(matrix: ChoiceMatrix, standing: EngineStanding) -> str:
+    setting = standing.setting
+    return f"{take_words(matrix, standing)}{f', {setting}' if setting else ''}{standing.cell.share}"
 
 
-def spent(one: EngineStanding, more: str = "") -> str:
+def spent(standing: EngineStanding, more: str = "") -> str:
     """Speed, and the scene that it is of with its setting, where scenes need different ones."""
-    study, setting = one.cell.slowest
-    words = setting.removeprefix(f"{one.engine} {one.formulation}").strip()
-    return f"{one.cell.text} real time{more}{f'; {study} needs most: {words}' if study else ''}"
+    study, setting = standing.cell.slowest
+    words = setting.removeprefix(f"{standing.engine} {standing.formulation}").strip()
+    return f"{standing.cell.text} real time{more}{f'; {study} needs most: {words}' if study else ''}"
 
 
-def _other(matrix: ChoiceMatrix, one: EngineStanding, first: EngineStanding | None) -> str:
+def _other(matrix: ChoiceMatrix, standing: EngineStanding, cheapest: EngineStanding | None) -> str:
     """Clause on another engine: its cost relative to the cheapest, or the reason why it does not hold the tolerance."""
-    name = take_words(matrix, one)
-    if one.cell.holds and first is not None:
-        if one.ties(first):
-            return f"{_told(matrix, one)} is a tie"
-        return f"{_told(matrix, one)} costs {one.cell.cost / first.cell.cost:.2g} times that"
-    if one.cell.state == Verdict.NOT_JUDGED:
+    name = take_words(matrix, standing)
+    if standing.cell.holds and cheapest is not None:
+        if standing.ties(cheapest):
+            return f"{_told(matrix, standing)} is a tie"
+        return f"{_told(matrix, standing)} costs {standing.cell.cost / cheapest.cell.cost:.2g} times that"
+    if standing.cell.state == Verdict.NOT_JUDGED:
         return f"{name} was not judged"
-    if one.cell.state == "cannot":
-        return f"{matrix.title(one.engine)} cannot represent it"
-    if one.cell.state == PARTLY:
-        return f"{name} {one.cell.why}"
-    return f"{name} does not get there ({one.cell.why})" if one.cell.why else f"{name} holds it, not timed"
+    if standing.cell.state == "cannot":
+        return f"{matrix.title(standing.engine)} cannot represent it"
+    if standing.cell.state == PARTLY:
+        return f"{name} {standing.cell.why}"
+    return f"{name} does not get there ({standing.cell.why})" if standing.cell.why else f"{name} holds it, not timed"
 
 
 def _with_forces(

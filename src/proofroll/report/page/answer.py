@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from proofroll.core.number_format import number
 from proofroll.core.verdict import Verdict
 from proofroll.report.page.choice_cell import CANNOT, NO_RUN, PARTLY, ChoiceCell, cell_of
-from proofroll.report.page.choice_matrix import ChoiceColumn, ChoiceMatrix, EngineStanding
+from proofroll.report.page.choice_matrix import ChoiceColumn, ChoiceMatrix, ChoiceRow, EngineStanding
 
 # Lengths per metre of path, in words, by negative power of ten of the tolerance.
 LENGTHS = {
@@ -96,14 +96,19 @@ class ColumnAnswer:
 
 @dataclass(frozen=True)
 class Chip:
-    """One clause of the answer in a line: an engine (empty: none) for kinds of scenes.
+    """One clause of the answer in a line: engines whose costs tie, for kinds of scenes.
 
-    Engines whose costs tie are all in ``title``, by name; ``engine`` is the first of them.
+    Attributes:
+        engines: code names; empty: no engine holds the tolerance, or it is not judged.
+        title: engines by name, or the text in place of one.
+        words: kinds of scenes.
+        judged: False: what is asked for is judged in none of them.
     """
 
-    engine: str
+    engines: tuple[str, ...]
     title: str
     words: str
+    judged: bool = True
 
 
 @dataclass(frozen=True)
@@ -127,9 +132,9 @@ class FirstAnswer:
 def answer(matrix: ChoiceMatrix, tolerance: float, forces: bool, engines: Collection[str] | None = None) -> FirstAnswer:
     """FirstAnswer of a matrix to a question; ``engines``: of these alone."""
     asked = ReaderQuestion(tolerance, forces)
-    found = {item.key: of_column(matrix, item, asked, engines) for item in matrix.columns}
-    kinds = [item for (_, _, whole), item in found.items() if whole]
-    scenes = [item for (_, _, whole), item in found.items() if not whole]
+    by_key = {item.key: of_column(matrix, item, asked, engines) for item in matrix.columns}
+    kinds = [item for (_, _, whole), item in by_key.items() if whole]
+    scenes = [item for (_, _, whole), item in by_key.items() if not whole]
     return FirstAnswer(asked, kinds, scenes, _chips(matrix, kinds))
 
 
@@ -151,7 +156,7 @@ def _failures(
     matrix: ChoiceMatrix, column: ChoiceColumn, asked: ReaderQuestion, engines: Collection[str] | None
 ) -> list[Failure]:
     """Rows of the column's comparisons that do not hold the tolerance and have a short reason, one per formulation."""
-    found: list[tuple[int, float, Failure, str]] = []
+    entries: list[tuple[int, float, Failure, str]] = []
     for row in matrix.rows:
         if not row.setting or row.own_equations or (engines is not None and row.engine not in engines):
             continue
@@ -163,12 +168,12 @@ def _failures(
                     continue
                 sizes = [size for item in steps if (size := item.tolerance(asked.forces)) is not None]
                 preset = f" {row.setting}" if row.setting == "default" else ""
-                who = f"{matrix.title(row.engine)} {row.formulation.replace('_', ' ')}{preset}"
+                who = f"{take_words(matrix, row)}{preset}"
                 place = _STATES.index(cell.state) if cell.state in _STATES else len(_STATES)
-                found.append((place, -min(sizes, default=0.0), Failure(cell.state, who, short), row.name))
-    found.sort(key=lambda item: item[:2])
-    first = {name: item for *_, item, name in reversed(found)}
-    return [item for *_, item, name in found if first[name] is item][:_REASONS]
+                entries.append((place, -min(sizes, default=0.0), Failure(cell.state, who, short), row.name))
+    entries.sort(key=lambda item: item[:2])
+    best_of = {name: item for *_, item, name in reversed(entries)}
+    return [item for *_, item, name in entries if best_of[name] is item][:_REASONS]
 
 
 def _chips(matrix: ChoiceMatrix, kinds: Sequence[ColumnAnswer]) -> list[Chip]:
@@ -192,11 +197,11 @@ def _chips(matrix: ChoiceMatrix, kinds: Sequence[ColumnAnswer]) -> list[Chip]:
             )
     ranked = sorted(taken.items(), key=lambda item: -len(item[1]))
     chips = [
-        Chip(engines[0], " or ".join(matrix.title(engine) for engine in engines), f"for {listed(names)}")
+        Chip(engines, " or ".join(matrix.title(engine) for engine in engines), f"for {listed(names)}")
         for engines, names in ranked
     ]
-    chips += [Chip("", "No engine", f"for {listed(nobody)}")] if nobody else []
-    return chips + ([Chip("?", "Not judged", f"for {listed(silent)}")] if silent else [])
+    chips += [Chip((), "No engine", f"for {listed(nobody)}")] if nobody else []
+    return chips + ([Chip((), "Not judged", f"for {listed(silent)}", judged=False)] if silent else [])
 
 
 def _lower(title: str) -> str:
@@ -214,19 +219,20 @@ def listed(words: Sequence[str]) -> str:
     return f"{', '.join(words[:-1])} and {words[-1]}" if len(words) > 1 else words[0]
 
 
-def take_words(matrix: ChoiceMatrix, standing: EngineStanding) -> str:
+def take_words(matrix: ChoiceMatrix, taken: EngineStanding | ChoiceRow) -> str:
     """Engine and formulation for a reader."""
-    return f"{matrix.title(standing.engine)} {standing.formulation.replace('_', ' ')}".strip()
+    return f"{matrix.title(taken.engine)} {taken.formulation.replace('_', ' ')}".strip()
 
 
 def next_words(matrix: ChoiceMatrix, item: ColumnAnswer) -> str:
     """The next engine and what it costs relative to the one to take; or what it does not do."""
-    second, first = item.next, item.taken
-    if second is None or first is None:
-        return "no other engine holds it" if first else ""
-    if second.ties(first):
+    second, best = item.next, item.taken
+    if second is None or best is None:
+        return "no other engine holds it" if best else ""
+    if second.ties(best):
         return f"{take_words(matrix, second)}, a tie"
-    return f"{take_words(matrix, second)}, {second.cell.cost / first.cell.cost:.2g}× the cost"
+    ratio = float(f"{second.cell.cost / best.cell.cost:.2g}")
+    return f"{take_words(matrix, second)}, {ratio:g}× the cost"
 
 
 def closest_words(matrix: ChoiceMatrix, item: ColumnAnswer) -> str:
@@ -252,8 +258,9 @@ def forces_words(matrix: ChoiceMatrix, motion: ColumnAnswer, both: ColumnAnswer)
         return "not judged"
     if both.taken is None:
         return "✗ none"
-    same = motion.taken is not None and (motion.taken.engine, motion.taken.cell.name) == (
-        both.taken.engine,
-        both.taken.cell.name,
+    # A kind of several scenes is held by settings that only the cells of these name.
+    best, second = (
+        item.taken and (item.taken.engine, item.taken.cell.name, [cell.name for cell in item.taken.scenes])
+        for item in (motion, both)
     )
-    return "✓ the same" if same else f"{take_words(matrix, both.taken)}, {both.taken.cell.text}"
+    return "✓ the same choice" if best == second else f"{take_words(matrix, both.taken)}, {both.taken.cell.text}"

@@ -89,37 +89,37 @@ def candidates(lines: Sequence[TableLine], href: str, runs: Mapping[tuple[int, s
     ``href``: HTML id of the study's evidence; ``runs``: those of its runs, by row and point.
     """
     needed = list(dict.fromkeys(line.place for line in lines))
-    own = lines[0].step
+    row_step = lines[0].step
     ladders, bounds = [_ladder(lines, role) for role in _ROLES], held_tolerances(lines)
     anchors = {"": href} | {point: run for (row, point), run in runs.items() if row == lines[0].row}
     steps = []
     for value in dict.fromkeys(line.step for line in lines):
-        at = {point: [line for line in lines if line.step == value and line.place == point] for point in needed}
-        steps.append(_candidate(lines[0], value, at, bounds=bounds, ladders=ladders, anchors=anchors))
-    return sorted(steps, key=lambda item: item.name != _name(lines[0], own))
+        by_point = {point: [line for line in lines if line.step == value and line.place == point] for point in needed}
+        steps.append(_candidate(lines[0], value, by_point, bounds=bounds, ladders=ladders, anchors=anchors))
+    return sorted(steps, key=lambda item: item.name != _name(lines[0], row_step))
 
 
 def _candidate(
-    first: TableLine,
+    table_line: TableLine,
     value: float | None,
-    at: dict[str, list[TableLine]],
+    by_point: dict[str, list[TableLine]],
     *,
     bounds: dict[TableLine, float],
     ladders: Sequence[LadderResult],
     anchors: dict[str, str],
 ) -> Candidate:
     """Candidate for one step of a row; ``anchors``: HTML ids of the evidence by point (the study's: empty point)."""
-    name, href = _name(first, value), anchors.get("", "")
+    name, href = _name(table_line, value), anchors.get("", "")
     judged = {
         point: [line for line in lines if line.verdict not in {Verdict.ILL_POSED, Verdict.NOT_JUDGED}]
-        for point, lines in at.items()
+        for point, lines in by_point.items()
     }
-    judged = {point: lines for point, lines in judged.items() if lines or not at[point]}
-    costs = [lines[0].cost for lines in at.values() if lines]
+    judged = {point: lines for point, lines in judged.items() if lines or not by_point[point]}
+    costs = [lines[0].cost for lines in by_point.values() if lines]
     cost = None if None in costs else max((item for item in costs if item is not None), default=None)
-    clean = all(lines[0].clean for lines in at.values() if lines)
-    own = {line: line.relative for line in bounds}
-    errors = {point: [largest(lines, role, own) for role in _ROLES] for point, lines in judged.items()}
+    clean = all(lines[0].clean for lines in by_point.values() if lines)
+    errors_of_lines = {line: line.relative for line in bounds}
+    errors = {point: [largest(lines, role, errors_of_lines) for role in _ROLES] for point, lines in judged.items()}
     blame, status, message = _blame(judged)
     if judged:
         furthest = max(errors, key=lambda point: max(errors[point][0] or 0.0, errors[point][1] or 0.0))
@@ -127,8 +127,20 @@ def _candidate(
     motion, forces = (_worst([pair[which] for pair in errors.values()]) for which in (0, 1))
     held = [_worst([largest(lines, role, bounds) for lines in judged.values()]) for role in _ROLES]
     return Candidate(
-        *(first.row, name, motion, forces, held[0], held[1], cost, clean, blame),
-        *(ladders[0], ladders[1], href, status, message),
+        row=table_line.row,
+        name=name,
+        motion=motion,
+        forces=forces,
+        motion_held=held[0],
+        forces_held=held[1],
+        cost=cost,
+        clean=clean,
+        blame=blame,
+        motion_ladder=ladders[0],
+        forces_ladder=ladders[1],
+        href=href,
+        status=status,
+        message=message,
     )
 
 
@@ -156,8 +168,8 @@ def held_tolerances(lines: Sequence[TableLine]) -> dict[TableLine, float]:
         return line.study, line.row, line.engine, line.place, line.quantity
 
     bounds = {}
-    for _, own in groupby(sorted(lines, key=lambda x: (*ladder(x), -(x.step or 0.0))), key=ladder):
-        steps = list(own)
+    for _, of_ladder in groupby(sorted(lines, key=lambda x: (*ladder(x), -(x.step or 0.0))), key=ladder):
+        steps = list(of_ladder)
         errors, least = [item.relative for item in steps], max(item.limit_least or 0.0 for item in steps)
         floor = errors.index(min(errors)) if any(item.floor for item in steps) else None
         bounds.update({item: max(size, least) for item, size in zip(steps, envelope(errors, floor), strict=True)})
@@ -184,8 +196,8 @@ def _ladder(lines: Sequence[TableLine], role: str) -> LadderResult:
 
 
 def _worst(errors: Sequence[float | None]) -> float | None:
-    known = [item for item in errors if item is not None]
-    return max(known) if known and len(known) == len(errors) else None
+    sizes = [item for item in errors if item is not None]
+    return max(sizes) if sizes and len(sizes) == len(errors) else None
 
 
 def _name(line: TableLine, value: float | None) -> str:

@@ -81,8 +81,8 @@ def speed(cost: float, clean: bool) -> str:
 def cell_of(steps: Sequence[Candidate], tolerance: float, forces: bool) -> ChoiceCell:
     """Cell of one study: the cheapest candidate that holds the tolerance, else the closest, else why there is none."""
     whole = [item for item in steps if item.blame is None]
-    known = [(size, item) for item in whole if (size := item.tolerance(forces)) is not None]
-    held = [(item.cost if item.cost is not None else math.inf, size, item) for size, item in known if size <= tolerance]
+    sized = [(size, item) for item in whole if (size := item.tolerance(forces)) is not None]
+    held = [(item.cost if item.cost is not None else math.inf, size, item) for size, item in sized if size <= tolerance]
     if held:
         cost, size, item = min(held, key=lambda entry: entry[:2])
         text = "not timed" if math.isinf(cost) else speed(cost, item.clean)
@@ -91,14 +91,14 @@ def cell_of(steps: Sequence[Candidate], tolerance: float, forces: bool) -> Choic
         )
         title = f"{item.name}: within {number(size)}, {spent}"
         return ChoiceCell(Verdict.AGREES, text, title, item.href, cost, item.clean, item.name)
-    if known:
-        size, item = min(known, key=lambda entry: entry[0])
-        limit, own = item.limit(forces, tolerance), item.error(forces)
+    if sized:
+        size, item = min(sized, key=lambda entry: entry[0])
+        limit, step_error = item.limit(forces, tolerance), item.error(forces)
         state = Verdict.CONVERGES if limit == LimitResult.WITHIN else Verdict.DIFFERS
-        luck = own is not None and own <= tolerance
-        size = own if own is not None and not luck else size
+        luck = step_error is not None and step_error <= tolerance
+        size = step_error if step_error is not None and not luck else size
         off = _beyond(size, tolerance)
-        by = f"its error of {number(own)} is luck, finer steps or their limit are off by" if luck else "off by"
+        by = f"its error of {number(step_error)} is luck, finer steps or their limit are off by" if luck else "off by"
         title, why = f"{item.name}: {by} {_beyond(size, tolerance, 2)}; {_WHY[limit]}", f"{by} {off}, {_WHY[limit]}"
         return ChoiceCell(state, off, title, item.href, name=item.name, why=why)
     if whole:

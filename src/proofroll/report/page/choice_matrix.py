@@ -143,16 +143,26 @@ class EngineStanding:
         """Sort key: what holds in all scenes comes first, the cheapest first; then by state."""
         return self.cell.absent if self.cell.holds else math.inf, self.cell.cost, ORDER.index(self.cell.state)
 
-    def ties(self, first: "EngineStanding") -> bool:
+    def ties(self, best: "EngineStanding") -> bool:
         """True if its cost overlaps with that of the first."""
-        rough = not (self.cell.clean and first.cell.clean)
-        return self is not first and self.cell.holds and rough and self.cell.cost < TIE * first.cell.cost
+        rough = not (self.cell.clean and best.cell.clean)
+        return self is not best and self.cell.holds and rough and self.cell.cost < TIE * best.cell.cost
 
     @property
     def setting(self) -> str:
         """Setting and step without engine and formulation; empty if scenes need different ones."""
         words = self.cell.name.removeprefix(f"{self.engine} {self.formulation}".strip()).strip()
         return words.removeprefix("at ").replace(" at ", ", ")
+
+    @property
+    def held_with(self) -> str:
+        """Formulation and presets that hold its scenes, for a reader; of more than two presets none is named."""
+        start = f"{self.engine} {self.formulation}".strip()
+        names = [cell.name for cell in self.scenes if cell.holds]
+        presets = {name.removeprefix(start).partition(" at ")[0].strip() for name in names}
+        few = len(presets) <= 2 and all(name.startswith(start) for name in names)
+        words = self.formulation.replace("_", " ")
+        return ", ".join(filter(None, (words, " or ".join(sorted(presets)) if few else "settings vary")))
 
 
 @dataclass(frozen=True)
@@ -201,14 +211,14 @@ class ChoiceMatrix:
         return {}
 
     def _new_cell(self, row: ChoiceRow, column: ChoiceColumn, tolerance: float, forces: bool) -> ChoiceCell:
-        own = [name for name in column.studies if name in row.found]
-        judged = [name for name in own if name not in self.unjudged[forces]]
-        if own and not judged:
+        names = [name for name in column.studies if name in row.found]
+        judged = [name for name in names if name not in self.unjudged[forces]]
+        if names and not judged:
             what = "no forces" if forces else "no motion"
             return ChoiceCell(Verdict.NOT_JUDGED, what, f"{what} judged here", why=f"{what} judged")
         # A study without any judgement, say for lack of time, does not count against the studies that ran.
-        known = [name for name in judged if any(item.blame != Verdict.NOT_JUDGED for item in row.found[name])]
-        cells = {name: cell_of(row.found[name], tolerance, forces) for name in known or judged}
+        run_names = [name for name in judged if any(item.blame != Verdict.NOT_JUDGED for item in row.found[name])]
+        cells = {name: cell_of(row.found[name], tolerance, forces) for name in run_names or judged}
         if not cells:
             return self._without_run(row, column)
         scenes = {
@@ -221,7 +231,7 @@ class ChoiceMatrix:
         lacking = [
             scene
             for scene in column.scenes
-            if self.judged[forces].intersection(scene.studies) and not set(known).intersection(scene.studies)
+            if self.judged[forces].intersection(scene.studies) and not set(run_names).intersection(scene.studies)
         ]
         return joined(scenes, {scene.name: scene.words for scene in column.scenes})._replace(
             scenes=len(scenes),
@@ -244,15 +254,15 @@ class ChoiceMatrix:
     @cached_property
     def judged(self) -> tuple[set[str], set[str]]:
         """Studies in which motion is judged, and those in which forces are judged, too."""
-        items = [(name, item) for row in self.rows for name, own in row.found.items() for item in own]
+        items = [(name, item) for row in self.rows for name, of_study in row.found.items() for item in of_study]
         motion = {name for name, item in items if item.motion is not None}
         return motion, motion & {name for name, item in items if item.forces is not None}
 
     @cached_property
     def unjudged(self) -> tuple[set[str], set[str]]:
         """Studies that ran without judged motion, and those that lack judged motion or forces."""
-        found = [(name, own) for row in self.rows for name, own in row.found.items()]
-        ran = {name for name, own in found if any(item.blame is None for item in own)}
+        pairs = [(name, of_study) for row in self.rows for name, of_study in row.found.items()]
+        ran = {name for name, of_study in pairs if any(item.blame is None for item in of_study)}
         return ran - self.judged[False], ran - self.judged[True]
 
     @property
@@ -281,26 +291,31 @@ class ChoiceMatrix:
 
     def _new_standing(self, engine: str, column: ChoiceColumn, tolerance: float, forces: bool) -> EngineStanding:
         rows = self.formulations(engine)
-        found = [
+        of_rows = [
             EngineStanding(engine, row.formulation, cell, (cell,))
             for row in rows
             for cell in [self.cell(row, column, tolerance, forces)]
         ]
-        best = min(found, key=lambda item: item.rank)
+        best = min(of_rows, key=lambda item: item.rank)
         single = [item for item in self.columns if not item.whole and item.group == column.group]
         if not column.whole or len(column.scenes) == 1 or len(single) < len(column.scenes):
             return best
-        each = [self.standing(engine, item, tolerance, forces) for item in single]
-        best = EngineStanding(engine, best.formulation, best.cell, tuple(item.cell for item in each))
-        ran = [item for item in each if item.cell.state not in {NO_RUN, CANNOT, Verdict.NOT_JUDGED}]
-        asked = [item for item in each if item in ran or (item.cell.state in {NO_RUN, CANNOT} and best.cell.lacking)]
+        by_scene = [self.standing(engine, item, tolerance, forces) for item in single]
+        best = EngineStanding(engine, best.formulation, best.cell, tuple(item.cell for item in by_scene))
+        ran = [item for item in by_scene if item.cell.state not in {NO_RUN, CANNOT, Verdict.NOT_JUDGED}]
+        asked = [
+            item for item in by_scene if item in ran or (item.cell.state in {NO_RUN, CANNOT} and best.cell.lacking)
+        ]
         held = [item for item in asked if item.cell.holds]
         if (best.cell.holds and not best.cell.absent) or not ran:
             return best
         slowest = max(held, key=lambda item: item.cell.cost, default=best)
         words = ", ".join(dict.fromkeys(item.formulation for item in held)) or best.formulation
         named = {scene.name: scene.words for scene in column.scenes}
-        says = "; ".join(f"{named[item.name]}: {one.cell.title}" for item, one in zip(single, each, strict=True))
+        says = "; ".join(
+            f"{named[item.name]}: {item_of_scene.cell.title}"
+            for item, item_of_scene in zip(single, by_scene, strict=True)
+        )
         if len(held) == len(asked):
             return EngineStanding(engine, words, slowest.cell._replace(title=says, name=""), best.scenes)
         state = PARTLY if held else max((item.cell.state for item in ran), key=ORDER.index)
@@ -325,17 +340,17 @@ def choice_matrix(
     rows: dict[tuple[str, str, str], ChoiceRow] = {}
     groups: dict[str, dict[str, dict[str, None]]] = {}
     derived = {(line.engine, line.formulation) for line in chosen if line.own_equations}
-    for (name, _, _), own in groupby(chosen, key=lambda x: (x.study, x.row, x.engine)):
-        of_row, study = list(own), studies[name]
-        first, found = of_row[0], candidates(of_row, study.href, study.runs)
-        groups.setdefault(first.group, {}).setdefault(first.scene, {})[name] = None
-        for setting in ("", first.setting or "as it is"):
-            key = (first.engine, first.formulation, setting)
+    for (name, _, _), group_lines in groupby(chosen, key=lambda x: (x.study, x.row, x.engine)):
+        of_row, study = list(group_lines), studies[name]
+        row_line, steps = of_row[0], candidates(of_row, study.href, study.runs)
+        groups.setdefault(row_line.group, {}).setdefault(row_line.scene, {})[name] = None
+        for setting in ("", row_line.setting or "as it is"):
+            key = (row_line.engine, row_line.formulation, setting)
             row = rows.setdefault(key, ChoiceRow(*key, own_equations=key[:2] in derived))
-            row.found.setdefault(name, []).extend(found)
+            row.found.setdefault(name, []).extend(steps)
     columns = []
     for group, names in groups.items():
-        scenes = tuple(ChoiceScene(name, tuple(own)) for name, own in names.items())
+        scenes = tuple(ChoiceScene(name, tuple(group_lines)) for name, group_lines in names.items())
         title, meaning = naming.kinds.get(group, (group[:1].upper() + group[1:], ""))
         whole = ChoiceColumn(group, title, meaning, "", scenes)
         single = []
@@ -344,5 +359,5 @@ def choice_matrix(
             single.append(ChoiceColumn(group, scene.words, about.title, about.href, (scene,), whole=False))
         columns += [replace(whole, href=single[0].href if len(single) == 1 else ""), *single]
     orders = [list(dict.fromkeys(key[:end] for key in rows)) for end in (1, 2, 3)]
-    keys = sorted(rows, key=lambda key: [known.index(key[: end + 1]) for end, known in enumerate(orders)])
+    keys = sorted(rows, key=lambda key: [order_of.index(key[: end + 1]) for end, order_of in enumerate(orders)])
     return ChoiceMatrix(columns, [rows[key] for key in keys], dict(studies), naming)

@@ -142,15 +142,15 @@ class FirstScreen:
         """Cell of a row as it is shown."""
         if row.row is not None:
             return self._view(row, column, self.matrix.cell(row.row, column, tolerance, forces))
-        found = self.matrix.standing(row.engine, column, tolerance, forces)
-        view = self._view(row, column, found.cell)
-        dots = tuple(cell.holds for cell in found.scenes) if len(found.scenes) > 1 else ()
+        standing = self.matrix.standing(row.engine, column, tolerance, forces)
+        view = self._view(row, column, standing.cell)
+        dots = tuple(cell.holds for cell in standing.scenes) if len(standing.scenes) > 1 else ()
         if view.look in {CANNOT, NO_RUN, "unjudged"}:
             return view
-        if found.cell.state == PARTLY:
-            pairs = zip(column.scenes, found.scenes, strict=True)
+        if standing.cell.state == PARTLY:
+            pairs = zip(column.scenes, standing.scenes, strict=True)
             return view._replace(sub=", ".join(f"{s.words} {c.text}" for s, c in pairs if c.holds), dots=dots)
-        words = found.formulation.replace("_", " ")
+        words = standing.formulation.replace("_", " ")
         finer = ", finer steps" if view.look == "converges" else ""
         return view._replace(sub=f"{words}{finer}", dots=dots)
 
@@ -169,28 +169,44 @@ class FirstScreen:
         sub = cell.why.partition(", ")[2].partition(";")[0]
         if cell.holds and row.row is not None:
             sub = cell.name.removeprefix(row.row.name).strip() if cell.name else "by scene"
-        where = f"{column.title}{cell.share}"
-        return CellView(kind, f"{glyph} {text}", sub, f"{glyph} {word}: {where}\n{says}", cell.href)
+        place = f"{column.title}{cell.share}"
+        return CellView(kind, f"{glyph} {text}", sub, f"{glyph} {word}: {place}\n{says}", cell.href)
 
-    def best(self, found: FirstAnswer) -> list[int]:
+    def best(self, answered: FirstAnswer) -> list[int]:
         """Number of the row of each column's engine to take; -1 where nothing holds the tolerance."""
         place = {row.name: number for number, row in enumerate(self.rows) if row.level == "engine"}
-        both = (*found.kinds, *found.scenes)
+        both = (*answered.kinds, *answered.scenes)
         answers = {item.column.key: item for item in both}
         taken = (answers[column.key].taken for column in self.matrix.columns)
         return [-1 if item is None else place[item.engine] for item in taken]
 
-    def uses(self, found: FirstAnswer) -> Iterator[tuple[ColumnAnswer, str, str]]:
+    def uses(self, answered: FirstAnswer) -> Iterator[tuple[ColumnAnswer, str, str]]:
         """Each scene of an answer with the next engine, and what changes if forces count."""
-        with_forces = None
-        if not found.question.forces:
-            with_forces = answer(self.matrix, found.question.tolerance, True, self._engines_of(found))
-        for number, item in enumerate(found.scenes):
+        with_forces = self._with_forces(answered)
+        for number, item in enumerate(answered.scenes):
             both = "" if with_forces is None else forces_words(self.matrix, item, with_forces.scenes[number])
             yield item, next_words(self.matrix, item), both
 
-    def _engines_of(self, found: FirstAnswer) -> set[str]:
-        return {item.engine for column in found.scenes for item in column.standings}
+    def forces(self, answered: FirstAnswer) -> list[str]:
+        """Effect of forces on the answer for each kind; empty where the question counts them already."""
+        with_forces = self._with_forces(answered)
+        if with_forces is None:
+            return []
+        pairs = zip(answered.kinds, with_forces.kinds, strict=True)
+        return [forces_words(self.matrix, motion, both) for motion, both in pairs]
+
+    def _with_forces(self, answered: FirstAnswer) -> FirstAnswer | None:
+        if answered.question.forces:
+            return None
+        engines = frozenset(item.engine for column in answered.scenes for item in column.standings)
+        key = answered.question.tolerance, engines
+        if key not in self._answers_with_forces:
+            self._answers_with_forces[key] = answer(self.matrix, answered.question.tolerance, True, engines)
+        return self._answers_with_forces[key]
+
+    @cached_property
+    def _answers_with_forces(self) -> dict[tuple[float, frozenset[str]], FirstAnswer]:
+        return {}
 
     def kind_title(self, group: str) -> str:
         """Title of a kind of scenes."""
@@ -218,7 +234,7 @@ class FirstScreen:
         pool: dict[CellView, int] = {}
         grid = [
             [
-                [pool.setdefault(self.cell(row, column, at, need), len(pool)) for need, at in ASKED]
+                [pool.setdefault(self.cell(row, column, tolerance, need), len(pool)) for need, tolerance in ASKED]
                 for column in self.matrix.columns
             ]
             for row in self.rows
@@ -226,17 +242,17 @@ class FirstScreen:
         cells = [[view.look, str(macros.inner(view))] for view in pool]  # type: ignore[attr-defined]
         screens = {}
         for chosen in self.choices:
-            answers = [answer(self.matrix, at, need, chosen) for need, at in ASKED]
+            answers = [answer(self.matrix, tolerance, need, chosen) for need, tolerance in ASKED]
             screens[" ".join(chosen)] = [
                 {
-                    "asked": found.question.words,
-                    "chips": str(macros.chips(found)),  # type: ignore[attr-defined]
-                    "cards": unbroken(str(macros.cards(self, found))),  # type: ignore[attr-defined]
-                    "profile": str(macros.profile(profile(self.matrix, found, chosen))),  # type: ignore[attr-defined]
-                    "use": unbroken(addressed(str(macros.use(self, found)))),  # type: ignore[attr-defined]
-                    "best": self.best(found),
+                    "asked": answered.question.words,
+                    "chips": str(macros.chips(answered)),  # type: ignore[attr-defined]
+                    "cards": unbroken(str(macros.cards(self, answered))),  # type: ignore[attr-defined]
+                    "profile": str(macros.profile(profile(self.matrix, answered, chosen))),  # type: ignore[attr-defined]
+                    "use": unbroken(addressed(str(macros.use(self, answered)))),  # type: ignore[attr-defined]
+                    "best": self.best(answered),
                 }
-                for found in answers
+                for answered in answers
             ]
         content = {"cells": cells, "grid": grid, "screens": screens}
         return packed(json.dumps(content, ensure_ascii=False, separators=(",", ":")).encode("utf-8", "replace"))

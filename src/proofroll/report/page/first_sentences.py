@@ -34,15 +34,11 @@ class Kept:
     boundaries: int
 
 
-def kept(
-    comparisons: Sequence[ReportedComparison], entries: Mapping[str, Sequence[PartEntry]], names: Mapping[str, str]
-) -> Kept:
-    """Counts over the comparisons and the maps of stability in ``entries``; ``names``: of engines for readers."""
+def kept(comparisons: Sequence[ReportedComparison], entries: Mapping[str, Sequence[PartEntry]]) -> Kept:
+    """Counts over the comparisons and the maps of stability in ``entries``."""
     counts = Counter(str(row.verdict) for comparison in comparisons for row in comparison.rows)
     wrong = [item for comparison in comparisons for item in _wrong(comparison)]
     _, name, text = max(wrong, default=(0.0, "", ""))
-    engine, space, rest = name.partition(" ")
-    name = f"{names.get(engine, engine)}{space}{rest}"
     maps = [entry.study for entry in entries.get("stability", ()) if entry.study is not None]
     return Kept(
         verdicts=dict(counts),
@@ -68,8 +64,8 @@ def three_sentences(
 def _agrees(comparisons: Sequence[ReportedComparison], choice: ChoiceMatrix) -> str:
     if not comparisons:
         return "Nothing was compared with the truth in this report."
-    known, alone = ([item for item in comparisons if item.laws_alone is either] for either in (False, True))
-    text = "; ".join(filter(None, (_near(known, choice), _lawful(alone))))
+    with_truth, alone = ([item for item in comparisons if item.laws_alone is either] for either in (False, True))
+    text = "; ".join(filter(None, (_near(with_truth, choice), _lawful(alone))))
     return f"{text[0].upper()}{text[1:]}."
 
 
@@ -89,8 +85,8 @@ def _near(comparisons: Sequence[ReportedComparison], choice: ChoiceMatrix) -> st
     rows = [row for comparison in comparisons for row in comparison.rows]
     counts = Counter(row.verdict.value for row in rows)
     agree = "agrees" if counts["agrees"] == 1 else "agree"
-    where = "one comparison" if len(comparisons) == 1 else f"{len(comparisons)} comparisons"
-    text = f"Of {counted(len(rows), 'settings')} in {where}, {counts['agrees']} {agree} with the truth everywhere"
+    count = "one comparison" if len(comparisons) == 1 else f"{len(comparisons)} comparisons"
+    text = f"Of {counted(len(rows), 'settings')} in {count}, {counts['agrees']} {agree} with the truth everywhere"
     rest = {
         "unconfirmed": "at this step, with a limit that is not confirmed",
         "incomplete": "without reporting all that is judged",
@@ -104,9 +100,9 @@ def _near(comparisons: Sequence[ReportedComparison], choice: ChoiceMatrix) -> st
     best = closest(comparisons[0], choice)
     if best is None:
         return f"{text}; none gave motion and forces in every case of the first comparison"
-    first = " in the first" if len(comparisons) > 1 else ""
+    which = " in the first" if len(comparisons) > 1 else ""
     return (
-        f"{text}; closest{first} is {best.name}, whose motion stays within {number(best.motion)} of its range and "
+        f"{text}; closest{which} is {best.name}, whose motion stays within {number(best.motion)} of its range and "
         f"whose forces within {number(best.forces)} of the largest"
     )
 
@@ -115,7 +111,7 @@ def _silent(comparisons: Sequence[ReportedComparison], maps: Sequence[StabilityS
     """Sentence on settings that are silently wrong, and on boundaries of stability passed silently."""
     wrong = [item for comparison in comparisons for item in _wrong(comparison)]
     silent, boundaries = (sum(getattr(study, key) for study in maps) for key in ("silent", "boundaries"))
-    passed = f"{silent} of {boundaries} boundaries of stability and accuracy are passed without a word"
+    passed = f"{silent} of {boundaries} boundaries of stability and accuracy are passed without a warning"
     alone = [comparison.laws_alone for comparison in comparisons]
     laws, truth = "a law of mechanics" if any(alone) else "", "from the truth" if not all(alone) or not alone else ""
     if comparisons and not any(run.status == "done" for item in comparisons for run in item.runs):
@@ -129,7 +125,7 @@ def _silent(comparisons: Sequence[ReportedComparison], maps: Sequence[StabilityS
     _, name, text = max(wrong)
     differ, breaks, run = ("differ", "break", "run") if len(wrong) > 1 else ("differs", "breaks", "runs")
     off = " or ".join(filter(None, (truth and f"{differ} {truth}", laws and f"{breaks} {laws}")))
-    text = f"{counted(len(wrong), 'settings')} {off} and {run} to the end without a word, worst {name}: {text}"
+    text = f"{counted(len(wrong), 'settings')} {off} and {run} to the end without a warning, worst {name}: {text}"
     return f"{text}; {passed}." if maps else f"{text}."
 
 

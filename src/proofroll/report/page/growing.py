@@ -48,7 +48,7 @@ class Report:
     def content(self) -> ReportContent:
         """Content of the report, with the further studies that have an entry so far; made anew after each."""
         keyed = [(part.key, self._entries[id(part)]) for part in self.parts if id(part) in self._entries]
-        entries = {key: [entry for other, entry in keyed if other == key] for key in self.compared.entries}
+        entries = {key: [entry for entry_key, entry in keyed if entry_key == key] for key in self.compared.entries}
         environment = self.compared.environment
         for _, entry in keyed:
             if isinstance(entry.study, dict):  # a stored study was made with the present versions
@@ -110,7 +110,7 @@ class Report:
         self.__dict__.pop("content", None)
         if entry.study is not None:
             self._lines[id(part)] = part.lines()
-            alike = [id(other) for other in self.parts if other.key == part.key]
+            alike = [id(rival) for rival in self.parts if rival.key == part.key]
             prefix = f"{part.key}{alike.index(id(part))}-"
             self.pictures |= _drawn(prefix, lambda: part.pictures(prefix))
 
@@ -136,7 +136,7 @@ def _replay(outcomes: list[Outcome], engines: Sequence[str]) -> Replay | None:
     kinds = {id(item): kind_of(item.scene) for item in outcomes}
     drawn_by = dict.fromkeys(kind for kind in kinds.values() if kind is not None)
     drawn = {kind: [item for item in outcomes if kinds[id(item)] is kind] for kind in drawn_by}
-    return joined([replay_content(own, kind.replay(), engines) for kind, own in drawn.items()])
+    return joined([replay_content(of_kind, kind.replay(), engines) for kind, of_kind in drawn.items()])
 
 
 def _drawn(prefix: str, draw: Callable[[], dict[str, str]]) -> dict[str, str]:

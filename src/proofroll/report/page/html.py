@@ -16,6 +16,7 @@ from proofroll.core import number_format
 from proofroll.files.json_data import plain
 from proofroll.report import labels
 from proofroll.report.comparison import tables, verdict_matrix
+from proofroll.report.comparison.closing import closing_notes
 from proofroll.report.comparison.spread import ALONE
 from proofroll.report.kinds import ReportKind, report_kinds
 from proofroll.report.page import profile
@@ -46,6 +47,7 @@ def page(
     drawn = {
         "precision": content.precision,
         "engines": content.engines,
+        "titles": {name: labels.engine_title(name) for name in content.engines},
         "rows": [_drawn_rows(comparison, content.engines) for comparison in content.comparisons],
         "points": [_marked(*pair) for pair in zip(content.comparisons, curves, strict=True)],
     }
@@ -91,8 +93,11 @@ def _datatables() -> str:
 
 def _drawn_rows(comparison: ReportedComparison, engines: Sequence[str]) -> list[dict[str, object]]:
     rows = comparison.rows
-    looks = zip(labels.names(rows), styles(rows, engines), strict=True)
-    return [{"name": name, **vars(style)} for name, style in looks]
+    looks = zip(labels.names(rows), rows, styles(rows, engines), strict=True)
+    return [
+        {"name": name, "label": f"{labels.engine_title(row.name)} {labels.setting(row)}", **vars(style)}
+        for name, row, style in looks
+    ]
 
 
 def templates() -> jinja2.Environment:
@@ -108,6 +113,8 @@ def _templates(kinds: tuple[type[Part] | type[ReportKind], ...]) -> jinja2.Envir
         "error": number_format.error,
         "symbol": labels.symbol,
         "unit": labels.unit,
+        "full_stop": lambda text: text if text.endswith((".", "!", "?")) else f"{text}.",
+        "engine": labels.engine_title,
         "values": labels.values,
         "settings": labels.settings_text,
         "name_of": labels.name_of,
@@ -121,7 +128,7 @@ def _templates(kinds: tuple[type[Part] | type[ReportKind], ...]) -> jinja2.Envir
         "step": labels.step,
         "detail": labels.detail,
         "setting": labels.setting,
-        "caveats": labels.caveat_lines,
+        "closing_notes": closing_notes,
         "alone_words": ALONE,
         "symbols": labels.SYMBOLS,
         "meanings": labels.MEANINGS,

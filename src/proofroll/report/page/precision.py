@@ -73,7 +73,7 @@ def work_precision(lines: Iterable[TableLine]) -> WorkPrecision | None:
     curves: dict[tuple[str, str, str, str], list[TableLine]] = {}
     for line in judged:
         curves.setdefault((line.engine, line.formulation, line.setting, line.resolution), []).append(line)
-    drawn = [_curve(own, groups, named, bounds) for own in curves.values()]
+    drawn = [_curve(curve_lines, groups, named, bounds) for curve_lines in curves.values()]
     drawn = [curve for curve in drawn if curve.points]
     if sum(len(curve.points) for curve in drawn) < _FEWEST:
         return None
@@ -84,12 +84,12 @@ def work_precision(lines: Iterable[TableLine]) -> WorkPrecision | None:
 def _curve(
     lines: Sequence[TableLine], groups: Sequence[str], named: Sequence[str], bounds: dict[TableLine, float]
 ) -> PrecisionCurve:
-    first = lines[0]
+    row_line = lines[0]
     steps = sorted({line.step for line in lines}, key=lambda value: -(value or 0.0))
     points = [_point([line for line in lines if line.step == value], groups, named, bounds) for value in steps]
-    name = " ".join(filter(None, (first.formulation, first.setting))) or first.engine
+    name = " ".join(filter(None, (row_line.formulation, row_line.setting))) or row_line.engine
     kept = [point for point in points if point is not None and any(item is not None for item in point.errors)]
-    return PrecisionCurve(first.engine, first.formulation, name, first.own_equations, kept)
+    return PrecisionCurve(row_line.engine, row_line.formulation, name, row_line.own_equations, kept)
 
 
 def _point(
@@ -98,13 +98,13 @@ def _point(
     costs = [line.cost for line in lines if line.cost is not None]
     if len(costs) < len(lines) or any(line.status != "done" for line in lines):
         return None
-    own = {line: line.relative for line in lines}
+    errors_of_lines = {line: line.relative for line in lines}
     errors, held = (
         [
             *(largest(lines, role, sizes) for role in groups),
             *(max((sizes[line] for line in lines if line.quantity == name), default=None) for name in named),
         ]
-        for sizes in (own, bounds)
+        for sizes in (errors_of_lines, bounds)
     )
     verdict = max((line.verdict for line in lines if line.verdict), key=lambda x: _SEVERITY.get(x, 0), default="")
     return PrecisionPoint(

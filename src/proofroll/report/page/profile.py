@@ -62,9 +62,9 @@ def x_of(ratio: float) -> float:
     return LEFT + (WIDTH - LEFT - RIGHT) * math.log(ratio) / math.log(LARGEST)
 
 
-def profile(matrix: ChoiceMatrix, found: FirstAnswer, engines: Collection[str] | None = None) -> Profile:
+def profile(matrix: ChoiceMatrix, answered: FirstAnswer, engines: Collection[str] | None = None) -> Profile:
     """Profile of the engines over the scenes of an answer that are judged; ``engines``: of these alone."""
-    asked, scenes = found.question, [item for item in found.scenes if item.judged]
+    asked, scenes = answered.question, [item for item in answered.scenes if item.judged]
     count = len(scenes)
 
     def y_of(held: int) -> float:

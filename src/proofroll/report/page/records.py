@@ -171,7 +171,7 @@ class ReportContent:
     @property
     def kept(self) -> Kept:
         """Counts of verdicts, of settings that are silently wrong, and of limits that are passed silently."""
-        return kept(self.comparisons, self.entries, self.names)
+        return kept(self.comparisons, self.entries)
 
     @property
     def beyond_budget(self) -> str:
@@ -207,13 +207,16 @@ class ReportContent:
 def report_content(outcomes: list[Outcome], command: str) -> ReportContent:
     """Content of a report of comparisons; paths of files are relative to its folder."""
     lines = [lines_of(outcome) for outcome in outcomes]
-    comparisons = [_comparison(outcome, own) for outcome, own in zip(outcomes, lines, strict=True)]
+    asked = [run.facts for outcome in outcomes for run in outcome.runs if run.facts is not None]
+    names = {item.name.partition("@")[0]: item.title or item.name for item in asked}
+    comparisons = [
+        _comparison(outcome, outcome_lines, names) for outcome, outcome_lines in zip(outcomes, lines, strict=True)
+    ]
     facts = machine()
     versions = {"proofroll": proofroll.__version__, "python": platform.python_version()}
     for run in (run for outcome in outcomes for run in outcome.runs):
         versions |= run.result.versions
     entries: dict[str, list[PartEntry]] = {kind.key: [] for kind in part_kinds()}
-    asked = [run.facts for outcome in outcomes for run in outcome.runs if run.facts is not None]
     provides = {shown_name(item.name): item.provides for item in asked if item.provides}
     content = ReportContent(
         datetime.now(UTC).isoformat(timespec="seconds"),
@@ -222,28 +225,31 @@ def report_content(outcomes: list[Outcome], command: str) -> ReportContent:
         [],
         [KnownFinding(item.name, item.engine, item.title, item.seen, item.gone) for item in load_findings()],
         entries,
-        {item.name.partition("@")[0]: item.title or item.name for item in asked},
+        names,
         provides,
         MadeWith(command, f"{facts['system']}, {facts['processor']}", versions),
         Sentences([]),
-        LongTable([line for own in lines for line in own]),
+        LongTable([line for outcome_lines in lines for line in outcome_lines]),
     )
     return content.summarised
 
 
-def _comparison(outcome: Outcome, lines: Sequence[TableLine]) -> ReportedComparison:
-    """Content of a comparison with its evidence: truths, facts from the kind of element, conclusions, costs."""
+def _comparison(outcome: Outcome, lines: Sequence[TableLine], names: Mapping[str, str]) -> ReportedComparison:
+    """Content of a comparison with its evidence: truths, facts from the kind of element, conclusions, costs.
+
+    ``names``: of engines for readers.
+    """
     content, truths = outcome_content(outcome), _truths(outcome)
     kind = kind_of(outcome.scene)
     facts = kind.run_facts(truths, outcome.runs) if kind is not None else [None] * len(outcome.runs)
     runs = [
-        dataclasses.replace(run, trajectory=made.trajectory.shown if made.trajectory else None, own=own)
-        for run, made, own in zip(content.runs, outcome.runs, facts, strict=True)
+        dataclasses.replace(run, trajectory=made.trajectory.shown if made.trajectory else None, own=fact)
+        for run, made, fact in zip(content.runs, outcome.runs, facts, strict=True)
     ]
     content = dataclasses.replace(content, runs=runs)
     points = outcome.points.values()
     sheet = sheet_of(outcome.file, [item.case.parameters for item in points], [item.scene for item in points])
-    choice = choice_matrix(lines, {content.name: ChoiceStudy(content.title, "")})
+    choice = choice_matrix(lines, {content.name: ChoiceStudy(content.title, "")}, naming(names))
     evidence = ComparisonEvidence(truths, sheet, conclusions(content, choice, truths, kind), growth(content, truths))
     return dataclasses.replace(content, evidence=evidence)
 

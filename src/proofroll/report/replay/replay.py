@@ -35,8 +35,8 @@ def replay_content(outcomes: list[Outcome], kind: ReplayKind, page_engines: Sequ
     """
     shown_in: dict[str, tuple[ComparedPoint, list[tuple[Outcome, str]]]] = {}
     for outcome in outcomes:
-        known = {name: point for name, point in outcome.points.items() if name not in outcome.laws_alone}
-        for name, point in known.items():
+        points = {name: point for name, point in outcome.points.items() if name not in outcome.laws_alone}
+        for name, point in points.items():
             if point.reference is not None and np.isfinite(point.reference.dataset["p_WB"]).all():
                 shown_in.setdefault(point.case.key, (point, []))[1].append((outcome, name))
     looks = {id(outcome): _looks(outcome, page_engines) for outcome in outcomes}
@@ -55,8 +55,8 @@ def replay_content(outcomes: list[Outcome], kind: ReplayKind, page_engines: Sequ
         content, packed_numbers = case_content(replayed, kind)
         cases.append(content)
         numbers.append(packed_numbers)
-    own = {outcome.scene.digest for outcome in outcomes}
-    start = next((number for number, (point, _) in enumerate(shown_in.values()) if point.scene.digest in own), 0)
+    digests = {outcome.scene.digest for outcome in outcomes}
+    start = next((number for number, (point, _) in enumerate(shown_in.values()) if point.scene.digest in digests), 0)
     return Replay(three(), start, cases, numbers)
 
 
@@ -72,22 +72,22 @@ def joined(parts: list[Replay]) -> Replay | None:
 def frame_times(until: float, fastest: float) -> FloatArray:
     """Evenly spaced times of frames [s], shape (n,), close enough for the spin ``fastest`` [rad/s] to look right."""
     turned = until * fastest
-    wanted = max(LEAST_PER_SECOND * until, turned / SMOOTH_TURN, LEAST_FRAMES)
-    return np.linspace(0.0, until, 1 + int(np.ceil(max(min(wanted, MOST_FRAMES), turned / WIDEST_TURN))))
+    count = max(LEAST_PER_SECOND * until, turned / SMOOTH_TURN, LEAST_FRAMES)
+    return np.linspace(0.0, until, 1 + int(np.ceil(max(min(count, MOST_FRAMES), turned / WIDEST_TURN))))
 
 
 def case_content(replayed: Replayed, kind: ReplayKind) -> tuple[ReplayCase, str]:
     """Description of a truth with its ghosts and their drawing, and their numbers as packed text."""
-    own, frames, drawn = kind.draw(replayed)
-    first = {ghost.engine: ghost for ghost in reversed(replayed.ghosts)}  # the one furthest off comes first
-    until, whole = own["until"], own["frames"]
+    numbers, frames, drawn = kind.draw(replayed)
+    furthest = {ghost.engine: ghost for ghost in reversed(replayed.ghosts)}  # the one furthest off comes first
+    until, whole = numbers["until"], numbers["frames"]
     runs = [
         ReplayedRun(replayed.solid, -1, True, whole, "", replayed.file),
         *(
             ReplayedRun(
                 name=ghost.name,
                 colour=ghost.colour,
-                shown=first[ghost.engine] is ghost,
+                shown=furthest[ghost.engine] is ghost,
                 frames=count,
                 message=ghost.ending(until * (count - 1) / max(1, whole - 1)) if count < whole else "",
                 trajectory=ghost.file,
@@ -96,7 +96,7 @@ def case_content(replayed: Replayed, kind: ReplayKind) -> tuple[ReplayCase, str]
             for ghost, count in zip(replayed.ghosts, frames, strict=True)
         ),
     ]
-    case = ReplayCase(replayed.group, replayed.label, kind.name, replayed.scene.title, own, runs, drawn.arrays)
+    case = ReplayCase(replayed.group, replayed.label, kind.name, replayed.scene.title, numbers, runs, drawn.arrays)
     return case, packed(bytes(drawn.content))
 
 
@@ -142,8 +142,10 @@ def _chosen(ghosts: list[Ghost], seen: float) -> list[Ghost]:
     once = {ghost.key: ghost for ghost in reversed(ghosts)}  # the first comparison names it
     chosen = []
     for engine in dict.fromkeys(ghost.engine for ghost in ghosts):
-        own = sorted((ghost for ghost in once.values() if ghost.engine == engine), key=lambda ghost: -ghost.distance)
-        default = [ghost for ghost in own if ghost.default]
-        other = [ghost for ghost in own if not ghost.default][:1]
-        chosen += default + [ghost for ghost in other if ghost.distance > seen or not default]
+        of_engine = sorted(
+            (ghost for ghost in once.values() if ghost.engine == engine), key=lambda ghost: -ghost.distance
+        )
+        default = [ghost for ghost in of_engine if ghost.default]
+        usual = [ghost for ghost in of_engine if not ghost.default][:1]
+        chosen += default + [ghost for ghost in usual if ghost.distance > seen or not default]
     return chosen

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from proofroll.core.dataset import part
+from proofroll.core.dataset import ended_early, part, until_end
 from proofroll.core.element import Element
 from proofroll.core.errors import InputError
 from proofroll.core.multi_element import each_alone
@@ -31,7 +31,8 @@ _WRITES = "proofroll run … --out writes one"
 def replay_page(path: Path, run: xr.Dataset, scene_of_run: str | None = None) -> str:
     """HTML page that replays a run: the truth of its scene, solid, and the run, translucent; without a truth alone.
 
-    In a scene of several elements, each is a case of its own, for no force couples them.
+    In a scene of several elements, each is a case of its own, for no force couples them. Behind the end of a truth
+    that ends early neither it nor the run is drawn; the caption says when and why it ends.
 
     Args:
         path: of the file, for messages.
@@ -52,6 +53,7 @@ def replay_page(path: Path, run: xr.Dataset, scene_of_run: str | None = None) ->
     usual = load_scene(name).parameters
     label = point_name({name: value for name, value in scene.parameters.items() if value != usual[name]})
     true = truth(scene, run["time"].to_numpy())
+    run = until_end(scene, true, {0: run})[0]
     cases: list[ReplayCase] = []
     packed: list[str] = []
     captions: list[str] = []
@@ -59,22 +61,24 @@ def replay_page(path: Path, run: xr.Dataset, scene_of_run: str | None = None) ->
     for (element, alone), drawer in zip(parts, drawers, strict=True):
         true_part, run_part = (part(scene, element, whole) for whole in (true, run))
         shown = element.name if len(parts) > 1 else label or scene.title
-        known = bool(np.isfinite(true_part["p_WB"]).all())  # else laws alone judge a run
-        if known:
+        has_truth = bool(np.isfinite(true_part["p_WB"]).all())  # else laws alone judge a run
+        if has_truth:
             replayed = Replayed(alone, true_part, "", _ghosts(run_part, true_part), group, shown)
         else:
             replayed = Replayed(alone, run_part, "", [], group, shown, str(run.attrs["engine"]))
         case, numbers = case_content(replayed, drawer)
         cases.append(case)
         packed.append(numbers)
-        captions.append(_caption(run, known))
+        captions.append(_caption(run, has_truth))
+    if has_truth and (end := ended_early(true)) is not None:
+        captions.append(f"What lies behind {end[0]:.6g} s is not drawn, for the truth ends there: {end[1]}.")
     return rendered(
         templates(),
         "run_replay.html",
         scene=scene,
         replay=Replay(three(), 0, cases, packed),
         caption=" ".join(dict.fromkeys(captions)),
-        replay_scripts=[other.replay_script for other in report_kinds().values() if other.replay_script],
+        replay_scripts=[kind.replay_script for kind in report_kinds().values() if kind.replay_script],
     )
 
 
@@ -85,20 +89,20 @@ def _drawer(path: Path, scene: Scene, element: Element, alone: Scene, run: xr.Da
     if kind is None or not kind.replay_script:
         what = f"the element {element.name} of " if of else ""
         raise InputError("run", path, f"nothing that is installed draws {what}the scene {scene.title}")
-    own = part(scene, element, run)
-    if "p_WB" not in own:
+    run_part = part(scene, element, run)
+    if "p_WB" not in run_part:
         raise InputError("run", path, f"it has no poses of bodies (p_WB){of}; {_WRITES}")
-    if not (np.diff(own["time"]) > 0).all() or not np.isfinite(own["p_WB"]).all():
+    if not (np.diff(run_part["time"]) > 0).all() or not np.isfinite(run_part["p_WB"]).all():
         raise InputError("run", path, f"its times have to rise, and its poses{of} to be numbers; {_WRITES}")
     return kind.replay()
 
 
-def _caption(run: xr.Dataset, known: bool) -> str:
+def _caption(run: xr.Dataset, has_truth: bool) -> str:
     engine = str(run.attrs["engine"])
     if engine == "truth":
         return "The truth."
     with_settings = f"{engine} ({settings_text(json.loads(run.attrs['settings']))})"
-    if not known:
+    if not has_truth:
         return f"{with_settings} alone: no truth tells the whole motion."
     return f"The truth, solid, and {with_settings}, translucent; where it agrees it is hidden in the truth."
 
@@ -114,8 +118,8 @@ def _scene(path: Path, run: xr.Dataset, name: str) -> Scene:
         raise InputError("run", path, f"it does not say which scene it is of, in which engine; {_WRITES}")
     if not is_scene(name):
         raise InputError("scene", name, "the scene of this run is not there; say where it lies by --scene PATH")
-    ran, known = str(run.attrs.get("scene")), read_scene_file(name).parameters
-    if lacking := sorted(parameters.keys() - known):
+    ran, declared = str(run.attrs.get("scene")), read_scene_file(name).parameters
+    if lacking := sorted(parameters.keys() - declared):
         raise InputError("scene", name, f"the run is one of {ran}, and this scene has no {', '.join(lacking)}")
     scene = load_scene(name, **parameters)
     if digest not in {scene.digest, scene.fully_asked.digest}:

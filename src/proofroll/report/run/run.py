@@ -1,29 +1,31 @@
 """Content of ``proofroll run``, and its lines on the terminal."""
 
+import csv
+import io
 import math
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+from proofroll.core.bounces import IMPACTS, Bounce, bounces_of
 from proofroll.core.columns import SMALLEST, UNCERTAIN, Columns, Variable
 from proofroll.core.dataset import ended_early
 from proofroll.core.diagnosis.scene_diagnosis import Diagnosis, diagnose_scene
+from proofroll.core.element_abilities import TellsBounces, WatchesRuns, step_bound
 from proofroll.core.events import Event, events_of
 from proofroll.core.number_format import number
-from proofroll.core.quantity import powers_of
+from proofroll.core.scene import Scene
 from proofroll.files.json_data import OPTIONAL
 from proofroll.files.scene_file import load_scene
 from proofroll.files.trajectory_file import read_columns
-from proofroll.report.labels import precision_words, settings_text
+from proofroll.report.labels import engine_title, precision_words, settings_text
+from proofroll.report.run.last_values import FORCES, bounce_table, short_names, value_table
 from proofroll.running.case import Case, Result
 
-_FORCES = ("N", "N m")
 _FEW = 3  # most forces and moments that are shown without being asked for
 _FEW_BODIES = 6  # most bodies whose places are shown where no point is tracked
-_DIGITS = 12
-_ROUND_OFF = 1e-14  # of the largest value of a dimension
-_EVENTS = 8  # most events on the terminal; the JSON document has all
+_EVENTS = 8  # most events on the terminal; --events and --json have all
 
 
 @dataclass(frozen=True)
@@ -42,7 +44,9 @@ class RunContent:
         uncertain: variable whose value may be wrong, not by the engine's fault -> reason.
         smallest: variable -> least value of the run, for variables where it matters, like a normal force.
         error_bars: of the truth, by variable.
-        trajectory, plot: files that were written.
+        trajectory, plot, event_table: files that were written.
+        bounces: energy and height of each impact; without error bars they are those of samples beside the impacts.
+        step_bound: clause on the longest stable step and on that of the run; None: nothing bounds it.
         ends: time from which the truth is not known [s]; samples from there on are missing; None: none is.
     """
 
@@ -70,7 +74,10 @@ class RunContent:
     uncertain: dict[str, str] | None = field(default=None, metadata=OPTIONAL)
     trajectory: str | None = field(default=None, metadata=OPTIONAL)
     plot: str | None = field(default=None, metadata=OPTIONAL)
+    event_table: str | None = field(default=None, metadata=OPTIONAL)
+    bounces: list[Bounce] | None = field(default=None, metadata=OPTIONAL)
     ends: float | None = field(default=None, metadata=OPTIONAL)
+    step_bound: str | None = field(default=None, metadata=OPTIONAL)
 
 
 def run_content(case: Case, result: Result, trajectory: Path) -> RunContent:
@@ -93,6 +100,7 @@ def run_content(case: Case, result: Result, trajectory: Path) -> RunContent:
         versions=result.versions,
         certificate=result.certificate,
         diagnosis=causes,
+        step_bound=step_bound(scene.elements, [] if case.engine.step is None else [case.engine.step]) or None,
     )
     if result.trajectory is None:
         return content
@@ -114,8 +122,18 @@ def run_content(case: Case, result: Result, trajectory: Path) -> RunContent:
         events=events_of(columns),
         smallest=smallest or None,
         error_bars={name: float(c.attrs["error_bar"]) for name, c in curves.items() if "error_bar" in c.attrs} or None,
+        bounces=_bounces(scene, columns) or None,
         ends=end[0] if end else None,
     )
+
+
+def _bounces(scene: Scene, columns: Columns) -> list[Bounce]:
+    """Energy and height of each impact of a scene with one element."""
+    stored, watches = bounces_of(columns), [one for one in scene.elements if isinstance(one, WatchesRuns)]
+    if stored is not None or len(scene.elements) != 1 or "event_kind" not in columns or not watches:
+        return stored or []
+    watch = watches[0].watch(())
+    return list(watch.bounces(columns)) if isinstance(watch, TellsBounces) else []
 
 
 def _places(columns: Columns, curves: Mapping[str, Variable]) -> dict[str, Variable]:
@@ -141,60 +159,26 @@ def _event_text(event: Event) -> str:
     return f"{event.kind.replace('_', '-')}{name} at {event.time:.9g} ± {bar} s"
 
 
-def value_text(value: float, bar: float | None, size: float) -> str:
-    """Text of a value with at most twelve digits: no digit below its error bar, and 0 for round-off.
-
-    Args:
-        value: to be written.
-        bar: error bar; None: it is not known.
-        size: largest value of the same dimension.
-    """
-    if not math.isfinite(value):
-        return "–"
-    if abs(value) <= max(bar or 0.0, _ROUND_OFF * size):
-        return "0"
-    digits = _DIGITS
-    if bar:
-        digits = min(_DIGITS, math.floor(math.log10(abs(value))) - math.ceil(math.log10(bar)) + 1)
-    return f"{value:.{max(digits, 1)}g}"
-
-
-def _dimension(unit: str) -> frozenset[tuple[str, float]]:
-    """Powers of base units; equal for a moment and an energy."""
-    return frozenset(powers_of(unit).items())
-
-
-def _place(unit: str) -> int:
-    """Place of a variable in the table by its unit: places and angles, velocities, the rest, forces and moments."""
-    order = {"s": 0, "m": 1, "rad": 1, "m/s": 2, "rad/s": 2}
-    return 4 if unit in _FORCES else order.get(unit, 3)
-
-
 def _hidden_forces(content: RunContent) -> list[str]:
     """Forces and moments, which are shown on request if they are more than a few."""
-    forces = [name for name, unit in content.units.items() if unit in _FORCES]
+    forces = [name for name, unit in content.units.items() if unit in FORCES]
     return forces if len(forces) > _FEW else []
 
 
-def _value_table(content: RunContent, hidden: Collection[str]) -> Any:
-    """Table of the last values: positions first, then velocities, energies and residuals, then forces."""
-    from rich.table import Column, Table
-
-    bars = content.error_bars or {}
-    of_bars = [Column("error bar", justify="right")] if bars else []
-    table = Table("at the end", Column("value", justify="right"), "unit", *of_bars, box=None, pad_edge=False)
-    sizes: dict[frozenset[tuple[str, float]], float] = {}
-    for name, value in content.final.items():
-        if math.isfinite(value):
-            dimension = _dimension(content.units[name])
-            sizes[dimension] = max(sizes.get(dimension, 0.0 if dimension else 1.0), abs(value))
-    shown = [name for name in content.final if name not in content.absent and name not in hidden]
-    for name in sorted(shown, key=lambda item: _place(content.units[item])):
-        value, unit = content.final[name], content.units[name]
-        bar = bars.get(name) if math.isfinite(value) else None
-        texts = [f"{bar:.1e}" if bar is not None else ""] if bars else []
-        table.add_row(name, value_text(value, bar, sizes.get(_dimension(unit), 0.0)), unit, *texts)
-    return table
+def event_csv(content: RunContent) -> str:
+    """Events of a run as CSV: time and bracket, kind, name; of impacts energies beside them and the next apex."""
+    header = ["time [s]", "low [s]", "high [s]", "kind", "name", "energy_before [J]", "energy_after [J]", "height [m]"]
+    bounces = {(item.time, item.name): item for item in reversed(content.bounces or [])}
+    rows: list[list[Any]] = [header]
+    for event in content.events:
+        row: list[Any] = [event.time, event.time_low, event.time_high, event.kind, event.name]
+        bounce = bounces.get((event.time, event.name)) if event.kind in IMPACTS else None
+        values = () if bounce is None else (bounce.energy_before, bounce.energy_after, bounce.height)
+        row += [value if math.isfinite(value) else "" for value in values] or [""] * 3
+        rows.append(row)
+    text = io.StringIO()
+    csv.writer(text, lineterminator="\n").writerows(rows)
+    return text.getvalue()
 
 
 def run_lines(content: RunContent, *, forces: bool = True) -> list[Any]:
@@ -202,28 +186,35 @@ def run_lines(content: RunContent, *, forces: bool = True) -> list[Any]:
     from rich.text import Text
 
     settings = ", ".join(filter(None, (settings_text(content.settings), *precision_words(content.precision))))
-    lines: list[Any] = [Text(f"{content.scene} in {content.engine}" + (f" ({settings})" if settings else ""))]
+    with_settings = f" ({settings})" if settings else ""
+    lines: list[Any] = [Text(f"{content.scene} in {engine_title(content.engine)}{with_settings}")]
+    lines += [Text(content.step_bound)] if content.step_bound else []
     lines.append(Text(f"{content.status}: {content.message}"))
     lines += [Text(f"  {cause.sentence}") for cause in content.diagnosis]
     if not content.final:
         return lines
     hidden = [] if forces else _hidden_forces(content)
-    lines.append(_value_table(content, hidden))
+    shown = [name for name in content.final if name not in content.absent and name not in hidden]
+    lines.append(value_table(content.final, content.units, content.error_bars or {}, shown))
     if hidden:
         lines.append(Text(f"{len(hidden)} forces and moments are not shown; --forces shows them"))
     for told in (content.absent, content.uncertain or {}):
         for reason in dict.fromkeys(why for name, why in told.items() if name not in hidden):
             names = [name for name, why in told.items() if why == reason and name not in hidden]
-            lines.append(Text(f"{reason}: {', '.join(names)}"))
+            lines.append(Text(f"{reason}: {', '.join(short_names(names))}"))
     for name, value in (content.smallest or {}).items():
         lines.append(Text(f"smallest {name} on the way: {value:.6g} {content.units.get(name, '')}".rstrip()))
     if content.events:
         events = ", ".join(_event_text(event) for event in content.events[:_EVENTS])
         more = len(content.events) - _EVENTS
-        lines.append(Text(f"events: {events}{f' and {more} more' if more > 0 else ''}"))
+        lines.append(Text(f"events: {events}{f' and {more} more: --events FILE.csv' if more > 0 else ''}"))
+    if content.bounces:
+        table, note = bounce_table(content.bounces)
+        lines += [table, Text(note)] if note else [table]
     before = "" if content.build_seconds is None else f", after {number(content.build_seconds)} s before the first step"
     lines.append(Text(f"{content.wall_seconds:.3g} s of wall time{before}"))
-    for what, file in (("trajectory", content.trajectory), ("plot", content.plot)):
+    files = ("trajectory", content.trajectory), ("table of events", content.event_table), ("plot", content.plot)
+    for what, file in files:
         if file:
             lines.append(Text(f"The {what} is in {file}."))
     return lines

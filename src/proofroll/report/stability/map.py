@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from proofroll.core.number_format import counted, number
 from proofroll.report.figure import panels, svg_text
-from proofroll.report.labels import name_of, step
+from proofroll.report.labels import engine_title, name_of, step
 from proofroll.report.pages import slug
 from proofroll.studies.failure import CRASHED, DIVERGED, GAVE_UP, LOST_PHASE, NOT_RUN, REFUSED, TOO_SLOW, WRONG_MODEL
 
@@ -90,7 +90,7 @@ def _drawn(study: StabilityStudy) -> Figure:
 def _panel(panel: Any, study: StabilityStudy, axis: Axis, curves: list[str], colours: Any) -> None:
     points = [point for point in study.points if point.axis == axis.name]
     values = list(dict.fromkeys(point.value for point in points))
-    names = {point.curve: name_of(point) for point in study.points}
+    names = curve_names(study)
     for point in points:
         x, y = values.index(point.value), curves.index(point.curve)
         text, shade = cell(study, point)
@@ -110,9 +110,14 @@ def _panel(panel: Any, study: StabilityStudy, axis: Axis, curves: list[str], col
     panel.set_yticks(range(len(curves)), [names[curve] for curve in curves])
     panel.tick_params(length=0)
     engines = [curve.partition("[")[0] for curve in curves]
-    for row, (one, other) in enumerate(itertools.pairwise(engines)):
-        if one != other:
+    for row, (upper, lower) in enumerate(itertools.pairwise(engines)):
+        if upper != lower:
             panel.axhline(row + 0.5, color="0.2", lw=1.0)
+
+
+def curve_names(study: StabilityStudy) -> dict[str, str]:
+    """Engine, formulation and setting of each curve, for readers."""
+    return {point.curve: name_of(point) for point in study.points}
 
 
 def _rectangle(x: int, y: int, face: Any, hatch: str | None) -> Any:
@@ -168,7 +173,7 @@ def heat_map(study: StabilityStudy) -> HeatMap:
     numbers = {(point.curve, point.axis, point.value): number for number, point in enumerate(study.points)}
     groups: dict[str, list[tuple[str, list[int | None]]]] = {}
     for curve, point in {point.curve: point for point in study.points}.items():
-        name = name_of(point).removeprefix(point.engine).strip() or curve
+        name = name_of(point).removeprefix(engine_title(point.engine)).strip() or curve
         groups.setdefault(point.engine, []).append((name, [numbers.get((curve, *column)) for column in columns]))
     seen = {point.failure for point in study.points}
     return HeatMap(axes, groups, {letter: kind for kind, letter in letters(study).items() if kind in seen})

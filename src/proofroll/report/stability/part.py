@@ -90,8 +90,8 @@ class StabilityPart(Part):
             against = claim.contradictions(study.points)
             contradictions += against
             untested = "" if against else claim.untested(study.points)
-            holds, found = None if untested else not against, untested or "; ".join(against)
-            claims.append(ClaimJudgement(_claim_text(claim, study.step_symbols), claim.because, holds, found))
+            holds, text = None if untested else not against, untested or "; ".join(against)
+            claims.append(ClaimJudgement(_claim_text(claim, study.step_symbols), claim.because, holds, text))
         points = [
             replace(point, reproducer=f"{self.folder}/{Path(point.reproducer).name}") if point.reproducer else point
             for point in study.points

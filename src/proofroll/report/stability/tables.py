@@ -29,7 +29,7 @@ def stability_parts(study: StabilityStudy, path: Path) -> Iterator[Table | str]:
         yield "The largest errors that the engines do not report:"
     yield from (f"  {line}" for line in silent)
     yield from study.findings
-    yield from (f"{at.axis} = {at.value:g}: {at.problem}" for at in study.places if at.problem)
+    yield from (f"{place.axis} = {place.value:g}: {place.problem}" for place in study.places if place.problem)
     yield from (f"{name}: {reason}" for name, reason in study.absent.items())
     yield from (f"!! {line}" for line in study.claims.contradictions)
     yield f"The map is in {path.with_suffix('.svg')}, everything in {path}."
@@ -68,24 +68,24 @@ def boundary_table(study: StabilityStudy) -> Table:
         title=f"Largest {symbol} (or tolerance) along each axis; n!: n times silent",
     )
     explained = {(e.curve, e.axis): e for e in study.explanations if e.boundary == "accurate"}
-    before = ""
+    last = ""
     for (curve, axis), points in grouped(study).items():
         name = name_of(points[0])
         table.add_row(
-            Text(name if name != before else ""),
+            Text(name if name != last else ""),
             axis,
             _range(points, "stable"),
             _range(points, "accurate"),
             Text(_explained(explained.get((curve, axis)), study.step_symbols)),
             Text(_beyond(points)),
         )
-        before = name
+        last = name
     return table
 
 
 def _beyond(points: Sequence[BoundaryPoint]) -> str:
     """Most frequent failure beyond the boundaries, and its silent cases (``n!``); silent ones win ties."""
-    kinds = Counter(point.failure for point in sorted(points, key=lambda each: not each.silent) if point.failure)
+    kinds = Counter(point.failure for point in sorted(points, key=lambda item: not item.silent) if point.failure)
     common = next((kind for kind, _ in kinds.most_common(1)), "")
     silent = sum(point.silent for point in points if point.failure == common)
     return f"{common} {silent}!" if silent else common
@@ -108,15 +108,15 @@ def size(point: BoundaryPoint, side: str) -> float | None:
 
 
 def _range(points: Sequence[BoundaryPoint], side: str) -> str:
-    known = [point for point in points if not (point.problem and side == "accurate")]
-    if not known:
+    valid = [point for point in points if not (point.problem and side == "accurate")]
+    if not valid:
         return "no truth"
-    values = [size(point, side) for point in known]
+    values = [size(point, side) for point in valid]
     sizes = [value for value in values if value is not None]
     if not sizes:
         return "none"
     low = "none" if len(sizes) < len(values) else number(min(sizes))
-    high = number(max(sizes)) + ("" if any(p.sides[side].reached for p in known) else "+")
+    high = number(max(sizes)) + ("" if any(p.sides[side].reached for p in valid) else "+")
     return low if low == high else f"{low}…{high}"
 
 
@@ -143,5 +143,5 @@ def silent_lines(study: StabilityStudy) -> Iterator[str]:
             beyond = f"down to {finest}, finer ones have too many steps"
         else:
             beyond = f"at every {'step' if point.resolution == 'dt' else 'tolerance'} down to {finest}"
-        where = f"{with_caveat(name_of(point), family_and_caveat(point))} at {point.axis} = {point.value:g}"
-        yield f"{where}: {point.failure} {beyond}{wrong}"
+        place = f"{with_caveat(name_of(point), family_and_caveat(point))} at {point.axis} = {point.value:g}"
+        yield f"{place}: {point.failure} {beyond}{wrong}"

@@ -120,10 +120,12 @@
     tip.style.top = `${box.bottom + tip.offsetHeight + 10 < innerHeight ? box.bottom + 7 : Math.max(6, box.top - tip.offsetHeight - 7)}px`;
   }
   const told = (target) => target.closest?.("#choice [title], #choice [data-tip], .key [title], .key [data-tip], #uses th[title], #uses th[data-tip]");
-  document.addEventListener("pointerover", ({ target }) => { const part = told(target); if (part) open(part); else if (owner && owner !== document.activeElement) close(); });
+  // What has the focus keeps its tooltip when the pointer leaves another, and beside it when the page scrolls.
+  const back = () => { const part = owner && told(document.activeElement); if (part) open(part); else close(); };
+  document.addEventListener("pointerover", ({ target }) => { const part = told(target); if (part) open(part); else back(); });
   document.addEventListener("focusin", ({ target }) => { const part = told(target); if (part) open(part); else close(); });
   document.addEventListener("keydown", ({ key }) => { if (key === "Escape") close(); });
-  addEventListener("scroll", close, { passive: true });
+  addEventListener("scroll", back, { passive: true });
 
   // The matrix as it is shown, as a file.
   place("csv").addEventListener("click", () => {

@@ -1,9 +1,10 @@
 // Data of one figure for plotly. Above: the curves. Below: their distances from the truth on a logarithmic axis, with
-// the truth's error bar, the tolerances, and at the side the limits of small steps with their error bars.
+// the truth's error bar, the tolerances, and at the left the limits of small steps with their error bars.
 // A figure is described by { rows, time, observable, off, paint }: `off` holds the rows that are switched off, `paint` gives
 // the colour of a name.
 const picture = (() => {
   // plotly interprets a few HTML tags and %{…} in names; escape them.
+  const LIMITS = 0.14;  // part of the width for the limits of small steps
   const literal = (text) => String(text).replace(/[&<>{}]/g, (sign) => `&#${sign.charCodeAt(0)};`);
   const unit = ({ observable }) => (observable.unit ? ` ${literal(observable.unit)}` : "");
   const short = (value) => (value === null ? "∞" : String(Number(value.toPrecision(3))));
@@ -129,18 +130,18 @@ const picture = (() => {
     const axis = { gridcolor: paint("--rule"), linecolor: paint("--rule"), zeroline: false, ticks: "", automargin: true };
     const title = (text) => ({ text, standoff: 6 }), inside = observable.unit ? ` [${literal(observable.unit)}]` : "";
     return {
-      ...size, margin: { l: 64, r: 8, t: 8, b: 40 }, showlegend: false, hovermode: "closest",
+      ...size, margin: { l: 64, r: figure.room, t: 8, b: 40 }, showlegend: false, hovermode: "closest",
       paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)", dragmode: matchMedia("(pointer: coarse)").matches ? false : "zoom",
       font: { family: paint("--sans"), size: 12, color: paint("--ink") },
       hoverlabel: { bgcolor: paint("--paper"), bordercolor: paint("--muted"), font: { color: paint("--ink") }, align: "left" },
-      xaxis: { ...axis, anchor: "y2", domain: [0, count ? 0.84 : 1], range: span(figure), title: title("time [s]") },
+      xaxis: { ...axis, anchor: "y2", domain: [count ? LIMITS + 0.13 : 0, 1], range: span(figure), title: title("time [s]") },
       yaxis: { ...axis, domain: [0.5, 1], range: frame(observable), title: title(literal(observable.symbol) + inside) },
       yaxis2: {
-        ...axis, domain: [0, 0.44], type: "log", range: log, exponentformat: "power", dtick: Math.max(1, Math.ceil((log[1] - log[0]) / 5)),
+        ...axis, ...(count && { anchor: "x2" }), domain: [0, 0.44], type: "log", range: log, exponentformat: "power", dtick: Math.max(1, Math.ceil((log[1] - log[0]) / 5)),
         title: title("distance" + inside),
       },
       ...(count && { xaxis2: {
-        anchor: "y2", domain: [0.87, 1], range: [-0.8, count - 0.2], fixedrange: true, showgrid: false, showticklabels: false, zeroline: false,
+        anchor: "y2", domain: [0, LIMITS], range: [-0.8, count - 0.2], fixedrange: true, showgrid: false, showticklabels: false, zeroline: false,
         showline: true, linecolor: paint("--rule"), title: { text: "limit", standoff: 22 },
       } }),
       annotations: names(figure), shapes: shapes(figure, log[0]),

@@ -27,7 +27,7 @@ const plots = (() => {
 
   function shown(figure) {
     const { c, p, o } = figure.dataset, point = parts.data.points[c][p];
-    return { rows: parts.data.rows[c], time: point.time, observable: point.observables[o], off: off(Number(c)), paint };
+    return { rows: parts.data.rows[c], time: point.time, observable: point.observables[o], off: off(Number(c)), paint, room: paper.contains("paper") ? 8 : ends.room(canvas(figure).clientWidth) };
   }
 
   const size = (figure) => (paper.contains("paper") ? PRINTED : { height: canvas(figure).clientHeight });
@@ -36,10 +36,26 @@ const plots = (() => {
     if (drawn.has(figure)) return;
     const element = canvas(figure), what = shown(figure);
     drawn.set(figure, element);
-    parts.Plotly.newPlot(element, picture.traces(what), picture.layout(what, size(figure)), { displayModeBar: false, responsive: true, doubleClick: "reset+autosize" });
-    element.on("plotly_relayout", (change) => linkTime(figure, change));
+    parts.Plotly.newPlot(element, picture.traces(what), named(figure, what, picture.layout(what, size(figure))), { displayModeBar: false, responsive: true, doubleClick: "reset+autosize" });
+    element.on("plotly_relayout", (change) => {
+      linkTime(figure, change);
+      if (Object.keys(change).some((key) => /^(autosize|[xy]axis)/.test(key))) name(figure);
+    });
     element.on("plotly_hover", (event) => { if (figure.matches(":hover")) linkHover(figure, event.points[0].x); });
     element.on("plotly_unhover", () => { if (!siblings(figure).some((other) => other.matches(":hover"))) linkHover(figure, null); });
+  }
+
+  // A layout with names at the ends of the curves, beside the names of lines.
+  function named(figure, what, layout) {
+    const lines = layout.annotations.filter(({ name }) => name !== ends.NAME);
+    return { ...layout, annotations: [...lines, ...ends.labels(what, layout, layout.height)] };
+  }
+
+  // Names as the curves end now, also of other traces. Plotly's `react` tells nobody of a zoom, as `relayout` would.
+  function name(figure, traces = drawn.get(figure).data) {
+    const element = drawn.get(figure), what = shown(figure), layout = { ...element.layout, ...size(figure) };
+    layout.margin = { ...layout.margin, r: what.room };
+    parts.Plotly.react(element, traces, named(figure, what, layout));
   }
 
   const ready = () => (loading ??= load());
@@ -53,7 +69,7 @@ const plots = (() => {
     for (const [figure, element] of drawn) {
       const what = shown(figure), layout = picture.layout(what, size(figure)), before = element.layout.xaxis;
       layout.xaxis.range = [...before.range];  // a person's zoom stays
-      parts.Plotly.react(element, picture.traces(what), layout);
+      parts.Plotly.react(element, picture.traces(what), named(figure, what, layout));
     }
   }
 
@@ -118,7 +134,7 @@ const plots = (() => {
       button.setAttribute("aria-pressed", String(!off(c).has(Number(button.dataset.row))));
     for (const [figure, element] of drawn) {
       if (Number(figure.dataset.c) !== c) continue;
-      parts.Plotly.restyle(element, { visible: element.data.map((trace) => picture.visible(trace.meta, off(c))) });
+      name(figure, element.data.map((trace) => ({ ...trace, visible: picture.visible(trace.meta, off(c)) })));
     }
   }
 

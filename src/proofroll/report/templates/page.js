@@ -137,3 +137,25 @@ addEventListener("load", () => {
     sizes.observe(region);
   }));
 })();
+
+// A button beside each command copies it; it comes with the part of the page that has the command.
+(() => {
+  everywhere((part) => part.querySelectorAll("dd > code").forEach((code) => {
+    if (!code.textContent.startsWith("proofroll ")) return;
+    const button = Object.assign(document.createElement("button"), { type: "button", className: "copy", textContent: "copy" });
+    button.setAttribute("aria-label", "Copy the command");
+    code.after(" ", button);
+  }));
+  document.addEventListener("click", async ({ target }) => {
+    if (!target.matches?.("button.copy")) return;
+    const code = target.parentElement.querySelector("code");
+    try {
+      await navigator.clipboard.writeText(code.textContent);
+      target.textContent = "copied";
+    } catch {
+      getSelection().selectAllChildren(code);  // a browser that forbids it has the command selected
+      target.textContent = "selected";
+    }
+    setTimeout(() => { target.textContent = "copy"; }, 2000);
+  });
+})();

@@ -9,6 +9,7 @@
   const { paint } = plots, literal = picture.literal;
   const short = (value) => (value >= 1e300 ? "∞" : String(Number(value.toPrecision(2))));
   const decade = () => Number(slider?.value ?? {{ first_decade }});
+  const title = (engine) => parts.data.titles[engine] ?? engine;
   let parts;
 
   // Points with a value of the quantity, without hidden engines.
@@ -29,8 +30,8 @@
   }
   function told({ name, engine }, { step, cost, clean, verdict, error, held }) {
     const answer = held <= 10 ** -decade() ? "holds" : error <= 10 ** -decade() ? "by luck, finer steps are worse:" : "does not hold";
-    return `<b>${literal(`${engine} ${name}`)}</b><br>${literal(step || "its own steps")}<br>error ${short(error)} of the size: ${answer} 1e-${decade()}` +
-      `<br>cost ${clean ? "" : "~"}${short(cost)} s/s<br>${verdict ? `verdict: ${literal(verdict)}` : "a step of its ladder"}<extra></extra>`;
+    return `<b>${literal(`${title(engine)} ${name}`)}</b><br>${literal(step || "its own steps")}<br>error ${short(error)} of the size: ${answer} 1e-${decade()}` +
+      `<br>cost ${clean ? "" : "≈ "}${short(cost)} s/s<br>${verdict ? `verdict: ${literal(verdict)}` : "a step of its ladder"}<extra></extra>`;
   }
 
   // Heights of the rows of panels. Each has its settings below, where they lie over no point: as many lines as its longest list.
@@ -64,7 +65,7 @@
       layout[`xaxis${tail}`] = { ...axis, domain: x, anchor: `y${tail}`, range: span, ...(at && { matches: "x" }), title: { text: "cost [s/s]", standoff: 4 }, ...(span[1] - span[0] > 1.5 && { dtick: Math.ceil((span[1] - span[0]) / 6) }) };
       layout[`yaxis${tail}`] = { ...axis, domain: y, anchor: `x${tail}`, range: [Math.log10(least) - 0.4, 0.35], ...(at && { matches: "y" }), nticks: 8, ...(!column && { title: { text: "error", standoff: 4 } }) };
       layout[`legend${tail}`] = { x: x[0], y: y[0] - TICKS / total, xanchor: "left", yanchor: "top", bgcolor: "rgba(0,0,0,0)", font: { size: 11 }, tracegroupgap: 0 };
-      layout.annotations.push({ text: `<b>${literal(engine)}</b>`, showarrow: false, xref: "paper", yref: "paper", x: x[0], y: y[1], xanchor: "left", yanchor: "bottom" });
+      layout.annotations.push({ text: `<b>${literal(title(engine))}</b>`, showarrow: false, xref: "paper", yref: "paper", x: x[0], y: y[1], xanchor: "left", yanchor: "bottom" });
       layout.shapes.push({ type: "line", xref: `x${tail} domain`, yref: `y${tail}`, x0: 0, x1: 1, y0: 10 ** -decade(), y1: 10 ** -decade(), line: { color: paint("--muted"), width: 1, dash: "dash" } });
       const here = { type: "scatter", xaxis: `x${tail}`, yaxis: `y${tail}`, legend: `legend${tail}` };
       const others = all.filter((curve) => curve.engine !== engine).flatMap(({ points }) => [...points, { cost: null, y: null }]);

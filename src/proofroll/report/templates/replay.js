@@ -15,6 +15,7 @@
   };
 
   let cases, library, shown, kind, time = 0, playing = false, last = 0, queued = false;
+  const strip = errorStrip(ui.errors, (to) => { stop(); go(to); });
   let view = null, stage = null;         // the camera, and what is drawn; null until there is something
 
   // ---- numbers ----
@@ -120,6 +121,7 @@
     if (document.activeElement !== ui.time || playing) ui.time.value = time;
     ui.time.setAttribute("aria-valuetext", `${time.toFixed(shown.until < 0.1 ? 5 : 3)} seconds`);
     kind.write();
+    strip.now(time);
     for (const run of shown.runs.slice(1)) {
       const here = there(run), { off, texts, sign } = kind.compare(run, here);
       const told = [here ? distance(1000 * off, shown.least) : "gone", ...texts.map((text) => (here ? text : "–"))];
@@ -298,6 +300,11 @@
     kind = kinds[shown.kind];
     time = 0;
     rows();
+    strip.show(shown, (run, moment) => {
+      time = moment;
+      return there(run) ? kind.compare(run, true).off : null;
+    });
+    time = 0;
     if (view) { build(); reset(); }
     go(0);
   }

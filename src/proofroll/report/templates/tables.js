@@ -1,4 +1,4 @@
-// Tables sort, filter and download once they come near; the library is kept compressed until the first one does.
+// Tables sort (but maps and spreads), filter and download once they come near; the library is kept compressed until the first one does.
 (() => {
   const order = {{ symbols|list|tojson }};
   let library = null;
@@ -9,18 +9,24 @@
     });
     return library;
   }
-  const sorts = (table) => !table.matches("#choice, #uses") && table.querySelector("tbody tr:not(.group)");
+  const sorts = (table) => !table.matches("#choice, #uses") && table.querySelector("tbody tr:not(.group, .note)");
+
+  // A map and a spread rank nothing: they keep the order of their file.
+  const ranks = (table) => !table.matches(".heat, .spread");
 
   // Rows of engines one after the other, each with its engine: a table that sorts has neither groups nor joined cells.
   function flatten(table) {
     const body = table.tBodies[0];
+    const notes = new Map();  // row -> the row below it that tells more, which goes where it goes
+    let named = "";
     for (const part of [...table.tBodies]) {
       for (const row of [...part.rows]) {
-        if (row.classList.contains("group")) { row.remove(); continue; }
+        if (row.classList.contains("note")) { notes.set(body.lastElementChild, row); row.remove(); continue; }
+        if (row.classList.contains("group")) { named = row.textContent.replace("#", "").trim(); row.remove(); continue; }
         if (part.dataset.engine) {
           row.dataset.engine = part.dataset.engine;
           row.classList.toggle("off", part.classList.contains("off"));
-          if (row.cells[0].textContent.trim() !== part.dataset.engine) row.cells[0].prepend(`${part.dataset.engine} `);
+          if (row.cells[0].textContent.trim() !== named) row.cells[0].prepend(`${named} `);
         }
         for (const joined of row.querySelectorAll("[colspan]")) {
           (row.querySelector(".word") ?? row.cells[0]).append(Object.assign(document.createElement("small"), { className: "why", textContent: joined.textContent, title: joined.textContent }));
@@ -33,6 +39,7 @@
     }
     delete body.dataset.engine;
     body.classList.remove("off");
+    return notes;
   }
   // Sort key of a cell: its verdict, or its first number; infinite values come last.
   function rank(cell, numeric) {
@@ -52,17 +59,20 @@
     const copy = cell.cloneNode(true);
     copy.querySelectorAll("[aria-hidden], .dt-column-order").forEach((part) => part.remove());
     copy.querySelectorAll("br, small, b").forEach((part) => part.before(" "));
-    return `${cell.dataset.axis ?? ""} ${copy.textContent}`.replace(/\s+/g, " ").trim();
+    return `${cell.dataset.axis ?? ""} ${copy.textContent} ${cell.dataset.note ?? ""}`.replace(/\s+/g, " ").trim();
   }
   async function enliven(table) {
     const { default: DataTable } = await load();
     const region = table.closest(".scroll");
     const label = region.getAttribute("aria-label");
-    flatten(table);
+    const notes = flatten(table);
     const heads = [...[...table.tHead.rows].at(-1).cells], rows = [...table.tBodies[0].rows];
-    keyTable(rows, heads);
+    if (ranks(table)) keyTable(rows, heads);
+    // What a note says is found by the filter and written to the file with the verdict above it.
+    notes.forEach((note, row) => { row.querySelector(".word").dataset.note = note.textContent.trim(); });
+    if (notes.size) rows.forEach((row) => { const cell = row.querySelector(".word"); cell.dataset.search = said(cell).replace(/[&<>]/g, (sign) => `&#${sign.charCodeAt(0)};`); });  // the library reads it as markup
     const made = new DataTable(table, {
-      paging: false, info: false, autoWidth: false, order: [], orderDescReverse: false,
+      paging: false, info: false, autoWidth: false, ordering: ranks(table), order: [], orderDescReverse: false,
       language: { search: "Filter", zeroRecords: "no row has this" },
       layout: {
         topStart: rows.length < 2 ? null : "search",
@@ -72,6 +82,7 @@
         bottomStart: null, bottomEnd: null,
       },
     });
+    notes.forEach((note, row) => made.row(row).child(note).show());
     const tools = made.table().container().querySelector(".dt-layout-row:not(.dt-layout-table)");
     tools.classList.add("tools");
     tools.querySelector("input")?.setAttribute("aria-label", `Filter: ${label}`);
@@ -87,7 +98,7 @@
   everywhere((part) => part.querySelectorAll(".scroll > table").forEach((table) => {
     if (!sorts(table)) return;
     // Room for the signs and the tools of a table that sorts, so that nothing moves when they come.
-    table.classList.add("sorts");
+    table.classList.toggle("sorts", ranks(table));
     table.closest(".scroll").before(Object.assign(document.createElement("div"), { className: "tools" }));
     near.observe(table);
   }));

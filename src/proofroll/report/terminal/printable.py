@@ -13,4 +13,4 @@ def printable(text: str) -> str:
 
 def escaped(text: str) -> str:
     """JSON with control characters as escapes, so that nothing is lost."""
-    return _COMMANDS.sub(lambda found: f"\\u{ord(found[0]):04x}", text)
+    return _COMMANDS.sub(lambda match: f"\\u{ord(match[0]):04x}", text)

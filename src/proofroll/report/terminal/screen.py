@@ -75,10 +75,10 @@ def fitted(table: Table, console: Console) -> list[Table]:
     for number, group in enumerate(groups):
         part = copy.copy(table)
         free = max(0, room - sum(least[i] for i in group))
-        wanted = sum(sizes[i].span for i in group)
+        ideal = sum(sizes[i].span for i in group)
         part.columns = []
         for place, index in enumerate(group):
-            width = sizes[index].minimum + (min(free, wanted) * sizes[index].span // wanted if wanted else 0)
+            width = sizes[index].minimum + (min(free, ideal) * sizes[index].span // ideal if ideal else 0)
             part.columns.append(
                 dataclasses.replace(table.columns[index], _index=place, width=width, min_width=None, no_wrap=False)
             )

@@ -10,10 +10,10 @@ from rich.table import Column, Table
 from rich.text import Text
 
 from proofroll.core.number_format import counted, number
-from proofroll.core.verdict import Verdict
+from proofroll.report.comparison.closing import closing_notes
 from proofroll.report.comparison.spread import ALONE
-from proofroll.report.comparison.tables import observables, one_scheme, remarks, seconds_before
-from proofroll.report.labels import SYMBOLS, caveat_lines, step, unit, unjudged, verdict_text
+from proofroll.report.comparison.tables import observables, remarks, seconds_before
+from proofroll.report.labels import SYMBOLS, engine_words, step, unit, unjudged, verdict_text
 from proofroll.report.page.answer import answer, closest_words, forces_words, next_words, take_words
 from proofroll.report.parts import part_kinds
 from proofroll.report.terminal.screen import Screen, numeric, plain_table, unbroken
@@ -61,17 +61,17 @@ def console() -> Screen:
 
 def verdict_table(content: ReportedComparison) -> Table:
     """Table with a line per engine with settings: the worst over all points of the parameters."""
-    names, before = columns(content), seconds_before(content)
+    names, seconds = columns(content), seconds_before(content)
     worst = [
         max((row.observables[name] for name, _ in names if name in row.observables), key=_beyond, default=None)
         for row in content.rows
     ]
     numbers = {
         "order": [item.order if item else None for item in worst],
-        "s before": [before.get(index) for index in range(len(content.rows))],
+        "s before": [seconds.get(index) for index in range(len(content.rows))],
         "s/s": [row.seconds_per_second for row in content.rows],
     }
-    numbers = {name: found for name, found in numbers.items() if any(value is not None for value in found)}
+    numbers = {name: column for name, column in numbers.items() if any(value is not None for value in column)}
     table = plain_table(
         # In a narrow window columns with a least width wrap between words, and nothing is cut.
         Column("engine formulation setting", min_width=_WORD, overflow="fold"),
@@ -85,11 +85,11 @@ def verdict_table(content: ReportedComparison) -> Table:
     for index, row in enumerate(content.rows):
         verdict, judged = row.verdict, row.observables
         table.add_row(
-            Text(" ".join(filter(None, (row.name, row.formulation, row.setting)))),
+            Text(" ".join(filter(None, (engine_words(row.name, row.formulation), row.setting)))),
             step(row.resolution, row.resolution_value),
             Text(f"{SYMBOLS[verdict]} {verdict_text(row, content.runs_of(index))}", style=STYLES[verdict]),
             *(number(judged[name].error if name in judged else None) for name, _ in names),
-            *(number(found[index]) for found in numbers.values()),
+            *(number(column[index]) for column in numbers.values()),
             Text("") if row.as_expected else Text("!!", style="bold red"),
         )
     return table
@@ -113,17 +113,33 @@ def verdict_parts(content: ReportedComparison) -> Iterator[Table | str]:
     if content.unreached and content.budget is None:
         yield from (content.title, content.unreached, "")
         return
+    if content.step_bound:
+        yield f"{content.step_bound}."
     yield verdict_table(content)
+    yield from dash_notes(content)
     for item in content.spread:
         yield from spread_parts(item)
     yield from closing_lines(content)
     yield ""
 
 
+def dash_notes(content: ReportedComparison) -> list[str]:
+    """Line below the verdict table on what its dashes mean; none where it has no dash."""
+    shown = [name for name, _ in columns(content)]
+    judged = [[row.observables[name] for name in shown if name in row.observables] for row in content.rows]
+    with_orders = any(item.order is not None for items in judged for item in items)
+    notes = []
+    if any(len(items) < len(shown) or any(not math.isfinite(item.error) for item in items) for items in judged):
+        notes.append("no value, see the reason of the row")
+    if with_orders and any(items and max(items, key=_beyond).order is None for items in judged):
+        notes.append("no order is measured where errors are round-off or the step is not varied")
+    return [f"–: {'; '.join(notes)}."] if notes else []
+
+
 def spread_parts(spread: Spread) -> Iterator[Table | str]:
     """Table of the spread of final values at a point without a unique truth, the widest first."""
-    where = f" at {spread.point}" if spread.point else ""
-    yield f"{ALONE[0].upper()}{ALONE[1:]}{where}: {spread.because}."
+    place = f" at {spread.point}" if spread.point else ""
+    yield f"{ALONE[0].upper()}{ALONE[1:]}{place}: {spread.because}."
     if spread.lines:
         table = plain_table(Column("spread of the settings"), *numeric("lowest", "highest"), *unbroken("unit"))
         for line in sorted(spread.lines, key=lambda line: -line.part)[:_WIDEST]:
@@ -143,7 +159,7 @@ def closing_lines(content: ReportedComparison) -> list[str]:
     for name, row, _ in content.lines():
         if row.reason and not row.reason.startswith(Status.LEFT_OUT):
             lines.append(f"{SYMBOLS[row.verdict]} {name}: {row.reason}")
-        lines += [f"  {told.cause.sentence}" for told in row.diagnosis]
+        lines += [f"  {told.cause.sentence}: {told.cause.cause.remedy}" for told in row.diagnosis]
     lines += [f"* {name}: {remark}" for name, remark in remarks(content)]
     if content.contradictions:
         count = len(content.contradictions)
@@ -157,8 +173,7 @@ def closing_lines(content: ReportedComparison) -> list[str]:
             if left
             else "Every verdict is as the comparison file expects."
         )
-    shared = [*one_scheme(content), *caveat_lines([row for row in content.rows if row.verdict != Verdict.REFUSED])]
-    return [*lines, *budget_lines(content), *shared, *host_sentences(content.hosts)]
+    return [*lines, *budget_lines(content), *closing_notes(content), *host_sentences(content.hosts)]
 
 
 def budget_lines(content: ReportedComparison) -> list[str]:
@@ -190,8 +205,8 @@ def change_lines(changes: Against | None) -> list[str]:
     lines = [f"Other versions: {', '.join(versions)}."] if versions else []
     runs: dict[str, list[str]] = {}
     for item in changes.changes:
-        where = f" at {item.place}" if item.place else ""
-        runs.setdefault("; ".join(item.says) or item.kind, []).append(f"{item.study}: {item.run}{where}")
+        place = f" at {item.place}" if item.place else ""
+        runs.setdefault("; ".join(item.says) or item.kind, []).append(f"{item.study}: {item.run}{place}")
     for change, where_seen in runs.items():
         several = f" ({len(where_seen)} runs)" if len(where_seen) > 1 else ""
         lines.append(f"!! {'; '.join(where_seen)}: {change}{several}")
@@ -221,7 +236,7 @@ def _one_line(text: str) -> str:
 
 def answer_table(matrix: ChoiceMatrix, tolerance: float, forces: bool, *, scenes: bool = False) -> Table:
     """The answer of the first screen: for each kind of scenes, or each scene, what to take, its speed, and the next."""
-    found = answer(matrix, tolerance, forces)
+    answered = answer(matrix, tolerance, forces)
     with_forces = None if forces else answer(matrix, tolerance, True)
     table = plain_table(
         Column("scene" if scenes else "kind of scene", min_width=_WORD),
@@ -229,15 +244,15 @@ def answer_table(matrix: ChoiceMatrix, tolerance: float, forces: bool, *, scenes
         *numeric("× real time"),
         Column("next engine", min_width=_WORD),
         *([] if forces else [Column("if forces count", min_width=_WORD)]),
-        title=f"The cheapest that holds {found.question.words}",
+        title=f"The cheapest that holds {answered.question.words}",
     )
-    for at, item in enumerate(found.scenes if scenes else found.kinds):
+    for index, item in enumerate(answered.scenes if scenes else answered.kinds):
         taken = item.taken
         take = ", ".join(filter(None, (take_words(matrix, taken), taken.setting))) if taken else ""
         both = (
             []
             if with_forces is None
-            else [forces_words(matrix, item, (with_forces.scenes if scenes else with_forces.kinds)[at])]
+            else [forces_words(matrix, item, (with_forces.scenes if scenes else with_forces.kinds)[index])]
         )
         table.add_row(
             Text(item.column.title),

@@ -162,11 +162,11 @@ def _limit(budget: CurveBudget, unit: str) -> dict[str, Any]:
 
 def advice(study: TradeoffStudy, claims: TradeoffClaims) -> list[Advice]:
     """Advice for the study's own quantity at the tolerances of its claims, or else at parts of the scale."""
-    own = list({claim.tolerance.value: claim.tolerance for claim in claims.cheapest}.values())
+    claimed = list({claim.tolerance.value: claim.tolerance for claim in claims.cheapest}.values())
     parts = [Tolerance(part, True) for part in PARTS]
     return [
         Advice(tolerance.value if tolerance.relative else None, recommend(study, Requirements(name, tolerance)).answer)
         for name in default_quantities(study)
         if study.quantities[name].scale is not None  # without a scale no relative tolerance exists
-        for tolerance in (own if own and name == study.quantity else parts)
+        for tolerance in (claimed if claimed and name == study.quantity else parts)
     ]

@@ -11,6 +11,7 @@ from rich.text import Text
 
 from proofroll.core.number_format import error, number
 from proofroll.report.labels import family_and_caveat, listed, name_of, step, with_caveat
+from proofroll.report.page.choice_matrix import FIRST_TOLERANCE
 from proofroll.report.terminal.screen import numeric, plain_table, unbroken
 from proofroll.running.timing import CONFIDENCE
 from proofroll.studies.tradeoff.pareto import costs_overlap
@@ -58,10 +59,12 @@ def effort(study: TradeoffStudy) -> str:
             "Speeds were measured briefly, twice at most and those of long runs once, and the finest steps were "
             "left out: they contradict no claim. "
         )
-    where = f"at {listed(study.parameters) or 'the default parameters'} over {study.until:g} s"
+    range_words = f"at {listed(study.parameters) or 'the default parameters'} over {study.until:g} s"
     if study.over:
-        return f"{text}Every choice holds {where}, and at the corners of {_ranges(study)}; nothing is known beyond."
-    return f"{text}Every choice holds {where}; it was not checked over ranges of the parameters."
+        return (
+            f"{text}Every choice holds {range_words}, and at the corners of {_ranges(study)}; nothing is known beyond."
+        )
+    return f"{text}Every choice holds {range_words}; it was not checked over ranges of the parameters."
 
 
 def advised(advice: Sequence[Advice]) -> dict[str, tuple[str, list[Advice]]]:
@@ -122,7 +125,7 @@ def point_table(
     """
     caption = Text("cost: wall seconds per simulated second through this adapter")
     if ties:
-        caption += Text("; ≈ a tie: the cost cannot be told from that of the next line, which is more accurate")
+        caption += Text("; ≈ a tie: the cost cannot be told from that of a more accurate one")
     lucky = [
         name for p in points for name in quantities if name in p.error and p.envelope_of(name) > (p.error[name] or 0.0)
     ]
@@ -152,9 +155,30 @@ def front_tables(study: TradeoffStudy, quantities: Sequence[str]) -> Iterator[Ta
         yield _front(study, everything, quantities, title)
 
 
+def held_first(
+    study: TradeoffStudy, points: Sequence[MeasuredPoint], quantity: str
+) -> list[tuple[MeasuredPoint, bool | None]]:
+    """Points of a front, each with True if it holds ``FIRST_TOLERANCE``: these first, the cheapest of them first.
+
+    Then those that do not hold it, the most accurate first. None: the quantity has no scale, and the order is kept.
+    """
+    scale = study.quantities[quantity].scale if quantity in study.quantities else None
+    if scale is None:
+        return [(point, None) for point in points]
+    told: list[tuple[MeasuredPoint, bool | None]] = [
+        (point, point.envelope_of(quantity) <= FIRST_TOLERANCE * scale) for point in points
+    ]
+    return [pair for pair in told if pair[1]] + [pair for pair in reversed(told) if not pair[1]]
+
+
 def _front(study: TradeoffStudy, points: Sequence[MeasuredPoint], quantities: Sequence[str], title: str) -> Table:
     ties = {cheap.id for cheap, fine in itertools.pairwise(points) if costs_overlap(cheap.interval, fine.interval)}
-    return point_table(study, points, quantities, title, ties)
+    ordered = held_first(study, points, quantities[0])
+    table = point_table(study, [point for point, _ in ordered], quantities, title, ties)
+    if any(holds for _, holds in ordered) and not all(holds for _, holds in ordered):
+        assert isinstance(table.caption, Text)
+        table.caption += Text(f"; first what holds {number(FIRST_TOLERANCE)} of the size, the cheapest first")
+    return table
 
 
 def corner_table(study: TradeoffStudy, quantity: str) -> Table:
@@ -164,9 +188,9 @@ def corner_table(study: TradeoffStudy, quantity: str) -> Table:
     table = plain_table(*columns, title=title)
     checked = [p for p in study.points if p.corners and quantity in p.error]
     for point in sorted(checked, key=lambda p: p.seconds_per_second or 0.0):
-        worst, where = _worst(point.corners or [], quantity)
+        worst, corner = _worst(point.corners or [], quantity)
         here, size = error(point.error[quantity]), step(point.resolution, point.step)
-        table.add_row(Text(name_of(point)), size, here, worst, Text(where))
+        table.add_row(Text(name_of(point)), size, here, worst, Text(corner))
     return table
 
 

@@ -35,8 +35,8 @@ def _drawn(study: TradeoffStudy, quantities: Sequence[str]) -> Figure:
     figure.set_size_inches(5.2 * columns + 2.6, max(3.9 * rows + 0.4, _LINE * len(curves) + 1.0))
     for panel, quantity in zip(drawn, quantities, strict=True):
         _panel(panel, study, quantity)
-    at = listed(study.parameters) or "default parameters"
-    figure.suptitle(f"{study.scene}, {at}, over {study.until:g} s", fontsize=9)
+    parameters = listed(study.parameters) or "default parameters"
+    figure.suptitle(f"{study.scene}, {parameters}, over {study.until:g} s", fontsize=9)
     handles, labels = drawn[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside right upper", frameon=False, fontsize=7)
     return figure

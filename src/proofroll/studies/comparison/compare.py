@@ -56,9 +56,9 @@ def evaluate(planned: Plan, results: dict[str, Result], runner: Runner) -> Outco
         if reference is None:
             judged.append(_without_truth(run, point, result))
             continue
-        other = reference.another_scene(result.certificate)
-        if other is not None:
-            judged.append(_of_another_scene(run, result, other))
+        built_scene = reference.another_scene(result.certificate)
+        if built_scene is not None:
+            judged.append(_of_another_scene(run, result, built_scene))
             continue
         trajectories = {
             factor: stored[case.key].dataset
@@ -155,8 +155,8 @@ def _without_result(run: Planned, point: ComparedPoint, result: Result) -> Run:
     expected = run.row.expected(run.parameters)
     if failed.verdict in expected or result.status is Status.LEFT_OUT:
         return failed
-    where = f"{run.row.engine}{at_point(run.parameters)}"
-    contradiction = f"{where} {result.status}, expected: {' or '.join(expected)} ({result.message})"
+    place = f"{run.row.engine}{at_point(run.parameters)}"
+    contradiction = f"{place} {result.status}, expected: {' or '.join(expected)} ({result.message})"
     return replace(failed, contradictions=[contradiction])
 
 
@@ -191,16 +191,16 @@ def _judgements(
     main = curves[1.0]
     judgements: list[Judgement] = []
     errors: dict[float, dict[str, float]] = {factor: {} for factor in curves if factor != 1}
-    always, given = run_values.always_judged(reference, main), band.bounds | run.row.bound
-    if reference.ended and {reference.scene.observables[name].role for name in given} == {Role.RESIDUAL}:
+    always, tolerances = run_values.always_judged(reference, main), band.bounds | run.row.bound
+    if reference.ended and {reference.scene.observables[name].role for name in tolerances} == {Role.RESIDUAL}:
         always = {}  # laws alone are asked for, which hold behind the end of the truth too
     for name, curve in main.items():
-        tolerance = given.get(name) or always.get(name)
+        tolerance = tolerances.get(name) or always.get(name)
         if tolerance is None:
             continue
         true, scale = reference.true(name, curve), reference.sizes.get(name, 1.0)
-        own = run_values.run_curve(reference, name, curve, trajectories[1.0], facts.precision)
-        limit = _limit(run, facts, name, curves, own.magnitude)
+        run_curve = run_values.run_curve(reference, name, curve, trajectories[1.0], facts.precision)
+        limit = _limit(run, facts, name, curves, run_curve.magnitude)
         if limit is not None:
             finest = run.row.ladder[-1]
             step = None if facts.step is None else facts.step * finest
@@ -209,15 +209,15 @@ def _judgements(
         ladder = facts.resolution is not None and len(run.row.ladder) > 1 and curve.size > 0
         allowance = Allowance(name, reference.scene.observables[name].unit, tolerance.absolute(scale), scale)
         faster = limit is not None and _falls_faster(run, name, curves, true.values)
-        judgement = judge_curve(allowance, own, true, Refinement(limit, ladder, lost, faster))
-        if name not in given and judgement.verdict is not Verdict.DIFFERS:
+        judgement = judge_curve(allowance, run_curve, true, Refinement(limit, ladder, lost, faster))
+        if name not in tolerances and judgement.verdict is not Verdict.DIFFERS:
             continue
         judgements.append(judgement)
         for factor, own_errors in errors.items():
             if name in curves[factor]:
                 rung = curves[factor][name]
                 own_errors[name] = run_values.error(reference, name, rung, trajectories[factor])
-    remark = run_values.rates_remark(reference, main, given)
+    remark = run_values.rates_remark(reference, main, tolerances)
     if remark and judgements and all(item.verdict in {Verdict.AGREES, Verdict.UNCONFIRMED} for item in judgements):
         judgements[0] = replace(judgements[0], remarks=(*judgements[0].remarks, remark))
     return judgements, errors

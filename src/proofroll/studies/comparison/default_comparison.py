@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
+from proofroll.core.bounds import require_bounds
 from proofroll.core.comparison import Band, Comparison, Row, Tolerance
 from proofroll.core.engine_abilities import offered
 from proofroll.core.errors import InputError, Missing
@@ -51,10 +52,11 @@ def default_comparison(
     Raises:
         InputError: there is no such scene or engine, a value makes no sense, or no engine can represent the scene.
     """
-    before = processor_seconds()
+    begin = processor_seconds()
     file, scene = read_scene_file(name), load_scene(name, **parameters)
     if until is not None:
         time_grid(until, until or 1.0)  # raises for a time that makes no sense
+        require_bounds("until", until, above=0)
     usual = times_of(replace(file, duration=min(file.duration or _UNTIL, _FIRST) if until is None else until))
     until, every = usual[0] if until is None else until, usual[1] if every is None else every
     time_grid(until, every)
@@ -74,7 +76,7 @@ def default_comparison(
         bands={_CLOSE: Band("one per cent is what an eye sees of a motion: a first look", bounds(scene, every))},
         rows=rows,
         budget=budget,
-        spent=processor_seconds() - before,
+        spent=processor_seconds() - begin,
         absent={name: str(answer) for name, answer in described.items() if isinstance(answer, Missing)},
     )
 
@@ -113,19 +115,20 @@ def asked_rows(
 def times_of(file: SceneFile) -> tuple[float, float]:
     """Last time and sampling interval of a first comparison of a scene [s]."""
     duration = file.duration or _UNTIL
-    every = _STEP * max(1, round(duration / _SAMPLES / _STEP))
+    step = file.every or _STEP
+    every = step * max(1, round(duration / _SAMPLES / step))
     return every * max(1, int(duration / every + 1e-9)), every
 
 
 def _stepped(engines: Sequence[str], dt: float | None, workers: Workers | None) -> list[str]:
-    """The engines, each with the step that the scene's file recommends if its own is longer."""
+    """The engines, each with the step that the scene's file recommends if its own is longer and no option gives it."""
     if dt is None:
         return [*engines]
     specs = [parse_engine(engine) for engine in engines]
     resolved = resolve([(spec.name, spec.options) for spec in specs], workers)
     return [
-        str(replace(spec, options={**spec.options, "dt": f"{dt:g}"}))
-        if isinstance(facts, EngineFacts) and facts.step is not None and facts.step > dt
+        str(replace(spec, options={**spec.options, "dt": f"{dt:.15g}"}))
+        if isinstance(facts, EngineFacts) and "dt" not in spec.options and facts.step is not None and facts.step > dt
         else engine
         for engine, spec, facts in zip(engines, specs, resolved, strict=True)
     ]
@@ -149,14 +152,14 @@ def bounds(scene: Scene, every: float) -> dict[str, Tolerance]:
 
 
 def able(
-    scene: Scene, workers: Workers | None = None, *, first: bool = False, names: Sequence[str] | None = None
+    scene: Scene, workers: Workers | None = None, *, preferred: bool = False, names: Sequence[str] | None = None
 ) -> list[str]:
     """Formulations of installed engines that can represent the scene, as files write them.
 
     Args:
         scene: the scene.
         workers: pool for the questions to engines; None: new workers.
-        first: True for one formulation per engine.
+        preferred: True for one formulation per engine.
         names: of the engines that are asked; None: all.
     """
     formulations = []
@@ -166,7 +169,7 @@ def able(
             for name in engine.provides
             if represents(scene, name, engine.provides) and offered(name, scene.requires, engine.made_for)
         ]
-        formulations += [f"{engine.name}[formulation={name}]" for name in fitting[: 1 if first else None]]
+        formulations += [f"{engine.name}[formulation={name}]" for name in fitting[: 1 if preferred else None]]
     return formulations
 
 
@@ -179,8 +182,8 @@ def _installed(workers: Workers | None, names: Sequence[str] | None = None) -> l
 def _reason_for_none(scene: Scene, workers: Workers | None) -> str:
     """Reason why no engine can represent a scene: missing capabilities, or else the elements that each cannot build."""
     engines = _installed(workers)
-    given = {item for engine in engines for items in engine.provides.values() for item in items}
-    if lacking := scene.requires - given:
+    provided = {item for engine in engines for items in engine.provides.values() for item in items}
+    if lacking := scene.requires - provided:
         return f"no adapter that is installed here represents {', '.join(sorted(lacking))}"
     reasons = []
     for engine in engines:

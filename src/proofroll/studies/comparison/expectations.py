@@ -34,46 +34,46 @@ def contradictions_of(
         unfinished: True if a part of the ladder was left out for lack of time; then only contradictions count that the
             rest of the ladder cannot change.
     """
-    where = f"{run.row.engine}{at_point(run.parameters)}"
+    place = f"{run.row.engine}{at_point(run.parameters)}"
     sentences = []
     row, expected = run.row, run.row.expected(run.parameters)
 
     def contradicts(verdict: Verdict, claim: Collection[Verdict]) -> bool:
         return not {*claim} & (_OPEN.get(verdict, {verdict}) if unfinished else {verdict})
 
-    known = [judgement for judgement in judgements if judgement.verdict not in NOBODY]
-    overall = worst(known, missing)
+    judged = [judgement for judgement in judgements if judgement.verdict not in NOBODY]
+    overall = worst(judged, missing)
     # If some observables cannot be judged, the others contradict only by a worse verdict than expected.
-    whole = len(known) == len(judgements)
-    worse = bool(known) and SEVERITY.index(overall) > max(map(SEVERITY.index, expected))
+    whole = len(judged) == len(judgements)
+    worse = bool(judged) and SEVERITY.index(overall) > max(map(SEVERITY.index, expected))
     # Missing observables are reported below, name by name.
     if contradicts(overall, {*expected, Verdict.INCOMPLETE}) and (whole or worse):
         # The observables with the worst verdict.
-        guilty = [judgement for judgement in known if judgement.verdict == overall]
+        guilty = [judgement for judgement in judged if judgement.verdict == overall]
         guilty.sort(key=lambda item: item.error / item.tolerance, reverse=True)
         causes = "; ".join(f"{item.observable} {item.verdict}" for item in guilty)
         causes = f"{causes}; {guilty[0].observable}: {guilty[0].reason}" if guilty else "nothing is judged"
-        sentences.append(f"{where} {overall}, expected: {' or '.join(expected)} ({causes})")
+        sentences.append(f"{place} {overall}, expected: {' or '.join(expected)} ({causes})")
     for judgement in judgements:
         name, verdict = judgement.observable, judgement.verdict
         alone = row.expect_for.get(name)
         if alone is not None and contradicts(verdict, {*alone, *NOBODY}):
-            sentences.append(f"{where}: {name} {verdict}, expected: {' or '.join(alone)} ({judgement.reason})")
+            sentences.append(f"{place}: {name} {verdict}, expected: {' or '.join(alone)} ({judgement.reason})")
         if name in row.order and not unfinished and not _within(judgement.order, row.order[name]):
             (low, high), order = row.order[name], number(judgement.order, 3, "not known")
-            sentences.append(f"{where}: order of {name} is {order}, expected {low:g} to {high:g}")
+            sentences.append(f"{place}: order of {name} is {order}, expected {low:g} to {high:g}")
         if name in row.limit and not unfinished:
             allowed = row.limit[name].absolute(judgement.scale)
             if judgement.limit_error is None or judgement.limit_error > allowed:
                 off = number(judgement.limit_error, 3, "not known")
                 sentences.append(
-                    f"{where}: error of the limit of {name} is {off}, expected at most {number(allowed, 3)}"
+                    f"{place}: error of the limit of {name} is {off}, expected at most {number(allowed, 3)}"
                 )
     claimed = {*row.bound, *row.expect_for, *row.order, *row.limit}
     if Verdict.INCOMPLETE not in expected:
         claimed |= {*missing}
     for name in sorted(claimed - {judgement.observable for judgement in judgements}):
-        sentences.append(f"{where}: {name} is not reported, though {comparison.name} makes a claim about it")
+        sentences.append(f"{place}: {name} is not reported, though {comparison.name} makes a claim about it")
     return sentences
 
 

@@ -29,6 +29,8 @@ _UNJUDGED = {
     Status.LEFT_OUT: Verdict.NOT_JUDGED,
 }
 
+_BROKEN = frozenset({Status.MISSING, Status.CRASHED, Status.TIMEOUT})
+
 
 def worst(judgements: Sequence[Judgement], missing: Collection[str] = ()) -> Verdict:
     """Worst verdict of the observables, missing ones included; failed if there is no judgement."""
@@ -144,7 +146,7 @@ class Outcome:
     @cached_property
     def rows(self) -> list[list[Run]]:
         """Runs of each row of the comparison file, in the file's order."""
-        return [list(own) for _, own in groupby(self.runs, key=lambda run: id(run.row))]
+        return [list(of_row) for _, of_row in groupby(self.runs, key=lambda run: id(run.row))]
 
     @property
     def contradictions(self) -> list[str]:
@@ -165,15 +167,25 @@ class Outcome:
 
     @property
     def lost(self) -> list[Run]:
-        """Runs whose engine is missing, crashed or hung, unless the comparison claims that it fails."""
-        broken = {Status.MISSING, Status.CRASHED, Status.TIMEOUT}
-        lost = [run for run in self.runs if run.result.status in broken]
-        expected = [set(run.row.expected(run.parameters)) for run in lost]
-        return [
-            run
-            for run, verdicts in zip(lost, expected, strict=True)
-            if Verdict.FAILED not in verdicts or verdicts == set(Verdict)
-        ]
+        """Runs whose engine is missing, crashed or hung, unless the comparison claims that it fails.
+
+        Where nothing is claimed also runs that failed in another way, or all of them if none was judged.
+        """
+        lost = []
+        for run in self.runs:
+            verdicts = set(run.row.expected(run.parameters))
+            claims = verdicts != set(Verdict)
+            if run.result.status in _BROKEN:
+                lost += [run] * (Verdict.FAILED not in verdicts or not claims)
+            elif not claims and run.verdict is Verdict.FAILED:
+                lost.append(run)
+        return lost or self._unjudged
+
+    @property
+    def _unjudged(self) -> list[Run]:
+        """All runs, if none has a claim and none of them could be judged."""
+        free = all(set(run.row.expected(run.parameters)) == set(Verdict) for run in self.runs)
+        return self.runs if free and all(run.verdict is Verdict.NOT_JUDGED for run in self.runs) else []
 
     def _repr_html_(self) -> str:
         """HTML table for a notebook: a row for each run, with the observable that is furthest beyond its tolerance."""

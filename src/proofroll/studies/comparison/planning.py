@@ -38,7 +38,7 @@ def point_name(parameters: Mapping[str, float | Edge]) -> str:
     ``speed=4, rolling_resistance=0.0005``; an edge is shown by its two ends.
     """
     ends = {key: value.edge_between if isinstance(value, Edge) else (value,) for key, value in parameters.items()}
-    return ", ".join(f"{key}={'…'.join(f'{end:.12g}' for end in each)}" for key, each in ends.items())
+    return ", ".join(f"{key}={'…'.join(f'{end:.12g}' for end in ends_of)}" for key, ends_of in ends.items())
 
 
 def at_point(parameters: dict[str, float]) -> str:
@@ -124,7 +124,7 @@ def plan(comparison: Comparison, engines: Iterable[str] = (), workers: Workers |
     Raises:
         InputError: an engine or setting that does not exist.
     """
-    before = processor_seconds()
+    begin = processor_seconds()
     chosen = [parse_engine(text) for text in dict.fromkeys(engines)]
     numbered = [
         (i, row)
@@ -135,11 +135,11 @@ def plan(comparison: Comparison, engines: Iterable[str] = (), workers: Workers |
         numbered += [(i, moved) for i, row in enumerate(comparison.rows) if (moved := _moved(row, spec))]
     rows = [row for _, row in numbered]
     if not rows:
-        known = ", ".join(dict.fromkeys(parse_engine(row.engine).name for row in comparison.rows))
+        names = ", ".join(dict.fromkeys(parse_engine(row.engine).name for row in comparison.rows))
         raise InputError(
             "engine",
             ", ".join(map(str, chosen)),
-            f"{comparison.name} compares {known}; proofroll new comparison writes a file with others",
+            f"{comparison.name} compares {names}; proofroll new comparison writes a file with others",
         )
     asked = scene_at(comparison, next(iter(comparison.variations(rows[0])), {}))
     resolved, truth_facts = row_facts(comparison, numbered, asked.requires, workers)
@@ -170,8 +170,14 @@ def plan(comparison: Comparison, engines: Iterable[str] = (), workers: Workers |
                 for factor, rung in ladder_facts.items()
             }
             runs.append(Planned(row, point, facts.on(scene.requires), ladder))
-    spent = comparison.spent + processor_seconds() - before
-    scene, file = load_scene(comparison.scene), read_scene_file(comparison.scene)
+    spent = comparison.spent + processor_seconds() - begin
+    try:
+        scene = load_scene(comparison.scene)
+    except InputError:  # of a robot file, which a parameter repairs
+        if not scenes:
+            raise
+        scene = next(iter(scenes.values()))
+    file = read_scene_file(comparison.scene)
     return Plan(replace(comparison, spent=spent), scene, file, scenes, truths, runs)
 
 
@@ -231,7 +237,7 @@ def require_fit(comparison: Comparison, facts: Sequence[EngineFacts | ProofrollE
     Raises:
         InputError: the first that does not fit.
     """
-    known = describe_each([item.name for item in facts if isinstance(item, EngineFacts)], workers)
+    descriptions = describe_each([item.name for item in facts if isinstance(item, EngineFacts)], workers)
     times = time_grid(comparison.until, comparison.every)
     for point in comparison.combinations():
         ends = product(*(value.edge_between if isinstance(value, Edge) else (value,) for value in point.values()))
@@ -240,40 +246,40 @@ def require_fit(comparison: Comparison, facts: Sequence[EngineFacts | ProofrollE
         for index, (row, item) in enumerate(zip(comparison.rows, facts, strict=True)):
             if not isinstance(item, EngineFacts) or point not in comparison.combinations(row.only):
                 continue
-            description = known[item.name]
+            description = descriptions[item.name]
             if isinstance(description, ProofrollError) or _UNFIT & set(row.expected(numbers)):
                 continue
-            formulation, where = item.settings["formulation"], f"{comparison.name}.toml: rows.{index}.engine"
+            formulation, place = item.settings["formulation"], f"{comparison.name}.toml: rows.{index}.engine"
             if not represents(scene, formulation, description.provides):
                 lacking = ", ".join(sorted(scene.requires - set(description.provides[formulation])))
                 advice = f"it does not have {lacking}{at_point(numbers)}; expect refused there, or leave it out"
-                raise InputError(where, row.engine, advice)
+                raise InputError(place, row.engine, advice)
             if (step := item.step) is None:
                 continue
             if error := _misfit([1.0], step, times):
-                raise error.within(where, row.engine)
+                raise error.within(place, row.engine)
             ladder = _fitting(row, step, times).ladder
             if _misfit(ladder, step, times):
                 advice = "a step of it does not divide the interval between samples (`every`); "
                 advice += f"{_fitting(replace(row, ladder=_USUAL), step, times).ladder} does"
-                raise InputError(f"{where.removesuffix('engine')}ladder", ladder, advice)
+                raise InputError(f"{place.removesuffix('engine')}ladder", ladder, advice)
 
 
 def _rungs(
     rows: list[Row], resolved: list[EngineFacts | ProofrollError], workers: Workers | None
 ) -> list[dict[float, EngineFacts]]:
     """Factor -> facts of each rung of every row's ladder, as far as the engine allows the scaled resolution."""
-    wanted: list[tuple[int, float, EngineFacts]] = []
+    asked: list[tuple[int, float, EngineFacts]] = []
     for index, (row, facts) in enumerate(zip(rows, resolved, strict=True)):
         if isinstance(facts, EngineFacts) and facts.resolution is not None:
-            wanted += [(index, factor, facts) for factor in row.ladder if factor != 1 and _asked(facts, factor)]
+            asked += [(index, factor, facts) for factor in row.ladder if factor != 1 and _asked(facts, factor)]
     scaled = [
         (facts.name, {**facts.settings, facts.resolution: facts.settings[facts.resolution] * _scaled(facts, factor)})
-        for _, factor, facts in wanted
+        for _, factor, facts in asked
         if facts.resolution is not None
     ]
     ladders = [{1.0: facts} if isinstance(facts, EngineFacts) else {} for facts in resolved]
-    for (index, factor, _), scaled_facts in zip(wanted, resolve(scaled, workers), strict=True):
+    for (index, factor, _), scaled_facts in zip(asked, resolve(scaled, workers), strict=True):
         if isinstance(scaled_facts, EngineFacts):
             ladders[index][factor] = scaled_facts
     return ladders
@@ -311,16 +317,16 @@ def with_edges(comparison: Comparison) -> Comparison:
 
 
 def _edge_found(comparison: Comparison, point: dict[str, float | Edge], name: str, edge: Edge) -> float:
-    where = f"{comparison.name}: points: {name}"
+    place = f"{comparison.name}: points: {name}"
     low, high = edge.edge_between
     others = {key: value for key, value in point.items() if isinstance(value, float)}
     scene = load_scene(comparison.scene, **{**others, name: high})
     try:
         jump = edge_between(scene, name, low, high, comparison.until)
     except InputError as error:
-        raise InputError(where, error.value, error.advice) from None
+        raise InputError(place, error.value, error.advice) from None
     if jump is None:
-        raise InputError(where, list(edge.edge_between), f"nothing jumps between these values of {name}")
+        raise InputError(place, list(edge.edge_between), f"nothing jumps between these values of {name}")
     return jump
 
 

@@ -12,6 +12,7 @@ from proofroll.core.arrays import FloatArray
 from proofroll.core.columns import UNCERTAIN
 from proofroll.core.comparison import Tolerance
 from proofroll.core.dataset import BETWEEN, off_impacts
+from proofroll.core.element_abilities import step_bound
 from proofroll.core.errors import InputError, require_known
 from proofroll.core.multi_element import REQUIRED
 from proofroll.core.number_format import number, spaced
@@ -63,7 +64,9 @@ class Compared:
         error, allowed = number(judgement.error, 3), number(judgement.tolerance, 3)
         difference = f"{judgement.observable} is off by {error}{unit}{when}, allowed {allowed}{unit}"
         if not np.isfinite(judgement.error):
-            difference = f"{judgement.observable} is not finite, or has not as many values as the truth"
+            counts = judgement.reason.removeprefix("the question is ill-posed here; ").partition(";")[0]
+            unlike = f"has {counts}" if " values, the truth has " in counts else "is not finite"
+            difference = f"{judgement.observable} {unlike}"
         bar = f"the truth is known to {number(judgement.truth_error_bar)}{unit}"
         if judgement.verdict is Verdict.NOT_JUDGED:
             bar = f"not judged, for {bar} only"
@@ -81,6 +84,7 @@ class Judged:
         because: reason of the tolerances; empty if not given.
         unjudged: given variable that is not judged -> reason.
         ended: time and reason of an early end of the truth, behind which nothing is judged; empty: there is none.
+        step_bound: clause on the longest stable step of an explicit scheme; empty: nothing bounds it.
     """
 
     scene: str
@@ -88,6 +92,7 @@ class Judged:
     because: str = ""
     unjudged: Mapping[str, str] = field(default_factory=dict)
     ended: str = ""
+    step_bound: str = ""
 
     @property
     def agrees(self) -> bool:
@@ -103,6 +108,8 @@ class Judged:
             lines.append(f"  not judged: {', '.join(name for name, its in self.unjudged.items() if its == why)}; {why}")
         if self.ended:
             lines.append(f"  not judged: what lies behind, for {self.ended}")
+        if self.step_bound:
+            lines.append(f"  {self.step_bound}")
         return "\n".join([head, *lines])
 
     def _repr_html_(self) -> str:
@@ -130,7 +137,12 @@ class Judged:
             for item in self.compared
         ]
         head = {"scene": self.scene, "agrees": self.agrees, "because": self.because}
-        return head | {"compared": rows, "unjudged": dict(self.unjudged), "ended": self.ended}
+        return head | {
+            "compared": rows,
+            "unjudged": dict(self.unjudged),
+            "ended": self.ended,
+            "step_bound": self.step_bound,
+        }
 
 
 def judge(
@@ -162,12 +174,12 @@ def judge(
         Refused, Diverged: there is no truth of this scene.
     """
     scene = load_scene(scene) if isinstance(scene, str) else scene
-    given = read_run(run, scene, columns)
-    dataset = given.dataset
+    user_run = read_run(run, scene, columns)
+    dataset = user_run.dataset
     between = dataset[BETWEEN].to_numpy() if BETWEEN in dataset else np.zeros(0)
     asked = scene.fully_asked if "q_WB" in {str(name).partition(".")[0] for name in dataset.data_vars} else scene
     reference = Reference.of(scene, _truth(asked, dataset["time"].to_numpy(), between))
-    given.require_units(reference.dataset)
+    user_run.require_units(reference.dataset)
     observed: dict[str, FloatArray] = {}
     if "scene_digest" in dataset.attrs:  # all variables of a run
         laws = run_values.laws_behind_the_end(reference, dataset)
@@ -186,23 +198,24 @@ def judge(
     unasked = [_compared(name, bound, reference, observed, dataset) for name, bound in further.items()]
     compared += [item for item in unasked if item.judgement.verdict is Verdict.DIFFERS]
     compared.sort(key=lambda item: item.judgement.error / item.judgement.tolerance, reverse=True)
-    unjudged = _unjudged(given, reference, bounds) | _unsure(dataset, reference, bounds)
+    unjudged = _unjudged(user_run, reference, bounds) | _unsure(dataset, reference, bounds)
     if tolerance is None:
         unjudged |= _events_left(scene, observed, bounds)
         if any(scene.observables[name].role is Role.REACTION for name in bounds if name in scene.observables):
-            unjudged = {name: why for name, why in unjudged.items() if name not in given.reactions}
+            unjudged = {name: why for name, why in unjudged.items() if name not in user_run.reactions}
         unjudged |= dict.fromkeys((name for name in observed if _unknown(reference, name)), _UNDETERMINED)
     parts = (f"parts of {item.judgement.observable}" for item in compared if _in_parts(reference, item))
     unjudged |= dict.fromkeys(parts, _UNDETERMINED)
     for item in compared:  # judged observables, though perhaps derived from other given variables
         unjudged.pop(item.judgement.observable, None)
-    return Judged(scene.name, tuple(compared), because, unjudged, reference.ended)
+    bound = step_bound(scene.elements)
+    return Judged(scene.name, tuple(compared), because, unjudged, reference.ended, bound)
 
 
-def _unjudged(given: GivenRun, reference: Reference, judged: Mapping[str, Tolerance]) -> dict[str, str]:
+def _unjudged(user_run: GivenRun, reference: Reference, judged: Mapping[str, Tolerance]) -> dict[str, str]:
     """Given variable that is not judged -> reason."""
     reasons = {}
-    for name, why in given.besides.items():
+    for name, why in user_run.besides.items():
         if not _comparable(reference, name):
             reasons[name] = "the truth has nothing of that name"
         elif why or name not in judged:
@@ -219,10 +232,10 @@ def _events_left(scene: Scene, observed: Mapping[str, FloatArray], judged: Mappi
 
 def _unsure(dataset: xr.Dataset, reference: Reference, judged: Mapping[str, Tolerance]) -> dict[str, str]:
     """Reasons for variables that are sampled too coarsely; a judged one appears as ``turns of NAME``."""
-    reasons, given = {}, dataset.variables
+    reasons, variables = {}, dataset.variables
     for name in judged.keys() | {name for name, item in reference.scene.observables.items() if item.headline}:
-        if name in given and UNCERTAIN in given[name].attrs:
-            reasons[f"turns of {name}" if name in judged else name] = str(given[name].attrs[UNCERTAIN])
+        if name in variables and UNCERTAIN in variables[name].attrs:
+            reasons[f"turns of {name}" if name in judged else name] = str(variables[name].attrs[UNCERTAIN])
     return dict(sorted(reasons.items()))
 
 
@@ -240,7 +253,7 @@ def _truth(scene: Scene, times: FloatArray, between: FloatArray) -> xr.Dataset:
 
 
 def _bounds(
-    given: Mapping[str, object] | str | float | None,
+    bounds: Mapping[str, object] | str | float | None,
     reference: Reference,
     observed: Mapping[str, FloatArray],
     variables: Sequence[str],
@@ -249,25 +262,25 @@ def _bounds(
     scene = reference.scene
     able = list(dict.fromkeys([*observed, *(name for name in variables if _comparable(reference, name))]))
     if not able:
-        known = ", ".join(str(name) for name in reference.dataset.data_vars if _comparable(reference, str(name)))
-        advice = f"the truth has none of these; say which is which, as --map theta=q.pivot[deg]; it has {known}"
+        names = ", ".join(str(name) for name in reference.dataset.data_vars if _comparable(reference, str(name)))
+        advice = f"the truth has none of these; say which is which, as --map theta=q.pivot[deg]; it has {names}"
         raise InputError("run", ", ".join(variables), advice)
-    if given is None:
+    if bounds is None:
         main = [name for name in observed if _is_main(scene.observables[name]) and not _unknown(reference, name)]
         events = [name for name in observed if (item := scene.observables[name]).watched and item.role is Role.EVENT]
         every = Tolerance(2 * reference.sampled_bar, False, "s")
         tolerances = dict.fromkeys([*main, *_states(reference, variables)] if main else able, _USUAL)
         return tolerances | dict.fromkeys(events, every)
-    if not isinstance(given, Mapping):
+    if not isinstance(bounds, Mapping):
         if len(able) > 1 and scene.deciding not in able:
-            raise InputError("tolerance", given, f"say of which variable: {', '.join(able)}")
-        given = {scene.deciding if scene.deciding in able else able[0]: given}
-    if not given:
+            raise InputError("tolerance", bounds, f"say of which variable: {', '.join(able)}")
+        bounds = {scene.deciding if scene.deciding in able else able[0]: bounds}
+    if not bounds:
         raise InputError("tolerance", "{}", "say how far what may be off")
-    for name in given:
+    for name in bounds:
         require_known("tolerance", name, able, "this trajectory has")
-    units = {name: _unit(reference, name) for name in given}
-    return {name: Tolerance.of_quantity(f"tolerance of {name}", text, units[name]) for name, text in given.items()}
+    units = {name: _unit(reference, name) for name in bounds}
+    return {name: Tolerance.of_quantity(f"tolerance of {name}", text, units[name]) for name, text in bounds.items()}
 
 
 def _is_main(item: Observable) -> bool:
@@ -284,8 +297,8 @@ def _in_parts(reference: Reference, item: Compared) -> bool:
     """True for a compared force that the truth determines in some of its components, or at some times, only."""
     name = item.judgement.observable
     lacks = reference.scene.observables.get(name) is None or name in reference.determinate
-    known = reference.dataset.variables.get(name)
-    return lacks and known is not None and bool(np.isnan(known.values[1:]).any())
+    variable = reference.dataset.variables.get(name)
+    return lacks and variable is not None and bool(np.isnan(variable.values[1:]).any())
 
 
 def _states(reference: Reference, variables: Sequence[str]) -> list[str]:
@@ -302,14 +315,14 @@ def _size(reference: Reference, name: str, true: FloatArray, unit: str) -> float
     natural = 0.0
     for element in reference.scene.elements:
         speed = 2 * np.pi / element.natural_time
-        own = {"m": element.length, "m/s": element.length * speed, "rad/s": speed, "rad": 1.0}
-        natural = max(natural, own.get(unit, 0.0))
+        sizes = {"m": element.length, "m/s": element.length * speed, "rad/s": speed, "rad": 1.0}
+        natural = max(natural, sizes.get(unit, 0.0))
     return max(reference.sizes.get(name, 0.0), float(np.ptp(true)), _LEAST * natural) or 1.0
 
 
 def _comparable(reference: Reference, name: str) -> bool:
-    known = reference.dataset.variables  # indexing a dataset would make coordinates, too
-    return name in known and "error_bar" in known[name].attrs
+    variables = reference.dataset.variables  # indexing a dataset would make coordinates, too
+    return name in variables and "error_bar" in variables[name].attrs
 
 
 def _unit(reference: Reference, name: str) -> str:
@@ -320,23 +333,31 @@ def _unit(reference: Reference, name: str) -> str:
 def _compared(
     name: str, bound: Tolerance, reference: Reference, observed: Mapping[str, FloatArray], dataset: xr.Dataset
 ) -> Compared:
-    item, unit, given = reference.scene.observables.get(name), _unit(reference, name), dataset.variables
-    times = given["time"].values
+    item, unit, variables = reference.scene.observables.get(name), _unit(reference, name), dataset.variables
+    times = variables["time"].values
     if name in observed:
         run = run_values.run_curve(reference, name, observed[name], dataset)
         true, scale = reference.true(name, run.values), reference.sizes.get(name, 1.0)
     else:
-        values, truth_of = given[name].values, reference.dataset.variables[name]
-        known = truth_of.values
+        values, truth_of = variables[name].values, reference.dataset.variables[name]
+        true_values = truth_of.values
         if item and item.role is Role.REACTION and times[0] == 0:
-            known, values = known[1:], values[1:]  # several engines define reactions only after a first step
+            true_values, values = (
+                true_values[1:],
+                values[1:],
+            )  # several engines define reactions only after a first step
         if truth_of.dims[-1:] == ("wxyz",):
-            values = turned_alike(values, known)
-        if name not in reference.curves and values.shape == known.shape:  # of forces, where they are not determinate
-            determinate = np.isfinite(known)
-            values, known = np.where(determinate, values, 0.0), np.where(determinate, known, 0.0)
+            values = turned_alike(values, true_values)
+        if (
+            name not in reference.curves and values.shape == true_values.shape
+        ):  # of forces, where they are not determinate
+            determinate = np.isfinite(true_values)
+            values, true_values = np.where(determinate, values, 0.0), np.where(determinate, true_values, 0.0)
         run = RunCurve(values, between=run_values.values_off_grid(reference, name, dataset))
-        true, scale = TrueCurve(known, float(truth_of.attrs["error_bar"])), _size(reference, name, known, unit)
+        true, scale = (
+            TrueCurve(true_values, float(truth_of.attrs["error_bar"])),
+            _size(reference, name, true_values, unit),
+        )
     judgement = judge_curve(Allowance(name, unit, bound.absolute(scale), scale), run, true)
     return Compared(judgement, _farthest(run.values, true.values, times))
 

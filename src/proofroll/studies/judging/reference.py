@@ -18,7 +18,7 @@ from proofroll.core.element_abilities import KnowsAnotherScene
 from proofroll.core.events import EVENT_ORDER, JUMPS, Event, events_of
 from proofroll.core.observable import Role
 from proofroll.core.scene import Scene
-from proofroll.core.verdict import Doubt, TrueCurve
+from proofroll.core.verdict import TrueCurve
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -80,19 +80,19 @@ class Reference:
     def shared(self, routes: Collection[str]) -> str:
         """Sentence about a route of the truth that is among ``routes``, and its check; empty if none is."""
         names = {key: str(self.dataset.attrs.get(key, "")) for key in ("route", "second_route")}
-        own = [key for key, name in names.items() if re.split(r"[,(]", name)[0].strip() in routes]
-        if not own:
+        keys = [key for key, name in names.items() if re.split(r"[,(]", name)[0].strip() in routes]
+        if not keys:
             return ""
-        others = [name for key, name in names.items() if key not in own]
+        others = [name for key, name in names.items() if key not in keys]
         checked = f"only {others[0]} checks both" if others else "nothing checks both"
-        return f"rests on the same equations as the truth itself ({names[own[0]]}): {checked}"
+        return f"rests on the same equations as the truth itself ({names[keys[0]]}): {checked}"
 
-    def doubt(self, name: str) -> Doubt:
-        """Verdicts that an ill-posed question does not allow for an observable."""
-        item = self.scene.observables[name]
-        if not self.ill_posed or not item.hangs_on_events:
-            return Doubt.NONE
-        return Doubt.EVERYTHING if item.role == Role.EVENT else Doubt.DIFFERENCES
+    def ill_posed_for(self, name: str) -> str:
+        """Reason why the question for an observable is ill-posed, for every run alike; empty: it is not.
+
+        Laws that hold for any motion, as residuals do, stay judged.
+        """
+        return self.ill_posed if self.scene.observables[name].hangs_on_events else ""
 
     def scale(self, name: str) -> float | None:
         """Size to which a percentage of an observable refers: its scale, or an event's first time; None: unknown."""
@@ -102,8 +102,7 @@ class Reference:
 
     def true(self, name: str, values: FloatArray) -> TrueCurve:
         """True curve of an observable, of infinite error bar if there are no values; ``values`` are an engine's."""
-        doubt = self.doubt(name)
-        return TrueCurve(*self._known(name, values), doubt, "" if doubt == Doubt.NONE else self.ill_posed)
+        return TrueCurve(*self._known(name, values), self.ill_posed_for(name))
 
     def _known(self, name: str, values: FloatArray) -> tuple[FloatArray, float]:
         """True values of an observable and their error bar."""
@@ -113,13 +112,13 @@ class Reference:
         if item.role == Role.EVENT:
             times = self.curves.get(name, np.zeros(0))  # of a scene without events there are none
             return times, max((event.time_high - event.time_low for event in self.events), default=0.0)
-        known = self.curves.get(name)
-        if known is None:  # for example a force that the equations do not determine all the time
+        curve = self.curves.get(name)
+        if curve is None:  # for example a force that the equations do not determine all the time
             return np.full_like(values, np.nan), np.inf
         if item.role != Role.RESIDUAL:
-            return known, float(self.dataset.variables[name].attrs.get("error_bar", np.inf))
+            return curve, float(self.dataset.variables[name].attrs.get("error_bar", np.inf))
         # Zero for a perfect run; the residual of the truth is the resolution of the measurement.
-        return np.zeros_like(values), float(np.max(np.abs(known), initial=0.0))
+        return np.zeros_like(values), float(np.max(np.abs(curve), initial=0.0))
 
     def magnitude(self, name: str) -> float:
         """Size of the numbers whose round-off an observable has.
@@ -150,7 +149,7 @@ class Reference:
             dataset: the run; if it reports no events, those of the truth are used, and the jumps of the true values.
             step: fixed step [s]; None: it adapts, and steps end at samples.
         """
-        role, known = self.scene.observables[name].role, self.curves.get(name)
+        role, curve = self.scene.observables[name].role, self.curves.get(name)
         if role == Role.EVENT:
             return 2 * self.own_bar(name, dataset)
         times = self.dataset["time"].to_numpy()
@@ -159,9 +158,9 @@ class Reference:
             return 0.0  # the values are no function of the sample times
         reported = any("event_kind" in part(self.scene, item, dataset) for item in self.scene.elements)
         events = self.events_of(dataset) if reported else self.events
-        if known is not None and not reported and role != Role.RESIDUAL and known.shape == values.shape:
+        if curve is not None and not reported and role != Role.RESIDUAL and curve.shape == values.shape:
             # a run's own samples beside a true event may lie on its other side
-            values = np.where(np.isfinite(known), known, values)
+            values = np.where(np.isfinite(curve), curve, values)
         widest = max((event.time_high - event.time_low for event in events), default=0.0)
         late = min(widest if reported else 2 * self.sampled_bar, step or np.inf)
         return beside_events(times, values, [event.time for event in events], late)
@@ -203,11 +202,11 @@ def _true_curves(scene: Scene, dataset: xr.Dataset) -> tuple[dict[str, FloatArra
 def _unsteady(scene: Scene, dataset: xr.Dataset) -> NDArray[np.bool_]:
     """Samples next to an impact or to an early end, and those of an ill-posed question, shape (time,)."""
     times = dataset.variables["time"].values
-    found = times >= float(dataset.attrs.get("horizon", np.inf))
-    found[-1:] |= ended_early(dataset) is not None
+    unsteady = times >= float(dataset.attrs.get("horizon", np.inf))
+    unsteady[-1:] |= ended_early(dataset) is not None
     for element in scene.elements:
         for event in events_of(part(scene, element, dataset)):
             if event.kind in JUMPS:
-                after = int(np.searchsorted(times, event.time))
-                found[max(after - 1, 0) : after + 1] = True
-    return np.asarray(found)
+                next_sample = int(np.searchsorted(times, event.time))
+                unsteady[max(next_sample - 1, 0) : next_sample + 1] = True
+    return np.asarray(unsteady)

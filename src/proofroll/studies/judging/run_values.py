@@ -55,19 +55,19 @@ def observables_of(reference: Reference, dataset: xr.Dataset) -> dict[str, Float
 
     A force that is not determinate all the time is zero where it is not, as its true values are.
     """
-    curves, given = observe(reference.scene, dataset), dataset.variables
+    curves, variables = observe(reference.scene, dataset), dataset.variables
     for name, determinate in reference.determinate.items():
         curves.pop(name, None)
-        values = given[name].values[1:] if name in given else np.zeros(0)
+        values = variables[name].values[1:] if name in variables else np.zeros(0)
         if values.shape[1:] == determinate.shape[1:] and len(values) <= len(determinate):
             masked = np.where(determinate[: len(values)], values, 0.0)
             curves |= {} if np.any(np.isnan(masked)) else {name: masked}
     for element in reference.scene.elements:
-        own, true = part(reference.scene, element, dataset), part(reference.scene, element, reference.dataset)
-        if "event_kind" in own:  # the run reports events
-            curves[reference.scene.label(element, EVENT_ORDER)] = event_order(own, true)
+        run_part, true = part(reference.scene, element, dataset), part(reference.scene, element, reference.dataset)
+        if "event_kind" in run_part:  # the run reports events
+            curves[reference.scene.label(element, EVENT_ORDER)] = event_order(run_part, true)
     curves = {name: values for name, values in curves.items() if name in reference.scene.observables}
-    for name in [name for name in curves if name in given and given[name].dims[-1:] == ("wxyz",)]:
+    for name in [name for name in curves if name in variables and variables[name].dims[-1:] == ("wxyz",)]:
         values = curves.pop(name)
         if name in reference.curves:  # the scene asks for orientations
             curves[name] = turned_alike(values, reference.curves[name])
@@ -79,8 +79,8 @@ def laws_behind_the_end(reference: Reference, dataset: xr.Dataset) -> dict[str, 
     """Residuals of laws that hold for any motion, of a whole run whose truth ends early; else nothing."""
     if not reference.ended:
         return {}
-    known = reference.scene.observables
-    laws = {name for name, item in known.items() if item.role is Role.RESIDUAL and not item.hangs_on_events}
+    observables = reference.scene.observables
+    laws = {name for name, item in observables.items() if item.role is Role.RESIDUAL and not item.hangs_on_events}
     return {name: values for name, values in observe(reference.scene, dataset).items() if name in laws}
 
 
@@ -92,14 +92,14 @@ def on_true_turns(reference: Reference, name: str, values: FloatArray, dataset: 
     true = reference.curves.get(name)
     if true is None and name in reference.dataset:
         true = reference.dataset[name].to_numpy()
-    known = None if true is None else true[: len(values)]
-    return on_turns_of(known, values, name, (dataset, reference.dataset))
+    true_turns = None if true is None else true[: len(values)]
+    return on_turns_of(true_turns, values, name, (dataset, reference.dataset))
 
 
 def values_off_grid(reference: Reference, name: str, dataset: xr.Dataset) -> tuple[FloatArray, FloatArray] | None:
     """Values of :func:`off_grid` with their true values, where the truth knows them; None: nothing to compare."""
-    found = off_grid(reference, name, dataset)
-    return None if found is None else (found[1][known := np.isfinite(found[2])], found[2][known])
+    triple = off_grid(reference, name, dataset)
+    return None if triple is None else (triple[1][finite := np.isfinite(triple[2])], triple[2][finite])
 
 
 def off_grid(reference: Reference, name: str, dataset: xr.Dataset) -> tuple[FloatArray, FloatArray, FloatArray] | None:
@@ -108,13 +108,14 @@ def off_grid(reference: Reference, name: str, dataset: xr.Dataset) -> tuple[Floa
     Sampling intervals with an event of the truth are left out, and the interval beside it in which the run has that
     event: for up to a step of the engine its forces may be those from before the event.
     """
-    own, item = f"{BETWEEN}.{name}", reference.scene.observables.get(name)
-    if own not in dataset or own not in reference.dataset:
+    name_between, item = f"{BETWEEN}.{name}", reference.scene.observables.get(name)
+    if name_between not in dataset or name_between not in reference.dataset:
         return None
     run, truth = dataset.variables, reference.dataset.variables  # indexing a dataset would copy arrays
-    times, known, grid = run[BETWEEN].values, truth[BETWEEN].values, truth["time"].values
+    times, true_times, grid = run[BETWEEN].values, truth[BETWEEN].values, truth["time"].values
     happened, own_events = (
-        np.array([event.time for event in reference.events_of(one)]) for one in (reference.dataset, dataset)
+        np.array([event.time for event in reference.events_of(run_or_truth)])
+        for run_or_truth in (reference.dataset, dataset)
     )
     left_out = np.searchsorted(grid, happened)
     if own_events.size:
@@ -122,11 +123,15 @@ def off_grid(reference: Reference, name: str, dataset: xr.Dataset) -> tuple[Floa
         beside = np.clip(np.searchsorted(grid, nearest), left_out - 1, left_out + 1)
         left_out = np.concatenate([left_out, beside])
     alone = ~np.isin(np.searchsorted(grid, times), left_out)
-    both = np.isin(times, known) & alone & (times < grid[-1])
-    times, values, true = times[both], run[own].values[both], truth[own].values[np.isin(known, times[both])]
+    both = np.isin(times, true_times) & alone & (times < grid[-1])
+    times, values, true = (
+        times[both],
+        run[name_between].values[both],
+        truth[name_between].values[np.isin(true_times, times[both])],
+    )
     if item is not None and item.role is Role.RESIDUAL:
         return times, values, np.zeros_like(values)
-    if run[own].dims[-1:] == ("wxyz",):
+    if run[name_between].dims[-1:] == ("wxyz",):
         values = turned_alike(values, true)
     turned = on_turns_of(true, values, name, (dataset, reference.dataset))
     return None if turned is None else (times, turned, true)
@@ -165,7 +170,9 @@ def event_order(dataset: xr.Dataset, truth: xr.Dataset) -> FloatArray:
 
     Events at one time may come in another order of their parts. A run need not name them.
     """
-    own, true = (events_of(item) for item in (dataset, truth))
-    kinds = itertools.zip_longest(*([event.kind for event in events] for events in (own, true)))
-    named, known = (Counter((event.kind, event.name) for event in events if event.name) for events in (own, true))
-    return np.array([float(max(sum(a != b for a, b in kinds), (named - known).total() if known else 0))])
+    run_events, true = (events_of(item) for item in (dataset, truth))
+    kinds = itertools.zip_longest(*([event.kind for event in events] for events in (run_events, true)))
+    named, counts = (
+        Counter((event.kind, event.name) for event in events if event.name) for events in (run_events, true)
+    )
+    return np.array([float(max(sum(a != b for a, b in kinds), (named - counts).total() if counts else 0))])

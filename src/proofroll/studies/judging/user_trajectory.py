@@ -57,17 +57,17 @@ class GivenRun:
         Raises:
             InputError: a variable has no numbers or another unit, or the bodies another order.
         """
-        for dim, given in self.labels.items():
-            wanted = truth.variables[dim].values.tolist() if dim in truth.coords else given
-            if given != wanted:
-                advice = f"name them as the scene does, in its order: {', '.join(wanted)}"
-                raise InputError("run", f"{dim} {', '.join(given)}", advice)
-        known = truth.variables
+        for dim, written in self.labels.items():
+            expected = truth.variables[dim].values.tolist() if dim in truth.coords else written
+            if written != expected:
+                advice = f"name them as the scene does, in its order: {', '.join(expected)}"
+                raise InputError("run", f"{dim} {', '.join(written)}", advice)
+        variables = truth.variables
         for name, unit in self.units.items():
-            if name in known and "units" in known[name].attrs:
-                _require_unit(name, unit, str(known[name].attrs["units"]))
+            if name in variables and "units" in variables[name].attrs:
+                _require_unit(name, unit, str(variables[name].attrs["units"]))
         for column, item in self.dataset.variables.items():
-            if column in known and known[column].dtype.kind in "iuf":
+            if column in variables and variables[column].dtype.kind in "iuf":
                 _require_numbers(str(column), item)
 
 
@@ -79,9 +79,9 @@ def _require_numbers(name: str, item: xr.Variable) -> None:
         raise InputError("run", name, f"it holds {held}; give real numbers")
 
 
-def _require_unit(name: str, unit: str, wanted: str) -> None:
-    if in_si(unit)[0] != wanted:
-        advice = f"convert {name} to {wanted}, the unit of the truth, or correct its attribute units"
+def _require_unit(name: str, unit: str, expected: str) -> None:
+    if in_si(unit)[0] != expected:
+        advice = f"convert {name} to {expected}, the unit of the truth, or correct its attribute units"
         raise InputError("run", f"{name} in {unit}", advice)
 
 
@@ -114,7 +114,7 @@ def read_run(run: RunInput, scene: Scene, columns: Mapping[str, str] | None = No
     times = dataset.variables["time"].values
     number = np.issubdtype(times.dtype, np.number)
     if not (times.size and number and np.all(np.isfinite(times)) and times[0] >= 0 and np.all(np.diff(times) > 0)):
-        raise InputError("run", "time", "give times in s that rise from 0 or later")
+        raise InputError("run", "time", f"{_wrong_times(times)}give times in s that rise from 0 or later")
     if times[-1] > LATEST:
         raise InputError("run", f"time up to {times[-1]:.4g} s", f"no motion is followed beyond {LATEST:g} s")
     if times[-1] == 0:
@@ -158,8 +158,8 @@ def _whole(run: xr.Dataset, scene: Scene) -> bool:
 def _require_finite_state(run: xr.Dataset, scene: Scene) -> None:
     """Raises InputError unless positions, velocities and orientations are finite, and quaternions of unit length."""
     for element in scene.elements:
-        for own in element.sample_type.widths:
-            name = scene.label(element, own)
+        for variable in element.sample_type.widths:
+            name = scene.label(element, variable)
             item = run.variables.get(name)
             if item is None or item.dims[:1] != ("time",):
                 continue
@@ -167,9 +167,9 @@ def _require_finite_state(run: xr.Dataset, scene: Scene) -> None:
             values = item.values.reshape(len(item), -1)
             bad = ~np.all(np.isfinite(values), axis=1)
             if np.any(bad):
-                at = float(run["time"][int(np.argmax(bad))])
-                raise InputError("run", name, f"it is not finite at {at:.6g} s; leave it out, or correct it")
-            if own == "q_WB" and values.shape[1] % 4 == 0:
+                time = float(run["time"][int(np.argmax(bad))])
+                raise InputError("run", name, f"it is not finite at {time:.6g} s; leave it out, or correct it")
+            if variable == "q_WB" and values.shape[1] % 4 == 0:
                 try:
                     require_unit(values.reshape(-1, 4), "somewhere")
                 except Diverged as error:
@@ -180,8 +180,8 @@ def _converted(run: xr.Dataset) -> xr.Dataset:
     """The trajectory with numbers in SI units where their units are known."""
     changes: dict[Any, Any] = {}
     for name, item in run.variables.items():
-        given = str(item.attrs.get("units", "")).strip()
-        unit, factor = in_si(given)
+        written = str(item.attrs.get("units", "")).strip()
+        unit, factor = in_si(written)
         if factor != 1.0 and item.dtype.kind in "iuf":
             changes[name] = (item.dims, item.values * factor, {**item.attrs, "units": unit})
     times = {"time": changes.pop("time")} if "time" in changes else {}
@@ -197,6 +197,20 @@ def _renamed(run: xr.Dataset, columns: Mapping[str, str]) -> xr.Dataset:
         run = run.assign({name: run[name].assign_attrs({"units": unit})}) if unit else run
         run = run.rename({name: new})
     return run.set_coords("time") if "time" in run else run
+
+
+def _wrong_times(times: Any) -> str:
+    """The first mistake in times [s] as a clause; empty where they are no numbers at all."""
+    if not times.size:
+        return "there are no samples; "
+    if not np.issubdtype(times.dtype, np.number) or np.iscomplexobj(times) or times.ndim != 1:
+        return ""
+    if np.any(late := ~np.isfinite(times)):
+        return f"sample {int(np.argmax(late)) + 1} has no time; "
+    if np.any(back := np.diff(times) <= 0):
+        first = int(np.argmax(back))
+        return f"{times[first + 1]:.9g} s follows {times[first]:.9g} s; "
+    return f"it begins at {times[0]:.9g} s; "
 
 
 def _dataset(run: RunInput, columns: Mapping[str, str]) -> xr.Dataset:
@@ -225,13 +239,13 @@ def _dataset(run: RunInput, columns: Mapping[str, str]) -> xr.Dataset:
         new, unit = name_and_unit(text)
         values = xr.DataArray(np.asarray(run[name]), attrs={"units": unit} if unit else {})
         run = {key: item for key, item in run.items() if key != name} | {new: values}
-    given = {str(name): np.asarray(run[name]) for name in run}
-    if "time" not in given:
-        raise InputError("run", ", ".join(given), "it has no time; add the times in s as time")
-    _check_lengths(given)
+    arrays = {str(name): np.asarray(run[name]) for name in run}
+    if "time" not in arrays:
+        raise InputError("run", ", ".join(arrays), "it has no time; add the times in s as time")
+    _check_lengths(arrays)
     attrs = {str(name): dict(getattr(run[name], "attrs", {})) for name in run}
-    dims = {name: ("time", *(f"{name}_{axis}" for axis in range(1, np.ndim(v)))) for name, v in given.items()}
-    variables = {name: (dims[name], values, attrs[name]) for name, values in given.items()}
+    dims = {name: ("time", *(f"{name}_{axis}" for axis in range(1, np.ndim(v)))) for name, v in arrays.items()}
+    variables = {name: (dims[name], values, attrs[name]) for name, values in arrays.items()}
     return xr.Dataset({name: item for name, item in variables.items() if name != "time"}, {"time": variables["time"]})
 
 
@@ -251,9 +265,9 @@ def _from_file(path: Path, columns: Mapping[str, str]) -> RunInput:
         return read_arrays(path)
 
 
-def _check_lengths(given: Mapping[str, Any]) -> None:
-    count = np.shape(given["time"])[0] if np.ndim(given["time"]) == 1 else 0
-    for name, values in given.items():
+def _check_lengths(arrays: Mapping[str, Any]) -> None:
+    count = np.shape(arrays["time"])[0] if np.ndim(arrays["time"]) == 1 else 0
+    for name, values in arrays.items():
         if np.ndim(values) == 0 or len(values) != count:
             raise InputError(
                 "run", name, f"its shape is {np.shape(values)}; give one row for each of the {count} times"

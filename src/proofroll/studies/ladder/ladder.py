@@ -117,8 +117,8 @@ class Ladder:
         """Runs every model once, reusing stored results, then times all of them in rounds."""
         self._run_truths([{}], progress)
         self.switches = switches(self.ladder, self.engines, self.scene, self.truths[str({})].dataset)
-        wanted = [rung.model for rung in self.ladder] + [m for s in self.switches for m in (s.on, s.off)]
-        models = {key_of(model): model for model in wanted if model is not None}
+        asked = [rung.model for rung in self.ladder] + [m for s in self.switches for m in (s.on, s.off)]
+        models = {key_of(model): model for model in asked if model is not None}
         self._run_truths([dict(s.on.parameters) for s in self.switches if s.on is not None], progress)
         facts = resolve([(model.engine, model.options) for model in models.values()], self._runner.workers)
         cases: dict[str, Case] = {}
@@ -137,18 +137,18 @@ class Ladder:
         scene = load_scene(self._name, asks=model.asks, **parameters)
         return case_of(self._name, scene, parameters, facts, self.until, _EVERY, time_limit=STUDY_TIME_LIMIT)
 
-    def _run_truths(self, wanted: Sequence[dict[str, float]], progress: Callable[[str], None]) -> None:
-        wanted = [point for point in wanted if str(point) not in self.truths]
+    def _run_truths(self, points: Sequence[dict[str, float]], progress: Callable[[str], None]) -> None:
+        points = [point for point in points if str(point) not in self.truths]
         # The steps of the models are not known yet: assume adaptive ones, and simple fractions of the interval.
         off_grid = off_grids(time_grid(self.until, _EVERY), [None, _EVERY / 2, _EVERY / 4, _EVERY / 5])
         cases = {
             str(point): dataclasses.replace(
                 self._case(self._truth_facts, LadderModel("truth", {}, point)), between=off_grid
             )
-            for point in wanted
+            for point in points
         }
         results = self._runner.run(cases.values(), lambda *_: progress("truth"))
-        for point in wanted:
+        for point in points:
             case = cases[str(point)]
             result = results[case.key]
             if result.status != Status.DONE:

@@ -88,7 +88,7 @@ def rungs(engines: Mapping[str, EngineDescription | ProofrollError], requires: f
     """Rungs from the simplest to the fullest model: each formulation, with its preset ``matched`` or its first one."""
     ladder: list[Rung] = []
     for level in Level:
-        before = len(ladder)
+        count = len(ladder)
         for description in engines.values():
             if isinstance(description, ProofrollError):
                 continue
@@ -105,7 +105,7 @@ def rungs(engines: Mapping[str, EngineDescription | ProofrollError], requires: f
                     if term.rung and formulation in term.formulations:
                         variant = ",".join(f"{key}={value}" for key, value in term.on.items())
                         ladder.append(Rung(level, _with(model, term.on), variant))
-        if len(ladder) == before:
+        if len(ladder) == count:
             ladder.append(Rung(level, None, message="no engine that was asked has a model of this level"))
     return ladder
 

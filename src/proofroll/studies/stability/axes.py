@@ -53,9 +53,9 @@ class Axis:
         """
         parameters = {}
         for name, term in self.parameters.items():
-            for known in (name, *([term.times] if isinstance(term.times, str) else ())):
+            for parameter in (name, *([term.times] if isinstance(term.times, str) else ())):
                 advice = f"{scene.name} has no such parameter; choose from"
-                require_known(f"axes: {self.name}", known, scene.parameters, advice)
+                require_known(f"axes: {self.name}", parameter, scene.parameters, advice)
             factor = scene.parameters[term.times] if isinstance(term.times, str) else term.times
             parameters[name] = factor * value**term.power
         return parameters
@@ -63,7 +63,7 @@ class Axis:
 
 def chosen(axes: Sequence[Axis], names: Sequence[str]) -> list[Axis]:
     """Axes of these names; all if no names are given. Raises InputError if there is no such axis."""
-    known = {axis.name: axis for axis in axes}
+    by_name = {axis.name: axis for axis in axes}
     for name in names:
-        require_known("axis", name, known, "there is no such axis; choose from")
-    return [known[name] for name in dict.fromkeys(names)] if names else list(axes)
+        require_known("axis", name, by_name, "there is no such axis; choose from")
+    return [by_name[name] for name in dict.fromkeys(names)] if names else list(axes)

@@ -63,18 +63,18 @@ def axis_values(name: str, axes: Sequence[Axis], effort: Effort) -> list[AxisVal
     for axis in axes:
         for value in effort.values_of(axis):
             # Parameters equal to their defaults are left out, so that axes share runs where they meet.
-            given = {
+            defaults = {
                 key: number for key, number in axis.at(default, value).items() if number != default.parameters[key]
             }
             try:
-                scene = load_scene(name, **given)
+                scene = load_scene(name, **defaults)
             except ProofrollError as error:
-                values.append(MappedValue(axis.name, value, given, str(error)))
+                values.append(MappedValue(axis.name, value, defaults, str(error)))
                 continue
             intervals = round(PER_PERIOD * (value if axis.horizon else effort.periods))
             stride = 1 + 2 * (intervals // (2 * _MOST_SAMPLES))
             every = stride * scene.natural_time / PER_PERIOD
-            values.append(AxisValue(axis.name, value, given, scene, every * max(1, intervals // stride), every))
+            values.append(AxisValue(axis.name, value, defaults, scene, every * max(1, intervals // stride), every))
     return values
 
 
@@ -83,20 +83,20 @@ def measure(name: str, values: Sequence[AxisValue], runner: Runner, tell: Callab
     _, facts = resolve_with_truth([], runner.workers)
     cases = [
         replace(
-            case_at(name, at, facts, STUDY_TIME_LIMIT),
-            between=off_grids(time_grid(at.until, at.every), [None, *at.steps]),
+            case_at(name, value, facts, STUDY_TIME_LIMIT),
+            between=off_grids(time_grid(value.until, value.every), [None, *value.steps]),
         )
-        for at in values
+        for value in values
     ]
     results = runner.run(cases, lambda *_: tell())
-    for at, case in zip(values, cases, strict=True):
+    for value, case in zip(values, cases, strict=True):
         result = results[case.key]
         truth = runner.store.stored(case).dataset if result.status == Status.DONE else None
         if truth is None:
-            at.problem = f"there is no truth here: {result.message}"
-        at.yardstick = Yardstick.of(at.scene, truth)
+            value.problem = f"there is no truth here: {result.message}"
+        value.yardstick = Yardstick.of(value.scene, truth)
 
 
-def case_at(name: str, at: AxisValue, facts: EngineFacts, limit: float) -> Case:
+def case_at(name: str, value: AxisValue, facts: EngineFacts, limit: float) -> Case:
     """Case at a value with a time limit [s]."""
-    return case_of(name, at.scene, at.parameters, facts, at.until, at.every, time_limit=limit)
+    return case_of(name, value.scene, value.parameters, facts, value.until, value.every, time_limit=limit)

@@ -59,12 +59,12 @@ def search(size: int, stride: int) -> Generator[int, RunOutcome | None, SearchRe
                 break
         rung = following
     for passes in (attrgetter("stable"), attrgetter("accurate")):
-        while (wanted := _next(result, passes)) is not None:
-            verdict = yield wanted
+        while (asked := _next(result, passes)) is not None:
+            verdict = yield asked
             if verdict is None:
-                result.limit = min(result.limit, wanted)
+                result.limit = min(result.limit, asked)
             else:
-                seen[wanted] = verdict
+                seen[asked] = verdict
     return result
 
 
@@ -75,5 +75,5 @@ def _next(search: SearchResult, passes: Callable[[RunOutcome], bool]) -> int | N
         return None
     coarser = -1 if failing is None else failing
     middle = (coarser + holding) // 2
-    wanted = middle if middle > coarser else holding + 1
-    return wanted if wanted < search.limit and wanted not in search.seen else None
+    rung = middle if middle > coarser else holding + 1
+    return rung if rung < search.limit and rung not in search.seen else None

@@ -81,8 +81,8 @@ class Claim:
         about = [p for p in points if self._about(p) and not p.problem and not p.timed_out]
         if self.same:
             for curve, axis in dict.fromkeys((point.curve, point.axis) for point in about):
-                along = [p for p in about if (p.curve, p.axis) == (curve, axis)]
-                change = dependence(along, self.boundary)
+                on_axis = [p for p in about if (p.curve, p.axis) == (curve, axis)]
+                change = dependence(on_axis, self.boundary)
                 if change:
                     sentences.append(
                         f"{curve} along {axis}: {self.boundary} up to {change}, expected the same everywhere"
@@ -94,8 +94,8 @@ class Claim:
             )
         for point in about:
             side = point.sides[self.boundary]
-            where = f"{point.curve} at {point.axis} = {point.value:g}"
-            sentences += [f"{where}: {sentence}" for sentence in self._wrong(side, point.cut)]
+            place = f"{point.curve} at {point.axis} = {point.value:g}"
+            sentences += [f"{place}: {sentence}" for sentence in self._wrong(side, point.cut)]
         return sentences
 
     def _about(self, point: BoundaryPoint) -> bool:
@@ -169,44 +169,44 @@ def file_for(scene: str) -> StabilityFile:
 
 
 def _load(path: Path) -> StabilityFile:
-    where = path.name
+    place = path.name
     content = study_content(path, STUDY)
-    file = validated(StabilityFile, content, where, name=path.stem)
-    with error_location(where):
-        _check(where, file)
+    file = validated(StabilityFile, content, place, name=path.stem)
+    with error_location(place):
+        _check(place, file)
     return file
 
 
-def _check(where: str, file: StabilityFile) -> None:
+def _check(place: str, file: StabilityFile) -> None:
     scene = load_scene(file.scene)
     for index, axis in enumerate(file.axes):
         if not axis.values:
-            raise InputError(f"{where}: axes.{index}.values", "nothing", "an axis needs its values; add them")
+            raise InputError(f"{place}: axes.{index}.values", "nothing", "an axis needs its values; add them")
         for value in axis.values:
             # a parameter may be infinite, but not the length of a run
             if not value > -math.inf or (axis.horizon and not (math.isfinite(value) and value > 0)):
                 what = "a length in natural times that is positive and finite" if axis.horizon else "a number"
-                raise InputError(f"{where}: axes.{index}.values", value, f"give {what}")
+                raise InputError(f"{place}: axes.{index}.values", value, f"give {what}")
         axis.at(scene, axis.values[0])
-    known = [axis.name for axis in file.axes]
+    axis_names = [axis.name for axis in file.axes]
     numbers = [item.name for item in step_numbers(scene)]
     for index, claim in enumerate(file.claims):
-        at = f"{where}: claims.{index}"
+        claim_place = f"{place}: claims.{index}"
         if not claim.because:
-            raise InputError(f"{at}.because", "nothing", "every claim needs its reason; add it")
-        with error_location(at):
+            raise InputError(f"{claim_place}.because", "nothing", "every claim needs its reason; add it")
+        with error_location(claim_place):
             parse_engine(claim.engine)
         for name in claim.axes:
-            require_known(f"{at}.axes", name, known, "there is no such axis; choose from")
+            require_known(f"{claim_place}.axes", name, axis_names, "there is no such axis; choose from")
         for failure in claim.failure:
-            require_known(f"{at}.failure", failure, meanings(scene))
+            require_known(f"{claim_place}.failure", failure, meanings(scene))
         if claim.number is not None:
-            require_known(f"{at}.number", claim.number, numbers)
+            require_known(f"{claim_place}.number", claim.number, numbers)
         if (claim.number is None) != (not claim.between):
-            raise InputError(f"{at}.between", claim.between, "number and between = [low, high] go together")
+            raise InputError(f"{claim_place}.between", claim.between, "number and between = [low, high] go together")
         for name in ("between", "values"):
             if pair := getattr(claim, name):
-                require_pair(f"{at}.{name}", pair)
+                require_pair(f"{claim_place}.{name}", pair)
 
 
 strict(StabilityFile, Claim, Axis)

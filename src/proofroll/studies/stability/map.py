@@ -132,13 +132,20 @@ def stability(
     curves = [curve for curve in curves if curve.facts.resolution is not None]
     curves = _matched(curves) if effort.matched else curves
     asked = axis_values(scene, axes, effort)
-    values = [at for at in asked if isinstance(at, AxisValue)]
+    values = [axis_value for axis_value in asked if isinstance(axis_value, AxisValue)]
     measure(scene, values, runner, lambda: tell("the truth", 0))
-    points = [MapPoint(curve, at, at.steps if curve.fixed_step else _TOLERANCES) for curve in curves for at in values]
+    points = [
+        MapPoint(curve, axis_value, axis_value.steps if curve.fixed_step else _TOLERANCES)
+        for curve in curves
+        for axis_value in values
+    ]
     _search(scene, points, effort, runner, tell)
     refused = _refused(points)
     points = [point for point in points if point.curve.engine not in refused]
-    mapped = [MappedValue(at.axis, at.value, at.parameters, at.problem) for at in asked]
+    mapped = [
+        MappedValue(axis_value.axis, axis_value.value, axis_value.parameters, axis_value.problem)
+        for axis_value in asked
+    ]
     return StabilityMap(scene, default, list(axes), effort, mapped, points, absent | refused)
 
 
@@ -165,14 +172,14 @@ def _matched(curves: Sequence[Curve]) -> list[Curve]:
 def _search(name: str, points: Sequence[MapPoint], effort: Effort, runner: Runner, tell: Progress) -> None:
     """Runs all searches side by side; each asks for its next case when the result of the last one arrives."""
     asking: dict[str, list[tuple[MapPoint, Searching, int]]] = {}
-    known: dict[str, Result] = {}
+    results_by_key: dict[str, Result] = {}
     finished = 0
 
     def ended(point: MapPoint) -> None:
         nonlocal finished
         finished += 1
-        where = f"{point.curve.facts.name}, {point.at.axis} = {point.at.value:g}"
-        tell(f"{where}: {finished} of {len(points)} points", 1)
+        words = f"{point.curve.facts.name}, {point.at.axis} = {point.at.value:g}"
+        tell(f"{words}: {finished} of {len(points)} points", 1)
 
     def ask(point: MapPoint, searching: Searching, rung: int | None) -> list[Case]:
         """Advances a search to its next missing case; returns that case unless another search asked for it."""
@@ -181,7 +188,7 @@ def _search(name: str, points: Sequence[MapPoint], effort: Effort, runner: Runne
                 rung = _send(point, searching, None)
                 continue
             case = point.cases[rung] = case_at(name, point.at, point.facts(rung), effort.limit)
-            if case.key not in known:
+            if case.key not in results_by_key:
                 asking.setdefault(case.key, []).append((point, searching, rung))
                 return [case] if len(asking[case.key]) == 1 else []
             rung = answer(point, searching, rung)
@@ -190,25 +197,25 @@ def _search(name: str, points: Sequence[MapPoint], effort: Effort, runner: Runne
 
     def answer(point: MapPoint, searching: Searching, rung: int) -> int | None:
         case = point.cases[rung]
-        point.results[rung] = result = known[case.key]
+        point.results[rung] = result = results_by_key[case.key]
         if result.status == Status.TIMEOUT:  # the outcome is open: a faster machine might have finished
             return _send(point, searching, None)
         dataset = None if result.trajectory is None else runner.store.stored(case).dataset
         return _send(point, searching, run_outcome(result, dataset, point.at.yardstick))
 
     def arrived(case: Case, result: Result) -> list[Case]:
-        known[case.key] = result
+        results_by_key[case.key] = result
         tell(case.engine.name, 0)
         further = []
         for point, searching, rung in asking.pop(case.key):
             further += ask(point, searching, answer(point, searching, rung))
         return further
 
-    first = []
+    begun = []
     for point in points:
         searching: Searching = search(len(point.ladder), _STRIDE["dt" if point.curve.fixed_step else "rtol"])
-        first += ask(point, searching, next(searching))
-    runner.follow(first, arrived)
+        begun += ask(point, searching, next(searching))
+    runner.follow(begun, arrived)
 
 
 def _send(point: MapPoint, searching: Searching, outcome: RunOutcome | None) -> int | None:

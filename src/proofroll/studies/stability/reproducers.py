@@ -31,16 +31,16 @@ def with_programs(
         The study, whose points name their programs or say why they have none.
     """
     points = list(study.points)
-    wanted: list[tuple[int, str, Case]] = []
+    tasks: list[tuple[int, str, Case]] = []
     for index, (made, point) in enumerate(zip(stability_map.points, study.points, strict=True)):
         name = _shown(point)
         side = point.sides[name]
         if side.failure in _NOTHING_TO_SHOW:
             points[index] = replace(point, reproducer_note=_NOTHING_TO_SHOW[side.failure])
         elif side.failure is not None and side.beyond is not None:
-            wanted.append((index, name, made.cases[made.ladder.index(side.beyond)]))
+            tasks.append((index, name, made.cases[made.ladder.index(side.beyond)]))
     for (index, name, case), (engine, reason) in zip(
-        wanted, programs([item[-1] for item in wanted], workers), strict=True
+        tasks, programs([item[-1] for item in tasks], workers), strict=True
     ):
         made, point = stability_map.points[index], study.points[index]
         element = made.at.scene.elements[0]

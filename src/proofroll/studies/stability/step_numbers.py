@@ -25,17 +25,18 @@ def step_numbers(scene: Scene, h: float = 1.0, truth: xr.Dataset | None = None) 
     """Dimensionless numbers of a step ``h`` [s], of all elements."""
     numbers = []
     for element in scene.elements:
-        own = None if truth is None else part(scene, element, truth)
+        true_part = None if truth is None else part(scene, element, truth)
         numbers += [
-            StepNumber(scene.label(element, n.name), n.symbol, n.meaning, n.value) for n in element.step_numbers(h, own)
+            StepNumber(scene.label(element, n.name), n.symbol, n.meaning, n.value)
+            for n in element.step_numbers(h, true_part)
         ]
     return numbers
 
 
 def values(scene: Scene, h: float, truth: xr.Dataset | None = None) -> dict[str, float]:
     """Dimensionless number of a step -> its value; numbers that are zero or unknown are left out."""
-    known = {number.name: number.value for number in step_numbers(scene, h, truth) if number.value}
-    return known | {OSCILLATION: h / scene.natural_time}
+    numbers = {number.name: number.value for number in step_numbers(scene, h, truth) if number.value}
+    return numbers | {OSCILLATION: h / scene.natural_time}
 
 
 @dataclass(frozen=True)

@@ -84,35 +84,35 @@ def stability_study(stability_map: StabilityMap) -> StabilityStudy:
 
 
 def _point(point: MapPoint) -> BoundaryPoint:
-    at, facts = point.at, point.curve.facts
+    axis_value, facts = point.at, point.curve.facts
     settings = {key: value for key, value in facts.settings.items() if key != facts.resolution}
     sides = {name: _side(point, name) for name in BOUNDARIES}
-    if at.yardstick.true is None:
+    if axis_value.yardstick.true is None:
         sides["accurate"] = replace(sides["accurate"], largest=None, numbers={})  # unknown without a truth
     # Without a boundary of stability that of accuracy is shown.
     boundary = "stable" if sides["stable"].failure else "accurate"
-    first = sides[boundary]
+    boundary_found = sides[boundary]
     errors = [item.error for item in point.found.seen.values() if item.stable and item.error is not None]
     return BoundaryPoint(
         **point.curve.setting(replace(facts, settings=settings)),
-        axis=at.axis,
-        value=at.value,
-        parameters=at.parameters,
-        until=at.until,
-        period=at.scene.natural_time,
+        axis=axis_value.axis,
+        value=axis_value.value,
+        parameters=axis_value.parameters,
+        until=axis_value.until,
+        period=axis_value.scene.natural_time,
         largest_stable=sides["stable"].largest,
         largest_accurate=sides["accurate"].largest,
         boundary=boundary,
-        failure=first.failure,
-        silent=first.silent,
-        message=first.message,
+        failure=boundary_found.failure,
+        silent=boundary_found.silent,
+        message=boundary_found.message,
         sides=sides,
         least_error=min(errors, default=None),
         finest=point.ladder[max(point.found.seen)] if point.found.seen else None,
         too_slow=point.ladder[point.found.limit] if point.found.limit < len(point.ladder) else None,
         timed_out=point.timeouts > 0,
         runs=len(point.results),
-        problem=at.problem,
+        problem=axis_value.problem,
     )
 
 
@@ -153,9 +153,9 @@ def _scale_conclusions(stability_map: StabilityMap, points: Sequence[BoundaryPoi
     sentences = []
     for axis in (axis for axis in stability_map.axes if axis.scale_free):
         for curve in dict.fromkeys(point.curve for point in points):
-            along = [point for point in points if point.curve == curve and point.axis == axis.name]
+            on_axis = [point for point in points if point.curve == curve and point.axis == axis.name]
             for name in BOUNDARIES:
-                change = dependence([p for p in along if not (p.problem and name == "accurate")], name)
+                change = dependence([p for p in on_axis if not (p.problem and name == "accurate")], name)
                 if change:
                     sentences.append(f"{curve} depends on {axis.name}, which should not matter: {name} up to {change}")
     return sentences

@@ -225,42 +225,42 @@ def load_claims(path: str | Path) -> TradeoffClaims:
     return _claims(Path(path), study_content(Path(path), STUDY))
 
 
-def _claims(path: Path, given: dict[str, Any]) -> TradeoffClaims:
-    where = path.name
+def _claims(path: Path, content: dict[str, Any]) -> TradeoffClaims:
+    place = path.name
     for kind in ("cheapest", "holds"):
-        raw = given.get(kind, [])
+        raw = content.get(kind, [])
         for index, claim in enumerate(raw if isinstance(raw, list) else []):
             if isinstance(claim, dict):
-                claim["tolerance"] = Tolerance.parse(f"{where}: {kind}.{index}.tolerance", claim.get("tolerance"))
+                claim["tolerance"] = Tolerance.parse(f"{place}: {kind}.{index}.tolerance", claim.get("tolerance"))
                 if kind == "cheapest" and isinstance(claim.get("engine"), str):
                     claim["engine"] = [claim["engine"]]
-    claims = validated(TradeoffClaims, given, where, name=path.stem)
-    with error_location(where):
-        _check(where, claims)
+    claims = validated(TradeoffClaims, content, place, name=path.stem)
+    with error_location(place):
+        _check(place, claims)
     return claims
 
 
-def _check(where: str, file: TradeoffClaims) -> None:
+def _check(place: str, file: TradeoffClaims) -> None:
     require_bounds("until", file.until, above=0)
-    unit = file.swept.loaded.observable(file.quantity, f"{where}: quantity").unit
+    unit = file.swept.loaded.observable(file.quantity, f"{place}: quantity").unit
     if not (file.cheapest or file.holds or file.converges):
         advice = "the file claims nothing; add [[cheapest]] with tolerance, engine and because"
-        raise InputError(f"{where}: cheapest", "nothing", advice)
+        raise InputError(f"{place}: cheapest", "nothing", advice)
     for kind in ("cheapest", "holds", "converges"):
         for index, claim in enumerate(getattr(file, kind)):
-            at = f"{where}: {kind}.{index}"
+            claim_place = f"{place}: {kind}.{index}"
             if not claim.because:
-                raise InputError(f"{at}.because", "nothing", "every claim needs its reason; add it")
+                raise InputError(f"{claim_place}.because", "nothing", "every claim needs its reason; add it")
             for text in claim.engine if kind == "cheapest" else [claim.engine]:
-                with error_location(at):
+                with error_location(claim_place):
                     parse_engine(text)
             if kind == "holds":
-                require_bounds(f"{at}.step", claim.step, above=0)
+                require_bounds(f"{claim_place}.step", claim.step, above=0)
             if kind == "converges":
-                require_pair(f"{at}.order", claim.order)
+                require_pair(f"{claim_place}.order", claim.order)
             tolerance = getattr(claim, "tolerance", None)
             if tolerance is not None and not tolerance.relative and tolerance.unit != unit:
-                raise InputError(f"{at}.tolerance", tolerance.unit, f"its unit is {unit}")
+                raise InputError(f"{claim_place}.tolerance", tolerance.unit, f"its unit is {unit}")
     for name, values in file.over.items():
         for value in values:
             load_scene(file.scene, **{**file.parameters, name: value})

@@ -80,7 +80,7 @@ class Question:
     def cases(self, facts: EngineFacts, every: float) -> tuple[Case, ...]:
         """Cases of a point: its run and, with an adaptive step, a second run with few samples."""
         adaptive = facts.resolution not in {None, "dt"}
-        return tuple(self.case(facts, each) for each in ((every, self.sparse) if adaptive else (every,)))
+        return tuple(self.case(facts, interval) for interval in ((every, self.sparse) if adaptive else (every,)))
 
     def truth(self, facts: EngineFacts, runs: Collection[Case]) -> Case:
         """Case of the truth, with samples off the grid wherever the runs have them."""
@@ -90,8 +90,8 @@ class Question:
     def reference(self, truth: xr.Dataset, every: float) -> Reference:
         """Reference with this sampling interval [s], taken from the samples of the truth with the shortest one."""
         if every != self.every:
-            known, times = truth["time"].to_numpy(), time_grid(self.until, every)
-            indices = np.abs(known[:, None] - times).argmin(axis=0)
+            true_times, times = truth["time"].to_numpy(), time_grid(self.until, every)
+            indices = np.abs(true_times[:, None] - times).argmin(axis=0)
             truth = truth.drop_dims(BETWEEN, errors="ignore").isel(time=indices)
         return Reference.of(self.loaded, truth)
 
@@ -167,8 +167,10 @@ class Curve:
 
     def setting(self, facts: EngineFacts) -> dict[str, Any]:
         """Values of the fields of :class:`SweptSetting` with the facts of one of its runs."""
-        known = {name: getattr(facts, name) for name in ("settings", "resolution", "caveat", "family", "precision")}
-        return {"engine": facts.name, "curve": self.engine, "level": facts.level or None} | known
+        facts_shown = {
+            name: getattr(facts, name) for name in ("settings", "resolution", "caveat", "family", "precision")
+        }
+        return {"engine": facts.name, "curve": self.engine, "level": facts.level or None} | facts_shown
 
     @property
     def tried(self) -> set[float | None]:
@@ -209,9 +211,9 @@ class Curve:
         """
         if self.fixed_step or len(self.points) < 2:
             return False
-        loosest, other = (point.errors.get(quantity, np.inf) for point in self.points[:2])
+        loosest, tighter = (point.errors.get(quantity, np.inf) for point in self.points[:2])
         bar = self.points[0].bars.get(quantity, 0.0)
-        return bool(np.isfinite(loosest) and abs(loosest - other) <= max(bar, _SAME * loosest))
+        return bool(np.isfinite(loosest) and abs(loosest - tighter) <= max(bar, _SAME * loosest))
 
 
 def judge_point(points: Sequence[CurvePoint], references: Mapping[float, Reference], runner: Runner) -> CurvePoint:
@@ -244,8 +246,8 @@ def judge_point(points: Sequence[CurvePoint], references: Mapping[float, Referen
 def with_errors(point: CurvePoint, reference: Reference, run: xr.Dataset) -> CurvePoint:
     """Point with its observables and their errors; the error of an event is at least half the width of its bracket."""
     run = off_impacts(reference.scene, reference.dataset, {0: run})[0]
-    given = run_values.observables_of(reference, run)
-    curves = {name: values for name, values in given.items() if np.isfinite(reference.true(name, values).error_bar)}
+    observed = run_values.observables_of(reference, run)
+    curves = {name: values for name, values in observed.items() if np.isfinite(reference.true(name, values).error_bar)}
     return replace(
         point,
         curves=curves,

@@ -123,7 +123,7 @@ def budget(
     if curve.facts.precision == "single":
         limit = replace(limit, error_bar=max(limit.error_bar, floor or 0.0, round_off_of("single", magnitude)))
     model_form, error = largest_magnitude(limit.values - true), used[-1].errors[quantity]
-    first, departure = _coarse_end(curve, quantity, every, limit) or (used[0], values[0] - limit.values)
+    begin, departure = _coarse_end(curve, quantity, every, limit) or (used[0], values[0] - limit.values)
     coarse, fine = (_dominant(away, limit, model_form, floor, bar) for away in (departure, values[-1] - limit.values))
     budget_of_curve = replace(
         budget_of_curve,
@@ -138,7 +138,7 @@ def budget(
         floor=floor,
         best_step=single.best.step if single else None,
         coarse=coarse,
-        coarse_step=first.step or 0.0,
+        coarse_step=begin.step or 0.0,
         fine=TRUTH if error <= bar else fine,
         fine_step=steps[-1],
         fine_error=error,
@@ -245,8 +245,8 @@ def _sentence(budget: CurveBudget, unit: str, resolution: str) -> str:
     if budget.truth is None:
         text += ". Nothing is known of the model itself: the truth's error bar is not finite"
     elif budget.model_form > budget.model_form_bar + budget.truth:
-        known = number(budget.model_form_bar, 1)
-        text += f". In the limit of small steps {number(budget.model_form)} {unit} remain (known to {known})"
+        bar = number(budget.model_form_bar, 1)
+        text += f". In the limit of small steps {number(budget.model_form)} {unit} remain (known to {bar})"
     else:
         seen = max(budget.model_form_bar, budget.truth)
         text += f". No error of the model itself is seen above {number(seen, 1)} {unit}"

@@ -6,9 +6,9 @@ from typing import TypeVar
 _Item = TypeVar("_Item")
 
 
-def costs_overlap(one: Sequence[float] | None, other: Sequence[float] | None) -> bool:
+def costs_overlap(cost: Sequence[float] | None, rival: Sequence[float] | None) -> bool:
     """True if the intervals (low, high) of two costs overlap; False if one is missing."""
-    return one is not None and other is not None and one[0] <= other[1] and other[0] <= one[1]
+    return cost is not None and rival is not None and cost[0] <= rival[1] and rival[0] <= cost[1]
 
 
 def front(entries: Iterable[tuple[_Item, float, float]]) -> list[_Item]:

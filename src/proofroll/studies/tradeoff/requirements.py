@@ -39,11 +39,11 @@ class Requirements:
 
 def absolute_tolerance(study: TradeoffStudy, required: Requirements) -> float:
     """Tolerance in the quantity's unit. Raises InputError if a percentage has no size to refer to."""
-    known = study.quantities
-    require_known("quantity", required.quantity, known, "measured are")
-    scale = known[required.quantity].scale
+    quantities = study.quantities
+    require_known("quantity", required.quantity, quantities, "measured are")
+    scale = quantities[required.quantity].scale
     if required.tolerance.relative and scale is None:
-        advice = f"{required.quantity} has no size here; give it in {known[required.quantity].unit}"
+        advice = f"{required.quantity} has no size here; give it in {quantities[required.quantity].unit}"
         raise InputError("tolerance", f"{number(100 * required.tolerance.value, 3)} %", advice)
     return required.tolerance.absolute(scale or 1.0)
 
@@ -108,12 +108,12 @@ def _reason_there(study: TradeoffStudy, point: MeasuredPoint, required: Requirem
     relative = required.tolerance.relative
     allowed = required.tolerance.value if relative else absolute
     for corner in point.corners:
-        where = ", ".join(f"{parameter} = {value:g}" for parameter, value in corner.parameters.items())
+        place = ", ".join(f"{parameter} = {value:g}" for parameter, value in corner.parameters.items())
         there = corner.off(relative).get(name)
         if there is None:
-            return f"at {where} there is no {name}: {corner.message}"
+            return f"at {place} there is no {name}: {corner.message}"
         if there > allowed:
-            return f"at {where} {name} is off by {number(corner.errors[name])} {unit}"
+            return f"at {place} {name} is off by {number(corner.errors[name])} {unit}"
     return None
 
 
@@ -141,6 +141,6 @@ def _blame(study: TradeoffStudy, point: MeasuredPoint, quantity: str, absolute: 
     if budget.model_form - (budget.model_form_bar or 0.0) > absolute:
         return f"no step would do, for {number(budget.model_form)} remain in the limit of small steps"
     if budget.model_form + (budget.model_form_bar or 0.0) > absolute:
-        known = f"{number(budget.model_form)} off, known to {number(budget.model_form_bar or 0.0)}"
-        return f"whether a finer step would do is not known: the limit of small steps is {known}"
+        form = f"{number(budget.model_form)} off, known to {number(budget.model_form_bar or 0.0)}"
+        return f"whether a finer step would do is not known: the limit of small steps is {form}"
     return _COARSE

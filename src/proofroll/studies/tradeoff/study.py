@@ -86,7 +86,7 @@ def make_tradeoff(
 
 def tradeoff_study(outcome: Tradeoff) -> TradeoffStudy:
     """Record of a trade-off; numbers that are not finite become None."""
-    question, reference, known = outcome.question, outcome.reference, outcome.reference.scene.observables
+    question, reference, observables = outcome.question, outcome.reference, outcome.reference.scene.observables
     numbers = {point.case.key: number for number, point in enumerate(outcome.points)}
     budgets = _budgets(outcome)
     study = TradeoffStudy(
@@ -97,11 +97,12 @@ def tradeoff_study(outcome: Tradeoff) -> TradeoffStudy:
         quantity=question.quantity,
         quantities={
             name: MeasuredQuantity(
-                known[name].unit,
+                observables[name].unit,
                 reference.scale(name),
                 reference.true(name, curve).error_bar,
-                known[name].shown + name.removeprefix(known[name].name),  # with the element, where there are several
-                known[name].column,
+                observables[name].shown
+                + name.removeprefix(observables[name].name),  # with the element, where there are several
+                observables[name].column,
             )
             for name, curve in reference.curves.items()
         },
@@ -150,8 +151,8 @@ def _points(curve: Curve, quantities: Sequence[str], numbers: Mapping[str, int])
     envelopes = {name: curve.envelope(name) for name in quantities}
     points = []
     for index, point in enumerate(curve.points):
-        own = {name: errors[index] for name, errors in envelopes.items() if name in point.errors}
-        points.append(_point(curve, point, numbers[point.case.key], own))
+        bounds = {name: errors[index] for name, errors in envelopes.items() if name in point.errors}
+        points.append(_point(curve, point, numbers[point.case.key], bounds))
     return points
 
 
@@ -194,13 +195,15 @@ def _conclusions(outcome: Tradeoff, budgets: Sequence[CurveBudget]) -> list[str]
     scale, unit = outcome.reference.scale(quantity) or 1.0, outcome.reference.scene.observables[quantity].unit
     judged = [item for item in budgets if item.quantity in outcome.quantities and item.contradicts_declaration]
     for curve in outcome.curves:
-        if other := [item for item in judged if item.curve == curve.engine]:
-            shown = ", ".join(f"{i.quantity} {i.order:.2f} ({i.order_low:.2f} to {i.order_high:.2f})" for i in other)
-            sentences.append(f"{curve.engine} declares order {other[0].declared}, but there show: {shown}.")
+        if misjudged := [item for item in judged if item.curve == curve.engine]:
+            shown = ", ".join(
+                f"{i.quantity} {i.order:.2f} ({i.order_low:.2f} to {i.order_high:.2f})" for i in misjudged
+            )
+            sentences.append(f"{curve.engine} declares order {misjudged[0].declared}, but there show: {shown}.")
     for item in budgets:
         if item.quantity == quantity and item.best_step is not None and item.floor is not None:
-            told = floor_text(item.best_step, item.floor, unit)
-            sentences.append(f"{item.curve}, {quantity}: {told}; smaller steps are worse.")
+            floor = floor_text(item.best_step, item.floor, unit)
+            sentences.append(f"{item.curve}, {quantity}: {floor}; smaller steps are worse.")
     whole = [
         c for c in outcome.curves if c.saturated(quantity) and c.points[0].errors.get(quantity, np.inf) < BROKEN * scale
     ]

@@ -53,7 +53,7 @@ def curves_of(
     Raises:
         InputError: an unknown engine, formulation or setting.
     """
-    wanted: list[str] = []
+    engines_asked: list[str] = []
     absent: dict[str, str] = {}
     asked = [(text, parse_engine(text)) for text in list(engines) or engine_names()]
     descriptions = describe_each((spec.name for _, spec in asked), workers)
@@ -67,15 +67,15 @@ def curves_of(
         chosen, foreign = _chosen(spec, answer, requires)
         if foreign:
             absent.setdefault(spec.name, "none of its formulations is for scenes of this kind")
-        wanted += chosen
-        if any(parse_engine(name).name == spec.name for name in wanted):
+        engines_asked += chosen
+        if any(parse_engine(name).name == spec.name for name in engines_asked):
             absent.pop(spec.name, None)
         elif spec.name not in absent:
             raise InputError("engine", text, f"{spec.name} has {', '.join(answer.presets)}")
-    specs = [parse_engine(name) for name in wanted]
+    specs = [parse_engine(name) for name in engines_asked]
     curves = []
     resolved = resolve([(spec.name, spec.options) for spec in specs], workers)
-    for name, facts in zip(wanted, resolved, strict=True):
+    for name, facts in zip(engines_asked, resolved, strict=True):
         if isinstance(facts, InputError):
             raise facts
         if isinstance(facts, EngineFacts):
@@ -95,9 +95,9 @@ def _chosen(spec: EngineSpec, described: EngineDescription, requires: frozenset[
     for formulation, presets in described.presets.items():
         if spec.options.get("formulation", formulation) != formulation:
             continue
-        known = not requires or requires & set(described.provides[formulation])
+        able = not requires or requires & set(described.provides[formulation])
         fits = "formulation" in spec.options or offered(formulation, requires, described.made_for)
-        if not known or not fits:
+        if not able or not fits:
             foreign = True
             continue
         for preset in presets:
@@ -132,17 +132,17 @@ def sweep(
         budget: processor time of all runs, or None.
     """
     references: dict[float, Reference] = {}
-    for first in (True, False, False, False):
-        wanted = [
+    for is_first in (True, False, False, False):
+        asked = [
             (curve, value)
             for curve in curves
             for value in (
-                _first(question, curve) if first else _further(question, curve, references, finer(curve), gain)
+                _first(question, curve) if is_first else _further(question, curve, references, finer(curve), gain)
             )
         ]
-        if not wanted:
+        if not asked:
             break
-        _run(question, wanted, runner, references, progress, budget)
+        _run(question, asked, runner, references, progress, budget)
         for curve in curves:
             curve.points.sort(key=lambda point: -(point.step or 0.0))
     return references
@@ -151,10 +151,10 @@ def sweep(
 def _first(question: Question, curve: Curve) -> list[float]:
     if curve.facts.resolution is None:
         return [0.0]  # a closed form has nothing to refine: one point
-    own = float(curve.facts.settings[curve.facts.resolution])
+    usual = float(curve.facts.settings[curve.facts.resolution])
     if curve.fixed_step:
         return [question.step(factor) for factor in _STEPS]
-    return list(dict.fromkeys([*_TOLERANCES, own]))
+    return list(dict.fromkeys([*_TOLERANCES, usual]))
 
 
 def _further(
@@ -182,19 +182,19 @@ def _further(
         return values
     finer = next((step for step in map(question.step, finer_steps) if step not in curve.tried), None)
     if finer is not None and len(curve.points) > 1:
-        now, before = (point.errors.get(question.quantity, np.inf) for point in (finest, curve.points[-2]))
-        known = max(
+        now, coarser_error = (point.errors.get(question.quantity, np.inf) for point in (finest, curve.points[-2]))
+        reached = max(
             finest.bars.get(question.quantity, 0.0),
             round_off_of("double", references[question.every].magnitude(question.quantity)),
         )
-        if known < now < (1 - gain) * before:
+        if reached < now < (1 - gain) * coarser_error:
             values.append(finer)
     return values
 
 
 def _run(
     question: Question,
-    wanted: list[tuple[Curve, float]],
+    asked: list[tuple[Curve, float]],
     runner: Runner,
     references: dict[float, Reference],
     progress: Progress | None,
@@ -202,12 +202,12 @@ def _run(
 ) -> None:
     """Runs curves with these steps or tolerances, and the truths that are still missing."""
     options: list[tuple[str, dict[str, Any]]] = []
-    for curve, value in wanted:
+    for curve, value in asked:
         facts = curve.facts
         options.append((facts.name, facts.settings | ({facts.resolution: value} if facts.resolution else {})))
     resolved, truth_facts = resolve_with_truth(options, runner.workers)
     cases: list[tuple[Curve, tuple[Case, ...]]] = []
-    for (curve, value), resolved_facts in zip(wanted, resolved, strict=True):
+    for (curve, value), resolved_facts in zip(asked, resolved, strict=True):
         try:
             if isinstance(resolved_facts, ProofrollError):
                 raise resolved_facts

@@ -182,35 +182,35 @@ def _check(tradeoff: Tradeoff, truth: EngineFacts, runner: Runner, arrived: Call
     }
     asked = []
     for values in itertools.product(*tradeoff.extent.over.values()):
-        given = dict(zip(tradeoff.extent.over, map(float, values), strict=True))
-        question = dataclasses.replace(tradeoff.question, parameters={**tradeoff.question.parameters, **given})
+        corner = dict(zip(tradeoff.extent.over, map(float, values), strict=True))
+        question = dataclasses.replace(tradeoff.question, parameters={**tradeoff.question.parameters, **corner})
         runs = {key: question.cases(point.case.engine, point.case.every) for key, point in chosen.items()}
         true = question.truth(truth, [case for both in runs.values() for case in both])
-        asked.append((given, question, true, runs))
+        asked.append((corner, question, true, runs))
     cases = [case for _, _, true, runs in asked for case in (true, *itertools.chain(*runs.values()))]
     results = runner.run(cases, arrived)
     corners: dict[str, list[Corner]] = {key: [] for key in chosen}
-    for given, question, true, runs in asked:
+    for corner, question, true, runs in asked:
         if results[true.key].status != Status.DONE:
-            lost = Corner(given, {}, {}, f"there is no truth: {results[true.key].message}")
-            for found in corners.values():
-                found.append(lost)
+            lost = Corner(corner, {}, {}, f"there is no truth: {results[true.key].message}")
+            for answers in corners.values():
+                answers.append(lost)
             continue
         dataset = runner.store.stored(true).dataset
         intervals = {case.every for both in runs.values() for case in both}
         references = {every: question.reference(dataset, every) for every in intervals}
         for key, both in runs.items():
             point = judge_point([CurvePoint(case, results[case.key]) for case in both], references, runner)
-            corners[key].append(_corner(given, point, references[both[0].every]))
+            corners[key].append(_corner(corner, point, references[both[0].every]))
     for point in tradeoff.points:
         point.corners = corners.get(point.case.key)
 
 
-def _corner(given: dict[str, float], point: CurvePoint, reference: Reference) -> Corner:
+def _corner(parameters: dict[str, float], point: CurvePoint, reference: Reference) -> Corner:
     errors = {name: error for name, error in point.errors.items() if np.isfinite(error)}
     relative = {name: error / (reference.scale(name) or 1.0) for name, error in errors.items()}
     ended = point.sparse or point
-    return Corner(given, errors, relative, (point if not point.errors else ended).result.message)
+    return Corner(parameters, errors, relative, (point if not point.errors else ended).result.message)
 
 
 def pareto_entries(curves: Iterable[Curve], quantity: str) -> list[tuple[CurvePoint, float, float]]:

@@ -119,36 +119,36 @@ class CaseDifference:
     changed: list[str]
 
 
-def case_difference(outcome: Outcome, before: Run, after: Run) -> CaseDifference:
+def case_difference(outcome: Outcome, old_run: Run, new_run: Run) -> CaseDifference:
     """Differences of one case between two versions."""
     verdicts = [
-        (one.observable, one.verdict, other.verdict)
-        for one in before.judgements
-        for other in after.judgements
-        if one.observable == other.observable and one.verdict != other.verdict
+        (judged.observable, judged.verdict, judged_new.verdict)
+        for judged in old_run.judgements
+        for judged_new in new_run.judgements
+        if judged.observable == judged_new.observable and judged.verdict != judged_new.verdict
     ]
     changed = []
-    if before.result.status != after.result.status:
-        changed.append(f"{_ending(before)} → {_ending(after)}")
-    elif before.verdict != after.verdict or verdicts:
-        which = ", ".join(f"{name} {one} → {other}" for name, one, other in verdicts)
-        changed.append(which or f"{before.verdict} → {after.verdict}")
-    changed += _given_by_one(outcome, before, after)
+    if old_run.result.status != new_run.result.status:
+        changed.append(f"{_ending(old_run)} → {_ending(new_run)}")
+    elif old_run.verdict != new_run.verdict or verdicts:
+        which = ", ".join(f"{name} {judged} → {judged_new}" for name, judged, judged_new in verdicts)
+        changed.append(which or f"{old_run.verdict} → {new_run.verdict}")
+    changed += _given_by_one(outcome, old_run, new_run)
     orders = [
-        OrderChange(one.observable, one.order, other.order)
-        for one in before.judgements
-        for other in after.judgements
-        if one.observable == other.observable and one.order and other.order
-        if abs(one.order - other.order) > _ANOTHER_ORDER
+        OrderChange(judged.observable, judged.order, judged_new.order)
+        for judged in old_run.judgements
+        for judged_new in new_run.judgements
+        if judged.observable == judged_new.observable and judged.order and judged_new.order
+        if abs(judged.order - judged_new.order) > _ANOTHER_ORDER
     ]
     return CaseDifference(
         comparison=outcome.comparison.name,
         scene=outcome.comparison.scene,
-        setting=setting_of(before),
-        point=point_name(before.parameters),
-        old=RunInVersion.of(before),
-        new=RunInVersion.of(after),
-        numbers=_numbers(outcome, before, after),
+        setting=setting_of(old_run),
+        point=point_name(old_run.parameters),
+        old=RunInVersion.of(old_run),
+        new=RunInVersion.of(new_run),
+        numbers=_numbers(outcome, old_run, new_run),
         orders=orders,
         changed=changed,
     )
@@ -158,33 +158,33 @@ def _ending(run: Run) -> str:
     return str(run.verdict) if run.result.status == Status.DONE else f"{run.result.status} ({run.result.message})"
 
 
-def _given_by_one(outcome: Outcome, before: Run, after: Run) -> list[str]:
+def _given_by_one(outcome: Outcome, old_run: Run, new_run: Run) -> list[str]:
     """A sentence for each observable that one run gives and the other one does not."""
-    if before.trajectory is None or after.trajectory is None:
+    if old_run.trajectory is None or new_run.trajectory is None:
         return []
-    scene = outcome.points[point_name(before.parameters)].scene
-    old, new = (observe(scene, run.trajectory.dataset).keys() for run in (before, after) if run.trajectory)
+    scene = outcome.points[point_name(old_run.parameters)].scene
+    old, new = (observe(scene, run.trajectory.dataset).keys() for run in (old_run, new_run) if run.trajectory)
     lost, gained = sorted(old - new), sorted(new - old)
     return [f"{name} is given no more" for name in lost] + [f"{name} is given now" for name in gained]
 
 
-def _numbers(outcome: Outcome, before: Run, after: Run) -> NumbersApart | None:
+def _numbers(outcome: Outcome, old: Run, new: Run) -> NumbersApart | None:
     """Difference of the trajectories; None if one is missing."""
-    if before.trajectory is None or after.trajectory is None:
+    if old.trajectory is None or new.trajectory is None:
         return None
-    point = outcome.points[point_name(before.parameters)]
-    one, other = before.trajectory.dataset, after.trajectory.dataset
-    return _apart(point.scene, one, other, point.reference.sizes if point.reference else {})
+    point = outcome.points[point_name(old.parameters)]
+    old_data, new_data = old.trajectory.dataset, new.trajectory.dataset
+    return _apart(point.scene, old_data, new_data, point.reference.sizes if point.reference else {})
 
 
-def _apart(scene: Scene, one: xr.Dataset, other: xr.Dataset, sizes: Mapping[str, float]) -> NumbersApart:
+def _apart(scene: Scene, data: xr.Dataset, new_data: xr.Dataset, sizes: Mapping[str, float]) -> NumbersApart:
     largest = NumbersApart()
-    values, others = observe(scene, one), observe(scene, other)
+    values, others = observe(scene, data), observe(scene, new_data)
     for name, mine in values.items():
         item, theirs = scene.observables[name], others.get(name)
         if theirs is None or item.role not in {Role.MOTION, Role.REACTION} or mine.ndim != theirs.ndim:
             continue
-        theirs = on_turns_of(mine, theirs, name, (one, other))
+        theirs = on_turns_of(mine, theirs, name, (data, new_data))
         if theirs is None:
             continue
         count = min(len(mine), len(theirs))

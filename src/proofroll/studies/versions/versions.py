@@ -179,9 +179,11 @@ def compare_versions(
     pairs: list[tuple[Outcome, Run, Run]] = []
     for item in plans:
         outcome = evaluate(item, results, runner)
-        one, other = ([run for run in outcome.runs if parse_engine(run.row.engine).name == side] for side in sides)
-        pairs += [(outcome, before, after) for before, after in zip(one, other, strict=True)]
-    differences = [case_difference(outcome, before, after) for outcome, before, after in pairs]
+        old_runs, new_runs = (
+            [run for run in outcome.runs if parse_engine(run.row.engine).name == side] for side in sides
+        )
+        pairs += [(outcome, old_run, new_run) for old_run, new_run in zip(old_runs, new_runs, strict=True)]
+    differences = [case_difference(outcome, old_run, new_run) for outcome, old_run, new_run in pairs]
     speeds = _speeds(pairs, runner, rounds, progress) if rounds else {}
     old, new = (
         EngineVersion(name, item.version, item.interpreter) for name, item in zip(sides, descriptions, strict=True)
@@ -245,15 +247,15 @@ def _speeds(
 ) -> dict[tuple[str, str], Interval]:
     """Time of the new version over that of the old one, at the first point of each setting that both ran."""
     chosen: dict[tuple[str, str], tuple[Run, Run]] = {}
-    for outcome, before, after in pairs:
-        if before.result.status == after.result.status == Status.DONE:
-            chosen.setdefault((outcome.comparison.name, setting_of(before)), (before, after))
+    for outcome, old, new in pairs:
+        if old.result.status == new.result.status == Status.DONE:
+            chosen.setdefault((outcome.comparison.name, setting_of(old)), (old, new))
     speeds = {}
     with Stopwatch(runner.workers) as watch:
-        for key, (before, after) in chosen.items():
-            assert before.case is not None  # both ran
-            assert after.case is not None
-            timings = time_in_rounds({"old": partial(watch, before.case), "new": partial(watch, after.case)}, rounds)
+        for key, (old, new) in chosen.items():
+            assert old.case is not None  # both ran
+            assert new.case is not None
+            timings = time_in_rounds({"old": partial(watch, old.case), "new": partial(watch, new.case)}, rounds)
             progress(f"timing {key[1]}")
             if timings.keys() == {"old", "new"} and len(timings["old"].values) == len(timings["new"].values):
                 speeds[key] = ratio(timings["new"], timings["old"])
@@ -267,8 +269,8 @@ def _defaults(old: EngineDescription, new: EngineDescription) -> list[ChangedDef
         (old.provides, new.provides),
     )
     return [
-        ChangedDefault(name, one.get(name), other.get(name))
-        for one, other in both
-        for name in sorted(one.keys() | other.keys())
-        if one.get(name) != other.get(name)
+        ChangedDefault(name, old_values.get(name), new_values.get(name))
+        for old_values, new_values in both
+        for name in sorted(old_values.keys() | new_values.keys())
+        if old_values.get(name) != new_values.get(name)
     ]

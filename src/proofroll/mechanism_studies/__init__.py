@@ -1,0 +1,1 @@
+"""Studies of mechanisms that no harness knows: equilibrium, and linearisation about it."""

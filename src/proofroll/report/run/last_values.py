@@ -1,0 +1,139 @@
+"""Tables of ``proofroll run`` on the terminal: values at the end, and bounces."""
+
+import math
+from collections.abc import Collection, Mapping, Sequence
+from typing import Any
+
+from proofroll.core.bounces import Bounce
+from proofroll.core.quantity import powers_of
+
+FORCES = ("N", "N m")
+_DIGITS = 12
+_ROUND_OFF = 1e-14  # of the largest value of a dimension
+_BOUNCES = 8  # most bounces on the terminal
+_AXES = tuple("xyz")
+
+
+def value_text(value: float, bar: float | None, size: float) -> str:
+    """Text of a value with at most twelve digits: no digit below its error bar, and 0 for round-off.
+
+    Args:
+        value: to be written.
+        bar: error bar; None: it is not known.
+        size: largest value of the same dimension.
+    """
+    if not math.isfinite(value):
+        return "–"
+    if abs(value) <= max(bar or 0.0, _ROUND_OFF * size):
+        return "0"
+    digits = _DIGITS
+    if bar:
+        digits = min(_DIGITS, math.floor(math.log10(abs(value))) - math.ceil(math.log10(bar)) + 1)
+    return f"{value:.{max(digits, 1)}g}"
+
+
+def short_names(names: Sequence[str]) -> list[str]:
+    """Names of components and of numbered contacts, written together: ``force.touch.1-4|7.x|y|z``.
+
+    Components (x, y, z) of one name are joined, and numbers before the last part or at the end.
+    """
+    tails: dict[tuple[str, bool], list[str]] = {}
+    for name in names:
+        stem, dot, tail = name.rpartition(".")
+        joined = bool(dot) and (tail in _AXES or _is_number(tail))
+        tails.setdefault((stem if joined else name, joined), []).append(tail)
+    numbered: dict[tuple[str, bool, tuple[str, ...]], list[str]] = {}
+    for (name, ended), parts in tails.items():
+        stem, dot, number = name.rpartition(".")
+        joined = bool(dot) and ended and _is_number(number)
+        numbered.setdefault((stem if joined else name, joined, tuple(parts) if ended else ()), []).append(number)
+    return [
+        ".".join([stem, *([_listed(numbers)] if joined else []), *([_listed(parts)] if parts else [])])
+        for (stem, joined, parts), numbers in numbered.items()
+    ]
+
+
+def _is_number(text: str) -> bool:
+    """True of digits as a counter writes them."""
+    return text.isdecimal() and text == str(int(text))
+
+
+def _listed(parts: Sequence[str]) -> str:
+    """Parts of names between bars; three consecutive numbers or more are a range, ``1-4``."""
+    runs: list[list[str]] = []
+    for part in parts:
+        follows = runs and _is_number(part) and _is_number(runs[-1][-1]) and int(part) == int(runs[-1][-1]) + 1
+        if follows:
+            runs[-1].append(part)
+        else:
+            runs.append([part])
+    return "|".join(f"{run[0]}-{run[-1]}" if len(run) > 2 else "|".join(run) for run in runs)
+
+
+def value_table(
+    values: Mapping[str, float], units: Mapping[str, str], bars: Mapping[str, float], shown: Collection[str]
+) -> Any:
+    """Table of the last values: positions first, then velocities, energies and residuals, then forces.
+
+    Components and numbered contacts with equal texts are one row, see :func:`short_names`.
+
+    Args:
+        values: variable -> value.
+        units: variable -> unit.
+        bars: variable -> error bar, where one is known.
+        shown: variables of the table.
+    """
+    from rich.table import Column, Table
+
+    of_bars = [Column("error bar", justify="right")] if bars else []
+    table = Table("at the end", Column("value", justify="right"), "unit", *of_bars, box=None, pad_edge=False)
+    sizes: dict[frozenset[tuple[str, float]], float] = {}
+    for name, value in values.items():
+        if math.isfinite(value):
+            dimension = _dimension(units[name])
+            sizes[dimension] = max(sizes.get(dimension, 0.0 if dimension else 1.0), abs(value))
+    alike: dict[tuple[str, ...], list[str]] = {}
+    for name in sorted(shown, key=lambda item: _place(units[item])):
+        value, unit = values[name], units[name]
+        bar = bars.get(name) if math.isfinite(value) else None
+        texts = [f"{bar:.1e}" if bar is not None else ""] if bars else []
+        family = ".".join(p for p in name.split(".") if not (p.isdigit() or (unit in FORCES and p in _AXES)))
+        row = (family, value_text(value, bar, sizes.get(_dimension(unit), 0.0)), unit, *texts)
+        alike.setdefault(row, []).append(name)
+    for (_, *cells), names in alike.items():
+        for text in short_names(names):
+            table.add_row(text, *cells)
+    return table
+
+
+def bounce_table(bounces: Sequence[Bounce]) -> tuple[Any, str]:
+    """Table of the first bounces, and a note on its dashes and its cut, which may be empty.
+
+    Its columns are the time, the energies beside the impact and the height of the next apex, with digits up to their
+    error bars. Impacts at one time, as of the corners of a box, are one bounce.
+    """
+    from rich.table import Column, Table
+
+    heads = ("energy before [J]", "after [J]", "next apex [m above]")
+    table = Table("impact at [s]", *(Column(head, justify="right") for head in heads), box=None, pad_edge=False)
+    moments = list({item.time: item for item in reversed(bounces)}.values())[::-1]
+    energy = max((abs(item.energy_before) for item in moments if math.isfinite(item.energy_before)), default=0.0)
+    height = max((abs(item.height) for item in moments if math.isfinite(item.height)), default=0.0)
+    for item in moments[:_BOUNCES]:
+        energies = (value_text(value, item.energy_bar, energy) for value in (item.energy_before, item.energy_after))
+        table.add_row(f"{item.time:.9g}", *energies, value_text(item.height, item.height_bar, height))
+    notes = ["–: no apex before the next impact or the end"] * any(math.isnan(b.height) for b in moments[:_BOUNCES])
+    if len(moments) > _BOUNCES:
+        notes.append(f"{len(moments) - _BOUNCES} more bounces: --events FILE.csv")
+    return table, "; ".join(notes)
+
+
+def _dimension(unit: str) -> frozenset[tuple[str, float]]:
+    """Powers of base units; equal for a moment and an energy."""
+    return frozenset(powers_of(unit).items())
+
+
+def _place(unit: str) -> int:
+    """Place of a variable in the table by its unit: places and angles, velocities, the rest, forces and moments."""
+    order = {"s": 0, "m": 1, "rad": 1, "m/s": 2, "rad/s": 2}
+    return 4 if unit in FORCES else order.get(unit, 3)
