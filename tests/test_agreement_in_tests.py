@@ -7,6 +7,7 @@ import re
 import subprocess
 import sys
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -21,10 +22,11 @@ import proofroll
 from proofroll.cli import app
 from proofroll.core.errors import InputError
 from proofroll.core.truth import truth
+from proofroll.elements.ball_on_surface.element import BallOnSurface, scene_with
 from proofroll.elements.ball_on_surface.sampling import BallSample
 from proofroll.files.scene_file import load_scene
-from proofroll.files.trajectory_file import write
-from proofroll.running.simulation import build
+from proofroll.files.trajectory_file import read, write
+from proofroll.running.simulation import build, simulate
 from proofroll.testing import assert_agrees
 
 Proofroll = Callable[..., tuple[int, str, str]]
@@ -239,10 +241,39 @@ def test_a_table_of_ones_own(header: str, words: str, tmp_path: Path) -> None:
 
 
 def test_a_word_in_a_table(tmp_path: Path) -> None:
-    """The line of a CSV file in which no number stands is named."""
+    """The line and column of a CSV file in which no number stands are named, with the remedy."""
     (file := tmp_path / "own.csv").write_text("time [s],q.pivot [rad]\n0.0,2.8\n0.1,none\n", encoding="utf-8")
-    with pytest.raises(InputError, match=r"line 3: 'none' is no number\)$"):
+    with pytest.raises(InputError, match=r"line 3, column q.pivot \[rad\]: 'none' is no number; fill it"):
         proofroll.judge(file, "pendulum")
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("", "it is empty; its first line has names with units"),
+        ("time [s],q.pivot [rad]\n", "there are no samples; give times"),
+        ("time [s],q.pivot [rad]\n0.0,2.8\n0.2,2.8\n0.1,2.8\n", "0.1 s follows 0.2 s; give times"),
+        ("time [s],q.pivot [rad]\n0.0,2.8\nnan,2.8\n", "sample 2 has no time; give times"),
+        ("time [s],q.pivot [rad]\n-1,2.8\n0.1,2.8\n", "it begins at -1 s; give times"),
+        ("time [s],q.pivot [rad]\n0.0,2.8\n0.1,\n", r"line 3, column q.pivot \[rad\]: there is no number; fill it"),
+    ],
+)
+def test_holes_in_a_table_are_named(text: str, words: str, tmp_path: Path) -> None:
+    """A CSV file without samples, with times that do not rise or with a hole gets one line that says where."""
+    (file := tmp_path / "own.csv").write_text(text, encoding="utf-8")
+    with pytest.raises(InputError, match=words) as caught:
+        proofroll.judge(file, "pendulum")
+    assert "\n" not in str(caught.value)
+
+
+def test_rows_of_separators_alone_are_no_samples(tmp_path: Path) -> None:
+    """Rows without any number, which spreadsheets write at the end, change nothing."""
+    text = "time [s],q.pivot [rad]\n0.0,2.8\n0.1,2.78392784\n"
+    readings = []
+    for tail in ("", ",\n,\n"):
+        (file := tmp_path / "own.csv").write_text(text + tail, encoding="utf-8")
+        readings.append(read(file)["q.pivot"].to_numpy().tolist())
+    assert readings[0] == readings[1]
 
 
 def test_a_quote_without_an_end(tmp_path: Path) -> None:
@@ -467,3 +498,20 @@ def test_a_file_says_whether_the_ball_sticks(sticks: int | None, agrees: bool) -
         state["sticking"] = np.full(41, sticks)
     for tolerance in (None, {"z": "1 %"}):
         assert proofroll.judge(state, scene, tolerance).agrees is agrees
+
+
+def test_what_lies_behind_the_end_of_a_truth_is_not_judged() -> None:
+    """A run agrees whatever it does behind the end of the truth, and differs by what it does before."""
+    bounces = load_scene("bouncing_ball")
+    ball = bounces.elements[0]
+    assert isinstance(ball, BallOnSurface)
+    scene = scene_with(bounces, contact=replace(ball.contact, restitution=None))  # its truth ends at 0.45 s
+    true = simulate(bounces, "truth", until=1.0)
+    given = {name: true[name].to_numpy().copy() for name in ("time", "p_WB", "v_WB", "w_WB")}
+    judged = assert_agrees(scene, given, tolerance={"gap": "1e-6 m"}, because="copied from the truth")
+    assert "not judged: what lies behind" in str(judged)
+    given["p_WB"][60] += 1.0
+    assert_agrees(scene, given, tolerance={"gap": "1e-6 m"}, because="copied from the truth")
+    given["p_WB"][30] += 1.0
+    with pytest.raises(AssertionError, match="gap is off by"):
+        assert_agrees(scene, given, tolerance={"gap": "1e-6 m"}, because="copied from the truth")

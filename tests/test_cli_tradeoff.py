@@ -140,7 +140,7 @@ def test_recommend_for_a_person(proofroll: Proofroll, folder: Path) -> None:
     code, out, _ = proofroll(*asked(folder))
     assert code == 0
     assert all(len(line) <= 100 for line in out.splitlines())
-    for words in ("use exudyn generic matched, dt", "Cheaper ones fail", "speed 3 to 5", "nothing is known beyond"):
+    for words in ("use Exudyn generic matched, dt", "Cheaper ones fail", "speed 3 to 5", "nothing is known beyond"):
         assert words in " ".join(out.split())
 
 
@@ -149,7 +149,7 @@ def test_a_tolerance_that_nothing_holds(proofroll: Proofroll, folder: Path) -> N
     code, out, _ = proofroll(*asked(folder, tolerance="1e-15 m"))
     assert code == 1
     assert "Nothing that was measured holds z" in out
-    assert "Closest: exudyn generic" in out
+    assert "Closest: Exudyn generic" in out
 
 
 @pytest.mark.parametrize(
@@ -237,13 +237,13 @@ def test_tradeoff_and_then_recommend(proofroll: Proofroll, tmp_path: Path) -> No
     assert "The Pareto front of the engines for z" in out
     assert "order (declared)" in out
     (drawn,) = (tmp_path / "tradeoff").glob("*.svg")
-    assert "exudyn generic matched" in drawn.read_text()
+    assert "Exudyn generic matched" in drawn.read_text()
     (timings,) = (tmp_path / "tradeoff").glob("*.pyperf.json")
     assert len(pyperf.BenchmarkSuite.load(str(timings)).get_benchmarks()) >= 6
 
     code, out, err = proofroll("recommend", "sphere_in_cylinder", "--tolerance", "1 %", *given)
     assert (code, err) == (0, "")
-    assert "use exudyn generic matched" in out
+    assert "use Exudyn generic matched" in out
     code, _, err = proofroll("recommend", "sphere_in_cylinder", "--tolerance", "1 %", *given[:4], *given[-2:])
     assert code == 2
     assert f"what is stored is of {ENGINE}; choose among these" in err

@@ -25,7 +25,14 @@ from proofroll.running.idle_workers import Workers
 
 ROOT = Path(__file__).resolve().parents[1]
 # README.md and the pages whose snippets have tests of their own.
-ELSEWHERE = {"agreement_in_your_tests", "vocabulary", "write_an_engine", "write_an_element", "worker_protocol"}
+ELSEWHERE = {
+    "agreement_in_your_tests",
+    "two_simulators",
+    "vocabulary",
+    "write_an_engine",
+    "write_an_element",
+    "worker_protocol",
+}
 PAGES = sorted(path.stem for path in (ROOT / "docs").glob("*.md") if path.stem not in ELSEWHERE)
 BLOCK = re.compile(r"^```([^\n]*)\n(.*?)^```$", flags=re.DOTALL | re.MULTILINE)
 # Pages that the build of the documentation writes.

@@ -114,9 +114,10 @@ def fields(title: str) -> set[str]:
         ("`compare --json`", ["compare", "claim.toml"]),
         ("`ladder --json`", ["ladder", "inclined_plane", "--engine", "oracle", "--until", "0.1"]),
         ("`onset --json`", ["onset", "sphere_in_cylinder", *SLIPS, "--engine", "oracle"]),
+        ("`balance --json`", ["balance", "pendulum", "--engine", "projection"]),
         ("`engines --json`", ["engines"]),
     ],
-    ids=["scenes", "check-scene", "check-study", "run", "compare", "ladder", "onset", "engines"],
+    ids=["scenes", "check-scene", "check-study", "run", "compare", "ladder", "onset", "balance", "engines"],
 )
 def test_fields(
     command_line: Proofroll,

@@ -19,7 +19,7 @@ from PIL import Image
 from proofroll.core.number_format import number
 from proofroll.core.plugins import parse_engine
 from proofroll.files.comparison_file import load_comparison
-from proofroll.report.labels import step
+from proofroll.report.labels import engine_title, engine_words, step
 from proofroll.running.case import EngineFacts
 from proofroll.studies.tradeoff.claims import claims_for
 
@@ -147,7 +147,12 @@ def complaint(text: str, settings: list[EngineFacts], now: str) -> str:
         return f"{STALE}: {len(lines)} lines for {len(comparison.rows)} rows"
     for row, found, cells in zip(comparison.rows, settings, lines, strict=True):
         shown = step(found.resolution, found.settings.get(str(found.resolution)))
-        expected = [found.name, str(found.settings.get("formulation")), str(found.settings["preset"]), shown]
+        expected = [
+            engine_title(found.name),
+            str(found.settings.get("formulation")),
+            str(found.settings["preset"]),
+            shown,
+        ]
         if cells[:4] != expected:
             return f"{STALE}: it has {cells[:4]}, the comparison {expected}"
         allowed = {*row.expect, *(verdict for exception in row.except_at for verdict in exception.expect)}
@@ -225,7 +230,9 @@ def test_the_table_of_the_cheapest_is_as_claimed() -> None:
         cells = lines[number(claim.tolerance.value) + " m"]
         cell = cells[3] if claim.levels else cells[2]
         names = [parse_engine(text) for text in claim.engine]
-        assert any(cell.strip().startswith(f"{spec.name} {spec.options['formulation']} ") for spec in names)
+        assert any(
+            cell.strip().startswith(f"{engine_words(spec.name, spec.options['formulation'])} ") for spec in names
+        )
 
 
 @pytest.mark.parametrize("name", ["README.md", "CONTRIBUTING.md"])

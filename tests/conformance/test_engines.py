@@ -29,8 +29,6 @@ KNOWN: Mapping[str, Mapping[str, str]] = {
         "moves_as_the_truth[joints-tuned-slider_crank]": "as its first steps",
         "moves_as_the_truth[joints-default-double_pendulum-friction]": "with MuJoCo's default solref friction comes up "
         "over 0.02 s at every step, and the presets with hard rows pass",
-        "moves_as_the_truth[joints-default-heavy_top]": "an Euler step of 2e-3 s: the forces are off by an eighth, and "
-        "by half as much at half the step",
         "moves_as_the_truth[geoms-default-sled]": "the pyramid brakes more along its edges than across, at every step",
         "moves_as_the_truth[geoms-default-two_spheres]": "an impact takes the part of the speed that MuJoCo's default "
         "impedance leaves it",

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from proofroll.core.errors import InputError
+from proofroll.elements.mechanism.published import read_published
 from proofroll_drill import published
 
 NUMBERS = """
@@ -28,6 +29,7 @@ def test_a_number_that_is_off_misses(monkeypatch: pytest.MonkeyPatch, tmp_path: 
     """A tenth digit that differs, an event or a run that there is not, and a larger error miss; the rest holds."""
     (tmp_path / "numbers.toml").write_text(NUMBERS, encoding="utf-8")
     monkeypatch.setattr(published, "FILE", tmp_path / "numbers.toml")
+    monkeypatch.setattr(published, "tables", dict)
     rows = list(published.held([]))
     assert [row.misses for row in rows] == [False, False, True, True, True]
     assert "chart" in rows[-1].what
@@ -37,3 +39,14 @@ def test_a_number_that_is_off_misses(monkeypatch: pytest.MonkeyPatch, tmp_path: 
         list(published.held(["sled"]))
     (tmp_path / "numbers.toml").write_text(NUMBERS.replace("4518,", "4528,").replace("1e-30", "1"), encoding="utf-8")
     assert [row.misses for row in published.held([])] == [True, False, True, False, True]
+
+
+def test_a_series_misses_by_its_worst_instant() -> None:
+    """A table of a scene is held at all its times; its row names the value that is a last digit too far off."""
+    table = {"source": "closed form", "times": [0.5, 1.0], "q.slide": [-0.24525, -0.9822]}
+    (entry,) = read_published([table])
+    (row,) = published.of_scene("falling_screw", entry)
+    assert row.misses
+    assert row.text == "✗ falling_screw: q.slide at 1 s, of 2: -0.9822 published, -0.981 ours"
+    (entry,) = read_published([{**table, "within": 2e-3}])
+    assert not next(iter(published.of_scene("falling_screw", entry))).misses

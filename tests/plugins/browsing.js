@@ -47,16 +47,16 @@ window.reading = (() => {
     return found;
   }
 
-  // Where links lead to and a reader who follows them sees nothing, everything being folded before.
-  async function lost() {
-    const links = new Map([...document.querySelectorAll("a[href^='#']")].map((link) => [link.hash, link]));
+  // Where links lead to and a reader who follows them sees nothing for so many milliseconds, everything being folded before.
+  async function lost(which, patience) {
+    const links = new Map([...document.querySelectorAll(which)].map((link) => [link.hash, link]));
     const found = [];
     document.querySelectorAll("details").forEach((fold) => { fold.open = false; });
     for (const link of links.values()) {
       link.click();
       const there = () => document.getElementById(decodeURIComponent(link.hash.slice(1)));
       const seen = () => there()?.checkVisibility() && (!there().matches("details") || there().open);
-      for (let tries = 0; !seen() && tries < 50; ++tries) await pause(0);
+      for (const end = performance.now() + patience; !seen() && performance.now() < end;) await pause(0);
       if (!seen()) found.push(link.hash);
       const target = there();
       for (let fold = target?.closest("details"); fold; fold = fold.parentElement.closest("details")) fold.open = false;

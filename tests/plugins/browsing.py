@@ -1,7 +1,13 @@
-"""A page in headless Chromium without network: its requests, its messages, and its content as a reader sees it."""
+"""A page in headless Chromium without network: its requests, its messages, and its content as a reader sees it.
+
+A page answers when it comes to it, which a busy machine delays: after an action a test waits for the state that it
+wants (:meth:`Visit.wait`, :meth:`Visit.until`) and reads nothing before. The environment variable
+``PROOFROLL_SLOW_BROWSER=20`` makes pages compute twenty times slower, so that a test that reads too early fails.
+"""
 
 from __future__ import annotations
 
+import os
 import shutil
 import time
 from collections.abc import Callable, Iterator, Mapping
@@ -17,6 +23,7 @@ SCRIPT = Path(__file__).with_suffix(".js")  # defines ``reading``: functions tha
 # A script for ``visiting`` with which no figure or replay is drawn, as nothing ever comes into view.
 UNDRAWN = "window.IntersectionObserver = class { observe() {} unobserve() {} disconnect() {} };"
 WIDE = {"width": 1280, "height": 900}
+PATIENCE = 120  # [s]: a busy machine must not meet it
 
 
 @dataclass
@@ -49,15 +56,33 @@ class Visit:
             AssertionError: the expression stays false.
         """
         # Playwright's own way needs ``eval`` in the page, which the page's policy forbids.
-        end, tries = time.monotonic() + 120, 0
+        self.until(lambda: self.page.evaluate(condition), again, condition)
+
+    def until(self, met: Callable[[], object], again: Callable[[], object] | None = None, what: str = "") -> None:
+        """Waits until a question that is asked from here is answered with yes, for two minutes at most.
+
+        Args:
+            met: question that is answered with yes once the state is there.
+            again: action repeated each second, where a busy page may miss a single one.
+            what: the state in words, for the error.
+
+        Raises:
+            AssertionError: the state never comes.
+        """
+        end, tries = time.monotonic() + PATIENCE, 0
         while True:
             if again is not None and tries % 100 == 0:
                 again()
-            if self.page.evaluate(condition):
+            if met():
                 return
-            assert time.monotonic() < end, f"never: {condition}"
+            assert time.monotonic() < end, f"never: {what or met}"
             self.page.wait_for_timeout(10)
             tries += 1
+
+    def near(self, selector: str, condition: str) -> None:
+        """Scrolls to an element until an expression is true: what lies above it may grow and push it out of sight."""
+        scroll = "(which) => document.querySelector(which).scrollIntoView({ behavior: 'instant' })"
+        self.wait(condition, again=lambda: self.page.evaluate(scroll, selector))
 
     def draw(self, which: str = "figure", *, patience: float = 120.0) -> list[str]:
         """Scrolls to figures and waits for their pictures.
@@ -107,11 +132,13 @@ class Browser:
             page = idle.pop()
         else:
             context = self.program.new_context(**{"offline": True, "service_workers": "block"} | options)
-            context.set_default_timeout(120_000)  # [ms]: a busy machine must not meet it
+            context.set_default_timeout(1000 * PATIENCE)
             context.add_init_script(path=SCRIPT)
             if before:
                 context.add_init_script(before)
             page = context.new_page()
+            if rate := os.environ.get("PROOFROLL_SLOW_BROWSER"):
+                context.new_cdp_session(page).send("Emulation.setCPUThrottlingRate", {"rate": float(rate)})
         try:
             page.emulate_media(media="null", color_scheme=color_scheme, reduced_motion="no-preference")
             yield page
@@ -133,7 +160,9 @@ def launched() -> Iterator[Browser]:
 
     with sync_playwright() as playwright:
         # WebGL without a graphics card.
-        browser = playwright.chromium.launch(executable_path=program, args=["--enable-unsafe-swiftshader"])
+        browser = playwright.chromium.launch(
+            executable_path=program, args=["--enable-unsafe-swiftshader"], timeout=1000 * PATIENCE
+        )
         yield Browser(browser)
         browser.close()
 

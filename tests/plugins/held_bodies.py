@@ -11,6 +11,7 @@ SPEEDS = {
     "fixed": (),
     "revolute": (2.0,),
     "prismatic": (1.5,),
+    "cylindrical": (1.5, 2.0),
     "universal": (1.0, 2.0),
     "spherical": (1.0, 2.0, 3.0),
     "planar": (1.0, 0.5, 3.0),

@@ -27,9 +27,10 @@ TABLEAUS: Mapping[int, tuple[list[list[float]], list[float]]] = {
     3: ([[], [0.5], [-1.0, 2.0]], [1 / 6, 2 / 3, 1 / 6]),
     4: ([[], [0.5], [0.0, 0.5], [0.0, 0.0, 1.0]], [1 / 6, 1 / 3, 1 / 3, 1 / 6]),
 }
-# Methods of other kinds, with their orders: semi-implicit Euler, implicit midpoint, and Adams-Bashforth of two steps.
+# Methods of other kinds, with their orders: semi-implicit and implicit Euler, implicit midpoint, and Adams-Bashforth of
+# two steps.
 _ROUNDS = 20  # of the fixed-point iteration of an implicit step
-ORDERS = {"semi_implicit": 1, "implicit": 2, "multistep": 2}
+ORDERS = {"semi_implicit": 1, "implicit_euler": 1, "implicit": 2, "multistep": 2}
 
 
 @dataclass(frozen=True)
@@ -92,9 +93,9 @@ def _slope(x: FloatArray, rates: Any, settings: HonestSettings, before: FloatArr
         return np.concatenate([later[:nq], now[nq:]])
     if settings.formulation == "multistep" and before is not None:
         return (3 * now - before) / 2
-    middle = now
+    middle, part = now, 1.0 if settings.formulation == "implicit_euler" else 0.5
     for _ in range(1 if settings.formulation == "multistep" else _ROUNDS):
-        middle = rates(x + settings.dt / 2 * middle)
+        middle = rates(x + part * settings.dt * middle)
     return middle
 
 

@@ -70,7 +70,8 @@ _PLACES, _FIRST, _MODEL = (
     ("differs from the scene", "does not say"),
 )
 _V, _W, _Q = ("v_WB",), ("w_WB",), ("q_WB", "attitude is", "attitudes is")
-_FORCES, _EVENTS = ("N is", "F3 is", "forces is"), ("event_times is", "first_slip is", "event_order is", "creep is")
+_FORCES = ("N is", "F3 is", "forces is")
+_EVENTS = ("event_times is", "event_times has", "first_slip is", "first_slip has", "event_order is", "creep is")
 ORDER = ("event_order is",)  # no error in a quantity
 _TURNED = ("rolls", *MECHANISMS, "sled")
 _STATE, _WRENCH = ("p_WB", "v_WB", "w_WB", "q_WB"), ("joint_force", "joint_torque")

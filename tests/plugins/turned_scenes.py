@@ -1,17 +1,37 @@
-"""The same mechanism in a world whose axes are turned and whose origin lies elsewhere."""
+"""The same scene in a world whose axes are turned and whose origin lies elsewhere, in another order, renamed."""
 
 from __future__ import annotations
 
 import dataclasses
+import random
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
 from proofroll.core.scene import Scene
+from proofroll.elements.ball_on_surface.element import BallOnSurface
 from proofroll.elements.mechanism import Mechanism
+from proofroll.elements.mechanism.bushing import Bushing
 from proofroll.elements.mechanism.checks import WORLD
 from proofroll.elements.mechanism.element import MechanismElement
 from proofroll.elements.mechanism.rotations import from_rpy, to_rpy
+from proofroll.elements.mechanism.signal import Formula, Table, value_at, varies
+
+# Lists of a mechanism whose order is that of its file.
+LISTS = (
+    "bodies",
+    "joints",
+    "loops",
+    "springs",
+    "points",
+    "geometries",
+    "pairs",
+    "actuators",
+    "couplings",
+    "forces",
+    "bushings",
+)
 
 
 def turned_mechanism(mechanism: Mechanism, rpy: tuple[float, float, float], shift: tuple[float, ...]) -> Mechanism:
@@ -63,11 +83,15 @@ def turned_mechanism(mechanism: Mechanism, rpy: tuple[float, float, float], shif
             changes["position"] = position(geometry.position)
             if geometry.kind in {"plane", "circle"}:
                 changes["normal"] = direction(geometry.normal)
-            elif geometry.kind == "bore":
+            elif geometry.kind in {"bore", "shaft", "cone", "torus", "capsule", "cylinder"}:
                 changes["axis"] = direction(geometry.axis)
             elif geometry.kind in {"box", "ellipsoid"}:
                 changes["orientation"] = orientation(geometry.orientation)
         geometries.append(dataclasses.replace(geometry, **changes))
+    forces = [
+        dataclasses.replace(force, value=_turned_signals(force.value, R)) if force.frame == WORLD else force
+        for force in mechanism.forces
+    ]
     points = [
         dataclasses.replace(point, position=position(point.position)) if point.body == WORLD else point
         for point in mechanism.points
@@ -77,9 +101,36 @@ def turned_mechanism(mechanism: Mechanism, rpy: tuple[float, float, float], shif
         joints=tuple(joints),
         loops=tuple(loops),
         springs=tuple(springs),
+        bushings=tuple(_turned_bushing(bushing, position, orientation) for bushing in mechanism.bushings),
         geometries=tuple(geometries),
+        forces=tuple(forces),
         points=tuple(points),
         gravity=direction(mechanism.gravity),
+    )
+
+
+def _turned_bushing(bushing: Bushing, position: Any, orientation: Any) -> Bushing:
+    """A bushing with its end in the world turned and shifted by these functions."""
+    changes: dict[str, Any] = {}
+    for side in ("a", "b"):
+        if getattr(bushing, f"body_{side}") == WORLD:
+            changes[f"position_{side}"] = position(getattr(bushing, f"position_{side}"))
+            changes[f"orientation_{side}"] = orientation(getattr(bushing, f"orientation_{side}"))
+    return dataclasses.replace(bushing, **changes)
+
+
+def _turned_signals(value: Any, R: Any) -> Any:
+    """Three numbers, or formulas, or tables, as components of a vector that is turned."""
+    if not any(varies(part) for part in value):
+        return tuple(float(x) for x in R @ np.array(value))
+    if times := sorted({time for part in value if isinstance(part, Table) for time in part.times}):
+        columns = np.array([np.broadcast_to(value_at(part, np.array(times)), len(times)) for part in value])
+        return tuple(Table(tuple(times), tuple(float(x) for x in row)) for row in R @ columns)
+    texts = [part.text if varies(part) else repr(float(part)) for part in value]
+    numbers = tuple(dict.fromkeys(item for part in value if varies(part) for item in part.numbers))
+    return tuple(
+        Formula(" + ".join(f"({float(a)!r})*({text})" for a, text in zip(row, texts, strict=True)), numbers)
+        for row in R
     )
 
 
@@ -89,3 +140,60 @@ def turned_scene(scene: Scene, rpy: tuple[float, float, float], shift: tuple[flo
     assert isinstance(element, MechanismElement)
     mechanism = turned_mechanism(element.mechanism, rpy, shift)
     return dataclasses.replace(scene, elements=(dataclasses.replace(element, mechanism=mechanism),))
+
+
+def shuffled(scene: Scene, order: random.Random) -> tuple[Scene, dict[str, str]]:
+    """The same scene with its lists in another order and each of their names replaced; and old name -> new name."""
+    (element,) = scene.elements
+    assert isinstance(element, MechanismElement)
+    lists = {name: list(getattr(element.mechanism, name)) for name in LISTS}
+    old = sorted({item.name for items in lists.values() for item in items})
+    new = [f"part{number}" for number in range(len(old))]
+    order.shuffle(new)
+    names = dict(zip(old, new, strict=True))
+    for items in lists.values():
+        order.shuffle(items)
+    parts: Any = {name: tuple(_renamed(item, names) for item in items) for name, items in lists.items()}
+    mechanism = dataclasses.replace(element.mechanism, **parts)
+    return dataclasses.replace(scene, elements=(MechanismElement(mechanism),)), names
+
+
+def _renamed(item: Any, names: Mapping[str, str]) -> Any:
+    """A part of a mechanism with new names, also of the parts that it refers to; a word that is no name stays."""
+    words = {"kind", "unmodelled"}
+    changes: dict[str, Any] = {}
+    for key in (field.name for field in dataclasses.fields(item) if field.name not in words):
+        value = getattr(item, key)
+        if isinstance(value, str):
+            changes[key] = names.get(value, value)
+        elif isinstance(value, tuple) and value and all(isinstance(part, str) for part in value):
+            changes[key] = tuple(names.get(part, part) for part in value)
+    return dataclasses.replace(item, **changes)
+
+
+def turned_ball(scene: Scene, angle: float) -> Scene:
+    """The scene of one ball in a plane, a cylinder, a cone or a torus, turned by an angle [rad] with all its names new.
+
+    A plane and a cylinder turn about the world's y axis, which changes their tilt; the others about their own axis,
+    which changes where on them the ball starts.
+    """
+    (element,) = scene.elements
+    assert isinstance(element, BallOnSurface)
+    tilts = hasattr(element.surface, "tilt")
+    R = from_rpy((0.0, angle, 0.0) if tilts else (0.0, 0.0, angle))
+    direction = tuple(float(x) for x in R @ np.array(element.gravity.direction))
+    surface: Any = dataclasses.replace(element.surface, name="part1")
+    coordinates = element.start.coordinates
+    if tilts:
+        surface = dataclasses.replace(surface, tilt=surface.tilt + angle)
+    else:
+        coordinates = (coordinates[0] + angle, coordinates[1])
+    turned = dataclasses.replace(
+        element,
+        ball=dataclasses.replace(element.ball, name="part0"),
+        surface=surface,
+        contact=dataclasses.replace(element.contact, body="part0", surface="part1"),
+        start=dataclasses.replace(element.start, body="part0", coordinates=coordinates),
+        gravity=dataclasses.replace(element.gravity, direction=direction),
+    )
+    return dataclasses.replace(scene, elements=(turned,))

@@ -10,7 +10,7 @@ import pytest
 from turned_scenes import turned_scene
 
 from proofroll.core.certificate import certify, first_difference
-from proofroll.core.errors import Refused
+from proofroll.core.errors import Diverged, Refused
 from proofroll.elements.mechanism.element import MechanismElement
 from proofroll.files.data_folders import data_folder
 from proofroll.files.scene_file import load_scene
@@ -59,6 +59,6 @@ def test_a_turned_mechanism_has_the_same_certificate(name: str, engine: str, for
     for case in [scene, *(turned_scene(scene, rpy, tuple(random.uniform(-2.0, 2.0, 3))) for rpy in turns)]:
         try:
             answers.append(first_difference(certify(build(case, engine, formulation=formulation), case)))
-        except Refused as refusal:
+        except (Refused, Diverged) as refusal:  # a law of contact may have no answer at the start
             answers.append(str(refusal))
     assert answers[1:] == answers[:1] * 2

@@ -65,14 +65,14 @@ def test_keys_do_what_the_mouse_does(seen: Visit) -> None:
     link.press("Enter")
     address = (link.get_attribute("href") or "").removeprefix("#")
     evidence = seen.page.locator(f"[id='{address}']")  # an address has points, which "#…" would take for classes
-    seen.wait(f"document.getElementById('{address}').open")
+    seen.wait(f"document.getElementById('{address}')?.open")
     evidence.locator("table").first.wait_for()  # built once the browser has told that its fold opened
     evidence.locator("summary").press("Enter")
-    assert not evidence.locator("table").first.is_visible()
+    evidence.locator("table").first.wait_for(state="hidden")
     button = seen.page.locator(".legend [data-row]").first
     for pressed in ("false", "true"):
         button.press("Space")
-        assert button.get_attribute("aria-pressed") == pressed
+        seen.until(lambda pressed=pressed: button.get_attribute("aria-pressed") == pressed, what="the button's state")
 
 
 def test_headings_form_an_outline(unfolded: Visit) -> None:

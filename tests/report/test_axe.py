@@ -53,8 +53,7 @@ def test_axe_finds_nothing_of_weight(report_page: Path, visit: Visiting, width: 
         opened.page.emulate_media(media="screen")
         opened.unfold()
         opened.page.evaluate("document.querySelectorAll('#choice [data-unfold]').forEach((button) => button.click())")
-        opened.page.evaluate("document.getElementById('verdicts').scrollIntoView()")
-        opened.wait("document.querySelectorAll('.scroll[data-sorts]').length > 0")
+        opened.near("#verdicts", "document.querySelectorAll('.scroll[data-sorts]').length > 0")
         assert grave(opened) == []
         opened.page.evaluate("document.querySelector('main').append(document.createElement('button'))")
         assert any("button-name" in text for text in grave(opened, "main > button:last-child"))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable
 from contextlib import AbstractContextManager
 from dataclasses import replace
@@ -21,10 +20,9 @@ def test_requests_and_errors_would_be_seen(tmp_path: Path, visit: Visiting) -> N
     address = "http://proofroll.invalid/a.png"
     file.write_text(f"<!doctype html><img src='{address}'><script>alert('hello')</script><script>nothing()</script>")
     with visit(file) as seen:
+        for words in ("alert: hello", "nothing is not defined", "net::ERR_FAILED"):
+            seen.until(lambda words=words: any(words in message for message in seen.messages), what=words)
         assert seen.requested == [file.as_uri(), address]
-        assert "alert: hello" in seen.messages
-        assert any("nothing is not defined" in message for message in seen.messages)
-        assert any("net::ERR_FAILED" in message for message in seen.messages)
 
 
 def test_every_section_says_something(report_page: Path, visit: Visiting) -> None:
@@ -40,18 +38,15 @@ def test_every_section_says_something(report_page: Path, visit: Visiting) -> Non
 
 def test_a_table_with_rows_below_says_so(report_page: Path, visit: Visiting) -> None:
     """A table that shows not all of its rows says that there are more, until the last one has been in sight."""
-    from playwright.sync_api import expect
-
-    says = "(table) => getComputedStyle(table, '::after').content"
-    with visit(report_page) as seen:
-        seen.page.set_viewport_size({"width": 1280, "height": 420})
-        table = seen.page.locator(".scroll:has(.matrix)").first
-        table.evaluate("(table) => { table.style.maxHeight = '9rem'; }")
-        expect(table).to_have_class(re.compile(r"\bmore\b"))
-        assert "more rows" in table.evaluate(says)
-        table.evaluate("(table) => { table.scrollTop = table.scrollHeight; }")
-        expect(table).not_to_have_class(re.compile(r"\bmore\b"))
-        assert table.evaluate(says) == "none"
+    region = ".scroll:has(.matrix)"
+    table = f"document.querySelector('{region}')"
+    says = f"getComputedStyle({table}, '::after').content"
+    with visit(report_page, viewport={"width": 1280, "height": 420}) as seen:
+        seen.near(region, f"{table}.dataset.sorts === ''")  # until then it is taken apart, and loses its place
+        seen.page.evaluate(f"{table}.style.maxHeight = '6rem'")
+        seen.wait(f"{says}.includes('more rows')")
+        seen.page.evaluate(f"{table}.scrollTop = {table}.scrollHeight")
+        seen.wait(f"{says} === 'none'")
 
 
 def test_figures_are_drawn_when_they_come_into_view(report_page: Path, drawn_page: Drawn) -> None:
@@ -76,9 +71,9 @@ def test_links_lead_to_evidence_that_opens(report_page: Path, visit: Visiting) -
     """Every link within the page ends at something one can see, however it was folded; a dead one is found."""
     with visit(report_page, before=UNDRAWN) as seen:
         assert seen.page.locator("a[href^='#']").count() > 50
-        assert seen.page.evaluate("reading.lost()") == []
+        assert seen.page.evaluate("reading.lost(\"a[href^='#']\", 60_000)") == []
         seen.page.evaluate("document.querySelector('main').insertAdjacentHTML('beforeend', '<a href=\"#no\">x</a>')")
-        assert seen.page.evaluate("reading.lost()") == ["#no"]
+        assert seen.page.evaluate("reading.lost(\"a[href='#no']\", 100)") == ["#no"]
         assert seen.messages == []
 
 
@@ -107,11 +102,12 @@ def test_what_is_folded_is_built_when_it_is_opened(everything: Any, tmp_path: Pa
     with visit(both, before=UNDRAWN) as seen:
         few = seen.page.evaluate(count)
         assert seen.page.locator("#evidence-again table").count() == 0
-        seen.page.get_by_role("checkbox", name="alpha").uncheck()
+        seen.page.locator("[name=engine][value=alpha]").uncheck()
         seen.page.locator("#evidence-again > details > summary").press("Enter")
         seen.wait("document.querySelectorAll('#evidence-again table').length > 3")
         assert seen.page.locator("#evidence-again [data-engine='alpha']").count() > 0
-        assert seen.page.locator("#evidence-again [data-engine='alpha']:visible").count() == 0
+        shown = seen.page.locator("#evidence-again [data-engine='alpha']:visible")
+        seen.until(lambda: shown.count() == 0, what="alpha is hidden")
     with visit(both, before=UNDRAWN) as seen:
         # the texts are read when the browser is idle
         left = "document.querySelectorAll('[data-fold]:not(.run > *)').length"
@@ -127,10 +123,28 @@ def test_an_address_with_a_fragment_opens_its_evidence(report_page: Path, visit:
     """A link from elsewhere into a folded part unfolds it, and what lies around it."""
     name = "evidence-invented.beta.speed-4"
     with visit(report_page, f"#{name}", before=UNDRAWN) as seen:
-        target = seen.page.locator(f"[id='{name}']")
-        assert target.get_attribute("open") is not None
-        target.locator("table").first.wait_for()  # what is folded is built once the browser has told that it opened
+        seen.wait(f"document.getElementById('{name}')?.open")
+        # what is folded is built once the browser has told that it opened
+        seen.page.locator(f"[id='{name}'] table").first.wait_for()
         seen.wait(f"document.getElementById('{name}').getBoundingClientRect().top < innerHeight")
+
+
+def test_a_command_is_copied(report_page: Path, visit: Visiting) -> None:
+    """The button beside the command of a run copies it, letter by letter, also in a part that is unfolded later."""
+    name = "evidence-invented.beta.speed-4"
+    copied = "window.copied = []; navigator.clipboard.writeText = async (text) => { copied.push(text); };"
+    with visit(report_page, f"#{name}", before=UNDRAWN + copied) as seen:
+        command = seen.page.locator(f"[id='{name}'] dd > code", has_text="proofroll run")
+        button = seen.page.locator(f"[id='{name}'] button.copy")
+        button.click()
+        seen.wait("copied.length === 1")
+        assert seen.page.evaluate("copied[0]") == command.text_content()
+        assert command.text_content().startswith("proofroll run ")
+        seen.until(lambda: button.inner_text() == "copied", again=button.click, what="copied")
+        seen.page.evaluate("() => { navigator.clipboard.writeText = () => Promise.reject(new Error('forbidden')); }")
+        seen.until(lambda: button.inner_text() == "selected", again=button.click, what="selected")
+        assert seen.page.evaluate("String(getSelection())") == command.text_content()
+        assert seen.messages == []
 
 
 @pytest.fixture(scope="module")
@@ -201,10 +215,10 @@ def test_a_row_is_switched_off_in_every_figure(drawn: Visit) -> None:
     hidden = "drawn.map((element) => element.data.filter((trace) => trace.visible === false).length)"
     button = drawn.page.locator('.legend [data-row="1"]').first
     button.click()
-    assert all(count >= 2 for count in drawn.page.evaluate(hidden)), "its curve and its distance"
+    drawn.wait(f"{hidden}.every((count) => count >= 2)")  # its curve and its distance
     assert button.get_attribute("aria-pressed") == "false"
     button.click()
-    assert not any(drawn.page.evaluate(hidden))
+    drawn.wait(f"{hidden}.every((count) => count === 0)")
 
 
 def test_first_slips_and_bounds_of_friction_are_drawn(drawn: Visit) -> None:
@@ -220,7 +234,6 @@ def test_the_contents_follow_the_reader(report_page: Path, visit: Visiting) -> N
     """Wherever a reader is, the contents are in sight and mark the section that is being read."""
     with visit(report_page, before=UNDRAWN) as seen:
         for name in ("findings", "replay", "verdicts"):
-            seen.page.evaluate(f"document.getElementById('{name}').scrollIntoView()")
-            seen.page.locator(f"nav a[aria-current][href='#{name}']").wait_for(state="attached")
+            marked = "[...document.querySelectorAll('nav a[aria-current]')].map((link) => link.hash).join()"
+            seen.near(f"#{name}", f"{marked} === '#{name}'")
             assert seen.page.evaluate("document.querySelector('nav').getBoundingClientRect().top") < 200
-        assert seen.page.locator("nav a[aria-current]").count() == 1

@@ -13,10 +13,12 @@ from proofroll.core.comparison import Tolerance
 from proofroll.core.engine_abilities import TellsCaveats
 from proofroll.core.first_steps import certificate
 from proofroll.core.plugins import engine_names, load_engine
+from proofroll.core.verdict import Verdict
 from proofroll.elements.ball_on_surface.model import BallCapability
 from proofroll.elements.mechanism.capabilities import MechanismCapability
 from proofroll.files.scene_file import load_scene
-from proofroll.report.labels import caveat_lines, family_and_caveat, with_caveat
+from proofroll.report.comparison.closing import closing_notes
+from proofroll.report.labels import family_and_caveat, with_caveat
 from proofroll.report.stability.tables import silent_lines
 from proofroll.report.tradeoff.tables import answer_lines
 from proofroll.running.case import EngineFacts
@@ -25,7 +27,7 @@ from proofroll.studies.tradeoff.recommend import recommend
 from proofroll.studies.tradeoff.requirements import Requirements
 
 CONTACT, SLIP = MechanismCapability.CONTACT, BallCapability.BOUNDED_FRICTION
-OURS = "proofroll's own integrator"
+OURS = "integrated by proofroll"
 
 
 @pytest.mark.parametrize(
@@ -138,31 +140,35 @@ def test_a_recommendation_says_which_law_a_choice_has() -> None:
     assert family_and_caveat(SimpleNamespace(family="", caveat="")) == ""
 
 
-def test_families_stand_under_the_rows() -> None:
-    """Rows of one law share a sentence, which names them by their engines; caveats follow."""
-    row = SimpleNamespace(name="machine", formulation="free", setting="default", caveat="", family="soft contact")
-    other = replace_all(row, setting="matched", family="hard contact", caveat="somebody else's steps")
-    assert caveat_lines([row, replace_all(row, name="tool"), other]) == [
-        "Soft contact: machine free default; tool free default.",
-        "Hard contact: machine free matched.",
-        "Somebody else's steps: machine free matched.",
+def test_notes_close_a_comparison_in_four_lines() -> None:
+    """Schemes, caveats, equations of the truth and contact laws are a line each; an engine with all its rows is one."""
+    common = {"verdict": Verdict.AGREES, "resolution": "dt", "resolution_value": 1e-3, "scheme": "Euler"}
+    words = {"caveat": "", "family": "soft contact", "shared": "", "formulation": "free", "setting": "default"}
+    row = SimpleNamespace(
+        name="machine", observables={"z": SimpleNamespace(largest=1.0, truth_error_bar=0.0)}, **common, **words
+    )
+    rows: list[Any] = [
+        row,
+        replace_all(row, name="tool", shared="same equations as the first route"),
+        replace_all(row, setting="matched", family="hard contact", caveat="integrated by others", scheme=""),
+        replace_all(row, setting="tuned", verdict=Verdict.REFUSED, observables={}, scheme=""),
+    ]
+    assert closing_notes(SimpleNamespace(rows=rows)) == [
+        "Same integration scheme (agreement is not independent evidence): machine free default, tool: Euler.",
+        "Caveats: machine free matched: integrated by others.",
+        "Equations of the truth: tool: same equations as the first route.",
+        "Contact law: machine free default, tool: soft contact; machine free matched: hard contact.",
     ]
 
 
-def replace_all(row: Any, **changes: str) -> Any:
+def replace_all(row: Any, **changes: Any) -> Any:
     """A copy of a row with these changes."""
     return SimpleNamespace(**{**vars(row), **changes})
 
 
-def test_a_caveat_stands_beside_verdicts_and_advice() -> None:
-    """Below the table once for all of its settings, beside a name that is blamed, and in a recommendation."""
-    row = SimpleNamespace(
-        name="machine", formulation="free", setting="default", caveat="somebody else's steps", family=""
-    )
-    changed = [SimpleNamespace(**vars(row) | change) for change in ({"setting": "matched"}, {"caveat": ""})]
-    rows: list[Any] = [row, *changed]
-    assert caveat_lines(rows) == ["Somebody else's steps: machine free default, free matched."]
-    assert with_caveat("machine free", row.caveat) == "machine free (somebody else's steps)"
+def test_a_caveat_stands_beside_a_name_that_is_blamed() -> None:
+    """A caveat is in brackets behind the name that it belongs to."""
+    assert with_caveat("machine free", "somebody else's steps") == "machine free (somebody else's steps)"
     assert with_caveat("machine free", "") == "machine free"
 
 

@@ -70,7 +70,12 @@ def test_everything_follows_the_question(seen: Visit, screen: FirstScreen) -> No
             for text in seen.page.locator("#answer-chips li > span:last-child").all_text_contents()
         ]
         assert chips == [f"{chip.title} {chip.words}" for chip in found.chips]
+        dots = "[...document.querySelectorAll('#answer-chips li')].map((chip) => chip.querySelectorAll('.dot').length)"
+        assert seen.page.evaluate(dots) == [len(chip.engines) for chip in found.chips]
         assert seen.page.locator("#answer-cards > li").count() == len(found.kinds)
+        too = [f"Forces, too: {words}" for words in screen.forces(found)]
+        assert [text.strip() for text in seen.page.locator("#answer-cards .too").all_inner_texts()] == too
+        assert len(too) == (0 if forces else len(found.kinds))
         assert seen.page.locator("#uses tbody tr:not(.group)").count() == len(found.scenes)
         assert f"1e-{decade} of the path" in seen.page.locator("#tolerance").get_attribute("aria-valuetext")
         assert ("largest" in seen.page.locator("#asked").inner_text()) == forces
@@ -82,11 +87,11 @@ def test_rows_unfold_to_formulations_and_settings(seen: Visit) -> None:
     assert rows.count() == 1
     engine = seen.page.locator("#choice [data-unfold='alpha']")
     engine.press("Enter")
-    assert (engine.get_attribute("aria-expanded"), rows.count()) == ("true", 2)
+    seen.until(lambda: (engine.get_attribute("aria-expanded"), rows.count()) == ("true", 2), what="formulations")
     seen.page.locator("#choice [data-unfold='alpha fine']").press("Enter")
-    assert rows.count() == 4, "matched and default"
+    seen.until(lambda: rows.count() == 4, what="matched and default")
     engine.press("Enter")
-    assert rows.count() == 1
+    seen.until(lambda: rows.count() == 1, what="all folded")
 
 
 def test_columns_are_kinds_or_single_scenes(seen: Visit, screen: FirstScreen) -> None:
@@ -94,8 +99,10 @@ def test_columns_are_kinds_or_single_scenes(seen: Visit, screen: FirstScreen) ->
     shown = seen.page.locator("#choice thead th:visible")
     assert shown.count() == 1 + len(screen.matrix.kinds)
     seen.page.get_by_role("button", name="single scenes").click()
-    assert shown.count() == 1 + len(screen.matrix.columns) - len(screen.matrix.kinds)
+    single = len(screen.matrix.columns) - len(screen.matrix.kinds)
+    seen.until(lambda: shown.count() == 1 + single, what="single scenes")
     seen.page.get_by_role("button", name="kinds", exact=True).click()
+    seen.until(lambda: shown.count() == 1 + len(screen.matrix.kinds), what="kinds")
 
 
 def test_an_engine_is_hidden_on_the_whole_page_and_in_the_answer(seen: Visit, screen: FirstScreen) -> None:
@@ -103,17 +110,17 @@ def test_an_engine_is_hidden_on_the_whole_page_and_in_the_answer(seen: Visit, sc
     ask(seen, 4, False)
     rows = seen.page.locator("[data-engine='alpha']:visible")
     before, framed = rows.count(), seen.page.evaluate(SHOWN)
-    box = seen.page.get_by_role("checkbox", name="alpha")
+    box = seen.page.locator("[name=engine][value=alpha]")
     box.uncheck()
     seen.wait("document.getElementById('asked').textContent.includes('alone')")
-    assert rows.count() == 0
+    seen.until(lambda: rows.count() == 0, what="alpha is hidden")
     others = {name for name in screen.matrix.engines if name != "alpha"}
     found = answer(screen.matrix, 1e-4, False, others)
     chips = seen.page.locator("#answer-chips li > span:last-child").all_text_contents()
     assert [" ".join(text.split()) for text in chips] == [f"{chip.title} {chip.words}" for chip in found.chips]
     box.check()
     seen.wait("!document.getElementById('asked').textContent.includes('alone')")
-    assert rows.count() == before
+    seen.until(lambda: rows.count() == before, what="alpha is back")
     assert seen.page.evaluate(SHOWN) == framed
 
 
@@ -131,19 +138,21 @@ def test_the_cells_are_one_stop_of_the_tab_key(seen: Visit) -> None:
     assert seen.page.locator("#choice .in[tabindex='0']").count() == 1
     first = seen.page.locator("#choice .in[tabindex='0']")
     first.focus()
-    assert seen.page.locator("#tip").is_visible()
+    seen.page.locator("#tip b").wait_for()
+    seen.page.evaluate("() => new Promise((done) => { scrollBy(0, 30); addEventListener('scroll', done); })")
+    seen.page.locator("#tip b").wait_for()
     assert seen.page.locator("#tip b").inner_text()
     cell = "document.activeElement.closest('td, th')"
-    place = f"[{cell}.parentElement.dataset.place, {cell}.cellIndex]"
-    start = seen.page.evaluate(place)
+    row, at = f"{cell}.parentElement.dataset.place", f"{cell}.cellIndex"
+    start = seen.page.evaluate(f"[{row}, {at}]")
     seen.page.keyboard.press("ArrowDown")
-    assert seen.page.evaluate(place)[0] != start[0]
+    seen.wait(f"{row} !== '{start[0]}'")
     seen.page.keyboard.press("ArrowUp")
-    assert seen.page.evaluate(place) == start
+    seen.wait(f"{row} === '{start[0]}' && {at} === {start[1]}")
     seen.page.keyboard.press("Home")
-    assert seen.page.evaluate(place)[1] == 0
+    seen.wait(f"{at} === 0")
     seen.page.keyboard.press("Escape")
-    assert not seen.page.locator("#tip").is_visible()
+    seen.page.locator("#tip").wait_for(state="hidden")
 
 
 def test_the_first_screen_is_there_without_a_program(report_page: Path, screen: FirstScreen, visit: Visiting) -> None:
@@ -153,6 +162,8 @@ def test_the_first_screen_is_there_without_a_program(report_page: Path, screen: 
         text = " ".join(seen.page.locator("main").inner_text().split())
     for chip in screen.first.chips:
         assert f"{chip.title} {chip.words}" in text
+    for words in screen.forces(screen.first):
+        assert f"Forces, too: {words}" in text
     for row in screen.rows:
         if row.level == "engine":
             for column in screen.matrix.kinds:

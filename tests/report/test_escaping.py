@@ -72,6 +72,8 @@ def test_nothing_that_others_write_runs(drawn_page: Drawn, poisoned_page: Path, 
     The label at the pointer, which plotly writes with markup of its own, shows the poison as text.
     """
     page = poisoned.page
+    for seen in (drawn_page.seen, poisoned):  # the script of a picture comes once the replay has been in sight
+        seen.near(".replay", "document.querySelector('.replay').dataset.ready === ''")
     scripts = drawn_page.seen.page.evaluate(HARM)[2]
     for number in range(3):
         page.locator(".legend button").nth(number).click()

@@ -46,12 +46,15 @@ def test_truth_and_tolerances_have_their_lines(seen: Visit, everything: Any) -> 
     assert band == z.error_bar > 0
     lines = traces(seen, "Array.isArray(t.meta)")
     assert {tuple(line["meta"]): line["y"][0] for line in lines} == {(0, 2): z.engines[0].tolerance, (1,): 1e-4}
-    seen.page.locator('.legend [data-row="1"]').first.click()
-    assert {tuple(line["meta"]): line["visible"] for line in traces(seen, "Array.isArray(t.meta)")} == {
-        (0, 2): True,
-        (1,): False,
-    }
-    seen.page.locator('.legend [data-row="1"]').first.click()
+    for shown in (False, True):
+        seen.page.locator('.legend [data-row="1"]').first.click()
+        expected = {(0, 2): True, (1,): shown}
+        seen.until(
+            lambda expected=expected: (
+                {tuple(line["meta"]): line["visible"] for line in traces(seen, "Array.isArray(t.meta)")} == expected
+            ),
+            what="the line of the row that is switched",
+        )
 
 
 def test_largest_distance_in_the_figure_is_the_judged_error(seen: Visit, everything: Any) -> None:
@@ -71,7 +74,7 @@ def test_keyboard_reads_and_zooms(seen: Visit) -> None:
     canvas.press("ArrowRight")
     readout = seen.page.locator(".readout").first
     assert readout.get_attribute("aria-live") == "polite"
-    assert readout.text_content().startswith("truth at 0.22 s: γ ")
+    seen.until(lambda: readout.text_content().startswith("truth at 0.22 s: γ "), what="the values at the sample")
     assert " m, N " in readout.text_content()
     shown = (
         "[...document.querySelectorAll('figure[data-p=\"0\"] .canvas')].filter((e) => e.querySelector('.hovertext'))"
@@ -104,8 +107,51 @@ def test_colours_follow_the_screen_while_it_is_open_and_paper_is_white(seen: Vis
     seen.page.evaluate("dispatchEvent(new Event('beforeprint'))")
     assert seen.page.evaluate(INK) == light[0]
     seen.page.evaluate("dispatchEvent(new Event('afterprint'))")
-    assert seen.page.evaluate(INK) == dark
+    seen.wait(f"{INK} === '{dark}'")
     seen.page.emulate_media(color_scheme="light")
     seen.wait(f"{INK} === '{light[0]}'")
     seen.page.locator(FIGURE).press("0")
     seen.wait(f"document.querySelector('{FIGURE}').layout.xaxis.range[1] === 1")
+
+
+# Of each figure: who is named at the ends, number of curves, and whether names overlap or are cut off at the right.
+NAMES = """() => [...document.querySelectorAll('figure[data-o] .canvas')].map((canvas) => {
+  const names = [...canvas.querySelectorAll('.annotation text')].filter((text) => text.textContent.startsWith('●'));
+  const boxes = names.map((text) => text.getBoundingClientRect()), right = canvas.getBoundingClientRect().right;
+  const meets = (one, other) => one.top < other.bottom - 1 && other.top < one.bottom - 1;
+  const ends = canvas.layout.annotations.filter(({ name }) => name === 'end');
+  return {
+    told: ends.flatMap(({ hovertext }) => hovertext.split('<br>')),
+    curves: canvas.data.filter(({ mode, visible, meta }) =>
+      visible && mode.includes('lines') && !Array.isArray(meta)).length,
+    overlap: boxes.some((one, k) => boxes.slice(k + 1).some((other) => meets(one, other))),
+    cut: boxes.some((box) => box.right > right + 1),
+  };
+})"""
+
+
+def test_curves_are_named_at_their_ends(drawn_page: Drawn) -> None:
+    """Each figure names the truth and every setting that it shows, in names that neither overlap nor are cut off."""
+    figures = drawn_page.seen.page.evaluate(NAMES)
+    assert figures
+    for figure in figures:
+        assert "truth" in figure["told"]
+        assert any(word.startswith("alpha") for word in figure["told"])
+        assert len(figure["told"]) <= figure["curves"]
+        assert not figure["overlap"]
+        assert not figure["cut"]
+
+
+def test_names_at_ends_follow_the_zoom(seen: Visit) -> None:
+    """A zoom to a part of the time moves the names to where the curves end there; back, they are as before."""
+    names = f"""document.querySelector('{FIGURE}').layout.annotations.filter(({{ name }}) => name === 'end')
+      .map(({{ y, text }}) => `${{y.toFixed(2)}} ${{text}}`).join()"""
+    before = seen.page.evaluate(names)
+    canvas = seen.page.locator(FIGURE)
+    canvas.focus()
+    canvas.press("Home")
+    canvas.press("+")
+    seen.wait(f"{names} !== {before!r}")
+    canvas.press("0")
+    seen.wait(f"{names} === {before!r}")
+    canvas.press("Escape")

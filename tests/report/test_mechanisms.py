@@ -16,7 +16,7 @@ from scipy.spatial.transform import Rotation
 from proofroll.core.errors import Refused
 from proofroll.core.scene import Scene
 from proofroll.core.truth import truth
-from proofroll.elements.mechanism.contacts.geometry import Geometry, Pair
+from proofroll.elements.mechanism.contacts.geometry import Geometry, GeometryKind, Pair
 from proofroll.elements.mechanism.element import MechanismElement
 from proofroll.elements.mechanism.joint import Joint
 from proofroll.elements.mechanism.model import Mechanism
@@ -91,13 +91,13 @@ def test_a_mechanism_is_replayed(
     """In a browser the picture moves with the time, and the values beside it are those of the stored truth."""
     outcome, _, _ = compared
     with visit(report / "report.html") as opened:
-        opened.page.evaluate("document.querySelector('.replay').scrollIntoView()")
-        opened.page.wait_for_selector(".replay[data-ready]")
+        opened.near(".replay", "document.querySelector('.replay').dataset.ready === ''")
         canvas, line = (opened.page.locator(f'.replay [data-part="{name}"]') for name in ("canvas", "time"))
         before = canvas.screenshot()
         line.evaluate("(line) => { line.value = line.max; line.dispatchEvent(new Event('input')); }")
-        opened.page.evaluate("() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
-        assert canvas.screenshot() != before
+        end = "document.querySelector('.replay [data-part=time]').max"
+        opened.wait(f"parseFloat(document.querySelector('.replay [data-part=clock]').textContent) === Number({end})")
+        opened.until(lambda: canvas.screenshot() != before, what="another picture")
         shown = opened.page.locator('.replay [data-part="values"]').inner_text().replace("−", "-").split()
         true = next(iter(outcome.points.values())).trajectory.dataset
         assert abs(float(shown[shown.index("slider.x") + 1]) - float(true["slider.x"][-1])) < 1e-4
@@ -153,6 +153,22 @@ def test_a_bore_is_replayed_as_a_tube_along_the_way() -> None:
     assert Rotation.from_quat(tube["turn"]).apply([0, 0, 1]) == pytest.approx([1, 0, 0])
     (ring,) = [mark for mark in mechanism_drawing(scene.elements[0]).marks if getattr(mark, "look", "") == "hidden"]
     assert len(ring.points) > 50
+
+
+@pytest.mark.parametrize(("kind", "half"), [("capsule", [0.1, 0.1, 0.1]), ("cylinder", [0.1, 0.1, 0.3])])
+def test_long_bodies_are_replayed_whole(kind: GeometryKind, half: list[float]) -> None:
+    """A capsule has its radius and its length in radii, a cylinder half of its length, along the axis of the file."""
+    body = Body("b", 1.0, inertia=(4e-4, 4e-4, 4e-4))
+    joint = Joint("j", "free", "world", "b", q0=(0.0, 0.0, 1.0, 1, 0, 0, 0))
+    shapes = (Geometry("log", "b", kind, radius=0.1, length=0.6, axis=(1, 0, 0)), Geometry("floor", "world", "plane"))
+    mechanism = Mechanism((body,), (joint,), geometries=shapes, pairs=(Pair("hit", ("log", "floor"), 0.1),))
+    scene = Scene("falling", "", (MechanismElement(mechanism),))
+    case, _, _ = draw_mechanism(Replayed(scene, truth(scene, np.linspace(0.0, 0.1, 3)), "", [], "log", "as it is"))
+    log = case["shapes"][0]
+    assert (log["kind"], log["half"]) == (kind, pytest.approx(half))
+    assert log.get("long", 6.0) == pytest.approx(6.0)
+    assert ("long" in log) == (kind == "capsule")
+    assert Rotation.from_quat(log["turn"]).apply([0, 0, 1]) == pytest.approx([1, 0, 0])
 
 
 def test_bodies_of_vertices_are_replayed_as_rods_around_them() -> None:

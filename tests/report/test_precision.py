@@ -138,9 +138,9 @@ def test_quantity_tolerance_and_engines_are_chosen(seen: Visit) -> None:
     seen.page.locator(f"{PART} select").select_option(label="forces (largest of all reactions)")
     seen.wait(f"{PICTURE}.layout.annotations.length === 1")
     seen.page.locator(f"{PART} select").select_option(index=0)
-    seen.page.get_by_role("checkbox", name="alpha").uncheck()
+    seen.page.locator("[name=engine][value=alpha]").uncheck()
     seen.wait(f"{TRACES}.length === 1")
-    seen.page.get_by_role("checkbox", name="alpha").check()
+    seen.page.locator("[name=engine][value=alpha]").check()
     seen.wait(f"{TRACES}.length === 3")
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import json
 import re
 import unicodedata
 from collections.abc import Callable
@@ -42,12 +43,14 @@ def on_paper(report_page: Path, visit: Visiting) -> tuple[PdfReader, list[list[s
         assert seen.draw("figure[data-o='0'][data-p='0']") == []
         colours = [seen.page.evaluate(COLOURS)]
         figures = [seen.page.evaluate(FIRST_POINT)]
+        seen.page.evaluate("folds.find('')")  # printing does not wait until the texts of the folds are unpacked
         noted = f"window.onPaper = ({COLOURS})(); window.figures = {FIRST_POINT};"
         seen.page.evaluate(f"addEventListener('beforeprint', () => {{ {noted} }})")
         content = seen.page.pdf(
             format="A4", prefer_css_page_size=True, print_background=True, tagged=True, outline=True
         )
         assert seen.messages == []
+        seen.wait(f"JSON.stringify(({COLOURS})()) === {json.dumps(json.dumps(colours[0], separators=(',', ':')))}")
         colours += [seen.page.evaluate("onPaper"), seen.page.evaluate(COLOURS)]
         figures += [seen.page.evaluate("figures")]
     return PdfReader(io.BytesIO(content)), colours, figures

@@ -202,16 +202,20 @@ def test_every_truth_is_a_case_with_the_default_settings_as_ghosts(made: Any) ->
     assert held == {"p"}, "neither forces nor an orientation are invented"
 
 
-def replay_with(made: Any, engine: str, change: Callable[[Any], Any]) -> dict[str, Any]:
-    """The first case of the replay with the ball of an engine's first run elsewhere."""
+def moved(made: Any, engine: str, change: Callable[[Any], Any]) -> Any:
+    """The comparison with the ball of an engine's first run elsewhere."""
     outcome, _ = made
     run = next(run for run in outcome.runs if run.row.engine == engine)
     dataset = run.trajectory.dataset
-    moved = StoredTrajectory(run.trajectory.file)
-    vars(moved)["dataset"] = dataset.assign(p_WB=dataset["p_WB"].copy(data=change(dataset["p_WB"].to_numpy())))
-    runs = [dataclasses.replace(run, trajectory=moved) if item is run else item for item in outcome.runs]
-    changed = dataclasses.replace(outcome, runs=runs)
-    return dict(plain(replay_content([changed], BallReport.replay()))["cases"][0])
+    elsewhere = StoredTrajectory(run.trajectory.file)
+    vars(elsewhere)["dataset"] = dataset.assign(p_WB=dataset["p_WB"].copy(data=change(dataset["p_WB"].to_numpy())))
+    runs = [dataclasses.replace(run, trajectory=elsewhere) if item is run else item for item in outcome.runs]
+    return dataclasses.replace(outcome, runs=runs)
+
+
+def replay_with(made: Any, engine: str, change: Callable[[Any], Any]) -> dict[str, Any]:
+    """The first case of the replay with the ball of an engine's first run elsewhere."""
+    return dict(plain(replay_content([moved(made, engine, change)], BallReport.replay()))["cases"][0])
 
 
 def test_the_furthest_of_the_other_settings_is_there_if_it_is_seen(made: Any) -> None:
@@ -306,9 +310,7 @@ def part(opened: Visit, name: str) -> Any:
 
 def ready(opened: Visit) -> None:
     """Brings the replay into view and waits until it has drawn."""
-    opened.page.locator("#replay").scroll_into_view_if_needed()
-    opened.page.evaluate("document.querySelector('.replay').scrollIntoView()")
-    opened.page.wait_for_selector(".replay[data-ready]")
+    opened.near(".replay", "document.querySelector('.replay').dataset.ready === ''")
     settle(opened)
 
 
@@ -328,18 +330,21 @@ def picture(opened: Visit) -> bytes:
     return bytes(part(opened, "canvas").screenshot())
 
 
-def until(opened: Visit, met: Callable[[float], bool]) -> None:
-    """Waits for the time shown; asked from here, since the page's policy forbids a polling script to be compiled."""
-    for _ in range(600):
-        if met(clock(opened)):
-            return
-        opened.page.wait_for_timeout(100)
-    pytest.fail(f"the time shown is still {clock(opened)} s")
+def still(opened: Visit) -> bytes:
+    """What is drawn once it stands: twice the same."""
+    taken = [b"", picture(opened)]
+
+    def same() -> bool:
+        taken[:] = [taken[1], picture(opened)]
+        return taken[0] == taken[1]
+
+    opened.until(same, what="a picture that stands")
+    return taken[1]
 
 
 def passes(opened: Visit, time: float) -> None:
     """Waits until the time shown is beyond ``time`` [s]."""
-    until(opened, lambda shown: shown > time)
+    opened.until(lambda: clock(opened) > time, what=f"the time {time} s is shown")
 
 
 def test_the_replay_plays(written: Any, replayed: Visit) -> None:
@@ -351,19 +356,47 @@ def test_the_replay_plays(written: Any, replayed: Visit) -> None:
     assert opened.page.evaluate("typeof THREE") == "object"
     settle(opened)
     assert clock(opened) == 0, "nothing moves by itself"
-    still = picture(opened)
-    assert still == picture(opened), "and the picture stands while time does"
+    before = still(opened)  # the picture stands while time does
     part(opened, "play").click()
     passes(opened, 0.02)
     part(opened, "play").click()
     stopped = clock(opened)
-    assert picture(opened) != still
+    assert still(opened) != before
     assert clock(opened) == stopped, "pause holds it"
     values = part(opened, "values").inner_text()
     assert "N" in values
     assert "rolls without slip" in values
     assert opened.messages == []
     assert opened.requested == [(written[1] / "report.html").as_uri()]
+
+
+@pytest.mark.drill
+def test_errors_of_ghosts_stand_below_the_picture(
+    made: Any, content: ReportContent, tmp_path: Path, visit: Visiting
+) -> None:
+    """A curve for each ghost shows its distance, the line is at the time shown, a click goes there, ghosts hide."""
+    file, shift = tmp_path / "report.html", np.array([0.0, 0.0, 2e-3])
+    replay = replay_content([moved(made, "beta", lambda p: p + shift)], BallReport.replay())
+    file.write_text(page(content, [[]], replay=replay), encoding="utf-8")
+    with visit(file, viewport=SMALL) as opened:
+        opened.near(".replay", "document.querySelector('.replay').dataset.ready === ''")
+        part(opened, "case").select_option("0")
+        heights = """[...document.querySelectorAll('[data-part=errors] polyline')].map((line) =>
+          line.getAttribute('points').split(' ').map((point) => Number(point.split(',')[1])))"""
+        # 2 mm between 0.1 mm, which is invisible, and 10 mm; what agrees lies on the floor.
+        at = 100 * (1 - np.log10(2 / 0.1) / 2)
+        opened.wait(f"{heights}.length === 2 && {heights}[1].every((height) => Math.abs(height - {at}) < 0.2)")
+        assert set(opened.page.evaluate(heights)[0]) == {100}
+        plot = part(opened, "errors").locator("svg")
+        assert plot.get_attribute("aria-label").endswith("at most 2 mm")
+        plot.scroll_into_view_if_needed()
+        box = plot.bounding_box()
+        plot.click(position={"x": 0.75 * box["width"], "y": 0.5 * box["height"]})
+        opened.until(lambda: abs(clock(opened) - 0.75) < 0.01, what="the time of the click")
+        opened.wait("Math.abs(parseFloat(document.querySelector('[data-errors=now]').style.left) - 75) < 1")
+        opened.page.locator('[data-part="runs"] input').first.uncheck()
+        opened.wait("document.querySelector('[data-part=errors] polyline').style.display === 'none'")
+        assert opened.messages == []
 
 
 @pytest.mark.drill
@@ -375,7 +408,7 @@ def test_the_replay_obeys(made: Any, replayed: Visit) -> None:
         "() => { const line = document.querySelector('[data-part=time]');"
         " line.value = 0.5; line.dispatchEvent(new Event('input')); }"
     )
-    settle(opened)
+    opened.until(lambda: clock(opened) == 0.5, what="the time of the line")
     shown = part(opened, "values").inner_text().replace("−", "-").split("\n")
     dataset = made[0].points["speed=4"].trajectory.dataset.sel(time=0.5, method="nearest")
     assert abs(float(shown[shown.index("z") + 1].split()[0]) - float(dataset["z"])) < 2e-4
@@ -388,22 +421,20 @@ def test_the_replay_obeys(made: Any, replayed: Visit) -> None:
     before = clock(opened)
     part(opened, "time").focus()
     opened.page.keyboard.press("Shift+ArrowRight")
-    settle(opened)
-    assert clock(opened) > before
-    drawn = picture(opened)
+    passes(opened, before)
+    drawn = still(opened)
     part(opened, "canvas").focus()
     opened.page.keyboard.press("ArrowLeft")
-    turned = picture(opened)
-    assert turned != drawn
+    opened.until(lambda: picture(opened) != drawn, what="a turned view")
+    turned = still(opened)
     part(opened, "forces").uncheck()
-    bare = picture(opened)
-    assert bare != turned
+    opened.until(lambda: picture(opened) != turned, what="a picture without forces")
+    bare = still(opened)
     opened.page.locator('[data-part="runs"] input').first.uncheck()
-    settle(opened)
-    assert opened.page.locator('[data-part="runs"] tr.off').count() == 1
+    opened.wait("document.querySelectorAll('[data-part=runs] tr.off').length === 1")
     part(opened, "case").select_option("0")
-    until(opened, lambda shown: shown == 0)
-    assert picture(opened) != bare
+    opened.until(lambda: clock(opened) == 0, what="the start of the other case")
+    opened.until(lambda: picture(opened) != bare, what="the other case")
     assert opened.messages == []
 
 
@@ -417,9 +448,8 @@ def test_without_a_picture_the_values_follow_the_time(
         replay = replace(replay, library=None)
     file = tmp_path / "report.html"
     file.write_text(page(content, [[]], replay=replay), encoding="utf-8")
-    with visit(file, viewport=SMALL) as opened:
-        if lacking == "WebGL":  # nothing is asked for a picture before the replay is in view
-            opened.page.evaluate("() => { HTMLCanvasElement.prototype.getContext = () => null; }")
+    blind = "HTMLCanvasElement.prototype.getContext = () => null;" if lacking == "WebGL" else ""
+    with visit(file, before=blind, viewport=SMALL) as opened:
         ready(opened)
         assert lacking in part(opened, "said").inner_text()
         part(opened, "play").click()

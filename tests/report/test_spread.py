@@ -97,7 +97,7 @@ def test_a_broken_law_is_called_one(made: tuple[Outcome, Store]) -> None:
     """Who breaks a law differs from no truth, and its reason is told."""
     sentences = report_content([_alone(made[0], 0.1)], "").findings.sentences
     assert "3 break a law at some points" in sentences[0]
-    assert sentences[1].startswith("3 settings break a law of mechanics and run to the end without a word, worst ")
+    assert sentences[1].startswith("3 settings break a law of mechanics and run to the end without a warning, worst ")
     assert "truth" not in sentences[1].partition(":")[0]
 
 

@@ -16,7 +16,15 @@ from proofroll.core.verdict import Verdict
 from proofroll.report.comparison.records import ReportedComparison
 from proofroll.report.page.records import ReportContent
 from proofroll.report.parts import PartEntry
-from proofroll.report.terminal.tables import WIDTH, console, first_lines, part_lines, verdict_parts, verdict_table
+from proofroll.report.terminal.tables import (
+    WIDTH,
+    console,
+    dash_notes,
+    first_lines,
+    part_lines,
+    verdict_parts,
+    verdict_table,
+)
 
 
 def test_the_table_of_verdicts_is_plain_where_nobody_watches(content: ReportContent) -> None:
@@ -41,6 +49,22 @@ def test_a_column_without_numbers_is_left_out(content: ReportContent) -> None:
     untimed = replace(found, rows=[replace(row, seconds_per_second=None) for row in found.rows])
     assert "s/s" in head(found)
     assert [name for name in head(found) if name != "s/s"] == head(untimed)
+
+
+def test_dashes_have_their_meaning_below_the_table(content: ReportContent) -> None:
+    """A row without values and one without an order are told below the table; without dashes there is no such line."""
+    found = content.comparisons[0]
+    lines = [line for line in verdict_parts(found) if str(line).startswith("–: ")]
+    assert lines == dash_notes(found)
+    with_values = replace(found, rows=[row for row in found.rows if row.observables])
+    orders = [
+        replace(row, observables={name: replace(item, order=order) for name, item in row.observables.items()})
+        for row, order in zip(2 * with_values.rows[:1], (2.0, None), strict=True)
+    ]
+    assert dash_notes(replace(found, rows=orders[:1])) == []
+    assert "no order is measured" in dash_notes(replace(found, rows=orders))[0]
+    assert "no value" not in dash_notes(replace(found, rows=orders))[0]
+    assert "no value" in dash_notes(replace(found, rows=[orders[0], replace(orders[0], observables={})]))[0]
 
 
 @pytest.mark.drill

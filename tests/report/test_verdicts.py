@@ -260,8 +260,8 @@ def test_rows_of_one_scheme_are_no_witnesses_for_one_another(
     outcome = with_runs(made[0], runs)
     content = report_content([outcome], "proofroll report invented")
     said = (
-        "Same step and errors to three digits, of one scheme or one wrong model, so no evidence for one another: "
-        "alpha fine matched (dt 1e-3 s), beta only (dt 1e-3 s)."
+        "Same integration scheme (agreement is not independent evidence): "
+        "alpha fine matched, beta: equal errors to three digits."
     )
     page_text = " ".join(parse(page(content, [point_curves(outcome)])).text.split())
     assert (said in page_text) is alike
@@ -277,8 +277,8 @@ def test_rows_of_one_declared_scheme_are_named_whatever_their_errors(
     declared = ["", "semi-implicit Euler", third, ""]
     rows = [dataclasses.replace(row, scheme=said) for row, said in zip(content.rows, declared, strict=True)]
     said = (
-        "Of one integration scheme, so no evidence for one another where they agree: "
-        "alpha fine default (dt 1e-3 s), beta only (dt 1e-3 s) (semi-implicit Euler)."
+        "Same integration scheme (agreement is not independent evidence): "
+        "alpha fine default, beta: semi-implicit Euler."
     )
     lines = closing_lines(dataclasses.replace(content, rows=rows))
     assert (said in lines) is shared
@@ -307,13 +307,16 @@ def test_the_cheapest_is_the_same_in_each_sentence_and_in_the_matrix(
             runs[number].append(dataclasses.replace(run, result=fine, rungs=[step]))
     content = report_content([with_runs(made[0], runs)], "proofroll report invented")
     (column,) = content.choice.kinds
-    cell = content.choice.standings(column, FIRST_TOLERANCE, True)[0].cell
+    first = content.choice.standings(column, FIRST_TOLERANCE, True)[0]
+    cell = first.cell
     assert "4e-3 s" in cell.name if coarse < 0.2 else cell.cost == 0.2
     assert "alpha for rolling balls" in content.findings.sentences[2]
     assert content.comparisons[0].evidence
     held = "To hold 0.1 mm per metre of the true path and forces within 1e-4 of the largest"
     answer = content.comparisons[0].evidence.findings.answer
-    assert f"{held}, the cheapest is {cell.name}: {cell.text} real time" in answer
+    assert (
+        f"{held}, the cheapest is {first.engine} {first.formulation}, {first.setting}: {cell.text} real time" in answer
+    )
 
 
 def test_equations_derived_for_a_scene_are_in_no_contest(made: tuple[Outcome, Store]) -> None:
@@ -355,5 +358,5 @@ def test_a_comparison_that_is_not_timed_shows_its_rough_cost(made: tuple[Outcome
     results[0] = dataclasses.replace(results[0], wall_seconds=0.25, processor={"advance": 0.2})
     runs = [dataclasses.replace(run, result=item) for run, item in zip(outcome.runs, results, strict=True)]
     rows = outcome_content(dataclasses.replace(outcome, runs=runs)).rows
-    assert tables.cost_cell(rows[0], None) == ("~0.2", "of one run beside which others ran: to a factor of about two")
+    assert tables.cost_cell(rows[0], None) == ("≈ 0.2", "of one run beside which others ran: to a factor of about two")
     assert tables.cost_cell(rows[-1], None) == ("–", "not timed")

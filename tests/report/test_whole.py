@@ -124,9 +124,9 @@ def test_exactly_three_sentences_from_the_data(report: Report) -> None:
     )
     assert "closest is alpha fine matched" in found[0]
     assert found[1].startswith(
-        "1 setting differs from the truth and runs to the end without a word, worst alpha fine default"
+        "1 setting differs from the truth and runs to the end without a warning, worst alpha fine default"
     )
-    assert found[1].endswith("1 of 2 boundaries of stability and accuracy are passed without a word.")
+    assert found[1].endswith("1 of 2 boundaries of stability and accuracy are passed without a warning.")
     assert found[2] == answer(report.content.choice, FIRST_TOLERANCE, forces=True).sentence
     nothing = three_sentences([], {}, choice_matrix([], {}))
     assert len(nothing) == 3

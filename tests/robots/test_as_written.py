@@ -53,7 +53,7 @@ def test_refused(proofroll: Proofroll, tmp_path: Path) -> None:
     code, out, _ = proofroll("check", str(path), "--engine", "mujoco", "--states", "2")
     assert code == 0
     said = " ".join(out.split())
-    assert said.count("The file as it is: mujoco: refused (ValueError") == 1
+    assert said.count("The file as it is: MuJoCo: refused (ValueError") == 1
     assert "absent.stl" in said
 
 

@@ -119,3 +119,61 @@ def test_a_joint_more(tmp_path: Path) -> None:
     assert found.added == []
     assert found.engines[0].layers["joints"].difference == 1
     assert set(found.engines[0].layers) > {"mass", "mass matrix"}
+
+
+def _renamed(text: str, form: str) -> str:
+    for number in (1, 2, 3):
+        text = text.replace(f'joint name="j{number}"', f'joint name="{form.format(number)}"')
+    return text
+
+
+@pytest.mark.parametrize(("form", "argument"), [("arm_j{}", "*=arm_*"), ("k{}", "j*=k*"), ("j{}_r", "*=*_r")])
+def test_proposed_map(form: str, argument: str, proofroll: Proofroll, tmp_path: Path) -> None:
+    """A map is proposed, and taken, where names differ by a prefix or suffix and kinds and tree fit."""
+    one, two = tmp_path / "one.urdf", tmp_path / "two.urdf"
+    one.write_text(urdf())
+    two.write_text(_renamed(urdf(), form))
+    code, out, _ = proofroll("check", str(one), "--against", str(two))
+    assert code == 1
+    assert f"try --map '{argument}'" in " ".join(out.split())
+    code, out, _ = proofroll("check", str(one), "--against", str(two), "--map", argument)
+    assert code == 0
+    assert "--map" not in out
+
+
+def test_no_map_is_proposed(tmp_path: Path) -> None:
+    """Joints of other kinds are no partners, whatever their names, nor are names without a common part."""
+    one, two = tmp_path / "one.urdf", tmp_path / "two.urdf"
+    one.write_text(urdf())
+    two.write_text(_renamed(urdf(kinds=("prismatic", "revolute", "prismatic")), "arm_j{}"))
+    assert against(one, two).proposed == ""
+    two.write_text(_renamed(urdf(), "x{}x"))
+    assert against(one, two).proposed == ""
+
+
+@pytest.mark.parametrize(
+    ("names", "said"),
+    [("j**=k*", "write one * on each side"), ("j*=k", "write one * on each side"), ("x*=y*", "it fits no joint")],
+)
+def test_wrong_patterns(names: str, said: str, proofroll: Proofroll, pair: Pair) -> None:
+    """A pattern of ``--map`` with no or two ``*`` on a side, or that fits nothing, is one clear line."""
+    one, _ = pair(URDF.format(""), "")
+    code, _, err = proofroll("check", str(one), "--against", str(one), "--map", names)
+    assert code == 2
+    assert said in err
+
+
+def test_last_written_digit(proofroll: Proofroll, pair: Pair, tmp_path: Path) -> None:
+    """Values that differ by the last digit of one file are one line; a value that differs by more is named."""
+    limits = '<limit lower="{}" upper="{}" effort="1" velocity="1"/>'
+    one, _ = pair(URDF.format(limits.format(-6.28319, 1.5708)).replace("continuous", "revolute"), "")
+    two = tmp_path / "two.urdf"
+    two.write_text(one.read_text().replace("-6.28319", "-6.283185307").replace("1.5708", "1.570796"))
+    code, out, _ = proofroll("check", str(one), "--against", str(two))
+    assert code == 0
+    assert "2 values differ by the last written digit alone: h lower -6.28319" in out
+    assert "joint h" not in out
+    two.write_text(one.read_text().replace("-6.28319", "-6.283185307").replace("1.5708", "1.5710"))
+    found = against(one, two)
+    assert [value.quantity for value in found.values] == ["upper"]
+    assert [value.quantity for value in found.rounded] == ["lower"]

@@ -32,6 +32,7 @@ def test_each_engine_is_started_once(
 
 
 @pytest.mark.drill
+@pytest.mark.own_workers
 def test_engines_that_are_not_asked_for_are_not_started(
     tmp_path: Path, command_line: Callable[..., tuple[int, str, str]], started_workers: list[str]
 ) -> None:

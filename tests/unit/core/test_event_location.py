@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from proofroll.core.dop853 import controlled_step, solver_from
-from proofroll.core.event_location import first_rise, locate_rise, stays_negative
+from proofroll.core.event_location import first_rise, locate_rise, locate_rise_within, stays_negative
 
 
 def functions(times):
@@ -64,3 +64,27 @@ def test_a_crest_after_a_rise_in_the_same_step_is_no_graze() -> None:
         assert rise is not None
         assert rise.time == pytest.approx(hit, abs=1e-12)
         assert len(grazes) == seen
+
+
+@pytest.mark.parametrize("above", [1e-12, 1e-6])
+def test_a_narrow_crest_between_the_points_is_found(above: float) -> None:
+    """A guard that rises above zero by little between two of its points, far below zero at others, has risen."""
+    for crest in np.linspace(0.11, 0.93, 40):
+        rise = locate_rise_within(lambda t, crest=crest: (above - (t - crest) ** 2 * (1 + t))[:, None], 0.0, 1.0)
+        assert rise is not None
+        assert rise[0] == pytest.approx(crest - np.sqrt(above / (1 + crest)), abs=1e-6)
+    grazes: list[float] = []
+    below = locate_rise_within(lambda t: (-above - (t - 0.5) ** 2)[:, None], 0.0, 1.0, near=2 * above, grazes=grazes)
+    assert below is None
+    assert grazes == pytest.approx([0.5], abs=1e-6)
+
+
+def test_no_rise_is_seen_in_a_guard_that_its_points_do_not_resolve() -> None:
+    """A guard that leaves zero with a cube, and is no polynomial in a long step, does not rise there."""
+
+    def guards(times):
+        return (1 - np.sqrt(1 + times**6 / (1 + times**2)))[:, None]
+
+    assert locate_rise_within(guards, 0.0, 10.0, 1e-14, leaving=True) is None
+    unresolved = locate_rise_within(guards, 0.0, 10.0, 1e-14, leaving=True, halvings=0)
+    assert unresolved is not None

@@ -13,12 +13,16 @@ from proofroll.core.errors import Refused
 from proofroll.elements.mechanism import Body, Joint, Mechanism, Spring
 from proofroll.elements.mechanism.analysis import analyse
 from proofroll.elements.mechanism.capabilities import required
+from proofroll.elements.mechanism.joint import WITH_AXIS
+from proofroll.elements.mechanism.parts import Force
 from proofroll.elements.mechanism.rotations import from_quaternion
+from proofroll.elements.mechanism.spring_law import SpringLaw
 from proofroll.files.scene_file import load_scene
 from proofroll.running.simulation import simulate
 
 ALL = tuple(runs.FORMULATIONS)
 ROUND_OFF = 1e-12
+LAW = SpringLaw("0.3*dL^3 - 0.2/L")
 # Explicit in joint coordinates, so that it has neither other joints nor reactions.
 WITH_REACTIONS = tuple(name for name in ALL if name != "tree")
 
@@ -35,7 +39,9 @@ def with_laws(formulation):
 def example(formulation):
     """A tree with every kind of joint, or with those that a kinematic tree has; with spring, dampers and drives."""
     if formulation != "tree":
-        return replace(examples.every_kind(), loops=(), joints=with_laws(formulation))
+        kinds = examples.every_kind()
+        springs = tuple(replace(spring, force=LAW) for spring in kinds.springs)
+        return replace(kinds, loops=(), joints=with_laws(formulation), springs=springs)
     solid = examples.SOLID
     joints = (
         Joint(
@@ -47,8 +53,13 @@ def example(formulation):
         ),
         Joint("c", "revolute", "b0", "b2", (0, 0, 1), axis=(0, 1, 0), stiffness=3, rest=0.2, damping=0.1, torque=0.4),
     )  # fmt: skip
-    spring = Spring("s", "b1", "world", (0.1, 0, 0), (0, 0, 1), stiffness=20.0, damping=0.5, length=0.3)
-    return Mechanism(tuple(Body(f"b{i}", **solid) for i in range(3)), joints, springs=(spring,))
+    spring = Spring("s", "b1", "world", (0.1, 0, 0), (0, 0, 1), stiffness=20.0, damping=0.5, length=0.3, force=LAW)
+    forces = (
+        Force("f", "b2", "force", (1.0, -2.0, 0.5), (0.1, 0.2, -0.1), "body"),
+        Force("m", "b1", "moment", (0.2, 0.1, -0.3)),
+    )
+    bodies = tuple(Body(f"b{i}", **solid) for i in range(3))
+    return Mechanism(bodies, joints, springs=(spring,), forces=forces, bushings=(examples.BUSHING,))
 
 
 @pytest.mark.parametrize("formulation", ALL)
@@ -78,7 +89,7 @@ def test_what_was_built_is_read_back(formulation):
     np.testing.assert_allclose(built.gravity, mechanism.gravity, atol=ROUND_OFF)
     np.testing.assert_allclose(built.joint_position, motion.p_joint, atol=ROUND_OFF)
     for joint, found, axes in zip(mechanism.joints, built.joint_axis, motion.R_parent, strict=True):
-        if joint.kind in {"revolute", "prismatic", "universal", "planar"}:
+        if joint.kind in WITH_AXIS:
             np.testing.assert_allclose(found, axes[:, 2], atol=ROUND_OFF)
         else:
             assert np.isnan(found).all()

@@ -11,6 +11,7 @@ from proofroll.core.plugins import load_engine
 from proofroll.elements.mechanism import Body, Joint, Loop, Mechanism
 from proofroll.elements.mechanism.contacts.geometry import Geometry, Pair
 from proofroll.elements.mechanism.contacts.start import touches
+from proofroll.elements.mechanism.drives import Actuator
 from proofroll.elements.mechanism.element import MechanismElement
 from proofroll.elements.mechanism.kinematics import Tree
 from proofroll.files.scene_file import load_scene
@@ -103,7 +104,7 @@ def test_wrong_geometry_and_friction_are_told():
 
 
 @pytest.mark.parametrize("name", ["sled", "ladder", "free_turntable", "rattleback", "tilted_disc", "flick"])
-@pytest.mark.parametrize("settings", ["default", "matched"])
+@pytest.mark.parametrize("settings", ["default", "matched", "tuned"])
 def test_the_delassus_matrix_is_read_back(name, settings):
     """What forces on what touches do to its slides is, by MuJoCo's own rows and mass matrix, as in the scene."""
     (element,) = load_scene(name).elements
@@ -186,6 +187,25 @@ def test_each_pair_has_its_own_friction(mu):
     run = MUJOCO.build(on_floor(*SLED, mu=mu, v0=(2, 0, 0, 0, 0, 0)), preset("tuned"))
     run.advance(0.3)
     assert run.sample().v_WB[0, 0] == pytest.approx(2 - mu * G * 0.3, abs=5e-3)
+
+
+def test_a_slip_that_gains_speed_keeps_its_contacts() -> None:
+    """What starts to slide down a slope presses with its weight in every step: the lift by the slip's rate is taken."""
+    mechanism = replace(on_floor(*SLED), gravity=(G * np.sin(0.5), 0.0, -G * np.cos(0.5)))
+    run = MUJOCO.build(mechanism, preset("tuned"))
+    run.advance(0.1)
+    for step in range(101, 120):
+        run.advance(step * 1e-3)
+        assert run.sample().contact_force[:, 2].sum() == pytest.approx(2 * G * np.cos(0.5), rel=1e-6)
+
+
+def test_a_contact_that_turns_or_stops_keeps_pressing() -> None:
+    """A rod's foot slips back, reverses and turns, and presses in every step: J̇v lifts no corrected contact."""
+    run = MUJOCO.build(load_scene("falling_rod"), preset("tuned"))
+    run.advance(0.1)
+    for step in range(101, 900):
+        run.advance(step * 1e-3)
+        assert run.sample().contact_force[0, 2] > 1.0, step
 
 
 # At rest after 0.7 s, by two routes of 1e-12 m: place of the centre of mass and angle.
@@ -274,3 +294,60 @@ def test_touching_bodies_without_weight_are_certified(name):
     (element,) = load_scene("cradle").elements
     run = MUJOCO.build(load_scene("cradle"), preset(name))
     assert [str(line) for line in element.certify(run.built(), run.sample()) if not line.holds] == []
+
+
+def damped_slider(kd, damping, *, contact=True, armature=0.01):
+    """A slider of 2 kg that reaches the floor at 1 m/s, the speed of its servo, through a gear of 2."""
+    shapes = {
+        "geometries": (Geometry("floor", "world", "plane"), Geometry("ball", "b", "sphere", radius=0.1)),
+        "pairs": (Pair("touch", ("ball", "floor"), 0.0),),
+    }
+    laws = {"damping": damping, "armature": armature, "torque": -damping}
+    joint = Joint("z", "prismatic", "world", "b", axis=(0, 0, 1), q0=(0.1 - 1e-9,), v0=(-1.0,), **laws)
+    servo = (Actuator("servo", "z", "velocity", target=-2.0, kd=kd, gear=2.0),) if kd else ()
+    body = Body("b", mass=2.0 - armature, inertia=(0.02, 0.02, 0.02))
+    return Mechanism((body,), (joint,), actuators=servo, gravity=(0, 0, 0), **(shapes if contact else {}))
+
+
+def stopped(mechanism, settings):
+    """Speed after the step in which a slider meets the floor [m/s]."""
+    run = MUJOCO.build(mechanism, settings)
+    run.advance(settings.dt)
+    return abs(float(run.sample().v_WB[0, 2]))
+
+
+@pytest.mark.parametrize(("kd", "damping"), [(500.0, 0.0), (0.0, 2000.0), (250.0, 1000.0)])
+def test_contacts_see_the_armature_of_damping(kd, damping):
+    """Contacts leave h c/(m + h c) of the speed with implicit damping of servos and joints, tuned leaves none."""
+    h, c = 1e-3, 4 * kd + damping
+    slider = damped_slider(kd, damping)
+    keeps = h * c / (2.0 + h * c)
+    assert stopped(slider, preset(dt=h, integrator="implicitfast")) == pytest.approx(keeps, rel=1e-3)
+    assert stopped(slider, preset("tuned", dt=h)) < 1e-3 * keeps
+
+
+def test_the_armature_of_damping_is_the_implicit_step():
+    """Without contact the step is MuJoCo's implicit one to round-off, and forces of a state are those without it."""
+    robot = damped_slider(30.0, 5.0, contact=False)
+    robot = replace(robot, joints=(replace(robot.joints[0], v0=(0.3,)),))
+    usual = replace(MUJOCO.presets["joints"]["tuned"], integrator="Euler")
+    runs = [MUJOCO.build(robot, replace(usual, **more)) for more in ({"damping_armature": True}, {}, {})]
+    runs[2] = MUJOCO.build(robot, replace(usual, integrator="implicitfast"))
+    assert runs[0].built().acceleration == pytest.approx(runs[1].built().acceleration, rel=1e-13)
+    for run in runs:
+        run.advance(0.1)
+    speeds = [float(run.sample().v_WB[0, 2]) for run in runs]
+    assert speeds[0] == pytest.approx(speeds[2], rel=1e-12)
+    assert runs[0].built().acceleration == pytest.approx(runs[2].built().acceleration, rel=1e-9)
+
+
+def test_the_armature_of_damping_needs_euler_and_joints():
+    """Other integrators are refused, for they damp by themselves, and so is a ball, which has no dampers."""
+    for settings, said in (
+        (preset("tuned", integrator="implicitfast", cone_correction=False), "needs integrator=Euler"),
+        (replace(MUJOCO.presets["free"]["tuned"], damping_armature=True), "a ball has no joints"),
+    ):
+        with pytest.raises(InputError, match=said):
+            MUJOCO.build(
+                damped_slider(1.0, 0.0) if settings.formulation == "geoms" else load_scene("inclined_plane"), settings
+            )

@@ -64,6 +64,15 @@ def test_an_error_of_the_solver_does_not_hang_on_units(preset: str, units: Units
     np.testing.assert_allclose(*places, rtol=0, atol=1e-12)
 
 
+def test_rows_that_turn_leave_no_contact_open() -> None:
+    """The foot of a rod that falls presses in every step, though its rows turn by several times gravity's pull."""
+    run = PINOCCHIO.build(load_scene("falling_rod"), PINOCCHIO.presets["impulses"]["tuned"])
+    run.advance(0.6)
+    for step in range(601, 900):
+        run.advance(step * 1e-3)
+        assert run.sample().contact_force[0, 2] > 1.0, step
+
+
 def test_normal_forces_are_those_at_rest() -> None:
     """Three feet at rest share the weight as the levers say."""
     run = PINOCCHIO.build(load_scene("sled"), PRESETS["matched"])

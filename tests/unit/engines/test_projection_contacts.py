@@ -12,14 +12,18 @@ from scipy.integrate import solve_ivp
 from proofroll.core.errors import Refused
 from proofroll.core.first_steps import first_steps
 from proofroll.core.plugins import load_engine
+from proofroll.elements.mechanism.contacts.acting import Acting
 from proofroll.elements.mechanism.contacts.geometry import Geometry, Pair
+from proofroll.elements.mechanism.contacts.touching import Touching
 from proofroll.elements.mechanism.drives import Actuator, Coupling
 from proofroll.elements.mechanism.element import MechanismElement
 from proofroll.elements.mechanism.joint import Joint
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.parts import Body
+from proofroll.elements.mechanism.rotations import Array
 from proofroll.elements.mechanism.sampling import mechanism_of
 from proofroll.elements.mechanism.signal import Formula
+from proofroll.engines.projection.slip_directions import SlipDirections
 from proofroll.files.scene_file import load_scene
 from proofroll.truth.mechanism.switched_truth import truth_of
 from proofroll_drill.published import true_values
@@ -325,6 +329,45 @@ def test_a_foot_that_turns_within_a_step_goes_on() -> None:
     (true,) = true_values("sled_on_slope")
     assert np.hypot(*(run.sample().p_WB[0, :2] - true["values"]["p_WB"][:2])) < 2e-4
     assert [event.kind for event in run.events()] == ["stick", "rest", "rest"]
+
+
+@pytest.mark.drill
+def test_a_slip_that_ends_while_it_turns_sticks() -> None:
+    """A foot whose slip ends within a fixed step becomes the pivot: it does not circle about zero, step after step."""
+    run = PROJECTION.build(load_scene("sled_on_slope"), DEFAULT)
+    run.advance(0.79)
+    (true,) = true_values("sled_on_slope")
+    assert [event.kind for event in run.events()] == ["stick"]
+    assert run.events()[0].time == pytest.approx(true["events"][0], abs=1e-4)
+
+
+@pytest.mark.parametrize("angle", [0.3, 0.6, 0.9])
+def test_a_fixed_step_that_ends_a_slip_keeps_its_direction(angle: float) -> None:
+    """A point that friction stops against a weaker drive passes zero along its slip, at every angle between them."""
+    step, drive = 0.01, 0.82 * np.array([np.cos(angle), np.sin(angle), 0.0])
+    mode = (Acting("slip", None, (1.0, 0.0, 0.0)),)
+    directions, u = SlipDirections(step), np.array([0.2, 0.0, 0.0])
+    directions.begin(mode)
+
+    def rate(slip: Array) -> Array:
+        return np.asarray(drive - directions.heading(0, touching(slip)))
+
+    for count in range(1000):
+        directions.look(count * step, mode, [touching(u)])
+        k1 = rate(u)
+        k2 = rate(u + 0.5 * step * k1)
+        k3 = rate(u + 0.5 * step * k2)
+        u = u + step / 6 * (k1 + 2 * k2 + 2 * k3 + rate(u + step * k3))
+        if directions.passed(0, touching(u)) > 0:
+            break
+    assert directions.passed(0, touching(u)) > 0
+    assert np.linalg.norm(u) < step
+
+
+def touching(slip: Array) -> Touching:
+    """A contact on a floor with this slip [m/s]."""
+    up, zero = np.array([0.0, 0.0, 1.0]), np.zeros(3)
+    return Touching(gap=0.0, normal=up, place=zero, slide=slip, normal_rate=zero, place_rate=zero)
 
 
 def test_a_ball_that_hardly_falls_comes_to_rest() -> None:

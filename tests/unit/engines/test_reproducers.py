@@ -186,6 +186,23 @@ def test_a_program_has_the_laws_of_joints(engine: str, name: str) -> None:
     np.testing.assert_allclose(places, expected, rtol=0, atol=1e-9)
 
 
+@pytest.mark.parametrize(("engine", "formulation"), [("exudyn", "redundant"), ("pinocchio", "constraint_dynamics")])
+def test_a_program_has_constant_forces(engine: str, formulation: str) -> None:
+    """Applied forces that do not change in time are part of the program."""
+    kind, given = kind_of(engine), load_scene("slung_load")
+    (element,) = given.elements
+    held = [dataclasses.replace(f, value=tuple(f.at(0.1)), reaction="world") for f in element.mechanism.forces]  # type: ignore[attr-defined]
+    mechanism = dataclasses.replace(element.mechanism, forces=tuple(held))  # type: ignore[attr-defined]
+    scene = dataclasses.replace(given, elements=(type(element)(mechanism),))  # type: ignore[call-arg]
+    settings = resolve_settings(kind, {"formulation": formulation, "preset": "matched"})
+    (((place,), _, _),) = program(engine, settings, scene)["run"]([0.1])
+    adapter = kind.build(scene, settings)
+    adapter.advance(0.1)
+    sample = adapter.sample()
+    turned = Rotation.from_quat(sample.q_WB[1], scalar_first=True)
+    np.testing.assert_allclose(place, sample.p_WB[1] + turned.apply((0, 0, -0.4)), rtol=0, atol=1e-9)
+
+
 def test_a_function_is_in_no_program() -> None:
     """An effort with a limit is a function of Python's in Exudyn, and the program that would lack it is refused."""
     kind = kind_of("exudyn")

@@ -242,7 +242,7 @@ def test_a_scene_outside_models(edited: Callable[[str, str], str]) -> None:
         (
             'title = "',
             'wheels = 4\ntitle = "',
-            ["wheels = 4", "no such key", "duration, files, gravity", "balls, surfaces"],
+            ["wheels = 4", "no such key", "duration, every, files, gravity", "balls, surfaces"],
         ),
         ("direction = [0, 0, -1]", "direction = [0, 1]", ["gravity.direction = [0, 1]", "list is too short"]),
         ("direction = [0, 0, -1]", "direction = [0, 0, 0, 1]", ["[0, 0, 0, 1]: the list should have at most 3 items"]),

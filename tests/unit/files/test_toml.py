@@ -24,6 +24,13 @@ def test_a_broken_file(tmp_path: Path, content: bytes) -> None:
     assert study_of(path) is None
 
 
+def test_a_file_that_begins_with_a_byte_order_mark(tmp_path: Path) -> None:
+    """A file as Windows' editors write it, with a mark before its first letter, is read."""
+    path = tmp_path / "made.toml"
+    path.write_bytes(b"\xef\xbb\xbfa = 1\r\n")
+    assert read_toml(path) == {"a": 1}
+
+
 def test_a_file_that_is_not_there(tmp_path: Path) -> None:
     """A file that cannot be read is one line that says why."""
     with pytest.raises(InputError, match="cannot be read: No such file"):

@@ -44,6 +44,24 @@ def test_states_within_a_stretch_follow_from_its_steps() -> None:
     assert found[:, 0] == pytest.approx(np.sin(times), abs=1e-12)
 
 
+def test_instants_of_a_controller_are_no_changes() -> None:
+    """A path with thousands of breaks reaches its end: they are known beforehand, as those of a controller at 1 kHz."""
+
+    class Still:
+        def begin(self) -> Transition[str]:
+            return Transition(np.zeros(1), "on", (), np.inf)
+
+        def walk(self, time: float, state: FloatArray, mode: str, until: float) -> Stretch[str]:
+            return Stretch(time, until, mode, state, state, None)
+
+        def change(self, stretch: Stretch[str]) -> Transition[str]:
+            return Transition(stretch.last, "on", (), np.inf)
+
+    path = follow(Still(), 3.0, [k / 1000 for k in range(1, 3000)])
+    assert path.known
+    assert len(path.stretches) == 3000
+
+
 @pytest.mark.parametrize("length", [0.0, 1e-9])
 def test_a_route_that_alternates_without_progress_is_told(length: float) -> None:
     """Stretches without end that are nothing beside the time that has passed end in words, with what alternates."""

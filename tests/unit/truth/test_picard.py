@@ -9,7 +9,7 @@ from proofroll.truth.picard import PicardSteps
 
 def turning(states: np.ndarray) -> np.ndarray:
     """Rates of a point that turns at 1 rad/s."""
-    return np.stack([-states[:, 1], states[:, 0]], axis=1)
+    return np.stack([-states[1], states[0]])
 
 
 def test_a_turning_point_stays_on_its_circle() -> None:
@@ -18,7 +18,7 @@ def test_a_turning_point_stays_on_its_circle() -> None:
     while time < 2 * np.pi:
         end, last, inside = steps.step(time, state, 2 * np.pi)
         within = np.linspace(time, end, 7)
-        assert inside(within) == pytest.approx(np.stack([np.cos(within), np.sin(within)], axis=1), abs=3e-15)
+        assert inside(within) == pytest.approx(np.stack([np.cos(within), np.sin(within)]), abs=3e-15)
         time, state, count = end, last, count + 1
     assert time == 2 * np.pi
     assert state == pytest.approx([1.0, 0.0], abs=3e-15)
@@ -34,3 +34,14 @@ def test_a_step_before_a_pole_gets_shorter_and_a_broken_right_side_has_none() ->
     assert state[0] == pytest.approx(1 / (1 - time), rel=1e-9)
     with pytest.raises(Diverged, match="fell to nothing at t = 1"):
         PicardSteps(lambda y: y * np.nan).step(1.0, np.array([1.0]), 2.0)
+
+
+def test_round_off_of_the_rates_does_not_shorten_steps() -> None:
+    """Rates with noise of 3e-15 of the scale, as of a slow slip, take as few steps as without, to their accuracy."""
+    state, time, count = np.array([1.0, 0.0]), 0.0, 0
+    steps = PicardSteps(lambda states: turning(states) + 3e-15 * np.sin(1e17 * states))
+    while time < 2 * np.pi:
+        time, state, _ = steps.step(time, state, 2 * np.pi)
+        count += 1
+    assert state == pytest.approx([1.0, 0.0], abs=3e-14)
+    assert count < 15

@@ -475,3 +475,24 @@ def test_spheres_that_graze_each_other_are_ill_posed(apart: float) -> None:
     found = motion("two_spheres", [0.0, 0.2], passing=0.08 + apart)
     assert found.horizon == pytest.approx(0.12533, abs=1e-4)
     assert found.events == ()
+
+
+@pytest.mark.drill
+def test_many_joints_at_rest_on_a_body_that_spins() -> None:
+    """Eight rubbing joints, at rest on a body that turns and falls, stay or begin to move by one law in both routes."""
+    bodies, joints = [Body("trunk", 3.0, inertia=(0.05, 0.06, 0.07))], []
+    joints.append(Joint("base", "free", "world", "trunk", q0=(0, 0, 0, 1, 0, 0, 0), v0=(0.3, 0.1, 0.2, 1.0, -2.0, 3.0)))
+    for k in range(8):
+        com = (0.0, 0.02 * (k % 3), -0.1 - 0.01 * k)
+        bodies.append(Body(f"leg{k}", 0.2 + 0.02 * k, com, (0.001, 0.0012, 0.0004)))
+        place = (0.2 * np.cos(k), 0.15 * np.sin(k), 0.0)
+        axis = (np.cos(2 * k), np.sin(2 * k), 0.3)
+        friction = 0.01 if k % 2 else 1.0
+        joints.append(
+            Joint(f"hip{k}", "revolute", "trunk", f"leg{k}", place, axis=axis, q0=(0.3 * k,), friction=friction)
+        )
+    found = truth_of(Mechanism(tuple(bodies), tuple(joints)), np.array([0.0, 0.01, 0.02]))
+    moving = np.abs(found.record.v[-1, 6:]) > 1e-6
+    assert moving.any()
+    assert not moving.all()
+    assert found.bars["p_WB"][-1] < 1e-12

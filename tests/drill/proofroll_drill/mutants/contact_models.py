@@ -13,6 +13,7 @@ from proofroll.core.scene import Scene
 from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.contacts.acting import Acting, heading_of
 from proofroll.elements.mechanism.contacts.dynamics import ContactDynamics
+from proofroll.elements.mechanism.contacts.geometry import coefficients_of
 from proofroll.elements.mechanism.contacts.start import touches
 from proofroll.elements.mechanism.contacts.touching import Touching
 from proofroll.elements.mechanism.rotations import Array
@@ -73,7 +74,7 @@ class ContactMutant(MechanismMutant):
         mechanism = self.mechanism if self.honest else mechanism_of(self.scenes)
         dynamics = ContactDynamics(mechanism)
         found = touches(mechanism, dynamics.at(*mechanism.start()).solution.motion)
-        bodies = mechanism.bodies
+        bodies, laws = mechanism.bodies, coefficients_of(mechanism.contacts)
         return MechanismBuilt(
             mass=np.array([body.mass for body in bodies]),
             com=np.array([body.com for body in bodies]),
@@ -82,8 +83,10 @@ class ContactMutant(MechanismMutant):
             contact_gap=np.array([each.gap for each in found]),
             contact_normal=np.array([each.normal for each in found]),
             contact_place=np.array([each.place for each in found]),
-            contact_friction=np.array([contact.friction for contact in mechanism.contacts]),
-            contact_restitution=np.array([contact.restitution for contact in mechanism.contacts]),
+            contact_friction=laws["contact_friction"],
+            contact_restitution=laws["contact_restitution"],
+            contact_static=laws["contact_static"],
+            contact_tangential=laws["contact_tangential"],
         )
 
 
@@ -139,7 +142,7 @@ class FrictionOfAnImpact(ContactMutant):
 
     fault = "friction of an impact 1.1 times"
     scene: ClassVar[Any] = ("two_spheres", {})
-    until, every = 0.2, 0.008  # the impact, at 0.1 s, lies between samples
+    until, every = 0.2, 0.01  # the impact, at 0.1 s, lies on a sample
     named = ("friction of impacts is 1.1",)
 
     def other(self, mechanism: Mechanism) -> Mechanism:
@@ -160,7 +163,7 @@ class RestitutionOfAnImpact(ContactMutant):
 
     fault = "restitution of an impact 0.9 times"
     scene: ClassVar[Any] = ("two_spheres", {})
-    until, every = 0.2, 0.008  # the impact, at 0.1 s, lies between samples
+    until, every = 0.2, 0.01  # the impact, at 0.1 s, lies on a sample
     named = ("restitution of impacts is 0.9", "restitution of all pairs is 0.9")
 
     def other(self, mechanism: Mechanism) -> Mechanism:

@@ -26,15 +26,20 @@ from proofroll.running.recording import record
 from proofroll.studies.judging import run_values
 from proofroll.studies.judging.reference import Reference
 from proofroll_drill.mutants import (
+    applied_forces,
     ball_models,
     ball_samples,
     ball_settings,
+    bushings,
     contact_models,
+    controllers,
     joint_laws,
     mechanism_models,
     mechanism_numbers,
     mechanism_samples,
     mechanism_settings,
+    prescribed,
+    turning,
 )
 from proofroll_drill.mutants.base import Mutant
 
@@ -42,15 +47,20 @@ if TYPE_CHECKING:
     from proofroll.running.cluster import Cluster
 
 MODULES: tuple[ModuleType, ...] = (
+    applied_forces,
     ball_models,
     ball_samples,
     ball_settings,
+    bushings,
     contact_models,
+    controllers,
     joint_laws,
     mechanism_models,
     mechanism_numbers,
     mechanism_samples,
     mechanism_settings,
+    prescribed,
+    turning,
 )
 # Least tolerance of every observable: relative to its size, and in errors of the engine without the fault.
 _TOLERANCE, _OF_METHOD = 1e-6, 10.0

@@ -225,8 +225,12 @@ class LoopWithoutRow(JointsMutant):
         found = JointCoordinates(mechanism, rank=1)
         whole = found.tree.loop_rows
 
-        def rows(motion: BodyMotion) -> Rows:
-            return Rows(*(np.delete(part, 1, axis=0) for part in whole(motion)))  # type: ignore[arg-type]  # one row less of each
+        def rows(motion: BodyMotion, time: float = 0.0) -> Rows:
+            every = whole(motion, time)
+            less: dict[str, Any] = {
+                name: np.delete(part, 1, axis=0) for name, part in every._asdict().items() if name != "moved"
+            }
+            return every._replace(**less)
 
         found.tree.loop_rows = rows  # type: ignore[method-assign]  # that is the fault
         return found

@@ -1,4 +1,7 @@
-"""Values and errors that were measured elsewhere, and the same of this machine beside them."""
+"""Values and errors that were measured elsewhere, and the same of this machine beside them.
+
+Those of ``numbers.toml``, and ``[[published]]`` of the scenes.
+"""
 
 from __future__ import annotations
 
@@ -14,7 +17,9 @@ import numpy as np
 from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import ProofrollError, require_known
 from proofroll.core.events import events_of
-from proofroll.files.scene_file import load_scene
+from proofroll.core.truth import truth
+from proofroll.elements.mechanism.published import Published, read_published
+from proofroll.files.scene_file import load_scene, read_scene_file, scene_names
 from proofroll.running.simulation import simulate
 
 FILE = Path(__file__).with_name("numbers.toml")
@@ -55,13 +60,39 @@ class Held:
 def held(scenes: list[str]) -> Iterator[Held]:
     """Every published number of some scenes, all if none is named."""
     file = tomllib.loads(FILE.read_text(encoding="utf-8"))
-    known = dict.fromkeys(entry["scene"] for kind in ("truths", "errors") for entry in file[kind])
+    peers = tables()
+    known = dict.fromkeys([*(entry["scene"] for kind in ("truths", "errors") for entry in file[kind]), *peers])
     for name in scenes:
         require_known("scene", name, known, "no number of it was published; choose from")
     for kind, hold in (("truths", _truths), ("errors", _errors)):
         for entry in file[kind]:
             if not scenes or entry["scene"] in scenes:
                 yield from hold(entry)
+    for name, entries in peers.items():
+        if not scenes or name in scenes:
+            for entry in entries:
+                yield from of_scene(name, entry)
+
+
+def tables() -> dict[str, tuple[Published, ...]]:
+    """``[[published]]`` of all scenes that have them."""
+    read = {name: read_scene_file(name).tables.get("published", []) for name in scene_names()}
+    return {name: read_published(content) for name, content in read.items() if content}
+
+
+def of_scene(scene: str, entry: Published) -> Iterator[Held]:
+    """Each observable of a ``[[published]]`` table beside the truth, at the instant at which it is furthest off."""
+    times = np.array([*([] if entry.times[0] == 0 else [0.0]), *entry.times])
+    found = truth(load_scene(scene, **entry.parameters), times)
+    for name, values in entry.values.items():
+        if name not in found:
+            yield Held(scene, "value", name, values[0], np.nan, True, "(the truth has no such observable)")
+            continue
+        ours = found[name].to_numpy()[-len(values) :]
+        share = np.abs(ours - values) / entry.allowed(name)
+        worst = int(np.argmax(np.nan_to_num(share, nan=np.inf)))
+        said = f"{name} at {entry.times[worst]:g} s" + (f", of {len(values)}" if len(values) > 1 else "")
+        yield Held(scene, "value", said, values[worst], float(ours[worst]), not share[worst] <= 1)
 
 
 def true_values(scene: str) -> list[dict[str, Any]]:

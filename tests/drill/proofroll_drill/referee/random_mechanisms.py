@@ -9,10 +9,19 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from proofroll.elements.mechanism import Body, Joint, Loop, Mechanism, Point, Spring, Tree
-from proofroll.elements.mechanism.joint import FACTS, LAWS, Kind
+from proofroll.elements.mechanism.joint import FACTS, LAWS, WITH_AXIS, Kind
 
-KINDS: tuple[Kind, ...] = ("fixed", "revolute", "prismatic", "universal", "spherical", "planar", "free")
-CLOSING = ("revolute", "prismatic", "universal", "spherical", "planar")
+KINDS: tuple[Kind, ...] = (
+    "fixed",
+    "revolute",
+    "prismatic",
+    "universal",
+    "spherical",
+    "planar",
+    "free",
+    "cylindrical",
+)
+CLOSING = ("revolute", "prismatic", "cylindrical", "universal", "spherical", "planar")
 STYLES = ("tree", "loop", "planar tree", "planar loop")
 _CLEAR = 0.05  # least relative singular value of a loop's rows: what is nearer to a singular pose may well be refused
 
@@ -53,7 +62,7 @@ def _tree(rng: Any, *, planar: bool, loop: bool) -> Mechanism:
             second = np.cross(axis, _unit(rng))
         q0, v0 = rng.uniform(-1, 1, FACTS[kind].nq), rng.uniform(-2, 2, FACTS[kind].nv)
         options: dict[str, Any] = {}
-        if kind in {"revolute", "prismatic", "universal", "planar"}:
+        if kind in WITH_AXIS:
             options = {"axis": tuple(axis), "second_axis": None if second is None else tuple(second)}
         values = {"stiffness": 8.0, "rest": 0.5, "damping": 0.4, "torque": 0.7, "armature": 0.1}
         for law, size in values.items():

@@ -110,6 +110,8 @@ class Referee:
                 S, spin = turn(z, q[0]), rates[0] * z
             elif joint.kind == "prismatic":
                 shift, slide = q[0] * z, rates[0] * z
+            elif joint.kind == "cylindrical":
+                S, spin, shift, slide = turn(z, q[1]), rates[1] * z, q[0] * z, rates[0] * z
             elif joint.kind == "universal":
                 S, spin = turn(z, q[0]) @ turn(x, q[1]), rates[0] * z + rates[1] * turn(z, q[0]) @ x
             elif joint.kind == "planar":
@@ -251,12 +253,13 @@ class Referee:
         x, y, z = frame_a.T
         X, Y, Z = frame_b.T
         none = np.zeros(3, np.longdouble)
-        slides = {"prismatic": ((a, x), (a, y)), "planar": ((a, z),), "free": ()}
+        slides = {"prismatic": ((a, x), (a, y)), "cylindrical": ((a, x), (a, y)), "planar": ((a, z),), "free": ()}
         for carrier, u in slides.get(kind, tuple((self.n, e) for e in _ONE)):
             self._rows.append((number, carrier, u, a, places[0], b, places[1], True))
         parallel = ((z, X), (z, Y))
         whole = ((x, Y), (y, Z), (z, X))
-        turns = {"revolute": parallel, "planar": parallel, "universal": ((z, X),), "spherical": (), "free": ()}
+        turns: dict[str, Any] = dict.fromkeys(("revolute", "cylindrical", "planar"), parallel)
+        turns |= {"universal": ((z, X),), "spherical": (), "free": ()}
         for u, other in turns.get(kind, whole):
             self._rows.append((number, a, u, a, none, b, other, False))
 

@@ -28,10 +28,13 @@ def test_a_mechanism_requires_what_it_holds_and_no_more():
     stops = {"limits": (-1.0, 1.0)}
     assert required(wheel(**stops)) == {MechanismCapability.REVOLUTE, MechanismCapability.STOPS}
     assert MechanismCapability.REBOUNDS in required(wheel(**stops, restitution=0.5))
-    of_contact = {"CONTACT", "CONTACT_FRICTION", "CONTACT_REBOUNDS"}
-    of_drives = {"ACTUATORS", "SATURATION", "COUPLINGS", "COUPLINGS_OF_MANY", "MASSLESS", "SIGNALS"}
+    of_contact = {"CONTACT", "CONTACT_FRICTION", "UNBOUNDED_FRICTION", "STATIC_FRICTION"}
+    of_contact |= {"CONTACT_REBOUNDS", "SLIP_REBOUNDS", "TURNING_FRICTION"}
+    of_drives = {"ACTUATORS", "SATURATION", "COUPLINGS", "COUPLINGS_OF_MANY", "MASSLESS", "SIGNALS", "HELD", "MOTIONS"}
     assert of_contact | of_drives | {
         "JOINT_SPRINGS",
+        "DISTANCE_LOOP",
+        "SPRING_LAWS",
         "JOINT_FRICTION",
         "ARMATURE",
         "REDUNDANT",

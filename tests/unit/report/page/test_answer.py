@@ -34,6 +34,8 @@ def test_the_cheapest_engine_of_each_kind_is_told_and_a_witness_never_is() -> No
 
 def test_a_tie_is_told_of_rough_costs_alone() -> None:
     """Costs known to a factor of two that are nearer than that tie; clean ones do not."""
+    dear = choice_matrix([line(error=1e-9, cost=0.2), replace(BETA, cost=23.0)], STUDIES)
+    assert next_words(dear, answer(dear, 1e-4, False).kinds[0]) == "beta joints, 120× the cost"
     for clean, words in ((False, "beta joints, a tie"), (True, "beta joints, 1.5× the cost")):
         lines = [line(error=1e-9, cost=0.2, clean=clean), replace(BETA, cost=0.3, clean=clean)]
         matrix = choice_matrix(lines, STUDIES)
@@ -47,7 +49,7 @@ def test_a_tie_is_told_in_the_chip_in_a_fixed_order() -> None:
     for cheap, dear in ((0.2, 0.3), (0.3, 0.2)):
         lines = [line(error=1e-9, cost=cheap, clean=False), replace(BETA, cost=dear, clean=False)]
         chips = answer(choice_matrix(lines, STUDIES, NAMES), 1e-4, False).chips
-        assert [(chip.engine, chip.title) for chip in chips] == [("alpha", "Alpha or beta")]
+        assert [(chip.engines, chip.title) for chip in chips] == [(("alpha", "beta"), "Alpha or beta")]
 
 
 def test_where_nothing_holds_it_the_closest_is_told() -> None:
@@ -64,13 +66,33 @@ def test_where_nothing_holds_it_the_closest_is_told() -> None:
 def test_forces_are_told_where_they_change_the_choice() -> None:
     """The same, another setting, none, or not judged."""
     for lines, words in (
-        ([LINE, replace(FORCE, error=1e-9)], "✓ the same"),
+        ([LINE, replace(FORCE, error=1e-9)], "✓ the same choice"),
         ([LINE, FORCE], "✗ none"),
         ([LINE], "not judged"),
     ):
         matrix = choice_matrix(lines, STUDIES)
         motion, both = (answer(matrix, 1e-3, forces).kinds[0] for forces in (False, True))
         assert forces_words(matrix, motion, both) == words
+
+
+def test_a_kind_is_held_with_one_setting_or_with_one_by_scene() -> None:
+    """Of scenes that need different presets two are named, more are not, and forces that change one are told."""
+    chain = replace(LINE, study="chain", scene="chain")
+    tuned = replace(chain, row=9, preset="tuned", setting="tuned", cost=2 * LINE.cost)
+    third = replace(tuned, study="ball", scene="ball", row=10, preset="matched", setting="matched")
+    for others, words in (
+        ([chain], "joints, default"),
+        ([tuned], "joints, default or tuned"),
+        ([tuned, third], "joints, settings vary"),
+    ):
+        taken = answer(choice_matrix([LINE, *others], STUDIES), 1e-3, False).kinds[0].taken
+        assert taken is not None
+        assert taken.held_with == words
+    forces = [replace(FORCE, error=1e-9), replace(FORCE, study="chain", scene="chain", error=0.5)]
+    forces.append(replace(forces[1], row=9, preset="tuned", setting="tuned", cost=tuned.cost, error=1e-9))
+    matrix = choice_matrix([LINE, chain, tuned, *forces], STUDIES)
+    motion, both = (answer(matrix, 1e-3, forces).kinds[0] for forces in (False, True))
+    assert forces_words(matrix, motion, both) == "alpha joints, 50×"
 
 
 def test_what_fails_is_told_in_the_words_of_its_comparison() -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import io
+import itertools
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -11,17 +12,21 @@ from typing import Any
 import numpy as np
 import pytest
 import xarray as xr
+from hypothesis import given
+from hypothesis import strategies as st
 from rich.console import Console
 
 from proofroll.core.events import Event
 from proofroll.files.scene_file import load_scene
 from proofroll.files.trajectory_file import write
-from proofroll.report.run.run import run_content, run_lines, value_text
+from proofroll.report.run.last_values import short_names, value_text
+from proofroll.report.run.run import event_csv, run_content, run_lines
 from proofroll.running.case import Result, Status
+from proofroll.running.simulation import simulate
 
 
 def _case(scene: str, **parameters: float) -> Any:
-    engine = SimpleNamespace(name="e", settings={}, precision="double")
+    engine = SimpleNamespace(name="e", settings={}, precision="double", step=None)
     return SimpleNamespace(scene=scene, parameters=parameters, engine=engine, until=1.0, every=0.1, asks=())
 
 
@@ -118,6 +123,50 @@ def test_positions_come_first_and_forces_on_request(tmp_path: Path) -> None:
     assert "force.a" in texts[1]
 
 
+def _range(text: str) -> list[str]:
+    low, _, high = text.partition("-")
+    return [str(number) for number in range(int(low), int(high) + 1)] if high else [text]
+
+
+@given(
+    st.lists(
+        st.tuples(
+            st.sampled_from(["a", "a.b", "c"]),
+            st.sampled_from(["", ".1", ".2", ".3", ".30"]),
+            st.sampled_from(["", ".x", ".y"]),
+        ),
+        unique=True,
+    )
+)
+def test_short_names_keep_every_name_once(parts: list[tuple[str, str, str]]) -> None:
+    """Written together, names of components and numbered contacts stand for exactly the names that were given."""
+    names = ["".join(part) for part in parts]
+    told: list[str] = []
+    for text in short_names(names):
+        choices = [[one for each in part.split("|") for one in _range(each)] for part in text.split(".")]
+        told += [".".join(choice) for choice in itertools.product(*choices)]
+    assert sorted(told) == sorted(names)
+
+
+def test_corners_with_equal_values_are_one_row(tmp_path: Path) -> None:
+    """Eight corners, of which four touch, take two rows for their gaps and one for all forces that are zero."""
+    result = Result(Status.DONE, "reached 1 s", wall_seconds=1.0)
+    gaps = {f"gap.touch.{corner}": 0.4 * (corner % 2) for corner in range(1, 9)}
+    forces = {f"force.touch.{corner}.{axis}": 0.0 for corner in range(1, 9) for axis in "xyz"}
+    content = run_content(_case("pendulum"), result, tmp_path / "none.npz")
+    units = dict.fromkeys(gaps, "m") | dict.fromkeys(forces, "N")
+    content = dataclasses.replace(content, final=gaps | forces, units=units)
+    shown = Console(file=io.StringIO(), width=80)
+    for line in run_lines(content):
+        shown.print(line)
+    rows = [line.split()[:2] for line in shown.file.getvalue().splitlines()[3:-1]]
+    assert rows == [
+        ["gap.touch.1|3|5|7", "0.4"],
+        ["gap.touch.2|4|6|8", "0"],
+        ["force.touch.1-8.x|y|z", "0"],
+    ]
+
+
 @pytest.mark.parametrize("tracked", [False, True])
 def test_a_body_without_tracked_points_is_shown_where_it_is(tracked: bool, tmp_path: Path) -> None:
     """The places of bodies stand among the values, with their error bar, where a scene tracks no point."""
@@ -131,3 +180,22 @@ def test_a_body_without_tracked_points_is_shown_where_it_is(tracked: bool, tmp_p
     places = {name: value for name, value in content.final.items() if name.startswith("box.")}
     assert places == ({} if tracked else {"box.x": 1.0, "box.y": 2.0, "box.z": 3.0})
     assert tracked or (content.error_bars or {})["box.z"] == 1e-9
+
+
+def test_bounces_stand_in_the_table_and_in_the_file_of_events(tmp_path: Path) -> None:
+    """Each impact has its energies and the next apex in the document, on the terminal and in a CSV of all events."""
+    write(simulate(load_scene("spinning_bounce"), "truth", until=1.0), tmp_path / "run.npz")
+    result = Result(Status.DONE, "reached 1 s", trajectory="run.npz", wall_seconds=0.1)
+    content = run_content(_case("spinning_bounce"), result, tmp_path / "run.npz")
+    assert content.bounces is not None
+    assert [round(item.energy_after, 9) for item in content.bounces] == [0.875809978, 0.532676936]
+    shown = Console(file=io.StringIO(), width=100)
+    for line in run_lines(content):
+        shown.print(line)
+    row = next(line for line in shown.file.getvalue().splitlines() if line.startswith("0.319"))
+    assert row.split() == ["0.319275428", "1.5756", "0.875809977641", "0.32"]
+    head, first, last = event_csv(content).splitlines()
+    assert head.endswith("kind,name,energy_before [J],energy_after [J],height [m]")
+    assert first.split(",")[3:5] == ["impact", "contact"]
+    assert float(first.split(",")[-1]) == pytest.approx(0.32, rel=1e-12)
+    assert last.endswith(",")  # its apex lies behind the end

@@ -341,6 +341,30 @@ def test_a_refusal_is_no_failure(tmp_path: Path, status: Status, verdict: Verdic
         assert exit_code([outcome]) == (0 if expected is verdict else 1)
 
 
+@pytest.mark.parametrize("status", [Status.DIVERGED, Status.WRONG_MODEL, Status.CRASHED, Status.REFUSED])
+@pytest.mark.parametrize("true", [True, False])
+def test_a_failure_counts_where_nothing_is_claimed(tmp_path: Path, status: Status, true: bool) -> None:
+    """A first look exits 3 where an engine failed, whether or not there is a truth; a refusal is no failure."""
+
+    def answer(*_: object) -> Result:
+        return Result(status, "the step fell to nothing")
+
+    free = [dataclasses.replace(ROW, engine=engine, expect=list(Verdict)) for engine in ("alpha", "beta")]
+    none = {} if true else {4.0: Result(Status.REFUSED, "two feet touch at once")}
+    outcome = judged(tmp_path, claim(free, [4.0]), answer, none)
+    assert exit_code([outcome]) == (0 if status is Status.REFUSED else 3)
+
+
+@pytest.mark.parametrize("status", [Status.REFUSED, Status.LEFT_OUT])
+def test_a_comparison_that_judges_nothing_is_no_success(tmp_path: Path, status: Status) -> None:
+    """A first look without a truth exits 3, also if every engine ran; one that expects it exits 0."""
+    none = {4.0: Result(status, "two feet touch at once")}
+    free = dataclasses.replace(ROW, expect=list(Verdict))
+    assert exit_code([judged(tmp_path / "free", claim([free], [4.0]), the_truth, none)]) == 3
+    expected = dataclasses.replace(ROW, expect=[Verdict.NOT_JUDGED])
+    assert exit_code([judged(tmp_path / "claim", claim([expected], [4.0]), the_truth, none)]) == 0
+
+
 def test_a_failure_that_was_expected_and_does_not_come(tmp_path: Path) -> None:
     """An engine that runs where a failure is expected contradicts the claim."""
     row = dataclasses.replace(ROW, expect=[Verdict.FAILED])
@@ -369,8 +393,8 @@ def test_at_a_stair_edge_nobody_is_judged_by_the_time_of_slip(tmp_path: Path) ->
 
     (run,) = judged(tmp_path / "right", comparison, projection).runs
     verdicts = {judgement.observable: judgement.verdict for judgement in run.judgements}
-    events = dict.fromkeys(("first_slip", "event_order", "event_times"), Verdict.ILL_POSED)
-    assert verdicts == events | dict.fromkeys(("z", "energy_balance", "gap"), Verdict.AGREES)
+    hanging = dict.fromkeys(("z", "first_slip", "event_order", "event_times"), Verdict.ILL_POSED)
+    assert verdicts == hanging | dict.fromkeys(("energy_balance", "gap"), Verdict.AGREES)
     assert (run.verdict, run.contradictions) == (Verdict.ILL_POSED, [])
 
 

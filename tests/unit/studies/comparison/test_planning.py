@@ -57,6 +57,12 @@ def test_a_ladder_fits_between_the_samples(step: float, factors: list[float]) ->
     assert all(run.ladder.keys() == set(factors) for run in found.runs)
 
 
+def test_a_comparison_without_motion_is_refused() -> None:
+    """An end at the start, where every engine is right, is one line."""
+    with pytest.raises(InputError, match=r"until = 0\.0: the value must be above 0"):
+        first_look.default_comparison("pendulum", {}, until=0.0)
+
+
 def test_a_first_look_takes_the_step_that_a_scene_asks_for() -> None:
     """Engines with a fixed step have that of the scene's file where their own is longer; adaptive ones have theirs."""
     engines = [row.engine for row in first_look.default_comparison("andrews_squeezer", {}).rows]

@@ -159,11 +159,11 @@ def test_reports_of_a_map(small: Any) -> None:
     assert headline(study).startswith("2 points, ")
     console = Console(width=100, record=True, file=open("/dev/null", "w"))  # noqa: SIM115 -- nobody reads it
     console.print(boundary_table(study))
-    assert "projection rotating_frame default" in console.export_text()
+    assert "projection solver rotating_frame default" in console.export_text()
     assert len(list(silent_lines(study))) <= 8
     picture = svg(study)
     assert picture.startswith("<?xml")
-    assert "projection rotating_frame default" in picture, "texts stay texts"
+    assert "projection solver rotating_frame default" in picture, "texts stay texts"
     assert all(f"{letter} {kind}" in " ".join(legend(study)) for kind, letter in letters(study).items())
     assert set(letters(study)) == set(meanings(load_scene("sphere_in_cylinder")))
     assert len(set(letters(study).values())) == len(letters(study))

@@ -289,12 +289,28 @@ def test_ties_are_marked_on_the_front() -> None:
         assert ("≈" in str(table.caption)) == bool(marked)
 
 
+def test_a_front_begins_with_what_holds() -> None:
+    """Points that hold 1e-4 of the size come first, the cheapest of them first; then the others, the nearest first."""
+    steps = [point(number, f"at{number}", 10.0**-number, 10.0 ** (number - 7)) for number in range(1, 6)]
+    numbers = [item.id for item in reversed(steps)]
+    fronts: dict[str, Any] = {"pareto": {"z": numbers}, "pareto_engines": {"z": numbers}}
+    measured = study(*steps, **fronts)
+    scale = measured.quantities["z"].scale
+    assert scale is not None
+    (table,) = front_tables(measured, ["z"])
+    errors = [float(str(cell)) / scale for cell in table.columns[-1].cells]
+    held = [size for size in errors if size <= 1e-4]
+    assert errors == sorted(held, reverse=True) + sorted(set(errors) - set(held))
+    assert 0 < len(held) < len(errors)
+    assert "first what holds 1e-4 of the size" in str(table.caption)
+
+
 def test_a_front_shows_the_errors_by_which_it_is_one() -> None:
     """A coarse run that is close by luck has the error of its finer neighbours there, and the caption says so."""
     lucky = point(1, "fast", 1e-3, 1e-6, envelope={"z": 1e-2})
     fronts: dict[str, Any] = {"pareto": {"z": [1, 2]}, "pareto_engines": {"z": [1, 2]}}
     (table,) = front_tables(study(lucky, MIDDLE, **fronts), ["z"])
-    assert [str(cell) for cell in table.columns[-1].cells] == ["0.01", "1e-4"]
+    assert [str(cell) for cell in table.columns[-1].cells] == ["1e-4", "0.01"]
     assert "by luck" in str(table.caption)
 
 

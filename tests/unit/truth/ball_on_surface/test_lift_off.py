@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import replace
 from typing import Any
 
@@ -10,7 +11,7 @@ import numpy as np
 import pytest
 
 from proofroll import load_scene
-from proofroll.core.errors import Refused
+from proofroll.core.dataset import ended_early
 from proofroll.core.events import events_of
 from proofroll.core.scene import Scene
 from proofroll.core.truth import truth
@@ -55,7 +56,7 @@ def test_known_digits(route: Any) -> None:
     body = rolling_ball(lying(2.4))
     path = follow(body, route(body), 1.0)
     assert path.events == [("lift_off", pytest.approx(0.242029573, abs=1e-9))]
-    assert path.lands == pytest.approx(0.594832033, abs=1e-9)
+    assert path.end == pytest.approx(0.594832033, abs=1e-9)
 
 
 def test_flight_is_a_parabola_with_constant_spin() -> None:
@@ -73,10 +74,17 @@ def test_flight_is_a_parabola_with_constant_spin() -> None:
     assert float(flies.gap.min()) > 0
 
 
-def test_landing_is_refused_with_its_time() -> None:
-    """A run that goes on after the ball has landed is refused; the sentence names the time and what is needed."""
-    with pytest.raises(Refused, match=r"lands at t = 0\.4591\d+ s; a restitution law would be needed"):
-        truth(lying(2.7), np.linspace(0, 1, 11))
+def test_the_truth_ends_at_a_landing() -> None:
+    """A truth that ends where the ball lands has all values before; the sentence names the time and what is needed."""
+    cut, whole = truth(lying(2.7), np.linspace(0, 1, 11)), truth(lying(2.7), np.linspace(0, 0.4, 5))
+    end = ended_early(cut)
+    assert end is not None
+    assert re.search(r"lands at t = 0\.4591\d+ s; a restitution law would be needed", end[1])
+    assert end[0] == pytest.approx(0.4591, abs=1e-4)
+    assert cut["time"].to_numpy().tolist() == whole["time"].to_numpy().tolist()
+    np.testing.assert_allclose(cut["p_WB"], whole["p_WB"], rtol=0, atol=1e-13)
+    assert [event.kind for event in events_of(cut)] == [event.kind for event in events_of(whole)]
+    assert float(cut["p_WB"].attrs["error_bar"]) < 1e-11
 
 
 @pytest.mark.parametrize("route", [SlidingTaylor, Polar, Implicit])

@@ -6,11 +6,15 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from proofroll.elements.mechanism.contacts.acting import Acting
+from proofroll.elements.mechanism.contacts.dynamics import ContactDynamics
 from proofroll.elements.mechanism.contacts.geometry import Geometry, Pair
 from proofroll.elements.mechanism.joint import Joint
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.parts import Body
+from proofroll.truth.mechanism.contact_equations import ContactEquations
 from proofroll.truth.mechanism.error_bars import TwoRouteMotion
+from proofroll.truth.mechanism.maximal_coordinates import MaximalCoordinates
 from proofroll.truth.mechanism.switched_truth import truth_of
 
 TURNS = Rotation.random(2, random_state=11)
@@ -60,3 +64,16 @@ def test_a_turned_planar_contact_keeps_its_motion_its_events_and_its_bars(
         one, other = (getattr(found.record, field)[-1, 0] for found in (plain, turned))
         assert np.abs(turn.as_matrix() @ one - other).max() <= sum(bars)
         assert max(bars) < WIDER * min(bars)
+
+
+def test_a_state_that_violates_nothing_is_left_as_it_is() -> None:
+    """What is exact to round-off stays to the last digit; a violation is removed, by both routes."""
+    mechanism = leaning_rod(0.1, 0.3, Rotation.identity())
+    dynamics, bodies = ContactDynamics(mechanism), ContactEquations(mechanism, MaximalCoordinates(mechanism).lean)
+    stick = (Acting("stick"),)
+    starts = np.concatenate(mechanism.start()), bodies.equations.equations.start()
+    for equations, start in zip((dynamics, bodies), starts, strict=True):
+        exact = equations.eliminated(np.append(start, 0.0), stick)
+        assert equations.eliminated(exact, stick).tobytes() == exact.tobytes()
+        moved = exact + 1e-7
+        assert np.abs(equations.eliminated(moved, stick) - moved).max() > 1e-8

@@ -11,8 +11,9 @@ import pytest
 from proofroll.elements.mechanism.contacts.dynamics import ContactDynamics
 from proofroll.elements.mechanism.drives import Actuator
 from proofroll.elements.mechanism.model import Mechanism
-from proofroll.elements.mechanism.parts import Spring
+from proofroll.elements.mechanism.parts import Force, Spring
 from proofroll.elements.mechanism.signal import Formula, Table
+from proofroll.elements.mechanism.spring_law import SpringLaw
 from proofroll.files.scene_file import load_scene
 from proofroll.truth.mechanism import contact_taylor
 from proofroll.truth.mechanism.contact_bodies import ContactBodies
@@ -88,15 +89,21 @@ def test_a_sweep_compiles_once() -> None:
 
 
 def driven_turntable(target: Any, torque: Any) -> Mechanism:
-    """A ball on a turntable with a motor and a drive, held by a spring off its centre."""
+    """A ball on a turntable with a motor, a drive and applied forces, held by a spring off its centre."""
     m = load_scene("free_turntable").elements[0].mechanism  # type: ignore[attr-defined]
     motor = Actuator("motor", "axle", "position", target=target, kp=0.3, kd=0.01, gear=2.0)
-    spring = Spring("band", "world", "ball", (0.5, 0.1, 0.4), (0.01, 0.0, 0.03), stiffness=0.7, damping=0.1, length=0.1)
+    ends = ("world", "ball", (0.5, 0.1, 0.4), (0.01, 0.0, 0.03))
+    spring = Spring("band", *ends, stiffness=0.7, damping=0.1, length=0.1, force=SpringLaw("0.2*L^3 + 0.1*dL"))
+    disc = m.joints[0].child
+    forces = (
+        Force("push", "ball", "force", (0.01, -0.02, 0.01), (0.0, 0.01, 0.02), "body", reaction=disc),
+        Force("twist", "ball", "moment", (1e-4, 0.0, 2e-4), frame="body", reaction=disc),
+    )
     axle = replace(m.joints[0], torque=torque, damping=0.02, armature=0.0)
-    return replace(m, joints=(axle, *m.joints[1:]), actuators=(motor,), springs=(spring,))
+    return replace(m, joints=(axle, *m.joints[1:]), actuators=(motor,), springs=(spring,), forces=forces)
 
 
-def test_springs_motors_and_drives_are_compiled_but_tables_are_not() -> None:
+def test_springs_forces_motors_and_drives_are_compiled_but_tables_are_not() -> None:
     """Loads of the joints and between bodies have rules in both routes, also as formulas of time; a table has none."""
     pytest.importorskip("heyoka")
     formula = driven_turntable(Formula("0.4*sin(3*t)"), Formula("0.01*t^2"))
@@ -137,3 +144,15 @@ def test_an_effort_at_its_limit_is_compiled() -> None:
     assert [route.split(", ")[1] for route in found.routes] == ["collocation", "Taylor series"]
     assert [(event.kind, event.name) for event in found.events] == [("slip", "push")]
     assert found.events[0].time == pytest.approx(0.060258231738, abs=1e-11)
+
+
+def test_a_load_that_contacts_share_compiles_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A box that slides on its four corners has no compiled mode: it takes seconds for many contacts."""
+    compiled: list[object] = []
+    monkeypatch.setattr(contact_taylor.CompiledModes, "of", lambda *given: compiled.append(given))
+    four = [replace(load_scene("sled").elements[0].mechanism.geometries[1], name=f"foot{k}", position=(x, y, -0.08))  # type: ignore[attr-defined]
+            for k, (x, y) in enumerate([(0.2, 0.1), (0.2, -0.1), (-0.2, 0.1), (-0.2, -0.1)])]  # fmt: skip
+    sled = load_scene("sled", spin=0.0).elements[0].mechanism  # type: ignore[attr-defined]
+    pairs = [replace(sled.pairs[0], name=each.name, geometries=(each.name, "floor")) for each in four]
+    truth_of(replace(sled, geometries=(sled.geometries[0], *four), pairs=tuple(pairs)), np.array([0.0, 0.01]))
+    assert not compiled

@@ -12,17 +12,19 @@ from proofroll.core.errors import InputError, Refused
 from proofroll.core.quantity import powers_of
 from proofroll.core.validation import units_of_kind
 from proofroll.elements.mechanism.assembly import assemble, check_start
+from proofroll.elements.mechanism.bushing import Bushing
 from proofroll.elements.mechanism.contacts.dynamics import ContactDynamics
-from proofroll.elements.mechanism.contacts.geometry import Geometry
+from proofroll.elements.mechanism.contacts.geometry import Geometry, Pair
 from proofroll.elements.mechanism.drives import Actuator, Coupling
 from proofroll.elements.mechanism.element import MechanismElement
 from proofroll.elements.mechanism.joint import Joint
 from proofroll.elements.mechanism.joint_coordinates import JointCoordinates
 from proofroll.elements.mechanism.model import Mechanism
-from proofroll.elements.mechanism.parts import Body, Loop, Point, Spring
+from proofroll.elements.mechanism.parts import Body, Force, Loop, Point, Spring
 from proofroll.elements.mechanism.reader import KINDS
 from proofroll.elements.mechanism.record import record_of
 from proofroll.elements.mechanism.signal import Formula, Table
+from proofroll.elements.mechanism.spring_law import SpringLaw
 from proofroll.files.scene_file import load_scene
 from proofroll.truth.mechanism.contact_tree import ContactTree
 from proofroll.truth.mechanism.error_bars import TwoRouteMotion
@@ -109,7 +111,15 @@ def everything() -> Mechanism:
     return Mechanism(
         tuple(bodies),
         tuple(joints),
-        springs=(Spring("rubber", "wheel", "loose", (0.0, 0.05, 0.0), (0.01, 0.0, 0.0), 4.0, 0.2, 0.3),),
+        springs=(
+            Spring(
+                "rubber", "wheel", "loose", (0.0, 0.05, 0.0), (0.01, 0.0, 0.0), 4.0, 0.2, 0.3, SpringLaw("dL/L + 2")
+            ),
+        ),
+        forces=(
+            Force("blow", "arm", "force", (0.5, turn, slide), (0.1, 0.2, 0.3)),
+            Force("twist", "loose", "moment", (0.1, turn, 0.0), reaction="arm"),
+        ),
         points=(Point("tip", "arm", (0.3, 0.0, 0.0)),),
         actuators=tuple(actuators),
         couplings=(Coupling("rack", "axle", "rail", 0.05, 0.2),),
@@ -131,6 +141,7 @@ def test_a_mechanism_in_other_units_has_the_same_equations() -> None:
     assert energy == pytest.approx(records[0].placed(mechanism).energy(), rel=1e-12)
 
 
+SIX = (1.0, 2.0, 3.0, 0.4, 0.5, 0.6)  # of a bushing
 # Numbers whose unit is that of a joint elsewhere; equations of motion with all of them are compared above.
 BY_JOINT = {"target", "kp", "kd", "limit", "ratio", "offset"}
 
@@ -139,22 +150,32 @@ def numbers_of(value: object) -> list[float]:
     """Numbers of a field, of a formula its value at one time."""
     if isinstance(value, tuple):
         return [number for part in value for number in numbers_of(part)]
+    if isinstance(value, SpringLaw):  # at a length of 1 m, or the same in other units
+        return [float(value.pull(1.0 / value.units[0], 0.5 / value.units[1]))]
     return [float(value)] if isinstance(value, float | int) and not isinstance(value, bool) else []
 
 
 def test_every_field_of_every_table_is_scaled_by_its_own_unit() -> None:
     """A field that a table of the scene file has is in its natural unit, and one without a unit is known."""
     loop = Loop("pin", "revolute", "arm", "loose", (0.2, 0.0, 0.0), (0.0, 0.4, 0.0))
+    strut = Loop("strut", "distance", "arm", "loose", length=0.7)
+    moved = Joint("moved", "prismatic", "world", "carried", motion=0.4)
     stop = Joint("stop", "prismatic", "slider", "end", limits=(-0.3, 0.7), friction=0.6, torque=0.3, restitution=0.5)
     all_of_it, units = everything(), Units(0.125, 8.0, 0.25)
     shapes = (
         Geometry("ball", "arm", "sphere", (0.1, 0.0, 0.2), radius=0.3),
         Geometry("stone", "arm", "ellipsoid", axes=(0.3, 0.2, 0.1)),
         Geometry("brick", "loose", "box", size=(0.3, 0.2, 0.1)),
+        Geometry("tyre", "arm", "torus", radius=0.1, ring_radius=0.4),
+        Geometry("floor", "world", "plane"),
+        Geometry("tank", "arm", "capsule", radius=0.1, length=0.4),
     )
+    pairs = (Pair("grip", ("ball", "floor"), 0.4, rolling_resistance=0.1, spinning_friction=0.2),)
     mechanism = replace(
-        all_of_it, loops=(loop,), joints=(*all_of_it.joints, stop), bodies=(*all_of_it.bodies, Body("end", 0.3)),
-        geometries=shapes,
+        all_of_it, loops=(loop, strut), joints=(*all_of_it.joints, stop, moved),
+        bodies=(*all_of_it.bodies, Body("end", 0.3), Body("carried", 0.2)),
+        bushings=(Bushing("mount", "arm", "loose", (0.1, 0.2, 0.3), (0.3, 0.1, 0.2), stiffness=SIX, damping=SIX),),
+        geometries=shapes, pairs=pairs,
     )  # fmt: skip
     own, base, seen = (
         units.mechanism(mechanism),

@@ -14,7 +14,7 @@ from proofroll.core.errors import Refused
 from proofroll.elements.mechanism import Body, Joint, Loop, Mechanism, Tree
 from proofroll.elements.mechanism.analysis import analyse
 from proofroll.elements.mechanism.assembly import check_start
-from proofroll.elements.mechanism.joint import FACTS
+from proofroll.elements.mechanism.joint import FACTS, WITH_AXIS
 from proofroll.elements.mechanism.joint_coordinates import JointCoordinates
 from proofroll.elements.mechanism.placed import Placed
 from proofroll.elements.mechanism.record import record_of
@@ -107,7 +107,7 @@ def test_routes_agree_on_every_kind_of_joint():
     assert np.abs(one.v - two.v).max() < 1e-11
 
 
-@pytest.mark.parametrize("kind", ["revolute", "prismatic", "universal", "spherical", "planar", "fixed"])
+@pytest.mark.parametrize("kind", ["revolute", "prismatic", "cylindrical", "universal", "spherical", "planar", "fixed"])
 def test_routes_agree_on_every_kind_of_loop(kind):
     """A loop of each kind between two branches in space, reactions included; the root is free, so nothing hides."""
     tree = mechanism_examples.every_kind()
@@ -151,6 +151,7 @@ def moved(joint, time):
         "fixed": lambda: (turn(none), none),
         "revolute": lambda: (turn(q[0] * z), none),
         "prismatic": lambda: (turn(none), q[0] * z),
+        "cylindrical": lambda: (turn(q[1] * z), q[0] * z),
         "universal": lambda: (turn(q[0] * z) * turn(q[1] * x), none),
         "planar": lambda: (turn(q[2] * z), q[0] * x + q[1] * np.cross(z, x)),
     }[joint.kind]()
@@ -186,7 +187,7 @@ def turned_joints(draw, kind, name, parent, along=None):
     if facts.nq >= 4:
         q[-4:] += [2.0, 0.0, 0.0, 0.0]  # no quaternion of zeros
         q[-4:] /= np.linalg.norm(q[-4:])
-    options = {"axis": tuple(axis)} if kind in {"revolute", "prismatic", "universal", "planar"} else {}
+    options = {"axis": tuple(axis)} if kind in WITH_AXIS else {}
     options |= {"second_axis": tuple(across)} if kind in {"universal", "planar"} else {}
     rates = draw(st.tuples(*[numbers] * facts.nv))
     there = draw(vectors)

@@ -14,6 +14,8 @@ from proofroll.files.scene_file import load_scene
 PLANE = {"name": "floor", "body": "world", "kind": "plane"}
 BALL = {"name": "ball", "body": "b", "kind": "sphere", "radius": 0.1}
 STONE = {"name": "stone", "body": "b", "kind": "ellipsoid", "axes": [0.3, 0.2, 0.1], "position": [0, 0, 1]}
+RING = {"name": "ring", "body": "world", "kind": "torus", "radius": 0.1, "ring_radius": 0.15}
+FUNNEL = {"name": "funnel", "body": "world", "kind": "cone", "slope": 0.5}
 BORE = {"name": "tube", "body": "world", "kind": "bore", "radius": 0.1}
 PAIR = {"name": "foot", "geometries": ["ball", "floor"], "friction": 0.3}
 
@@ -39,7 +41,7 @@ def made(
     [
         ({**BALL, "radius": -0.1}, "geometries.ball.radius = -0.1: must be at least 0"),
         ({**BALL, "body": "nobody"}, "geometries.ball.body = 'nobody': there is no such body; choose from b, c, world"),
-        ({**BALL, "kind": "cone"}, "geometries.1.kind"),
+        ({**BALL, "kind": "prism"}, "geometries.1.kind"),
         ({**BALL, "axes": [1, 1, 1]}, "geometries.ball.axes = (1.0, 1.0, 1.0): a sphere has none; it has radius"),
         ({**STONE, "axes": [1, 1, 0]}, "geometries.stone.axes = (1.0, 1.0, 0.0): each must be above 0"),
         ({**STONE, "axes": [0.2, 0.1, 1e-6]}, "geometries.stone.axes = (0.2, 0.1, 1e-06): the largest may be at most"),
@@ -51,6 +53,10 @@ def made(
         ({**BORE, "radius": 0}, "geometries.tube.radius = 0.0: a bore has a radius above 0"),
         ({**BORE, "normal": [1, 0, 0]}, "geometries.tube.normal = (1.0, 0.0, 0.0): a bore has none; it has"),
         ({**BORE, "axis": [0, 0, 0]}, "geometries.tube.axis"),
+        ({**RING, "ring_radius": 0.1}, "geometries.ring.ring_radius = 0.1: must be above that of the wire, 0.1"),
+        ({**RING, "slope": 0.1}, "geometries.ring.slope = 0.1: a torus has none; it has ring_radius and radius and"),
+        ({**FUNNEL, "slope": 1.6}, "geometries.funnel.slope = 1.6: must lie between 0 and a right angle, pi/2"),
+        ({**FUNNEL, "radius": 1.0}, "geometries.funnel.radius = 1.0: a cone has none; it has slope and axis"),
     ],
 )  # fmt: skip
 def test_bad_geometries_are_one_line(geometry: dict[str, Any], said: str) -> None:
@@ -73,6 +79,8 @@ def test_bad_geometries_are_one_line(geometry: dict[str, Any], said: str) -> Non
         ({"geometries": ["stone", "tube"]}, "pairs.foot.geometries = ('stone', 'tube'): only a plane with"),
         ({"geometries": ["lid", "tube"]}, "pairs.foot.geometries = ('lid', 'tube'): only a plane with"),
         ({"geometries": ["tube", "ball"]}, "pairs.foot.geometries = ('tube', 'ball'): a sphere of radius 0.1 m has"),
+        ({"geometries": ["ball", "ring"]}, "pairs.foot.geometries = ('ball', 'ring'): a sphere of radius 0.1 m has no"),
+        ({"geometries": ["stone", "funnel"]}, "pairs.foot.geometries = ('stone', 'funnel'): only a plane with a sph"),
         ({"friction": -0.1}, "pairs.foot.friction = -0.1: must be at least 0"),
         ({"restitution": 1.5}, "pairs.foot.restitution = 1.5: no impact returns more than it takes"),
         ({"restitution": -0.5}, "pairs.foot.restitution = -0.5: must be at least 0"),
@@ -81,8 +89,9 @@ def test_bad_geometries_are_one_line(geometry: dict[str, Any], said: str) -> Non
 def test_bad_pairs_are_one_line(pair: dict[str, Any], said: str) -> None:
     """Each impossible pair names its field, its value and what to do."""
     egg = {**STONE, "name": "egg", "body": "c"}
+    others = PLANE, BALL, STONE, egg, BORE, RING, FUNNEL, {**PLANE, "name": "lid", "body": "c"}
     with pytest.raises(InputError) as error:
-        made(PLANE, BALL, STONE, egg, BORE, {**PLANE, "name": "lid", "body": "c"}, pairs=({**PAIR, **pair},))
+        made(*others, pairs=({**PAIR, **pair},))
     assert str(error.value).startswith(said)
     assert "\n" not in str(error.value)
 
@@ -91,6 +100,13 @@ def test_room_in_a_bore_is_more_than_round_off() -> None:
     """A sphere that is smaller than its bore by 1e-12 of it is told that it has no room, before a truth fails at it."""
     with pytest.raises(InputError, match=r"a sphere of radius 0\.1 m has no room in a bore of 0\.1 m; make it smaller"):
         made(PLANE, BALL, {**BORE, "radius": 0.1 * (1 + 1e-12)}, pairs=({**PAIR, "geometries": ["tube", "ball"]},))
+
+
+def test_a_ball_in_the_tip_of_a_cone_is_told_so() -> None:
+    """There it touches along a whole circle, and no direction is the normal."""
+    deep = {**FUNNEL, "position": [0, 0, 1 - 0.1 / np.cos(0.5)]}
+    with pytest.raises(InputError, match="they touch at several points at once, without one normal; move one"):
+        made(PLANE, BALL, deep, pairs=({**PAIR, "geometries": ["ball", "funnel"]},))
 
 
 def test_a_pair_is_listed_once() -> None:

@@ -7,8 +7,9 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from proofroll.elements.mechanism.contacts.geometry import BodyContact
-from proofroll.elements.mechanism.contacts.shapes import Bore, CircleShape, EllipsoidShape, HalfSpace, SphereShape
+from proofroll.elements.mechanism.contacts.shapes import CircleShape, EllipsoidShape, HalfSpace, SphereShape
 from proofroll.elements.mechanism.contacts.touching import Moving, Touching, touch
+from proofroll.elements.mechanism.contacts.walls import Bore, BowlWall, ConeWall, Shaft, TorusWall
 
 STEP = 1e-5  # s; central differences leave 1e-10 of it, round-off 1e-11
 
@@ -36,6 +37,10 @@ def some_shape(kind: str, rng: np.random.Generator) -> Any:
         "ellipsoid": lambda: EllipsoidShape(centre, axes, frame),
         "disc": lambda: CircleShape(centre, 0.3, frame[:, 2].copy()),
         "bore": lambda: Bore(centre, frame[:, 1].copy(), 9.0),
+        "shaft": lambda: Shaft(centre, frame[:, 1].copy(), 0.2),
+        "bowl": lambda: BowlWall(centre, frame[:, 1].copy(), 9.0),
+        "cone": lambda: ConeWall(centre, frame[:, 1].copy(), 0.6),
+        "ring": lambda: TorusWall(centre, frame[:, 1].copy(), 4.0, 0.2),
         "plane": lambda: HalfSpace(centre, frame[:, 1].copy()),
     }[kind]()
 
@@ -69,6 +74,11 @@ def test_a_ball_on_the_axis_of_its_bore_has_numbers() -> None:
         "ball ball",
         "ball bore",
         "bore vertex",
+        "ball shaft",
+        "bowl ball",
+        "ball cone",
+        "vertex cone",
+        "ring ball",
     ],
 )
 @pytest.mark.parametrize("seed", [0, 1, 2])

@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 import functools
+from dataclasses import replace
+from pathlib import Path
 
+import numpy as np
 import pytest
 import xarray as xr
 
 from proofroll.core.diagnosis import Evidence, diagnose, hypotheses_of
+from proofroll.core.plugins import load_engine
 from proofroll.core.scene import Scene
 from proofroll.core.truth import truth
+from proofroll.elements.mechanism.diagnosis.contacts import convex_cone_from_rest
 from proofroll.files.scene_file import load_scene
 from proofroll.running.simulation import simulate
 
@@ -73,3 +78,51 @@ def test_creep_of_a_regularised_law_is_named_with_its_speed() -> None:
     for settled in (frozenset[str](), frozenset({"positions"})):
         causes = diagnose(Evidence(element, [], run, true, 1e-3, settled), hypotheses_of(element))
         assert any("stick creep at 0.0001 m/s" in cause.says for cause in causes) == (not settled), causes
+
+
+BOX = """
+title = "A box that starts to slide"
+source = "this project"
+duration = 1.0
+gravity = { magnitude = 9.81, direction = [0.5, 0, -0.8660254037844387] }
+bodies = [{ name = "box", mass = 1.0, inertia = [0.0017, 0.0017, 0.0017] }]
+joints = [{ name = "float", kind = "free", parent = "world", child = "box", q0 = [0, 0, 0.05, 1, 0, 0, 0] }]
+pairs = [{ name = "rub", geometries = ["shape", "slope"], friction = 0.3 }]
+
+[[geometries]]
+name = "slope"
+body = "world"
+kind = "plane"
+
+[[geometries]]
+name = "shape"
+body = "box"
+kind = "box"
+size = [0.1, 0.1, 0.1]
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("corrects", [False, True])
+def test_a_convex_cone_is_named_from_rest_with_a_remedy_that_holds(tmp_path: Path, corrects: bool) -> None:
+    """A box that starts to slide rises at μ times its acceleration in MuJoCo; with the remedy it follows the truth."""
+    folder = tmp_path / "box"
+    folder.mkdir()
+    (folder / "scene.toml").write_text(BOX)
+    scene = load_scene(str(folder))
+    engine, (element,) = load_engine("mujoco"), scene.elements
+    settings = replace(engine.presets["geoms"]["matched"], cone_correction=corrects)
+    built = engine.build(scene, settings)
+    lines = [line.as_dict() for line in element.certify(built.built(), built.sample())]
+    causes = list(convex_cone_from_rest.test(Evidence(element, lines)))
+    if not corrects:
+        (cause,) = causes
+        assert cause.proven
+        assert "cone_correction=true" in cause.remedy
+        return
+    assert not any(cause.proven for cause in causes)
+    options = {"formulation": "geoms", "preset": "matched", "cone_correction": True}
+    run = simulate(scene, "mujoco", until=0.1, every=0.02, **options)
+    true = simulate(scene, "truth", until=0.1, every=0.02)
+    for name, allowed in (("p_WB", 4e-4), ("v_WB", 2e-5), ("w_WB", 1e-7)):
+        assert float(np.abs(run[name].to_numpy() - true[name].to_numpy()).max()) < allowed, name

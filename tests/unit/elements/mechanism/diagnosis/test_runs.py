@@ -31,9 +31,11 @@ def _told(scene: Scene, run: object, true: object, settled: frozenset[str] = fro
     return [cause.says for cause in _causes(scene, run, true, settled)]
 
 
-def _causes(scene: Scene, run: object, true: object, settled: frozenset[str] = frozenset()) -> Sequence[Cause]:
+def _causes(
+    scene: Scene, run: object, true: object, settled: frozenset[str] = frozenset(), step: float | None = 2e-3
+) -> Sequence[Cause]:
     (element,) = scene.elements
-    evidence = Evidence(element, [], run, true, 2e-3, settled)  # type: ignore[arg-type]  # datasets
+    evidence = Evidence(element, [], run, true, step, settled)  # type: ignore[arg-type]  # datasets
     return diagnose(evidence, hypotheses_of(element))
 
 

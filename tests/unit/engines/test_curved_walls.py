@@ -1,4 +1,4 @@
-"""A ball in a tilted bore: engines that follow its contact agree, the others say why they do not."""
+"""A ball on curved walls: engines that follow its contact agree, the others say why they do not."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def test_a_ball_in_a_bore_agrees(engine: str, largest: float, bored: Scene) -> N
     [
         (
             "mujoco[formulation=geoms]",
-            "contact is in a bore; MuJoCo's shapes are convex, and facets are another surface",
+            "contact has the wall bore; this adapter builds convex geoms alone, as facets are another surface",
         ),
         ("exudyn[formulation=spheres]", "contact has a shape that is no sphere and no plane"),
     ],
@@ -55,3 +55,26 @@ def test_who_has_no_bore_says_so(engine: str, why: str, bored: Scene) -> None:
     """Refused, with the reason."""
     with pytest.raises(Refused, match=why):
         proofroll.simulate(bored, engine, until=0.01)
+
+
+WALLS = {
+    "shaft": (Geometry("wall", "world", "shaft", radius=0.2, axis=(1.0, 0.0, 0.0)), (0.0, 0.0, 0.225)),
+    "bowl": (Geometry("wall", "world", "bowl", (0.0, 0.0, 0.1), radius=0.225), (0.12, 0.0, -0.06)),
+    "cone": (Geometry("wall", "world", "cone", (0.0, 0.0, -0.05), slope=0.6435011087932844), (0.04, 0.0, 0.01125)),
+    "torus": (Geometry("wall", "world", "torus", radius=0.05, ring_radius=0.2), (0.2, 0.0, 0.075)),
+}
+
+
+@pytest.mark.parametrize("kind", WALLS)
+@pytest.mark.parametrize("engine", ["projection[formulation=dependent]", "pinocchio[formulation=impulses,dt=1e-4]"])
+def test_a_ball_slides_on_each_wall_as_its_truth_says(engine: str, kind: str) -> None:
+    """A sphere that slides and spins: path, speeds and forces agree, of a mechanism whose centre of mass is aside."""
+    wall, place = WALLS[kind]
+    inertia = 0.4 * 0.5 * 0.025**2
+    joint = Joint("j", "free", "world", "ball", q0=(*place, 1, 0, 0, 0), v0=(0.0, 0.3, 0.0, 5.0, 0.0, 3.0))
+    body = Body("ball", 0.5, com=(0.002, 0.0, 0.001), inertia=(inertia, inertia, 1.2 * inertia))
+    shapes = (Geometry("sphere", "ball", "sphere", radius=0.025), wall)
+    mechanism = Mechanism((body,), (joint,), geometries=shapes, pairs=(Pair("contact", ("sphere", "wall"), 0.3),))
+    scene = Scene(kind, "", (MechanismElement(mechanism),))
+    found = proofroll.judge(proofroll.simulate(scene, engine, until=0.02, every=0.01), scene)
+    assert found.agrees, str(found)

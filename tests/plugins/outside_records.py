@@ -1,0 +1,281 @@
+"""Records of a robot in the air that programs write without proofroll: MuJoCo alone, and Pinocchio with own steps.
+
+The loop around both is written for itself, with the mistakes that people make in it.
+"""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+
+JOINTS = ("FL_HAA", "FL_HFE", "FL_KFE", "FR_HAA", "FR_HFE", "FR_KFE")
+POSE = np.array([0.1, 0.7, -1.4, 0.1, 0.7, -1.4])
+KP, KD, SCALE, ARMATURE, EFFORT, RATE = 5.0, 0.2, 0.25, 1e-3, 0.8, 50
+OFFSET = 0.15 * np.array([1.0, -1.0, 1.0, 1.0, -1.0, -1.0])
+QUATERNION = np.array([0.9, 0.3, -0.2, 0.25]) / np.linalg.norm([0.9, 0.3, -0.2, 0.25])
+VELOCITY, SPIN = np.array([0.2, -0.1, 0.3]), np.array([0.3, -0.4, 0.9])  # in the world, in the body
+
+_LINK = """<link name="{name}"><inertial><origin xyz="{com}"/><mass value="{mass}"/>
+<inertia ixx="{x}" iyy="{y}" izz="{z}" ixy="0" ixz="0" iyz="0"/></inertial></link>"""
+_JOINT = """<joint name="{name}" type="revolute"><parent link="{parent}"/><child link="{name}_link"/>
+<origin xyz="{place}"/><axis xyz="{axis}"/><limit lower="-3" upper="3" effort="0.8" velocity="40"/></joint>
+<transmission name="{name}_drive"><type>simple</type><joint name="{name}"/>
+<actuator name="{name}_motor"><mechanicalReduction>9</mechanicalReduction></actuator></transmission>"""
+
+
+def urdf() -> str:
+    """A trunk with two legs of three joints, whose efforts are limited to 0.8 N m behind reductions of 9."""
+    parts = [_LINK.format(name="trunk", com="0.02 0 0.01", mass=2, x=0.02, y=0.03, z=0.04)]
+    for leg, side in (("FL", 0.1), ("FR", -0.12)):
+        parent, place = "trunk", f"0.15 {side} 0"
+        for part, axis in (("HAA", "1 0 0"), ("HFE", "0 1 0"), ("KFE", "0 1 0")):
+            name = f"{leg}_{part}"
+            parts.append(_JOINT.format(name=name, parent=parent, place=place, axis=axis))
+            parts.append(_LINK.format(name=f"{name}_link", com="0 0.01 -0.08", mass=0.3, x=2e-3, y=2.1e-3, z=6e-4))
+            parent, place = f"{name}_link", "0 0.02 -0.16"
+    return f'<robot name="legs">{"".join(parts)}</robot>'
+
+
+CONTROL = f"""rate = {RATE}
+pose = {{"FL_HAA" = 0.1, FL_HFE = 0.7, FL_KFE = -1.4, FR_HAA = 0.1, FR_HFE = 0.7, FR_KFE = -1.4}}
+[[gains]]
+joints = "*"
+kp = {KP}
+kd = {KD}
+armature = {ARMATURE}
+[policy]
+call = "proofroll.robots.probe:make"
+scale = {SCALE}
+"""
+
+
+@dataclass
+class Loop:
+    """Somebody's loop around a simulator; every attribute but the first two is a mistake unless it has its default."""
+
+    step: float = 1e-3
+    steps: int = 100
+    to_joint: Sequence[int] = range(6)
+    seen: Sequence[int] = range(6)
+    pose: np.ndarray = field(default_factory=POSE.copy)
+    kp: float = KP
+    kd: float = KD
+    scale: float = SCALE
+    more_steps: int = 0
+    late: int = 0
+    limit: float = EFFORT
+    armature: float = ARMATURE
+    xyzw: bool = False
+    gravity_sign: float = -1.0
+    body_velocity: bool = False
+    world_spin: bool = False
+    signs: np.ndarray = field(default_factory=lambda: np.ones(6))
+    lag: int = 0
+    gravity: float = 9.81
+
+    def record(self, program: Callable[[Loop], Simulator]) -> dict[str, np.ndarray]:
+        """Columns over time of a run, each named as in the documentation."""
+        from proofroll.elements.mechanism.policy import Observation
+        from proofroll.robots.probe import make
+
+        sim, act, rows = program(self), make(JOINTS), []
+        action, queue = np.zeros(6), [POSE.copy() for _ in range(self.late)]
+        period = round(1 / RATE / self.step) + self.more_steps
+        before = sim.state()
+        for k in range(self.steps + 1):
+            state = sim.state()
+            if k % period == 0:
+                quaternion = np.roll(state["q_WB"], -1) if self.xyzw else state["q_WB"]
+                R, body = _matrix(quaternion), _matrix(state["q_WB"])
+                seen = {
+                    "q": state["q"][list(self.seen)],
+                    "v": state["v"][list(self.seen)],
+                    "v_WB_W": body.T @ state["v_WB"] if self.body_velocity else state["v_WB"],
+                    "w_WB_B": state["w_WB"] if self.world_spin else body.T @ state["w_WB"],
+                    "gravity_B": R.T @ np.array([0, 0, self.gravity_sign]),
+                }
+                action = act(Observation(time=k * self.step, p_WB=state["p_WB"], R_WB=R, last=action, **seen))
+                placed = np.zeros(6)
+                placed[list(self.to_joint)] = action
+                queue.append(self.signs * (self.pose + self.scale * placed))
+                target = queue.pop(0)
+            servo = before if self.lag else state
+            effort = np.clip(self.kp * (target - servo["q"]) - self.kd * servo["v"], -self.limit, self.limit)
+            row = {"time": np.array([k * self.step]), **state, **{f"observed.{key}": seen[key] for key in seen}}
+            rows.append({**row, "action": action, "target": target, "effort": effort})
+            before = state
+            sim.step(effort, target)
+        return {key: np.array([row[key] for row in rows]) for key in rows[0]}
+
+
+class Simulator(Protocol):
+    """Needs of a loop around a simulator."""
+
+    def state(self) -> Mapping[str, np.ndarray]:
+        """``q``, ``v``, ``p_WB``, ``q_WB`` (scalar first), ``v_WB`` and ``w_WB`` in world axes."""
+
+    def step(self, effort: np.ndarray, target: np.ndarray) -> None:
+        """Moves on by one step under efforts at the joints, or under servos that follow targets."""
+
+
+def _matrix(quaternion: np.ndarray) -> np.ndarray:
+    w, x, y, z = quaternion
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+        ]
+    )
+
+
+class MujocoAlone:
+    """MuJoCo with its Euler method."""
+
+    def __init__(self, loop: Loop) -> None:
+        import mujoco
+
+        self.mujoco = mujoco
+        spec = mujoco.MjSpec.from_string(urdf())
+        spec.worldbody.first_body().add_freejoint()
+        spec.option.timestep, spec.option.gravity = loop.step, [0, 0, -loop.gravity]
+        spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT
+        for joint in spec.joints:
+            if joint.type == mujoco.mjtJoint.mjJNT_HINGE:
+                joint.armature, joint.actfrclimited = loop.armature, 0
+        self.add_servos(spec, loop)
+        self.model = spec.compile()
+        self.data = mujoco.MjData(self.model)
+        self.data.qpos[:] = [0, 0, 1, *QUATERNION, *(POSE + OFFSET)]
+        self.data.qvel[:] = [*VELOCITY, *SPIN, *np.zeros(6)]
+        mujoco.mj_forward(self.model, self.data)
+
+    def add_servos(self, spec: Any, loop: Loop) -> None:
+        """Adds nothing: the loop computes efforts."""
+
+    def state(self) -> Mapping[str, np.ndarray]:
+        """See :class:`Simulator`."""
+        q, v = self.data.qpos.copy(), self.data.qvel.copy()
+        spin = _matrix(q[3:7]) @ v[3:6]
+        return {"q": q[7:], "v": v[6:], "p_WB": q[:3], "q_WB": q[3:7], "v_WB": v[:3], "w_WB": spin}
+
+    def step(self, effort: np.ndarray, target: np.ndarray) -> None:  # noqa: ARG002 -- one of the two counts
+        """See :class:`Simulator`."""
+        self.data.qfrc_applied[6:] = effort
+        self.mujoco.mj_step(self.model, self.data)
+
+
+class MujocoServos(MujocoAlone):
+    """MuJoCo with its own position actuators, whose damping it takes implicitly."""
+
+    def add_servos(self, spec: Any, loop: Loop) -> None:
+        """Adds a position actuator with a limit at every joint."""
+        spec.option.integrator = self.mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+        for name in JOINTS:
+            servo = spec.add_actuator(name=name, target=name, trntype=self.mujoco.mjtTrn.mjTRN_JOINT)
+            servo.gainprm[0], servo.biasprm[1:3] = loop.kp, [-loop.kp, -loop.kd]
+            servo.biastype = self.mujoco.mjtBias.mjBIAS_AFFINE
+            if np.isfinite(loop.limit):
+                servo.forcelimited, servo.forcerange = 1, [-loop.limit, loop.limit]
+
+    def step(self, effort: np.ndarray, target: np.ndarray) -> None:  # noqa: ARG002 -- one of the two counts
+        """See :class:`Simulator`."""
+        self.data.ctrl[:] = target
+        self.mujoco.mj_step(self.model, self.data)
+
+
+class PinocchioAlone:
+    """Accelerations of Pinocchio's articulated bodies, integrated by a semi-implicit Euler method of our own."""
+
+    def __init__(self, loop: Loop) -> None:
+        import pinocchio
+
+        self.pin = pinocchio
+        self.model = pinocchio.buildModelFromXML(urdf(), pinocchio.JointModelFreeFlyer())
+        self.model.armature = np.array([*np.zeros(6), *np.full(6, loop.armature)])
+        self.model.gravity.linear = np.array([0, 0, -loop.gravity])
+        self.data, self.h = self.model.createData(), loop.step
+        x, y, z, w = *QUATERNION[1:], QUATERNION[0]
+        self.q = np.array([0, 0, 1, x, y, z, w, *(POSE + OFFSET)])
+        self.v = np.array([*(_matrix(QUATERNION).T @ VELOCITY), *SPIN, *np.zeros(6)])
+
+    def state(self) -> Mapping[str, np.ndarray]:
+        """See :class:`Simulator`."""
+        quaternion = np.roll(self.q[3:7], 1)
+        R = _matrix(quaternion)
+        names = [self.model.joints[self.model.getJointId(name)] for name in JOINTS]
+        q, v = np.array([self.q[item.idx_q] for item in names]), np.array([self.v[item.idx_v] for item in names])
+        return {
+            "q": q, "v": v, "p_WB": self.q[:3].copy(), "q_WB": quaternion,
+            "v_WB": R @ self.v[:3], "w_WB": R @ self.v[3:6],
+        }  # fmt: skip
+
+    def step(self, effort: np.ndarray, target: np.ndarray) -> None:  # noqa: ARG002 -- one of the two counts
+        """See :class:`Simulator`."""
+        acceleration = self.pin.aba(self.model, self.data, self.q, self.v, np.array([*np.zeros(6), *effort]))
+        self.v = self.v + self.h * acceleration
+        self.q = self.pin.integrate(self.model, self.q, self.h * self.v)
+
+
+PROGRAMS: Mapping[str, Callable[[Loop], Simulator]] = {"mujoco": MujocoAlone, "pinocchio": PinocchioAlone}
+SERVOS: Mapping[str, Callable[[Loop], Simulator]] = {"mujoco's servos": MujocoServos}
+# Mistake -> its id, the layer at which a record shows it, and the attributes of a loop that makes it.
+MISTAKES: Mapping[str, tuple[str, str, dict[str, Any]]] = {
+    "legs swapped": ("joint_order", "target", {"to_joint": (3, 4, 5, 0, 1, 2)}),
+    "place by place": ("joint_order", "target", {"to_joint": (0, 3, 1, 4, 2, 5)}),
+    "order in the observation": ("observed_order", "observation", {"seen": (3, 4, 5, 0, 1, 2)}),
+    "pose missing": ("pose_missing", "target", {"pose": 0 * POSE}),
+    "pose off": ("pose", "target", {"pose": POSE + np.array([0.1, -0.2, 0.1, -0.2, 0.1, -0.2])}),
+    "half kp": ("kp", "effort", {"kp": 0.5 * KP}),
+    "kp + 10 %": ("kp", "effort", {"kp": 1.1 * KP}),
+    "half kd": ("kd", "effort", {"kd": 0.5 * KD}),
+    "kd + 10 %": ("kd", "effort", {"kd": 1.1 * KD}),
+    "double scale": ("scale", "target", {"scale": 2 * SCALE}),
+    "half scale": ("scale", "target", {"scale": 0.5 * SCALE}),
+    "a step more": ("decimation", "instants", {"more_steps": 1}),
+    "a step less": ("decimation", "instants", {"more_steps": -1}),
+    "an instant late": ("late", "target", {"late": 1}),
+    "no clamp": ("clamp_missing", "effort", {"limit": np.inf}),
+    "half the clamp": ("clamp", "effort", {"limit": 0.5 * EFFORT}),
+    "no armature": ("armature", "acceleration", {"armature": 0.0}),
+    "xyzw": ("quaternion", "observation", {"xyzw": True}),
+    "sign of gravity": ("gravity_sign", "observation", {"gravity_sign": 1.0}),
+    "velocity in the base": ("velocity_frame", "observation", {"body_velocity": True}),
+    "spin in the world": ("spin_frame", "observation", {"world_spin": True}),
+    "sign of a joint": ("joint_sign", "target", {"signs": np.array([1.0, -1, 1, 1, 1, 1])}),
+    "state before": ("state_before", "effort", {"lag": 1}),
+    "gravity 9.80": ("gravity", "acceleration", {"gravity": 9.80}),
+    "no gravity": ("gravity", "acceleration", {"gravity": 0.0}),
+}
+
+
+def columns_of(record: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """Columns with the names of the documentation."""
+    found = {}
+    for key, values in record.items():
+        width = values.shape[1]
+        labels = JOINTS if width == 6 else "wxyz" if width == 4 else "xyz"
+        found |= {"time": values[:, 0]} if width == 1 else {f"{key}.{labels[k]}": values[:, k] for k in range(width)}
+    return found
+
+
+def written(columns: Mapping[str, np.ndarray], path: Path, digits: str = "") -> Path:
+    """A CSV of columns: with all digits, in ``single`` precision, or with a number of decimals."""
+
+    def text(name: str, value: float) -> str:
+        if name == "time":
+            return f"{value:.9g}"
+        if digits == "single":
+            return str(np.float32(value))
+        return f"{value:.{digits}f}" if digits else repr(float(value))
+
+    names = list(columns)
+    rows = zip(*(columns[name].tolist() for name in names), strict=True)
+    with path.open("w", newline="") as file:
+        csv.writer(file).writerows([names, *([text(*pair) for pair in zip(names, row, strict=True)] for row in rows)])
+    return path

@@ -1,0 +1,24 @@
+"""Certificate of a disc parallel to its plane."""
+
+from __future__ import annotations
+
+import pytest
+
+from proofroll.core.scene import Scene
+from proofroll.elements.mechanism.contacts.geometry import Geometry, Pair
+from proofroll.elements.mechanism.element import MechanismElement
+from proofroll.elements.mechanism.joint import Joint
+from proofroll.elements.mechanism.model import Mechanism
+from proofroll.elements.mechanism.parts import Body
+from proofroll.running.simulation import simulate
+
+
+@pytest.mark.parametrize("engine", ["mujoco", "projection"])
+def test_any_point_of_the_edge_is_the_nearest_of_a_parallel_disc(engine: str) -> None:
+    """An engine that names one of them holds the scene's model, and is not refused."""
+    free = Joint("free", "free", "world", "disc", q0=(0, 0, 0.05, 1, 0, 0, 0))
+    shapes = (Geometry("floor", "world", "plane"), Geometry("rim", "disc", "circle", radius=0.25))
+    pairs = (Pair("touch", ("rim", "floor"), friction=0.3),)
+    bodies = (Body("disc", 1.0, inertia=(0.015625, 0.015625, 0.03125)),)
+    scene = Scene("disc", "", (MechanismElement(Mechanism(bodies, (free,), geometries=shapes, pairs=pairs)),))
+    assert simulate(scene, engine, until=0.02).attrs["status"] == "done"

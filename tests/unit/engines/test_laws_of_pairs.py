@@ -1,0 +1,137 @@
+"""Static friction and tangential restitution of pairs: engines that have them agree, others say why they do not."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+import proofroll
+from proofroll.core.errors import InputError, Refused
+from proofroll.core.scene import Scene
+from proofroll.elements.mechanism.contacts.geometry import Geometry, Pair
+from proofroll.elements.mechanism.element import MechanismElement
+from proofroll.elements.mechanism.joint import Joint
+from proofroll.elements.mechanism.model import Mechanism
+from proofroll.elements.mechanism.parts import Body
+from proofroll.files.scene_file import load_scene
+
+FILE = """
+title = "a puck"
+source = "this project"
+[gravity]
+magnitude = 9.81
+[[bodies]]
+name = "puck"
+mass = 1.0
+inertia = [0.01, 0.01, 0.01]
+[[joints]]
+name = "slide"
+kind = "free"
+parent = "world"
+child = "puck"
+q0 = [0, 0, 0.1, 1, 0, 0, 0]
+[[geometries]]
+name = "ball"
+body = "puck"
+kind = "sphere"
+radius = 0.1
+[[geometries]]
+name = "floor"
+body = "world"
+kind = "plane"
+[[pairs]]
+name = "foot"
+geometries = ["ball", "floor"]
+"""
+
+
+def falling(pair: Pair) -> Scene:
+    """A ball that falls on a plane with spin and speed and hits at 0.0452 s."""
+    inertia = 0.4 * 0.5 * 0.1**2
+    shapes = (Geometry("s", "ball", "sphere", radius=0.1), Geometry("floor", "world", "plane"))
+    joint = Joint("j", "free", "world", "ball", q0=(0, 0, 0.11, 1, 0, 0, 0), v0=(0.3, 0.1, 0, 1.0, 5.0, -8.0))
+    body = Body("ball", 0.5, com=(0.01, 0.0, 0.02), inertia=(inertia, inertia, 1.3 * inertia))
+    return Scene("falling", "", (MechanismElement(Mechanism((body,), (joint,), geometries=shapes, pairs=(pair,))),))
+
+
+def climbing(static: float | None) -> Scene:
+    """A foot that presses on a slope and slides up it along a rail."""
+    joints = (
+        Joint("rail", "prismatic", "world", "cart", axis=(1, 0, 0), v0=(-0.5,)),
+        Joint("shaft", "prismatic", "cart", "foot", axis=(0, 0, 1), q0=(0.1,)),
+    )
+    shapes = (Geometry("sole", "foot", "sphere", radius=0.1), Geometry("floor", "world", "plane"))
+    bodies = tuple(Body(name, 0.5, inertia=(0.01, 0.01, 0.01)) for name in ("cart", "foot"))
+    pair = Pair("foot", ("sole", "floor"), 0.4, static_friction=static)
+    parts = Mechanism(bodies, joints, geometries=shapes, pairs=(pair,), gravity=(2.5, 0.0, -9.5))
+    return Scene("climbing", "", (MechanismElement(parts),))
+
+
+@pytest.mark.parametrize("engine", ["projection[formulation=dependent]", "pinocchio[formulation=impulses,dt=1e-4]"])
+def test_a_slip_rebounds_as_the_truth_says(engine: str) -> None:
+    """A ball with its centre of mass aside leaves an impact with part of its slip reversed."""
+    scene = falling(Pair("contact", ("s", "floor"), 0.8, 0.6, tangential_restitution=0.5))
+    found = proofroll.judge(proofroll.simulate(scene, engine, until=0.06, every=0.01), scene)
+    assert found.agrees, str(found)
+
+
+def test_static_friction_holds_what_kinetic_would_not() -> None:
+    """A foot that slid up a slope stays with more static friction, else it slides back; the projection agrees."""
+    ends = {}
+    for static in (None, 0.7):
+        scene = climbing(static)
+        run = proofroll.simulate(scene, "projection[formulation=dependent]", until=0.5, every=0.05)
+        ends[static] = float(run["v_WB"].to_numpy().ravel()[-3])
+        if static is None:
+            continue
+        found = proofroll.judge(run, scene)
+        assert found.agrees, str(found)
+    assert ends[None] > 0.1
+    assert abs(ends[0.7]) < 1e-9
+
+
+@pytest.mark.parametrize(
+    ("engine", "law", "why"),
+    [
+        ("mujoco[formulation=geoms]", {"static_friction": 0.9}, "this formulation gives a contact one coefficient"),
+        ("pinocchio[formulation=impulses]", {"static_friction": 0.9}, "this formulation gives a contact one coeffi"),
+        ("exudyn[formulation=spheres]", {"static_friction": 0.9}, "this formulation gives a contact one coefficient"),
+        ("mujoco[formulation=geoms]", {"tangential_restitution": 0.5}, "sets restitution along the normal alone"),
+        ("exudyn[formulation=spheres]", {"tangential_restitution": 0.5}, "this formulation has no rebounds"),
+    ],
+)
+def test_who_lacks_a_law_says_so(engine: str, law: dict[str, float], why: str) -> None:
+    """Refused, with the reason."""
+    with pytest.raises(Refused, match=why):
+        proofroll.simulate(falling(replace(Pair("contact", ("s", "floor"), 0.8), **law)), engine, until=0.01)
+
+
+@pytest.mark.parametrize(
+    ("law", "said"),
+    [
+        ("friction = {static = 0.5, kinetic = 0.3}", ""),
+        ("friction = {static = 0.2, kinetic = 0.3}", "pairs.foot.static_friction = 0.2: kinetic friction, 0.3, must"),
+        ("friction = {static = 0.2, kinetic = 0}", "pairs.foot.static_friction = 0.2: kinetic friction, 0, must lie"),
+        ("friction = {static = inf, kinetic = 1}", "pairs.foot.static_friction = inf: must be finite"),
+        ("friction = {static = 0.5}", "pairs.0.friction = {'static': 0.5}: give static and kinetic, or one number"),
+        ("friction = {static = 0.5, dynamic = 0.3}", "pairs.0.friction.dynamic = 0.3: there is no such key here"),
+        (
+            "friction = {static = 0.5, kinetic = 0.3}\nstatic_friction = 0.5",
+            "pairs.0.static_friction = 0.5: friction gives it already; remove one",
+        ),
+        ("friction = 1\ntangential_restitution = 2", "pairs.foot.tangential_restitution = 2.0: no impact returns more"),
+    ],
+)
+def test_laws_of_a_pair_are_read(law: str, said: str, tmp_path: Path) -> None:
+    """A table of two coefficients is read; each impossible law names its field, its value and what to do."""
+    (tmp_path / "scene.toml").write_text(FILE + law)
+    if not said:
+        (pair,) = load_scene(str(tmp_path)).elements[0].mechanism.pairs  # type: ignore[attr-defined]
+        assert (pair.static, pair.friction) == (0.5, 0.3)
+        return
+    with pytest.raises(InputError) as error:
+        load_scene(str(tmp_path))
+    assert said in str(error.value)
+    assert "\n" not in str(error.value)
