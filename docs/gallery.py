@@ -26,6 +26,7 @@ from proofroll.report.comparison.lines import lines_of
 from proofroll.report.comparison.records import ReportedComparison
 from proofroll.report.comparison.spread import ALONE
 from proofroll.report.comparison.summary import outcome_content
+from proofroll.report.labels import engine_words
 from proofroll.report.page.choice_matrix import ChoiceStudy, choice_matrix
 from proofroll.report.page.html import templates
 from proofroll.report.page.scene_sheet import scene_sheet
@@ -76,7 +77,7 @@ def comparisons() -> dict[str, tuple[str, Comparison]]:
 def failures(content: ReportedComparison) -> str:
     """Why rows have no result, a line each."""
     return "".join(
-        f"- {row.name} {row.formulation} {row.setting} {row.verdict}, {row.reason}.\n"
+        f"- {engine_words(row.name, row.formulation)} {row.setting} {row.verdict}, {row.reason}.\n"
         for row in content.rows
         if row.verdict in {Verdict.REFUSED, Verdict.FAILED}
     )

@@ -8,9 +8,10 @@ from proofroll.core.comparison import Tolerance
 from proofroll.core.engine_abilities import Level
 from proofroll.core.number_format import number
 from proofroll.core.verdict import Verdict
+from proofroll.report.comparison.closing import closing_notes
 from proofroll.report.comparison.records import ReportedComparison
 from proofroll.report.comparison.tables import remarks
-from proofroll.report.labels import SYMBOLS, caveat_lines, name_of, step, verdict_text
+from proofroll.report.labels import SYMBOLS, engine_title, engine_words, name_of, step, verdict_text
 from proofroll.report.terminal.tables import columns
 from proofroll.studies.tradeoff.recommend import recommend
 from proofroll.studies.tradeoff.records import MeasuredPoint, TradeoffStudy
@@ -45,7 +46,9 @@ def choice_table(groups: Mapping[str, Mapping[str, Sequence[str]]]) -> str:
             held = sum(state == Verdict.AGREES for state in states)
             sign = SYMBOLS[min(states, key=order.index)] if states else ""
             cells.append(f"{sign} {held}/{len(states)}" if 0 < held < len(states) else sign)
-        lines.append(f"| {name.replace('_', '_<wbr>')} | " + " | ".join(cells) + " |")
+        engine, _, formulation = name.partition(" ")
+        shown_name = engine_words(engine, formulation).replace("_", "_<wbr>")
+        lines.append(f"| {shown_name} | " + " | ".join(cells) + " |")
     scenes = max((len(states) for rows in groups.values() for states in rows.values()), default=0)
     held_in = " (4/7: in 4 of 7 scenes)" if scenes > 1 else ""
     shown = [word for word in CHOICE_MEANINGS if any(SYMBOLS[word] in line for line in lines)]
@@ -61,7 +64,7 @@ def verdict_table(content: ReportedComparison) -> str:
     lines = ["| " + " | ".join(head) + " |", "|" + "---|" * len(head)]
     for row in content.rows:
         errors = [row.observables[name].largest if name in row.observables else None for name, _ in names]
-        cells = [row.name, row.formulation or "", row.setting, step(row.resolution, row.resolution_value)]
+        cells = [engine_title(row.name), row.formulation or "", row.setting, step(row.resolution, row.resolution_value)]
         cells.append(f"{SYMBOLS[row.verdict]} {verdict_text(row)}")
         cells += [number(error) for error in errors]
         cells.append(number(row.seconds_per_second))
@@ -70,8 +73,8 @@ def verdict_table(content: ReportedComparison) -> str:
 
 
 def caveat_list(content: ReportedComparison) -> str:
-    """What of some settings is not the engine's own, a line each."""
-    return "".join(f"- {line}\n" for line in caveat_lines(content.rows))
+    """Notes on all settings of a comparison, a line each."""
+    return "".join(f"- {line}\n" for line in closing_notes(content))
 
 
 def remark_list(content: ReportedComparison) -> str:

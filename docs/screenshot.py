@@ -21,7 +21,7 @@ COLOURS = 64
 # The end of the picture, and the first table of verdicts, which stands below it.
 COUNTS, VERDICTS = ".counts", ".matrix"
 # Row for row: what the comparison file calls it, and its verdict.
-ROWS = """(table) => [...document.querySelector(table).querySelectorAll("tbody tr:not(.group)")].map((row) =>
+ROWS = """(table) => [...document.querySelector(table).querySelectorAll("tbody tr:not(.group, .note)")].map((row) =>
   [row.querySelector("th").title, row.querySelector(".v").textContent.trim().split(" ")[1]])"""
 
 

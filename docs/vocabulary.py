@@ -17,6 +17,7 @@ from proofroll.core.gravity import Gravity
 from proofroll.elements.ball_on_surface import model as balls
 from proofroll.elements.ball_on_surface.surfaces import surface_kinds
 from proofroll.elements.mechanism import model as mechanisms
+from proofroll.elements.mechanism.composed import Cable, Gimbal, Screw
 from proofroll.elements.mechanism.contacts import geometry as contacts
 from proofroll.elements.mechanism.drives import ActuatorKind
 from proofroll.elements.mechanism.joint import Kind
@@ -54,8 +55,13 @@ CHAPTERS: dict[str, tuple[Table, ...]] = {
     "A scene with a mechanism": (
         Table("[[bodies]]", mechanisms.Body),
         Table("[[joints]]", mechanisms.Joint),
+        Table("[[joints]]", Screw),
+        Table("[[joints]]", Gimbal),
         Table("[[loops]]", mechanisms.Loop),
+        Table("[[loops]]", Cable),
         Table("[[springs]]", mechanisms.Spring),
+        Table("[[bushings]]", mechanisms.Bushing),
+        Table("[[forces]]", mechanisms.Force),
         Table("[[points]]", mechanisms.Point),
         Table("[[geometries]]", contacts.Geometry),
         Table("[[pairs]]", contacts.Pair),
@@ -94,7 +100,10 @@ formulas `i`.
 
 ### `[[published]]`
 
-What somebody else found of the same mechanism; it is kept with the scene and moves nothing.
+What somebody else found of the same mechanism; it moves nothing. `source` (required); `time`, an instant, or `times`,
+a list [s]; a number, or a list of as many, for each observable, as `"q.slide"`; `parameters` with which they hold, the
+others at their defaults; `within`, the largest error that the numbers are known to have: without it a unit of the last
+digit of each. `proofroll drill published` holds them against the truth.
 
 ### `unmodelled`
 
@@ -106,6 +115,13 @@ engine refuse the scene and say so.
 At the top of the file: what an impact at several contacts at once does. `"any order"` (the default): one contact after
 another, in any order, with the corners of a flat face as one; the truth goes on where all orders end alike, and ends
 where they do not. `"together"`: Moreau's law for all contacts.
+
+### `control`
+
+A table of a controller: `rate` (instants per second, required), `actuators` (list of names, required), `call` (a policy
+`module:make`; without it the actuators' own targets are read at the instants and held), `scale` of an action, `pose` (a
+coordinate for each actuator), `delay` (whole instants), `held` (`"target"` or `"effort"`).
+[Control a robot](control_a_robot.md) says what a policy is.
 """,
     "A comparison: `comparisons/*.toml` without `study`": """### `[vary]`, `[brief]`
 
