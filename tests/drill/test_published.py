@@ -43,10 +43,10 @@ def test_a_number_that_is_off_misses(monkeypatch: pytest.MonkeyPatch, tmp_path: 
 
 def test_a_series_misses_by_its_worst_instant() -> None:
     """A table of a scene is held at all its times; its row names the value that is a last digit too far off."""
-    table = {"source": "closed form", "times": [0.5, 1.0], "q.slide": [-0.24525, -0.9822]}
+    table = {"source": "closed form", "times": [0.5, 1.0], "q.thread.slide": [-0.24525, -0.9822]}
     (entry,) = read_published([table])
     (row,) = published.of_scene("falling_screw", entry)
     assert row.misses
-    assert row.text == "✗ falling_screw: q.slide at 1 s, of 2: -0.9822 published, -0.981 ours"
+    assert row.text == "✗ falling_screw: q.thread.slide at 1 s, of 2: -0.9822 published, -0.981 ours"
     (entry,) = read_published([{**table, "within": 2e-3}])
     assert not next(iter(published.of_scene("falling_screw", entry))).misses

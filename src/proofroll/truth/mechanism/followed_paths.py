@@ -159,11 +159,13 @@ def two_route_motion(
     reach = np.maximum(units.length, np.maximum(largest(placed.p_WB), largest(placed.points)))
     bars["drift"] = np.maximum.accumulate(placed.drift() + ROUND_OFF * reach)
     horizon = min(parted, first_close(paths, CLOSE) * units.time)
-    # A change at the horizon is what the question hangs on, and may lie before it by the accuracy of times; of one at
-    # the end the last digits would say whether it is in.
+    # A change at the horizon is what the question hangs on, and may lie before it by the root of the accuracy, as where
+    # bodies graze each other; of one at the end the last digits would say whether it is in.
     end, ended = end_of(paths)
-    last = min(horizon, units.time * end, until)
+    last = min(units.time * end, until)
     certain = last - units.time * time_accuracy(last / units.time)
+    if np.isfinite(horizon):
+        certain = min(certain, horizon - np.sqrt(CLOSE) * max(units.time, horizon))
     happened = tuple(event for event in _events(*paths, units.time) if event.time < certain)
     force = None if pressed is None else pressed[0]
     if np.isfinite(end):
