@@ -20,7 +20,7 @@ from proofroll.elements.mechanism import model as mechanisms
 from proofroll.elements.mechanism.composed import Cable, Gimbal, Screw
 from proofroll.elements.mechanism.contacts import geometry as contacts
 from proofroll.elements.mechanism.drives import ActuatorKind
-from proofroll.elements.mechanism.joint import Kind
+from proofroll.elements.mechanism.joint_kinds import LOOP_FACTS, JointKind
 from proofroll.files.scene_file import SceneFile
 from proofroll.files.scene_parameters import Parameter
 from proofroll.studies.stability import axes
@@ -185,7 +185,8 @@ def _type(annotation: Any) -> str:
         "Vector | None": "[x, y, z]",
         "Inertia": "3×3 or [Ixx, Iyy, Izz]",
         "Numbers": "number or list",
-        "Kind": " or ".join(get_args(Kind)),
+        "JointKind": " or ".join(JointKind),
+        "LoopKind": " or ".join(LOOP_FACTS),
         "Tolerance": '"1e-3 m" or "1 %"',
         "float | Formula | Table": "number, formula of t, or table",
         "GeometryKind": " or ".join(get_args(contacts.GeometryKind)),

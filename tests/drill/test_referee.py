@@ -15,8 +15,8 @@ from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.analysis import analyse
 from proofroll.elements.mechanism.assembly import check_start
 from proofroll.elements.mechanism.contacts.start import check_contacts
-from proofroll.elements.mechanism.joint import FACTS
 from proofroll.elements.mechanism.joint_coordinates import JointCoordinates
+from proofroll.elements.mechanism.joint_kinds import FACTS
 from proofroll.elements.mechanism.record import Record, record_of
 from proofroll.truth.mechanism import maximal_taylor
 from proofroll.truth.mechanism.maximal_bodies import Planar, made_bodies

@@ -19,7 +19,7 @@ from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Diverged, Refused
 from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.model import BallCapability, RollingBall
-from proofroll.elements.mechanism.joint import FACTS
+from proofroll.elements.mechanism.joint_kinds import FACTS
 from proofroll.elements.mechanism.sampling import mechanism_of
 from proofroll.engines.pinocchio.constraint_dynamics import ConstraintDynamics
 from proofroll.engines.pinocchio.contact import LARGEST_FRICTION

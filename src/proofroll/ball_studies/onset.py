@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from proofroll.core.errors import InputError, ProofrollError
-from proofroll.core.events import Event, events_of
+from proofroll.core.events import Event, EventKind, events_of
 from proofroll.core.plugins import engine_names, parse_engine
 from proofroll.elements.ball_on_surface.element import BallOnSurface
 from proofroll.elements.ball_on_surface.model import BallCapability
@@ -162,7 +162,7 @@ def _first_slip(runner: Runner, case: Case, result: Result) -> Event | None:
     if result.trajectory is None:
         return None
     events = events_of(read_columns(runner.store.trajectory(case)))
-    return next((event for event in events if event.kind == "slip"), None)
+    return next((event for event in events if event.kind == EventKind.SLIP), None)
 
 
 def onset_verdict(truth: Onset, result: Result, slip: Event | None) -> str:

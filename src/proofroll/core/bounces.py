@@ -10,13 +10,11 @@ import numpy as np
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.columns import Columns, Variable
-from proofroll.core.events import Event, events_of
+from proofroll.core.events import IMPACTS, Event, events_of
 
 if TYPE_CHECKING:
     import xarray as xr
 
-# Kinds of events that are single impacts; after the end of infinitely many nothing bounces.
-IMPACTS = frozenset({"impact", "bounce"})
 # Samples between two impacts, or an impact and the end, of a motion that can be sampled at any time.
 _BETWEEN = 3
 # Distance of samples from the time of an event, relative to it: its round-off.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from enum import StrEnum
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,8 +17,27 @@ if TYPE_CHECKING:
 # Name of an observable for kinds of elements with events: how many events differ in kind from the truth's, are missing
 # or are too many.
 EVENT_ORDER = "event_order"
-# Kinds of events at which velocities jump, of all kinds of elements.
-JUMPS = frozenset({"impact", "bounce", "settle"})
+
+
+class EventKind(StrEnum):
+    """What begins or happens in an event of our own kinds of elements; other packages may name more."""
+
+    SLIP = "slip"  # a contact or a joint begins to slip
+    STICK = "stick"  # friction holds it again
+    REST = "rest"  # it is held, and nothing of the mechanism moves any more
+    TURN = "turn"  # its slip reverses
+    LIFT_OFF = "lift_off"  # the normal force reaches zero
+    IMPACT = "impact"  # a gap closes, or a joint strikes a stop
+    BOUNCE = "bounce"  # a ball strikes a wall
+    SETTLE = "settle"  # the last of infinitely many impacts
+    SATURATE = "saturate"  # an effort reaches its limit
+    RELEASE = "release"  # it leaves its limit
+
+
+# After the last of infinitely many impacts nothing bounces.
+IMPACTS = frozenset({EventKind.IMPACT, EventKind.BOUNCE})
+# Velocities jump at these.
+JUMPS = IMPACTS | {EventKind.SETTLE}
 # Room of a time beside its bracket, relative to it: round-off.
 _ROUNDED = 1e-9
 

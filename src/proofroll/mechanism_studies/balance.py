@@ -17,6 +17,7 @@ from proofroll.elements.mechanism.dataset import along, reactions
 from proofroll.elements.mechanism.element import MechanismElement
 from proofroll.elements.mechanism.joint import Joint
 from proofroll.elements.mechanism.joint_coordinates import JointCoordinates
+from proofroll.elements.mechanism.joint_kinds import JointKind
 from proofroll.elements.mechanism.kinematics import Tree
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.named_forces import lengths, named_forces, pick_named
@@ -195,14 +196,14 @@ def _values(posed: Mechanism, equations: JointCoordinates, q: Array, second: Max
     found = []
     for joint, at in zip(posed.joints, posed.q_slices, strict=True):
         if joint.nq == 1:
-            unit = "rad" if joint.kind == "revolute" else "m"
+            unit = "rad" if joint.kind == JointKind.REVOLUTE else "m"
             found.append(Value(f"q.{joint.name}", unit, float(q[at.start]), 0.0))
     for item, value, again in zip(named_forces(posed), one["named"], other.named[0], strict=True):
         found.append(Value(item.name, str(item.unit), float(value), float(abs(value - again))))
     known = analyse(posed).determinate
     for connection, sure, row, again in zip(posed.connections, known, one["wrench"], other.wrench[0], strict=True):
         for k, axis in enumerate("xyzxyz"):
-            if sure[k] and connection.kind != "free":
+            if sure[k] and connection.kind != JointKind.FREE:
                 kind, unit = ("force", "N") if k < 3 else ("torque", "N m")
                 bar = float(abs(row[k] - again[k]))
                 found.append(Value(f"{kind}.{connection.name}.{axis}", unit, float(row[k]), bar))

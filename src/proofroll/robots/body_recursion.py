@@ -5,6 +5,7 @@ M comes column by column. Source: Featherstone, Rigid Body Dynamics Algorithms, 
 
 import numpy as np
 
+from proofroll.elements.mechanism.joint_kinds import JointKind
 from proofroll.robots.model import NO_BODY, Array, Robot, RobotBody, RobotJoint
 from proofroll.robots.states import RobotStates
 from proofroll.robots.two_formulations import Dynamics, armature, skew, turned_armature, within
@@ -41,7 +42,7 @@ def newton_euler(robot: Robot, states: RobotStates, v: Array, a: Array, gravity:
             relative = v[..., columns] @ S[joint.child].transpose(0, 2, 1)
             velocity[joint.child] = V = velocity[joint.child] + relative
             acceleration[joint.child] += a[..., columns] @ S[joint.child].transpose(0, 2, 1)
-            if joint.kind == "free":  # its velocity has world axes: the derivative of Rᵀ v
+            if joint.kind == JointKind.FREE:  # its velocity has world axes: the derivative of Rᵀ v
                 acceleration[joint.child][..., 3:] -= np.cross(V[..., :3], V[..., 3:])
             else:
                 acceleration[joint.child] += _cross_motion(V, relative)
@@ -63,14 +64,14 @@ def _subspace(joint: RobotJoint, R: Array) -> Array:
     A free joint's velocities are in world axes, linear first.
     """
     zero = np.zeros((3, 3))
-    if joint.kind == "free":
+    if joint.kind == JointKind.FREE:
         E = R.transpose(0, 2, 1)
         return np.block([[np.zeros_like(E), E], [E, np.zeros_like(E)]])
-    if joint.kind == "prismatic":
+    if joint.kind == JointKind.PRISMATIC:
         subspace = np.concatenate([np.zeros(3), joint.axis])[:, None]
     else:
         turning = np.vstack([np.eye(3), zero + skew(joint.child_position)])
-        subspace = turning if joint.kind == "spherical" else turning @ joint.axis[:, None]
+        subspace = turning if joint.kind == JointKind.SPHERICAL else turning @ joint.axis[:, None]
     return np.broadcast_to(subspace, (len(R), *subspace.shape))
 
 

@@ -15,6 +15,7 @@ from proofroll.core.errors import InputError, error_location
 from proofroll.core.parameters import Parameters
 from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.control import TARGET, Control
+from proofroll.elements.mechanism.joint_kinds import JointKind
 from proofroll.elements.mechanism.policy import PolicySource
 from proofroll.elements.mechanism.reader import made_mechanism
 from proofroll.robots.actuators import scene_actuators
@@ -147,7 +148,7 @@ class ControlledScenes:
     def _robot(self, path: Path, controller: Controller, base: str) -> tuple[RobotFile, Robot]:
         """Robot whose joints have the controller's armatures; ``base``: ``fixed`` or ``free``, of a URDF's root."""
         file, robot = read_robot(path, base)
-        if controller.start.base is not None and not any(joint.kind == "free" for joint in robot.moving):
+        if controller.start.base is not None and not any(joint.kind == JointKind.FREE for joint in robot.moving):
             advice = "this robot's root is fixed in its file; leave it out, or give the root a free joint"
             raise InputError(f"{self._path}: start.base", list(controller.start.base), advice)
         own = {joint.name: controller.servo(joint.name) for joint in robot.moving if joint.dofs == 1}
@@ -192,16 +193,16 @@ def start_of(robot: Robot, controller: Controller) -> RobotStates:
     for joint in robot.moving:
         if joint.dofs == 1:
             continue
-        R, p = (joint.rotation if joint.kind == "free" else np.eye(3)), joint.position
+        R, p = (joint.rotation if joint.kind == JointKind.FREE else np.eye(3)), joint.position
         rates = np.zeros(joint.dofs)
-        if joint.kind == "free" and not position:
+        if joint.kind == JointKind.FREE and not position:
             if start.base is not None:
                 R = np.asarray(Rotation.from_quat(start.base[3:], scalar_first=True).as_matrix())
                 p = np.array(start.base[:3])
             spin = R @ np.array(start.base_velocity[3:])
             rates = np.concatenate([start.base_velocity[:3], spin])
         rotation[joint.name], velocity[joint.name] = R[None], rates[None]
-        if joint.kind == "free":
+        if joint.kind == JointKind.FREE:
             position[joint.name] = p[None]
     still = {name: np.zeros_like(rates) for name, rates in velocity.items()}
     return RobotStates(angle=angle, rotation=rotation, position=position, velocity=velocity, acceleration=still)

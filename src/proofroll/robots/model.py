@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from proofroll.core.arrays import FloatArray, slices
+from proofroll.elements.mechanism.joint_kinds import FACTS, ONE_COORDINATE, JointKind
 
 Array = FloatArray  # its short name, for signatures of robots
 # Parent of joints in the world. It is no name of a body or joint: many root links are called ``world``.
@@ -17,7 +18,9 @@ NO_BODY = ""
 # Relative violation of inertia's inequalities that counts as round-off of the file's digits.
 _ROUNDING = 1e-9
 # Degrees of freedom of each kind of joint.
-DOFS = {"fixed": 0, "revolute": 1, "prismatic": 1, "spherical": 3, "free": 6}
+DOFS: Mapping[str, int] = {
+    kind: FACTS[kind].nv for kind in (JointKind.FIXED, *ONE_COORDINATE, JointKind.SPHERICAL, JointKind.FREE)
+}
 
 
 @dataclasses.dataclass(frozen=True)

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from proofroll.core.bounds import DENSEST
+from proofroll.elements.mechanism.joint_kinds import JointKind
 from proofroll.elements.mechanism.plausibility import FAR, LARGE, TIMES
 from proofroll.robots.mjcf_classes import with_classes
 from proofroll.robots.model import Robot, RobotBody
@@ -22,13 +23,13 @@ _IN_RADIANS = (1.57, 3.14, 6.28)
 def implausible(file: RobotFile, robot: Robot) -> Iterator[tuple[str, str, str]]:
     """Level, place and text of a remark on each implausible number."""
     noun = "link" if file.kind == "urdf" else "body"
-    between = sum(float(np.linalg.norm(joint.position)) for joint in robot.joints if joint.kind != "free")
+    between = sum(float(np.linalg.norm(joint.position)) for joint in robot.joints if joint.kind != JointKind.FREE)
     for name, body in robot.bodies.items():
         for what in _body(body, between):
             yield "warning", f"{noun} {name}", what
     for joint in robot.joints:
         away = float(np.linalg.norm(joint.position))
-        if away > LARGE and joint.kind != "free":
+        if away > LARGE and joint.kind != JointKind.FREE:
             yield "warning", f"joint {joint.name}", f"it lies {away:.4g} m from its parent's origin; lengths are metres"
     yield from (_urdf_angles(file, robot) if file.kind == "urdf" else _mjcf_joints(file))
 
@@ -57,7 +58,7 @@ def _body(body: RobotBody, between: float) -> Iterator[str]:
 def _urdf_angles(file: RobotFile, robot: Robot) -> Iterator[tuple[str, str, str]]:
     for joint in robot.moving:
         limits = [abs(limit) for limit in (joint.lower, joint.upper) if limit is not None]
-        if joint.kind == "revolute" and limits and _TURNS[0] < max(limits) <= _TURNS[1]:
+        if joint.kind == JointKind.REVOLUTE and limits and _TURNS[0] < max(limits) <= _TURNS[1]:
             words = f"a limit of {max(limits):g} rad are {max(limits) / 2 / math.pi:.1f} turns; angles are radians"
             yield "warning", f"joint {joint.name}", words
     for owner in (*file.root.findall("joint"), *file.root.findall("link")):

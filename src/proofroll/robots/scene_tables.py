@@ -14,7 +14,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from proofroll.core.errors import InputError
-from proofroll.elements.mechanism.joint import LAWS
+from proofroll.elements.mechanism.joint_kinds import LAWS, JointKind
 from proofroll.elements.mechanism.rotations import to_rpy
 from proofroll.robots.meaning import opened, robot_of_text
 from proofroll.robots.model import NO_BODY, Array, Mimic, Robot, RobotJoint, RobotLoop, Tie
@@ -138,13 +138,13 @@ def _joint(
         law: values[law] * getattr(joint, law) for law in _FACTORS if joint.kind in LAWS[law] and getattr(joint, law)
     }
     v = values.get("speed", 1.0) * start.velocity[joint.name][0]
-    if joint.kind == "free":  # its coordinates are relative to the world, whatever its parent is
+    if joint.kind == JointKind.FREE:  # its coordinates are relative to the world, whatever its parent is
         turned = start.rotation[joint.name][0]
         q = [*start.position[joint.name][0], *_quaternion(turned)]
         return table | laws | {"q0": q, "v0": [*(turned.T @ v[:3]), *(turned.T @ v[3:])]}
     table["position"] = (p + R @ joint.position).tolist()
     table["orientation"] = list(to_rpy(R @ joint.rotation))
-    if joint.kind == "spherical":
+    if joint.kind == JointKind.SPHERICAL:
         table |= {"q0": list(_quaternion(start.rotation[joint.name][0]))}
     else:
         table |= {"axis": joint.axis.tolist(), "q0": [float(start.angle[joint.name][0])], "rest": joint.rest}
@@ -194,13 +194,13 @@ def _following(robot: Robot) -> frozenset[str]:
 
     between = (carriers(loop.body_a) ^ carriers(loop.body_b) for loop in robot.loops)
     tied = (set(tie.joints) for tie in robot.ties if _tied(robot, tie))
-    free = {joint.name for joint in robot.moving if joint.kind == "free"}
+    free = {joint.name for joint in robot.moving if joint.kind == JointKind.FREE}
     return frozenset(set().union(*between, *tied) - free)
 
 
 def _guess(joint: RobotJoint, start: RobotStates) -> dict[str, Any]:
     """Keys of a joint whose start follows from loops: a guess near the pose of the file, where they are closed."""
-    if joint.kind == "spherical":
+    if joint.kind == JointKind.SPHERICAL:
         return {"dependent": True, "q0": [1.0, 0.0, 0.0, 0.0]}
     return {"dependent": True, "q0": [_NEAR * float(start.angle[joint.name][0])]}
 
@@ -215,7 +215,7 @@ def _loop(robot: Robot, loop: RobotLoop, names: Mapping[str, str]) -> dict[str, 
         table |= {f"body_{side}": "world" if home == NO_BODY else names[carrier]}
         table |= {f"position_{side}": (p + R @ position).tolist()}
         turns[side] = R
-    if loop.kind == "fixed":
+    if loop.kind == JointKind.FIXED:
         table["orientation"] = list(to_rpy(turns["a"] @ loop.rotation @ turns["b"].T))
     return table
 

@@ -12,6 +12,7 @@ import dataclasses
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from proofroll.elements.mechanism.joint_kinds import ONE_COORDINATE, JointKind
 from proofroll.robots.model import Array, Robot
 
 # Least speed of a joint: slower ones might stick where an engine smooths Coulomb friction [rad/s or m/s].
@@ -63,7 +64,7 @@ class RobotStates:
         return RobotStates(
             self.angle | {joint.name: np.zeros(count) for joint in added if joint.dofs == 1},
             self.rotation | {joint.name: np.tile(np.eye(3), (count, 1, 1)) for joint in turning},
-            self.position | {joint.name: np.zeros((count, 3)) for joint in turning if joint.kind == "free"},
+            self.position | {joint.name: np.zeros((count, 3)) for joint in turning if joint.kind == JointKind.FREE},
             self.velocity | still,
             self.acceleration | still,
         )
@@ -74,14 +75,14 @@ def random_states(robot: Robot, count: int, seed: int) -> RobotStates:
     random = np.random.default_rng(seed)
     angle, rotation, position = {}, {}, {}
     for joint in robot.moving:
-        if joint.kind in {"revolute", "prismatic"}:
-            reach = np.pi if joint.kind == "revolute" else 1.0
+        if joint.kind in ONE_COORDINATE:
+            reach = np.pi if joint.kind == JointKind.REVOLUTE else 1.0
             lower = -reach if joint.lower is None else max(joint.lower, -reach)
             upper = reach if joint.upper is None else min(joint.upper, reach)
             angle[joint.name] = random.uniform(*((lower, upper) if lower < upper else (-reach, reach)), count)
         else:
             rotation[joint.name] = np.asarray(Rotation.random(count, rng=random).as_matrix())
-            if joint.kind == "free":
+            if joint.kind == JointKind.FREE:
                 position[joint.name] = random.uniform(-1, 1, (count, 3))
     velocity = {
         joint.name: random.uniform(_SLOWEST, 1, (count, joint.dofs)) * random.choice([-1.0, 1.0], (count, joint.dofs))

@@ -13,6 +13,7 @@ import numpy as np
 
 from proofroll.core.errors import InputError, require_known
 from proofroll.core.plugins import EngineSpec
+from proofroll.elements.mechanism.joint_kinds import JointKind
 from proofroll.robots import reading
 from proofroll.robots.body_recursion import body_recursion
 from proofroll.robots.check import bar_of, robot_drawing
@@ -137,7 +138,7 @@ def _matched(robot: Robot, rival: Robot, names: Mapping[str, str]) -> dict[str, 
         raise InputError("--map", ", ".join(names.values()), "each joint has one partner")
     partners = dict(names) | {name: name for name in ours if name not in names and name in theirs and name not in taken}
     free = [
-        [name for name, joint in side.items() if joint.kind == "free" and name not in taken_names]
+        [name for name, joint in side.items() if joint.kind == JointKind.FREE and name not in taken_names]
         for side, taken_names in ((ours, partners), (theirs, set(partners.values())))
     ]
     if all(len(left) == 1 for left in free):

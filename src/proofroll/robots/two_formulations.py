@@ -11,6 +11,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from proofroll.core.arrays import cross
+from proofroll.elements.mechanism.joint_kinds import JointKind
 from proofroll.robots.model import NO_BODY, Array, Robot, RobotJoint
 from proofroll.robots.states import RobotStates
 
@@ -64,13 +65,13 @@ def within(joint: RobotJoint, states: RobotStates) -> tuple[Array, Array]:
     count = states.count
     slid = np.zeros((count, 3))
     turned = np.broadcast_to(np.eye(3), (count, 3, 3))
-    if joint.kind == "revolute":
+    if joint.kind == JointKind.REVOLUTE:
         turned = Rotation.from_rotvec(states.angle[joint.name][:, None] * joint.axis).as_matrix()
-    elif joint.kind == "prismatic":
+    elif joint.kind == JointKind.PRISMATIC:
         slid = states.angle[joint.name][:, None] * joint.axis
-    elif joint.kind == "spherical":
+    elif joint.kind == JointKind.SPHERICAL:
         turned = states.rotation[joint.name]
-    elif joint.kind == "free":
+    elif joint.kind == JointKind.FREE:
         return joint.position + states.position[joint.name], states.rotation[joint.name]
     R = joint.rotation @ turned
     return joint.position + slid @ joint.rotation.T - R @ joint.child_position, R
@@ -173,16 +174,16 @@ def _carried(robot: Robot, joint: RobotJoint, parent: _Motion, frames: Frames, v
     (p_parent, R_parent), (p, R) = frames[joint.parent], frames[joint.child]
     r = p - p_parent
     Jv, Jw = parent.Jv - skew(r) @ parent.Jw, parent.Jw.copy()
-    if joint.kind == "fixed":
+    if joint.kind == JointKind.FIXED:
         return _Motion(Jv, Jw, parent.w, parent.a + _swung(parent.w, parent.alpha, r), parent.alpha)
     columns = robot.columns[joint.name]
     rate = v[:, columns]
-    if joint.kind == "free":
+    if joint.kind == JointKind.FREE:
         Jv[:, :, columns], Jw[:, :, columns] = np.eye(3, 6), np.eye(3, 6, 3)
         return _Motion(Jv, Jw, rate[:, 3:], np.zeros_like(p), np.zeros_like(p))
-    u = R @ (np.eye(3) if joint.kind == "spherical" else joint.axis[:, None])  # (states, 3, velocities)
+    u = R @ (np.eye(3) if joint.kind == JointKind.SPHERICAL else joint.axis[:, None])  # (states, 3, velocities)
     relative = np.einsum("sij,sj->si", u, rate)
-    if joint.kind == "prismatic":
+    if joint.kind == JointKind.PRISMATIC:
         Jv[:, :, columns] = u
         a = parent.a + _swung(parent.w, parent.alpha, r) + 2 * cross(parent.w, relative)
         return _Motion(Jv, Jw, parent.w, a, parent.alpha)

@@ -10,13 +10,20 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from proofroll.core.errors import InputError, choices, error_location
+from proofroll.elements.mechanism.joint_kinds import ONE_COORDINATE, JointKind
 from proofroll.robots.model import DOFS, NO_BODY, Array, Mimic, Robot, RobotBody, RobotJoint
 from proofroll.robots.robot_file import LintRemark, RobotFile, numbers
 
 # Name of the joint between the world and the root link.
 BASE_JOINT = "(base)"
 # Kind in a URDF -> kind of a joint here. ``spherical`` is not in the specification, but Bullet and MuJoCo read it.
-_KINDS = {kind: kind for kind in ("revolute", "prismatic", "fixed", "spherical")} | {"continuous": "revolute"}
+_KINDS = {
+    "revolute": JointKind.REVOLUTE,
+    "prismatic": JointKind.PRISMATIC,
+    "fixed": JointKind.FIXED,
+    "spherical": JointKind.SPHERICAL,
+    "continuous": JointKind.REVOLUTE,
+}
 _MOMENTS = ("xx", "xy", "xz", "yy", "yz", "zz")
 _PRIMITIVES = {"box", "sphere", "cylinder", "capsule"}
 
@@ -183,8 +190,8 @@ def _joint(name: str, element: Element, links: dict[str, Element]) -> RobotJoint
     bounded = limit is not None and element.get("type") in {"revolute", "prismatic"}
     return RobotJoint(
         name, kind, ends["parent"], ends["child"], position, rotation, axis / length,
-        damping=0.0 if dynamics is None or kind == "fixed" else numbers(dynamics, "damping", "0", 1)[0],
-        friction=0.0 if dynamics is None or kind == "fixed" else numbers(dynamics, "friction", "0", 1)[0],
+        damping=0.0 if dynamics is None or kind == JointKind.FIXED else numbers(dynamics, "damping", "0", 1)[0],
+        friction=0.0 if dynamics is None or kind == JointKind.FIXED else numbers(dynamics, "friction", "0", 1)[0],
         lower=numbers(limit, "lower", "0", 1)[0] if bounded and limit is not None else None,
         upper=numbers(limit, "upper", "0", 1)[0] if bounded and limit is not None else None,
         effort=_of_drive(limit, "effort"),
@@ -216,7 +223,7 @@ def _ordered(joints: list[RobotJoint], links: dict[str, Element], base: str) -> 
     below: dict[str, list[RobotJoint]] = {}
     for joint in joints:
         below.setdefault(joint.parent, []).append(joint)
-    kind = "free" if base == "free" else "fixed"
+    kind = JointKind.FREE if base == "free" else JointKind.FIXED
     parents_first = [RobotJoint(BASE_JOINT, kind, NO_BODY, roots[0], np.zeros(3), np.eye(3), np.array([0.0, 0.0, 1.0]))]
     waiting = list(reversed(below.get(roots[0], [])))
     while waiting:
@@ -246,7 +253,7 @@ def _direct(mimics: list[Mimic], robot: Robot) -> tuple[Mimic, ...]:
             meant = [name for name in kinds if name != mimic.joint and name.endswith(leader)]
             advice = f"; name the one that is meant, {choices(meant)}" if meant else "; name one that moves"
             raise InputError(f"<joint {mimic.joint} mimic>", leader, f"the file has no joint of this name{advice}")
-        if leader in seen or kinds.get(leader) not in {"revolute", "prismatic"}:
+        if leader in seen or kinds.get(leader) not in ONE_COORDINATE:
             raise InputError(f"<joint {mimic.joint} mimic>", mimic.other, "name another joint that moves")
         resolved.append(Mimic(mimic.joint, leader, factor, offset))
     return tuple(resolved)

@@ -13,7 +13,7 @@ from proofroll.core.errors import Refused
 from proofroll.elements.mechanism import Body, Joint, Mechanism, Spring
 from proofroll.elements.mechanism.analysis import analyse
 from proofroll.elements.mechanism.capabilities import required
-from proofroll.elements.mechanism.joint import WITH_AXIS
+from proofroll.elements.mechanism.joint_kinds import WITH_AXIS
 from proofroll.elements.mechanism.parts import Force
 from proofroll.elements.mechanism.rotations import from_quaternion
 from proofroll.elements.mechanism.spring_law import SpringLaw

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 from proofroll.ball_studies.onset import onset_verdict as judged_onset
-from proofroll.core.events import Event, events_of
+from proofroll.core.events import Event, EventKind, events_of
 from proofroll.core.number_format import number
 from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.files.json_data import OPTIONAL
@@ -72,7 +72,7 @@ def _run_facts(truth: Onset | None, run: Run) -> RunSlips:
     if truth is None:
         return RunSlips([])
     events = [] if run.trajectory is None else events_of(run.trajectory.dataset)
-    slip = next((event for event in events if event.kind == "slip"), None)
+    slip = next((event for event in events if event.kind == EventKind.SLIP), None)
     return RunSlips(events, judged_onset(truth, run.result, slip))
 
 
@@ -112,7 +112,7 @@ def _marked(content: ReportedComparison, curves: PointCurves, truth: TrueSlips) 
 
 def first_slip(events: Sequence[Event]) -> Event | None:
     """First slip with a finite time, or None."""
-    return next((event for event in events if event.kind == "slip" and math.isfinite(event.time)), None)
+    return next((event for event in events if event.kind == EventKind.SLIP and math.isfinite(event.time)), None)
 
 
 # Largest number of events in the table; the page counts the rest.

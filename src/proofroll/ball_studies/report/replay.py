@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from proofroll.ball_studies.report.replay_wall import middle, wall
 from proofroll.core.arrays import FloatArray
+from proofroll.core.events import EventKind
 from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.elements.ball_on_surface.model import RollingBall
@@ -42,7 +43,13 @@ _SPEED = 0.1
 _FROM = (-1.15, 0.5)
 
 SLIPS, STICKS, AWAY = 0, 1, 2
-_AFTER = {"slip": SLIPS, "stick": STICKS, "lift_off": AWAY, "bounce": AWAY, "settle": STICKS}
+_AFTER = {
+    EventKind.SLIP: SLIPS,
+    EventKind.STICK: STICKS,
+    EventKind.LIFT_OFF: AWAY,
+    EventKind.BOUNCE: AWAY,
+    EventKind.SETTLE: STICKS,
+}
 
 
 @dataclass(frozen=True)

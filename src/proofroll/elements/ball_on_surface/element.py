@@ -17,6 +17,7 @@ from proofroll.core.columns import Columns
 from proofroll.core.element import FirstMotion, OptionalTerm, Sign, StepNumber
 from proofroll.core.element_abilities import RunWatch
 from proofroll.core.errors import InputError, Refused
+from proofroll.core.events import EventKind
 from proofroll.core.gravity import Gravity
 from proofroll.core.number_format import vector
 from proofroll.core.observable import Observable
@@ -110,7 +111,7 @@ class BallOnSurface:
     askable: ClassVar[Mapping[str, str]] = {"orientation": BallCapability.ORIENTATION}
     softened: ClassVar[frozenset[str]] = frozenset(name for name in certificate.CAPS if not name.startswith("1 / "))
     failures: ClassVar[Mapping[str, str]] = failure.MEANINGS
-    failing_events: ClassVar[Mapping[str, str]] = {"lift_off": failure.LEFT}
+    failing_events: ClassVar[Mapping[str, str]] = {EventKind.LIFT_OFF: failure.LEFT}
 
     @property
     def start_facts(self) -> Sequence[str]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Hashable, Mapping, Sequence
-from typing import TYPE_CHECKING, Literal, TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
@@ -12,7 +12,7 @@ from proofroll.core.arrays import FloatArray
 from proofroll.core.bounces import Bounce, bounces_along
 from proofroll.core.columns import Columns
 from proofroll.core.element_abilities import SeenInRun
-from proofroll.core.events import Event, events_of
+from proofroll.core.events import Event, EventKind, events_of
 from proofroll.elements.ball_on_surface.mechanics import (
     always_pressed,
     bouncing_bodies,
@@ -26,9 +26,6 @@ from proofroll.elements.ball_on_surface.sampling import BallSample
 if TYPE_CHECKING:
     import xarray as xr
 
-# Slip begins; the ball sticks again; the normal force reaches zero; an impact; the last of infinitely many impacts.
-EventKind = Literal["slip", "stick", "lift_off", "bounce", "settle"]
-
 # Shortest time without pressure that counts as a flight [s]: soft and corrected contacts let a ball hop for less.
 _FLIGHT = 0.01
 # Normal force, relative to the natural one, that counts as round-off or a solver's tolerance.
@@ -36,7 +33,7 @@ _FAINT = 1e-6
 # Relative bracket of a time below which a message gives one number, of six digits.
 _TOLD = 1e-6
 # Events between two states on the wall.
-_SWITCHES = ("slip", "stick")
+_SWITCHES = (EventKind.SLIP, EventKind.STICK)
 # Variables that have a value only on the wall.
 _ON_WALL = ("N", "F2", "F3", "needed_friction", "slip2", "slip3", "slip", "gap")
 
@@ -61,7 +58,7 @@ class Watch:
         """Events of the run, number of samples that belong to the scene, and the reason if the run ends early."""
         at, kept, ended = times.tolist(), len(samples), None
         events = list(located or ())
-        left = next((event for event in events if event.kind == "lift_off"), None)
+        left = next((event for event in events if event.kind == EventKind.LIFT_OFF), None)
         if self._leaves:
             pressed = [self._press(sample) for sample in samples]
             if left is None and (left := lift_off(at[:kept], pressed, self._faint)) is not None:
@@ -80,7 +77,7 @@ class Watch:
         if located is None or contradicted(at, sticking, events):
             events = [event for event in events if event.kind not in _SWITCHES]
             slides = located is None and not sticking[0] and at[0] == 0 and bool(np.any(self._body.slip0))
-            begun = [Event("slip", 0.0, 0.0, 0.0)] if slides else []
+            begun = [Event(EventKind.SLIP, 0.0, 0.0, 0.0)] if slides else []
             events = [*begun, *between_samples(at, [bool(value) for value in sticking]), *events]
         return SeenInRun(kept, sorted(events, key=lambda event: event.time), ended)
 
@@ -107,7 +104,9 @@ def contradicted(times: Sequence[float], sticking: Sequence[bool | None], events
         if any(event.time_low <= t <= event.time_high for event in switches):
             continue
         before, after = [e for e in switches if e.time_high < t], [e for e in switches if e.time_low > t]
-        expected = before[-1].kind == "stick" if before else after[0].kind == "slip" if after else sticking[0]
+        expected = (
+            before[-1].kind == EventKind.STICK if before else after[0].kind == EventKind.SLIP if after else sticking[0]
+        )
         if t < until and bool(sticks) != expected:
             return True
     return False
@@ -116,7 +115,7 @@ def contradicted(times: Sequence[float], sticking: Sequence[bool | None], events
 def between_samples(times: Sequence[float], sticking: Sequence[bool]) -> list[Event]:
     """Slip and stick events between consecutive samples [s] that differ in sticking."""
     return [
-        Event("stick" if after else "slip", 0.5 * (low + high), low, high)
+        Event(EventKind.STICK if after else EventKind.SLIP, 0.5 * (low + high), low, high)
         for before, after, low, high in zip(sticking, sticking[1:], times, times[1:], strict=False)
         if before != after
     ]
@@ -140,13 +139,13 @@ def lift_off(times: Sequence[float], N: Sequence[float], faint: float) -> Event 
             low, high = times[pressed], times[pressed + 1]
             before, after = N[pressed], N[pressed + 1]
             part = before / (before - after) if after < 0 < before else 0.5
-            return Event("lift_off", low + part * (high - low), low, high)
+            return Event(EventKind.LIFT_OFF, low + part * (high - low), low, high)
     return None
 
 
 def lift_off_time(dataset: xr.Dataset) -> float:
     """Time at which the ball first leaves the wall [s]; inf: it does not."""
-    return min((event.time for event in events_of(dataset) if event.kind == "lift_off"), default=math.inf)
+    return min((event.time for event in events_of(dataset) if event.kind == EventKind.LIFT_OFF), default=math.inf)
 
 
 def common_span(truth: xr.Dataset, runs: Mapping[Key, xr.Dataset]) -> tuple[xr.Dataset, dict[Key, xr.Dataset]]:

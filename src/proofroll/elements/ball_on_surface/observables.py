@@ -13,7 +13,7 @@ import numpy as np
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.dataset import BETWEEN
-from proofroll.core.events import events_of
+from proofroll.core.events import EventKind, events_of
 from proofroll.core.observable import Observable, Role
 from proofroll.elements.ball_on_surface.mechanics import energy, natural_acceleration, resistance_moment, wall_velocity
 from proofroll.elements.ball_on_surface.model import RollingBall
@@ -146,7 +146,9 @@ def observe(body: RollingBall, dataset: xr.Dataset) -> dict[str, FloatArray]:
     if "event_kind" in dataset:
         curves["event_times"] = np.array([event.time for event in events_of(dataset)])
     if "sticking" in dataset:
-        curves["first_slip"] = np.array([event.time for event in events_of(dataset) if event.kind == "slip"][:1])
+        curves["first_slip"] = np.array(
+            [event.time for event in events_of(dataset) if event.kind == EventKind.SLIP][:1]
+        )
         curves["creep"] = np.array([creep(dataset)])
     return curves
 

@@ -8,8 +8,8 @@ from scipy.linalg import null_space
 from proofroll.core.errors import InputError
 from proofroll.elements.mechanism.analysis import RANK, least_norm_solution, rank_of, singular_values
 from proofroll.elements.mechanism.contacts.start import extent
-from proofroll.elements.mechanism.joint import DISTANCE, FACTS
 from proofroll.elements.mechanism.joint_coordinates import JointCoordinates
+from proofroll.elements.mechanism.joint_kinds import DISTANCE, FACTS
 from proofroll.elements.mechanism.kinematics import BodyMotion, Rows, Tree
 from proofroll.elements.mechanism.light_joints import SINGULAR
 from proofroll.elements.mechanism.model import Mechanism

@@ -6,7 +6,7 @@ from enum import StrEnum
 
 from proofroll.core.errors import Refused
 from proofroll.elements.mechanism.commands import has_held
-from proofroll.elements.mechanism.joint import FACTS
+from proofroll.elements.mechanism.joint_kinds import FACTS
 from proofroll.elements.mechanism.light_joints import lacks_inertia
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.signal import is_held, varies

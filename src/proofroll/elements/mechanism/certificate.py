@@ -14,7 +14,8 @@ from proofroll.core.errors import Refused
 from proofroll.elements.mechanism.contacts.dynamics import ContactDynamics
 from proofroll.elements.mechanism.contacts.start import TOUCHING, touches
 from proofroll.elements.mechanism.dataset import along, reactions
-from proofroll.elements.mechanism.joint import WITH_AXIS, Joint
+from proofroll.elements.mechanism.joint import Joint
+from proofroll.elements.mechanism.joint_kinds import WITH_AXIS
 from proofroll.elements.mechanism.matrices import matrices_of
 from proofroll.elements.mechanism.named_forces import lengths, named_forces
 from proofroll.elements.mechanism.sampling import MechanismBuilt, MechanismSample

@@ -14,6 +14,7 @@ from proofroll.core.engine import Sample
 from proofroll.core.errors import Diverged, InputError
 from proofroll.elements.mechanism.checks import WORLD
 from proofroll.elements.mechanism.control import EFFORT, constant
+from proofroll.elements.mechanism.joint_kinds import JointKind
 from proofroll.elements.mechanism.kinematics import Tree
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.placed import TURN, Placed
@@ -192,7 +193,7 @@ class Commands:
         others += [part for force in mechanism.forces for part in force.value if is_held(part)]
         self.tables = [table for table in others if isinstance(table, Table)]
         self._times = sorted({time for table in self.tables for time in table.times})
-        self._base = next((joint.child for joint in mechanism.joints if joint.kind == "free"), WORLD)
+        self._base = next((joint.child for joint in mechanism.joints if joint.kind == JointKind.FREE), WORLD)
         gravity = np.array(mechanism.gravity)
         size = float(np.linalg.norm(gravity))
         self._down = gravity / size if size else gravity
@@ -282,7 +283,7 @@ class Commands:
         pairs = [placed.along(joint) for joint in self._joints]
         q, v = (np.array([float(pair[part][0, 0]) for pair in pairs]) for part in (0, 1))
         expected = self._turned + v * (t - self._seen)
-        turns = np.array([TURN if joint.kind == "revolute" else np.inf for joint in self._joints])
+        turns = np.array([TURN if joint.kind == JointKind.REVOLUTE else np.inf for joint in self._joints])
         q = np.where(np.isfinite(turns), q + TURN * np.round((expected - q) / TURN), q)
         self._turned, self._seen = q, t
         return q, v, placed

@@ -17,7 +17,8 @@ from proofroll.elements.mechanism import checks, rotations
 from proofroll.elements.mechanism.checks import METRES, RADIANS, RATIO, ZERO, Numbers, Vector, Z
 from proofroll.elements.mechanism.contacts.geometry import Geometry, Pair
 from proofroll.elements.mechanism.drives import Coupling
-from proofroll.elements.mechanism.joint import DISTANCE, Joint
+from proofroll.elements.mechanism.joint import Joint
+from proofroll.elements.mechanism.joint_kinds import DISTANCE, JointKind
 from proofroll.elements.mechanism.parts import Body
 from proofroll.elements.mechanism.signal import Formula, Table
 
@@ -91,7 +92,7 @@ class Screw:
             q0=self.q0, v0=self.v0, **with_laws,
         )  # fmt: skip
         slide = _joint(
-            self, "slide", "prismatic", parent=self.parent, child=carriage, position=self.position,
+            self, "slide", JointKind.PRISMATIC, parent=self.parent, child=carriage, position=self.position,
             orientation=self.orientation, axis=self.axis, q0=(lead * turn.q0[0],), v0=(lead * turn.v0[0],),
             dependent=self.dependent,
         )  # fmt: skip
@@ -225,7 +226,7 @@ def reader_of(kind: str, table: Mapping[str, Any], simple: type[Any]) -> type[An
     return Cable if kind == "loops" and table.get("kind") == DISTANCE and "at_most" in table else simple
 
 
-def _joint(whole: Screw | Gimbal, name: str, kind: Any = "revolute", **data: Any) -> Joint:
+def _joint(whole: Screw | Gimbal, name: str, kind: Any = JointKind.REVOLUTE, **data: Any) -> Joint:
     """Joint that is a part of another; a mistake in it is that of the whole, which the file has."""
     part = f"{whole.name}.{name}"
     try:

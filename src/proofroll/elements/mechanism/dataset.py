@@ -22,7 +22,7 @@ from proofroll.elements.mechanism.contacts.observables import (
     normal_forces,
     residuals,
 )
-from proofroll.elements.mechanism.joint import TURNING
+from proofroll.elements.mechanism.joint_kinds import TURNING, JointKind
 from proofroll.elements.mechanism.link_forces import put_links
 from proofroll.elements.mechanism.named_forces import lengths, named_forces, pick_named
 from proofroll.elements.mechanism.placed import TURN, Placed
@@ -145,7 +145,7 @@ def columns(
     put("positions", placed.points, "m", "tracked points, or centres of mass", "point", "xyz")
     doubts = _doubts(placed, element.turn_interval)
     for name, (q, rate) in placed.coordinates().items():
-        unit = "rad" if next(j for j in mechanism.joints if j.name == name).kind == "revolute" else "m"
+        unit = "rad" if next(j for j in mechanism.joints if j.name == name).kind == JointKind.REVOLUTE else "m"
         put(f"q.{name}", q, unit, f"coordinate of {name}", **doubts.get(name, {}))
         put(f"v.{name}", rate, f"{unit}/s", f"rate of {name}")
     for index, point in enumerate(mechanism.points):

@@ -11,7 +11,8 @@ import numpy as np
 
 from proofroll.core.errors import InputError, require_known
 from proofroll.elements.mechanism import checks
-from proofroll.elements.mechanism.joint import LAWS, Joint
+from proofroll.elements.mechanism.joint import Joint
+from proofroll.elements.mechanism.joint_kinds import LAWS
 from proofroll.elements.mechanism.signal import Formula, Table, checked, value_at
 
 ActuatorKind = Literal["torque", "velocity", "position"]

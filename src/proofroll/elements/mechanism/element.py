@@ -28,8 +28,8 @@ from proofroll.elements.mechanism.contacts.observables import LAWS, RESIDUALS, c
 from proofroll.elements.mechanism.contacts.start import extent, followed_moves, natural_length
 from proofroll.elements.mechanism.dataset import from_samples
 from proofroll.elements.mechanism.failure_program import program
-from proofroll.elements.mechanism.joint import TURNING
 from proofroll.elements.mechanism.joint_coordinates import JointCoordinates, Solution
+from proofroll.elements.mechanism.joint_kinds import TURNING, JointKind
 from proofroll.elements.mechanism.link_forces import link_observables
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.named_forces import named_forces
@@ -241,8 +241,8 @@ class MechanismElement:
         ]
         for joint in self.mechanism.joints:
             if joint.nq == 1:
-                unit = "rad" if joint.kind == "revolute" else "m"
-                floor = _LEAST if joint.kind == "revolute" else a
+                unit = "rad" if joint.kind == JointKind.REVOLUTE else "m"
+                floor = _LEAST if joint.kind == JointKind.REVOLUTE else a
                 table.append(
                     Observable(f"q.{joint.name}", unit, f"coordinate of {joint.name}", Role.MOTION, floor=floor)
                 )

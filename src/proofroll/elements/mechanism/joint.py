@@ -1,120 +1,51 @@
-"""Joints of the tree and the facts of each kind."""
+"""Joints of the tree: data, frames and coordinates."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from proofroll.core.arrays import read_only
 from proofroll.core.errors import InputError, require_known
 from proofroll.core.parameters import Unit
 from proofroll.elements.mechanism import checks, rotations
 from proofroll.elements.mechanism.checks import METRES, RADIANS, RATIO, WORLD, ZERO, Numbers, Vector, Z
+from proofroll.elements.mechanism.joint_kinds import FACTS, LAWS, ONE_COORDINATE, WITH_AXIS, WITH_QUATERNION, JointKind
 from proofroll.elements.mechanism.prescribed import checked_motion
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.elements.mechanism.signal import Formula, Signal, Table, checked, varies
 
-Kind = Literal["fixed", "revolute", "prismatic", "cylindrical", "universal", "spherical", "planar", "free"]
-
-
-class Facts(NamedTuple):
-    """Facts of a kind of joint, in the frames A (on the parent) and B (on the child) whose z is the axis.
-
-    Attributes:
-        nq, nv: number of coordinates and of velocities.
-        translations: axes of A along which the joint's points may not separate.
-        rotations: pairs (axis of A, axis of B) that stay perpendicular.
-    """
-
-    nq: int
-    nv: int
-    translations: tuple[int, ...]
-    rotations: tuple[tuple[int, int], ...]
-
-
-_ALL, _PARALLEL, _EQUAL = (0, 1, 2), ((0, 2), (1, 2)), ((0, 1), (1, 2), (2, 0))
-FACTS: dict[str, Facts] = {
-    "fixed": Facts(0, 0, _ALL, _EQUAL),
-    "revolute": Facts(1, 1, _ALL, _PARALLEL),
-    "prismatic": Facts(1, 1, (0, 1), _EQUAL),
-    "cylindrical": Facts(2, 2, (0, 1), _PARALLEL),
-    "universal": Facts(2, 2, _ALL, ((2, 0),)),
-    "spherical": Facts(4, 3, _ALL, ()),
-    "planar": Facts(3, 3, (2,), _PARALLEL),
-    "free": Facts(7, 6, (), ()),
-}
-
-DISTANCE = "distance"  # kind of a loop alone: its one row holds the distance of its points
-LOOP_FACTS: dict[str, Facts] = {**FACTS, DISTANCE: Facts(0, 0, (), ())}
-
-
-def rows_of(kinds: Sequence[str]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Indices of the constraint rows of connections: points, (2, points), and angles, (3, angles).
-
-    Each column is the number of a connection, then its axis of A (points), or its axes of A and of B (angles). A
-    distance is a row of points, whose direction is not the axis.
-    """
-    points = [
-        (number, k)
-        for number, kind in enumerate(kinds)
-        for k in ((0,) if kind == DISTANCE else FACTS[kind].translations)
-    ]
-    angles = [(number, *pair) for number, kind in enumerate(kinds) for pair in LOOP_FACTS[kind].rotations]
-    return np.array(points, dtype=np.intp).reshape(-1, 2).T, np.array(angles, dtype=np.intp).reshape(-1, 3).T
-
-
-TURNING = ("revolute", "universal")  # coordinates are angles that may exceed a turn
-WITH_AXIS = ("revolute", "prismatic", "cylindrical", "universal", "planar")
-WITH_QUATERNION = ("spherical", "free")
 _O, _UNIT = np.zeros(3), np.eye(3)
-# For each velocity: (its axis belongs to B, not to A; number of the axis; it is a rotation; the child carries the axis,
-# not the parent). The sum of three rotations about axes of the child does not turn with it, for ω × ω = 0.
-AXES: dict[str, tuple[tuple[bool, int, bool, bool], ...]] = {
-    "fixed": (),
-    "revolute": ((False, 2, True, False),),
-    "prismatic": ((False, 2, False, False),),
-    "cylindrical": ((False, 2, False, False), (False, 2, True, False)),
-    "universal": ((False, 2, True, False), (True, 0, True, True)),
-    "spherical": tuple((True, axis, True, False) for axis in range(3)),
-    "planar": ((False, 0, False, False), (False, 1, False, False), (False, 2, True, False)),
-    "free": tuple((True, axis, turns, not turns) for turns in (False, True) for axis in range(3)),
-}
-# Kinds that may have a law along their coordinates; other kinds lack the coordinate, the rate or a unit for it.
-LAWS: dict[str, tuple[str, ...]] = {
-    "stiffness": ("revolute", "prismatic", "universal"),
-    "rest": ("revolute", "prismatic", "universal"),
-    "damping": ("revolute", "prismatic", "universal", "spherical"),
-    "friction": ("revolute", "prismatic", "universal"),
-    "torque": ("revolute", "prismatic"),
-    "armature": ("revolute", "prismatic"),
-}
 AT_STOP = 1e-9  # relative to the range between stops: a joint may start so far beyond a stop, by rounding in a file
-MOVED = ("revolute", "prismatic")  # kinds that may have a motion
 _START = 1e-9  # largest difference of q0 and v0 from a motion at time 0, relative to the largest of them
 _LENGTHS, _SPEEDS = ("m", "m", "m"), ("m/s", "m/s", "m/s")
 _ABOUT: dict[str, dict[str, Unit]] = {
     "q": {
-        "spherical": "1",
-        "cylindrical": ("m", "rad"),
-        "planar": ("m", "m", "rad"),
-        "free": (*_LENGTHS, "1", "1", "1", "1"),
+        JointKind.SPHERICAL: "1",
+        JointKind.CYLINDRICAL: ("m", "rad"),
+        JointKind.PLANAR: ("m", "m", "rad"),
+        JointKind.FREE: (*_LENGTHS, "1", "1", "1", "1"),
     },
     "v": {
-        "spherical": "rad/s",
-        "cylindrical": ("m/s", "rad/s"),
-        "planar": ("m/s", "m/s", "rad/s"),
-        "free": (*_SPEEDS, "rad/s", "rad/s", "rad/s"),
+        JointKind.SPHERICAL: "rad/s",
+        JointKind.CYLINDRICAL: ("m/s", "rad/s"),
+        JointKind.PLANAR: ("m/s", "m/s", "rad/s"),
+        JointKind.FREE: (*_SPEEDS, "rad/s", "rad/s", "rad/s"),
     },
-    "damping": {"spherical": "N m s/rad"},
+    "damping": {JointKind.SPHERICAL: "N m s/rad"},
 }
 # Units along a coordinate, by kind of joint: turning, sliding, other.
 _UNITS: dict[str, dict[str, dict[str, Unit]]] = {
-    name: {"unit": {"revolute": turning, "universal": turning, "prismatic": sliding, **_ABOUT.get(name, {})}}
+    name: {
+        "unit": {
+            JointKind.REVOLUTE: turning,
+            JointKind.UNIVERSAL: turning,
+            JointKind.PRISMATIC: sliding,
+            **_ABOUT.get(name, {}),
+        }
+    }
     for name, turning, sliding in (
         ("q", "rad", "m"),
         ("coordinate", "rad", "m"),
@@ -169,7 +100,7 @@ class Joint:
     """
 
     name: str
-    kind: Kind
+    kind: JointKind
     parent: str
     child: str
     position: Vector = field(default=ZERO, metadata=METRES)
@@ -193,6 +124,7 @@ class Joint:
     def __post_init__(self) -> None:
         where = f"joints.{checks.name(self.name, 'joints')}"
         require_known(f"{where}.kind", self.kind, FACTS)
+        checks.assign(self, kind=JointKind(self.kind))
         if self.parent == self.child:
             raise InputError(f"{where}.child", self.child, "a joint connects two bodies; parent and child are the same")
         if self.child == WORLD:
@@ -232,9 +164,11 @@ class Joint:
         """Takes q0 and v0 from a motion. Raises InputError if the motion and other data contradict each other."""
         if self.motion is None:
             return
-        if self.kind not in MOVED:
+        if self.kind not in ONE_COORDINATE:
             raise InputError(
-                f"{where}.motion", str(self.motion), f"a {self.kind} joint has none; it is for {', '.join(MOVED)}"
+                f"{where}.motion",
+                str(self.motion),
+                f"a {self.kind} joint has none; it is for {', '.join(ONE_COORDINATE)}",
             )
         for key in ("friction", "limits", "dependent"):
             if value := getattr(self, key):
@@ -310,27 +244,27 @@ def _none(values: object) -> bool:
 def child_in_parent(kind: str, q: Array) -> tuple[Array, Array]:
     """Pose of frame B in frame A for a joint of this kind at q, (nq): origin [m] and rotation matrix."""
     origin, rotation = _O, _UNIT
-    if kind == "revolute":
+    if kind == JointKind.REVOLUTE:
         rotation = rotations.about(2, q[0])
-    elif kind == "prismatic":
+    elif kind == JointKind.PRISMATIC:
         origin = np.array([0.0, 0.0, q[0]])
-    elif kind == "cylindrical":
+    elif kind == JointKind.CYLINDRICAL:
         origin, rotation = np.array([0.0, 0.0, q[0]]), rotations.about(2, q[1])
-    elif kind == "universal":
+    elif kind == JointKind.UNIVERSAL:
         rotation = rotations.about(2, q[0]) @ rotations.about(0, q[1])
-    elif kind == "spherical":
+    elif kind == JointKind.SPHERICAL:
         rotation = rotations.from_quaternion(q)
-    elif kind == "planar":
+    elif kind == JointKind.PLANAR:
         origin, rotation = np.array([q[0], q[1], 0.0]), rotations.about(2, q[2])
-    elif kind == "free":
+    elif kind == JointKind.FREE:
         origin, rotation = q[:3], rotations.from_quaternion(q[3:])
     return origin, rotation
 
 
 def coordinate_rate(kind: str, q: Array, v: Array) -> Array:
     """Rate of a joint's coordinates, (nq), for coordinates q and velocities v, (nv)."""
-    if kind == "spherical":
+    if kind == JointKind.SPHERICAL:
         return rotations.quaternion_rate(q, v)
-    if kind == "free":
+    if kind == JointKind.FREE:
         return np.concatenate([rotations.from_quaternion(q[3:]) @ v[:3], rotations.quaternion_rate(q[3:], v[3:])])
     return v

@@ -7,7 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from proofroll.elements.mechanism.drives import Coupling
-from proofroll.elements.mechanism.joint import AXES, DISTANCE, FACTS, Joint, child_in_parent, coordinate_rate
+from proofroll.elements.mechanism.joint import Joint, child_in_parent, coordinate_rate
+from proofroll.elements.mechanism.joint_kinds import AXES, DISTANCE, FACTS, WITH_QUATERNION
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.parts import Loop
 from proofroll.elements.mechanism.prescribed import moved
@@ -112,7 +113,7 @@ class Tree:
         """The coordinates with quaternions of unit length."""
         q = q.copy()
         for joint, at_q in zip(self.mechanism.joints, self.mechanism.q_slices, strict=True):
-            if joint.kind in {"spherical", "free"}:
+            if joint.kind in WITH_QUATERNION:
                 quaternion = q[at_q][-4:]
                 q[at_q.stop - 4 : at_q.stop] = quaternion / np.linalg.norm(quaternion)
         return q

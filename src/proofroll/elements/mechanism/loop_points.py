@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from proofroll.elements.mechanism.joint_kinds import DISTANCE, IN_PLANE, JointKind
 from proofroll.elements.mechanism.kinematics import Tree
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.parts import Loop
@@ -18,7 +19,7 @@ def held_points(mechanism: Mechanism, loop: Loop) -> tuple[float, ...]:
     In space a revolute loop needs two points: with one alone the axes could part without any drift of the point. Where
     all bodies move in parallel planes a second point would be redundant.
     """
-    return (0.0, _APART * _size(mechanism)) if loop.kind == "revolute" and not is_planar(mechanism) else (0.0,)
+    return (0.0, _APART * _size(mechanism)) if loop.kind == JointKind.REVOLUTE and not is_planar(mechanism) else (0.0,)
 
 
 def is_planar(mechanism: Mechanism) -> bool:
@@ -31,12 +32,12 @@ def is_planar(mechanism: Mechanism) -> bool:
     axes = [(str(joint.kind), A[:, 2]) for joint, A in zip(mechanism.joints, motion.R_parent, strict=True)]
     for loop in mechanism.loops:
         R = motion.R_WB[mechanism.body_index[loop.body_a]]
-        without = loop.kind in {"spherical", "distance"}
-        axes.append(("fixed" if without else loop.kind, R @ loop.frame_a[:, 2]))
-    if any(kind not in {"fixed", "revolute", "prismatic", "planar"} for kind, _ in axes):
+        without = loop.kind in {JointKind.SPHERICAL, DISTANCE}
+        axes.append((JointKind.FIXED if without else loop.kind, R @ loop.frame_a[:, 2]))
+    if any(kind not in IN_PLANE for kind, _ in axes):
         return False
-    turning = [axis for kind, axis in axes if kind in {"revolute", "planar"}]
-    sliding = [axis for kind, axis in axes if kind == "prismatic"]
+    turning = [axis for kind, axis in axes if kind in {JointKind.REVOLUTE, JointKind.PLANAR}]
+    sliding = [axis for kind, axis in axes if kind == JointKind.PRISMATIC]
     return (
         bool(turning)
         and all(np.linalg.norm(np.cross(turning[0], axis)) < _PARALLEL for axis in turning)

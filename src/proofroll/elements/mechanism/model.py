@@ -22,6 +22,7 @@ from proofroll.elements.mechanism.contacts.geometry import BodyContact, Geometry
 from proofroll.elements.mechanism.control import Control
 from proofroll.elements.mechanism.drives import Actuator, Coupling, check_drives
 from proofroll.elements.mechanism.joint import Joint
+from proofroll.elements.mechanism.joint_kinds import JointKind
 from proofroll.elements.mechanism.parts import Body, Force, Loop, Point, Spring
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.elements.mechanism.signal import Held, Signal
@@ -166,7 +167,7 @@ class Mechanism:
         """
         found: dict[str, list[Vector]] = {name: [] for name in [*(body.name for body in self.bodies), WORLD]}
         for connection in self.connections:
-            if connection.kind != "free":
+            if connection.kind != JointKind.FREE:
                 found[connection.a].append(connection.position_a)
                 found[connection.b].append(connection.position_b)
         for link in self.links:

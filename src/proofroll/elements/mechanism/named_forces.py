@@ -6,6 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from proofroll.core.parameters import Unit
+from proofroll.elements.mechanism.joint_kinds import JointKind
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.rotations import Array
 
@@ -34,7 +35,7 @@ FIELDS = ("effort", "coupling", "drive", "friction", "stop")
 
 def named_forces(mechanism: Mechanism) -> tuple[NamedForce, ...]:
     """Named forces of a mechanism; arrays over them have this order."""
-    unit = {joint.name: "N" if joint.kind == "prismatic" else "N m" for joint in mechanism.joints}
+    unit = {joint.name: "N" if joint.kind == JointKind.PRISMATIC else "N m" for joint in mechanism.joints}
     forces = [
         NamedForce(f"effort.{item.name}", "effort", k, unit[item.joint], f"effort of {item.name} at {item.joint}")
         for k, item in enumerate(mechanism.actuators)

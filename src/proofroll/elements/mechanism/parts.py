@@ -13,12 +13,11 @@ from proofroll.core.arrays import read_only
 from proofroll.core.errors import InputError, require_known
 from proofroll.elements.mechanism import checks, rotations
 from proofroll.elements.mechanism.checks import METRES, RADIANS, RATIO, WORLD, ZERO, Inertia, Vector, Z
-from proofroll.elements.mechanism.joint import DISTANCE, LOOP_FACTS, Kind
+from proofroll.elements.mechanism.joint_kinds import DISTANCE, LOOP_FACTS, JointKind, LoopKind
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.elements.mechanism.signal import FUNCTIONS, Formula, Table, checked, value_at
 from proofroll.elements.mechanism.spring_law import SpringLaw
 
-LoopKind = Kind | Literal["distance"]
 ForceKind = Literal["force", "moment"]
 Axes = Literal["world", "body"]
 _LOAD: Mapping[str, Any] = {"unit": {"force": "N", "moment": "N m"}, "signal": True}
@@ -81,7 +80,9 @@ class Loop:
     def __post_init__(self) -> None:
         where = f"loops.{checks.name(self.name, 'loops')}"
         require_known(f"{where}.kind", self.kind, LOOP_FACTS)
-        if self.kind == "free":
+        if self.kind != DISTANCE:
+            checks.assign(self, kind=JointKind(self.kind))
+        if self.kind == JointKind.FREE:
             raise InputError(f"{where}.kind", self.kind, "a free loop holds nothing; remove it")
         if self.body_a == self.body_b:
             raise InputError(f"{where}.body_b", self.body_b, "a loop connects two bodies; these are the same")
@@ -100,9 +101,9 @@ class Loop:
     @cached_property
     def frame_b(self) -> Array:
         """Axes of the loop's frame B on body_b, as columns; with :attr:`frame_a` as A it obeys the rows of a joint."""
-        if self.kind in {"fixed", "prismatic"}:
+        if self.kind in {JointKind.FIXED, JointKind.PRISMATIC}:
             return read_only(rotations.from_rpy(self.orientation).T @ self.frame_a)
-        if self.kind == "universal":  # the joint's row is: z of A perpendicular to x of B
+        if self.kind == JointKind.UNIVERSAL:  # the joint's row is: z of A perpendicular to x of B
             return read_only(rotations.frame_of_axis(self.axis_b)[:, [2, 0, 1]])
         return read_only(rotations.frame_of_axis(self.axis_b))
 

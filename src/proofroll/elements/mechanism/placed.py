@@ -9,7 +9,8 @@ import numpy as np
 from proofroll.core.arrays import FloatArray, cross, on_turns, read_only
 from proofroll.elements.mechanism.bushing import Bushing
 from proofroll.elements.mechanism.checks import ZERO
-from proofroll.elements.mechanism.joint import AXES, DISTANCE, FACTS, WITH_QUATERNION, Joint
+from proofroll.elements.mechanism.joint import Joint
+from proofroll.elements.mechanism.joint_kinds import AXES, DISTANCE, FACTS, WITH_QUATERNION, JointKind
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.prescribed import moved
 
@@ -104,7 +105,7 @@ class Placed:
         if joint.kind in WITH_QUATERNION:
             from scipy.spatial.transform import Rotation
 
-            q = [*np.einsum("ti,tij->jt", self._apart(joint)[0], A)] if joint.kind == "free" else []
+            q = [*np.einsum("ti,tij->jt", self._apart(joint)[0], A)] if joint.kind == JointKind.FREE else []
             q += [*Rotation.from_matrix(turned).as_quat(canonical=True, scalar_first=True).T]
         count = len(self.time)
         return np.reshape(q, (joint.nq, count)).T, np.reshape(v, (joint.nv, count)).T

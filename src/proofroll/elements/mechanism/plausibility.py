@@ -10,6 +10,7 @@ import numpy as np
 from proofroll.core.bounds import DENSEST, LIGHTEST
 from proofroll.elements.mechanism.contacts.geometry import Geometry
 from proofroll.elements.mechanism.joint import Joint
+from proofroll.elements.mechanism.joint_kinds import TURNING, JointKind
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.parts import Body
 
@@ -40,10 +41,10 @@ def _joint(joint: Joint) -> Iterator[str]:
     away = float(np.linalg.norm(joint.position))
     if away > LARGE:
         yield f"it lies {away:.4g} m from its parent's origin; {_METRES}"
-    angles = [*joint.orientation, *(joint.q0 if joint.kind in {"revolute", "universal"} else joint.q0[2:3])]
-    if joint.kind in {"prismatic", "spherical", "free"}:
+    angles = [*joint.orientation, *(joint.q0 if joint.kind in TURNING else joint.q0[2:3])]
+    if joint.kind in {JointKind.PRISMATIC, JointKind.SPHERICAL, JointKind.FREE}:
         angles = [*joint.orientation]
-    if joint.kind == "revolute":
+    if joint.kind == JointKind.REVOLUTE:
         angles += [limit for limit in joint.limits or () if abs(limit) > 2 * _TURN]
     largest = max(map(abs, angles), default=0.0)
     if _TURN < largest <= _MOST:

@@ -22,7 +22,8 @@ from proofroll.elements.mechanism.contacts.geometry import Geometry, Pair
 from proofroll.elements.mechanism.contacts.start import check_contacts
 from proofroll.elements.mechanism.control import made_control
 from proofroll.elements.mechanism.drives import Actuator, Coupling
-from proofroll.elements.mechanism.joint import FACTS, Joint
+from proofroll.elements.mechanism.joint import Joint
+from proofroll.elements.mechanism.joint_kinds import FACTS, JointKind
 from proofroll.elements.mechanism.model import IN_ANY_ORDER, Mechanism
 from proofroll.elements.mechanism.parts import Body, Force, Loop, Point, Spring
 from proofroll.elements.mechanism.signal import Table, read_signal
@@ -122,7 +123,7 @@ def _made(kind: str, field: str, table: Any, numbers: Parameters) -> Any:
         raise InputError(field, table, "give a table")
     made = reader_of(kind, table, KINDS[kind])
     if kind == "joints":
-        require_known(f"{field}.kind", table.get("kind", "revolute"), (*FACTS, *COMPOSED))
+        require_known(f"{field}.kind", table.get("kind", JointKind.REVOLUTE), (*FACTS, *COMPOSED))
     if kind == "pairs" and isinstance(table.get("friction"), Mapping):
         table = _with_both_frictions(field, table)
     units = units_of_kind(made, table.get("kind"))

@@ -9,6 +9,7 @@ import numpy as np
 
 from proofroll.core.number_format import vector
 from proofroll.elements.mechanism.contacts.start import touches
+from proofroll.elements.mechanism.joint_kinds import WITH_QUATERNION, JointKind
 from proofroll.elements.mechanism.kinematics import Tree
 from proofroll.elements.mechanism.placed import Placed
 
@@ -57,9 +58,9 @@ def _start_velocities(element: MechanismElement) -> list[str]:
     """Sentences on v0 of free and spherical joints, which is along the child's axes, with the world's beside it."""
     sentences = []
     for joint in element.mechanism.joints:
-        if joint.kind not in {"free", "spherical"} or not any(joint.v0):
+        if joint.kind not in WITH_QUATERNION or not any(joint.v0):
             continue
-        linear = f"velocity {vector(joint.v0[:3])} m/s, " if joint.kind == "free" else ""
+        linear = f"velocity {vector(joint.v0[:3])} m/s, " if joint.kind == JointKind.FREE else ""
         velocity = f"{linear}angular velocity {vector(joint.v0[-3:])} rad/s along the axes of {joint.child}"
         number = element.mechanism.body_index[joint.child]
         moving = [f"{vector(element.start.w_WB[0, number])} rad/s"]
@@ -74,6 +75,6 @@ def pose(mechanism: Mechanism, sample: MechanismSample) -> str:
     arrays = (sample.p_WB, sample.v_WB, sample.w_WB, sample.q_WB)
     placed = Placed(mechanism, np.zeros(1), *(np.asarray(item)[None] for item in arrays))
     coordinates = placed.coordinates()
-    units = {joint.name: "rad" if joint.kind == "revolute" else "m" for joint in mechanism.joints}
+    units = {joint.name: "rad" if joint.kind == JointKind.REVOLUTE else "m" for joint in mechanism.joints}
     words = [f"q.{name} = {float(q[0]):.4g} {units[name]}" for name, (q, _) in list(coordinates.items())[:_JOINTS]]
     return ", ".join(words) + (", …" if len(coordinates) > _JOINTS else "")

@@ -10,7 +10,7 @@ import numpy as np
 
 from proofroll.core.errors import Refused
 from proofroll.elements.mechanism import WORLD, Joint, Mechanism
-from proofroll.elements.mechanism.joint import DISTANCE
+from proofroll.elements.mechanism.joint_kinds import DISTANCE, JointKind
 from proofroll.elements.mechanism.model import JointOrLoop
 from proofroll.elements.mechanism.parts import Force, Spring
 from proofroll.elements.mechanism.rotations import Array, cross
@@ -19,11 +19,11 @@ from proofroll.engines.exudyn.native import Output, data_node, exu, items
 
 # 1 for each of three translations and three rotations that Exudyn's joint locks, in the axes of its first frame.
 _HELD = {
-    "fixed": (1, 1, 1, 1, 1, 1),
-    "prismatic": (1, 1, 0, 1, 1, 1),
-    "cylindrical": (1, 1, 0, 1, 1, 0),
-    "universal": (1, 1, 1, 0, 1, 0),
-    "planar": (0, 0, 1, 1, 1, 0),
+    JointKind.FIXED: (1, 1, 1, 1, 1, 1),
+    JointKind.PRISMATIC: (1, 1, 0, 1, 1, 1),
+    JointKind.CYLINDRICAL: (1, 1, 0, 1, 1, 0),
+    JointKind.UNIVERSAL: (1, 1, 1, 0, 1, 0),
+    JointKind.PLANAR: (0, 0, 1, 1, 1, 0),
 }
 # The same for a revolute loop of a planar mechanism: the plane locks the rest already.
 _IN_PLANE = (1, 1, 0, 0, 0, 0)
@@ -31,12 +31,12 @@ _IN_PLANE = (1, 1, 0, 0, 0, 0)
 # multipliers of these rows, not a moment. Found from residuals of the rows; Exudyn's documents do not describe it.
 _THREE, _TWO = ((2, 1), (2, 0), (0, 1)), ((2, 0), (2, 1))
 _ROWS = {
-    "fixed": _THREE,
-    "prismatic": _THREE,
-    "revolute": _TWO,
-    "cylindrical": _TWO,
-    "planar": _TWO,
-    "universal": (None, (0, 2)),
+    JointKind.FIXED: _THREE,
+    JointKind.PRISMATIC: _THREE,
+    JointKind.REVOLUTE: _TWO,
+    JointKind.CYLINDRICAL: _TWO,
+    JointKind.PLANAR: _TWO,
+    JointKind.UNIVERSAL: (None, (0, 2)),
 }
 
 
@@ -157,7 +157,7 @@ class Connections:
             "localPosition1": self._local(joint.child, joint.child_position),
             "axis0": self._turns[joint.parent] @ joint.parent_frame[:, 2],
         }
-        if joint.kind == "prismatic":
+        if joint.kind == JointKind.PRISMATIC:
             return self._system.AddMarker(items.MarkerBodiesRelativeTranslationCoordinate(**between))
         node = data_node(self._system, joint.q0[0])  # it counts whole turns
         return self._system.AddMarker(items.MarkerBodiesRelativeRotationCoordinate(nodeNumber=node, **between))
@@ -168,19 +168,19 @@ class Connections:
         ``flat``: the mechanism is planar.
         """
         kind, A, B = between.kind, between.frame_a, between.frame_b
-        if kind == "universal":  # Exudyn's row is x of the first to z of the second, ours z to x
+        if kind == JointKind.UNIVERSAL:  # Exudyn's row is x of the first to z of the second, ours z to x
             A, B = A[:, [2, 0, 1]], B[:, [1, 2, 0]]
         markers = [self.marker(between.a, between.position_a, A), self.marker(between.b, between.position_b, B)]
         item, rows = None, _ROWS.get(kind, ())
-        if kind == "spherical":
+        if kind == JointKind.SPHERICAL:
             item = items.ObjectJointSpherical(markerNumbers=markers)
-        elif kind == "revolute" and flat and joint is None:
+        elif kind == JointKind.REVOLUTE and flat and joint is None:
             item, rows = items.ObjectJointGeneric(constrainedAxes=_IN_PLANE, markerNumbers=markers), ()
-        elif kind == "revolute":
+        elif kind == JointKind.REVOLUTE:
             item = items.ObjectJointRevoluteZ(markerNumbers=markers)
         elif kind == DISTANCE:
             item = items.ObjectConnectorDistance(markerNumbers=markers, distance=between.length)
-        elif kind != "free":
+        elif kind != JointKind.FREE:
             item = items.ObjectJointGeneric(constrainedAxes=_HELD[kind], markerNumbers=markers)
         constraint = None if item is None else self._system.AddObject(item)
         spring = None if joint is None else self._spring_of(joint, markers)
@@ -191,10 +191,10 @@ class Connections:
         if not (joint.stiffness or joint.damping or joint.torque):
             return None
         law = {"stiffness": joint.stiffness, "damping": joint.damping, "offset": joint.rest}
-        if joint.kind == "spherical":
+        if joint.kind == JointKind.SPHERICAL:
             D = np.diag([0.0, 0.0, 0.0, *[joint.damping] * 3])
             item = items.ObjectConnectorRigidBodySpringDamper(damping=D, markerNumbers=markers)
-        elif joint.kind == "prismatic":  # its force is a pull, as the spring's is
+        elif joint.kind == JointKind.PRISMATIC:  # its force is a pull, as the spring's is
             item = items.ObjectConnectorLinearSpringDamper(
                 markerNumbers=markers, force=-joint.constant_drive, axisMarker0=[0.0, 0.0, 1.0], **law
             )
@@ -222,7 +222,7 @@ class Connections:
             a, b = (np.array(system.GetMarkerOutput(marker, Output.Position, now)) for marker in made.markers)
             pull = float(np.ravel(system.GetObjectOutput(made.constraint, Output.Force))[0])
             force -= pull * (b - a) / made.between.length
-        elif made.between.kind == "spherical":
+        elif made.between.kind == JointKind.SPHERICAL:
             force -= system.GetObjectOutput(made.constraint, Output.Force)
         elif made.constraint is not None:
             force -= A @ system.GetObjectOutput(made.constraint, Output.ForceLocal)
@@ -230,9 +230,9 @@ class Connections:
             for multiplier, row in zip(multipliers, made.rows, strict=False):  # there are always three
                 if row is not None:
                     torque -= multiplier * cross(B[:, row[1]], A[:, row[0]])
-        if made.spring is not None and made.between.kind == "prismatic":
+        if made.spring is not None and made.between.kind == JointKind.PRISMATIC:
             force -= np.ravel(system.GetObjectOutput(made.spring, Output.ForceLocal))[0] * A[:, 2]
-        elif made.spring is not None and made.between.kind == "revolute":
+        elif made.spring is not None and made.between.kind == JointKind.REVOLUTE:
             torque -= np.ravel(system.GetObjectOutput(made.spring, Output.TorqueLocal))[0] * A[:, 2]
         elif made.spring is not None:
             torque -= A @ system.GetObjectOutput(made.spring, Output.TorqueLocal)

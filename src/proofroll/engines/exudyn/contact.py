@@ -20,8 +20,7 @@ import numpy as np
 from proofroll.core.arrays import FloatArray
 from proofroll.core.engine import Regularised
 from proofroll.core.errors import Refused
-from proofroll.core.events import Event
-from proofroll.elements.ball_on_surface.events import EventKind
+from proofroll.core.events import Event, EventKind
 from proofroll.elements.ball_on_surface.mechanics import initial_response, natural_acceleration, newton_euler
 from proofroll.elements.ball_on_surface.model import BallCapability, RollingBall
 from proofroll.elements.ball_on_surface.sampling import BallBuilt, BallSample
@@ -117,7 +116,7 @@ class PenaltyContact(BallRun):
             self.system.SetPostStepUserFunction(self._watch)
         self.integration = Integration(self.system, settings, impacts=body.flies)
         if not self._sticks and not body.flies:
-            self.integration.events.append(Event("slip", 0.0, 0.0, 0.0))
+            self.integration.events.append(Event(EventKind.SLIP, 0.0, 0.0, 0.0))
 
     def _watch(self, system: Any, t: float) -> bool:
         """Records events; Exudyn calls it after each step and once at the start. False ends the run."""
@@ -125,7 +124,7 @@ class PenaltyContact(BallRun):
             return True
         gap, speed, _, _ = system.GetNodeOutput(self.data, COORDINATES).tolist()
         if gap > 0:
-            self.integration.events.append(Event("lift_off", 0.5 * (self._t + t), self._t, t))
+            self.integration.events.append(Event(EventKind.LIFT_OFF, 0.5 * (self._t + t), self._t, t))
             self.integration.complaint = "the ball leaves the wall"
             return False
         slip = speed / self.zone
@@ -135,9 +134,9 @@ class PenaltyContact(BallRun):
             elif self._left is None:
                 self._left = self._t, t
             if self._left is not None and slip > SURELY:
-                self._switch("slip", *self._left)
+                self._switch(EventKind.SLIP, *self._left)
         elif slip < 1:
-            self._switch("stick", self._t, t)
+            self._switch(EventKind.STICK, self._t, t)
         self._t = t
         return self.integration.complaint is None
 
@@ -150,7 +149,7 @@ class PenaltyContact(BallRun):
             self.integration.complaint = "the ball slips, as rolling needs more friction than grip (use a larger grip),"
             return
         self.integration.events.append(Event(kind, 0.5 * (low + high), low, high))
-        self._sticks, self._left = kind == "stick", None
+        self._sticks, self._left = kind == EventKind.STICK, None
 
     def _pressing(self) -> float:
         """Normal force on a slipping ball [N], from the size of the contact force and the grip."""

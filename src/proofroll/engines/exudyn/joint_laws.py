@@ -14,6 +14,7 @@ import numpy as np
 
 from proofroll.elements.mechanism import Body, Joint, Mechanism
 from proofroll.elements.mechanism.drives import Actuator
+from proofroll.elements.mechanism.joint_kinds import JointKind
 from proofroll.elements.mechanism.named_forces import joint_force_shares, lengths
 from proofroll.elements.mechanism.prescribed import moved
 from proofroll.elements.mechanism.rotations import Array
@@ -157,7 +158,7 @@ class JointLaws:
         """Adds a rotor with the inertia of the joint's armature, constrained to the joint's coordinate."""
         system = self._system
         node = system.AddNode(items.Node1D(initialCoordinates=[joint.q0[0]], initialVelocities=[joint.v0[0]]))
-        if joint.kind == "prismatic":
+        if joint.kind == JointKind.PRISMATIC:
             add_renamed(system, items.ObjectMass1D(nodeNumber=node), joint.armature, "mass", "physicsMass")
         else:
             item = items.ObjectRotationalMass1D(nodeNumber=node)
@@ -189,7 +190,7 @@ def _drive(joint: Joint) -> Callable[[float, float, float], float]:
 
 def _inertia(joint: Joint, child: Body) -> float:
     """Inertia of the child alone along the joint's coordinate, plus the joint's armature [kg, kg m²]."""
-    if joint.kind == "prismatic":
+    if joint.kind == JointKind.PRISMATIC:
         return child.mass + joint.armature
     axis = joint.child_frame[:, 2]
     arm = np.cross(axis, np.array(child.com) - joint.child_position)

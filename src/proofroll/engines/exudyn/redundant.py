@@ -14,6 +14,7 @@ from proofroll.core.errors import Refused
 from proofroll.elements.mechanism import WORLD, Mechanism, Tree
 from proofroll.elements.mechanism.capabilities import ALL_JOINTS, ALL_LOOPS, FORCES, MechanismCapability, require
 from proofroll.elements.mechanism.commands import drive
+from proofroll.elements.mechanism.joint_kinds import JointKind
 from proofroll.elements.mechanism.loop_points import is_planar
 from proofroll.elements.mechanism.rotations import Array, quaternion_rate, to_quaternion
 from proofroll.elements.mechanism.sampling import (
@@ -160,7 +161,7 @@ class Redundant(ExudynModel):
         pushes = self._laws.pushes()
         for law, push in pushes:
             along = push * self._connections.axes(self._joints[law.number])[0][:, 2]
-            (force if self._mechanism.joints[law.number].kind == "prismatic" else torque)[law.number] += along
+            (force if self._mechanism.joints[law.number].kind == JointKind.PRISMATIC else torque)[law.number] += along
         return MechanismSample(
             p_WB=self._over_bodies(Output.Position),
             v_WB=self._over_bodies(Output.Velocity),
@@ -180,7 +181,7 @@ class Redundant(ExudynModel):
         axes = np.full((len(joints), 3), np.nan)
         for number, (joint, made) in enumerate(zip(self._mechanism.joints, joints, strict=True)):
             if joint.kind in WITH_AXIS:
-                axes[number] = self._connections.axes(made)[0][:, 0 if joint.kind == "universal" else 2]
+                axes[number] = self._connections.axes(made)[0][:, 0 if joint.kind == JointKind.UNIVERSAL else 2]
         to_com = np.array(
             [
                 self._connections.body(body.name, Output.RotationMatrix, np.zeros(3)).reshape(3, 3).T
@@ -232,5 +233,5 @@ def _matrix(six: Any) -> Array:
 def _check(mechanism: Mechanism) -> None:
     """Raises Refused for forces in universal joints, which no capability covers."""
     for joint in mechanism.joints:
-        if joint.kind == "universal" and (joint.stiffness or joint.damping or joint.friction):
+        if joint.kind == JointKind.UNIVERSAL and (joint.stiffness or joint.damping or joint.friction):
             raise Refused(f"Exudyn has no torsional spring, damper or friction for the two angles of {joint.name}")

@@ -8,6 +8,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from proofroll.core.errors import Refused
+from proofroll.elements.mechanism.joint_kinds import JointKind
 from proofroll.engines.exudyn.integration import new_system
 from proofroll.engines.exudyn.native import Output, add_kinematic_tree, exu, items, new_settings
 from proofroll.robots.model import NO_BODY, Array, RobotJoint
@@ -15,7 +16,12 @@ from proofroll.robots.protocol import AtState, Reading, Request, evaluate
 
 # Exudyn's joint type and axis of each link that stands for a joint.
 _FREE = tuple((kind, axis) for kind in ("prismatic", "revolute") for axis in "XYZ")
-_CHAINS = {"free": _FREE, "spherical": _FREE[3:], "revolute": (("revolute", "Z"),), "prismatic": (("prismatic", "Z"),)}
+_CHAINS = {
+    JointKind.FREE: _FREE,
+    JointKind.SPHERICAL: _FREE[3:],
+    JointKind.REVOLUTE: (("revolute", "Z"),),
+    JointKind.PRISMATIC: (("prismatic", "Z"),),
+}
 
 
 class ExudynRobots:
@@ -124,7 +130,7 @@ class _Tree:
         home, p, R = robot.welded[joint.parent]
         position, rotation = p + R @ joint.position, R @ joint.rotation @ A
         parent = -1
-        if joint.kind == "free":  # its coordinates are relative to the world, whatever its parent is
+        if joint.kind == JointKind.FREE:  # its coordinates are relative to the world, whatever its parent is
             position, rotation = np.zeros(3), np.eye(3)
         elif home != NO_BODY:
             parent = self.link[home]
@@ -152,7 +158,7 @@ class _Tree:
             R = states.rotation[joint.name][k]
             turned = slice(columns.stop - 3, columns.stop)
             q[turned] = angles = Rotation.from_matrix(R).as_euler("XYZ")
-            if joint.kind == "free":
+            if joint.kind == JointKind.FREE:
                 q[columns.start : turned.start], R = states.position[joint.name][k], np.eye(3)
             x = np.array([1.0, 0.0, 0.0])
             y = Rotation.from_euler("X", angles[0]).apply([0.0, 1.0, 0.0])

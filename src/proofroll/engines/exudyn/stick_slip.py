@@ -16,8 +16,7 @@ import numpy as np
 from proofroll.core.arrays import FloatArray
 from proofroll.core.engine import whole_steps
 from proofroll.core.errors import Diverged
-from proofroll.core.events import Event
-from proofroll.elements.ball_on_surface.events import EventKind
+from proofroll.core.events import Event, EventKind
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.engines.exudyn.friction import Touch, mobility, slip_direction
 from proofroll.engines.exudyn.integration import Integration
@@ -72,7 +71,7 @@ class SwitchedIntegration:
         self._watching, self._stopped = False, False
         self.system.SetPostStepUserFunction(self._watch)
         if np.any(body.slip0) or self._margin(self.state.touch) < 0:
-            self._switch("slip", 0.0, 0.0, 0.0)
+            self._switch(EventKind.SLIP, 0.0, 0.0, 0.0)
         self._restart()
 
     def advance(self, t: float) -> None:
@@ -86,7 +85,7 @@ class SwitchedIntegration:
             if self.sticking and not self._stopped:
                 self.state = self._state(exu.ConfigurationType.Current)
             if self.state.touch.N <= 0:
-                self.events.append(Event("lift_off", 0.5 * (self._before_t + self.t), self._before_t, self.t))
+                self.events.append(Event(EventKind.LIFT_OFF, 0.5 * (self._before_t + self.t), self._before_t, self.t))
                 raise Diverged(f"the ball leaves the wall at {self.t:g} s")
             if self._stopped:
                 self._divide()
@@ -165,7 +164,7 @@ class SwitchedIntegration:
                 self.state = beyond
                 break
             if self.sticking and self._margin(self.state.touch) <= 0:
-                self._switch("slip", now, self._before_t, end)
+                self._switch(EventKind.SLIP, now, self._before_t, end)
                 continue
             if not self.sticking and (self._begun(now) or self._margin(self.state.touch) <= 0):
                 # The force only touched the cone: the ball does not slip after all, and the step ends sticking.
@@ -192,29 +191,29 @@ class SwitchedIntegration:
         """Switches the contact in the present state, which is at an event."""
         touch = self.state.touch
         if self.sticking:
-            self._switch("slip", now, self._before_t, end)
+            self._switch(EventKind.SLIP, now, self._before_t, end)
             return
         holds = touch.needed <= self.mu_static * touch.N
         if holds:
-            self._switch("stick", now, self._before_t, end)
+            self._switch(EventKind.STICK, now, self._before_t, end)
         if holds or touch.slip <= AT_REST * self.settings.dt * self.beta * self.mu_kinetic * touch.N:
             q, q_t = self.state.q, self.model.without_slip(self.state.q_t)
             self.state = ContactState(q, q_t, self.model.touch(q, q_t))
 
     def _switch(self, kind: EventKind, now: float, low: float, high: float) -> None:
         self.events.append(Event(kind, now, low, high))
-        self.sticking = kind == "stick"
+        self.sticking = kind == EventKind.STICK
 
     def _begun(self, now: float) -> bool:
         """True if the ball began to slip at this very time [s]."""
-        return bool(self.events) and self.events[-1].kind == "slip" and self.events[-1].time == now
+        return bool(self.events) and self.events[-1].kind == EventKind.SLIP and self.events[-1].time == now
 
     def _take_back(self, now: float) -> None:
         if self._begun(now):
             self.events.pop()
             self.sticking = True
         else:
-            self._switch("stick", now, self._before_t, now)
+            self._switch(EventKind.STICK, now, self._before_t, now)
 
     def _part(self, dt: float) -> ContactState:
         """The state after one step of another size [s] from the present one."""

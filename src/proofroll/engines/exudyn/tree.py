@@ -13,6 +13,7 @@ from proofroll.core.errors import Diverged
 from proofroll.elements.mechanism import WORLD, Joint
 from proofroll.elements.mechanism.capabilities import ALL_JOINTS, ALL_LOOPS, FORCES, MechanismCapability, require
 from proofroll.elements.mechanism.commands import drive
+from proofroll.elements.mechanism.joint_kinds import JointKind
 from proofroll.elements.mechanism.rotations import Array, to_quaternion
 from proofroll.elements.mechanism.sampling import MechanismBuilt, MechanismSample, mechanism_of
 from proofroll.engines.exudyn.bushings import add_bushings
@@ -33,7 +34,7 @@ LACKING: Mapping[str, str] = {
     MechanismCapability.MOTIONS: "Exudyn's explicit integrators take no constraints",
     MechanismCapability.ARMATURE: "Exudyn's kinematic tree has no inertia of drives",
 }
-_TYPES = {"revolute": exu.JointType.RevoluteZ, "prismatic": exu.JointType.PrismaticZ}
+_TYPES = {JointKind.REVOLUTE: exu.JointType.RevoluteZ, JointKind.PRISMATIC: exu.JointType.PrismaticZ}
 _READ = ("Position", "Velocity", "AngularVelocity", "RotationMatrix", "Acceleration", "AngularAcceleration")
 
 

@@ -8,6 +8,7 @@ import numpy as np
 from proofroll.core.arrays import cross
 from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.joint import child_in_parent
+from proofroll.elements.mechanism.joint_kinds import JointKind
 from proofroll.elements.mechanism.rotations import Array, skews
 from proofroll.engines.mujoco import mechanism_model
 from proofroll.engines.mujoco.running import mass_matrix
@@ -38,7 +39,7 @@ def _velocities(mechanism: Mechanism, model: Any) -> tuple[Array, Array]:
             continue
         first = int(parts[0].dofadr[0])
         T[first : first + joint.nv, at] = np.eye(joint.nv)
-        if joint.kind != "free":
+        if joint.kind != JointKind.FREE:
             continue
         R = child_in_parent(joint.kind, q[at_q])[1]
         arm = np.zeros(3)

@@ -8,8 +8,7 @@ import mujoco
 import numpy as np
 
 from proofroll.core.errors import Refused
-from proofroll.core.events import Event
-from proofroll.elements.ball_on_surface.events import EventKind
+from proofroll.core.events import Event, EventKind
 from proofroll.elements.ball_on_surface.model import Contact, RollingBall
 from proofroll.engines.mujoco.settings import LARGEST_PYRAMIDAL_FRICTION, PRELOAD, MujocoSettings
 
@@ -89,7 +88,7 @@ class BoundedFriction:
     def start(self, data: Any) -> bool:
         """True if the forces at time 0 hold the ball; if not, records that it slips from time 0."""
         if not self.holds(data):
-            self._change(False, Event("slip", 0.0, 0.0, 0.0))
+            self._change(False, Event(EventKind.SLIP, 0.0, 0.0, 0.0))
         return self.sticking
 
     def step(self, data: Any) -> None:
@@ -125,7 +124,7 @@ class BoundedFriction:
             self._lost = self._steps
         if not self._flies and float(self._surface.gap(data.xpos[self._ball])) > self._radius:
             self._flies = True
-            self._change(False, self._event(self._lost, "lift_off"))
+            self._change(False, self._event(self._lost, EventKind.LIFT_OFF))
 
     def _presses(self, data: Any) -> bool:
         """True if there is a contact with a normal force; stores the force in ``self._wrench``."""
@@ -207,7 +206,7 @@ class BoundedFriction:
 
     def _event(self, step: int, kind: EventKind | None = None) -> Event:
         low, high = max(step - 1, 0) * self._dt, step * self._dt
-        return Event(kind or ("slip" if self.sticking else "stick"), 0.5 * (low + high), low, high)
+        return Event(kind or (EventKind.SLIP if self.sticking else EventKind.STICK), 0.5 * (low + high), low, high)
 
     def _change(self, sticking: bool, event: Event) -> None:
         self._events.append(event)

@@ -13,7 +13,8 @@ from proofroll.core.errors import Refused
 from proofroll.elements.mechanism import WORLD, Joint, Mechanism
 from proofroll.elements.mechanism.capabilities import ALL_JOINTS, FORCES, MechanismCapability, require
 from proofroll.elements.mechanism.commands import drive
-from proofroll.elements.mechanism.joint import DISTANCE, child_in_parent
+from proofroll.elements.mechanism.joint import child_in_parent
+from proofroll.elements.mechanism.joint_kinds import DISTANCE, JointKind
 from proofroll.elements.mechanism.named_forces import named_forces
 from proofroll.elements.mechanism.rotations import Array, to_quaternion
 from proofroll.elements.mechanism.sampling import (
@@ -141,14 +142,16 @@ class MujocoMechanism(SteppedModel):
         if not parts:
             return
         q, v = np.array(joint.q0), np.array(joint.v0)
-        if len(parts) == 1 and joint.kind == "free":  # qpos: the body's frame in the world; qvel: its origin's velocity
+        if (
+            len(parts) == 1 and joint.kind == JointKind.FREE
+        ):  # qpos: the body's frame in the world; qvel: its origin's velocity
             origin, S = child_in_parent(joint.kind, q)
             R = joint.parent_frame @ S
             arm = R @ joint.child_position
             place = np.array(joint.position) + joint.parent_frame @ origin - arm
             q = np.concatenate([place, to_quaternion(R)])
             v = np.concatenate([R @ v[:3] - cross(R @ v[3:], arm), v[3:]])
-        elif joint.kind == "free":
+        elif joint.kind == JointKind.FREE:
             v = np.concatenate([child_in_parent(joint.kind, q)[1] @ v[:3], v[3:]])
         self._data.qpos[parts[0].qposadr[0] :][: len(q)] = q
         first = parts[0].dofadr[0]
@@ -250,7 +253,7 @@ class MujocoMechanism(SteppedModel):
             force[number], torque[number] = (R @ data.sensordata[at : at + 3] for at in self._sensors[number])
         rows = {int(data.efc_id[row]): row for row in reversed(range(data.ne))}  # first row of each constraint
         for number, loop in enumerate(self._mechanism.loops):
-            if loop.kind == "fixed":
+            if loop.kind == JointKind.FIXED:
                 continue
             force[count + number] = torque[count + number] = 0.0
             origin = data.site(f"loop{number}b0").xpos
@@ -303,7 +306,7 @@ class MujocoMechanism(SteppedModel):
         if joint.kind not in WITH_AXIS:
             return np.full(3, np.nan)
         names = mechanism_model.part_names(joint)
-        return np.array(data.xaxis[self._model.joint(names[0 if joint.kind == "universal" else -1]).id])
+        return np.array(data.xaxis[self._model.joint(names[0 if joint.kind == JointKind.UNIVERSAL else -1]).id])
 
     def _rows(self, data: Any, count: int) -> Array:
         """The first rows of all constraints on MuJoCo's velocities, shape (count, nv)."""

@@ -14,7 +14,7 @@ import numpy as np
 
 from proofroll.elements.mechanism import WORLD, Body, Joint, Mechanism
 from proofroll.elements.mechanism.drives import Actuator, Coupling
-from proofroll.elements.mechanism.joint import DISTANCE, WITH_QUATERNION
+from proofroll.elements.mechanism.joint_kinds import DISTANCE, WITH_QUATERNION, JointKind
 from proofroll.elements.mechanism.kinematics import Tree
 from proofroll.elements.mechanism.loop_points import held_points
 from proofroll.elements.mechanism.rotations import to_quaternion
@@ -26,20 +26,20 @@ _HINGE, _SLIDE = mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE
 _BALL, _FREE = mujoco.mjtJoint.mjJNT_BALL, mujoco.mjtJoint.mjJNT_FREE
 # MuJoCo's joints that make up one of ours, in order, each with the column of the joint's frame that is its axis.
 PARTS: dict[str, tuple[tuple[Any, int], ...]] = {
-    "fixed": (),
-    "revolute": ((_HINGE, 2),),
-    "prismatic": ((_SLIDE, 2),),
-    "cylindrical": ((_SLIDE, 2), (_HINGE, 2)),
-    "universal": ((_HINGE, 2), (_HINGE, 0)),
-    "spherical": ((_BALL, 2),),
-    "planar": ((_SLIDE, 0), (_SLIDE, 1), (_HINGE, 2)),
-    "free": ((_SLIDE, 0), (_SLIDE, 1), (_SLIDE, 2), (_BALL, 2)),
+    JointKind.FIXED: (),
+    JointKind.REVOLUTE: ((_HINGE, 2),),
+    JointKind.PRISMATIC: ((_SLIDE, 2),),
+    JointKind.CYLINDRICAL: ((_SLIDE, 2), (_HINGE, 2)),
+    JointKind.UNIVERSAL: ((_HINGE, 2), (_HINGE, 0)),
+    JointKind.SPHERICAL: ((_BALL, 2),),
+    JointKind.PLANAR: ((_SLIDE, 0), (_SLIDE, 1), (_HINGE, 2)),
+    JointKind.FREE: ((_SLIDE, 0), (_SLIDE, 1), (_SLIDE, 2), (_BALL, 2)),
 }
 
 
 def parts_of(joint: Joint) -> tuple[tuple[Any, int], ...]:
     """MuJoCo's joints that make up a joint."""
-    return ((_FREE, 2),) if joint.kind == "free" and joint.parent == WORLD else PARTS[joint.kind]
+    return ((_FREE, 2),) if joint.kind == JointKind.FREE and joint.parent == WORLD else PARTS[joint.kind]
 
 
 def part_names(joint: Joint) -> list[str]:
@@ -242,7 +242,7 @@ def _add_strut(spec: Any, bodies: dict[str, Any], number: int, mechanism: Mechan
 
 def _add_loop(spec: Any, bodies: dict[str, Any], number: int, mechanism: Mechanism, settings: MujocoSettings) -> None:
     loop = mechanism.loops[number]
-    kind = mujoco.mjtEq.mjEQ_WELD if loop.kind == "fixed" else mujoco.mjtEq.mjEQ_CONNECT
+    kind = mujoco.mjtEq.mjEQ_WELD if loop.kind == JointKind.FIXED else mujoco.mjtEq.mjEQ_CONNECT
     for point, place in enumerate(held_points(mechanism, loop)):
         names = [f"loop{number}{end}{point}" for end in "ab"]
         ends = ((loop.body_a, loop.position_a, loop.frame_a), (loop.body_b, loop.position_b, loop.frame_b))

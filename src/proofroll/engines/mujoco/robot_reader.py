@@ -10,6 +10,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from proofroll.core.errors import Refused
+from proofroll.elements.mechanism.joint_kinds import ONE_COORDINATE, JointKind
 from proofroll.engines.mujoco.running import mass_matrix, written
 from proofroll.robots.model import NO_BODY, Array, Mimic, Robot, RobotBody, RobotJoint, RobotLoop, Tie, composed
 from proofroll.robots.protocol import AtState, Reading, Request, Whole, evaluate
@@ -192,7 +193,7 @@ def _coupled(model: Any, joints: tuple[str, ...]) -> tuple[str, ...]:
     return tuple(joints[number] for number in model.eq_obj1id[model.eq_type == int(mujoco.mjtEq.mjEQ_JOINT)].tolist())
 
 
-_KINDS = {0: "free", 1: "spherical", 2: "prismatic", 3: "revolute"}
+_KINDS = {0: JointKind.FREE, 1: JointKind.SPHERICAL, 2: JointKind.PRISMATIC, 3: JointKind.REVOLUTE}
 
 
 def robot_of(model: Any) -> Robot:
@@ -217,7 +218,9 @@ def robot_of(model: Any) -> Robot:
         position, rotation = np.array(model.body_pos[index]), matrix(model.body_quat[index])
         begin, count = int(model.body_jntadr[index]), int(model.body_jntnum[index])
         if not count:
-            joints.append(RobotJoint(f"({name})", "fixed", parent, name, position, rotation, np.array([0.0, 0.0, 1.0])))
+            joints.append(
+                RobotJoint(f"({name})", JointKind.FIXED, parent, name, position, rotation, np.array([0.0, 0.0, 1.0]))
+            )
         for joint in range(begin, begin + count):
             last = joint == begin + count - 1
             child = name if last else f"{name}/{joint - begin}"
@@ -268,13 +271,13 @@ def _joint(
 ) -> RobotJoint:
     kind = _KINDS[int(model.jnt_type[index])]
     dof, start = int(model.jnt_dofadr[index]), int(model.jnt_qposadr[index])
-    anchor = np.array(model.jnt_pos[index]) * (kind != "free")
-    shift = float(model.qpos0[start]) * (kind in {"revolute", "prismatic"})
-    bounded = bool(model.jnt_limited[index]) and kind in {"revolute", "prismatic"}
+    anchor = np.array(model.jnt_pos[index]) * (kind != JointKind.FREE)
+    shift = float(model.qpos0[start]) * (kind in ONE_COORDINATE)
+    bounded = bool(model.jnt_limited[index]) and kind in ONE_COORDINATE
     return RobotJoint(
         model.joint(index).name, kind, parent, child,
-        position + rotation @ anchor if kind != "free" else np.zeros(3),
-        rotation if kind != "free" else np.eye(3),
+        position + rotation @ anchor if kind != JointKind.FREE else np.zeros(3),
+        rotation if kind != JointKind.FREE else np.eye(3),
         np.array(model.jnt_axis[index]), anchor,
         damping=_first(model.dof_damping[dof]),
         friction=float(model.dof_frictionloss[dof]),
@@ -324,7 +327,7 @@ def _constraints(model: Any, names: Sequence[str]) -> tuple[tuple[RobotLoop, ...
                 place, turn = (data[:3], data[3:6]), np.eye(3)
             else:
                 place, turn = (data[3:6], data[:3]), matrix(data[6:10])
-            closing = "spherical" if kind == int(kinds.mjEQ_CONNECT) else "fixed"
+            closing = JointKind.SPHERICAL if kind == int(kinds.mjEQ_CONNECT) else JointKind.FIXED
             loops.append(RobotLoop(name, closing, names[a], names[b], *place, turn))
         elif kind == int(kinds.mjEQ_TENDON) and (terms := _held_sum(model, a, b, data)):
             ties.append(Tie(name, tuple(terms), tuple(terms.values()), float(data[0])))

@@ -15,8 +15,7 @@ import pinocchio as pin
 from proofroll.core.arrays import FloatArray, cross
 from proofroll.core.engine import Regularised, whole_steps
 from proofroll.core.errors import Diverged, Refused
-from proofroll.core.events import Event
-from proofroll.elements.ball_on_surface.events import EventKind
+from proofroll.core.events import Event, EventKind
 from proofroll.elements.ball_on_surface.mechanics import (
     initial_angular_acceleration,
     initial_response,
@@ -101,7 +100,7 @@ class ContactSteps:
         self.mu_static = body.contact.mu_static if self.bounded else unbounded
         self.mu_kinetic = body.contact.mu_kinetic if self.bounded else unbounded
 
-        self._status: EventKind = "stick"
+        self._status: EventKind = EventKind.STICK
         self._pressed = False
         self._normal_force = 0.0  # start of the fixed-point iteration for rolling resistance
         self.happened: list[Event] = []
@@ -111,9 +110,9 @@ class ContactSteps:
         except Diverged as error:
             raise Refused(str(error)) from None
         self._normal_force = kick.normal_force
-        if self.bounded and kick.status == "slip":
-            self._status = "slip"
-            self.happened.append(Event("slip", 0.0, 0.0, 0.0))
+        if self.bounded and kick.status == EventKind.SLIP:
+            self._status = EventKind.SLIP
+            self.happened.append(Event(EventKind.SLIP, 0.0, 0.0, 0.0))
 
     @property
     def span(self) -> float:
@@ -229,16 +228,16 @@ class ContactSteps:
 
     def _solved(self, delassus: Any, free: FloatArray) -> tuple[FloatArray, float, EventKind]:
         """Impulse [N s], shape (3,), its normal part, and status; ``free``: contact velocity without impulse [m/s]."""
-        mu = self.mu_static if self._status == "stick" else self.mu_kinetic
+        mu = self.mu_static if self._status == EventKind.STICK else self.mu_kinetic
         impulse = self.contact.impulse(delassus, free, mu)
         if impulse is None:
             raise self._not_found()
         F2, F3, N = impulse.tolist()
         if not self._faint < N:
             # the status does not change before the wall first presses
-            return impulse, N, "lift_off" if self._pressed else self._status
+            return impulse, N, EventKind.LIFT_OFF if self._pressed else self._status
         if math.hypot(F2, F3) < _ON_CONE * mu * N:
-            return impulse, N, "stick"
+            return impulse, N, EventKind.STICK
         if not self.bounded:
             raise Diverged(f"at {self._time:g} s more friction is needed than {mu:g} times the normal force")
         if mu != self.mu_kinetic:
@@ -246,7 +245,7 @@ class ContactSteps:
             if impulse is None:
                 raise self._not_found()
             N = impulse.item(2)
-        return impulse, N, "slip"
+        return impulse, N, EventKind.SLIP
 
     def _not_found(self) -> Diverged:
         return Diverged(
@@ -280,7 +279,7 @@ class ContactRun(ContactSteps):
             w_WB=velocity.angular.copy(),
             q_WB=np.roll(pin.Quaternion(pose.rotation).coeffs(), 1),
             force=contact.axes @ kick.impulse / self.span,
-            sticking=kick.status == "stick" if self.bounded else None,
+            sticking=kick.status == EventKind.STICK if self.bounded else None,
         )
 
     def built(self) -> BallBuilt:

@@ -11,7 +11,7 @@ from proofroll.core.arrays import FloatArray
 from proofroll.core.dop853 import controlled_step, solver_from
 from proofroll.core.engine import whole_steps
 from proofroll.core.errors import Diverged, Refused
-from proofroll.core.events import Event
+from proofroll.core.events import Event, EventKind
 from proofroll.engines.pinocchio.ball_with_rows import BallWithRows, left_the_wall
 from proofroll.engines.pinocchio.settings import PinocchioSettings
 
@@ -96,7 +96,7 @@ class FixedStep(TangentIntegrator):
         """Acceleration at the end of a step, where the next one starts; ends the run if the wall would pull."""
         acceleration = self._acceleration(self.q, self.v)
         if self._mechanism.normal_force(self._data) < -self._mechanism.faint:
-            self.events.append(Event("lift_off", time - 0.5 * self._dt, time - self._dt, time))
+            self.events.append(Event(EventKind.LIFT_OFF, time - 0.5 * self._dt, time - self._dt, time))
             raise left_the_wall(f"before {time:.6g} s")
         return acceleration
 
@@ -218,7 +218,7 @@ class Adaptive(TangentIntegrator):
             self._make_step(solver, end)
             # The last evaluated rates belong to the end of the step, with or without projection.
             if self._mechanism.normal_force(self._data) < -self._mechanism.faint:
-                self.events.append(Event("lift_off", 0.5 * (solver.t_old + solver.t), solver.t_old, solver.t))
+                self.events.append(Event(EventKind.LIFT_OFF, 0.5 * (solver.t_old + solver.t), solver.t_old, solver.t))
                 raise left_the_wall(f"before {solver.t:.6g} s")
         self._keep(solver.y)
 

@@ -14,6 +14,7 @@ import pinocchio as pin
 from proofroll.elements.mechanism import WORLD, Joint, Loop, Mechanism, Spring
 from proofroll.elements.mechanism.bushing import Bushing
 from proofroll.elements.mechanism.capabilities import ALL_JOINTS, ALL_LOOPS, FORCES, MechanismCapability
+from proofroll.elements.mechanism.joint_kinds import WITH_QUATERNION, JointKind
 from proofroll.elements.mechanism.light_joints import lacks_inertia
 from proofroll.elements.mechanism.prescribed import moved
 from proofroll.elements.mechanism.rotations import Array
@@ -41,7 +42,13 @@ LACKING: Mapping[str, str] = {
 }
 _X, _Z = np.array([1.0, 0.0, 0.0]), np.array([0.0, 0.0, 1.0])
 # Column of the axis of rotation or translation among a joint's own velocities.
-AXIS_COLUMN = {"revolute": 0, "prismatic": 0, "cylindrical": 1, "universal": 0, "planar": 2}
+AXIS_COLUMN = {
+    JointKind.REVOLUTE: 0,
+    JointKind.PRISMATIC: 0,
+    JointKind.CYLINDRICAL: 1,
+    JointKind.UNIVERSAL: 0,
+    JointKind.PLANAR: 2,
+}
 
 
 class JointTree:
@@ -81,7 +88,7 @@ class JointTree:
             parent, pose = carried[joint.parent]
             place = pose * pin.SE3(joint.parent_frame, np.array(joint.position))
             back = pin.SE3(joint.child_frame, np.array(joint.child_position)).inverse()
-            if joint.kind == "fixed":
+            if joint.kind == JointKind.FIXED:
                 index, place = parent, place * back
             else:
                 index, place = self.model.addJoint(parent, self._joint_model(joint), place, joint.name), back
@@ -99,7 +106,7 @@ class JointTree:
         frames[WORLD] = 0
         self._forces = [(force, frames[force.body], frames[force.reaction]) for force in mechanism.forces]
         self.pushed = bool(self.springs or self._bushings or self._forces)
-        self.own_velocities = not (apart and any(joint.kind == "free" for joint in mechanism.joints))
+        self.own_velocities = not (apart and any(joint.kind == JointKind.FREE for joint in mechanism.joints))
         self.q0, self.v0 = self._start()
         self._laws()
 
@@ -117,27 +124,27 @@ class JointTree:
         )
 
     def _joint_model(self, joint: Joint) -> Any:
-        if joint.kind == "planar":  # pin.JointModelPlanar has cosine and sine, and velocities in the child
+        if joint.kind == JointKind.PLANAR:  # pin.JointModelPlanar has cosine and sine, and velocities in the child
             return _composite(pin.JointModelPX(), pin.JointModelPY(), pin.JointModelRZ())
-        if joint.kind == "cylindrical":
+        if joint.kind == JointKind.CYLINDRICAL:
             return _composite(pin.JointModelPZ(), pin.JointModelRZ())
-        if joint.kind == "free" and self._apart:
+        if joint.kind == JointKind.FREE and self._apart:
             return _composite(pin.JointModelTranslation(), pin.JointModelSpherical())
         return {
-            "revolute": pin.JointModelRZ,
-            "prismatic": pin.JointModelPZ,
-            "universal": lambda: pin.JointModelUniversal(_Z, _X),
-            "spherical": pin.JointModelSpherical,
-            "free": pin.JointModelFreeFlyer,
+            JointKind.REVOLUTE: pin.JointModelRZ,
+            JointKind.PRISMATIC: pin.JointModelPZ,
+            JointKind.UNIVERSAL: lambda: pin.JointModelUniversal(_Z, _X),
+            JointKind.SPHERICAL: pin.JointModelSpherical,
+            JointKind.FREE: pin.JointModelFreeFlyer,
         }[joint.kind]()
 
     def _start(self) -> tuple[Array, Array]:
         q, v = self.mechanism.start()
         slices = zip(self.mechanism.joints, self.mechanism.q_slices, self.mechanism.v_slices, strict=True)
         for joint, at_q, at_v in slices:
-            if joint.kind in {"spherical", "free"}:  # Pinocchio writes the scalar last
+            if joint.kind in WITH_QUATERNION:  # Pinocchio writes the scalar last
                 q[at_q.stop - 4 : at_q.stop] = np.roll(q[at_q.stop - 4 : at_q.stop], -1)
-            if joint.kind == "free" and self._apart:
+            if joint.kind == JointKind.FREE and self._apart:
                 linear = slice(at_v.start, at_v.start + 3)
                 v[linear] = pin.Quaternion(q[at_q.stop - 4 : at_q.stop]).matrix() @ v[linear]
         return q, v

@@ -10,6 +10,7 @@ from proofroll.core.integrators import INTEGRATORS
 from proofroll.core.stalling import Stalled
 from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.commands import drive
+from proofroll.elements.mechanism.joint_kinds import JointKind
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.elements.mechanism.sampling import MechanismBuilt, MechanismSample, row_rank, unsaid
 from proofroll.elements.mechanism.words import pose
@@ -118,7 +119,7 @@ class MechanismRun(MechanismMotion):
         force[count:], torque[count:] = on_loops
         pin.rnea(self._model, data, q, v, acceleration, forces)
         for number, (joint, index) in enumerate(zip(self._mechanism.joints, self.tree.joint, strict=True)):
-            if joint.kind != "fixed":  # Pinocchio joins bodies held by a fixed joint into one
+            if joint.kind != JointKind.FIXED:  # Pinocchio joins bodies held by a fixed joint into one
                 R = data.oMi[index].rotation
                 force[number], torque[number] = R @ data.f[index].linear, R @ data.f[index].angular
         return MechanismSample(
@@ -176,7 +177,7 @@ class MechanismRun(MechanismMotion):
                 J = pin.getJointJacobian(self._model, data, index, pin.LOCAL_WORLD_ALIGNED)
                 J = J.reshape(6, self._model.nv)  # a single column is returned as a vector
                 column = J[:, self._model.joints[index].idx_v + AXIS_COLUMN[joint.kind]]
-                axes[number] = column[:3] if joint.kind == "prismatic" else column[3:]
+                axes[number] = column[:3] if joint.kind == JointKind.PRISMATIC else column[3:]
         return axes
 
     def _matrices(self, q: Array, v: Array) -> dict[str, Any]:

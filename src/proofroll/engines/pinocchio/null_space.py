@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy.linalg.lapack import dgesdd, dpotrf, dtrtri
 
 from proofroll.core.arrays import cross
-from proofroll.elements.mechanism.joint import DISTANCE, LOOP_FACTS, rows_of
+from proofroll.elements.mechanism.joint_kinds import DISTANCE, LOOP_FACTS, rows_of
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.elements.mechanism.sampling import independent_anywhere
 from proofroll.engines.pinocchio.joint_tree import JointTree

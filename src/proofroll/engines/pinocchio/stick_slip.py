@@ -17,8 +17,7 @@ import numpy as np
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.event_location import Rise, locate_rise
-from proofroll.core.events import Event
-from proofroll.elements.ball_on_surface.events import EventKind
+from proofroll.core.events import Event, EventKind
 from proofroll.elements.ball_on_surface.model import Contact
 from proofroll.engines.pinocchio.ball_with_rows import NOISE, BallWithRows, SlidingContact, left_the_wall, unit
 from proofroll.engines.pinocchio.integrators import Adaptive, FixedStep, SemiImplicitEuler, TangentRungeKutta4
@@ -67,12 +66,12 @@ class AdaptiveStickSlip(Adaptive):
         self._monitored = 0.0, 0.0, 0.0
         y = self._joined(self.q, self.v)
         if mechanism.slips0:
-            self._record("slip", 0.0, 0.0)
+            self._record(EventKind.SLIP, 0.0, 0.0)
             self._creep(y)  # also sets the scales of this slip
             self._mode = FrictionLaw.SLIDING
             self._floor = max(self._floor, _BEGUN * self._speed(y)[0])
         elif self._excess(y) > 0:
-            self._record("slip", 0.0, 0.0)
+            self._record(EventKind.SLIP, 0.0, 0.0)
             self._creep(y)
 
     @property
@@ -212,7 +211,7 @@ class AdaptiveStickSlip(Adaptive):
         lift = locate_rise(solver, lambda y: np.array([-self._monitor(y)[2]]))
         time, width = lift[:2] if lift else (float(solver.t), float(solver.step_size))
         if stop is None or time <= stop[0]:
-            self._record("lift_off", time, width)
+            self._record(EventKind.LIFT_OFF, time, width)
             raise left_the_wall(f"at {time:.6g} s")
 
     def _switch(self, time: float, width: float, y: FloatArray) -> float:
@@ -227,11 +226,11 @@ class AdaptiveStickSlip(Adaptive):
         self.q, self.v = self._mechanism.project(self._data, self.q, self.v)
         y = self._joined(self.q, self.v)
         if was is FrictionLaw.STICKING:
-            self._record("slip", time, width)
+            self._record(EventKind.SLIP, time, width)
             self._creep(y)
         elif self._excess(y) <= NOISE:
             self._mode = FrictionLaw.STICKING
-            self._record("stick", time, width)
+            self._record(EventKind.STICK, time, width)
         else:
             self._creep(y)
         return time
@@ -267,7 +266,7 @@ class FixedStickSlip(FixedStep):
         self.sticking = self._excess <= 0 and not mechanism.slips0
         self._free = self._without_friction()
         if not self.sticking:
-            self.events.append(Event("slip", 0.0, 0.0, 0.0))
+            self.events.append(Event(EventKind.SLIP, 0.0, 0.0, 0.0))
 
     def reaction(self, data: Any) -> tuple[FloatArray, FloatArray]:
         """See :class:`~proofroll.engines.pinocchio.integrators.TangentIntegrator`."""
@@ -290,7 +289,7 @@ class FixedStickSlip(FixedStep):
                 self._must_press(time + self._dt, normal_force)
                 return
             part = min(max(old_excess / (old_excess - self._excess), 0.0), 1.0) if old_excess < 0 else 0.0
-            self.events.append(Event("slip", time + part * self._dt, time, time + self._dt))
+            self.events.append(Event(EventKind.SLIP, time + part * self._dt, time, time + self._dt))
             self.sticking = False
         self._free = self._without_friction()
         self._must_press(time + self._dt, self._free.normal_force)
@@ -306,7 +305,7 @@ class FixedStickSlip(FixedStep):
         low = max(time - self._dt, 0.0)
         best = low + (time - low) * last_force / (last_force - normal_force) if last_force > 0 else low
         best = max([best, *(event.time for event in self.events[-1:])])  # not before a slip in the same step
-        self.events.append(Event("lift_off", best, low, time))
+        self.events.append(Event(EventKind.LIFT_OFF, best, low, time))
         raise left_the_wall(f"at {best:.6g} s")
 
     def _stick_if_it_can(self, time: float) -> None:
@@ -324,7 +323,7 @@ class FixedStickSlip(FixedStep):
         slowing = math.sqrt((free.slip_rate - taken) @ (free.slip_rate - taken))
         size = math.sqrt(free.slip @ free.slip)
         part = min(size / (slowing * self._dt), 1.0) if slowing > 0 else 0.0
-        self.events.append(Event("stick", time + part * self._dt, time, time + self._dt))
+        self.events.append(Event(EventKind.STICK, time + part * self._dt, time, time + self._dt))
         self.q, self.v, self._excess, self.sticking = q, v, needed, True
 
     def _direction(self, data: Any, q: FloatArray, v: FloatArray) -> FloatArray:

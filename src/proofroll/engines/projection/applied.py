@@ -8,6 +8,7 @@ import numpy as np
 
 from proofroll.elements.mechanism import Joint, Mechanism
 from proofroll.elements.mechanism.drives import Actuator
+from proofroll.elements.mechanism.joint_kinds import JointKind
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.elements.mechanism.signal import value_at, varies
 from proofroll.elements.mechanism.switches import switched_joints
@@ -60,14 +61,14 @@ class Applied:
         self._balls = [
             (n, joint.damping)
             for n, joint in enumerate(mechanism.joints)
-            if joint.kind == "spherical" and joint.damping
+            if joint.kind == JointKind.SPHERICAL and joint.damping
         ]
         self.laws = bool(self._laws or self._balls)
         # coordinates to evaluate, without a force law
         watched = {joint.number for joint in switched_joints(mechanism)}
         watched |= {number[name] for item in mechanism.couplings for name, _ in item.terms}
         watched |= {number[joint.name] for joint, _, _ in mechanism.prescribed}
-        axes = {k: "slide" if mechanism.joints[k].kind == "prismatic" else "z" for k in sorted(watched)}
+        axes = {k: "slide" if mechanism.joints[k].kind == JointKind.PRISMATIC else "z" for k in sorted(watched)}
         self._watched = {k: _Law(k, axis, 0.0, 0.0, 0.0, 0.0) for k, axis in axes.items()}
         turning = [law for law in self._watched.values() if law.axis != "slide"]
         self._angles |= {law: mechanism.joints[law.connection].q0[0] for law in turning}
@@ -166,7 +167,7 @@ class Applied:
         Otherwise a linear spring, a damper and a constant drive.
         """
         n, target = actuator.gear, actuator.target
-        axis = "slide" if joint.kind == "prismatic" else "z"
+        axis = "slide" if joint.kind == JointKind.PRISMATIC else "z"
         if actuator.limit is not None or not isinstance(target, float):
             push = lambda t, q, v: actuator.effort(t, q, v, self.modes.get(k))  # noqa: E731 -- closes over its number
             return _Law(number, axis, 0.0, 0.0, 0.0, 0.0, push)
@@ -208,9 +209,9 @@ def _direction(law: _Law, ends: Ends) -> Array:
 
 
 def _laws(number: int, joint: Joint) -> list[_Law]:
-    if not (joint.stiffness or joint.damping or joint.torque) or joint.kind == "spherical":
+    if not (joint.stiffness or joint.damping or joint.torque) or joint.kind == JointKind.SPHERICAL:
         return []
-    axes = {"revolute": ("z",), "prismatic": ("slide",), "universal": ("z", "x")}[joint.kind]
+    axes = {JointKind.REVOLUTE: ("z",), JointKind.PRISMATIC: ("slide",), JointKind.UNIVERSAL: ("z", "x")}[joint.kind]
     laws_of_joint = [
         _Law(number, axis, joint.stiffness, joint.rest, joint.damping, joint.constant_drive) for axis in axes
     ]

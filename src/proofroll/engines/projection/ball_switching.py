@@ -7,9 +7,8 @@ import numpy as np
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Diverged
-from proofroll.core.events import Event
+from proofroll.core.events import Event, EventKind
 from proofroll.core.integrators import Integrator
-from proofroll.elements.ball_on_surface.events import EventKind
 from proofroll.elements.ball_on_surface.mechanics import natural_speed
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.engines.projection.alternating import WITHOUT_PROGRESS
@@ -71,7 +70,7 @@ class Switching:
         if not np.any(body.slip0):
             self._settle(0.0, 0.0, x, was_sticking=True)
         else:
-            self._event("slip", 0.0, 0.0)
+            self._event(EventKind.SLIP, 0.0, 0.0)
             slip = body.surface.frame(body.u0)[:, 1:].T @ body.slip0
             size, angle = math.hypot(*slip.tolist()), math.atan2(slip[1], slip[0])
             self._enter(self._free, 0.0, np.concatenate([x, [size, angle]]))
@@ -176,12 +175,12 @@ class Switching:
         y = self.stepper.inside(high)
         x = self.mode.x(y)
         if exit_ is Exit.CONE:
-            self._event("slip", low, high)
+            self._event(EventKind.SLIP, low, high)
             self._enter(self._slaved, high, np.append(x, 0.0))
         elif exit_ is Exit.CHANGE:
             self._enter(self._free, high, self._slaved.freed(y))
         elif exit_ is Exit.LIFTOFF:
-            self._event("lift_off", low, high)
+            self._event(EventKind.LIFT_OFF, low, high)
             self._enter(self.mode, high, y)
             self._lost = f"the ball leaves the wall at t = {high:.6g} s; its flight is not modelled"
             raise Diverged(self._lost)
@@ -203,7 +202,7 @@ class Switching:
             holds = self.friction.reserve(ball.response_at(x)) >= 0
             mode = self._stick if holds else self._slaved
         if mode.sticking != was_sticking:
-            self._event("stick" if mode.sticking else "slip", low, high)
+            self._event(EventKind.STICK if mode.sticking else EventKind.SLIP, low, high)
         self._enter(mode, high, x if mode.sticking else np.append(x, 0.0))
 
     def _event(self, kind: EventKind, low: float, high: float) -> None:

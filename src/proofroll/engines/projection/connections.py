@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from proofroll.core.arrays import cross
 from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.checks import Vector
-from proofroll.elements.mechanism.joint import DISTANCE, rows_of
+from proofroll.elements.mechanism.joint_kinds import DISTANCE, rows_of
 from proofroll.elements.mechanism.rotations import Array
 
 # ω @ SKEW: the nine elements of the matrix ω ×. 0.5 * elements @ SKEW.T: ω of the antisymmetric part of any matrix.

@@ -15,6 +15,7 @@ import numpy as np
 from proofroll.core.arrays import cross
 from proofroll.core.dop853 import Accept
 from proofroll.core.errors import Diverged, Refused
+from proofroll.core.events import EventKind
 from proofroll.core.integrators import Integrator
 from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.contacts.acting import (
@@ -31,6 +32,7 @@ from proofroll.elements.mechanism.contacts.geometry import BodyContact, coeffici
 from proofroll.elements.mechanism.contacts.joint_laws import JointContact, joint_contacts, refuse_rubbing_stops
 from proofroll.elements.mechanism.contacts.start import closed_and_still, natural_scale
 from proofroll.elements.mechanism.contacts.touching import Moving, Touching, torn, touch
+from proofroll.elements.mechanism.joint_kinds import JointKind
 from proofroll.elements.mechanism.rotations import Array, frame_of_axis
 from proofroll.elements.mechanism.signal import breaks, varies
 from proofroll.elements.mechanism.switches import switched_joints
@@ -84,7 +86,7 @@ class ContactMotion(AlternatingMotion[ContactMode]):
         self._still, self._rate, self._length = scale.speed, scale.rate, scale.length
         # overlap of each contact when it opened, an error of the method: it is no impact
         self._overlap = np.zeros(len(self.contacts))
-        turns = [mechanism.joints[each.joint.number].kind != "prismatic" for each in self._joints]
+        turns = [mechanism.joints[each.joint.number].kind != JointKind.PRISMATIC for each in self._joints]
         # length of each contact's motion by 1 m, or by 1 rad
         self._arms = np.array([1.0] * len(self._bodies) + [scale.length if turn else 1.0 for turn in turns])
         self._slipping = SlipDirections(step)
@@ -262,11 +264,11 @@ class ContactMotion(AlternatingMotion[ContactMode]):
         shared = sum(own.kind == "stick" or (own.kind == "slip" and s) for own, s in zip(self.mode, stops, strict=True))
         for k, (own, each) in enumerate(zip(self.mode, now.touching, strict=True)):
             if own.kind == "open":
-                ends.append(Excess(k, "impact", -each.gap - self._overlap[k], -float(each.normal @ each.slide)))
+                ends.append(Excess(k, EventKind.IMPACT, -each.gap - self._overlap[k], -float(each.normal @ each.slide)))
                 continue
             N = float(each.normal @ force[k])
             if not self._bounds[k]:
-                ends.append(Excess(k, "lift_off", -N))
+                ends.append(Excess(k, EventKind.LIFT_OFF, -N))
             if own.kind == "slip" and self._rubs[k]:
                 ends.append(Excess(k, "still", self._slipping.passed(k, each)))
             elif own.kind == "stick":
@@ -278,7 +280,7 @@ class ContactMotion(AlternatingMotion[ContactMode]):
                         now, [one.kind != "open" for one in self.mode], [one.kind == "stick" for one in self.mode]
                     )
                     beyond = -beyond if held[k].kind == "stick" else beyond
-                ends.append(Excess(k, "slip", beyond))
+                ends.append(Excess(k, EventKind.SLIP, beyond))
         modes, wanted = list(self._equations.applied.modes.values()), self._equations.wanted(self._at(x))
         return ends + ends_of_efforts(self._limited.values(), modes, wanted, len(self.mode))
 
@@ -288,20 +290,20 @@ class ContactMotion(AlternatingMotion[ContactMode]):
             number = list(self._limited)[k - len(was)]
             self._equations.applied.modes = {**self._equations.applied.modes, number: kind}
             return x, was, happened
-        if kind == "lift_off":
+        if kind == EventKind.LIFT_OFF:
             x = self._settled(x, was)  # a closing speed that the method left would hit at once
         now, closed = self.at(x), [own.kind != "open" for own in was]
         still = [own.kind == "stick" for own in was]
-        if kind == "impact":
+        if kind == EventKind.IMPACT:
             x, closed, settles = self._struck(x, now, k)
             self._limit_efforts(x)  # the effort that a servo requires jumps with the velocity
-            happened = [("settle" if settles else "impact", self.contacts[k].name)]
+            happened = [(EventKind.SETTLE if settles else EventKind.IMPACT, self.contacts[k].name)]
             now = self.at(x)
             still = [slip <= self._still for slip in self._slips(now)]
         elif kind == "still":
             slips = self._slips(now)
             still = [stuck or own == k or slips[own] <= self._faint for own, stuck in enumerate(still)]
-        mode = self._leaving(now, k) if kind == "slip" else self._decided(now, closed, still)
+        mode = self._leaving(now, k) if kind == EventKind.SLIP else self._decided(now, closed, still)
         if kind == "still" and slips[k] > self._still and mode[k].kind == "slip":  # it has turned, not stopped
             mode = self._decided(now, closed, [stands and own != k for own, stands in enumerate(still)])
         struck = {name for _, name in happened}

@@ -23,6 +23,7 @@ import numpy as np
 from proofroll.core.arrays import cross
 from proofroll.core.errors import Refused
 from proofroll.elements.mechanism import Mechanism, Tree
+from proofroll.elements.mechanism.joint_kinds import JointKind
 from proofroll.elements.mechanism.prescribed import moved
 from proofroll.elements.mechanism.rotations import Array, to_quaternion
 from proofroll.elements.mechanism.sampling import DEPENDENT, independent_anywhere
@@ -98,7 +99,7 @@ class DependentCoordinates:
         self.coupled = self.loop_rows + len(self._geared)
         self.moved = slice(self.coupled - len(self._moved), self.coupled)
         # the axes of other joints are fixed in one of the two bodies
-        self._bent = any(joint.kind == "universal" for joint in mechanism.joints)
+        self._bent = any(joint.kind == JointKind.UNIVERSAL for joint in mechanism.joints)
         self.gravity = np.array(mechanism.gravity)
         self.regularity = 1.0
         self._mean = np.full(self._count, 1.0 / self._count)

@@ -13,20 +13,21 @@ from typing import NamedTuple
 import numpy as np
 
 from proofroll.elements.mechanism import Mechanism
+from proofroll.elements.mechanism.joint_kinds import JointKind
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.engines.projection.connections import SKEW, Bodies, ProjectedConnections
 
 # Velocities of each kind of joint: (rotation?, axis of the frame on its carrier, is the carrier body b?).
 _TURN_B, _SLIDE_A = [(True, k, True) for k in range(3)], [(False, k, False) for k in range(3)]
 DIRECTIONS: dict[str, list[tuple[bool, int, bool]]] = {
-    "fixed": [],
-    "revolute": [_TURN_B[2]],
-    "prismatic": [_SLIDE_A[2]],
-    "cylindrical": [_SLIDE_A[2], _TURN_B[2]],
-    "universal": [(True, 2, False), _TURN_B[0]],
-    "spherical": _TURN_B,
-    "planar": [*_SLIDE_A[:2], _TURN_B[2]],
-    "free": [*_SLIDE_A, *_TURN_B],
+    JointKind.FIXED: [],
+    JointKind.REVOLUTE: [_TURN_B[2]],
+    JointKind.PRISMATIC: [_SLIDE_A[2]],
+    JointKind.CYLINDRICAL: [_SLIDE_A[2], _TURN_B[2]],
+    JointKind.UNIVERSAL: [(True, 2, False), _TURN_B[0]],
+    JointKind.SPHERICAL: _TURN_B,
+    JointKind.PLANAR: [*_SLIDE_A[:2], _TURN_B[2]],
+    JointKind.FREE: [*_SLIDE_A, *_TURN_B],
 }
 
 

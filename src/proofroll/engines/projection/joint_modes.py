@@ -11,10 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from proofroll.core.errors import NotUnique, Refused
-from proofroll.core.events import Event
+from proofroll.core.events import Event, EventKind
 from proofroll.core.integrators import Integrator
 from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.contacts.start import natural_scale
+from proofroll.elements.mechanism.joint_kinds import JointKind
 from proofroll.elements.mechanism.named_forces import joint_force_shares
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.elements.mechanism.signal import breaks
@@ -53,7 +54,7 @@ class SwitchedMotion(AlternatingMotion[Mode]):
         self._joints = switched_joints(mechanism)
         self._limited = {k: item for k, item in enumerate(mechanism.actuators) if item.limit is not None}
         scale = natural_scale(mechanism)
-        slides = [mechanism.joints[joint.number].kind == "prismatic" for joint in self._joints]
+        slides = [mechanism.joints[joint.number].kind == JointKind.PRISMATIC for joint in self._joints]
         self._units = [scale.rate * (scale.length if slide else 1.0) for slide in slides]  # natural speeds
         self.mode: Mode = ("free",) * len(self._joints)
         start = np.append(equations.start, 0.0)
@@ -70,7 +71,9 @@ class SwitchedMotion(AlternatingMotion[Mode]):
         happened = [*changes(self._joints, was, mode)]
         pairs = zip(self._limited.values(), was[count:], mode[count:], strict=True)
         happened += [
-            ("release" if now == "linear" else "saturate", item.name) for item, old, now in pairs if now != old
+            (EventKind.RELEASE if now == "linear" else EventKind.SATURATE, item.name)
+            for item, old, now in pairs
+            if now != old
         ]
         self.events += [Event(kind, t, t, t, name) for kind, name in happened if t > 0]
         self._enter(t, y, mode)
@@ -197,13 +200,13 @@ class SwitchedMotion(AlternatingMotion[Mode]):
         was, happened = self.mode, list[tuple[str, str]]()
         if k >= len(self._joints):
             actuator = list(self._limited.values())[k - len(self._joints)]
-            happened = [("release" if kind == "linear" else "saturate", actuator.name)]
+            happened = [(EventKind.RELEASE if kind == "linear" else EventKind.SATURATE, actuator.name)]
             mode = (*was[:k], kind, *was[k + 1 :])
         elif kind in {"up", "down"}:
             mode = (*was[:k], self._joints[k].moving(1.0 if kind == "up" else -1.0), *was[k + 1 :])
         else:
             y, mode = self._stopped(y, k, kind)
-            happened = [("impact", self._joints[k].name)] if kind != "still" else []
+            happened = [(EventKind.IMPACT, self._joints[k].name)] if kind != "still" else []
         # a joint that stays where it hit has come to rest by its impact
         named = {name for _, name in happened}
         happened += [item for item in changes(self._joints, was, mode) if item[1] not in named]

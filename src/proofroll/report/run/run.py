@@ -8,12 +8,12 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from proofroll.core.bounces import IMPACTS, Bounce, bounces_of
+from proofroll.core.bounces import Bounce, bounces_of
 from proofroll.core.columns import SMALLEST, UNCERTAIN, Columns, Variable
 from proofroll.core.dataset import ended_early
 from proofroll.core.diagnosis.scene_diagnosis import Diagnosis, diagnose_scene
 from proofroll.core.element_abilities import TellsBounces, WatchesRuns, step_bound
-from proofroll.core.events import Event, events_of
+from proofroll.core.events import IMPACTS, Event, events_of
 from proofroll.core.number_format import number
 from proofroll.core.scene import Scene
 from proofroll.files.json_data import OPTIONAL

@@ -5,6 +5,7 @@ import dataclasses
 from typing import Any
 from xml.etree.ElementTree import SubElement
 
+from proofroll.elements.mechanism.joint_kinds import JointKind
 from proofroll.robots.hypotheses import RobotEvidence, hypothesis
 from proofroll.robots.model import Robot
 
@@ -30,9 +31,9 @@ def armature_of_free_joints_turns(evidence: RobotEvidence) -> Robot | None:
     world axes; they differ by ω × v.
     """
     robot = evidence.robot
-    if not any(joint.kind == "free" and joint.armature for joint in robot.joints):
+    if not any(joint.kind == JointKind.FREE and joint.armature for joint in robot.joints):
         return None
-    joints = (dataclasses.replace(joint, turning=joint.kind == "free") for joint in robot.joints)
+    joints = (dataclasses.replace(joint, turning=joint.kind == JointKind.FREE) for joint in robot.joints)
     return robot.change(joints=tuple(joints))
 
 

@@ -6,6 +6,7 @@ from xml.etree.ElementTree import Element
 
 import numpy as np
 
+from proofroll.elements.mechanism.joint_kinds import JointKind
 from proofroll.robots.hypotheses import RobotEvidence, hypothesis
 from proofroll.robots.model import NO_BODY, Robot, RobotBody, RobotJoint
 
@@ -118,16 +119,16 @@ def free_base_is_fixed(evidence: RobotEvidence) -> Robot | None:
     """A free base without mass is fixed to the world."""
     robot = evidence.robot
     names = set(evidence.reading.joints)
-    lost = [joint for joint in robot.joints if joint.kind == "free" and joint.name not in names]
+    lost = [joint for joint in robot.joints if joint.kind == JointKind.FREE and joint.name not in names]
     if not lost:
         return None
-    joints = (dataclasses.replace(joint, kind="fixed") if joint in lost else joint for joint in robot.joints)
+    joints = (dataclasses.replace(joint, kind=JointKind.FIXED) if joint in lost else joint for joint in robot.joints)
     return robot.change(joints=tuple(joints))
 
 
 def _offset(joint: RobotJoint, robot: Robot) -> RobotJoint:
     source = robot.sources.get(joint.child, {})
-    if joint.kind != "free" or "rotation" not in source:
+    if joint.kind != JointKind.FREE or "rotation" not in source:
         return joint
     p = np.array(source["position"])
     offset = p - np.array(source["rotation"]) @ p
@@ -158,7 +159,7 @@ def root_pose_dropped(evidence: RobotEvidence) -> Robot | None:
     All that it carries is placed as if it lay at the origin of the world.
     """
     robot = evidence.robot
-    if not robot.joints or robot.joints[0].kind != "fixed":
+    if not robot.joints or robot.joints[0].kind != JointKind.FIXED:
         return None
     root_joint = robot.joints[0]
     if not np.any(root_joint.position) and np.array_equal(root_joint.rotation, np.eye(3)):

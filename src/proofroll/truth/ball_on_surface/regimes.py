@@ -6,6 +6,7 @@ import numpy as np
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Refused
+from proofroll.core.events import EventKind
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.surfaces import Cylinder
 from proofroll.truth.ball_on_surface.flight import normal_force_per_mass
@@ -32,7 +33,7 @@ def classify(body: RollingBall, until: float) -> tuple[Regime, int, float]:
     path = follow(body, route, until)
     if path.ended:
         raise Refused(path.ended)
-    slips = [time for kind, time in path.events if kind == "slip"]
+    slips = [time for kind, time in path.events if kind == EventKind.SLIP]
     first = slips[0] if slips else float("nan")
     last = path.stretches[-1]
     if not slips:

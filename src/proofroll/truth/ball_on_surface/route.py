@@ -12,7 +12,7 @@ from typing import ClassVar
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
-from proofroll.elements.ball_on_surface.events import EventKind
+from proofroll.core.events import EventKind
 from proofroll.elements.ball_on_surface.motion import BallMotion
 
 # Position [m], velocity [m/s] and spin [rad/s] of a ball in the world, each shape (3,).

@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
-from proofroll.core.bounces import IMPACTS, Bounce, Course, exact_bounces, with_bars, with_bounces
+from proofroll.core.bounces import Bounce, Course, exact_bounces, with_bars, with_bounces
 from proofroll.core.dataset import ENDED, ENDS
 from proofroll.core.errors import Diverged, Refused
-from proofroll.core.events import Event, with_events
+from proofroll.core.events import IMPACTS, Event, EventKind, with_events
 from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.elements.ball_on_surface.mechanics import always_pressed, bouncing_bodies, course_of, natural_speed
@@ -42,7 +42,7 @@ def first_route(body: RollingBall) -> Route:
 def stays_on(body: RollingBall, until: float) -> bool:
     """True if the ball is known to stay on the wall until ``until`` [s], by the first route."""
     path = follow(body, first_route(body), until)
-    return not np.isfinite(path.end) and all(kind != "lift_off" for kind, _ in path.events)
+    return not np.isfinite(path.end) and all(kind != EventKind.LIFT_OFF for kind, _ in path.events)
 
 
 def stick_slip(scene: Scene, times: FloatArray) -> tuple[xr.Dataset, list[Event]]:

@@ -12,7 +12,7 @@ import numpy as np
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Refused
-from proofroll.elements.ball_on_surface.events import EventKind
+from proofroll.core.events import EventKind
 from proofroll.elements.ball_on_surface.mechanics import (
     can_rest,
     natural_acceleration,
@@ -91,7 +91,7 @@ class SwitchedBall:
                 return Transition(state, RESTS, ())
             state = route.nudged(state, setting_off(body, body.p0))
         if normal_force_per_mass(body, body.p0, body.v0) < -_OFF_WALL * natural_acceleration(body):
-            return Transition(state, Mode(flight=(body.p0, body.v0, body.w0)), (("lift_off", ""),))
+            return Transition(state, Mode(flight=(body.p0, body.v0, body.w0)), ((EventKind.LIFT_OFF, ""),))
         return self._touching(state, body.slip0 if np.any(body.slip0) else None)
 
     def walk(self, time: float, state: FloatArray, mode: Mode, until: float) -> BallStretch:
@@ -114,9 +114,9 @@ class SwitchedBall:
             return self._landed(stretch)
         if stretch.why is End.LIFTOFF:
             # ``at_end`` includes the slip, which the state lacks.
-            return Transition(route.start(), Mode(flight=stretch.at_end()), (("lift_off", ""),))
+            return Transition(route.start(), Mode(flight=stretch.at_end()), ((EventKind.LIFT_OFF, ""),))
         if _comes_to_rest(body, route, stretch):
-            stopped = () if stretch.sticking else (("stick", ""),)
+            stopped = () if stretch.sticking else ((EventKind.STICK, ""),)
             return Transition(route.nudged(state, np.zeros(3)), RESTS, stopped)
         if stretch.why is End.HALT:
             state = route.nudged(state, setting_off(body, route.world(state)[0]))
@@ -133,25 +133,27 @@ class SwitchedBall:
         slips = stretch.why is End.CONE or _must_slip(body, route, state)
         if slips != stretch.sticking:
             return Transition(state, Mode() if slips else ROLLS, ())
-        return Transition(state, Mode() if slips else ROLLS, (("slip" if slips else "stick", ""),))
+        return Transition(state, Mode() if slips else ROLLS, ((EventKind.SLIP if slips else EventKind.STICK, ""),))
 
     def _landed(self, stretch: BallStretch) -> Transition[Mode]:
         outcome = landing_outcome(self.body, self.route, stretch)
         if outcome is None:
             return Transition(stretch.state, None, ())
         if isinstance(outcome, Rebound):
-            return Transition(stretch.state, Mode(flight=outcome.world), (("bounce", ""),) if outcome.seen else ())
+            return Transition(
+                stretch.state, Mode(flight=outcome.world), ((EventKind.BOUNCE, ""),) if outcome.seen else ()
+            )
         state = self.route.at(*outcome.world)
         state = state if outcome.slip is not None else self.route.nudged(state, outcome.world[1])
         after = self._touching(state, outcome.slip)
-        happenings = (("settle", ""), *after.happenings)
+        happenings = ((EventKind.SETTLE, ""), *after.happenings)
         return Transition(state, after.mode, happenings, delay=outcome.rest, blur=outcome.blur)
 
     def _touching(self, state: FloatArray, slip: FloatArray | None) -> Transition[Mode]:
         """Mode of a ball that starts to touch the wall with the velocity ``slip`` of its contact point [m/s]."""
         if slip is None and not _must_slip(self.body, self.route, state):
             return Transition(state, ROLLS, ())
-        return Transition(state, Mode(slip=slip), (("slip", ""),))
+        return Transition(state, Mode(slip=slip), ((EventKind.SLIP, ""),))
 
 
 def _must_slip(body: RollingBall, route: Route, state: FloatArray) -> bool:

@@ -14,6 +14,7 @@ from scipy.special import ellipj, ellipk, ellipkinc
 from proofroll.elements.mechanism.checks import WORLD
 from proofroll.elements.mechanism.joint import Joint
 from proofroll.elements.mechanism.joint_coordinates import JointCoordinates
+from proofroll.elements.mechanism.joint_kinds import JointKind
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.record import Record
 from proofroll.elements.mechanism.rotations import Array, from_rpy
@@ -79,7 +80,7 @@ def swing(angle: float, speed: float, w2: float, times: Array) -> tuple[Array, A
 def _swinging(mechanism: Mechanism) -> ClosedForm | None:  # noqa: PLR0911 -- each is a way not to be a pendulum
     """Pendulum: all joints turn by ± the same angle or not at all, with constant inertia, under gravity."""
     laws = ("stiffness", "damping", "torque")
-    if any(joint.kind != "revolute" or any(getattr(joint, law) for law in laws) for joint in mechanism.joints):
+    if any(joint.kind != JointKind.REVOLUTE or any(getattr(joint, law) for law in laws) for joint in mechanism.joints):
         return None
     equations = JointCoordinates(mechanism)
     if mechanism.nv - equations.rank != 1:
@@ -128,12 +129,12 @@ def _oscillators(mechanism: Mechanism) -> ClosedForm | None:
     bodies = {body.name: body for body in mechanism.bodies}
     systems = []
     for joint in mechanism.joints:
-        if joint.kind == "fixed":
+        if joint.kind == JointKind.FIXED:
             continue
         body, gravity = bodies[joint.child], np.array(mechanism.gravity)
         axis, arm = np.array(joint.axis), np.array(body.com) - joint.child_position
         off_axis = arm - axis * (axis @ arm)
-        if joint.kind == "revolute":
+        if joint.kind == JointKind.REVOLUTE:
             if not joint.stiffness or (off_axis.any() and gravity.any()):
                 return None
             inertia = axis @ np.array(body.inertia) @ axis + body.mass * off_axis @ off_axis
@@ -161,7 +162,7 @@ def _alone(mechanism: Mechanism, kind: str) -> Joint | None:
 
 def _free_body(mechanism: Mechanism) -> ClosedForm | None:
     """Angular velocity, in body axes, of a torque-free body with three different moments of inertia."""
-    joint = _alone(mechanism, "free")
+    joint = _alone(mechanism, JointKind.FREE)
     if joint is None:
         return None
     moments, axes = np.linalg.eigh(np.array(mechanism.bodies[0].inertia))
@@ -195,7 +196,7 @@ def _free_body(mechanism: Mechanism) -> ClosedForm | None:
 
 def _heavy_top(mechanism: Mechanism) -> ClosedForm | None:
     """Cosine of the tilt of a symmetric top about a fixed point."""
-    joint, body = _alone(mechanism, "spherical"), mechanism.bodies[0]
+    joint, body = _alone(mechanism, JointKind.SPHERICAL), mechanism.bodies[0]
     gravity = np.array(mechanism.gravity)
     if joint is None or not gravity.any():
         return None

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from proofroll.elements.mechanism.joint import DISTANCE, FACTS
+from proofroll.elements.mechanism.joint_kinds import DISTANCE, FACTS, JointKind
 from proofroll.truth.mechanism.maximal_bodies import AXES, BodyInScalars, GeneralBody, Planar
 from proofroll.truth.scalars import Scalar, add, cross, dot, is_zero, minus, mul, plus, product, scaled, sub, turned
 
@@ -123,7 +123,7 @@ class ConstraintRows:
         a, b = self._views[c.a], self._views[c.b]
         axis = columns(product(a.R, c.frame_a))[2]
         back = scaled(-1.0, axis)
-        if kind == "revolute":
+        if kind == JointKind.REVOLUTE:
             bias = dot(cross(a.w, axis), minus(b.w, a.w))
             return self.row(number, 0.0, bias, (NONE, axis), (NONE, back), (NONE, axis))
         return self._sliding(number, axis)

@@ -5,8 +5,8 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from proofroll.core.bounces import IMPACTS, Bounce, Course, exact_bounces, with_bars
-from proofroll.core.events import Event
+from proofroll.core.bounces import Bounce, Course, exact_bounces, with_bars
+from proofroll.core.events import IMPACTS, Event
 from proofroll.elements.mechanism.contacts.acting import ContactMode
 from proofroll.elements.mechanism.contacts.bounces import bouncing_bodies, course_of
 from proofroll.elements.mechanism.model import Mechanism

@@ -13,6 +13,7 @@ import numpy as np
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Diverged
+from proofroll.core.events import EventKind
 from proofroll.core.last_results import LastResults
 from proofroll.elements.mechanism.contacts.acting import (
     FAINT,
@@ -293,7 +294,7 @@ class ContactStretches(Stretches[ContactMode]):
             # No split of the load is left, or each moves another way.
             return Transition(stretch.last, None, (), margin=0.0)
         if kind == "lift" or (kind == "break" and leaves(self.contacts[k], k, solved)):
-            return Transition(stretch.last, opened(self.contacts, stretch.mode, k), (("lift_off", name),))
+            return Transition(stretch.last, opened(self.contacts, stretch.mode, k), ((EventKind.LIFT_OFF, name),))
         if kind == "break":
             return self._broken(stretch, k)
         return self._stopped(stretch) if kind == "still" else self._impact(stretch, k)
@@ -306,7 +307,9 @@ class ContactStretches(Stretches[ContactMode]):
         leaving = self._leaving(stretch.last, stretch.mode, k)
         for number, own in leaving.items():
             mode[number] = own
-        return Transition(stretch.last, tuple(mode), tuple(("slip", contacts[number].name) for number in leaving))
+        return Transition(
+            stretch.last, tuple(mode), tuple((EventKind.SLIP, contacts[number].name) for number in leaving)
+        )
 
     def _leaving(self, state: Array, mode: ContactMode, k: int) -> dict[int, Acting]:
         """Slip that starts at the bound of friction, opposite to the friction that held, of each contact that slips."""
@@ -345,7 +348,8 @@ class ContactStretches(Stretches[ContactMode]):
         stays = [stay or bool(contact.bound) for stay, contact in zip(stays, contacts, strict=True)]
         settled = [bool(delay) and contacts[k].pair == contacts[hit].pair for k in hits]
         happened = tuple(
-            ("settle" if over else "impact", contacts[k].name) for k, over in zip(hits, settled, strict=True)
+            (EventKind.SETTLE if over else EventKind.IMPACT, contacts[k].name)
+            for k, over in zip(hits, settled, strict=True)
         )
         return self._after(stretch, state, stays, happened, margin, delay)
 

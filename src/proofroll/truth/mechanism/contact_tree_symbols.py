@@ -12,7 +12,7 @@ from proofroll.elements.mechanism.contacts.acting import ContactMode
 from proofroll.elements.mechanism.contacts.dynamics import ContactDynamics
 from proofroll.elements.mechanism.contacts.joint_laws import JointContact
 from proofroll.elements.mechanism.contacts.turning import TurningFriction
-from proofroll.elements.mechanism.joint import AXES
+from proofroll.elements.mechanism.joint_kinds import AXES, SLIDING, WITH_QUATERNION, JointKind
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.prescribed import moved
 from proofroll.elements.mechanism.signal import Held, Table, value_at
@@ -304,16 +304,16 @@ def _tree(
 
 def _pose(kind: str, q: Sequence[Scalar], functions: Any) -> tuple[Vector, _Matrix]:
     """Pose of frame B in frame A: origin, and rotation by rows."""
-    if kind == "revolute":
+    if kind == JointKind.REVOLUTE:
         return _NONE, _about_z(q[0], functions)
-    if kind in {"prismatic", "cylindrical"}:
-        return (0.0, 0.0, q[0]), _AXES if kind == "prismatic" else _about_z(q[1], functions)
-    if kind == "universal":
+    if kind in SLIDING:
+        return (0.0, 0.0, q[0]), _AXES if kind == JointKind.PRISMATIC else _about_z(q[1], functions)
+    if kind == JointKind.UNIVERSAL:
         c, s = functions["cos"](q[1]), functions["sin"](q[1])
         return _NONE, product(_about_z(q[0], functions), ((1.0, 0.0, 0.0), (0.0, c, -s), (0.0, s, c)))
-    if kind == "planar":
+    if kind == JointKind.PLANAR:
         return (q[0], q[1], 0.0), _about_z(q[2], functions)
-    if kind == "fixed":
+    if kind == JointKind.FIXED:
         return _NONE, _AXES
     a, b, c, d = q[-4:]
     R = (
@@ -321,7 +321,7 @@ def _pose(kind: str, q: Sequence[Scalar], functions: Any) -> tuple[Vector, _Matr
         (2.0 * (b * c + a * d), 1.0 - 2.0 * (b * b + d * d), 2.0 * (c * d - a * b)),
         (2.0 * (b * d - a * c), 2.0 * (c * d + a * b), 1.0 - 2.0 * (b * b + c * c)),
     )
-    return (q[:3] if kind == "free" else _NONE), R
+    return (q[:3] if kind == JointKind.FREE else _NONE), R
 
 
 def _about_z(angle: Scalar, functions: Any) -> _Matrix:
@@ -330,7 +330,7 @@ def _about_z(angle: Scalar, functions: Any) -> _Matrix:
 
 
 def _coordinate_rates(kind: str, q: Sequence[Scalar], v: Sequence[Scalar], S: _Matrix) -> list[Scalar]:
-    if kind not in {"spherical", "free"}:
+    if kind not in WITH_QUATERNION:
         return list(v)
     (a, b, c, d), (x, y, z) = q[-4:], v[-3:]
     turning = [
@@ -339,7 +339,7 @@ def _coordinate_rates(kind: str, q: Sequence[Scalar], v: Sequence[Scalar], S: _M
         0.5 * (a * y + d * x - b * z),
         0.5 * (a * z + b * y - c * x),
     ]
-    return [*turned(S, v[:3]), *turning] if kind == "free" else turning
+    return [*turned(S, v[:3]), *turning] if kind == JointKind.FREE else turning
 
 
 def _slide(

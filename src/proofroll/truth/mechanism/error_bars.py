@@ -10,6 +10,7 @@ from proofroll.core.bounces import Bounce
 from proofroll.core.errors import Refused
 from proofroll.core.events import Event
 from proofroll.elements.mechanism.joint_coordinates import JointCoordinates
+from proofroll.elements.mechanism.joint_kinds import WITH_QUATERNION, JointKind
 from proofroll.elements.mechanism.link_forces import link_values, works
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.placed import Placed
@@ -102,11 +103,11 @@ def on_same_turns(mechanism: Mechanism, guide: Record, other: Record) -> Record:
     q_WB = _same_sign(guide.q_WB, other.q_WB)
     q = other.q.copy()
     for joint, at in zip(mechanism.joints, mechanism.q_slices, strict=True):
-        if joint.kind in {"spherical", "free"}:
+        if joint.kind in WITH_QUATERNION:
             quaternion = slice(at.stop - 4, at.stop)
             q[:, quaternion] = _same_sign(guide.q[:, quaternion], q[:, quaternion])
-        elif joint.kind in {"revolute", "cylindrical", "universal", "planar"}:
-            angles = at if joint.kind == "universal" else slice(at.stop - 1, at.stop)
+        elif joint.kind in {JointKind.REVOLUTE, JointKind.CYLINDRICAL, JointKind.UNIVERSAL, JointKind.PLANAR}:
+            angles = at if joint.kind == JointKind.UNIVERSAL else slice(at.stop - 1, at.stop)
             q[:, angles] += 2 * np.pi * np.round((guide.q[:, angles] - q[:, angles]) / (2 * np.pi))
     return replace(other, q_WB=q_WB, q=q)
 

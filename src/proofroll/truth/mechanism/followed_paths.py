@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from proofroll.core.errors import Refused
-from proofroll.core.events import Event
+from proofroll.core.events import Event, EventKind
 from proofroll.elements.mechanism.analysis import analyse
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.record import Record
@@ -83,7 +83,7 @@ def cut_early(
     The error of a cut is quadratic in its speed, so that of the path itself is at most a third of their difference.
     None: no rebounds were cut.
     """
-    if not any(item.kind == "settle" for item in path.happenings):
+    if not any(item.kind == EventKind.SETTLE for item in path.happenings):
         return None
     early = follow(route, until, kinks, CLOSE)
     modes = ([kinds(each.stretches[k].mode) for k in each.stretch_at(times)] for each in (path, early))

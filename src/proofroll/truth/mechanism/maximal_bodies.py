@@ -13,6 +13,7 @@ from scipy.spatial.transform import Rotation
 
 from proofroll.elements.mechanism.checks import WORLD
 from proofroll.elements.mechanism.joint import Joint
+from proofroll.elements.mechanism.joint_kinds import IN_PLANE, SLIDING, JointKind
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.rotations import Array, frame_of_axis
 from proofroll.truth.scalars import Scalar, add, cross, dot, mul, plus, scaled, turned, turned_back
@@ -182,20 +183,20 @@ def _moved(joint: Joint, q: Array, v: Array) -> tuple[Array, Rotation, Array, Ar
     """Shift, rotation, velocity and angular velocity of the child, in the axes that it has at q = 0."""
     none, still = np.zeros(3), Rotation.identity()
     e1, e2, e3 = joint.child_frame.copy().T
-    if joint.kind == "revolute":
+    if joint.kind == JointKind.REVOLUTE:
         return none, Rotation.from_rotvec(q[0] * e3), none, v[0] * e3
-    if joint.kind in {"prismatic", "cylindrical"}:
-        angle, spin = (0.0, 0.0) if joint.kind == "prismatic" else (q[1], v[1])
+    if joint.kind in SLIDING:
+        angle, spin = (0.0, 0.0) if joint.kind == JointKind.PRISMATIC else (q[1], v[1])
         return q[0] * e3, Rotation.from_rotvec(angle * e3), v[0] * e3, spin * e3
-    if joint.kind == "universal":
+    if joint.kind == JointKind.UNIVERSAL:
         first = Rotation.from_rotvec(q[0] * e3)
         return none, first * Rotation.from_rotvec(q[1] * e1), none, v[0] * e3 + v[1] * first.apply(e1)
-    if joint.kind == "planar":
+    if joint.kind == JointKind.PLANAR:
         return q[0] * e1 + q[1] * e2, Rotation.from_rotvec(q[2] * e3), v[0] * e1 + v[1] * e2, v[2] * e3
-    if joint.kind == "fixed":
+    if joint.kind == JointKind.FIXED:
         return none, still, none, none
     turn = Rotation.from_quat(q[-4:], scalar_first=True) if q[-4:].any() else still
-    shift, slide = (q[:3], turn.apply(v[:3])) if joint.kind == "free" else (none, none)
+    shift, slide = (q[:3], turn.apply(v[:3])) if joint.kind == JointKind.FREE else (none, none)
     return shift, turn, slide, turn.apply(v[-3:])
 
 
@@ -221,15 +222,13 @@ def _plane(mechanism: Mechanism) -> Array | None:
     """Frame of the plane in which all bodies move, as columns with the normal last; None: they do not."""
     placed = placed_bodies(mechanism)
     axes = [(joint, placed[joint.child].R.apply(joint.child_frame[:, 2].copy())) for joint in mechanism.joints]
-    normals = [axis for joint, axis in axes if joint.kind in {"revolute", "planar"}]
-    if not normals or any(
-        joint.kind in {"cylindrical", "universal", "spherical", "free"} for joint in mechanism.joints
-    ):
+    normals = [axis for joint, axis in axes if joint.kind in {JointKind.REVOLUTE, JointKind.PLANAR}]
+    if not normals or any(joint.kind not in IN_PLANE for joint in mechanism.joints):
         return None
     normal = normals[0]
     for joint, axis in axes:
-        skewness = axis @ normal if joint.kind == "prismatic" else np.abs(np.cross(axis, normal)).max()
-        if joint.kind != "fixed" and abs(skewness) > _PARALLEL:
+        skewness = axis @ normal if joint.kind == JointKind.PRISMATIC else np.abs(np.cross(axis, normal)).max()
+        if joint.kind != JointKind.FIXED and abs(skewness) > _PARALLEL:
             return None
     return frame_of_axis(normal)
 

@@ -16,6 +16,7 @@ from proofroll.core.arrays import slices
 from proofroll.elements.mechanism.checks import WORLD
 from proofroll.elements.mechanism.drives import Coupling
 from proofroll.elements.mechanism.joint import Joint
+from proofroll.elements.mechanism.joint_kinds import TURNING, JointKind
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.prescribed import moved
 from proofroll.elements.mechanism.rotations import Array
@@ -132,7 +133,7 @@ class MaximalEquations:
         self.angles = [
             (k, n)
             for k, joint in enumerate(mechanism.joints)
-            if (joint.stiffness or joint.limits or k in held) and joint.kind in {"revolute", "universal"}
+            if (joint.stiffness or joint.limits or k in held) and joint.kind in TURNING
             for n in range(joint.nq)
         ]
 
@@ -363,14 +364,14 @@ class MaximalEquations:
         A, B = columns(product(a.R, c.frame_a)), columns(product(b.R, c.frame_b))
         turning = minus(b.w, a.w)
         d = minus(plus(b.r, arm_b), plus(a.r, arm_a))
-        if joint.kind == "spherical":
+        if joint.kind == JointKind.SPHERICAL:
             moment = scaled(-joint.damping, turning)
-        elif joint.kind == "prismatic":
+        elif joint.kind == JointKind.PRISMATIC:
             slide = minus(minus(speed_at(b, arm_b), speed_at(a, arm_a)), cross(a.w, d))
             along, speed = dot(A[2], d), dot(A[2], slide)
             push = scaled(add(_along(joint, along, speed), effort(number, along, speed)), A[2])
         else:
-            axes = [A[2]] if joint.kind == "revolute" else [A[2], B[0]]
+            axes = [A[2]] if joint.kind == JointKind.REVOLUTE else [A[2], B[0]]
             speeds = [dot(axis, turning) for axis in axes]
             if angles:
                 rates = speeds

@@ -20,6 +20,7 @@ from proofroll.core.quantity import OR, powers_of
 from proofroll.core.validation import units_of_kind
 from proofroll.elements.mechanism.contacts.start import natural_scale
 from proofroll.elements.mechanism.joint import Joint
+from proofroll.elements.mechanism.joint_kinds import JointKind
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.named_forces import named_forces
 from proofroll.elements.mechanism.record import Record
@@ -59,7 +60,7 @@ class Units(NamedTuple):
 
     def mechanism(self, si: Mechanism) -> Mechanism:
         """Mechanism in these units, from one in SI units."""
-        slides = {joint.name: joint.kind == "prismatic" for joint in si.joints}
+        slides = {joint.name: joint.kind == JointKind.PRISMATIC for joint in si.joints}
 
         def each(parts: Iterable[Any]) -> tuple[Any, ...]:
             return tuple(self._own(part) for part in parts)

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from proofroll.core.errors import Diverged, Refused
+from proofroll.core.events import EventKind
 from proofroll.elements.mechanism.commands import has_held
 from proofroll.elements.mechanism.joint import Joint
 from proofroll.elements.mechanism.joint_coordinates import JointCoordinates
@@ -144,7 +145,7 @@ def _switched(mechanism: Mechanism, units: Units, own: Mechanism, times: Array) 
     paths = followed(*routes, until, kinks)
     if held:
         paths = routes[0].completed(paths[0]), routes[1].completed(paths[1])
-    if held and any(item.kind == "settle" for item in paths[0].happenings):
+    if held and any(item.kind == EventKind.SETTLE for item in paths[0].happenings):
         raise Refused("no route of the truth follows rebounds to their end under held targets yet")
     times = asked = times_known(paths, times)
     for values in held:

@@ -9,19 +9,26 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from proofroll.elements.mechanism import Body, Joint, Loop, Mechanism, Point, Spring, Tree
-from proofroll.elements.mechanism.joint import FACTS, LAWS, WITH_AXIS, Kind
+from proofroll.elements.mechanism.joint_kinds import FACTS, LAWS, WITH_AXIS, JointKind
 
-KINDS: tuple[Kind, ...] = (
-    "fixed",
-    "revolute",
-    "prismatic",
-    "universal",
-    "spherical",
-    "planar",
-    "free",
-    "cylindrical",
+KINDS: tuple[JointKind, ...] = (
+    JointKind.FIXED,
+    JointKind.REVOLUTE,
+    JointKind.PRISMATIC,
+    JointKind.UNIVERSAL,
+    JointKind.SPHERICAL,
+    JointKind.PLANAR,
+    JointKind.FREE,
+    JointKind.CYLINDRICAL,
 )
-CLOSING = ("revolute", "prismatic", "cylindrical", "universal", "spherical", "planar")
+CLOSING = (
+    JointKind.REVOLUTE,
+    JointKind.PRISMATIC,
+    JointKind.CYLINDRICAL,
+    JointKind.UNIVERSAL,
+    JointKind.SPHERICAL,
+    JointKind.PLANAR,
+)
 STYLES = ("tree", "loop", "planar tree", "planar loop")
 _CLEAR = 0.05  # least relative singular value of a loop's rows: what is nearer to a singular pose may well be refused
 
@@ -31,10 +38,10 @@ def random_mechanism(seed: int) -> tuple[str, Mechanism]:
     rng = np.random.default_rng(seed)
     style = STYLES[seed % len(STYLES)]
     while True:
-        tree = _tree(rng, planar="planar" in style, loop="loop" in style)
+        tree = _tree(rng, planar=JointKind.PLANAR in style, loop="loop" in style)
         if "loop" not in style:
             return style, tree
-        closed = _closed(rng, tree, planar="planar" in style)
+        closed = _closed(rng, tree, planar=JointKind.PLANAR in style)
         if closed is not None:
             return style, closed
 
@@ -48,17 +55,19 @@ def _tree(rng: Any, *, planar: bool, loop: bool) -> Mechanism:
     for number in range(count):
         name = f"b{number}"
         parent = names[-1] if loop or rng.random() < 0.7 else str(rng.choice(names))
-        kinds: tuple[Kind, ...] = ("revolute", "prismatic", "planar", "fixed") if planar else KINDS
+        kinds: tuple[JointKind, ...] = (
+            (JointKind.REVOLUTE, JointKind.PRISMATIC, JointKind.PLANAR, JointKind.FIXED) if planar else KINDS
+        )
         kind = kinds[rng.choice(len(kinds), p=(0.6, 0.2, 0.1, 0.1) if planar else None)]
-        if number == 0 and kind == "fixed":
-            kind = "revolute"
+        if number == 0 and kind == JointKind.FIXED:
+            kind = JointKind.REVOLUTE
         orientation = rng.uniform(-1.2, 1.2, 3)
         turned[name] = turned[parent] * Rotation.from_euler("xyz", orientation)
         axis, second = _unit(rng), None
         if planar:
-            along = normal if kind != "prismatic" else np.cross(normal, _unit(rng))
+            along = normal if kind != JointKind.PRISMATIC else np.cross(normal, _unit(rng))
             axis = turned[name].inv().apply(along / np.linalg.norm(along))
-        if kind in {"universal", "planar"}:
+        if kind in {JointKind.UNIVERSAL, JointKind.PLANAR}:
             second = np.cross(axis, _unit(rng))
         q0, v0 = rng.uniform(-1, 1, FACTS[kind].nq), rng.uniform(-2, 2, FACTS[kind].nv)
         options: dict[str, Any] = {}
@@ -74,7 +83,7 @@ def _tree(rng: Any, *, planar: bool, loop: bool) -> Mechanism:
         bodies.append(_body(rng, name))
         names.append(name)
     if all(joint.nv == 0 for joint in joints):
-        joints[0] = replace(joints[0], kind="revolute")
+        joints[0] = replace(joints[0], kind=JointKind.REVOLUTE)
     springs = [
         Spring("s", names[-1], "world", tuple(rng.uniform(-0.3, 0.3, 3)), tuple(rng.uniform(2, 3, 3)),
                float(rng.uniform(1, 30)), float(rng.uniform(0, 1)), float(rng.uniform(0.1, 2)))
@@ -98,18 +107,20 @@ def _closed(rng: Any, tree: Mechanism, *, planar: bool) -> Mechanism | None:
     """The tree with a loop that closes where it stands, and velocities that keep it closed; None: it cannot move."""
     motion = Tree(tree).at(*tree.start())
     a, b = tree.bodies[-1].name, "world"
-    kinds: tuple[Kind, ...] = (
-        ("revolute",) if planar else tuple(kind for kind in KINDS if kind not in {"free", "fixed"})
+    kinds: tuple[JointKind, ...] = (
+        (JointKind.REVOLUTE,)
+        if planar
+        else tuple(kind for kind in KINDS if kind not in {JointKind.FREE, JointKind.FIXED})
     )
     kind = kinds[rng.integers(len(kinds))]
     R_a, p_a = motion.R_WB[tree.body_index[a]], motion.p_WB[tree.body_index[a]]
     place, axis = rng.uniform(-0.4, 0.4, 3), _unit(rng)
     if planar:
-        hinge = next((joint for joint in tree.joints if joint.kind in {"revolute", "planar"}), None)
+        hinge = next((joint for joint in tree.joints if joint.kind in {JointKind.REVOLUTE, JointKind.PLANAR}), None)
         if hinge is None:
             return None
         axis = R_a.T @ motion.R_WB[tree.body_index[hinge.child]] @ np.array(hinge.axis)
-    world_axis = R_a @ (np.cross(axis, _unit(rng)) if kind == "universal" else axis)
+    world_axis = R_a @ (np.cross(axis, _unit(rng)) if kind == JointKind.UNIVERSAL else axis)
     orientation = Rotation.from_matrix(R_a.T).as_euler("xyz")
     loop = Loop("loop", kind, a, b, tuple(place), tuple(p_a + R_a @ place), tuple(axis), tuple(world_axis),
                 tuple(orientation))  # fmt: skip

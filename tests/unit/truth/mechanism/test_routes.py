@@ -14,8 +14,8 @@ from proofroll.core.errors import Refused
 from proofroll.elements.mechanism import Body, Joint, Loop, Mechanism, Tree
 from proofroll.elements.mechanism.analysis import analyse
 from proofroll.elements.mechanism.assembly import check_start
-from proofroll.elements.mechanism.joint import FACTS, WITH_AXIS
 from proofroll.elements.mechanism.joint_coordinates import JointCoordinates
+from proofroll.elements.mechanism.joint_kinds import FACTS, WITH_AXIS
 from proofroll.elements.mechanism.placed import Placed
 from proofroll.elements.mechanism.record import record_of
 from proofroll.elements.mechanism.rotations import to_rpy

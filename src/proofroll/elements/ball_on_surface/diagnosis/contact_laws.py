@@ -8,7 +8,7 @@ import numpy as np
 from proofroll.core.arrays import FloatArray, known_difference
 from proofroll.core.diagnosis import Cause, Evidence, Hypothesis, hypothesis
 from proofroll.core.diagnosis.samples import run_and_truth
-from proofroll.core.events import events_of
+from proofroll.core.events import EventKind, events_of
 from proofroll.elements.ball_on_surface.diagnosis.equations import (
     COVERED,
     Law,
@@ -55,7 +55,7 @@ def starts_to_slip(evidence: Evidence) -> Iterator[Cause]:
     if run is None or truth is None or not np.isfinite(contact.mu_static) or "sticking" not in truth:
         return
     first, true = (
-        next((event.time for event in events_of(data) if event.kind == "slip"), float(data["time"][-1]))
+        next((event.time for event in events_of(data) if event.kind == EventKind.SLIP), float(data["time"][-1]))
         for data in (run, truth)
     )
     if contact.mu_kinetic >= contact.mu_static or first == true:

@@ -15,6 +15,7 @@ from proofroll.core.errors import Diverged
 from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.bookkeeping.law import ControlLaw, RobotState
 from proofroll.elements.mechanism.joint_coordinates import JointCoordinates
+from proofroll.elements.mechanism.joint_kinds import JointKind
 from proofroll.elements.mechanism.policy import Observation
 from proofroll.elements.mechanism.rotations import Array
 
@@ -53,7 +54,7 @@ class AirRobot:
         self.joints = tuple(joint.name for joint in mechanism.joints if joint.nq == 1)
         self.places = np.array([mechanism.place_of(name) for name in self.joints]).reshape(-1, 2)
         self.driven = np.array([mechanism.place_of(name) for name in law.joints])
-        base = [k for k, joint in enumerate(mechanism.joints) if joint.kind == "free"][:1]
+        base = [k for k, joint in enumerate(mechanism.joints) if joint.kind == JointKind.FREE][:1]
         self.base = (mechanism.q_slices[base[0]], mechanism.v_slices[base[0]]) if base else None
 
     def coordinates(self, q: Array, v: Array, base: Array | None) -> tuple[Array, Array]:

@@ -20,7 +20,7 @@ from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.bookkeeping.air import SCHEMES, AirRobot, Scheme, steps_in_air
 from proofroll.elements.mechanism.bookkeeping.law import ControlLaw
 from proofroll.elements.mechanism.bookkeeping.mistakes import Mistake, fitted, mistakes, offsets_told
-from proofroll.elements.mechanism.joint import WITH_QUATERNION
+from proofroll.elements.mechanism.joint_kinds import WITH_QUATERNION, JointKind
 from proofroll.elements.mechanism.rotations import Array
 
 SHOWN = 0.1  # s: a mistake of bookkeeping shows in the air within it
@@ -105,7 +105,7 @@ class _Search:
         self.turning = np.zeros(self.mechanism.nq, dtype=bool)
         self.quaternions = []
         for joint, at in zip(self.mechanism.joints, self.mechanism.q_slices, strict=True):
-            self.turning[at] = joint.kind == "revolute"
+            self.turning[at] = joint.kind == JointKind.REVOLUTE
             if joint.kind in WITH_QUATERNION:
                 self.quaternions.append(slice(at.stop - 4, at.stop))
         self.schemes: list[Scheme] = [name for name in SCHEMES if self.quaternions or not name.endswith("_base")]

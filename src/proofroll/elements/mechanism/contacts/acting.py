@@ -5,6 +5,7 @@ from typing import Literal, NamedTuple, Protocol
 
 import numpy as np
 
+from proofroll.core.events import EventKind
 from proofroll.elements.mechanism.contacts.touching import Touching
 from proofroll.elements.mechanism.rotations import Array, frame_of_axis
 
@@ -175,13 +176,13 @@ def changes(
         if contact.pressed_by is not None:
             continue
         if now.kind == "stick" and was.kind != "stick":
-            found.append(("rest" if stands and not contact.bound else "stick", contact.name))
+            found.append((EventKind.REST if stands and not contact.bound else EventKind.STICK, contact.name))
         elif was.kind == "stick" and now.kind == "slip":
-            found.append(("slip", contact.name))
+            found.append((EventKind.SLIP, contact.name))
         elif was.kind != "open" and now.kind == "open":
-            found.append(("lift_off", contact.name))
+            found.append((EventKind.LIFT_OFF, contact.name))
         elif was.kind == now.kind == "slip" and _opposite(was, now):
-            found.append(("turn", contact.name))
+            found.append((EventKind.TURN, contact.name))
     return tuple(found)
 
 

@@ -4,9 +4,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from proofroll.core.bounces import IMPACTS, Bounce, Course, bounces_along
+from proofroll.core.bounces import Bounce, Course, bounces_along
 from proofroll.core.columns import Columns
-from proofroll.core.events import events_of
+from proofroll.core.events import IMPACTS, events_of
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.placed import Placed
 

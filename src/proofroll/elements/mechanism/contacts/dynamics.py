@@ -42,6 +42,7 @@ from proofroll.elements.mechanism.contacts.turning import (
     turning_frictions,
 )
 from proofroll.elements.mechanism.joint_coordinates import JointCoordinates
+from proofroll.elements.mechanism.joint_kinds import JointKind
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.named_forces import named_forces
 from proofroll.elements.mechanism.rotations import Array, cross, frame_of_axis
@@ -224,7 +225,7 @@ class ContactDynamics:
         """
         q, v = self.mechanism.start()
         scale = natural_scale(self.mechanism)
-        turns = [isinstance(c, JointContact) and self.mechanism.joints[c.joint.number].kind != "prismatic"
+        turns = [isinstance(c, JointContact) and self.mechanism.joints[c.joint.number].kind != JointKind.PRISMATIC
                  for c in self.contacts]  # fmt: skip
         lengths = np.where(turns, 1.0, scale.length)
         closed, still = closed_and_still(self.at(q, v).touching, lengths, scale.rate)

@@ -12,7 +12,7 @@ from proofroll.core.arrays import FloatArray
 from proofroll.core.bounces import Bounce
 from proofroll.core.columns import Columns
 from proofroll.core.element_abilities import SeenInRun
-from proofroll.core.events import Event
+from proofroll.core.events import Event, EventKind
 from proofroll.elements.mechanism.contacts.bounces import sampled_bounces
 from proofroll.elements.mechanism.contacts.observables import (
     PRESSES,
@@ -38,7 +38,7 @@ _ROUNDED = 1.01
 _REVERSED = -0.9
 # Kinds of events that samples cannot distinguish from others: a resting contact may still begin to move, and a settling
 # one may go on rebounding.
-_ALIKE = {"rest": "stick", "settle": "impact"}
+_ALIKE = {EventKind.REST: EventKind.STICK, EventKind.SETTLE: EventKind.IMPACT}
 
 
 class ContactWatch:
@@ -112,8 +112,8 @@ class ContactWatch:
             states = forces[:, c], presses[:, c], slips[:, c]
             for k in range(len(times) - 1):
                 kind, at = _change(times, found, u_n[:, c], states, k, c)
-                if kind == "stick" and stands[k + 1]:
-                    kind = "rest"
+                if kind == EventKind.STICK and stands[k + 1]:
+                    kind = EventKind.REST
                 if kind:
                     low, high = float(times[k]), float(times[k + 1])
                     events.append(Event(kind, min(max(at, low), high), low, high, contact.name))
@@ -196,17 +196,17 @@ def _change(
     if not presses[k]:
         closing = float(u_n[k])
         if presses[k + 1] or (closing < 0 < u_n[k + 1] and _strikes(times, found.gap[:, c], u_n, pressed, k)):
-            return "impact", start + float(found.gap[k, c]) / -closing if closing < 0 else middle
+            return EventKind.IMPACT, start + float(found.gap[k, c]) / -closing if closing < 0 else middle
         return "", start
     if not presses[k + 1]:
-        return "lift_off", middle
+        return EventKind.LIFT_OFF, middle
     if slips[k] and not slips[k + 1]:
         before = float(found.slip[k - 1, c]) if k and slips[k - 1] else np.inf
         slip, lost = float(found.slip[k, c]), before - float(found.slip[k, c])
         whole = start + slip / lost * float(times[k] - times[k - 1]) if 0 < lost < np.inf else middle
-        return "stick", whole
+        return EventKind.STICK, whole
     if slips[k + 1] and not slips[k]:
-        return "slip", middle
+        return EventKind.SLIP, middle
     along = float(found.slide[k, c] @ found.slide[k + 1, c])
     turned = slips[k] and along < _REVERSED * float(found.slip[k, c] * found.slip[k + 1, c])
-    return ("turn", middle) if turned else ("", start)
+    return (EventKind.TURN, middle) if turned else ("", start)

@@ -14,6 +14,7 @@ from proofroll.core.observable import Observable, Role
 from proofroll.elements.mechanism.contacts.coulomb import largest_friction
 from proofroll.elements.mechanism.contacts.geometry import shared_pairs
 from proofroll.elements.mechanism.contacts.touching import Moving, touch
+from proofroll.elements.mechanism.joint_kinds import JointKind
 from proofroll.elements.mechanism.signal import varies
 
 if TYPE_CHECKING:
@@ -92,7 +93,7 @@ def kept_laws(mechanism: Mechanism) -> frozenset[str]:
     ends = {name for contact in mechanism.contacts for name in (contact.body_a, contact.body_b)}
     ends |= {name for spring in mechanism.links for name in (spring.body_a, spring.body_b)}
     ends |= {name for loop in mechanism.loops for name in (loop.body_a, loop.body_b)}
-    held = any(joint.kind != "free" and "world" in {joint.parent, joint.child} for joint in mechanism.joints)
+    held = any(joint.kind != JointKind.FREE and "world" in {joint.parent, joint.child} for joint in mechanism.joints)
     held = held or "world" in ends or bool(np.any(mechanism.gravity))
     return frozenset(name for name, _, _ in (LAWS[:1] if held else LAWS))
 

@@ -11,6 +11,7 @@ from proofroll.core.errors import InputError
 from proofroll.core.last_results import kept
 from proofroll.elements.mechanism.contacts.touching import Moving, Touching, touch
 from proofroll.elements.mechanism.joint_coordinates import JointCoordinates, Solution
+from proofroll.elements.mechanism.joint_kinds import JointKind
 from proofroll.elements.mechanism.kinematics import BodyMotion, Tree
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.rotations import skew
@@ -75,7 +76,7 @@ def natural_length(mechanism: Mechanism, found: Solution) -> float:
     acceleration.
     """
     motion = found.motion
-    slides = [joint for joint in mechanism.joints if joint.kind == "prismatic"]
+    slides = [joint for joint in mechanism.joints if joint.kind == JointKind.PRISMATIC]
     ways = [abs(way) for joint in slides for way in (*joint.q0, joint.rest)]
     radii = [np.sqrt(np.trace(body.inertia) / body.mass) for body in mechanism.bodies if body.mass]
     length, pull = max([extent(mechanism, motion), *ways, *radii]), _largest(_rates(found)[:, :3])
@@ -138,7 +139,7 @@ def check_contacts(mechanism: Mechanism) -> None:
     for joint in stopped:
         assert joint.limits is not None
         (low, high), (q,), (v,) = joint.limits, joint.q0, joint.v0
-        digits, still = joint.stop_digits, scale.speed if joint.kind == "prismatic" else STILL * scale.rate
+        digits, still = joint.stop_digits, scale.speed if joint.kind == JointKind.PRISMATIC else STILL * scale.rate
         if (q <= low + digits and v < -still) or (q >= high - digits and v > still):
             advice = "the joint starts on its stop and moves into it, an impact at time 0; correct v0 or start it apart"
             raise InputError(f"joints.{joint.name}.v0", v, advice)

@@ -20,7 +20,7 @@ from proofroll.core.arrays import FloatArray, cross
 from proofroll.core.diagnosis import Evidence
 from proofroll.core.first_steps import OF_FIRST_STEPS
 from proofroll.elements.mechanism.drives import Actuator
-from proofroll.elements.mechanism.joint import WITH_QUATERNION
+from proofroll.elements.mechanism.joint_kinds import WITH_QUATERNION
 from proofroll.elements.mechanism.kinematics import BodyMotion, Tree
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.placed import Placed

@@ -13,8 +13,8 @@ from proofroll.core.errors import Diverged, Refused
 from proofroll.elements.mechanism.diagnosis.equations import Change, is_motion, is_one_motion, of_start, placed_of
 from proofroll.elements.mechanism.diagnosis.residuals import COVERED, best, residuals_of
 from proofroll.elements.mechanism.drives import Actuator
-from proofroll.elements.mechanism.joint import WITH_QUATERNION
 from proofroll.elements.mechanism.joint_coordinates import JointCoordinates
+from proofroll.elements.mechanism.joint_kinds import WITH_QUATERNION, JointKind
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.signal import value_at
 
@@ -265,7 +265,7 @@ def of_stops(evidence: Evidence) -> Iterator[Cause]:
                 count = 2  # place and rate
             says = f"the joint {joint.name} {does} at {limit + shift:.6g}, not at its stop at {limit:.6g}"
             remedy = "look at the place of the stop, at the joint's zero, and at how far the stop gives way"
-            unit = "rad" if joint.kind == "revolute" else "m"
+            unit = "rad" if joint.kind == JointKind.REVOLUTE else "m"
             what, change = (f"{joint.name} at its stop", unit, difference, remainder), abs(shift) / size
             yield Cause(f"stop of {joint.name}", says, *what, remedy, 1, _COVERS, explains=count, change=change)
 

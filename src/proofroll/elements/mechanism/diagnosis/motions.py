@@ -10,6 +10,7 @@ from proofroll.core.diagnosis.samples import run_and_truth
 from proofroll.elements.mechanism.diagnosis.equations import is_motion, of_start, placed_of
 from proofroll.elements.mechanism.diagnosis.residuals import COVERED
 from proofroll.elements.mechanism.joint import Joint
+from proofroll.elements.mechanism.joint_kinds import JointKind
 from proofroll.elements.mechanism.prescribed import moved
 from proofroll.elements.mechanism.signal import delayed, varies
 
@@ -30,7 +31,7 @@ def of_motions(evidence: Evidence) -> Iterator[Cause]:
     placed = placed_of(mechanism, found[0]) if found is not None and is_motion(found[0]) else None
     start = of_start(evidence) if placed is None else None
     for joint, _, at_v in mechanism.prescribed:
-        unit = "rad" if joint.kind == "revolute" else "m"
+        unit = "rad" if joint.kind == JointKind.REVOLUTE else "m"
         if placed is not None:
             # the sample at time 0 is given to an engine
             times, values = placed.time[1:], placed.along(joint)[0][1:, 0]
@@ -71,6 +72,6 @@ def _mistakes(joint: Joint, step: float | None) -> Iterator[tuple[str, float, fl
     if step and joint.motion is not None and varies(joint.motion):
         yield "is a step late", 1.0, step, "evaluate it at the time of each stage of the step"
     yield "has the opposite sign", -1.0, 0.0, "it is along the joint's axis, of the child from the parent"
-    if joint.kind == "revolute":
+    if joint.kind == JointKind.REVOLUTE:
         yield "is taken for degrees", _DEGREE, 0.0, "the scene's motion is in radians"
         yield "is in degrees", 1 / _DEGREE, 0.0, "the scene's motion is in radians"

@@ -15,6 +15,7 @@ from proofroll.core.errors import InputError
 from proofroll.core.first_steps import OF_FIRST_STEPS
 from proofroll.elements.mechanism.diagnosis.equations import Change, is_motion, of_run, placed_of, stretch
 from proofroll.elements.mechanism.diagnosis.residuals import COVERED, residuals_of
+from proofroll.elements.mechanism.joint_kinds import JointKind
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.placed import Placed
 
@@ -36,7 +37,7 @@ def other_axis(evidence: Evidence) -> Iterator[Cause]:
         return
     placed = placed_of(mechanism, pair[0])
     for joint in mechanism.joints:
-        if joint.kind != "revolute":
+        if joint.kind != JointKind.REVOLUTE:
             continue
         parent, child = (mechanism.body_index[name] for name in (joint.parent, joint.child))
         turning = placed.w_WB[:, child] - placed.spin(joint.parent)
@@ -96,7 +97,7 @@ def axis_of_first_steps(evidence: Evidence) -> Iterator[Cause]:
     start, mechanism = element.start, element.mechanism
     rate, w = np.vstack([np.reshape(turning["found"], (-1, 3)), np.zeros(3)]), start.w_WB[0]
     for index, joint in enumerate(mechanism.joints):
-        if joint.kind != "revolute":
+        if joint.kind != JointKind.REVOLUTE:
             continue
         parent, child = (mechanism.body_index[name] for name in (joint.parent, joint.child))
         above = np.zeros(3) if parent == len(w) else w[parent]

@@ -11,7 +11,7 @@ from proofroll.elements.mechanism.contacts.shapes import HalfSpace, Shape, Spher
 from proofroll.elements.mechanism.contacts.start import TOUCHING, touches
 from proofroll.elements.mechanism.contacts.walls import BowlWall, CurvedWall
 from proofroll.elements.mechanism.element import MechanismElement
-from proofroll.elements.mechanism.joint import DISTANCE
+from proofroll.elements.mechanism.joint_kinds import DISTANCE, SLIDING, JointKind
 from proofroll.elements.mechanism.kinematics import Tree
 from proofroll.elements.mechanism.rotations import frame_of_axis
 from proofroll.report.pen import Drawing, View, across, circle, unit
@@ -58,10 +58,10 @@ def mechanism_drawing(element: MechanismElement) -> Drawing:
         picture.disc(at(com).tolist(), _MASS, "ball")
     named: dict[tuple[int, ...], list[str]] = {}
     for number, each in enumerate(mechanism.connections):
-        if each.kind == "free":
+        if each.kind == JointKind.FREE:
             continue
         here, there = place(each.a, each.position_a), place(each.b, each.position_b)
-        if each.kind in {"prismatic", "cylindrical"}:  # the line on which the child slides
+        if each.kind in SLIDING:  # the line on which the child slides
             way = there - here if np.linalg.norm(there - here) else 0.2 * element.length * _axis(element, number)
             picture.path(at(np.stack([here - 0.3 * way, there + 0.3 * way])), "axis")
         if each.kind == DISTANCE:
@@ -184,9 +184,9 @@ def _laws(picture: Drawing, at: View, element: MechanismElement) -> None:
     for number, joint in enumerate(mechanism.joints):
         axis, here = _axis(element, number), place(joint.name)
         for limit in joint.limits or ():
-            if abs(limit) * (element.length if joint.kind == "revolute" else 1.0) > _FARTHEST * element.length:
+            if abs(limit) * (element.length if joint.kind == JointKind.REVOLUTE else 1.0) > _FARTHEST * element.length:
                 continue  # beyond the drawing
-            if joint.kind == "prismatic":
+            if joint.kind == JointKind.PRISMATIC:
                 there = at(here + (limit - joint.q0[0]) * axis)
                 side = _STROKE * across(at(axis))
                 picture.path(np.stack([there - side, there + side]), "line")
@@ -203,12 +203,14 @@ def direction(element: MechanismElement) -> tuple[FloatArray, FloatArray]:
     The viewer looks along the axes of the joints where all are parallel, else obliquely; gravity points down.
     """
     mechanism = element.mechanism
-    axes = [_axis(element, n) for n, joint in enumerate(mechanism.joints) if joint.kind == "revolute"]
+    axes = [_axis(element, n) for n, joint in enumerate(mechanism.joints) if joint.kind == JointKind.REVOLUTE]
     down = np.array(mechanism.gravity)
     up = -down / np.linalg.norm(down) if np.any(down) else np.array([0.0, 0.0, 1.0])
     viewer = _from_z_up(np.array(_OBLIQUE), up)
     plane = axes and all(np.linalg.norm(np.cross(axes[0], axis)) < 1e-6 for axis in axes)
-    slides = any(joint.kind not in {"revolute", "prismatic", "fixed"} for joint in mechanism.joints)
+    slides = any(
+        joint.kind not in {JointKind.REVOLUTE, JointKind.PRISMATIC, JointKind.FIXED} for joint in mechanism.joints
+    )
     if plane and not slides:
         viewer = axes[0] * (1.0 if float(axes[0] @ np.ones(3)) > 0 else -1.0)
         if np.linalg.norm(np.cross(viewer, up)) < 1e-6:

@@ -18,6 +18,7 @@ from proofroll.elements.mechanism.contacts.geometry import BodyContact, Geometry
 from proofroll.elements.mechanism.contacts.observables import SLIDES
 from proofroll.elements.mechanism.contacts.shapes import Wall
 from proofroll.elements.mechanism.element import MechanismElement, the_mechanism
+from proofroll.elements.mechanism.joint_kinds import SLIDING, JointKind
 from proofroll.elements.mechanism.placed import Placed
 from proofroll.elements.mechanism.report.drawing import direction
 from proofroll.files.json_data import plain
@@ -57,7 +58,7 @@ def draw_mechanism(replayed: Replayed) -> tuple[dict[str, Any], list[int], Packe
     joints = [
         (connection.name, connection.b, connection.position_b)
         for connection in mechanism.connections
-        if connection.kind != "free"
+        if connection.kind != JointKind.FREE
     ]
     # The force of a contact is drawn at the middle of the shape that is no wall; undetermined forces are not drawn.
     touching = [_touching(contact) for contact in mechanism.contacts]
@@ -119,8 +120,8 @@ def draw_mechanism(replayed: Replayed) -> tuple[dict[str, Any], list[int], Packe
         "shapes": [_shape(geometry, index[geometry.body], element, com) for geometry in mechanism.geometries],
         "springs": [[index[s.body_a], s.position_a, index[s.body_b], s.position_b] for s in mechanism.links]
                    + [[index[j.parent], j.position, index[j.child], j.child_position]
-                      for j in mechanism.joints if j.kind in {"prismatic", "cylindrical", "planar"}],
-        "falls": any(joint.kind == "free" for joint in mechanism.joints),
+                      for j in mechanism.joints if j.kind in {*SLIDING, JointKind.PLANAR}],
+        "falls": any(joint.kind == JointKind.FREE for joint in mechanism.joints),
     }  # fmt: skip
     return dict(plain(case)), [motion.time.size for motion in ghosts], numbers
 
@@ -209,7 +210,7 @@ def _shape(geometry: Geometry, body: int, element: MechanismElement, com: FloatA
 def _readings(element: MechanismElement) -> list[tuple[str, str]]:
     """Name and unit of the values listed beside the picture: of tracked points, then of joints."""
     points = [(f"{point.name}.{axis}", "m") for point in element.mechanism.points for axis in "xyz"]
-    units = {"revolute": "rad", "prismatic": "m"}
+    units = {JointKind.REVOLUTE: "rad", JointKind.PRISMATIC: "m"}
     joints = [(f"q.{joint.name}", units[joint.kind]) for joint in element.mechanism.joints if joint.kind in units]
     return (points + joints)[:_MOST_READINGS]
 
