@@ -141,13 +141,24 @@ def onset_study(
     for name, spec, facts_of_engine in zip(names, specs, facts, strict=True):
         if not isinstance(facts_of_engine, EngineFacts):
             status = status_of(facts_of_engine)
-            rows.append(EngineOnset(name, spec.name, {}, status, str(facts_of_engine), None, None, "failed"))
+            rows.append(
+                EngineOnset(
+                    engine=name,
+                    name=spec.name,
+                    settings={},
+                    status=status,
+                    message=str(facts_of_engine),
+                    onset=None,
+                    difference=None,
+                    verdict="failed",
+                )
+            )
             continue
         result, slip = next(answered)
         apart = None if slip is None or truth.time is None else slip.time - truth.time
         ended = (result.status, result.message, slip, apart, onset_verdict(truth, result, slip))
         rows.append(EngineOnset(name, spec.name, facts_of_engine.settings, *ended))
-    return OnsetStudy(loaded.name, loaded.parameters, until, truth, rows)
+    return OnsetStudy(scene=loaded.name, parameters=loaded.parameters, until=until, truth=truth, engines=rows)
 
 
 def _soon(truth: Onset, until: float) -> float:

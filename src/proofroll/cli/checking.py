@@ -110,7 +110,16 @@ def _scene(name: str) -> SoundFile:
     start = [line for element in scene.elements if isinstance(element, TellsStart) for line in element.start_facts]
     doubts = [line for element in scene.elements if isinstance(element, DoubtsNumbers) for line in element.implausible]
     path = str(scene.folder / "scene.toml")
-    return SoundFile("scene", scene.name, path, scene.name, counts, sorted(scene.requires), start, doubts)
+    return SoundFile(
+        kind="scene",
+        name=scene.name,
+        path=path,
+        scene=scene.name,
+        counts=counts,
+        requires=sorted(scene.requires),
+        start=start,
+        warnings=doubts,
+    )
 
 
 def _comparison(path: Path) -> SoundFile:
@@ -130,7 +139,7 @@ def _comparison(path: Path) -> SoundFile:
         "rows": len(comparison.rows),
         "tolerances": len(comparison.bands),
     }
-    return SoundFile("comparison", path.stem, str(path), comparison.scene, counts)
+    return SoundFile(kind="comparison", name=path.stem, path=str(path), scene=comparison.scene, counts=counts)
 
 
 def _study(path: Path, study: str) -> SoundFile:
@@ -149,4 +158,4 @@ def _study(path: Path, study: str) -> SoundFile:
         for key, value in parts.items()
         if isinstance(value, (list, tuple, Mapping)) and value
     }
-    return SoundFile(study, path.stem, str(path), getattr(content, "scene", ""), counts)
+    return SoundFile(kind=study, name=path.stem, path=str(path), scene=getattr(content, "scene", ""), counts=counts)

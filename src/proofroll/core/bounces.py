@@ -90,7 +90,11 @@ def bounces_along(course: Course, events: Sequence[Event], bodies: Mapping[str, 
             height = _apex(course, body, event.time, behind[course.time[behind] <= until])[1]
         energy_before = float(course.energy[ahead[-1]]) if ahead.size else np.nan
         energy_after = float(course.energy[behind[0]]) if behind.size else np.nan
-        bounces.append(Bounce(event.time, event.name, energy_before, energy_after, height))
+        bounces.append(
+            Bounce(
+                time=event.time, name=event.name, energy_before=energy_before, energy_after=energy_after, height=height
+            )
+        )
     return bounces
 
 
@@ -212,13 +216,13 @@ def bounces_of(columns: xr.Dataset | Columns) -> list[Bounce] | None:
     energy_bar, height_bar = (float(variables[name].attrs["error_bar"]) for name in (_COLUMNS[1][0], _COLUMNS[2][0]))
     return [
         Bounce(
-            event.time,
-            event.name,
-            e_in,
-            e_out,
-            height,
-            energy_bar,
-            height_bar if np.isfinite(height) else None,
+            time=event.time,
+            name=event.name,
+            energy_before=e_in,
+            energy_after=e_out,
+            height=height,
+            energy_bar=energy_bar,
+            height_bar=height_bar if np.isfinite(height) else None,
         )
         for event, (e_in, e_out, height) in zip(events_of(columns), zip(*values, strict=True), strict=True)
         if event.kind in IMPACTS

@@ -83,13 +83,13 @@ def _lines(kind: Any, scene: Scene, settings: Any, index: int, start: FirstMotio
         difference, bar = float(np.max(np.abs(limit[row] - expected))) / scale, longest(unknown[row]) / scale
         lines.append(
             Line(
-                scene.label(element, f"{quantity}{OF_FIRST_STEPS}"),
-                unit,
-                tuple(np.ravel(expected).tolist()),
-                tuple(np.ravel(limit[row]).tolist()),
-                difference if np.isfinite(difference) else float("inf"),
-                _MARGIN * bar + max(_FLOOR, ROUNDINGS * epsilon) + soft,
-                f"derived from velocities after steps of {number(h)} s and {number(h / 2)} s",
+                quantity=scene.label(element, f"{quantity}{OF_FIRST_STEPS}"),
+                unit=unit,
+                expected=tuple(np.ravel(expected).tolist()),
+                found=tuple(np.ravel(limit[row]).tolist()),
+                difference=difference if np.isfinite(difference) else float("inf"),
+                tolerance=_MARGIN * bar + max(_FLOOR, ROUNDINGS * epsilon) + soft,
+                because=f"derived from velocities after steps of {number(h)} s and {number(h / 2)} s",
             )
         )
     return lines
@@ -120,7 +120,14 @@ def certificate(kind: Any, engine: Any, scene: Scene, settings: Any) -> list[Lin
         more = granted.get(line.quantity.replace(OF_FIRST_STEPS, ""))
         derived.append(line if more is None else replace(line, tolerance=max(line.tolerance, _STIFF) + more))
     contact_laws = [
-        Line(scene.label(element, f"law of contact: {clause}"), "", (), (), 0.0, EXACT)
+        Line(
+            quantity=scene.label(element, f"law of contact: {clause}"),
+            unit="",
+            expected=(),
+            found=(),
+            difference=0.0,
+            tolerance=EXACT,
+        )
         for element in scene.elements
         for need, clause in laws(kind, settings).items()
         if need in element.requires

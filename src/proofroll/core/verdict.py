@@ -275,7 +275,9 @@ def _read(limit: Limit, allowance: Allowance, true: TrueCurve, round_off: float,
         text += f"; {limit.floor}"
     if limit.saturated:
         text += "; two tolerances give the same run, so something else sets its steps, as samples do"
-    return _Ladder(finding, error, bar, order, doubted, leaves, wrong, text)
+    return _Ladder(
+        finding=finding, error=error, bar=bar, order=order, doubt=doubted, leaves=leaves, wrong_within=wrong, text=text
+    )
 
 
 def _verdict(error: float, tolerance: float, rungs: _Ladder) -> Verdict:

@@ -141,20 +141,33 @@ def against(old: EarlierReport, lines: Iterable[TableLine], machine: str, versio
         if study not in shared:
             continue
         if key not in new_runs or key not in old_runs:
-            changes.append(RunChange(study, run, place, "gone" if key not in new_runs else "new", []))
+            changes.append(
+                RunChange(study=study, run=run, place=place, kind="gone" if key not in new_runs else "new", says=[])
+            )
             continue
         differences = list(_changes(old_runs[key], new_runs[key], (drift, factor) if costs else None))
         if differences:
             kinds = [kind for kind, _ in differences]
             first_kind = next(kind for kind in ("verdict", "value", "cost") if kind in kinds)
-            changes.append(RunChange(study, run, place, first_kind, [text for _, text in differences]))
+            changes.append(
+                RunChange(study=study, run=run, place=place, kind=first_kind, says=[text for _, text in differences])
+            )
     others = {
         name: (version, versions[name])
         for name, version in old.versions.items()
         if name in versions and versions[name] != version
     }
     both = sum(key in old_runs for key in new_runs)
-    return Against(str(old.path), old.date, others, costs, drift, factor, both, changes)
+    return Against(
+        old=str(old.path),
+        date=old.date,
+        versions=others,
+        costs=costs,
+        drift=drift,
+        factor=factor,
+        compared=both,
+        changes=changes,
+    )
 
 
 def runs_of(lines: Iterable[TableLine]) -> dict[tuple[str, str, str, int], dict[str, TableLine]]:

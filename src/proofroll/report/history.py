@@ -83,11 +83,11 @@ def read_history(folder: Path) -> History:
     names = dict.fromkeys(line.engine for report in reports for line in report.lines)
     engines = [_engine(name, tables, changed) for name in names]
     return History(
-        [str(report.path) for report in reports],
-        [report.date for report in reports],
-        [report.machine for report in reports],
-        engines,
-        steps,
+        files=[str(report.path) for report in reports],
+        dates=[report.date for report in reports],
+        machines=[report.machine for report in reports],
+        engines=engines,
+        steps=steps,
     )
 
 

@@ -76,7 +76,9 @@ def acceleration_fit(record: ControlRecord, law: ControlLaw, mechanism: Mechanis
         return "too few rows lie between instants"
     values, errors, _, implicit = min(fits, key=lambda fit: fit[2])
     right = np.array([law.gravity, 1.0, 1.0 if law.armature.any() else 0.0])
-    return AirFit(("gravity", "effort scale", "armature"), values, right, errors, implicit)
+    return AirFit(
+        names=("gravity", "effort scale", "armature"), values=values, right=right, errors=errors, implicit=implicit
+    )
 
 
 def states_of(record: ControlRecord, robot: AirRobot) -> list[tuple[Array, Array]] | str:

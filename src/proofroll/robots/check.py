@@ -66,7 +66,17 @@ def check(
         folder = Path(name)
         file, written, robot, compiler = moving_robot(path, settings, lent, folder)
         truth = RobotTruth.of(robot, random_states(robot, settings.states, settings.seed))
-        checked = _Checked(path, file, written, settings, truth, bar_of(truth), compiler, folder, lent)
+        checked = _Checked(
+            path=path,
+            file=file,
+            written=written,
+            settings=settings,
+            truth=truth,
+            bar=bar_of(truth),
+            compiler=compiler,
+            folder=folder,
+            workers=lent,
+        )
 
         def row(item: tuple[EngineSpec, dict[str, bool]]) -> ImporterRow:
             try:
@@ -86,7 +96,13 @@ def check(
         kind=file.kind,
         base=settings.base if file.kind == "urdf" else "as in the file",
         lint=[*file.remarks, *lint(file, robot)],
-        truth=UsedTruth(source_of(compiler), checked.bar, settings.states, settings.seed, robot.dofs),
+        truth=UsedTruth(
+            by=source_of(compiler),
+            difference=checked.bar,
+            states=settings.states,
+            seed=settings.seed,
+            velocities=robot.dofs,
+        ),
         layers=LAYERS,
         engines=rows,
         robot=robot_drawing(truth),
@@ -167,8 +183,8 @@ class _Checked:
         robot, truth = self.truth.robot, self.truth
         children = {joint.name: joint.child for joint in robot.moving}
         return Request(
-            path, self.file.kind, self.settings.base, BASE_JOINT, options, children, truth.states, truth.torques,
-            robot.gravity, robot,
+            path=path, kind=self.file.kind, base=self.settings.base, base_joint=BASE_JOINT, options=options,
+            children=children, states=truth.states, torques=truth.torques, gravity=robot.gravity, robot=robot,
         )  # fmt: skip
 
 
@@ -199,7 +215,9 @@ def robot_drawing(truth: RobotTruth) -> DrawnRobot:
     upright = {joint.name: np.eye(3)[None] for joint in robot.moving}
     origin = {joint.name: np.zeros((1, 3)) for joint in robot.moving}
     still = {joint.name: np.zeros((1, joint.dofs)) for joint in robot.moving}
-    frames = poses(robot, RobotStates(zero, upright, origin, still, still))
+    frames = poses(
+        robot, RobotStates(angle=zero, rotation=upright, position=origin, velocity=still, acceleration=still)
+    )
     placed = {name: (p[0], R[0]) for name, (p, R) in frames.items()}
 
     def drawn_joint(joint: RobotJoint) -> DrawnJoint:

@@ -53,7 +53,7 @@ def check(
     from proofroll.robots.meaning import CheckSettings
     from proofroll.robots.terminal import WIDTH, check_parts
 
-    how = CheckSettings(base, root, states, seed, time_limit)
+    how = CheckSettings(base=base, root=root, states=states, seed=seed, time_limit=time_limit)
     if against is None:
         if names:
             raise InputError("--map", ", ".join(names), "this is for two files; name the other by --against FILE")

@@ -88,7 +88,7 @@ def _layer(name: str, evidence: _Evidence) -> Layer:
     parts = np.abs(compared.difference) / bars
     row, column = np.unravel_index(int(np.argmax(parts)), parts.shape)
     residual, bar = abs(float(compared.difference[row, column])), float(bars[column])
-    return Layer(name, residual, bar, compared.columns[column], float(compared.time[row]))
+    return Layer(name=name, residual=residual, bar=bar, column=compared.columns[column], time=float(compared.time[row]))
 
 
 def _bars(name: str, evidence: _Evidence, compared: _Compared) -> Array:

@@ -52,4 +52,11 @@ def motion_layer(record: ControlRecord, law: ControlLaw, mechanism: Mechanism) -
         )
         for item in best.explanations
     )
-    return Layer("motion", best.before, bar, "the state", float(seen.time[-1]), causes=tuple(causes))
+    return Layer(
+        name="motion",
+        residual=best.before,
+        bar=bar,
+        column="the state",
+        time=float(seen.time[-1]),
+        causes=tuple(causes),
+    )

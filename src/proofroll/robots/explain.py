@@ -130,7 +130,11 @@ class Search:
     def _tried(self, step: _Step, hypothesis: RobotHypothesis, layer: str, most: float = math.inf) -> _Step | None:
         """Step after a hypothesis; None: it changes nothing, or leaves a difference above ``most`` at the layer."""
         truth, reading = step.truth, step.reading
-        changed = hypothesis.change(RobotEvidence(self.file, truth.robot, reading, self.recompiled, self.reread))
+        changed = hypothesis.change(
+            RobotEvidence(
+                file=self.file, robot=truth.robot, reading=reading, recompiled=self.recompiled, reread=self.reread
+            )
+        )
         if changed is None or changed is truth.robot:
             return None
         if isinstance(changed, Reading):
@@ -145,7 +149,13 @@ class Search:
         versions_text = ", ".join(f"{name} {versions}".strip() for name, versions in hypothesis.known.items())
         difference, remainder = step.found[layer], left[layer]
         cause = RobotCause(
-            hypothesis.id, hypothesis.name, layer, difference, remainder, hypothesis.remedy, versions_text
+            id=hypothesis.id,
+            name=hypothesis.name,
+            layer=layer,
+            before=difference,
+            after=remainder,
+            remedy=hypothesis.remedy,
+            known=versions_text,
         )
         return _Step(truth, reading, left, (*step.causes, cause))
 

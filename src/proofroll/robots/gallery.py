@@ -124,11 +124,20 @@ def _row(engines: Sequence[str], entry: Entry, workers: Workers | None = None) -
     readings, unexpected = [], []
     for item in check(path, names, CheckSettings(base=entry.base), workers=workers).engines:
         outcomes = outcome(item)
-        readings.append(GalleryReading(item.engine, item.version, item.status, item.causes, item.message, outcomes))
+        readings.append(
+            GalleryReading(
+                engine=item.engine,
+                version=item.version,
+                status=item.status,
+                causes=item.causes,
+                message=item.message,
+                outcome=outcomes,
+            )
+        )
         if item.status != "missing" and set(outcomes) != set(entry.engines[item.engine]):
             expected = ", ".join(entry.engines[item.engine]) or "to hold the file"
             unexpected.append(f"{item.named}: expected {expected}; found {', '.join(outcomes) or 'holds the file'}")
-    return GalleryRow(entry.name, entry.package, str(path), readings, unexpected)
+    return GalleryRow(name=entry.name, package=entry.package, file=str(path), engines=readings, unexpected=unexpected)
 
 
 def outcome(row: ImporterRow) -> list[str]:

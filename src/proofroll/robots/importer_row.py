@@ -63,12 +63,12 @@ def importer_row(
     }
     recompiled = _of_changed(file, lambda changed, written: meaning(changed, written, TIME_LIMIT, workers)[0])
     search = Search(
-        file,
-        answer.reading,
-        plain_name(spec.name),
-        tolerances,
-        recompiled if file.kind == "mjcf" else Search.recompiled,
-        Search.reread if ask is None else _of_changed(file, lambda _, written: ask(written).reading),
+        file=file,
+        reading=answer.reading,
+        engine=plain_name(spec.name),
+        tolerances=tolerances,
+        recompiled=recompiled if file.kind == "mjcf" else Search.recompiled,
+        reread=Search.reread if ask is None else _of_changed(file, lambda _, written: ask(written).reading),
     )
     causes, unexplained = search.causes(truth)
     holds = all(layer.holds for layer in layers.values())

@@ -52,7 +52,9 @@ def _opened(path: Path, base: str, inside: Path, expand: Expand | None) -> Robot
     count = sum(1 for _ in root.iter(body))
     if count > MOST_BODIES:
         raise InputError("file", path, f"it has {count} {body}s; at most {MOST_BODIES} are checked")
-    return RobotFile(path, kind, root, base, tuple(remarks), contained, driven)
+    return RobotFile(
+        path=path, kind=kind, root=root, base=base, remarks=tuple(remarks), contained=contained, driven=driven
+    )
 
 
 def _require_plain(root: Element, path: Path) -> None:

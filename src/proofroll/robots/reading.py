@@ -221,15 +221,17 @@ def call(function: Callable[..., dict[str, Any]], **arguments: Any) -> dict[str,
 def robot_from(data: Mapping[str, Any]) -> Robot:
     """Robot from its data by :func:`proofroll.files.json_data.plain`; its ``sources`` stay plain."""
     return Robot(
-        data["name"],
-        {name: RobotBody(**_arrays(body)) for name, body in data["bodies"].items()},
-        tuple(RobotJoint(**_arrays(joint)) for joint in data["joints"]),
-        tuple(Mimic(**mimic) for mimic in data["mimics"]),
-        np.array(data["gravity"]),
-        data["sources"],
-        tuple(RobotLoop(**_arrays(loop)) for loop in data["loops"]),
-        tuple(Tie(tie["name"], tuple(tie["joints"]), tuple(tie["coefficients"]), tie["value"]) for tie in data["ties"]),
-        tuple(data["further"]),
+        name=data["name"],
+        bodies={name: RobotBody(**_arrays(body)) for name, body in data["bodies"].items()},
+        joints=tuple(RobotJoint(**_arrays(joint)) for joint in data["joints"]),
+        mimics=tuple(Mimic(**mimic) for mimic in data["mimics"]),
+        gravity=np.array(data["gravity"]),
+        sources=data["sources"],
+        loops=tuple(RobotLoop(**_arrays(loop)) for loop in data["loops"]),
+        ties=tuple(
+            Tie(tie["name"], tuple(tie["joints"]), tuple(tie["coefficients"]), tie["value"]) for tie in data["ties"]
+        ),
+        further=tuple(data["further"]),
     )
 
 

@@ -62,11 +62,12 @@ class RobotStates:
         turning = [joint for joint in added if joint.dofs > 1]
         still = {joint.name: np.zeros((count, joint.dofs)) for joint in added}
         return RobotStates(
-            self.angle | {joint.name: np.zeros(count) for joint in added if joint.dofs == 1},
-            self.rotation | {joint.name: np.tile(np.eye(3), (count, 1, 1)) for joint in turning},
-            self.position | {joint.name: np.zeros((count, 3)) for joint in turning if joint.kind == JointKind.FREE},
-            self.velocity | still,
-            self.acceleration | still,
+            angle=self.angle | {joint.name: np.zeros(count) for joint in added if joint.dofs == 1},
+            rotation=self.rotation | {joint.name: np.tile(np.eye(3), (count, 1, 1)) for joint in turning},
+            position=self.position
+            | {joint.name: np.zeros((count, 3)) for joint in turning if joint.kind == JointKind.FREE},
+            velocity=self.velocity | still,
+            acceleration=self.acceleration | still,
         )
 
 
@@ -93,4 +94,4 @@ def random_states(robot: Robot, count: int, seed: int) -> RobotStates:
         angle[mimic.joint] = mimic.multiplier * angle[mimic.other] + mimic.offset
         for rates in (velocity, acceleration):
             rates[mimic.joint] = mimic.multiplier * rates[mimic.other]
-    return RobotStates(angle, rotation, position, velocity, acceleration)
+    return RobotStates(angle=angle, rotation=rotation, position=position, velocity=velocity, acceleration=acceleration)

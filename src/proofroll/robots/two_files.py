@@ -75,7 +75,7 @@ def against(
         kind=file.kind,
         base=settings.base if "urdf" in {file.kind, second.kind} else "as in the file",
         lint=[*_lint(file, robot), *(_of_file(rival, remark) for remark in _lint(second, other_robot))],
-        truth=UsedTruth(by, bar, settings.states, settings.seed, robot.dofs),
+        truth=UsedTruth(by=by, difference=bar, states=settings.states, seed=settings.seed, velocities=robot.dofs),
         layers=LAYERS,
         engines=[_as_file(row) for row in rows],
         robot=robot_drawing(truth),
@@ -107,7 +107,7 @@ def _of_file(path: Path, remark: LintRemark) -> LintRemark:
 
 
 def _answer(robot: Robot, truth: RobotTruth) -> reading.ReaderAnswer:
-    return reading.ReaderAnswer("", "", {}, reading_of(robot, truth), "")
+    return reading.ReaderAnswer(version="", says="", tolerances={}, reading=reading_of(robot, truth), refused="")
 
 
 def _as_file(row: ImporterRow) -> ImporterRow:

@@ -122,7 +122,7 @@ def world_jacobians(robot: Robot, states: RobotStates, frames: Frames | None = N
     v = states.stacked(states.velocity, robot)
     frames = poses(robot, states) if frames is None else frames
     rest = np.zeros((count, 3))
-    motions = {NO_BODY: _Motion(np.zeros((count, 3, n)), np.zeros((count, 3, n)), rest, rest, rest)}
+    motions = {NO_BODY: _Motion(Jv=np.zeros((count, 3, n)), Jw=np.zeros((count, 3, n)), w=rest, a=rest, alpha=rest)}
     for joint in robot.joints:
         motions[joint.child] = _carried(robot, joint, motions[joint.parent], frames, v)
     M, g, c = np.zeros((count, n, n)), np.zeros((count, n)), np.zeros((count, n))
@@ -175,23 +175,23 @@ def _carried(robot: Robot, joint: RobotJoint, parent: _Motion, frames: Frames, v
     r = p - p_parent
     Jv, Jw = parent.Jv - skew(r) @ parent.Jw, parent.Jw.copy()
     if joint.kind == JointKind.FIXED:
-        return _Motion(Jv, Jw, parent.w, parent.a + _swung(parent.w, parent.alpha, r), parent.alpha)
+        return _Motion(Jv=Jv, Jw=Jw, w=parent.w, a=parent.a + _swung(parent.w, parent.alpha, r), alpha=parent.alpha)
     columns = robot.columns[joint.name]
     rate = v[:, columns]
     if joint.kind == JointKind.FREE:
         Jv[:, :, columns], Jw[:, :, columns] = np.eye(3, 6), np.eye(3, 6, 3)
-        return _Motion(Jv, Jw, rate[:, 3:], np.zeros_like(p), np.zeros_like(p))
+        return _Motion(Jv=Jv, Jw=Jw, w=rate[:, 3:], a=np.zeros_like(p), alpha=np.zeros_like(p))
     u = R @ (np.eye(3) if joint.kind == JointKind.SPHERICAL else joint.axis[:, None])  # (states, 3, velocities)
     relative = np.einsum("sij,sj->si", u, rate)
     if joint.kind == JointKind.PRISMATIC:
         Jv[:, :, columns] = u
         a = parent.a + _swung(parent.w, parent.alpha, r) + 2 * cross(parent.w, relative)
-        return _Motion(Jv, Jw, parent.w, a, parent.alpha)
+        return _Motion(Jv=Jv, Jw=Jw, w=parent.w, a=a, alpha=parent.alpha)
     anchor = p_parent + _rotate(R_parent, np.broadcast_to(joint.position, p.shape))
     Jw[:, :, columns], Jv[:, :, columns] = u, -skew(p - anchor) @ u
     w, alpha = parent.w + relative, parent.alpha + cross(parent.w, relative)
     a = parent.a + _swung(parent.w, parent.alpha, anchor - p_parent) + _swung(w, alpha, p - anchor)
-    return _Motion(Jv, Jw, w, a, alpha)
+    return _Motion(Jv=Jv, Jw=Jw, w=w, a=a, alpha=alpha)
 
 
 def _swung(w: Array, alpha: Array, r: Array) -> Array:

@@ -189,7 +189,8 @@ def _joint(name: str, element: Element, links: dict[str, Element]) -> RobotJoint
     limit = element.find("limit")
     bounded = limit is not None and element.get("type") in {"revolute", "prismatic"}
     return RobotJoint(
-        name, kind, ends["parent"], ends["child"], position, rotation, axis / length,
+        name=name, kind=kind, parent=ends["parent"], child=ends["child"], position=position, rotation=rotation,
+        axis=axis / length,
         damping=0.0 if dynamics is None or kind == JointKind.FIXED else numbers(dynamics, "damping", "0", 1)[0],
         friction=0.0 if dynamics is None or kind == JointKind.FIXED else numbers(dynamics, "friction", "0", 1)[0],
         lower=numbers(limit, "lower", "0", 1)[0] if bounded and limit is not None else None,
@@ -224,7 +225,17 @@ def _ordered(joints: list[RobotJoint], links: dict[str, Element], base: str) -> 
     for joint in joints:
         below.setdefault(joint.parent, []).append(joint)
     kind = JointKind.FREE if base == "free" else JointKind.FIXED
-    parents_first = [RobotJoint(BASE_JOINT, kind, NO_BODY, roots[0], np.zeros(3), np.eye(3), np.array([0.0, 0.0, 1.0]))]
+    parents_first = [
+        RobotJoint(
+            name=BASE_JOINT,
+            kind=kind,
+            parent=NO_BODY,
+            child=roots[0],
+            position=np.zeros(3),
+            rotation=np.eye(3),
+            axis=np.array([0.0, 0.0, 1.0]),
+        )
+    ]
     waiting = list(reversed(below.get(roots[0], [])))
     while waiting:
         parents_first.append(waiting.pop())

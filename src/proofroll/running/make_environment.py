@@ -168,7 +168,15 @@ def _made(
         reason = str(error).replace(f"{name}@{python}: ", "")
         raise ProofrollError(f"{name} does not work with {', '.join(requirements)}: {reason}") from None
     interpreter, packages = json.loads(_call([python, "-c", _PACKAGES]))
-    return Environment(name, label, folder, version, list(requirements), interpreter, packages)
+    return Environment(
+        name=name,
+        label=label,
+        folder=folder,
+        version=version,
+        requirements=list(requirements),
+        interpreter=interpreter,
+        packages=packages,
+    )
 
 
 def _install_by_pip(venv: Path, base: Path, packages: Sequence[str], tell: Callable[[str], None]) -> None:

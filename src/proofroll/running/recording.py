@@ -128,7 +128,16 @@ def record(
     for owner, own_events in events:
         columns = add_events(scene, owner, columns, own_events)
     remarks = tuple(engine.remarks()) if isinstance(engine, TellsRemarks) else ()
-    return Recording(columns, failure, wall, (wall, inside), sampling, remarks, ended, passed)
+    return Recording(
+        columns=columns,
+        failure=failure,
+        wall_seconds=wall,
+        advancing=(wall, inside),
+        sampling=sampling,
+        remarks=remarks,
+        ended=ended,
+        passed=passed,
+    )
 
 
 def _conclusions(

@@ -43,7 +43,16 @@ def case_of(
         **others: further fields of :class:`proofroll.running.case.Case`.
     """
     parameters = {parameter: scene.parameters[parameter] for parameter in names}
-    return Case(name, parameters, scene.digest, engine, until, every, asks=scene.asks, **others)
+    return Case(
+        scene=name,
+        parameters=parameters,
+        scene_digest=scene.digest,
+        engine=engine,
+        until=until,
+        every=every,
+        asks=scene.asks,
+        **others,
+    )
 
 
 def scene_of_run(scene: str, parameters: Mapping[str, object], asks: Sequence[str] = ()) -> Scene:

@@ -149,9 +149,19 @@ def run_outcome(result: Result, dataset: xr.Dataset | None, yardstick: Yardstick
         # The run ended early without an error, where its model left the scene.
         return _failed(_by_event(dataset, yardstick.scene) or GAVE_UP, result, error, float(dataset["time"][-1]))
     if errors is None or error is None or error <= ACCURATE:
-        return RunOutcome(True, True, None, False, error, None, result.message)
+        return RunOutcome(
+            stable=True, accurate=True, failure=None, silent=False, error=error, time=None, message=result.message
+        )
     index = int(np.argmax(errors > ACCURATE))
-    return RunOutcome(True, False, _wrong(dataset, yardstick, errors, index), True, error, None, result.message)
+    return RunOutcome(
+        stable=True,
+        accurate=False,
+        failure=_wrong(dataset, yardstick, errors, index),
+        silent=True,
+        error=error,
+        time=None,
+        message=result.message,
+    )
 
 
 def _by_event(dataset: xr.Dataset, scene: Scene) -> str | None:
@@ -166,7 +176,9 @@ def _by_event(dataset: xr.Dataset, scene: Scene) -> str | None:
 def _failed(
     failure: str | None, result: Result, error: float | None, time: float | None, *, silent: bool = False
 ) -> RunOutcome:
-    return RunOutcome(False, False, failure, silent, error, time, result.message)
+    return RunOutcome(
+        stable=False, accurate=False, failure=failure, silent=silent, error=error, time=time, message=result.message
+    )
 
 
 def _errors(dataset: xr.Dataset, yardstick: Yardstick) -> FloatArray | None:

@@ -289,7 +289,7 @@ def integrate_to_guard(
         Diverged: the integration fails, or would take too many steps.
     """
     if not until > time:
-        return Stretch(time, time, mode, state, state, None)
+        return Stretch(start=time, end=time, mode=mode, first=state, last=state, guard=None)
     solver = solver_from(lambda _, y: law.rates(y), time, state, float(np.min(tolerance)), tolerance)
     back, count, visited, grazes = corrected_by(law.corrected), StepCount(time, until), [], list[float]()
     if first_step is not None:
@@ -299,9 +299,27 @@ def integrate_to_guard(
         controlled_step(solver, None, until)
         count.took(solver.t)
         if rise := locate_rise(solver, law.guards, law.noise, solver.t_old == time, law.near, grazes):
-            return Stretch(time, rise.time, mode, state, law.corrected(rise.state), rise.guard, visited, grazes)
+            return Stretch(
+                start=time,
+                end=rise.time,
+                mode=mode,
+                first=state,
+                last=law.corrected(rise.state),
+                guard=rise.guard,
+                visited=visited,
+                grazes=grazes,
+            )
         go_on_from(solver, back(solver.t, solver.y))
-    return Stretch(time, until, mode, state, np.asarray(solver.y), None, visited, grazes)
+    return Stretch(
+        start=time,
+        end=until,
+        mode=mode,
+        first=state,
+        last=np.asarray(solver.y),
+        guard=None,
+        visited=visited,
+        grazes=grazes,
+    )
 
 
 def states_at(

@@ -188,12 +188,12 @@ def slip_table(content: ReportedComparison, point: str, truth: TrueSlips) -> Sli
         slip, true = first_slip(events), first_slip(truth.events)
         shown = range(columns) if run is None or run.status == "done" else ()
         return SlipLine(
-            run,
-            slip,
-            signed(slip.time - true.time) if run and slip and true else "–",
-            [_cell(events, truth.events, index, is_own=run is None) for index in shown],
-            len(events),
-            [event.kind for event in events] == [event.kind for event in truth.events],
+            run=run,
+            first=slip,
+            difference=signed(slip.time - true.time) if run and slip and true else "–",
+            cells=[_cell(events, truth.events, index, is_own=run is None) for index in shown],
+            count=len(events),
+            in_order=[event.kind for event in events] == [event.kind for event in truth.events],
         )
 
     wrong = "ill-posed" if truth.onset.verdict == "ill-posed" else "differs"

@@ -75,7 +75,16 @@ def built_otherwise(names: Collection[str], covers: tuple[str, ...]) -> Hypothes
             "give the engine the scene's number, once, in its unit and about the point and axes that the engine takes"
         )
         name = f"at time 0 {worst['quantity']}, relative"
-        yield Cause("built", says, name, "1", worst["difference"], 0.0, remedy, covers=covers)
+        yield Cause(
+            id="built",
+            says=says,
+            quantity=name,
+            unit="1",
+            before=worst["difference"],
+            after=0.0,
+            remedy=remedy,
+            covers=covers,
+        )
 
     return test
 
@@ -104,4 +113,12 @@ def single_precision(lines: Sequence[Mapping[str, Any]]) -> Iterator[Cause]:
         difference = max(line["difference"] for line in exact)
         name, says = str(exact[0]["quantity"]), "what the engine holds are single-precision numbers (float32)"
         remedy = 'compute in double precision, or say precision = "single" in the settings'
-        yield Cause("float32", says, f"at time 0 {name}, relative", "1", difference, 0.0, remedy)
+        yield Cause(
+            id="float32",
+            says=says,
+            quantity=f"at time 0 {name}, relative",
+            unit="1",
+            before=difference,
+            after=0.0,
+            remedy=remedy,
+        )

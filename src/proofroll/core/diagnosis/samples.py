@@ -56,7 +56,15 @@ def single_precision_run(evidence: Evidence) -> Iterator[Cause]:
     if all(in_single_precision(reported) for reported in required):
         true, says = truth[REQUIRED[0]].to_numpy(), "every number of the run is a single-precision one (float32)"
         difference = known_difference(required[0], true) if required[0].shape == true.shape else np.inf
-        yield Cause("float32", says, REQUIRED[0], "m", difference, 0.0, "compute and report in double precision")
+        yield Cause(
+            id="float32",
+            says=says,
+            quantity=REQUIRED[0],
+            unit="m",
+            before=difference,
+            after=0.0,
+            remedy="compute and report in double precision",
+        )
 
 
 def another_clock(state: Callable[[Any, xr.Dataset], FloatArray], covers: tuple[str, ...]) -> Hypothesis:
@@ -87,14 +95,38 @@ def another_clock(state: Callable[[Any, xr.Dataset], FloatArray], covers: tuple[
             says = f"every sample is {delay_text(delay, evidence.step)}: the motion is right at another time"
             remedy = "advance(t) has to end at t, neither a step before nor after it"
             change = in_steps(delay, evidence.step)
-            yield Cause("late", says, "state", "m", difference, remainder, remedy, 1, covers, _CLOCK, change=change)
+            yield Cause(
+                id="late",
+                says=says,
+                quantity="state",
+                unit="m",
+                before=difference,
+                after=remainder,
+                remedy=remedy,
+                fitted=1,
+                covers=covers,
+                closes=_CLOCK,
+                change=change,
+            )
         paced = best_clock_factor(time, reported, true)
         if paced is not None:
             rate, difference, remainder = paced
             says = f"the engine's time runs {rate:.6g} times as fast as it says: the motion is right at other times"
             remedy = "the step that the engine takes is not the one that is counted"
             change = change_by(rate)
-            yield Cause("clock", says, "state", "m", difference, remainder, remedy, 1, covers, _CLOCK, change=change)
+            yield Cause(
+                id="clock",
+                says=says,
+                quantity="state",
+                unit="m",
+                before=difference,
+                after=remainder,
+                remedy=remedy,
+                fitted=1,
+                covers=covers,
+                closes=_CLOCK,
+                change=change,
+            )
 
     return test
 
@@ -147,7 +179,9 @@ def reported_vectors(
         time, frame_data = truth["time"].to_numpy(), frames(evidence)
         for name, (what, unit) in units.items():
             reported, true, size = run[name].to_numpy(), truth[name].to_numpy(), least(evidence.element, name)
-            vector = ReportedVector(name, what, unit, reported, true, time, frame_data, size).after_start()
+            vector = ReportedVector(
+                name=name, what=what, unit=unit, reported=reported, true=true, time=time, frames=frame_data, least=size
+            ).after_start()
             moves, turns = moves_otherwise(evidence, name), moves_otherwise(evidence, name, "q_WB", "w_WB")
             for cause in (*vector.causes(evidence.step), *besides(vector, evidence)):
                 if not (turns if name != "w_WB" and cause.id.startswith(_OF_BOTH) else moves):
@@ -207,7 +241,9 @@ def reported_quaternions(true_ones: Callable[[Evidence], FloatArray]) -> Hypothe
             ),
         ):
             remedy = "give a unit quaternion of the body, scalar first"
-            yield Cause("quaternion", says, "q_WB", "1", difference, remainder, remedy)
+            yield Cause(
+                id="quaternion", says=says, quantity="q_WB", unit="1", before=difference, after=remainder, remedy=remedy
+            )
 
     return test
 
@@ -240,8 +276,14 @@ def at_start(frames_of: Callable[[Any], Mapping[str, FloatArray]], follows: froz
                 if reported.shape != true.shape:
                     continue
                 frames = {key: frame[None] for key, frame in frames_of(evidence.element).items()}
-                yield from ReportedVector(name, what, unit, reported[None], true[None], np.zeros(1), frames).causes(
-                    evidence.step
-                )
+                yield from ReportedVector(
+                    name=name,
+                    what=what,
+                    unit=unit,
+                    reported=reported[None],
+                    true=true[None],
+                    time=np.zeros(1),
+                    frames=frames,
+                ).causes(evidence.step)
 
     return test

@@ -102,7 +102,16 @@ def diagnose_scene(
         commanded = element.along(ran) if isinstance(element, HoldsTargets) else element
         if commanded is None:  # without its targets every cause would be a guess
             continue
-        evidence = Evidence(commanded, own_lines, ran, true, step, settled, by_step, element)
+        evidence = Evidence(
+            element=commanded,
+            lines=own_lines,
+            run=ran,
+            truth=true,
+            step=step,
+            settled=settled,
+            by_step=by_step,
+            asked=element,
+        )
         diagnoses += [
             Diagnosis(element.name, cause, seen) for cause in diagnose(evidence, hypotheses_of(element))[:_MOST]
         ]

@@ -212,7 +212,17 @@ class ReportedVector:
         says = f"{self.name} is {delay_text(delay, step)}"
         remedy = f"sample {self.name} at the time that was asked for"
         change = 0.0 if half_step else in_steps(delay, step)
-        yield Cause(f"late.{self.name}", says, self.name, self.unit, difference, remainder, remedy, 1, change=change)
+        yield Cause(
+            id=f"late.{self.name}",
+            says=says,
+            quantity=self.name,
+            unit=self.unit,
+            before=difference,
+            after=remainder,
+            remedy=remedy,
+            fitted=1,
+            change=change,
+        )
 
 
 def components_along(frame: FloatArray, vectors: FloatArray) -> FloatArray:

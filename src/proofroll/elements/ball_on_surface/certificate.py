@@ -69,14 +69,33 @@ def certify(body: RollingBall, built: BallBuilt, sample: BallSample) -> list[Lin
     def compare(quantity: str, unit: str, expected: Any, found: Any, scale: float, required: bool = False) -> None:
         want = np.atleast_1d(np.asarray(expected, float))
         if found is None and not required:
-            lines.append(Line(quantity, unit, tuple(want.tolist()), (), None, EXACT))
+            lines.append(
+                Line(
+                    quantity=quantity,
+                    unit=unit,
+                    expected=tuple(want.tolist()),
+                    found=(),
+                    difference=None,
+                    tolerance=EXACT,
+                )
+            )
             return
         got = np.atleast_1d(np.asarray(np.nan if found is None else found, float))
         difference = float(np.max(np.abs(got - want))) / scale if got.shape == want.shape else np.inf
         difference = difference if np.isfinite(difference) else float("inf")
         cap = _LIFTED if quantity in _DYNAMICS and np.any(body.slip0) else CAPS.get(quantity)
-        allowed = tolerated(built.regularised.get(quantity), cap, EXACT, "")
-        lines.append(Line(quantity, unit, tuple(want.tolist()), tuple(got.tolist()), difference, *allowed))
+        tolerance, because = tolerated(built.regularised.get(quantity), cap, EXACT, "")
+        lines.append(
+            Line(
+                quantity=quantity,
+                unit=unit,
+                expected=tuple(want.tolist()),
+                found=tuple(got.tolist()),
+                difference=difference,
+                tolerance=tolerance,
+                because=because,
+            )
+        )
 
     compare("mass", "kg", body.ball.mass, built.mass, body.ball.mass)
     compare("inertia", "kg m^2", np.full(3, body.ball.inertia), built.inertia, body.ball.inertia)

@@ -72,7 +72,9 @@ class BallOnSurfaceKind:
             coordinates = tables["initial"][at].get("coordinates", [])
             numbers.filled(coordinates, f"{where}: initial.{at}.coordinates", {}, surface.units)
             try:
-                elements.append(BallOnSurface(ball, surface, contact, start, gravity))
+                elements.append(
+                    BallOnSurface(ball=ball, surface=surface, contact=contact, start=start, gravity=gravity)
+                )
             except InputError as error:
                 raise error.within(f"{where}: initial", ball.name) from None
         for name in balls.keys() - {contact.body for contact in contents.contacts}:

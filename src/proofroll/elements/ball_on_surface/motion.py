@@ -57,4 +57,6 @@ def world_motion(
     v_WB = along(velocity)
     # slip = v + a ω × e1, so the tangential part of ω is e1 × (slip - v) / a
     w_WB = spin[:, None] * e1 + cross(e1, along(slip) - v_WB) / body.ball.radius
-    return BallMotion(body.surface.position(u), v_WB, w_WB, along(friction) - press[:, None] * e1, route)
+    return BallMotion(
+        p_WB=body.surface.position(u), v_WB=v_WB, w_WB=w_WB, force=along(friction) - press[:, None] * e1, route=route
+    )

@@ -88,12 +88,12 @@ def first_motion(body: RollingBall) -> FirstMotion | None:
     at_contact = acceleration + np.cross(turning, body.ball.radius * body.surface.normal(body.p0))
     lasts = min(_stops(body.v0, acceleration), _stops(body.slip0, at_contact))
     return FirstMotion(
-        acceleration[None, :],
-        turning[None, :],
-        natural_acceleration(body),
-        _PART * min(body.ball.radius / (speed or 1.0), lasts),
-        float(np.linalg.norm(body.gravity)) or None,
-        lasts,
+        acceleration=acceleration[None, :],
+        angular_acceleration=turning[None, :],
+        scale=natural_acceleration(body),
+        moment=_PART * min(body.ball.radius / (speed or 1.0), lasts),
+        pull=float(np.linalg.norm(body.gravity)) or None,
+        lasts=lasts,
     )
 
 

@@ -106,7 +106,7 @@ def _plane(body: RollingBall, t: FloatArray) -> BallMotion:
         rates, route = acceleration + np.cross(turning, v), "closed form (circles of a turntable)"
     carried = wall_velocity(body, p, np.broadcast_to(e1, p.shape))
     w = (body.w0 @ e1) * e1 - np.cross(e1, v - carried) / body.ball.radius
-    return BallMotion(p, v, w, body.ball.mass * (rates - body.gravity), route)
+    return BallMotion(p_WB=p, v_WB=v, w_WB=w, force=body.ball.mass * (rates - body.gravity), route=route)
 
 
 def _vertical_cylinder(body: RollingBall, surface: Cylinder, t: FloatArray) -> BallMotion:
@@ -138,4 +138,4 @@ def _vertical_cylinder(body: RollingBall, surface: Cylinder, t: FloatArray) -> B
     local_w = np.stack([spin1, z_rate / a, np.full_like(t, -c * omega / a)], axis=-1)
     local_f = np.stack([np.full_like(t, -m * c * omega**2), np.zeros_like(t), m * (z_second - gravity)], axis=-1)
     v, w, force = (np.einsum("tij,tj->ti", frame, x) for x in (local_v, local_w, local_f))
-    return BallMotion(surface.position(u), v, w, force, "closed form (Blajer 2006)")
+    return BallMotion(p_WB=surface.position(u), v_WB=v, w_WB=w, force=force, route="closed form (Blajer 2006)")

@@ -76,7 +76,16 @@ def certify(element: MechanismElement, built: MechanismBuilt, sample: MechanismS
         if want.size and np.all(np.isnan(want)):
             return  # nothing is known: a line would pass without any comparison
         if given is None or np.all(np.isnan(given)):
-            lines.append(Line(quantity, unit, tuple(np.ravel(want).tolist()), (), None, COMPOSED))
+            lines.append(
+                Line(
+                    quantity=quantity,
+                    unit=unit,
+                    expected=tuple(np.ravel(want).tolist()),
+                    found=(),
+                    difference=None,
+                    tolerance=COMPOSED,
+                )
+            )
             return
         got = np.asarray(given, dtype=np.float64)
         if len(mechanism.bodies) == 1 and got.size == want.size:
@@ -91,8 +100,19 @@ def certify(element: MechanismElement, built: MechanismBuilt, sample: MechanismS
         noise = _MARGIN * element.noise / own if quantity in _FROM_ACCELERATIONS else 0.0
         tolerance, because = max((tolerance, because), (noise, _NOISY))
         roundings = max(ROUNDINGS, noise / EPSILON["double"])
-        shown = tuple(np.ravel(want).tolist()), tuple(np.ravel(got).tolist())
-        lines.append(Line(quantity, unit, *shown, difference, tolerance, because, roundings))
+        expected, numbers = tuple(np.ravel(want).tolist()), tuple(np.ravel(got).tolist())
+        lines.append(
+            Line(
+                quantity=quantity,
+                unit=unit,
+                expected=expected,
+                found=numbers,
+                difference=difference,
+                tolerance=tolerance,
+                because=because,
+                roundings=roundings,
+            )
+        )
 
     size, bodies, gravity = element.length, mechanism.bodies, np.array(mechanism.gravity)
     masses, inertias = (np.array([getattr(body, name) for body in bodies]) for name in ("mass", "inertia"))

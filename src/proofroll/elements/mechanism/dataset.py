@@ -58,7 +58,12 @@ def placed_from(element: MechanismElement, times: FloatArray, samples: Sequence[
         return np.array([np.asarray(getattr(sample, name)).reshape(count, width) for sample in samples])
 
     return Placed(
-        element.mechanism, times, stacked("p_WB", 3), stacked("v_WB", 3), stacked("w_WB", 3), stacked("q_WB", 4)
+        mechanism=element.mechanism,
+        time=times,
+        p_WB=stacked("p_WB", 3),
+        v_WB=stacked("v_WB", 3),
+        w_WB=stacked("w_WB", 3),
+        q_WB=stacked("q_WB", 4),
     )
 
 

@@ -241,8 +241,7 @@ class MechanismElement:
         ]
         for joint in self.mechanism.joints:
             if joint.nq == 1:
-                unit = "rad" if joint.kind == JointKind.REVOLUTE else "m"
-                floor = _LEAST if joint.kind == JointKind.REVOLUTE else a
+                unit, floor = ("rad", _LEAST) if joint.kind == JointKind.REVOLUTE else ("m", a)
                 table.append(
                     Observable(f"q.{joint.name}", unit, f"coordinate of {joint.name}", Role.MOTION, floor=floor)
                 )
@@ -266,8 +265,8 @@ class MechanismElement:
         table += link_observables(self.mechanism, least)
         if self.conservative:
             never: dict[str, Any] = {"hangs_on_events": False, "difference_of": "energy", "floor": least["J"]}
-            meaning = "energy now minus energy at the start"
-            table.append(Observable("energy_error", "J", meaning, Role.RESIDUAL, "ΔE", column=True, **never))
+            never |= {"symbol": "ΔE", "column": True, "role": Role.RESIDUAL}
+            table.append(Observable("energy_error", "J", "energy now minus energy at the start", **never))
         never = {"hangs_on_events": False, "difference_of": "p_WB", "floor": a, "asked_for": False}
         table.append(Observable("drift", "m", "how far joints and loops are open", Role.RESIDUAL, **never))
         return tuple(table)

@@ -124,7 +124,15 @@ class JointCoordinates:
             raise Diverged("the mass matrix is singular, as where joints of massless bodies line up") from None
         free = into.T @ b
         if not rank:
-            return Solution(into @ free, np.zeros(0), motion, rows, None, C, np.zeros(0))
+            return Solution(
+                acceleration=into @ free,
+                multipliers=np.zeros(0),
+                motion=motion,
+                rows=rows,
+                split=None,
+                C=C,
+                holding=np.zeros(0),
+            )
         U, S, Vt = np.linalg.svd(C @ into, full_matrices=False)
         if held and (rank > len(S) or S[rank - 1] < RANK * S[0]):
             raise Refused(REDUNDANT)
@@ -134,13 +142,13 @@ class JointCoordinates:
         multipliers = back.T @ normal
         loops = len(rows.residual)
         return Solution(
-            into @ free + locked_into @ normal,
-            multipliers[:loops],
-            motion,
-            rows,
-            (locked_into, back),
-            C,
-            multipliers[loops:],
+            acceleration=into @ free + locked_into @ normal,
+            multipliers=multipliers[:loops],
+            motion=motion,
+            rows=rows,
+            split=(locked_into, back),
+            C=C,
+            holding=multipliers[loops:],
         )
 
     def _weighted(self, M: Array, b: Array, C: Array, bias: Array) -> tuple[Array, Array]:

@@ -57,7 +57,17 @@ def _with_drive(scene: Scene, drive: str) -> Scene:
         "servo": {"actuators": (servo,)},
         "limit": {"actuators": (replace(servo, limit=5.0),)},
         "target": {"actuators": (of_time,)},
-        "coupling": {"couplings": (Coupling("gear", joint_1.name, joint_2.name, 1.0, joint_2.q0[0] - joint_1.q0[0]),)},
+        "coupling": {
+            "couplings": (
+                Coupling(
+                    name="gear",
+                    joint_a=joint_1.name,
+                    joint_b=joint_2.name,
+                    ratio=1.0,
+                    offset=joint_2.q0[0] - joint_1.q0[0],
+                ),
+            )
+        },
     }
     return _changed(scene, f"{scene.name}-{drive}", joints=joints, **drives[drive])
 

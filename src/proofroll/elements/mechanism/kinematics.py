@@ -149,7 +149,9 @@ class Tree:
         arm_rates = vel.T[:, :, None] - v_joint[:, None, self._joint]
         turned_rate = _cross(turning_rate, arms) + _cross(turning, arm_rates)
         J_rate = self._twists(rates - turning_rate, turning_rate, turned_rate)
-        return BodyMotion(p, R, vel, w, J, J_rate @ v, p_joint, frames[0], q)
+        return BodyMotion(
+            p_WB=p, R_WB=R, v_WB=vel, w_WB=w, J=J, bias=J_rate @ v, p_joint=p_joint, R_parent=frames[0], q=q
+        )
 
     def _twists(self, sliding: Array, turning: Array, turned: Array) -> Array:
         """Jacobian of each body, (bodies + 1, 6, nv), from columns that slide and turn it and ω × arm."""
@@ -177,10 +179,26 @@ class Tree:
         parts += [self._moved(joint, at_v, time) for joint, _, at_v in self.mechanism.prescribed]
         if not parts:
             none, nv = np.zeros(0), self.mechanism.nv
-            return Rows(none, np.zeros((0, nv)), none, np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0, dtype=int), 0)
+            return Rows(
+                residual=none,
+                C=np.zeros((0, nv)),
+                bias=none,
+                force=np.zeros((0, 3)),
+                torque=np.zeros((0, 3)),
+                loop=np.zeros(0, dtype=int),
+                moved=0,
+            )
         loop = np.repeat(np.arange(len(parts)), [len(part[0]) for part in parts])
         residual, C, bias, force, torque = (np.concatenate(columns) for columns in zip(*parts, strict=True))
-        return Rows(residual, C, bias, force, torque, loop, len(self.mechanism.prescribed))
+        return Rows(
+            residual=residual,
+            C=C,
+            bias=bias,
+            force=force,
+            torque=torque,
+            loop=loop,
+            moved=len(self.mechanism.prescribed),
+        )
 
     def _coupled(self, motion: BodyMotion, coupling: Coupling) -> tuple[Array, Array, Array, Array, Array]:
         C, apart = np.zeros((1, self.mechanism.nv)), -coupling.place

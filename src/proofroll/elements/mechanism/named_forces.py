@@ -37,16 +37,22 @@ def named_forces(mechanism: Mechanism) -> tuple[NamedForce, ...]:
     """Named forces of a mechanism; arrays over them have this order."""
     unit = {joint.name: "N" if joint.kind == JointKind.PRISMATIC else "N m" for joint in mechanism.joints}
     forces = [
-        NamedForce(f"effort.{item.name}", "effort", k, unit[item.joint], f"effort of {item.name} at {item.joint}")
+        NamedForce(
+            name=f"effort.{item.name}",
+            field="effort",
+            number=k,
+            unit=unit[item.joint],
+            meaning=f"effort of {item.name} at {item.joint}",
+        )
         for k, item in enumerate(mechanism.actuators)
     ]
     forces += [
         NamedForce(
-            f"coupling.{item.name}",
-            "coupling",
-            k,
-            unit[item.terms[0][0]],
-            f"force of {item.name} on {item.terms[0][0]}",
+            name=f"coupling.{item.name}",
+            field="coupling",
+            number=k,
+            unit=unit[item.terms[0][0]],
+            meaning=f"force of {item.name} on {item.terms[0][0]}",
         )
         for k, item in enumerate(mechanism.couplings)
     ]
@@ -60,7 +66,13 @@ def named_forces(mechanism: Mechanism) -> tuple[NamedForce, ...]:
     )
     for key, what, names in kinds:
         forces += [
-            NamedForce(f"{key}.{name}", key, mechanism.joint_index[name], unit[name], f"{what} along {name}")
+            NamedForce(
+                name=f"{key}.{name}",
+                field=key,
+                number=mechanism.joint_index[name],
+                unit=unit[name],
+                meaning=f"{what} along {name}",
+            )
             for name in names
         ]
     return tuple(forces)

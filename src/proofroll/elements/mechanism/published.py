@@ -81,7 +81,7 @@ def _read(field: str, table: Any) -> Published:
     }
     if not values:
         raise InputError(field, "no numbers", 'give those of an observable, as "q.slide" = 0.25')
-    return Published(source, times, values, within, dict(parameters))
+    return Published(source=source, times=times, values=values, within=within, parameters=dict(parameters))
 
 
 def _numbers(field: str, value: Any, single: bool, count: int | None) -> tuple[float, ...]:

@@ -40,7 +40,15 @@ class Record:
     def placed(self, mechanism: Mechanism) -> Placed:
         """The recorded motion of the mechanism."""
         known_q = self.q if self.q.shape[1] else None  # a route that integrates poses has no coordinates at first
-        return Placed(mechanism, self.time, self.p_WB, self.v_WB, self.w_WB, self.q_WB, known_q)
+        return Placed(
+            mechanism=mechanism,
+            time=self.time,
+            p_WB=self.p_WB,
+            v_WB=self.v_WB,
+            w_WB=self.w_WB,
+            q_WB=self.q_WB,
+            known_q=known_q,
+        )
 
 
 def record_of(time: Array, samples: list[dict[str, Any]]) -> Record:

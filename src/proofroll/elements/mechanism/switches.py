@@ -121,7 +121,18 @@ def switched_joints(mechanism: Mechanism) -> tuple[SwitchedJoint, ...]:
             raise Refused(f"joint {joint.name} has dry friction along several coordinates, which no route follows")
         q, v = mechanism.q_slices[number].start, mechanism.v_slices[number].start
         low, high = joint.limits or (-math.inf, math.inf)
-        switched.append(SwitchedJoint(joint.name, number, q, v, joint.friction, low, high, joint.restitution))
+        switched.append(
+            SwitchedJoint(
+                name=joint.name,
+                number=number,
+                coordinate=q,
+                velocity=v,
+                friction=joint.friction,
+                low=low,
+                high=high,
+                restitution=joint.restitution,
+            )
+        )
     return tuple(switched)
 
 

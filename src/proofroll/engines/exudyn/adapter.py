@@ -109,18 +109,18 @@ class Exudyn:
     }
     terms: ClassVar[Sequence[Term]] = (
         Term(
-            "new Jacobian at every step",
-            ("carrier", "rolling_disc", "contact", "redundant", "spheres", "discs"),
-            {"jacobian": "step"},
-            {"jacobian": "reused"},
-            "lets Newton's method end after two or three iterations where an old Jacobian needs seven",
+            name="new Jacobian at every step",
+            formulations=("carrier", "rolling_disc", "contact", "redundant", "spheres", "discs"),
+            on={"jacobian": "step"},
+            off={"jacobian": "reused"},
+            because="lets Newton's method end after two or three iterations where an old Jacobian needs seven",
         ),
         Term(
-            "halving of steps",
-            ("contact", "spheres"),
-            {"halvings": 10},
-            {"halvings": 0},
-            "goes on where Newton's method fails at the edge of the friction zone",
+            name="halving of steps",
+            formulations=("contact", "spheres"),
+            on={"halvings": 10},
+            off={"halvings": 0},
+            because="goes on where Newton's method fails at the edge of the friction zone",
         ),
     )
     inherent: ClassVar[Mapping[str, Mapping[str, str]]] = {

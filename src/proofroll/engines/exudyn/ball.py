@@ -98,7 +98,7 @@ def add_ball(system: Any, rolling: RollingBall, spin: FloatArray | None = None) 
     resistance = None
     if rolling.contact.rolling_resistance:
         resistance = system.AddLoad(items.LoadTorqueVector(**resisting(rolling, marker, node)))
-    return RigidBall(system, node, body, weight, marker, resistance)
+    return RigidBall(system=system, node=node, body=body, weight=weight, marker=marker, resistance=resistance)
 
 
 def resisting(rolling: RollingBall, marker: Any, node: Any) -> dict[str, Any]:

@@ -184,7 +184,13 @@ class Connections:
             item = items.ObjectJointGeneric(constrainedAxes=_HELD[kind], markerNumbers=markers)
         constraint = None if item is None else self._system.AddObject(item)
         spring = None if joint is None else self._spring_of(joint, markers)
-        return Connected(between._replace(frame_a=A, frame_b=B), constraint, spring, markers, rows)
+        return Connected(
+            between=between._replace(frame_a=A, frame_b=B),
+            constraint=constraint,
+            spring=spring,
+            markers=markers,
+            rows=rows,
+        )
 
     def _spring_of(self, joint: Joint, markers: list[Any]) -> Any:
         """Exudyn's object for the joint's own spring, damper and drive, or None."""

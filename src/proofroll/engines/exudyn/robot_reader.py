@@ -66,7 +66,7 @@ class ExudynRobots:
                 except np.linalg.LinAlgError:  # the file's own mass matrix is singular: nothing to compare
                     return np.full_like(v, np.nan)
 
-            return AtState(T, drift, M, g, h, None, forward)
+            return AtState(T=T, drift=drift, M=M, g=g, h=h, inverse=None, forward=forward)
 
         arrays = evaluate(request, joints, dofs, at)
         mass, com, inertia = tree.body_numbers()

@@ -142,9 +142,7 @@ class MujocoMechanism(SteppedModel):
         if not parts:
             return
         q, v = np.array(joint.q0), np.array(joint.v0)
-        if (
-            len(parts) == 1 and joint.kind == JointKind.FREE
-        ):  # qpos: the body's frame in the world; qvel: its origin's velocity
+        if len(parts) == 1 and joint.kind == JointKind.FREE:  # qpos: the body's frame; qvel: its origin's velocity
             origin, S = child_in_parent(joint.kind, q)
             R = joint.parent_frame @ S
             arm = R @ joint.child_position

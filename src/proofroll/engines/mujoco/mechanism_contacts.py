@@ -286,7 +286,9 @@ class Contacts:
         of, by = slice(0, 3 * count), slice(3 * count, None)
         through_loops = np.linalg.pinv(whole[by, by], DEPENDENT, hermitian=True) @ whole[by, of]
         response = (whole[of, of] - whole[of, by] @ through_loops).reshape(count, 3, count, 3)
-        return ContactsRead(gap, normal, place, friction, restitution, response)
+        return ContactsRead(
+            gap=gap, normal=normal, place=place, friction=friction, restitution=restitution, response=response
+        )
 
     def _to_surface(self, number: int) -> float:
         """Signed half: times the gap, the step along the normal from MuJoCo's contact point to the curved shape."""

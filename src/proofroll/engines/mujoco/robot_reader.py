@@ -171,7 +171,7 @@ def _at(
         data.qfrc_applied[:] = 0.0
         return np.array(data.qacc)
 
-    return AtState(T, np.zeros(model.nv), M, g, data.qfrc_bias.copy(), inverse, forward)
+    return AtState(T=T, drift=np.zeros(model.nv), M=M, g=g, h=data.qfrc_bias.copy(), inverse=inverse, forward=forward)
 
 
 def _group(model: Any, body: int) -> RobotBody:
@@ -219,7 +219,15 @@ def robot_of(model: Any) -> Robot:
         begin, count = int(model.body_jntadr[index]), int(model.body_jntnum[index])
         if not count:
             joints.append(
-                RobotJoint(f"({name})", JointKind.FIXED, parent, name, position, rotation, np.array([0.0, 0.0, 1.0]))
+                RobotJoint(
+                    name=f"({name})",
+                    kind=JointKind.FIXED,
+                    parent=parent,
+                    child=name,
+                    position=position,
+                    rotation=rotation,
+                    axis=np.array([0.0, 0.0, 1.0]),
+                )
             )
         for joint in range(begin, begin + count):
             last = joint == begin + count - 1
@@ -230,7 +238,17 @@ def robot_of(model: Any) -> Robot:
             parent, position, rotation = child, np.zeros(3), np.eye(3)
     gravity = np.zeros(3) if _off(model, "GRAVITY") else np.array(model.opt.gravity)
     loops, ties, further = _constraints(model, names)
-    robot = Robot("robot", bodies, tuple(joints), _mimics(model), gravity, _sources(model, names), loops, ties, further)
+    robot = Robot(
+        name="robot",
+        bodies=bodies,
+        joints=tuple(joints),
+        mimics=_mimics(model),
+        gravity=gravity,
+        sources=_sources(model, names),
+        loops=loops,
+        ties=ties,
+        further=further,
+    )
     laws = {"SPRING": "stiffness", "DAMPER": "damping", "FRICTIONLOSS": "friction"}
     return robot.with_joints(**{law: 0.0 for flag, law in laws.items() if _off(model, flag)})
 
@@ -275,10 +293,10 @@ def _joint(
     shift = float(model.qpos0[start]) * (kind in ONE_COORDINATE)
     bounded = bool(model.jnt_limited[index]) and kind in ONE_COORDINATE
     return RobotJoint(
-        model.joint(index).name, kind, parent, child,
-        position + rotation @ anchor if kind != JointKind.FREE else np.zeros(3),
-        rotation if kind != JointKind.FREE else np.eye(3),
-        np.array(model.jnt_axis[index]), anchor,
+        name=model.joint(index).name, kind=kind, parent=parent, child=child,
+        position=position + rotation @ anchor if kind != JointKind.FREE else np.zeros(3),
+        rotation=rotation if kind != JointKind.FREE else np.eye(3),
+        axis=np.array(model.jnt_axis[index]), child_position=anchor,
         damping=_first(model.dof_damping[dof]),
         friction=float(model.dof_frictionloss[dof]),
         armature=float(model.dof_armature[dof]),
@@ -328,7 +346,17 @@ def _constraints(model: Any, names: Sequence[str]) -> tuple[tuple[RobotLoop, ...
             else:
                 place, turn = (data[3:6], data[:3]), matrix(data[6:10])
             closing = JointKind.SPHERICAL if kind == int(kinds.mjEQ_CONNECT) else JointKind.FIXED
-            loops.append(RobotLoop(name, closing, names[a], names[b], *place, turn))
+            loops.append(
+                RobotLoop(
+                    name=name,
+                    kind=closing,
+                    body_a=names[a],
+                    body_b=names[b],
+                    position_a=place[0],
+                    position_b=place[1],
+                    rotation=turn,
+                )
+            )
         elif kind == int(kinds.mjEQ_TENDON) and (terms := _held_sum(model, a, b, data)):
             ties.append(Tie(name, tuple(terms), tuple(terms.values()), float(data[0])))
         elif kind != int(kinds.mjEQ_JOINT) or b < 0 or np.any(data[2:5]):

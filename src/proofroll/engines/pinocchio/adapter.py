@@ -64,25 +64,26 @@ class Pinocchio:
     }
     terms: ClassVar[Sequence[Term]] = (
         Term(
-            "orientation",
-            ("composite", "free_flyer"),
-            {"orientation": True},
-            {"orientation": False},
-            "turns the ball's own axes; its inertia is the same about all of them, so the motion does not ask for it",
+            name="orientation",
+            formulations=("composite", "free_flyer"),
+            on={"orientation": True},
+            off={"orientation": False},
+            because="turns the ball's own axes; its inertia is the same about all of them, so the motion does not "
+            "ask for it",
         ),
         Term(
-            "projection",
-            ("composite", "free_flyer", "null_space", "constraint_dynamics"),
-            {"projection": True},
-            {"projection": False},
-            "puts the state back on the constraints after each step",
+            name="projection",
+            formulations=("composite", "free_flyer", "null_space", "constraint_dynamics"),
+            on={"projection": True},
+            off={"projection": False},
+            because="puts the state back on the constraints after each step",
         ),
         Term(
-            "turning of the plane",
-            ("contact",),
-            {"integrator": "leapfrog"},
-            {"integrator": "semi_implicit_euler"},
-            "gives the solver the rate at which the contact's plane turns during a step",
+            name="turning of the plane",
+            formulations=("contact",),
+            on={"integrator": "leapfrog"},
+            off={"integrator": "semi_implicit_euler"},
+            because="gives the solver the rate at which the contact's plane turns during a step",
         ),
     )
     inherent: ClassVar[Mapping[str, Mapping[str, str]]] = {

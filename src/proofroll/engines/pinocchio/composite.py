@@ -110,7 +110,13 @@ class Composite(BallWithRows):
             return None
         directions = _slip_directions(self._radius, np.eye(3))
         (_, _), (t2u, t2v), (t3u, t3v), *turns = here[:, :2].tolist()
-        return _AlongAxes(directions, directions @ here, here[3:].T.copy(), ((t2u, t2v), (t3u, t3v)), tuple(turns))
+        return _AlongAxes(
+            directions=directions,
+            rows=directions @ here,
+            by_moment=here[3:].T.copy(),
+            tangents=((t2u, t2v), (t3u, t3v)),
+            turns=tuple(turns),
+        )
 
     def _own_jacobian(self, q: FloatArray) -> FloatArray:
         """Jacobian from joint velocities to the ball's (v, ω), in the axes of its joint, shape (6, 5)."""
@@ -183,7 +189,14 @@ class Composite(BallWithRows):
             torque += normal_force * resistance
         acceleration = np.array(pin.aba(self.model, data, q, v, torque))
         slip_rate = tangents @ (rows @ acceleration + drift)
-        return SlidingContact(acceleration, normal_force, tangents @ (rows @ v), slip_rate, tangents @ friction, e1)
+        return SlidingContact(
+            acceleration=acceleration,
+            normal_force=normal_force,
+            slip=tangents @ (rows @ v),
+            slip_rate=slip_rate,
+            friction=tangents @ friction,
+            e1=e1,
+        )
 
     def sliding_reaction(
         self, data: Any, q: FloatArray, v: FloatArray, direction: FloatArray

@@ -178,7 +178,14 @@ class FreeFlyer(BallWithRows):
         acceleration, normal_force = solution[:6], -float(solution[6])
         slip_rate = tangents @ (rows[1:] @ acceleration + drift[1:])
         friction = tangents @ (normal_force * against)
-        return SlidingContact(acceleration, normal_force, tangents @ (rows[1:] @ v), slip_rate, friction, e1)
+        return SlidingContact(
+            acceleration=acceleration,
+            normal_force=normal_force,
+            slip=tangents @ (rows[1:] @ v),
+            slip_rate=slip_rate,
+            friction=friction,
+            e1=e1,
+        )
 
     def slide(self, data: Any, q: FloatArray, v: FloatArray, direction: FloatArray) -> SlidingContact:
         """See :class:`~proofroll.engines.pinocchio.ball_with_rows.BallWithRows`."""

@@ -259,7 +259,9 @@ class ImpulseSteps:
             settings, size = self._settings, sum(3 if k < count else 1 for k in which)
             solve, options, result = solver_of(settings.solver or "admm", float(settings.solver_tolerance or 0.0), size)
             made = [datas[i].extract() for i in range(len(which))]
-            self._solvers[which] = _Solver(points, made, models, datas, solve, options, result)
+            self._solvers[which] = _Solver(
+                points=points, point_datas=made, models=models, datas=datas, solve=solve, options=options, result=result
+            )
         return self._solvers[which]
 
     def _joint(self, body: str) -> int:

@@ -122,13 +122,13 @@ class LoopRows:
             residual[strut] -= self._lengths
             drifts[strut] += ((slide * slide).sum(1) - (n[strut] * slide).sum(1) ** 2) / sizes
         return RowsAtState(
-            residual,
-            np.concatenate([C, _times(t, J[j, 3:])]),
-            drifts,
-            0.0,
-            self._loop,
-            np.concatenate([n, np.zeros_like(t)]),
-            np.concatenate([np.zeros_like(n), t]),
+            residual=residual,
+            C=np.concatenate([C, _times(t, J[j, 3:])]),
+            drift=drifts,
+            rate=0.0,
+            loop=self._loop,
+            force=np.concatenate([n, np.zeros_like(t)]),
+            torque=np.concatenate([np.zeros_like(n), t]),
         )
 
     def _frames(self, data: Any, frames: NDArray[np.intp]) -> tuple[Array, Array, Array, Array, Array]:

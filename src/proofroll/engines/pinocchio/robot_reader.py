@@ -63,7 +63,7 @@ class PinocchioRobots:
                 return np.array(pin.aba(model, data, q, v, torque))
 
             # aba does not support mimic joints
-            return AtState(T, drift, M, g, h, inverse, None if reduced else forward)
+            return AtState(T=T, drift=drift, M=M, g=g, h=h, inverse=inverse, forward=None if reduced else forward)
 
         arrays = evaluate(request, joints, dofs, at)
         mass, com, inertia = {}, {}, {}

@@ -157,7 +157,15 @@ PROXIMAL = 1e-8
 def _presets(formulation: Literal["composite", "free_flyer"]) -> Mapping[str, PinocchioSettings]:
     return {
         # the obvious first model: a classical scheme with pin.integrate, which turns the ball, without drift correction
-        "default": PinocchioSettings(formulation, "default", "rk4", 1e-3, None, orientation=True, projection=False),
+        "default": PinocchioSettings(
+            formulation=formulation,
+            preset="default",
+            integrator="rk4",
+            dt=1e-3,
+            rtol=None,
+            orientation=True,
+            projection=False,
+        ),
         # the same model, integrated to round-off; without the orientation, unless the scene requires it, as the fast
         # turning of the ball's own axes would dictate the step
         "matched": PinocchioSettings(formulation, "matched", rtol=3e-14),
@@ -172,7 +180,14 @@ def _impulses(
     tolerance: float,
 ) -> PinocchioSettings:
     return PinocchioSettings(
-        "impulses", preset, integrator, 1e-3, None, projection=False, solver="admm", solver_tolerance=tolerance
+        formulation="impulses",
+        preset=preset,
+        integrator=integrator,
+        dt=1e-3,
+        rtol=None,
+        projection=False,
+        solver="admm",
+        solver_tolerance=tolerance,
     )
 
 
@@ -182,18 +197,25 @@ PRESETS: Mapping[str, Mapping[str, PinocchioSettings]] = {
     "contact": {
         # the obvious first model: the plane at the ball's position when the step begins, the solver's default tolerance
         "default": PinocchioSettings(
-            "contact",
-            "default",
-            "semi_implicit_euler",
-            1e-3,
-            None,
+            formulation="contact",
+            preset="default",
+            integrator="semi_implicit_euler",
+            dt=1e-3,
+            rtol=None,
             projection=False,
             solver="pgs",
             solver_tolerance=1e-6,
         ),
         # the same contact, with the plane's turning during a step taken into account, solved to round-off
         "matched": PinocchioSettings(
-            "contact", "matched", "leapfrog", 1e-3, None, projection=False, solver="pgs", solver_tolerance=1e-12
+            formulation="contact",
+            preset="matched",
+            integrator="leapfrog",
+            dt=1e-3,
+            rtol=None,
+            projection=False,
+            solver="pgs",
+            solver_tolerance=1e-12,
         ),
     },
     "impulses": {
@@ -206,16 +228,26 @@ PRESETS: Mapping[str, Mapping[str, PinocchioSettings]] = {
         "tuned": _impulses("tuned", "midpoint", 1e-8),
     },
     "null_space": {
-        "default": PinocchioSettings("null_space", "default", "rk4", 1e-3, None, projection=False),
-        "matched": PinocchioSettings("null_space", "matched", "rk4", 1e-3, None),
+        "default": PinocchioSettings(
+            formulation="null_space", preset="default", integrator="rk4", dt=1e-3, rtol=None, projection=False
+        ),
+        "matched": PinocchioSettings(formulation="null_space", preset="matched", integrator="rk4", dt=1e-3, rtol=None),
         # integrated to round-off
         "tuned": PinocchioSettings("null_space", "tuned", rtol=TIGHTEST),
     },
     "constraint_dynamics": {
         "default": PinocchioSettings(
-            "constraint_dynamics", "default", "rk4", 1e-3, None, projection=False, proximal=PROXIMAL
+            formulation="constraint_dynamics",
+            preset="default",
+            integrator="rk4",
+            dt=1e-3,
+            rtol=None,
+            projection=False,
+            proximal=PROXIMAL,
         ),
-        "matched": PinocchioSettings("constraint_dynamics", "matched", "rk4", 1e-3, None, proximal=PROXIMAL),
+        "matched": PinocchioSettings(
+            formulation="constraint_dynamics", preset="matched", integrator="rk4", dt=1e-3, rtol=None, proximal=PROXIMAL
+        ),
         "tuned": PinocchioSettings("constraint_dynamics", "tuned", rtol=1e-13, proximal=PROXIMAL),
     },
 }

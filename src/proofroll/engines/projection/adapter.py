@@ -54,12 +54,12 @@ class Projection:
     }
     terms: ClassVar[Sequence[Term]] = (
         Term(
-            "elimination of violations",
-            tuple(PRESETS),
-            {"elimination": True},
-            {"elimination": False},
-            "takes away the slip that a step leaves (Blajer 2002); where rolling is linear with constant coefficients, "
-            "as in the rotating frame, there is none",
+            name="elimination of violations",
+            formulations=tuple(PRESETS),
+            on={"elimination": True},
+            off={"elimination": False},
+            because="takes away the slip that a step leaves (Blajer 2002); where rolling is linear with constant "
+            "coefficients, as in the rotating frame, there is none",
         ),
     )
     inherent: ClassVar[Mapping[str, Mapping[str, str]]] = {

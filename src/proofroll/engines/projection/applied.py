@@ -24,10 +24,10 @@ class _Law(NamedTuple):
 
     connection: int
     axis: str
-    stiffness: float
-    rest: float
-    damping: float
-    drive: float
+    stiffness: float = 0.0
+    rest: float = 0.0
+    damping: float = 0.0
+    drive: float = 0.0
     push: Callable[[float, float, float], float] | None = None
 
 
@@ -69,7 +69,7 @@ class Applied:
         watched |= {number[name] for item in mechanism.couplings for name, _ in item.terms}
         watched |= {number[joint.name] for joint, _, _ in mechanism.prescribed}
         axes = {k: "slide" if mechanism.joints[k].kind == JointKind.PRISMATIC else "z" for k in sorted(watched)}
-        self._watched = {k: _Law(k, axis, 0.0, 0.0, 0.0, 0.0) for k, axis in axes.items()}
+        self._watched = {k: _Law(k, axis) for k, axis in axes.items()}
         turning = [law for law in self._watched.values() if law.axis != "slide"]
         self._angles |= {law: mechanism.joints[law.connection].q0[0] for law in turning}
         com = np.array([*(body.com for body in mechanism.bodies), (0.0, 0.0, 0.0)])
@@ -170,9 +170,16 @@ class Applied:
         axis = "slide" if joint.kind == JointKind.PRISMATIC else "z"
         if actuator.limit is not None or not isinstance(target, float):
             push = lambda t, q, v: actuator.effort(t, q, v, self.modes.get(k))  # noqa: E731 -- closes over its number
-            return _Law(number, axis, 0.0, 0.0, 0.0, 0.0, push)
+            return _Law(number, axis, push=push)
         gain = {"torque": 1.0, "velocity": actuator.kd, "position": actuator.kp}[actuator.kind]
-        return _Law(number, axis, n * n * actuator.kp, 0.0, n * n * actuator.kd, n * gain * target)
+        return _Law(
+            connection=number,
+            axis=axis,
+            stiffness=n * n * actuator.kp,
+            rest=0.0,
+            damping=n * n * actuator.kd,
+            drive=n * gain * target,
+        )
 
     @staticmethod
     def _rate(law: _Law, ends: Ends) -> float:
@@ -213,10 +220,16 @@ def _laws(number: int, joint: Joint) -> list[_Law]:
         return []
     axes = {JointKind.REVOLUTE: ("z",), JointKind.PRISMATIC: ("slide",), JointKind.UNIVERSAL: ("z", "x")}[joint.kind]
     laws_of_joint = [
-        _Law(number, axis, joint.stiffness, joint.rest, joint.damping, joint.constant_drive) for axis in axes
+        _Law(
+            connection=number,
+            axis=axis,
+            stiffness=joint.stiffness,
+            rest=joint.rest,
+            damping=joint.damping,
+            drive=joint.constant_drive,
+        )
+        for axis in axes
     ]
     if varies(joint.torque):  # one axis has it
-        laws_of_joint.append(
-            _Law(number, axes[0], 0.0, 0.0, 0.0, 0.0, lambda t, _q, _v: float(value_at(joint.torque, t)))
-        )
+        laws_of_joint.append(_Law(number, axes[0], push=lambda t, _q, _v: float(value_at(joint.torque, t))))
     return laws_of_joint

@@ -351,4 +351,4 @@ class FreeSlip(_Slip):
         change = math.hypot(sliding.growth, sliding.across)
         doubling = rho / change if change else math.inf
         longest = min(self._pace.reach * doubling, 0.8 * self._pace.stability * relaxation)
-        return Survey((rho - self._pace.still, N), trend, 1, longest, slaved)
+        return Survey(margins=(rho - self._pace.still, N), trend=trend, dips=1, longest=longest, slaved=slaved)

@@ -119,7 +119,14 @@ class ProjectedConnections:
         of_a, of_b = bodies.pose[a] @ self.at_a[chosen], bodies.pose[b] @ self.at_b[chosen]
         relative, place = bodies.twist[b] - bodies.twist[a], of_b[:, :, 3:]
         e = (relative @ place)[:, :3, 0]
-        return Ends(of_a[:, :3, :3], of_b[:, :3, :3], place[:, :3, 0], of_b[:, :3, 3] - of_a[:, :3, 3], relative, e)
+        return Ends(
+            A=of_a[:, :3, :3],
+            B=of_b[:, :3, :3],
+            place=place[:, :3, 0],
+            d=of_b[:, :3, 3] - of_a[:, :3, 3],
+            relative=relative,
+            e=e,
+        )
 
     def constraints(self, chosen: slice = slice(None)) -> Constraints:
         """Constraint rows of some connections."""
@@ -180,7 +187,16 @@ class Constraints:
         twist[:points, :3, 3], twist[points:, :3, :3] = n, 2 * form[points:, :3, :3]
         twist[points:, :3, 3] = -turned(twist[points:, :3, :3], ends.place[j])
         rate = (form * ends.relative[self.owner]).sum((1, 2))
-        return ConnectionRows(residual, rate, form.reshape(-1, 16), force, torque, x, y, twist.reshape(-1, 16))
+        return ConnectionRows(
+            residual=residual,
+            rate=rate,
+            form=form.reshape(-1, 16),
+            force=force,
+            torque=torque,
+            x=x,
+            y=y,
+            twist=twist.reshape(-1, 16),
+        )
 
     def bending(self, ends: Ends, rows: ConnectionRows) -> Array:
         """Φ̈ of a motion in which each relative twist is constant in body a."""

@@ -139,7 +139,7 @@ class DependentCoordinates:
         inverse[:, :3, 3:] = -inverse[:, :3, :3] @ pose[:, :3, 3:]
         own[:n, :3, :3] = (w @ SKEW).reshape(n, 3, 3)
         own[:n, :3, 3:] = back @ v[:, :, None]
-        return Bodies(pose, inverse, own, pose @ own @ inverse, origin)
+        return Bodies(pose=pose, inverse=inverse, own=own, twist=pose @ own @ inverse, origin=origin)
 
     def solve(
         self, x: Array, drives: Array | float = 0.0, closing: Closing | None = None, held: Sequence[int] = ()
@@ -183,7 +183,14 @@ class DependentCoordinates:
         rates = inverse @ motions[..., :-1, :, :] @ pose
         linear = (pose @ (rates + bent))[..., :3, 3] + self.gravity
         angular = 0.5 * rates[..., :3, :3].reshape(*rates.shape[:-2], 9) @ SKEW.T
-        return SolvedState(bodies, linear, angular, rates + bent, velocities, multipliers)
+        return SolvedState(
+            bodies=bodies,
+            linear=linear,
+            angular=angular,
+            forces=rates + bent,
+            rates=velocities,
+            multipliers=multipliers,
+        )
 
     def _with_zeros(self, of_loops: Array, held: Sequence[int]) -> Array:
         """Right-hand sides of all rows, (…, rows), from those of loops; zero for the others."""

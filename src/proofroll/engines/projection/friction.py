@@ -83,4 +83,11 @@ class Friction:
         rate2, rate3 = response.slip_rate
         held = self.sliding.mobility * self.mu_kinetic * response.N
         drive = rate2 + held * d2, rate3 + held * d3
-        return SlidingForces(kin, response, direction, drive, d2 * rate2 + d3 * rate3, d2 * rate3 - d3 * rate2)
+        return SlidingForces(
+            kin=kin,
+            response=response,
+            direction=direction,
+            drive=drive,
+            growth=d2 * rate2 + d3 * rate3,
+            across=d2 * rate3 - d3 * rate2,
+        )

@@ -75,7 +75,9 @@ class SwitchedMotion(AlternatingMotion[Mode]):
             for item, old, now in pairs
             if now != old
         ]
-        self.events += [Event(kind, t, t, t, name) for kind, name in happened if t > 0]
+        self.events += [
+            Event(kind=kind, time=t, time_low=t, time_high=t, name=name) for kind, name in happened if t > 0
+        ]
         self._enter(t, y, mode)
 
     def solve(self, y: Array | None = None) -> SolvedState:

@@ -129,7 +129,18 @@ class ProjectedBall:
             convected = convected[0] + gain2, convected[1] + gain3
         turned = (o2 * w3 - o3 * w2, o3 * w1 - o1 * w3, o1 * w2 - o2 * w1)
         rates = (s_1, s_2, *self._orientation.rates(angles, r, frame))
-        return Kinematics(frame, shape, rates, r, pose, v, drift, convected, turned, carried)
+        return Kinematics(
+            frame=frame,
+            shape=shape,
+            rates=rates,
+            r=r,
+            pose=pose,
+            v=v,
+            drift=drift,
+            convected=convected,
+            turned=turned,
+            carried=carried,
+        )
 
     def _carried(
         self, F: FloatArray, place: Sequence[float], W: FloatArray, v: tuple[float, float], turning: Vector
@@ -190,7 +201,9 @@ class ProjectedBall:
         p2, p3, (first2, first3, second2, second3) = a2 - d2, a3 - d3, kin.shape.inverse
         spin = self._orientation.acceleration(kin.pose, kin.r, (0.0, b2, b3), kin.turned, kin.frame)
         acceleration = (first2 * p2 + first3 * p3, second2 * p2 + second3 * p3, *spin)
-        return Response(acceleration, (d1, a2, a3, 0.0, b2, b3), N, F2, F3, slip_rate)
+        return Response(
+            acceleration=acceleration, rate=(d1, a2, a3, 0.0, b2, b3), N=N, F2=F2, F3=F3, slip_rate=slip_rate
+        )
 
     def response_at(self, x: FloatArray) -> Response:
         """Solution of :meth:`response` at the state x."""

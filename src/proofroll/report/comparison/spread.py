@@ -85,5 +85,7 @@ def spread_of(name: str, point: ComparedPoint, runs: Mapping[int, xr.Dataset], r
             low, high = min(values.values()), max(values.values())
             if high - low > ALIKE * size:
                 shown = [values.get(row) for row in range(rows)]
-                lines.append(SpreadLine(column, item.unit, shown, low, high, (high - low) / size))
+                lines.append(
+                    SpreadLine(name=column, unit=item.unit, values=shown, low=low, high=high, part=(high - low) / size)
+                )
     return Spread(name, point.reference.ill_posed or point.reference.ended, end, lines)

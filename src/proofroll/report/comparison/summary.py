@@ -47,7 +47,9 @@ def outcome_content(outcome: Outcome) -> ReportedComparison:
         shown_by=kind_name(scene),
         requires=sorted(scene.requires),
         observables={
-            name: ShownObservable(item.unit, item.shown, item.role, item.headline, item.audit)
+            name: ShownObservable(
+                unit=item.unit, symbol=item.shown, role=item.role, headline=item.headline, audit=item.audit
+            )
             for name, item in scene.observables.items()
         },
         until=comparison.until,

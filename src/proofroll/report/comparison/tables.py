@@ -140,13 +140,13 @@ def belief(content: ReportedComparison) -> list[Belief]:
         finite = [line for line in certificate if line["difference"] is not None and math.isfinite(line["difference"])]
         lines.append(
             Belief(
-                name,
-                sum(bool(line["holds"]) for line in certificate),
-                len(certificate),
-                max(finite, key=_part_taken, default=None),
-                list(dict.fromkeys(line["quantity"] for line in certificate if line["because"])),
-                list(dict.fromkeys(not_reported(lines_of_all))),
-                next((row.observables[item] for item in audits if item in row.observables), None),
+                name=name,
+                held=sum(bool(line["holds"]) for line in certificate),
+                total=len(certificate),
+                largest=max(finite, key=_part_taken, default=None),
+                soft=list(dict.fromkeys(line["quantity"] for line in certificate if line["because"])),
+                silent=list(dict.fromkeys(not_reported(lines_of_all))),
+                audit=next((row.observables[item] for item in audits if item in row.observables), None),
             )
         )
     return lines

@@ -136,12 +136,28 @@ def ladder_content(study: Ladder) -> LadderContent:
 def _rung(study: Ladder, rung: Rung) -> RungFound:
     model = rung.model
     if model is None:
-        return RungFound(rung.level.value, rung.variant, None, None, None, Ran(None, "empty", rung.message, None, None))
+        return RungFound(
+            level=rung.level.value,
+            variant=rung.variant,
+            engine=None,
+            formulation=None,
+            preset=None,
+            ran=Ran(settings=None, status="empty", message=rung.message, error=None, seconds_per_second=None),
+        )
     case = study.answers[key_of(model)].case
     resolution = case.engine.resolution if case else None
     value = case.engine.settings.get(resolution) if case and resolution else None
     preset, ran = model.options["preset"], _ran(study, model, {})
-    return RungFound(rung.level.value, rung.variant, model.engine, model.formulation, preset, ran, resolution, value)
+    return RungFound(
+        level=rung.level.value,
+        variant=rung.variant,
+        engine=model.engine,
+        formulation=model.formulation,
+        preset=preset,
+        ran=ran,
+        resolution=resolution,
+        resolution_value=value,
+    )
 
 
 def _ran(study: Ladder, model: LadderModel, point: dict[str, float]) -> Ran:
@@ -150,11 +166,11 @@ def _ran(study: Ladder, model: LadderModel, point: dict[str, float]) -> Ran:
     if answer.result.status == Status.DONE and answer.values is None:
         message = f"the engine does not give {study.quantity}"
     return Ran(
-        answer.case.engine.settings if answer.case else None,
-        answer.result.status.value,
-        message,
-        study.error(model, point),
-        answer.timing.interval if answer.timing else None,
+        settings=answer.case.engine.settings if answer.case else None,
+        status=answer.result.status.value,
+        message=message,
+        error=study.error(model, point),
+        seconds_per_second=answer.timing.interval if answer.timing else None,
     )
 
 
@@ -183,7 +199,9 @@ def _term(study: Ladder, switch: Switch) -> TermFound:
         bar=study.bar(point),
         scale=study.truths[str({})].sizes.get(study.quantity, 1.0),
     )
-    return TermFound(*names, verdict, reason, on, off, cost, change, error_change)
+    return TermFound(
+        *names, verdict=verdict, reason=reason, on=on, off=off, cost=cost, change=change, error_change=error_change
+    )
 
 
 def label(row: RungFound | TermFound) -> str:

@@ -145,7 +145,13 @@ def of_column(
     standings = matrix.standings(column, asked.tolerance, asked.forces, engines)
     best = [min(cells, key=_state_rank) for cells in zip(*(item.scenes for item in standings), strict=True)]
     judged = not matrix.unjudged[asked.forces].issuperset(column.studies)
-    return ColumnAnswer(column, standings, best, _failures(matrix, column, asked, engines), judged)
+    return ColumnAnswer(
+        column=column,
+        standings=standings,
+        scenes=best,
+        failures=_failures(matrix, column, asked, engines),
+        judged=judged,
+    )
 
 
 def _state_rank(cell: ChoiceCell) -> tuple[bool, bool]:

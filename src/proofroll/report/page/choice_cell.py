@@ -90,7 +90,9 @@ def cell_of(steps: Sequence[Candidate], tolerance: float, forces: bool) -> Choic
             text if math.isinf(cost) else f"{text} real time ({number(cost, 2)} s of computing per second of motion)"
         )
         title = f"{item.name}: within {number(size)}, {spent}"
-        return ChoiceCell(Verdict.AGREES, text, title, item.href, cost, item.clean, item.name)
+        return ChoiceCell(
+            state=Verdict.AGREES, text=text, title=title, href=item.href, cost=cost, clean=item.clean, name=item.name
+        )
     if sized:
         size, item = min(sized, key=lambda entry: entry[0])
         limit, step_error = item.limit(forces, tolerance), item.error(forces)

@@ -352,11 +352,15 @@ def choice_matrix(
     for group, names in groups.items():
         scenes = tuple(ChoiceScene(name, tuple(group_lines)) for name, group_lines in names.items())
         title, meaning = naming.kinds.get(group, (group[:1].upper() + group[1:], ""))
-        whole = ChoiceColumn(group, title, meaning, "", scenes)
+        whole = ChoiceColumn(group=group, title=title, meaning=meaning, href="", scenes=scenes)
         single = []
         for scene in scenes:
             about = studies[scene.studies[0]]
-            single.append(ChoiceColumn(group, scene.words, about.title, about.href, (scene,), whole=False))
+            single.append(
+                ChoiceColumn(
+                    group=group, title=scene.words, meaning=about.title, href=about.href, scenes=(scene,), whole=False
+                )
+            )
         columns += [replace(whole, href=single[0].href if len(single) == 1 else ""), *single]
     orders = [list(dict.fromkeys(key[:end] for key in rows)) for end in (1, 2, 3)]
     keys = sorted(rows, key=lambda key: [order_of.index(key[: end + 1]) for end, order_of in enumerate(orders)])

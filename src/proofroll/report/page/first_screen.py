@@ -122,7 +122,11 @@ class FirstScreen:
             models = self.matrix.formulations(engine)
             title = self.matrix.title(engine)
             title = title[:1].upper() + title[1:]
-            rows.append(MatrixRow("engine", engine, engine, "", title, len(models), witness))
+            rows.append(
+                MatrixRow(
+                    level="engine", engine=engine, name=engine, of="", label=title, count=len(models), witness=witness
+                )
+            )
             for model in models:
                 settings = [
                     row
@@ -131,9 +135,29 @@ class FirstScreen:
                 ]
                 name = f"{engine} {model.formulation}"
                 label = model.formulation.replace("_", " ") or title
-                rows.append(MatrixRow("formulation", engine, name, engine, label, len(settings), witness, model))
+                rows.append(
+                    MatrixRow(
+                        level="formulation",
+                        engine=engine,
+                        name=name,
+                        of=engine,
+                        label=label,
+                        count=len(settings),
+                        witness=witness,
+                        row=model,
+                    )
+                )
                 rows += [
-                    MatrixRow("setting", engine, f"{name} {row.setting}", name, row.setting, 0, witness, row)
+                    MatrixRow(
+                        level="setting",
+                        engine=engine,
+                        name=f"{name} {row.setting}",
+                        of=name,
+                        label=row.setting,
+                        count=0,
+                        witness=witness,
+                        row=row,
+                    )
                     for row in settings
                 ]
         return rows
@@ -170,7 +194,9 @@ class FirstScreen:
         if cell.holds and row.row is not None:
             sub = cell.name.removeprefix(row.row.name).strip() if cell.name else "by scene"
         place = f"{column.title}{cell.share}"
-        return CellView(kind, f"{glyph} {text}", sub, f"{glyph} {word}: {place}\n{says}", cell.href)
+        return CellView(
+            look=kind, main=f"{glyph} {text}", sub=sub, title=f"{glyph} {word}: {place}\n{says}", href=cell.href
+        )
 
     def best(self, answered: FirstAnswer) -> list[int]:
         """Number of the row of each column's engine to take; -1 where nothing holds the tolerance."""

@@ -89,7 +89,9 @@ def _curve(
     points = [_point([line for line in lines if line.step == value], groups, named, bounds) for value in steps]
     name = " ".join(filter(None, (row_line.formulation, row_line.setting))) or row_line.engine
     kept = [point for point in points if point is not None and any(item is not None for item in point.errors)]
-    return PrecisionCurve(row_line.engine, row_line.formulation, name, row_line.own_equations, kept)
+    return PrecisionCurve(
+        engine=row_line.engine, formulation=row_line.formulation, name=name, own=row_line.own_equations, points=kept
+    )
 
 
 def _point(

@@ -86,7 +86,17 @@ def profile(matrix: ChoiceMatrix, answered: FirstAnswer, engines: Collection[str
             path += f"H{x_of(item):.1f}V{y_of(held)}"
         path += f"H{x_of(LARGEST):.1f}"
         end = y_of(held)
-        lines.append(ProfileLine(name, matrix.title(name), name in matrix.witnesses, ratios, path, end, end))
+        lines.append(
+            ProfileLine(
+                engine=name,
+                title=matrix.title(name),
+                witness=name in matrix.witnesses,
+                ratios=ratios,
+                path=path,
+                y=end,
+                label=end,
+            )
+        )
     apart: list[ProfileLine] = []
     for line in sorted(lines, key=lambda line: line.y):
         apart.append(replace(line, label=max(line.y, apart[-1].label + APART) if apart else line.y))

@@ -219,17 +219,20 @@ def report_content(outcomes: list[Outcome], command: str) -> ReportContent:
     entries: dict[str, list[PartEntry]] = {kind.key: [] for kind in part_kinds()}
     provides = {shown_name(item.name): item.provides for item in asked if item.provides}
     content = ReportContent(
-        datetime.now(UTC).isoformat(timespec="seconds"),
-        comparisons,
-        [],
-        [],
-        [KnownFinding(item.name, item.engine, item.title, item.seen, item.gone) for item in load_findings()],
-        entries,
-        names,
-        provides,
-        MadeWith(command, f"{facts['system']}, {facts['processor']}", versions),
-        Sentences([]),
-        LongTable([line for outcome_lines in lines for line in outcome_lines]),
+        date=datetime.now(UTC).isoformat(timespec="seconds"),
+        comparisons=comparisons,
+        awaited=[],
+        left_out=[],
+        engine_findings=[
+            KnownFinding(name=item.name, engine=item.engine, title=item.title, seen=item.seen, gone=item.gone)
+            for item in load_findings()
+        ],
+        entries=entries,
+        names=names,
+        provides=provides,
+        environment=MadeWith(command, f"{facts['system']}, {facts['processor']}", versions),
+        findings=Sentences([]),
+        table=LongTable([line for outcome_lines in lines for line in outcome_lines]),
     )
     return content.summarised
 

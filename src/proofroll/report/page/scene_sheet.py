@@ -70,16 +70,23 @@ def sheet_of(file: SceneFile, points: Sequence[dict[str, float]], scenes: Sequen
         values = list(dict.fromkeys(default if value is None else _written(value) for value in set_to)) or [default]
         parameters.append(
             ShownParameter(
-                name,
-                _letter(parameter.symbol) or symbol(name),
-                _listed(values),
-                unit(parameter.unit),
-                parameter.meaning,
-                parameter.source,
-                len(values) > 1,
+                name=name,
+                symbol=_letter(parameter.symbol) or symbol(name),
+                values=_listed(values),
+                unit=unit(parameter.unit),
+                meaning=parameter.meaning,
+                source=parameter.source,
+                varied=len(values) > 1,
             )
         )
-    return SceneSheet(file.title, file.source, parameters, drawings, undrawn, kind.caption if kind else "")
+    return SceneSheet(
+        title=file.title,
+        source=file.source,
+        parameters=parameters,
+        drawings=drawings,
+        undrawn=undrawn,
+        caption=kind.caption if kind else "",
+    )
 
 
 def _letter(text: str) -> str:

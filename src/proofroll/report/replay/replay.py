@@ -51,7 +51,14 @@ def replay_content(outcomes: list[Outcome], kind: ReplayKind, page_engines: Sequ
         # The comparison with the most runs at this point names the case.
         title = max(shared, key=lambda pair: len(runs_at(*pair)))[0].comparison.title
         label = point_name(point.case.parameters) or point.scene.title
-        replayed = Replayed(point.scene, point.reference.dataset, point.trajectory.shown, ghosts, title, label)
+        replayed = Replayed(
+            scene=point.scene,
+            true=point.reference.dataset,
+            file=point.trajectory.shown,
+            ghosts=ghosts,
+            group=title,
+            label=label,
+        )
         content, packed_numbers = case_content(replayed, kind)
         cases.append(content)
         numbers.append(packed_numbers)
@@ -82,7 +89,7 @@ def case_content(replayed: Replayed, kind: ReplayKind) -> tuple[ReplayCase, str]
     furthest = {ghost.engine: ghost for ghost in reversed(replayed.ghosts)}  # the one furthest off comes first
     until, whole = numbers["until"], numbers["frames"]
     runs = [
-        ReplayedRun(replayed.solid, -1, True, whole, "", replayed.file),
+        ReplayedRun(name=replayed.solid, colour=-1, shown=True, frames=whole, message="", trajectory=replayed.file),
         *(
             ReplayedRun(
                 name=ghost.name,
@@ -96,7 +103,15 @@ def case_content(replayed: Replayed, kind: ReplayKind) -> tuple[ReplayCase, str]
             for ghost, count in zip(replayed.ghosts, frames, strict=True)
         ),
     ]
-    case = ReplayCase(replayed.group, replayed.label, kind.name, replayed.scene.title, numbers, runs, drawn.arrays)
+    case = ReplayCase(
+        group=replayed.group,
+        label=replayed.label,
+        kind=kind.name,
+        scene=replayed.scene.title,
+        own=numbers,
+        runs=runs,
+        arrays=drawn.arrays,
+    )
     return case, packed(bytes(drawn.content))
 
 
@@ -125,9 +140,18 @@ def _ghosts(
         assert run.case is not None  # it has a trajectory
         engine, away = run.case.engine, distance(motion.dataset["p_WB"].to_numpy(), true)
         message = "" if run.result.status == Status.DONE else run.result.message
+        name, colour = looks[number]
         ghosts.append(
             Ghost(
-                run.case.key, engine.name, engine.settings, *looks[number], away, motion.dataset, motion.shown, message
+                key=run.case.key,
+                engine=engine.name,
+                settings=engine.settings,
+                name=name,
+                colour=colour,
+                distance=away,
+                motion=motion.dataset,
+                file=motion.shown,
+                message=message,
             )
         )
     return ghosts

@@ -63,9 +63,13 @@ def replay_page(path: Path, run: xr.Dataset, scene_of_run: str | None = None) ->
         shown = element.name if len(parts) > 1 else label or scene.title
         has_truth = bool(np.isfinite(true_part["p_WB"]).all())  # else laws alone judge a run
         if has_truth:
-            replayed = Replayed(alone, true_part, "", _ghosts(run_part, true_part), group, shown)
+            replayed = Replayed(
+                scene=alone, true=true_part, file="", ghosts=_ghosts(run_part, true_part), group=group, label=shown
+            )
         else:
-            replayed = Replayed(alone, run_part, "", [], group, shown, str(run.attrs["engine"]))
+            replayed = Replayed(
+                scene=alone, true=run_part, file="", ghosts=[], group=group, label=shown, solid=str(run.attrs["engine"])
+            )
         case, numbers = case_content(replayed, drawer)
         cases.append(case)
         packed.append(numbers)
@@ -136,4 +140,16 @@ def _ghosts(run: xr.Dataset, true: xr.Dataset) -> list[Ghost]:
     settings = json.loads(run.attrs["settings"])
     message = "" if run.attrs["status"] == "done" else str(run.attrs["message"])
     away = distance(run["p_WB"].to_numpy(), true["p_WB"].to_numpy())
-    return [Ghost("", engine, settings, engine, 0, away, run, "", message)]
+    return [
+        Ghost(
+            key="",
+            engine=engine,
+            settings=settings,
+            name=engine,
+            colour=0,
+            distance=away,
+            motion=run,
+            file="",
+            message=message,
+        )
+    ]

@@ -141,7 +141,7 @@ def hypothesis(known: Mapping[str, str], remedy: str) -> Callable[[Change], Robo
     def decorate(change: Change) -> RobotHypothesis:
         text = inspect.getdoc(change) or change.__name__
         name = text[0].lower() + text[1:].partition("\n")[0].removesuffix(".")
-        return RobotHypothesis(change.__name__, name, known, remedy, change)
+        return RobotHypothesis(id=change.__name__, name=name, known=known, remedy=remedy, change=change)
 
     return decorate
 

@@ -93,7 +93,14 @@ def evaluate(planned: Plan, results: dict[str, Result], runner: Runner) -> Outco
             judged_run = replace(judged_run, diagnosis=causes)
         judged.append(judged_run)
     judged = [run if run.result.trajectory is None else _with_trajectory(run, stored) for run in judged]
-    return Outcome(comparison, planned.scene, planned.file, judged, points, _beyond_budget(planned, results))
+    return Outcome(
+        comparison=comparison,
+        scene=planned.scene,
+        file=planned.file,
+        runs=judged,
+        points=points,
+        beyond_budget=_beyond_budget(planned, results),
+    )
 
 
 def left_out(results: Mapping[str, Result]) -> set[str]:

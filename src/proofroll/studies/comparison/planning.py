@@ -178,7 +178,9 @@ def plan(comparison: Comparison, engines: Iterable[str] = (), workers: Workers |
             raise
         scene = next(iter(scenes.values()))
     file = read_scene_file(comparison.scene)
-    return Plan(replace(comparison, spent=spent), scene, file, scenes, truths, runs)
+    return Plan(
+        comparison=replace(comparison, spent=spent), scene=scene, file=file, scenes=scenes, truths=truths, runs=runs
+    )
 
 
 def scene_at(comparison: Comparison, point: Mapping[str, float]) -> Scene:

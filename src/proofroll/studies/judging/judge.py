@@ -209,7 +209,14 @@ def judge(
     for item in compared:  # judged observables, though perhaps derived from other given variables
         unjudged.pop(item.judgement.observable, None)
     bound = step_bound(scene.elements)
-    return Judged(scene.name, tuple(compared), because, unjudged, reference.ended, bound)
+    return Judged(
+        scene=scene.name,
+        compared=tuple(compared),
+        because=because,
+        unjudged=unjudged,
+        ended=reference.ended,
+        step_bound=bound,
+    )
 
 
 def _unjudged(user_run: GivenRun, reference: Reference, judged: Mapping[str, Tolerance]) -> dict[str, str]:

@@ -137,7 +137,13 @@ def read_run(run: RunInput, scene: Scene, columns: Mapping[str, str] | None = No
     kept = [name for name in names if name not in state and not _has_values(completed, name)]
     besides: dict[str, str | None] = dict.fromkeys([name for name in names if name not in (*state, *kept)], FROM_STATE)
     besides |= dict.fromkeys((*state, *kept))  # the judged observables may be of some bodies' places alone
-    return GivenRun(completed.assign({name: dataset[name] for name in kept}), units, labels, besides, kept)
+    return GivenRun(
+        dataset=completed.assign({name: dataset[name] for name in kept}),
+        units=units,
+        labels=labels,
+        besides=besides,
+        reactions=kept,
+    )
 
 
 def _has_values(run: xr.Dataset, name: str) -> bool:

@@ -139,7 +139,14 @@ def switches(
         description = engines[model.engine]
         assert isinstance(description, EngineDescription)
         switches_of_terms += [
-            Switch(term.name, "engine", model, _with(model, term.on), _with(model, term.off), term.because)
+            Switch(
+                term=term.name,
+                kind="engine",
+                model=model,
+                on=_with(model, term.on),
+                off=_with(model, term.off),
+                because=term.because,
+            )
             for term in description.terms
             if model.formulation in term.formulations
         ]
@@ -156,11 +163,17 @@ def _of_the_scene(model: LadderModel, scene: Scene, truth: xr.Dataset, inherent:
     for element in scene.elements:
         for term in element.optional_terms(scene.parameters, part(scene, element, truth)):
             if term.capability in inherent:
-                switches_of_terms.append(Switch(term.name, "scene", model, None, None, inherent[term.capability]))
+                switches_of_terms.append(
+                    Switch(
+                        term=term.name, kind="scene", model=model, on=None, off=None, because=inherent[term.capability]
+                    )
+                )
             elif not term.asks or not scene.asks:
                 on = LadderModel(model.engine, model.options, term.put, term.asks)
                 off = LadderModel(model.engine, model.options, term.taken)
-                switches_of_terms.append(Switch(term.name, "scene", model, on, off, term.because))
+                switches_of_terms.append(
+                    Switch(term=term.name, kind="scene", model=model, on=on, off=off, because=term.because)
+                )
     return switches_of_terms
 
 

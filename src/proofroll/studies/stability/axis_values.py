@@ -74,7 +74,16 @@ def axis_values(name: str, axes: Sequence[Axis], effort: Effort) -> list[AxisVal
             intervals = round(PER_PERIOD * (value if axis.horizon else effort.periods))
             stride = 1 + 2 * (intervals // (2 * _MOST_SAMPLES))
             every = stride * scene.natural_time / PER_PERIOD
-            values.append(AxisValue(axis.name, value, defaults, scene, every * max(1, intervals // stride), every))
+            values.append(
+                AxisValue(
+                    axis=axis.name,
+                    value=value,
+                    parameters=defaults,
+                    scene=scene,
+                    until=every * max(1, intervals // stride),
+                    every=every,
+                )
+            )
     return values
 
 

@@ -165,7 +165,13 @@ def file_for(scene: str) -> StabilityFile:
         if content.get("scene") == scene:
             return _load(path)
     question = "Up to which step or tolerance is each engine stable, and up to which is it right to 1 %?"
-    return StabilityFile(Path(scene).stem, read_scene_file(scene).title, question, scene, default_axes(scene))
+    return StabilityFile(
+        name=Path(scene).stem,
+        title=read_scene_file(scene).title,
+        question=question,
+        scene=scene,
+        axes=default_axes(scene),
+    )
 
 
 def _load(path: Path) -> StabilityFile:
@@ -223,7 +229,15 @@ def default_axes(name: str) -> list[Axis]:
             continue
         allowed = [part for part in _PARTS if _loads(name, key, part * values[key])]
         if len(allowed) > 1:
-            axes.append(Axis(key, "1", f"{item.meaning}, in parts of the default", allowed, {key: AxisTerm(key)}))
+            axes.append(
+                Axis(
+                    name=key,
+                    unit="1",
+                    meaning=f"{item.meaning}, in parts of the default",
+                    values=allowed,
+                    parameters={key: AxisTerm(key)},
+                )
+            )
     return [*axes, Axis("horizon", "swings", "length of the run in natural times", [1.0, 3.0], horizon=True)]
 
 

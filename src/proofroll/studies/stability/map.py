@@ -146,7 +146,15 @@ def stability(
         MappedValue(axis_value.axis, axis_value.value, axis_value.parameters, axis_value.problem)
         for axis_value in asked
     ]
-    return StabilityMap(scene, default, list(axes), effort, mapped, points, absent | refused)
+    return StabilityMap(
+        scene=scene,
+        default=default,
+        axes=list(axes),
+        effort=effort,
+        values=mapped,
+        points=points,
+        absent=absent | refused,
+    )
 
 
 def _refused(points: Sequence[MapPoint]) -> dict[str, str]:
@@ -233,7 +241,9 @@ def failure_beyond(point: MapPoint, rung: int | None) -> RunOutcome | None:
         return point.found.seen[rung]
     if not point.found.seen and point.found.limit == 0:
         message = "even the coarsest run takes too long"
-        return RunOutcome(False, False, TOO_SLOW, False, None, None, message)
+        return RunOutcome(
+            stable=False, accurate=False, failure=TOO_SLOW, silent=False, error=None, time=None, message=message
+        )
     return None
 
 

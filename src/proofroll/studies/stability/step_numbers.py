@@ -71,4 +71,4 @@ def explanation(boundaries: Sequence[Mapping[str, float]]) -> Explanation | None
     best = min(spreads, key=lambda name: spreads[name])
     values = [item[best] for item in boundaries]
     tells = spreads[best] <= _EXPLAINS < max(spreads.values())
-    return Explanation(best, min(values), max(values), spreads[best], tells)
+    return Explanation(number=best, low=min(values), high=max(values), spread=spreads[best], explains=tells)

@@ -153,18 +153,18 @@ def recommend(study: TradeoffStudy, required: Requirements) -> Recommendation:
     )
     within = [p for p in asked if required.max_cost is not None and p.cost <= required.max_cost]
     return Recommendation(
-        answer,
-        study.scene,
-        study.parameters,
-        required.max_cost,
-        affordable,
-        None if affordable else chosen(best(within), "the most accurate that costs no more"),
-        CheckedOver(
+        answer=answer,
+        scene=study.scene,
+        parameters=study.parameters,
+        max_cost=required.max_cost,
+        affordable=affordable,
+        best_affordable=None if affordable else chosen(best(within), "the most accurate that costs no more"),
+        checked=CheckedOver(
             {name: [min(values), max(values)] for name, values in study.over.items()},
             max((len(p.corners) for p in study.points if p.corners is not None), default=0),
             study.until,
         ),
-        study.measured,
+        measured=study.measured,
     )
 
 

@@ -97,12 +97,12 @@ def tradeoff_study(outcome: Tradeoff) -> TradeoffStudy:
         quantity=question.quantity,
         quantities={
             name: MeasuredQuantity(
-                observables[name].unit,
-                reference.scale(name),
-                reference.true(name, curve).error_bar,
-                observables[name].shown
+                unit=observables[name].unit,
+                scale=reference.scale(name),
+                truth_error_bar=reference.true(name, curve).error_bar,
+                symbol=observables[name].shown
                 + name.removeprefix(observables[name].name),  # with the element, where there are several
-                observables[name].column,
+                column=observables[name].column,
             )
             for name, curve in reference.curves.items()
         },

@@ -132,7 +132,7 @@ def tradeoff(question: Question, runner: Runner, extent: Extent, progress: Progr
 
     finer, gain = (partial(_briefly, extent.claimed), BRIEF_GAIN) if extent.is_brief else (lambda _: FINER, GAIN)
     references = sweep(question, curves, runner, arrived, finer, gain, limit)
-    study = Tradeoff(question, curves, absent, references, extent)
+    study = Tradeoff(question=question, curves=curves, absent=absent, references=references, extent=extent)
     _, truth = resolve_with_truth([], runner.workers)
     _time(study, question.case(truth, question.every), runner.workers, tell, limit)
     if extent.over:

@@ -194,5 +194,5 @@ def _apart(scene: Scene, data: xr.Dataset, new_data: xr.Dataset, sizes: Mapping[
         relative = difference / (sizes.get(name) or float(np.nanmax(np.abs(mine), initial=0.0)) or 1.0)
         if not relative < largest.relative:  # NaN counts as a difference
             kind = NumberKind.CHANGED if relative > ROUND_OFF else NumberKind.ROUND_OFF
-            largest = NumbersApart(name, item.unit, difference, relative, kind)
+            largest = NumbersApart(quantity=name, unit=item.unit, difference=difference, relative=relative, kind=kind)
     return largest

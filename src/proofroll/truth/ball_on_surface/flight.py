@@ -133,7 +133,9 @@ def fly(body: RollingBall, world: World, time: float, until: float, state: Float
 
     def motion(times: FloatArray) -> BallMotion:
         p_WB, v_WB = p + way(times), v + (times - time)[:, None] * body.gravity
-        return BallMotion(p_WB, v_WB, np.broadcast_to(w, p_WB.shape), np.zeros_like(p_WB), "free flight")
+        return BallMotion(
+            p_WB=p_WB, v_WB=v_WB, w_WB=np.broadcast_to(w, p_WB.shape), force=np.zeros_like(p_WB), route="free flight"
+        )
 
     def sunk(times: FloatArray) -> FloatArray:
         whole = way(times)
@@ -155,5 +157,5 @@ def fly(body: RollingBall, world: World, time: float, until: float, state: Float
         end = min(time + 2 * (start - time), until)
         lands, start = first_rise(sunk, start, end), end
     if lands is None:
-        return BallStretch(time, until, False, state, End.TIME, motion)
-    return BallStretch(time, lands, False, state, End.LANDED, motion)
+        return BallStretch(start=time, end=until, sticking=False, state=state, why=End.TIME, motion=motion)
+    return BallStretch(start=time, end=lands, sticking=False, state=state, why=End.LANDED, motion=motion)

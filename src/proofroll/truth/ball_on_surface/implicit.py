@@ -110,7 +110,14 @@ class Implicit(Route):
         def motion(times: FloatArray) -> BallMotion:
             return join_motions(times, [(-np.inf, early), (begun, lambda late: self.motion(at(late), True))], self.name)
 
-        return BallStretch(walk.start, end, True, at(np.array([end]))[0], End.CONE if slips else End.TIME, motion)
+        return BallStretch(
+            start=walk.start,
+            end=end,
+            sticking=True,
+            state=at(np.array([end]))[0],
+            why=End.CONE if slips else End.TIME,
+            motion=motion,
+        )
 
     def slip(self, time: float, state: FloatArray, until: float, slip: FloatArray | None = None) -> BallStretch:
         """See :class:`Route`."""
@@ -137,7 +144,13 @@ class Implicit(Route):
 
     def motion(self, y: FloatArray, sticking: bool) -> BallMotion:
         """Motion of the ball in the given states, shape (n, 9)."""
-        return BallMotion(y[:, :3], self._contact.velocity(y), y[:, 3:6], self._contact.force(y, sticking), self.name)
+        return BallMotion(
+            p_WB=y[:, :3],
+            v_WB=self._contact.velocity(y),
+            w_WB=y[:, 3:6],
+            force=self._contact.force(y, sticking),
+            route=self.name,
+        )
 
     def force_at_start(self, state: FloatArray) -> FloatArray:
         """Force of the wall at the start of a slip [N], shape (3,), where u = 0 but its direction is known."""
@@ -267,4 +280,4 @@ class _Walk:
                     result.force[row] = route.force_at_start(y[row])
             return result
 
-        return BallStretch(self.start, end, sticking, state, why, motion)
+        return BallStretch(start=self.start, end=end, sticking=sticking, state=state, why=why, motion=motion)

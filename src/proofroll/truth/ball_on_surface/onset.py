@@ -60,7 +60,18 @@ def onset(scene: Scene, until: float, uncertainty: float = 1e-3) -> Onset:
         raise InputError("uncertainty", uncertainty, "give a relative uncertainty of mu and f between 0 and 1")
     body = rolling_ball(scene)
     if np.any(body.slip0):  # independent of friction
-        return Onset(0.0, None, None, None, None, float("inf"), uncertainty, "well-posed", 0.0, 0.0)
+        return Onset(
+            time=0.0,
+            by_mu=None,
+            by_f=None,
+            edge_below=None,
+            edge_above=None,
+            distance=float("inf"),
+            uncertainty=uncertainty,
+            verdict="well-posed",
+            earliest=0.0,
+            latest=0.0,
+        )
     mu = body.contact.mu_static
     curve = friction_curve(body, until)
     time = curve.onset(mu)

@@ -53,7 +53,7 @@ def unreduced(body: RollingBall, times: FloatArray) -> BallMotion:
     states = _integrated(rates, np.repeat(_sizes(body), 3), np.concatenate([body.p0, body.v0, body.w0]), times)
     p, v, w = states[:, :3], states[:, 3:6], states[:, 6:]
     force = np.array([newton_euler(body, *x)[2] for x in zip(p, v, w, strict=True)])
-    return BallMotion(p, v, w, force, "unreduced Newton-Euler, DOP853")
+    return BallMotion(p_WB=p, v_WB=v, w_WB=w, force=force, route="unreduced Newton-Euler, DOP853")
 
 
 def _sizes(body: RollingBall) -> tuple[float, float, float]:

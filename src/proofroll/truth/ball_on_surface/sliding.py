@@ -94,7 +94,7 @@ class Sliding(Route):
         def motion(times: FloatArray) -> BallMotion:
             return self._motion(run.at(times), np.zeros(len(times)), None)
 
-        return BallStretch(time, run.end, True, run.last, run.why, motion)
+        return BallStretch(start=time, end=run.end, sticking=True, state=run.last, why=run.why, motion=motion)
 
     def slip(self, time: float, state: FloatArray, until: float, slip: FloatArray | None = None) -> BallStretch:
         """See :class:`Route`."""
@@ -108,7 +108,9 @@ class Sliding(Route):
 
         if slip is None:
             if creep.why is not End.GROWN:  # the time limit, or the slip stops before
-                return BallStretch(time, creep.end, False, creep.last[:5], creep.why, creeping)
+                return BallStretch(
+                    start=time, end=creep.end, sticking=False, state=creep.last[:5], why=creep.why, motion=creeping
+                )
             small, phi = creep.last, self._slaved(creep.last[None, :])[0]
         else:
             _, e2, e3 = self._axes(state).T
@@ -126,8 +128,8 @@ class Sliding(Route):
 
         y = self._stood_still(run.last) if run.why is End.STILL else run.last
         if run.why is End.TIME or y[7] >= until:
-            return BallStretch(time, until, False, y[:5], End.TIME, motion)
-        return BallStretch(time, float(y[7]), False, y[:5], run.why, motion)
+            return BallStretch(start=time, end=until, sticking=False, state=y[:5], why=End.TIME, motion=motion)
+        return BallStretch(start=time, end=float(y[7]), sticking=False, state=y[:5], why=run.why, motion=motion)
 
 
 def _at_clock(run: IntegratedRun, times: FloatArray) -> FloatArray:

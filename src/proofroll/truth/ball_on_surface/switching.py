@@ -188,6 +188,6 @@ def _rest(body: RollingBall, route: Route, state: FloatArray, time: float, until
 
     def motion(times: FloatArray) -> BallMotion:
         p_WB, v_WB, w_WB, wall = (np.broadcast_to(x, (len(times), 3)) for x in (p, np.zeros(3), (w @ e1) * e1, force))
-        return BallMotion(p_WB, v_WB, w_WB, wall, "at rest")
+        return BallMotion(p_WB=p_WB, v_WB=v_WB, w_WB=w_WB, force=wall, route="at rest")
 
-    return BallStretch(time, until, True, state, End.TIME, motion)
+    return BallStretch(start=time, end=until, sticking=True, state=state, why=End.TIME, motion=motion)

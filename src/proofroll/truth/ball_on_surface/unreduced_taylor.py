@@ -53,7 +53,7 @@ def unreduced(body: RollingBall, times: FloatArray) -> BallMotion:
     """
     p, v, w = (np.array(part) for part in np.split(states(body, times), 3, axis=1))
     force = np.array([newton_euler(body, *x)[2] for x in zip(p, v, w, strict=True)])
-    return BallMotion(p, v, w, force, "unreduced Newton-Euler, Taylor series")
+    return BallMotion(p_WB=p, v_WB=v, w_WB=w, force=force, route="unreduced Newton-Euler, Taylor series")
 
 
 def states(body: RollingBall, times: FloatArray) -> FloatArray:

@@ -60,11 +60,11 @@ class SwitchedBodies(JointStretches):
     def _law(self, state: Array, mode: Mode) -> StretchLaw:
         equations = self.equations.switched(state[:-1], self.switched(mode))
         return StretchLaw(
-            lambda y: np.append(equations.rate(float(y[-1]), y[:-1]), 1.0),
-            lambda y: self._guards(equations, y, mode),
-            lambda y: np.append(equations.eliminated(y[:-1]), y[-1]),
-            noise_of(self.joints, self.limited, mode, *self._along(state), self._wanted(state)),
-            near_stops(self.joints, mode),
+            rates=lambda y: np.append(equations.rate(float(y[-1]), y[:-1]), 1.0),
+            guards=lambda y: self._guards(equations, y, mode),
+            corrected=lambda y: np.append(equations.eliminated(y[:-1]), y[-1]),
+            noise=noise_of(self.joints, self.limited, mode, *self._along(state), self._wanted(state)),
+            near=near_stops(self.joints, mode),
         )
 
     def _at_rest(self, stretch: Stretch[Mode], state: Array, stopped: Sequence[int]) -> tuple[Array, Mode, float]:

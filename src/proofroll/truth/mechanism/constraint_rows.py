@@ -60,7 +60,15 @@ class ConstraintRow:
         bias = sub(self.bias, mul(ratio, other.bias))
         share = (other.connection, scaled(-ratio, other.force), scaled(-ratio, other.torque))
         besides = (*self.besides, share)
-        return ConstraintRow(0.0, coefficients, bias, self.connection, self.force, self.torque, besides)
+        return ConstraintRow(
+            residual=0.0,
+            coefficients=coefficients,
+            bias=bias,
+            connection=self.connection,
+            force=self.force,
+            torque=self.torque,
+            besides=besides,
+        )
 
 
 class ConstraintRows:

@@ -369,14 +369,14 @@ class ContactBodies(ContactStretches):
         bodies = self.equations.at(self.equations.equations.normalised(state))
         solution = self.equations.accelerated(bodies, mode)
         return SolvedContacts(
-            bodies.touching,
-            solution.mode,
-            bodies.u,
-            solution.moved,
-            solution.slide,
-            solution.force,
-            solution.response,
-            solution.splits,
-            solution.spread,
-            solution.shifts,
+            touching=bodies.touching,
+            mode=solution.mode,
+            velocity=bodies.u,
+            acceleration=solution.moved,
+            slide_rate=solution.slide,
+            force=solution.force,
+            response=solution.response,
+            splits=solution.splits,
+            spread=solution.spread,
+            shifts=solution.shifts,
         )

@@ -127,7 +127,13 @@ class BodySymbols:
         turning.add_to(forces, answer[e.nu + len(held) :])
         moved = [plus(self._moved(k, touch, answer, at), self._bias(k, touch, at)) for k, touch in enumerate(touching)]
         return SolvedSymbols(
-            [*now.rate, *answer[: e.nu], *now.angle_rate], touching, lines, forces, response, moved, limits
+            rates=[*now.rate, *answer[: e.nu], *now.angle_rate],
+            touching=touching,
+            lines=lines,
+            forces=forces,
+            response=response,
+            slide_rates=moved,
+            within_limits=limits,
         )
 
     def _wanted(self, state: Sequence[Scalar], number: int, functions: Any) -> Scalar:

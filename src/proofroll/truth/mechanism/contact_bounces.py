@@ -68,7 +68,10 @@ def contact_bounces(
     bodies, found = bouncing_bodies(mechanism), []
     for route, path, poses in routes:
         happened = path.happenings[: len(events)]
-        own = [Event(event.kind, event.time, event.time, event.time, event.name) for event in happened]
+        own = [
+            Event(kind=event.kind, time=event.time, time_low=event.time, time_high=event.time, name=event.name)
+            for event in happened
+        ]
 
         def sampled(
             times: Array,
@@ -80,7 +83,7 @@ def contact_bounces(
                 np.array, zip(*map(poses, states_of(route, path, times, path.stretch_at(times))), strict=True)
             )
             q = Rotation.from_matrix(R.reshape(-1, 3, 3)).as_quat(scalar_first=True).reshape(*R.shape[:2], 4)
-            return course_of(Placed(mechanism, times, p, v, w, q))
+            return course_of(Placed(mechanism=mechanism, time=times, p_WB=p, v_WB=v, w_WB=w, q_WB=q))
 
         found.append(exact_bounces(sampled, own, bodies, end))
     one, two = found

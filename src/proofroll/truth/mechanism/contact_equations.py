@@ -160,7 +160,18 @@ class ContactEquations:
         C, bias = _independent(C, bias, self.equations.rank)
         centres = np.array([view.r for view in constrained.views], dtype=float)
         residual = np.array([row.residual for row in constrained.rows], dtype=float)
-        return BodiesState(touching, J, rates, C, bias, mass, force, residual, state[e.nx : e.nx + e.nu], centres)
+        return BodiesState(
+            touching=touching,
+            J=J,
+            bias=rates,
+            C=C,
+            of_joints=bias,
+            mass=mass,
+            force=force,
+            residual=residual,
+            u=state[e.nx : e.nx + e.nu],
+            centres=centres,
+        )
 
     def accelerated(self, state: BodiesState, mode: ContactMode) -> BodiesSolution:
         """Accelerations and forces while each contact keeps its mode."""
@@ -269,7 +280,18 @@ class ContactEquations:
         slide = state.J @ x + bias
         parting = np.array([each.normal @ rate for each, rate in zip(state.touching, slide, strict=True)]) + beyond
         spread = float(np.linalg.norm(ways[:nu]))
-        return BodiesSolution(mode, x, force, slide, parting, response, rank < count, splits, spread, shifts)
+        return BodiesSolution(
+            mode=mode,
+            moved=x,
+            force=force,
+            slide=slide,
+            parting=parting,
+            response=response,
+            loose=rank < count,
+            splits=splits,
+            spread=spread,
+            shifts=shifts,
+        )
 
     def applied(self, state: BodiesState, force: Array) -> tuple[Array, Array]:
         """Forces of contacts between bodies, and wrenches on the bodies about their centres of mass, (bodies, 6)."""

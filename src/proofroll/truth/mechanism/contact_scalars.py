@@ -73,7 +73,15 @@ def touch_in_scalars(contact: BodyContact, a: ScalarMotion, b: ScalarMotion, roo
         if isinstance(disc, CircleShape):
             leaning = cross(turned(of.R, floats(disc.normal)), n)
             tilt = root(dot(leaning, leaning))
-    return ScalarTouch(gap, n, n_rate, place, rate, minus(a.velocity(place), b.velocity(place)), tilt)
+    return ScalarTouch(
+        gap=gap,
+        normal=n,
+        normal_rate=n_rate,
+        place=place,
+        place_rate=rate,
+        slide=minus(a.velocity(place), b.velocity(place)),
+        tilt=tilt,
+    )
 
 
 def floats(vector: Array) -> list[float]:

@@ -150,11 +150,11 @@ class ContactStretches(Stretches[ContactMode]):
             side = np.where(equations.excess(state + _AHEAD * equations.rate(state, mode)) > 0, 1.0, -1.0)
         noise = np.where(np.abs(excess := equations.excess(state)) < _CLAMPED, 2 * np.abs(excess), 0.0)
         return StretchLaw(
-            lambda y: equations.rate(y, mode),
-            lambda y: np.append(self._guards(y, mode, guards), -side * equations.excess(y)),
-            lambda y: equations.eliminated(y, mode),
-            np.append(noise_of(guards, self._size), noise),
-            np.append([CLOSE * (guard.kind == "close") for guard in guards], np.zeros_like(noise)),
+            rates=lambda y: equations.rate(y, mode),
+            guards=lambda y: np.append(self._guards(y, mode, guards), -side * equations.excess(y)),
+            corrected=lambda y: equations.eliminated(y, mode),
+            noise=np.append(noise_of(guards, self._size), noise),
+            near=np.append([CLOSE * (guard.kind == "close") for guard in guards], np.zeros_like(noise)),
         )
 
     def _guards(self, state: Array, mode: ContactMode, guards: Sequence[ContactGuard]) -> FloatArray:
@@ -165,13 +165,13 @@ class ContactStretches(Stretches[ContactMode]):
     def walk(self, time: float, state: Array, mode: ContactMode, until: float) -> Stretch[ContactMode]:
         """See the protocol."""
         if self._stands(state, mode):
-            return Stretch(time, until, mode, state, state, None)
+            return Stretch(start=time, end=until, mode=mode, first=state, last=state, guard=None)
         if any(own.leads for own in mode):
             return self._begun(time, state, mode, until)
         guards = guards_of(self.contacts, mode)
         share = next((number for number, guard in enumerate(guards) if guard.kind == "share"), None)
         if share is not None and self._guards(state, mode, [guards[share]])[0] > 0:
-            return Stretch(time, time, mode, state, state, share)
+            return Stretch(start=time, end=time, mode=mode, first=state, last=state, guard=share)
         start, begun = self._kicked(time, state, mode)
         stretch = self._walked(begun, start, mode, until)
         end, last = stretch.end, stretch.last
@@ -307,9 +307,8 @@ class ContactStretches(Stretches[ContactMode]):
         leaving = self._leaving(stretch.last, stretch.mode, k)
         for number, own in leaving.items():
             mode[number] = own
-        return Transition(
-            stretch.last, tuple(mode), tuple((EventKind.SLIP, contacts[number].name) for number in leaving)
-        )
+        slips = tuple((EventKind.SLIP, contacts[number].name) for number in leaving)
+        return Transition(stretch.last, tuple(mode), slips)
 
     def _leaving(self, state: Array, mode: ContactMode, k: int) -> dict[int, Acting]:
         """Slip that starts at the bound of friction, opposite to the friction that held, of each contact that slips."""
@@ -347,10 +346,8 @@ class ContactStretches(Stretches[ContactMode]):
             state, stays, margin = self._struck(stretch.last, closed, [0.0] * len(closed), [0.0] * len(closed))
         stays = [stay or bool(contact.bound) for stay, contact in zip(stays, contacts, strict=True)]
         settled = [bool(delay) and contacts[k].pair == contacts[hit].pair for k in hits]
-        happened = tuple(
-            (EventKind.SETTLE if over else EventKind.IMPACT, contacts[k].name)
-            for k, over in zip(hits, settled, strict=True)
-        )
+        kinds = (EventKind.SETTLE if over else EventKind.IMPACT for over in settled)
+        happened = tuple((kind, contacts[k].name) for kind, k in zip(kinds, hits, strict=True))
         return self._after(stretch, state, stays, happened, margin, delay)
 
     def _stopped(self, stretch: Stretch[ContactMode]) -> Transition[ContactMode]:
@@ -393,7 +390,7 @@ class ContactStretches(Stretches[ContactMode]):
         changed = changes(self.contacts, was, mode, self._stands(state, mode))
         struck = {name for _, name in happened}
         happenings = (*happened, *(item for item in changed if item[1] not in struck))
-        return Transition(state, mode, happenings, np.inf if delay else min(margin, sure), delay)
+        return Transition(state, mode, happenings, margin=np.inf if delay else min(margin, sure), delay=delay)
 
     def _stands(self, state: Array, mode: ContactMode) -> bool:
         """True if nothing moves or is about to move."""

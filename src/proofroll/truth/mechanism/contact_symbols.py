@@ -76,7 +76,14 @@ def of_joint(contact: JointContact, q: Scalar, v: Scalar) -> ScalarTouch:
     """A law of a joint as a contact, at a coordinate and its rate; see :meth:`JointContact.touching`."""
     stop = contact.joint.low if contact.side > 0 else contact.joint.high
     gap = mul(float(contact.side), sub(q, float(stop))) if contact.side else 0.0
-    return ScalarTouch(gap, (1.0, 0.0, 0.0), _NONE, _NONE, _NONE, scaled(v, floats(contact.direction)))
+    return ScalarTouch(
+        gap=gap,
+        normal=(1.0, 0.0, 0.0),
+        normal_rate=_NONE,
+        place=_NONE,
+        place_rate=_NONE,
+        slide=scaled(v, floats(contact.direction)),
+    )
 
 
 def limit_guard(wanted: Scalar, bound: float, clamped: int, root: Callable[[Scalar], Scalar]) -> Scalar:

@@ -237,7 +237,7 @@ class CompiledMode:
             Diverged: the steps become too small or too many.
         """
         if not until > time:
-            return Stretch(time, time, mode, state, state, None)
+            return Stretch(start=time, end=time, mode=mode, first=state, last=state, guard=None)
         count, watch, pars = StepCount(time, until), StepWatch(), self._parameters(mode)
         steps, grazes, visited, rise = list[ModeStep](), list[float](), list[tuple[float, Array]](), None
         for step in self._steps(pars, state, until):
@@ -261,7 +261,18 @@ class CompiledMode:
                 break
         last = steps[-1].last if rise is None else steps[-1].inside(np.array([rise[0]]))[:, 0]
         end, guard = (until, None) if rise is None else (float(last[-1]), rise[1])
-        return CompiledStretch(time, end, mode, state, law.corrected(last), guard, visited, grazes, self, steps)
+        return CompiledStretch(
+            start=time,
+            end=end,
+            mode=mode,
+            first=state,
+            last=law.corrected(last),
+            guard=guard,
+            visited=visited,
+            grazes=grazes,
+            by=self,
+            steps=steps,
+        )
 
     def _steps(self, pars: Array, state: Array, until: float) -> Iterator[ModeStep]:
         """Steps of the integrator to a time [s].
@@ -280,7 +291,9 @@ class CompiledMode:
                 states = inside(points_within(place, end))
             if last[-1] >= until or (not self._slips and end >= until):
                 last[-1] = until
-            yield ModeStep(place, end, state, last, inside, self._guards(pars, states))
+            yield ModeStep(
+                start=place, end=end, first=state, last=last, inside=inside, guards=self._guards(pars, states)
+            )
             place, state = end, last
 
     def _places(self, pars: Array, start: float, end: float, inside: Inside, times: FloatArray) -> FloatArray:

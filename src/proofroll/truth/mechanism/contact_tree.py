@@ -59,16 +59,16 @@ class ContactTree(ContactStretches):
     def _solution(self, state: Array, mode: ContactMode) -> SolvedContacts:
         solution, v = self._forces(state, mode), self.dynamics.parts(state)[1]
         return SolvedContacts(
-            solution.state.touching,
-            solution.mode,
-            v,
-            solution.acceleration,
-            solution.slide_rate,
-            solution.force,
-            solution.response,
-            solution.splits,
-            solution.spread,
-            solution.shifts,
+            touching=solution.state.touching,
+            mode=solution.mode,
+            velocity=v,
+            acceleration=solution.acceleration,
+            slide_rate=solution.slide_rate,
+            force=solution.force,
+            response=solution.response,
+            splits=solution.splits,
+            spread=solution.spread,
+            shifts=solution.shifts,
         )
 
     def _decided(

@@ -130,7 +130,15 @@ class TreeSymbols:
             moved = plus(moved, scaled(size, each))
         turning.add_to(forces, sizes)
         slide_rates = [plus(_moved(J, moved), bias) for J, bias in slides]
-        return SolvedSymbols([*rates, *moved], touching, lines, forces, response, slide_rates, limits)
+        return SolvedSymbols(
+            rates=[*rates, *moved],
+            touching=touching,
+            lines=lines,
+            forces=forces,
+            response=response,
+            slide_rates=slide_rates,
+            within_limits=limits,
+        )
 
     def _contacts(
         self,
@@ -245,7 +253,7 @@ def _tree(
     m: Mechanism, q: Sequence[Scalar], v: Sequence[Scalar], functions: Any
 ) -> tuple[list[MovingBody], list[Scalar]]:
     """Bodies, the world last, and rates of the coordinates."""
-    ground = MovingBody(_NONE, _AXES, _NONE, _NONE, _NONE, _NONE, {}, {})
+    ground = MovingBody(p=_NONE, R=_AXES, v=_NONE, w=_NONE, a=_NONE, turning=_NONE, move={}, turn={})
     bodies: list[MovingBody] = [ground] * (len(m.bodies) + 1)
     rates: list[Scalar] = []
     index = m.body_index
@@ -286,17 +294,17 @@ def _tree(
         velocity = plus(velocity, slide)
         place = plus(parent.p, turned(parent.R, to_joint))
         R = product(parent.R, across)
-        at_joint = MovingBody(place, R, velocity, w, a, turning, move, turn)
+        at_joint = MovingBody(p=place, R=R, v=velocity, w=w, a=a, turning=turning, move=move, turn=turn)
         moved, a_origin = at_joint.at(from_joint)
         bodies[index[joint.child]] = MovingBody(
-            plus(place, turned(R, from_joint)),
-            R,
-            plus(velocity, cross(w, from_joint)),
-            w,
-            a_origin,
-            turning,
-            moved,
-            turn,
+            p=plus(place, turned(R, from_joint)),
+            R=R,
+            v=plus(velocity, cross(w, from_joint)),
+            w=w,
+            a=a_origin,
+            turning=turning,
+            move=moved,
+            turn=turn,
         )
         rates += _coordinate_rates(joint.kind, own, v[at_v], S)
     return bodies, rates

@@ -309,5 +309,7 @@ def _events(one: FollowedPath, two: FollowedPath, unit: float) -> Sequence[Event
             unit * float(a.time),
             unit * (SAFETY * abs(a.time - b.time) + least * max(1.0, a.time) + a.blur),
         )
-        events.append(Event(a.kind, time, float(time - wide), float(time + wide), a.name))
+        events.append(
+            Event(kind=a.kind, time=time, time_low=float(time - wide), time_high=float(time + wide), name=a.name)
+        )
     return tuple(events)

@@ -131,7 +131,9 @@ class HeldRoute(Generic[ModeT]):
         change = self.change(last)
         if change.mode is None:
             return path
-        after = Stretch(last.end, last.end, change.mode, change.state, change.state, None)
+        after = Stretch(
+            start=last.end, end=last.end, mode=change.mode, first=change.state, last=change.state, guard=None
+        )
         return replace(path, stretches=(*path.stretches, after))
 
     def change(self, stretch: Stretch[ModeT]) -> Transition[ModeT]:

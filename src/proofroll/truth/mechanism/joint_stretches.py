@@ -81,7 +81,9 @@ class JointStretches(Stretches[Mode]):
         settles = delay > 0 and decided[which] in HOLDING
         changed = [item for item in changes(self.joints, stretch.mode, decided) if item[1] != joint.name]
         happened = ("settle" if settles else "impact", joint.name), *changed
-        return Transition(state, decided, happened, np.inf if settles else margin, delay)
+        return Transition(
+            state=state, mode=decided, happenings=happened, margin=np.inf if settles else margin, delay=delay
+        )
 
 
 def reversed_mode(mode: Mode, which: int) -> Mode:

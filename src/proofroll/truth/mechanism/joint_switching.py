@@ -40,11 +40,11 @@ class SwitchedTree(JointStretches):
         q, v = self._parts(state)
         corrected = self.equations.followed(mode)
         return StretchLaw(
-            lambda y: np.append(self.equations.rate(float(y[-1]), y[:-1], mode), 1.0),
-            lambda y: self._guards(y, mode),
-            lambda y: np.append(corrected(y[:-1]), y[-1]),
-            noise_of(self.joints, self.limited, mode, *self._along(state), self._wanted(float(state[-1]), q, v)),
-            near_stops(self.joints, mode),
+            rates=lambda y: np.append(self.equations.rate(float(y[-1]), y[:-1], mode), 1.0),
+            guards=lambda y: self._guards(y, mode),
+            corrected=lambda y: np.append(corrected(y[:-1]), y[-1]),
+            noise=noise_of(self.joints, self.limited, mode, *self._along(state), self._wanted(float(state[-1]), q, v)),
+            near=near_stops(self.joints, mode),
         )
 
     def _at_rest(self, stretch: Stretch[Mode], state: Array, stopped: Sequence[int]) -> tuple[Array, Mode, float]:

@@ -119,14 +119,14 @@ class NumericEquations:
         if self._switched is not None and self._switched.held:
             residual[-len(self._switched.held) :] = 0.0  # held where they are, not at zero
         if not self.rank:
-            return Solved(
-                constrained, half @ free, np.zeros(len(C)), C, residual, np.zeros((len(half), 0)), np.zeros((0, len(C)))
-            )
+            into, back = np.zeros((len(half), 0)), np.zeros((0, len(C)))
+            return Solved(constrained, half @ free, np.zeros(len(C)), C, residual=residual, into=into, back=back)
         U, S, Vt = np.linalg.svd(C @ half, full_matrices=False)
         locked, back = Vt[: self.rank], U[:, : self.rank].T / S[: self.rank, None]
         normal = -back @ np.array([row.bias for row in constrained.rows], dtype=float) - locked @ free
         into = half @ locked.T
-        return Solved(constrained, half @ free + into @ normal, back.T @ normal, C, residual, into, back)
+        acceleration = half @ free + into @ normal
+        return Solved(constrained, acceleration, back.T @ normal, C, residual=residual, into=into, back=back)
 
     def loaded(
         self, state: Array, time: float = 0.0, switched: Switched | None = None

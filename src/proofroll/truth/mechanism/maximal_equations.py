@@ -279,9 +279,17 @@ class MaximalEquations:
     ) -> Connection:
         """Connection of two named bodies, from its places and axes in their frames."""
         index = self.mechanism.body_index
-        places = (self._place(a, at_a), self._place(b, at_b))
         A, B = ([clean(row) for row in frame] for frame in (frame_a, frame_b))
-        return Connection(kind, index[a], index[b], *places, A, B, length)
+        return Connection(
+            kind=kind,
+            a=index[a],
+            b=index[b],
+            place_a=self._place(a, at_a),
+            place_b=self._place(b, at_b),
+            frame_a=A,
+            frame_b=B,
+            length=length,
+        )
 
     def _place(self, body: str, position: Sequence[float]) -> list[float]:
         return [float(value) for value in np.array(position) - self._com[body]]

@@ -113,7 +113,15 @@ def begun_slip(
         states = _settled(state, mode, k, length, nodes, rate, solve)
         if states is not None and all(clear(y, plain) for y in states[1:]):
             end = until if length == until - time else time + length
-            return BegunSlip(time, end, plain, state, states[-1], None, nodes=nodes.to_series @ states)
+            return BegunSlip(
+                start=time,
+                end=end,
+                mode=plain,
+                first=state,
+                last=states[-1],
+                guard=None,
+                nodes=nodes.to_series @ states,
+            )
         length /= 2
     raise Refused(
         f"{name} begins to slip from rest at t = {time:.6g} s as others hold or stop it: no route of the truth follows "

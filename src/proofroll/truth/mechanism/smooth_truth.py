@@ -95,7 +95,16 @@ def find_truth(mechanism: Mechanism, times: Array, tolerance: float = 1e-15) -> 
     if form is not None and form.motion is None:
         checked = (form.title, float(largest(form.part(times) - form.same(best)).max()))
     branches = [] if exact is None or form is None else singular_poses_of(form, first, float(times[-1]))
-    return TwoRouteMotion(masked, bars, differences, horizon, branches, analysis.determinate, routes, checked)
+    return TwoRouteMotion(
+        record=masked,
+        bars=bars,
+        differences=differences,
+        horizon=horizon,
+        branches=branches,
+        determinate=analysis.determinate,
+        routes=routes,
+        checked_by=checked,
+    )
 
 
 def _runs(

@@ -72,7 +72,17 @@ def starts_to_slip(evidence: Evidence) -> Iterator[Cause]:
     says = f"the ball begins to slip at {both}"
     remedy = "the ball sticks up to the static friction, and only slips at the kinetic one"
     before, after = abs(first - true), abs(first - crossing)
-    yield Cause("static friction", says, "first slip", "s", before, after, remedy, 0, ("motion", "force"))
+    yield Cause(
+        id="static friction",
+        says=says,
+        quantity="first slip",
+        unit="s",
+        before=before,
+        after=after,
+        remedy=remedy,
+        fitted=0,
+        covers=("motion", "force"),
+    )
 
 
 @hypothesis(
@@ -108,7 +118,16 @@ def pyramidal_cone(evidence: Evidence) -> Iterator[Cause]:
     remedy = "choose an elliptic (quadratic) cone"
     covered = ("motion", *COVERED)
     yield Cause(
-        "pyramidal cone", says, "friction while slipping", "N", before, after, remedy, 1, covered, closes=_PYRAMID
+        id="pyramidal cone",
+        says=says,
+        quantity="friction while slipping",
+        unit="N",
+        before=before,
+        after=after,
+        remedy=remedy,
+        fitted=1,
+        covers=covered,
+        closes=_PYRAMID,
     )
 
 

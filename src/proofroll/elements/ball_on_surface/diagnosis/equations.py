@@ -102,7 +102,9 @@ def _states(body: RollingBall, part: xr.Dataset) -> BallStates:
         force = force[inner] if np.all(np.isfinite(force[inner])) else None
     sticks = part["sticking"].to_numpy() if "sticking" in part else np.ones(len(t))
     p, v = part["p_WB"].to_numpy(), part["v_WB"].to_numpy()
-    return BallStates(p[inner], v[inner], w[inner], a[inner], alpha[inner], force, sticks[inner])
+    return BallStates(
+        p=p[inner], v=v[inner], w=w[inner], a=a[inner], alpha=alpha[inner], force=force, sticks=sticks[inner]
+    )
 
 
 def residuals(body: RollingBall, seen: BallStates, law: Law) -> FloatArray:
@@ -170,8 +172,9 @@ def residuals_of(evidence: Evidence) -> Iterator[Residuals[Law]]:
     if np.isfinite(before) and before > ABOVE * float(np.max(np.abs(residuals(body, true, plain)))):
         allowed = CLOSES * before / natural_acceleration(body)
         yield Residuals(
-            left_of_run, "motion", "m/s^2", before, CLOSES, COVERED, plain, lambda: _others(body),
-            lambda law: _contradicted(evidence.lines, body, law, allowed),
+            left=left_of_run, quantity="motion", unit="m/s^2", before=before, closes=CLOSES, covers=COVERED,
+            plain=plain, others=lambda: _others(body),
+            contradicted=lambda law: _contradicted(evidence.lines, body, law, allowed),
         )  # fmt: skip
 
 
@@ -189,8 +192,9 @@ def held_at_start(evidence: Evidence, body: RollingBall, wrong: Sequence[Mapping
     what = " and ".join(str(line["quantity"]) for line in wrong[:2]) + (" and more" if len(wrong) > 2 else "")
     before = float(np.max(np.abs(relative_differences(evidence.lines, {}, GIVEN)), initial=0.0))
     return Residuals(
-        left_of_lines, f"at time 0 {what}, relative,", "1", before, CLOSES_EXACTLY, COVERED, Law(body),
-        lambda: _others(body), lambda law: _contradicted(evidence.lines, body, law, CLOSES_EXACTLY * before),
+        left=left_of_lines, quantity=f"at time 0 {what}, relative,", unit="1", before=before, closes=CLOSES_EXACTLY,
+        covers=COVERED, plain=Law(body), others=lambda: _others(body),
+        contradicted=lambda law: _contradicted(evidence.lines, body, law, CLOSES_EXACTLY * before),
     )  # fmt: skip
 
 

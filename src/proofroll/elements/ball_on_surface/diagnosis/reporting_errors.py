@@ -91,7 +91,9 @@ def reported_force(evidence: Evidence) -> Iterator[Cause]:
     reported, true = forces(body, run), forces(body, truth)
     known = np.all(np.isfinite(reported) & np.isfinite(true), axis=-1)
     own = {name: frame[known] for name, frame in axes.items()}
-    vector = ReportedVector("force", _FORCE, "N", reported[known], true[known], time[known], own).after_start()
+    vector = ReportedVector(
+        name="force", what=_FORCE, unit="N", reported=reported[known], true=true[known], time=time[known], frames=own
+    ).after_start()
     if forced_otherwise(evidence, vector):
         return
     yield _friction_reversed(vector, own[SURFACE][-len(vector.true) :, :, 0])
@@ -123,7 +125,17 @@ def starts_late(evidence: Evidence) -> Iterator[Cause]:
     before, after = float(np.max(np.abs(off))), float(np.max(np.abs(off - v * ahead - bend)))
     says = f"the start is {delay_text(-ahead, evidence.step)}: the ball has moved before time 0"
     remedy, change = "sample before the first step", in_steps(ahead, evidence.step)
-    yield Cause("late", says, "position at time 0", "m", before, after, remedy, 1, change=change)
+    yield Cause(
+        id="late",
+        says=says,
+        quantity="position at time 0",
+        unit="m",
+        before=before,
+        after=after,
+        remedy=remedy,
+        fitted=1,
+        change=change,
+    )
 
 
 @hypothesis("contact point", "the contact point is at p + a e1, its velocity v + a w x e1, both known from the truth")
@@ -148,13 +160,13 @@ def at_the_contact(evidence: Evidence) -> Iterator[Cause]:
             before = known_difference(reported, true)
             remedy = f"give {name} of the ball's centre, along the axes of the world"
             yield Cause(
-                "contact point",
-                says,
-                name,
-                _UNITS[name][1],
-                before,
-                known_difference(reported, changed[1:]),
-                remedy,
+                id="contact point",
+                says=says,
+                quantity=name,
+                unit=_UNITS[name][1],
+                before=before,
+                after=known_difference(reported, changed[1:]),
+                remedy=remedy,
             )
 
 
@@ -187,7 +199,17 @@ def stale_normal(evidence: Evidence) -> Iterator[Cause]:
         "take the normal where the ball is when the force is read",
     )
     change = in_steps(delay, evidence.step)
-    yield Cause("stale normal", says, "force", "N", known_difference(reported, true), after, remedy, 1, change=change)
+    yield Cause(
+        id="stale normal",
+        says=says,
+        quantity="force",
+        unit="N",
+        before=known_difference(reported, true),
+        after=after,
+        remedy=remedy,
+        fitted=1,
+        change=change,
+    )
 
 
 @hypothesis("force at time 0", "the scene's own force with another sign, unit or axes is the one of the certificate")
@@ -202,7 +224,15 @@ def force_at_start(evidence: Evidence) -> Iterator[Cause]:
         frame @ np.array([-lines["N"][key][0], lines["F2"][key][0], lines["F3"][key][0]])
         for key in ("found", "expected")
     )
-    vector = ReportedVector("force", _FORCE, "N", reported[None], true[None], np.zeros(1), {SURFACE: frame[None]})
+    vector = ReportedVector(
+        name="force",
+        what=_FORCE,
+        unit="N",
+        reported=reported[None],
+        true=true[None],
+        time=np.zeros(1),
+        frames={SURFACE: frame[None]},
+    )
     yield _friction_reversed(vector, frame[None, :, 0])
     yield from vector.causes(evidence.step)
 

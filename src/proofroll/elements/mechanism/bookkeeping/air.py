@@ -149,7 +149,7 @@ def run_in_air(
     q, v, efforts, targets, actions = (np.array([getattr(each, name) for each in steps]) for name in names)
     time = np.asarray(step * np.arange(count + 1), float)
     seen = tuple(each.observation for each in steps if each.observation is not None)
-    return AirRun(time, q, v, efforts, targets, actions, seen)
+    return AirRun(time=time, q=q, v=v, efforts=efforts, targets=targets, actions=actions, observations=seen)
 
 
 def steps_in_air(
@@ -178,7 +178,7 @@ def steps_in_air(
         servo = before[-law.lag] if law.lag and len(before) >= law.lag else state
         if not law.hold_effort or k % period == 0:
             efforts = law.effort(target, servo.q, servo.v)
-        yield AirStep(q, v, efforts, target, last, observation)
+        yield AirStep(q=q, v=v, efforts=efforts, target=target, action=last, observation=observation)
         q, v = _stepped(robot, law, (q, v), (efforts, target), step, scheme)
         if not np.abs(v).max() < _STOP:
             raise Diverged(f"the motion blows up at t = {k * step:.4g} s")

@@ -85,7 +85,14 @@ def _mistakes(law: ControlLaw) -> Iterator[Mistake]:
     if law.armature.any():
         yield _sized("armature", "the armature is {size} of the right one", "acceleration", "armature", (0.9, 0.2))
     else:
-        yield Mistake("armature", "there is an armature of {size} kg m²", "acceleration", _armed, True, (1e-4, 1e-2))
+        yield Mistake(
+            id="armature",
+            words="there is an armature of {size} kg m²",
+            layer="acceleration",
+            changed=_armed,
+            sized=True,
+            starts=(1e-4, 1e-2),
+        )
     yield _sized("gravity", "gravity is {size} of the right one", "acceleration", "gravity")
 
 
@@ -127,7 +134,7 @@ def _fixed(name: str, words: str, layer: str, **changes: object) -> Mistake:
 
 
 def _sized(name: str, words: str, layer: str, attribute: str, starts: tuple[float, ...] = (0.95,)) -> Mistake:
-    return Mistake(name, words, layer, partial(_scaled, attribute), True, starts)
+    return Mistake(id=name, words=words, layer=layer, changed=partial(_scaled, attribute), sized=True, starts=starts)
 
 
 def _scaled(attribute: str, law: ControlLaw, size: float) -> ControlLaw:

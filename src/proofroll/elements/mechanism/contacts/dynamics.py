@@ -96,7 +96,7 @@ class ContactDynamics:
             parts.append((part @ J, part @ rate + friction.part_rate(there) @ turning))
         J = np.array([row for row, _ in parts]).reshape(-1, 3, len(v))
         bias = np.array([rate for _, rate in parts]).reshape(-1, 3)
-        return ContactsNow(found, W, touching, J, bias)
+        return ContactsNow(solution=found, W=W, touching=touching, J=J, bias=bias)
 
     def solve(self, q: Array, v: Array, mode: ContactMode, time: float = 0.0) -> ContactSolution:
         """Accelerations and forces while each contact keeps the given mode, at a time [s].
@@ -135,7 +135,10 @@ class ContactDynamics:
         if not owner:
             summed = np.ones((len(self.sums), 3), dtype=bool)
             none = np.zeros((len(mode), 3, 0))
-            return ContactSolution(state, mode, free, force, known, summed, response=1.0, shifts=none, spread=0.0)
+            return ContactSolution(
+                state=state, mode=mode, acceleration=free, force=force, determinate=known, determinate_sums=summed,
+                response=1.0, shifts=none, spread=0.0
+            )  # fmt: skip
         D = np.array([direction @ state.J[k] for direction, k in zip(along, owner, strict=True)])
         owned = list(zip(owner, along, strict=True))
         moments = moments_by_pressing(turning, owned, [each.normal for each in state.touching])
@@ -165,7 +168,10 @@ class ContactDynamics:
         response = float(np.linalg.det(whole.T @ S @ whole) / np.linalg.det(whole.T @ smooth @ whole))
         spread = float(np.linalg.norm(state.W @ (D.T @ ways)))
         free = free + state.W @ D.T @ z
-        return ContactSolution(state, mode, free, force, known, summed, response, shifts, spread)
+        return ContactSolution(
+            state=state, mode=mode, acceleration=free, force=force, determinate=known, determinate_sums=summed,
+            response=response, shifts=shifts, spread=spread
+        )  # fmt: skip
 
     @staticmethod
     def heading(own: Acting, found: Touching) -> Array:

@@ -116,7 +116,9 @@ class ContactWatch:
                     kind = EventKind.REST
                 if kind:
                     low, high = float(times[k]), float(times[k + 1])
-                    events.append(Event(kind, min(max(at, low), high), low, high, contact.name))
+                    events.append(
+                        Event(kind=kind, time=min(max(at, low), high), time_low=low, time_high=high, name=contact.name)
+                    )
         return sorted(events, key=lambda event: event.time)
 
 

@@ -314,9 +314,22 @@ def contacts_of(geometries: Sequence[Geometry], pairs: Sequence[Pair]) -> tuple[
         touching = list(itertools.product(a.shapes, b.shapes))
         for number, (one, other) in enumerate(touching, 1):
             name = pair.name if len(touching) == 1 else f"{pair.name}.{number}"
-            law = pair.friction, pair.restitution, pair.name, pair.static_friction, pair.tangential_restitution
-            turning = pair.rolling_resistance, pair.spinning_friction
-            found.append(BodyContact(name, a.body, b.body, one, other, *law, *turning))
+            found.append(
+                BodyContact(
+                    name=name,
+                    body_a=a.body,
+                    body_b=b.body,
+                    shape_a=one,
+                    shape_b=other,
+                    friction=pair.friction,
+                    restitution=pair.restitution,
+                    pair=pair.name,
+                    static_friction=pair.static_friction,
+                    tangential_restitution=pair.tangential_restitution,
+                    rolling_resistance=pair.rolling_resistance,
+                    spinning_friction=pair.spinning_friction,
+                )
+            )
     return tuple(found)
 
 

@@ -74,7 +74,7 @@ class JointContact:
         """Gap, normal and slide of the contact at a coordinate and its rate."""
         stop = self.joint.low if self.side > 0 else self.joint.high
         gap = self.side * (q - stop) if self.side else 0.0
-        return Touching(gap, _X, _NONE, _NONE, _NONE, v * self.direction)
+        return Touching(gap=gap, normal=_X, normal_rate=_NONE, place=_NONE, place_rate=_NONE, slide=v * self.direction)
 
 
 def joint_contacts(joints: Sequence[SwitchedJoint]) -> tuple[JointContact, ...]:

@@ -88,7 +88,15 @@ def touch(contact: BodyContact, a: Moving, b: Moving) -> Touching:
         gap, n, n_rate, place, rate = _two_spheres(contact.shape_a, a, contact.shape_b, b)
     discs = ((contact.shape_a, a), (contact.shape_b, b))
     tilts = (float(np.linalg.norm(cross(of.R @ disc.normal, n))) for disc, of in discs if isinstance(disc, CircleShape))
-    return Touching(gap, n, n_rate, place, rate, a.velocity(place) - b.velocity(place), next(tilts, 1.0))
+    return Touching(
+        gap=gap,
+        normal=n,
+        normal_rate=n_rate,
+        place=place,
+        place_rate=rate,
+        slide=a.velocity(place) - b.velocity(place),
+        tilt=next(tilts, 1.0),
+    )
 
 
 _Lying = tuple[float, Array, Array, Array, Array]

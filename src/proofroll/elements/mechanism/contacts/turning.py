@@ -73,7 +73,7 @@ def turning_frictions(contacts: Sequence[BodyContact]) -> tuple[TurningFriction,
         for spins, size in ((False, contact.rolling_resistance), (True, contact.spinning_friction)):
             if size:
                 text = f"{contact.name} {'spin' if spins else 'roll'}"
-                found.append(TurningFriction(contact.name, k, spins, size, text))
+                found.append(TurningFriction(name=contact.name, pressed_by=k, spins=spins, friction=size, pair=text))
     return tuple(found)
 
 

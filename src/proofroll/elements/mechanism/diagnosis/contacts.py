@@ -115,16 +115,16 @@ def touch_of(evidence: Evidence) -> Iterator[SeenContact]:
     true = follow_contacts(placed_of(element.mechanism, truth))
     u_n = np.sum(followed.normal * followed.slide, axis=-1)
     yield SeenContact(
-        evidence,
-        run["time"].to_numpy(),
-        followed,
-        force,
-        N,
-        u_n,
-        presses,
-        slides,
-        true,
-        truth["contact_forces"].to_numpy(),
+        evidence=evidence,
+        time=run["time"].to_numpy(),
+        found=followed,
+        force=force,
+        N=N,
+        u_n=u_n,
+        presses=presses,
+        slides=slides,
+        true=true,
+        true_force=truth["contact_forces"].to_numpy(),
     )
 
 
@@ -138,9 +138,16 @@ def contact_forces(evidence: Evidence) -> Iterator[Cause]:
         reported, true = touch.force[1:, finite], touch.true_force[1:, finite]
         if finite.any() and "contact_forces" not in evidence.settled:
             what, least = "the force of a contact on its first body", evidence.element.force
-            yield from ReportedVector("contact_forces", what, "N", reported, true, touch.time[1:], {}, least).causes(
-                evidence.step
-            )
+            yield from ReportedVector(
+                name="contact_forces",
+                what=what,
+                unit="N",
+                reported=reported,
+                true=true,
+                time=touch.time[1:],
+                frames={},
+                least=least,
+            ).causes(evidence.step)
 
 
 @hypothesis(
@@ -285,9 +292,15 @@ def forces_at_start(evidence: Evidence) -> Iterator[Cause]:
     reported, true = np.reshape(line["found"], shape), np.reshape(line["expected"], shape)
     finite = np.isfinite(reported).all(axis=-1) & np.isfinite(true).all(axis=-1)
     if all(other["holds"] for key, other in lines.items() if key != name) and finite.any():
-        what = "the force of a contact on its first body"
-        values = reported[None, finite], true[None, finite], np.zeros(1)
-        yield from ReportedVector("contact_forces", what, "N", *values, {}, element.force).causes(evidence.step)
+        yield from ReportedVector(
+            name="contact_forces",
+            what="the force of a contact on its first body",
+            unit="N",
+            reported=reported[None, finite],
+            true=true[None, finite],
+            time=np.zeros(1),
+            least=element.force,
+        ).causes(evidence.step)
     followed = follow_contacts(element.start)
     n, friction = followed.normal[0], np.array([contact.friction for contact in element.mechanism.contacts])
     friction = np.where(np.isinf(friction), 0.0, friction)

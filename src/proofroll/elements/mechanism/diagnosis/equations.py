@@ -80,7 +80,11 @@ class MechanismStates:
             v = np.linalg.lstsq(still.J[:-1].reshape(-1, mechanism.nv), twists.ravel(), rcond=None)[0]
             off = np.abs(still.J[:-1].reshape(-1, mechanism.nv) @ v - twists.ravel())
             self.consistent &= bool(np.max(off) <= _CONSISTENT * max(float(np.max(np.abs(twists))), 1e-300))
-            self.each.append(MechanismState(float(placed.time[i]), q, v, self.tree.at(q, v), acceleration[i]))
+            self.each.append(
+                MechanismState(
+                    t=float(placed.time[i]), q=q, v=v, motion=self.tree.at(q, v), acceleration=acceleration[i]
+                )
+            )
 
     @cached_property
     def allowed(self) -> list[FloatArray]:

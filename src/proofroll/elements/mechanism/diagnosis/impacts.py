@@ -131,7 +131,14 @@ def _met(t: FloatArray, gap: FloatArray, rate: FloatArray, free: Any) -> Iterato
             when = min(meets, key=lambda index: abs(index - min(closes)))
             fell, rose = flight_in.deriv()(when), flight_out.deriv()(when)
             bars = off / abs(fell), off_rate / abs(fell)
-            yield _Impact(k, when, when - min(closes), bars[0], float(-rose / fell), bars[1])
+            yield _Impact(
+                k=k,
+                time=when,
+                delay=when - min(closes),
+                delay_bar=bars[0],
+                restitution=float(-rose / fell),
+                restitution_bar=bars[1],
+            )
 
 
 @dataclass(frozen=True)
@@ -221,11 +228,18 @@ def _struck(mechanism: Mechanism, dataset: Any, followed: Followed, presses: Any
             R = Rotation.from_rotvec((time - t[k]) * (w[k] + spins[0]) / 2) * Rotation.from_matrix(placed.R_WB[k, :-1])
             turns = np.roll(R.as_quat(), 1, axis=-1)
             (q, v_in), (_, v_out) = (
-                Placed(mechanism, np.array([time]), p[None], velocity[None], spin[None], turns[None]).of_tree()
+                Placed(
+                    mechanism=mechanism,
+                    time=np.array([time]),
+                    p_WB=p[None],
+                    v_WB=velocity[None],
+                    w_WB=spin[None],
+                    q_WB=turns[None],
+                ).of_tree()
                 for velocity, spin in zip((v, v_after), spins, strict=True)
             )
             root = np.linalg.cholesky(np.linalg.inv(dynamics.at(q[0], v_in[0]).W)).T / np.sqrt(mass)
-            yield _Struck(contact, q[0], v_in[0], v_out[0], root)
+            yield _Struck(contact=contact, q=q[0], before=v_in[0], after=v_out[0], root=root)
 
 
 def _extrapolated(

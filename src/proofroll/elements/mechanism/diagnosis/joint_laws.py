@@ -144,7 +144,16 @@ def of_couplings(evidence: Evidence) -> Iterator[Cause]:
         what = name, "1/s^2" if alone else "1/s", difference, remainder
         change = np.inf if remainder <= CLOSES_EXACTLY * difference else change_by(ratio / ratio_true)
         count = len(moving[0]) if alone else None
-        yield Cause(f"ratio of {coupling.name}", says, *what, remedy, 1, _COVERS, explains=count, change=change)
+        yield Cause(
+            f"ratio of {coupling.name}",
+            says,
+            *what,
+            remedy=remedy,
+            fitted=1,
+            covers=_COVERS,
+            explains=count,
+            change=change,
+        )
 
 
 @hypothesis(
@@ -196,7 +205,9 @@ def soft_couplings(evidence: Evidence) -> Iterator[Cause]:
             "armature, or relate heavy joints by one coupling without the light ones"
         )
         what = "accelerations at time 0", "1/s^2", difference, remainder
-        yield Cause("soft couplings", says, *what, remedy, 1, _COVERS, explains=len(rates), change=part)
+        yield Cause(
+            "soft couplings", says, *what, remedy=remedy, fitted=1, covers=_COVERS, explains=len(rates), change=part
+        )
         return
 
 
@@ -267,7 +278,16 @@ def of_stops(evidence: Evidence) -> Iterator[Cause]:
             remedy = "look at the place of the stop, at the joint's zero, and at how far the stop gives way"
             unit = "rad" if joint.kind == JointKind.REVOLUTE else "m"
             what, change = (f"{joint.name} at its stop", unit, difference, remainder), abs(shift) / size
-            yield Cause(f"stop of {joint.name}", says, *what, remedy, 1, _COVERS, explains=count, change=change)
+            yield Cause(
+                f"stop of {joint.name}",
+                says,
+                *what,
+                remedy=remedy,
+                fitted=1,
+                covers=_COVERS,
+                explains=count,
+                change=change,
+            )
 
 
 @dataclass(frozen=True)
@@ -322,5 +342,5 @@ def _rebounds(t: FloatArray, q: FloatArray, v: FloatArray) -> list[_Rebound]:
 
         if apart(0.0) * apart(h) < 0:
             place = float(state @ (1.0, x := brentq(apart, 0.0, h), x * x))
-            rebounds.append(_Rebound(state, second, place, float(np.sign(v[k + 1])), h))
+            rebounds.append(_Rebound(before=state, after=second, place=place, side=float(np.sign(v[k + 1])), h=h))
     return rebounds

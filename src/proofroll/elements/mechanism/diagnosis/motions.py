@@ -48,15 +48,15 @@ def of_motions(evidence: Evidence) -> Iterator[Cause]:
         for says, factor, delay, remedy in _mistakes(joint, evidence.step):
             after = float(np.max(np.abs(values - _values(joint, factor, delay, times)[part])))
             yield Cause(
-                f"motion of {joint.name}",
-                f"the motion of {joint.name} {says}",
-                what,
-                units,
-                before,
-                after,
-                remedy,
-                0,
-                _COVERS,
+                id=f"motion of {joint.name}",
+                says=f"the motion of {joint.name} {says}",
+                quantity=what,
+                unit=units,
+                before=before,
+                after=after,
+                remedy=remedy,
+                fitted=0,
+                covers=_COVERS,
             )
 
 

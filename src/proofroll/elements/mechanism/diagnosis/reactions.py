@@ -119,9 +119,19 @@ def _reactions(
             name: np.stack([placed.R_WB[:, bodies[ends[k].b if name == BODY else ends[k].a]] for k in which], axis=1)
             for name in (BODY, PARENT)
         }
-        both = np.where(finite, reported[kind], np.nan)[:, which], true[kind][:, which]
+        values = np.where(finite, reported[kind], np.nan)[:, which]
         least = force if kind == "force" else force * element.length
-        vector = ReportedVector(kind, what, unit, *both, placed.time, frames, least, bars.get(kind, 0.0))
+        vector = ReportedVector(
+            name=kind,
+            what=what,
+            unit=unit,
+            reported=values,
+            true=true[kind][:, which],
+            time=placed.time,
+            frames=frames,
+            least=least,
+            bar=bars.get(kind, 0.0),
+        )
         yield Reactions(vector, which, placed, true["force"][:, which])
 
 

@@ -128,7 +128,17 @@ def _residuals_at(
 
     quantity = f"balance of the equations of motion {place}, relative,"
     covers = ("motion", *COVERED)
-    return Residuals(left, quantity, "1", difference, closes, covers, plain, lambda: _others(plain), contradicted)
+    return Residuals(
+        left=left,
+        quantity=quantity,
+        unit="1",
+        before=difference,
+        closes=closes,
+        covers=covers,
+        plain=plain,
+        others=lambda: _others(plain),
+        contradicted=contradicted,
+    )
 
 
 def _others(plain: Change) -> list[Change]:

@@ -55,7 +55,7 @@ def other_axis(evidence: Evidence) -> Iterator[Cause]:
             covered = ("p_WB", "v_WB", "w_WB", "q_WB", "motion", "force", "torque")
             what = (f"turning of {joint.name} across its axis", "rad/s", difference, remainder)
             change = float(np.linalg.norm(fitted - axis))
-            yield Cause(f"axis of {joint.name}", says, *what, _REMEDY, 2, covered, change=change)
+            yield Cause(f"axis of {joint.name}", says, *what, remedy=_REMEDY, fitted=2, covers=covered, change=change)
 
 
 def _turns_about(placed: Placed, parent: int, child: int, seen: FloatArray, axis: FloatArray) -> bool:
@@ -79,7 +79,15 @@ def _axes_at_start(evidence: Evidence) -> Iterator[Cause]:
         says = f"the joint {joint.name} was built with the axis {both}"
         remainder = float(np.max(np.delete(off, i), initial=0.0))
         yield Cause(
-            "joint axis", says, "joint axes at time 0", "1", float(np.max(off)), remainder, _REMEDY, 0, ("motion",)
+            id="joint axis",
+            says=says,
+            quantity="joint axes at time 0",
+            unit="1",
+            before=float(np.max(off)),
+            after=remainder,
+            remedy=_REMEDY,
+            fitted=0,
+            covers=("motion",),
         )
 
 
@@ -128,7 +136,16 @@ def axis_of_first_steps(evidence: Evidence) -> Iterator[Cause]:
         what = ("first motion and reactions, in tolerances,", "1", largest, left * largest)
         covered = ("motion", *COVERED)
         explains, change = int(np.sum(seen)), float(np.linalg.norm(axis_seen - axis))
-        yield Cause(f"axis of {joint.name}", says, *what, _REMEDY, 2, covered, explains=explains, change=change)
+        yield Cause(
+            f"axis of {joint.name}",
+            says,
+            *what,
+            remedy=_REMEDY,
+            fitted=2,
+            covers=covered,
+            explains=explains,
+            change=change,
+        )
 
 
 def _first(element: Any) -> dict[str, FloatArray]:
@@ -223,4 +240,14 @@ def loop_lacks_row(evidence: Evidence) -> Iterator[Cause]:
         says = f"the loop {loop.name} lacks {many}: it opens there freely, and holds less than a {loop.kind} joint"
         remedy = f"a {loop.kind} loop has {int(np.sum(of_loop))} rows; a point that is held gives three of them"
         covered = ("motion", *COVERED)
-        yield Cause("missing row", says, "opening of loops", "m", float(np.max(opened)), remainder, remedy, 0, covered)
+        yield Cause(
+            id="missing row",
+            says=says,
+            quantity="opening of loops",
+            unit="m",
+            before=float(np.max(opened)),
+            after=remainder,
+            remedy=remedy,
+            fitted=0,
+            covers=covered,
+        )

@@ -241,7 +241,7 @@ def _placed(element: MechanismElement, sampled: dict[str, npt.NDArray[Any]], tim
     q_WB = np.stack(
         [_orientations(grid, sampled["q_WB"][:, n], sampled["w_WB"][:, n], times) for n in range(p_WB.shape[1])], axis=1
     )
-    return Placed(element.mechanism, times, p_WB, v_WB, w_WB, q_WB)
+    return Placed(mechanism=element.mechanism, time=times, p_WB=p_WB, v_WB=v_WB, w_WB=w_WB, q_WB=q_WB)
 
 
 def _orientations(grid: FloatArray, q: FloatArray, w: FloatArray, times: FloatArray) -> FloatArray:
