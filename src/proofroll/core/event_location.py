@@ -165,8 +165,8 @@ def locate_rise_within(
     if halvings and np.any(~below & (left_out > _RESOLVED * np.abs(at_points).max(axis=0))):
         middle = (start + end) / 2
         rest = near, grazes, None, halvings - 1
-        first = locate_rise_within(guards, start, middle, noise, leaving, *rest)
-        return first or locate_rise_within(guards, middle, end, noise, False, *rest)
+        earliest = locate_rise_within(guards, start, middle, noise, leaving, *rest)
+        return earliest or locate_rise_within(guards, middle, end, noise, False, *rest)
     nearly = np.broadcast_to(near, below.shape)
     rises, crests = list[tuple[float, int]](), list[float]()
     for number in np.flatnonzero(np.logical_not(below)).tolist():

@@ -41,24 +41,24 @@ def strict(*types: type, finite: bool = False) -> None:
         setattr(kind, "__pydantic_config__", config)  # noqa: B010 -- the name is pydantic's
 
 
-def validated(kind: type[_T], content: Mapping[str, Any], place: str, **own: object) -> _T:
+def validated(kind: type[_T], content: Mapping[str, Any], place: str, **program_values: object) -> _T:
     """A dataclass filled with the content of a file, or of a table in it.
 
     Args:
         kind: the dataclass.
         content: key -> value.
         place: name of the file, for messages.
-        own: fields whose values the program knows; the file must not have them.
+        program_values: fields whose values the program knows; the file must not have them.
 
     Raises:
         InputError: the first mistake, with its location.
     """
-    for name in (name for name in content if name in own):
-        raise no_such_key(f"{place}: {name}", content[name], _keys(kind, (), own))
+    for name in (name for name in content if name in program_values):
+        raise no_such_key(f"{place}: {name}", content[name], _keys(kind, (), program_values))
     try:
-        content_of_kind: _T = _adapter(kind).validate_python({**content, **own})  # type: ignore[arg-type]  # any class can be hashed
+        content_of_kind: _T = _adapter(kind).validate_python({**content, **program_values})  # type: ignore[arg-type]  # any class can be hashed
     except ValidationError as error:
-        raise _first_problem(error, place, kind, content, own) from None
+        raise _first_problem(error, place, kind, content, program_values) from None
     except OverflowError:
         raise InputError(place, content, "a product or power of its numbers is too large; give smaller ones") from None
     for location, value in _booleans(content, content_of_kind):

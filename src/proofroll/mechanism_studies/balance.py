@@ -133,10 +133,10 @@ def balance(
         )
     truth = spectrum(InTree(equations, q))
     second = MaximalCoordinates(posed)
-    other = spectrum(Apart(second))
+    second_spectrum = spectrum(Apart(second))
     values = _values(posed, equations, q, second)
     eigenvalues = truth.eigenvalues
-    bar = apart(eigenvalues, other.eigenvalues)
+    bar = apart(eigenvalues, second_spectrum.eigenvalues)
     least = max(bar, 1e-6 * float(np.abs(eigenvalues).max(initial=0.0)))
     asked = list(engines) or able(_with(scene, element, posed))
     return Balance(
@@ -144,7 +144,7 @@ def balance(
         held=tuple(hold),
         freedom=analyse(posed).mobility,
         values=values,
-        eigenvalues=tuple((float(each.real), float(each.imag)) for each in eigenvalues),
+        eigenvalues=tuple((float(eigenvalue.real), float(eigenvalue.imag)) for eigenvalue in eigenvalues),
         eigenvalue_error=bar,
         stable=bool((eigenvalues.real <= least).all()),
         engines=tuple(
@@ -192,22 +192,24 @@ def _with(scene: Scene, element: MechanismElement, mechanism: Mechanism) -> Scen
 
 
 def _values(posed: Mechanism, equations: JointCoordinates, q: Array, second: MaximalCoordinates) -> tuple[Value, ...]:
-    one, other = equations.sample(q, np.zeros(posed.nv)), second.at_start()
-    found = []
-    for joint, at in zip(posed.joints, posed.q_slices, strict=True):
+    solution, second_solution = equations.sample(q, np.zeros(posed.nv)), second.at_start()
+    values = []
+    for joint, part in zip(posed.joints, posed.q_slices, strict=True):
         if joint.nq == 1:
             unit = "rad" if joint.kind == JointKind.REVOLUTE else "m"
-            found.append(Value(f"q.{joint.name}", unit, float(q[at.start]), 0.0))
-    for item, value, again in zip(named_forces(posed), one["named"], other.named[0], strict=True):
-        found.append(Value(item.name, str(item.unit), float(value), float(abs(value - again))))
-    known = analyse(posed).determinate
-    for connection, sure, row, again in zip(posed.connections, known, one["wrench"], other.wrench[0], strict=True):
+            values.append(Value(f"q.{joint.name}", unit, float(q[part.start]), 0.0))
+    for item, value, again in zip(named_forces(posed), solution["named"], second_solution.named[0], strict=True):
+        values.append(Value(item.name, str(item.unit), float(value), float(abs(value - again))))
+    determinate = analyse(posed).determinate
+    for connection, sure, row, again in zip(
+        posed.connections, determinate, solution["wrench"], second_solution.wrench[0], strict=True
+    ):
         for k, axis in enumerate("xyzxyz"):
             if sure[k] and connection.kind != JointKind.FREE:
                 kind, unit = ("force", "N") if k < 3 else ("torque", "N m")
                 bar = float(abs(row[k] - again[k]))
-                found.append(Value(f"{kind}.{connection.name}.{axis}", unit, float(row[k]), bar))
-    return tuple(found)
+                values.append(Value(f"{kind}.{connection.name}.{axis}", unit, float(row[k]), bar))
+    return tuple(values)
 
 
 class _InEngine:
@@ -226,9 +228,9 @@ class _InEngine:
         built = self._made(at_pose(self._mechanism, q, velocities)).built()
         if built.acceleration is None or built.angular_acceleration is None:
             raise Refused("it does not say what accelerations it has")
-        found = np.hstack([np.reshape(part, (-1, 3)) for part in (built.acceleration, built.angular_acceleration)])
+        reported = np.hstack([np.reshape(part, (-1, 3)) for part in (built.acceleration, built.angular_acceleration)])
         motion = self._tree.at(q, velocities)
-        off = (found - motion.bias[:-1]).ravel()
+        off = (reported - motion.bias[:-1]).ravel()
         return np.asarray(np.linalg.lstsq(motion.J[:-1].reshape(len(off), -1), off, rcond=None)[0])
 
 
@@ -255,30 +257,32 @@ def _asked(
         posed_element = replace(element, mechanism=posed)
         fields = {name: along(sample, name, count) for name, count in lengths(posed).items()}
         efforts = _off(pick_named(posed, fields), true["named"], np.ones(len(true["named"]), dtype=bool))
-        given = np.hstack([reactions(posed_element, sample, name) for name in ("joint_force", "joint_torque")])
-        force = _off(given, true["wrench"], analyse(posed).determinate)
+        wrench = np.hstack([reactions(posed_element, sample, name) for name in ("joint_force", "joint_torque")])
+        force = _off(wrench, true["wrench"], analyse(posed).determinate)
         place = _InEngine(made, mechanism, InTree(equations, q))
         try:
-            own = spectrum(place, _STEP)
+            engine_spectrum = spectrum(place, _STEP)
         except Refused:
             return _judged(EngineBalance(engine=text, efforts=efforts, reactions=force), tolerance, 0.0)
     except ProofrollError as error:
         return EngineBalance(engine=text, refused=str(error))
     size = float(np.abs(truth.eigenvalues).max(initial=0.0))
-    difference = apart(truth.eigenvalues, own.eigenvalues) / size if size else None
-    found = EngineBalance(engine=text, left=own.left, efforts=efforts, reactions=force, eigenvalues=difference)
+    difference = apart(truth.eigenvalues, engine_spectrum.eigenvalues) / size if size else None
+    answer = EngineBalance(
+        engine=text, left=engine_spectrum.left, efforts=efforts, reactions=force, eigenvalues=difference
+    )
     natural = max(float(np.linalg.norm(posed.gravity)), 1e-3)
-    return _judged(found, tolerance, own.left / natural)
+    return _judged(answer, tolerance, engine_spectrum.left / natural)
 
 
-def _off(given: Array, true: Array, counts: NDArray[np.bool_]) -> float | None:
+def _off(reported: Array, true: Array, counts: NDArray[np.bool_]) -> float | None:
     """Largest difference of the values that count, relative to the largest; None: the engine gives none of them."""
-    counts = counts & np.isfinite(given) & np.isfinite(true)
+    counts = counts & np.isfinite(reported) & np.isfinite(true)
     if not counts.any():
         return None
-    return float(np.abs(given - true)[counts].max() / (np.abs(true[counts]).max() or 1.0))
+    return float(np.abs(reported - true)[counts].max() / (np.abs(true[counts]).max() or 1.0))
 
 
-def _judged(found: EngineBalance, tolerance: float, left: float) -> EngineBalance:
-    differences = [item for item in (found.efforts, found.reactions, found.eigenvalues, left) if item is not None]
-    return replace(found, agrees=all(item <= tolerance for item in differences))
+def _judged(answer: EngineBalance, tolerance: float, left: float) -> EngineBalance:
+    differences = [item for item in (answer.efforts, answer.reactions, answer.eigenvalues, left) if item is not None]
+    return replace(answer, agrees=all(item <= tolerance for item in differences))

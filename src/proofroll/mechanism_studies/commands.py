@@ -59,7 +59,7 @@ def _parts(study: Balance) -> Iterator[Table | str]:
     values = Table(box=None, pad_edge=False)
     for heading in ("value", "", "unit", "±"):
         values.add_column(heading, justify="left" if heading in {"value", "unit"} else "right")
-    largest = {item.unit: max(abs(one.value) for one in study.values if one.unit == item.unit) for item in study.values}
+    largest = {item.unit: max(abs(row.value) for row in study.values if row.unit == item.unit) for item in study.values}
     for item in study.values:
         value = 0.0 if abs(item.value) < _FAINT * largest[item.unit] else item.value
         values.add_row(Text(item.name), f"{value:.8g}", item.unit, f"{item.error_bar:.1g}")
@@ -72,15 +72,15 @@ def _parts(study: Balance) -> Iterator[Table | str]:
     engines = Table(box=None, pad_edge=False)
     for heading in ("engine", "", "acceleration left", "efforts", "reactions", "eigenvalues"):
         engines.add_column(heading, justify="left" if heading in {"engine", ""} else "right", no_wrap=not heading)
-    for one in study.engines:
-        if one.refused:
+    for row in study.engines:
+        if row.refused:
             continue
-        numbers = (one.left, one.efforts, one.reactions, one.eigenvalues)
+        numbers = (row.left, row.efforts, row.reactions, row.eigenvalues)
         parts = ["–" if number is None else f"{number:.2g}" for number in numbers]
-        engines.add_row(Text(one.engine), "✓ agrees" if one.agrees else "✗ differs", *parts)
+        engines.add_row(Text(row.engine), "✓ agrees" if row.agrees else "✗ differs", *parts)
     if engines.row_count:
         yield engines
         yield "Differences are relative to the largest value of their kind; the acceleration is in m/s² or rad/s²."
-    for one in study.engines:
-        if one.refused:
-            yield f"{one.engine} is left out: {one.refused}"
+    for row in study.engines:
+        if row.refused:
+            yield f"{row.engine} is left out: {row.refused}"

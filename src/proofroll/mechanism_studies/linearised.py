@@ -73,15 +73,15 @@ class Apart:
     def accelerations(self, displaced: Array, velocities: Array) -> Array:
         """See :class:`Displaced`."""
         e, state = self._lean.equations, self._start.copy()
-        at = e.nx + e.nu
-        state[e.nx : at] = displaced
+        end = e.nx + e.nu
+        state[e.nx : end] = displaced
         turned = self._lean.solve(state).equations.angle_rate
         state[: e.nx] += self._lean.moving(state[: e.nx], displaced)
-        state[at:] += np.array(turned, dtype=float)
-        state[e.nx : at] = 0.0
+        state[end:] += np.array(turned, dtype=float)
+        state[e.nx : end] = 0.0
         for _ in range(3):
             state = self._lean.eliminated(state)
-        state[e.nx : at] = velocities
+        state[e.nx : end] = velocities
         return self._lean.solve(state).acceleration
 
 
@@ -119,9 +119,9 @@ def spectrum(place: Displaced, step: float = _STEP) -> Spectrum:
     return Spectrum(np.asarray(np.sort_complex(np.linalg.eigvals(matrix)), dtype=np.complex128), float(left))
 
 
-def apart(one: NDArray[np.complex128], other: NDArray[np.complex128]) -> float:
+def apart(eigenvalues: NDArray[np.complex128], second: NDArray[np.complex128]) -> float:
     """Largest distance between eigenvalues of two spectra that are paired closest [1/s]."""
-    distance = np.abs(one[:, None] - other[None, :])
+    distance = np.abs(eigenvalues[:, None] - second[None, :])
     return float(distance[linear_sum_assignment(distance)].max(initial=0.0))
 
 
@@ -170,5 +170,5 @@ def at_rest(equations: JointCoordinates) -> Array:
 
 def _natural(mechanism: Mechanism, equations: JointCoordinates, q: Array) -> float:
     """Size of accelerations without constraints [m/s², rad/s²]: gravity, or what acts at the pose."""
-    found = float(np.abs(equations.solve(q, np.zeros(mechanism.nv)).acceleration).max(initial=0.0))
-    return max(float(np.linalg.norm(mechanism.gravity)), found, 1e-9)
+    acceleration = float(np.abs(equations.solve(q, np.zeros(mechanism.nv)).acceleration).max(initial=0.0))
+    return max(float(np.linalg.norm(mechanism.gravity)), acceleration, 1e-9)

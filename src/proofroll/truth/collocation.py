@@ -98,7 +98,7 @@ def take(system: System, time: float, state: FloatArray, length: float, guess: F
     """Attempts one step from a time [s]; ``guess``: states at the nodes to start Newton's method from, shape (s, n)."""
     s, n = guess.shape
     values = guess
-    before, factors, grown = np.inf, None, 0
+    last_change, factors, grown = np.inf, None, 0
     for _ in range(_NEWTON):
         rates = system.rates(values)
         if factors is None:
@@ -113,16 +113,18 @@ def take(system: System, time: float, state: FloatArray, length: float, guess: F
         correction = lu_solve(factors, -residual.ravel(), check_finite=False).reshape(s, n)
         values = values + correction
         change = float(np.max(np.abs(correction) / system.scale))
-        if change < _ROUND_OFF or (change < 1e-11 and change > 0.3 * before):  # converged, or as far as round-off lets
+        if change < _ROUND_OFF or (
+            change < 1e-11 and change > 0.3 * last_change
+        ):  # converged, or as far as round-off lets
             coefficients = length * _TO_LEGENDRE @ system.rates(values) / system.scale
             # Two coefficients, as one alone may vanish by symmetry
             return Step(time, length, np.vstack([state, values]), float(np.max(np.abs(coefficients[-2:]))))
-        if change > 0.02 * before or (before == np.inf and change > _GOOD):
+        if change > 0.02 * last_change or (last_change == np.inf and change > _GOOD):
             factors = None
-        grown = grown + 1 if change > before else 0
+        grown = grown + 1 if change > last_change else 0
         if grown > 1:
             break
-        before = change
+        last_change = change
     return Step(time, length, np.vstack([state, guess]), np.inf)
 
 
@@ -136,8 +138,8 @@ def by_states(step: Step, scale: FloatArray) -> tuple[float, float]:
     if not np.isfinite(step.error):
         return np.inf, np.inf
     sizes = np.max(np.abs(_TO_LEGENDRE @ step.values[1:] / scale), axis=-1)
-    known = 2 + int(np.flatnonzero(sizes[2:] > _SEEN)[-1]) if np.any(sizes[2:] > _SEEN) else 1
-    decay = (sizes[known] / sizes[1]) ** (1 / (known - 1)) if known > 1 else 0.0
+    resolved = 2 + int(np.flatnonzero(sizes[2:] > _SEEN)[-1]) if np.any(sizes[2:] > _SEEN) else 1
+    decay = (sizes[resolved] / sizes[1]) ** (1 / (resolved - 1)) if resolved > 1 else 0.0
     return float(np.max(sizes[-2:])), float(sizes[1] * decay ** (_STAGES - 3))
 
 

@@ -41,34 +41,34 @@ class Story:
     states: Callable[[FloatArray], FloatArray]
 
 
-def in_common(first: Events, second: Events, pace: float, until: float) -> tuple[int, bool]:
+def in_common(events: Events, second_events: Events, pace: float, until: float) -> tuple[int, bool]:
     """Number of leading events that two routes share, and True if there are no others until ``until`` [s].
 
     ``pace`` is the time [s] in which the motion changes by its own scale.
     """
-    return _shared([first, second], pace, until, lambda times: abs(times[0] - times[1]) <= _SAME * pace)
+    return _shared([events, second_events], pace, until, lambda times: abs(times[0] - times[1]) <= _SAME * pace)
 
 
-def well_posed_events(own: Story, moved: Sequence[Story], pace: float, until: float) -> tuple[int, bool]:
+def well_posed_events(followed: Story, moved: Sequence[Story], pace: float, until: float) -> tuple[int, bool]:
     """Number of leading events that small changes of the parameters keep, and True if the whole motion is well-posed.
 
     ``moved`` holds the stories with decreased and with increased parameters. States between events are compared too:
     friction that an impact just uses up makes no event of its own.
     """
-    stories = [own, *moved]
+    stories = [followed, *moved]
     number, alike = _shared(
         [story.events for story in stories], pace, until, lambda times: _uneven(*times) <= _SAME * pace
     )
-    knots = np.array([0.0, *(time for _, time in own.events[:number]), *([until] if alike else [])])
+    knots = np.array([0.0, *(time for _, time in followed.events[:number]), *([until] if alike else [])])
     between = knots[:-1] + _BETWEEN * np.diff(knots)
     off = np.max(_uneven(*(story.states(between) for story in stories)), axis=-1) > _UNEVEN
     off &= np.diff(knots) > 0  # simultaneous events have nothing between them, and one of them may be an impact
     return (int(np.argmax(off)), False) if np.any(off) else (number, alike)
 
 
-def _uneven(own: Any, less: Any, more: Any) -> Any:
+def _uneven(value: Any, less: Any, more: Any) -> Any:
     """Second difference: deviation of a response to a decrease and an increase from a linear one."""
-    return np.abs(less + more - 2 * own)
+    return np.abs(less + more - 2 * value)
 
 
 def _shared(

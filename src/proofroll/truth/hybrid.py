@@ -201,7 +201,7 @@ def follow(
         since = since + 1 if since or change.margin < close else 0
         if change.mode is None or since > _BEYOND:
             return HybridPath(tuple(stretches), tuple(happenings), tuple(margins), known=False)
-        end = next((at for at in breaks if time < at < until), until)
+        end = next((corner for corner in breaks if time < corner < until), until)
         try:
             stretch = route.walk(time, change.state, change.mode, end)
         except (Diverged, Refused) as error:
@@ -267,8 +267,8 @@ def _narrows(stretches: Sequence[Span]) -> bool:
     starts = np.array([stretch.first[:-1] for stretch in stretches if isinstance(stretch, Stretch)])
     if not len(starts):
         return False
-    first, second = (np.linalg.norm(np.ptp(half, axis=0)) for half in np.array_split(starts, 2))
-    return bool(second < _SHRUNK * first)
+    early, late = (np.linalg.norm(np.ptp(half, axis=0)) for half in np.array_split(starts, 2))
+    return bool(late < _SHRUNK * early)
 
 
 def integrate_to_guard(
@@ -330,8 +330,8 @@ def states_at(
     steps, rtol = [visited[max(int(k), 0)] for k in starts], float(np.min(tolerance))
     return np.array(
         [
-            law.corrected(integrated_to(lambda _, y: law.rates(y), at, y, t, rtol, tolerance))
-            for t, (at, y) in zip(times.tolist(), steps, strict=True)
+            law.corrected(integrated_to(lambda _, y: law.rates(y), begin, y, t, rtol, tolerance))
+            for t, (begin, y) in zip(times.tolist(), steps, strict=True)
         ]
     )
 
@@ -340,9 +340,9 @@ def states_of(
     route: HybridRoute[ModeT], path: HybridPath[Stretch[ModeT]], times: FloatArray, stretches: Sequence[int]
 ) -> FloatArray:
     """States at rising times [s], each within the stretch of the given index or at its end, shape (times, state)."""
-    at, ends = np.asarray(stretches), np.array([path.stretches[number].end for number in stretches])
+    indices, ends = np.asarray(stretches), np.array([path.stretches[number].end for number in stretches])
     within = np.minimum(times, ends)  # beyond the end of a path that is not known further, rates may be of any size
-    parts = [route.within(path.stretches[number], within[at == number]) for number in sorted(set(stretches))]
+    parts = [route.within(path.stretches[number], within[indices == number]) for number in sorted(set(stretches))]
     return np.concatenate(parts)
 
 

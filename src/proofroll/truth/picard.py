@@ -75,12 +75,12 @@ class PicardSteps:
             Diverged: no length is short enough.
         """
         scale = np.maximum(1.0, np.abs(state))[:, None]
-        first = self._rates(state[:, None])
-        length = self._length or _first_length(first, scale)
+        rates = self._rates(state[:, None])
+        length = self._length or _first_length(rates, scale)
         for _ in range(_TRIED):
             length = min(length, until - time)
             end = until if length == until - time else time + length
-            values, error, longer = self._solved(state[:, None], first, scale, length)
+            values, error, longer = self._solved(state[:, None], rates, scale, length)
             if error <= _LEFT_OUT:
                 if end < until or self._length is None:
                     self._length = length * longer
@@ -92,14 +92,14 @@ class PicardSteps:
         raise Diverged(f"the step size fell to nothing at t = {time:.6g} s")
 
     def _solved(
-        self, state: FloatArray, first: FloatArray, scale: FloatArray, length: float
+        self, state: FloatArray, rates: FloatArray, scale: FloatArray, length: float
     ) -> tuple[FloatArray, float, float]:
         """Rates at the nodes of a step, the relative size of what its polynomial leaves out, and change of the length.
 
         That size is inf if there is no solution.
         """
-        before, least = np.inf, np.inf
-        states = state + length / 2 * (np.repeat(first, _STAGES, axis=1) @ _TO_NODES)
+        last_change, least = np.inf, np.inf
+        states = state + length / 2 * (np.repeat(rates, _STAGES, axis=1) @ _TO_NODES)
         for count in range(_ITERATIONS):
             values = self._rates(states)
             if not np.isfinite(values).all():
@@ -107,12 +107,12 @@ class PicardSteps:
             moved = state + length / 2 * (values @ _TO_NODES)
             change = float((np.abs(moved - states) / scale).max())
             states = moved
-            if change <= _SETTLED or (change < 1e-13 and change > 0.5 * before):
+            if change <= _SETTLED or (change < 1e-13 and change > 0.5 * last_change):
                 sizes = (np.abs(values @ _TO_COEFFICIENTS) * length / scale).max(axis=0)
                 return self._rates(states), *_left_out(sizes, count)
             if count > _SLOW and change > least:
                 break
-            before, least = change, min(least, change)
+            last_change, least = change, min(least, change)
         return values, np.inf, 0.5
 
 

@@ -66,9 +66,9 @@ def certify(body: RollingBall, built: BallBuilt, sample: BallSample) -> list[Lin
     spin = max(float(np.linalg.norm(body.w0)), speed / body.ball.radius)
     lines: list[Line] = []
 
-    def compare(quantity: str, unit: str, expected: Any, found: Any, scale: float, required: bool = False) -> None:
+    def compare(quantity: str, unit: str, expected: Any, reported: Any, scale: float, required: bool = False) -> None:
         want = np.atleast_1d(np.asarray(expected, float))
-        if found is None and not required:
+        if reported is None and not required:
             lines.append(
                 Line(
                     quantity=quantity,
@@ -80,7 +80,7 @@ def certify(body: RollingBall, built: BallBuilt, sample: BallSample) -> list[Lin
                 )
             )
             return
-        got = np.atleast_1d(np.asarray(np.nan if found is None else found, float))
+        got = np.atleast_1d(np.asarray(np.nan if reported is None else reported, float))
         difference = float(np.max(np.abs(got - want))) / scale if got.shape == want.shape else np.inf
         difference = difference if np.isfinite(difference) else float("inf")
         cap = _LIFTED if quantity in _DYNAMICS and np.any(body.slip0) else CAPS.get(quantity)
@@ -103,15 +103,15 @@ def certify(body: RollingBall, built: BallBuilt, sample: BallSample) -> list[Lin
     compare("ball radius", "m", body.ball.radius, built.ball_radius, body.ball.radius)
     f = body.contact.rolling_resistance
     compare("rolling resistance", "m", f, built.rolling_resistance, f or body.ball.radius, required=f > 0)
-    for name, expected, found in (
+    for name, expected, reported in (
         ("static friction", body.contact.mu_static, built.mu_static),
         ("kinetic friction", body.contact.mu_kinetic, built.mu_kinetic),
     ):
         bounded = np.isfinite(expected)
         if bounded:
-            compare(name, "1", expected, found, expected or 1.0, required=True)
-        elif found is not None:  # compared by its inverse, which is 0 for unbounded friction
-            compare(f"1 / {name}", "1", 0.0, 1 / found if found else np.inf, 1.0)
+            compare(name, "1", expected, reported, expected or 1.0, required=True)
+        elif reported is not None:  # compared by its inverse, which is 0 for unbounded friction
+            compare(f"1 / {name}", "1", 0.0, 1 / reported if reported else np.inf, 1.0)
     # Position is compared along the wall; distance from the wall is the gap.
     below = body.surface.position(body.surface.locate(sample.p_WB))
     compare("position", "m", body.surface.position(body.u0), below, body.ball.radius)
@@ -140,7 +140,9 @@ def _expected(body: RollingBall, built: BallBuilt) -> tuple[FloatArray, FloatArr
     assumed, reported = body, built.acceleration
     if resistance_undirected(body, body.v0) and reported is not None:
         free = dataclasses.replace(body, contact=dataclasses.replace(body.contact, rolling_resistance=0.0))
-        assumed = min((body, free), key=lambda one: float(np.linalg.norm(initial_response(one)[0] - reported)))
+        assumed = min(
+            (body, free), key=lambda candidate: float(np.linalg.norm(initial_response(candidate)[0] - reported))
+        )
     return *initial_response(assumed), initial_angular_acceleration(assumed)
 
 

@@ -92,7 +92,8 @@ class BallOnSurface:
             needs.add(BallCapability.ROLLING_RESISTANCE)
         if math.isfinite(self.contact.mu_static):
             needs.add(BallCapability.BOUNDED_FRICTION)
-        flat = self.surface.generators is not None and all(one.kind == "translation" for one in self.surface.generators)
+        generators = self.surface.generators
+        flat = generators is not None and all(generator.kind == "translation" for generator in generators)
         if not flat:
             needs.add(BallCapability.CURVED_SURFACE)
         if np.any(self.rolling.slip0):
@@ -118,9 +119,9 @@ class BallOnSurface:
         """Sentences on centre, velocity, normal force, and whether the ball rolls, slips, rests or leaves at once."""
         body = self.rolling
         named = zip(body.wall.coordinates, body.u0.tolist(), body.wall.units, strict=True)
-        at = ", ".join(f"{name} = {value:.4g}{'' if unit == '1' else f' {unit}'}" for name, value, unit in named)
+        place = ", ".join(f"{name} = {value:.4g}{'' if unit == '1' else f' {unit}'}" for name, value, unit in named)
         sentences = [
-            f"{body.ball.name}: centre at {vector(body.p0)} m in the world ({at}), velocity {vector(body.v0)} m/s, "
+            f"{body.ball.name}: centre at {vector(body.p0)} m in the world ({place}), velocity {vector(body.v0)} m/s, "
             f"spin {vector(body.w0)} rad/s"
         ]
         if body.gap0:
@@ -155,10 +156,10 @@ class BallOnSurface:
         w0 = self.start.spin * frame[:, 0] - np.cross(frame[:, 0], v0 - carried) / self.ball.radius
         slip0 = np.zeros(3)
         if self.start.tangential_spin is not None:
-            given = frame @ (self.start.spin, *self.start.tangential_spin)
-            slip = self.ball.radius * np.cross(given - w0, frame[:, 0])
+            spin = frame @ (self.start.spin, *self.start.tangential_spin)
+            slip = self.ball.radius * np.cross(spin - w0, frame[:, 0])
             if np.linalg.norm(slip) > _ROUND_OFF * np.linalg.norm(v0):
-                w0, slip0 = given, np.zeros(3) if self.start.gap else slip
+                w0, slip0 = spin, np.zeros(3) if self.start.gap else slip
         return RollingBall(
             ball=self.ball,
             contact=self.contact,

@@ -56,17 +56,17 @@ class Watch:
 
     def conclude(self, times: FloatArray, samples: Sequence[BallSample], located: Sequence[Event] | None) -> SeenInRun:
         """Events of the run, number of samples that belong to the scene, and the reason if the run ends early."""
-        at, kept, ended = times.tolist(), len(samples), None
+        instants, kept, ended = times.tolist(), len(samples), None
         events = list(located or ())
         left = next((event for event in events if event.kind == EventKind.LIFT_OFF), None)
         if self._leaves:
             pressed = [self._press(sample) for sample in samples]
-            if left is None and (left := lift_off(at[:kept], pressed, self._faint)) is not None:
+            if left is None and (left := lift_off(instants[:kept], pressed, self._faint)) is not None:
                 events.append(left)
             if pressed[-1] < -self._faint and kept > 1:
                 kept -= 1
             # Not where it fails later, in flight
-            if left is not None and kept < len(at) and left.time_high >= at[kept - 1]:
+            if left is not None and kept < len(instants) and left.time_high >= instants[kept - 1]:
                 when = f"at t = {left.time:.6g} s"
                 if left.time_high - left.time_low > _TOLD * left.time_high:
                     when = f"between t = {left.time_low:.6g} s and {left.time_high:.6g} s"
@@ -74,11 +74,11 @@ class Watch:
         sticking = [sample.sticking for sample in samples[:kept]]
         if any(value is None for value in sticking):
             return SeenInRun(kept, [left] if left is not None else None, ended)
-        if located is None or contradicted(at, sticking, events):
+        if located is None or contradicted(instants, sticking, events):
             events = [event for event in events if event.kind not in _SWITCHES]
-            slides = located is None and not sticking[0] and at[0] == 0 and bool(np.any(self._body.slip0))
+            slides = located is None and not sticking[0] and instants[0] == 0 and bool(np.any(self._body.slip0))
             begun = [Event(EventKind.SLIP, 0.0, 0.0, 0.0)] if slides else []
-            events = [*begun, *between_samples(at, [bool(value) for value in sticking]), *events]
+            events = [*begun, *between_samples(instants, [bool(value) for value in sticking]), *events]
         return SeenInRun(kept, sorted(events, key=lambda event: event.time), ended)
 
     def bounces(self, columns: Columns) -> Sequence[Bounce]:
@@ -103,9 +103,13 @@ def contradicted(times: Sequence[float], sticking: Sequence[bool | None], events
     for t, sticks in zip(times, sticking, strict=False):
         if any(event.time_low <= t <= event.time_high for event in switches):
             continue
-        before, after = [e for e in switches if e.time_high < t], [e for e in switches if e.time_low > t]
+        earlier, later = [e for e in switches if e.time_high < t], [e for e in switches if e.time_low > t]
         expected = (
-            before[-1].kind == EventKind.STICK if before else after[0].kind == EventKind.SLIP if after else sticking[0]
+            earlier[-1].kind == EventKind.STICK
+            if earlier
+            else later[0].kind == EventKind.SLIP
+            if later
+            else sticking[0]
         )
         if t < until and bool(sticks) != expected:
             return True
@@ -115,9 +119,9 @@ def contradicted(times: Sequence[float], sticking: Sequence[bool | None], events
 def between_samples(times: Sequence[float], sticking: Sequence[bool]) -> list[Event]:
     """Slip and stick events between consecutive samples [s] that differ in sticking."""
     return [
-        Event(EventKind.STICK if after else EventKind.SLIP, 0.5 * (low + high), low, high)
-        for before, after, low, high in zip(sticking, sticking[1:], times, times[1:], strict=False)
-        if before != after
+        Event(EventKind.STICK if sticks else EventKind.SLIP, 0.5 * (low + high), low, high)
+        for stuck, sticks, low, high in zip(sticking, sticking[1:], times, times[1:], strict=False)
+        if stuck != sticks
     ]
 
 
@@ -137,8 +141,8 @@ def lift_off(times: Sequence[float], N: Sequence[float], faint: float) -> Event 
             pressed = index
         elif N[index] < -faint or times[index] - times[pressed + 1] >= _FLIGHT * (1 - 1e-9):
             low, high = times[pressed], times[pressed + 1]
-            before, after = N[pressed], N[pressed + 1]
-            part = before / (before - after) if after < 0 < before else 0.5
+            last_force, next_force = N[pressed], N[pressed + 1]
+            part = last_force / (last_force - next_force) if next_force < 0 < last_force else 0.5
             return Event(EventKind.LIFT_OFF, low + part * (high - low), low, high)
     return None
 
@@ -166,9 +170,9 @@ def common_span(truth: xr.Dataset, runs: Mapping[Key, xr.Dataset]) -> tuple[xr.D
     def cut(dataset: xr.Dataset) -> xr.Dataset:
         short = dataset.isel(time=slice(count))
         prefixes = (("time", ""), ("between", "between."))
-        there = [(start + name, at) for at, start in prefixes for name in _ON_WALL if start + name in short]
+        there = [(start + name, axis) for axis, start in prefixes for name in _ON_WALL if start + name in short]
         on_wall = {
-            name: short[name].where(short[at] < until, 0.0).assign_attrs(short[name].attrs) for name, at in there
+            name: short[name].where(short[axis] < until, 0.0).assign_attrs(short[name].attrs) for name, axis in there
         }
         return short.assign(on_wall)
 

@@ -67,8 +67,8 @@ def signs(body: RollingBall, dataset: xr.Dataset, truth: xr.Dataset | None) -> l
         }
     if truth is not None and body.contact.rolling_resistance > 0:
         v = dataset["v_WB"].to_numpy()
-        along = np.sum(v * heading(truth["v_WB"].to_numpy())[: len(v)], axis=-1)
-        shown[REVERSED] = along < -BACKWARDS * float(np.linalg.norm(body.v0))
+        forward_speed = np.sum(v * heading(truth["v_WB"].to_numpy())[: len(v)], axis=-1)
+        shown[REVERSED] = forward_speed < -BACKWARDS * float(np.linalg.norm(body.v0))
     return [Sign(name, values) for name, values in shown.items()]
 
 

@@ -64,9 +64,9 @@ def program(body: RollingBall, failed: FailedRun, engine: str | None) -> str:
     """Text of the program; see :class:`proofroll.core.element_abilities.WritesPrograms`."""
     truth, part = failed.truth, engine if engine is not None else through_proofroll(body, failed)
     generators = body.surface.generators
-    along = None if generators is None else generators[-1]
+    generator = None if generators is None else generators[-1]
     true: list[float] = []
-    if truth is not None and along is not None and along.kind == "translation":
+    if truth is not None and generator is not None and generator.kind == "translation":
         true = (truth[body.surface.coordinates[-1]].to_numpy() - body.u0[-1]).tolist()
     rolls = [] if truth is None or "sticking" not in truth else [int(value) for value in truth["sticking"].to_numpy()]
     resists = truth is not None and body.contact.rolling_resistance > 0
@@ -77,7 +77,7 @@ def program(body: RollingBall, failed: FailedRun, engine: str | None) -> str:
         "GAIN": GAIN,
         "SLIPPED": SLIPPED,
         "BACKWARDS": BACKWARDS,
-        "ALONG": list(along.axis) if along else [0.0, 0.0, 0.0],
+        "ALONG": list(generator.axis) if generator else [0.0, 0.0, 0.0],
         "TRUE": true,
         "ROLLS": rolls,
         "HEADING": ways,

@@ -65,12 +65,12 @@ class BallOnSurfaceKind:
                 raise InputError(
                     f"{where}: initial", contact.body, "say how this ball starts; add an [[initial]] of it"
                 )
-            if any(contact.body == other.body for other in contents.contacts[:index]):
+            if any(contact.body == earlier.body for earlier in contents.contacts[:index]):
                 raise InputError(f"{where}: contacts.{index}.body", contact.body, "a ball touches one surface")
-            ball, surface, (at, start) = balls[contact.body], surfaces[contact.surface], starts[contact.body]
+            ball, surface, (number, start) = balls[contact.body], surfaces[contact.surface], starts[contact.body]
             # Only with the surface are the units of its coordinates known.
-            coordinates = tables["initial"][at].get("coordinates", [])
-            numbers.filled(coordinates, f"{where}: initial.{at}.coordinates", {}, surface.units)
+            coordinates = tables["initial"][number].get("coordinates", [])
+            numbers.filled(coordinates, f"{where}: initial.{number}.coordinates", {}, surface.units)
             try:
                 elements.append(
                     BallOnSurface(ball=ball, surface=surface, contact=contact, start=start, gravity=gravity)
@@ -129,22 +129,22 @@ def _with_tilt(scene: Scene, gamma: float, tilt: float, **motion: Any) -> Scene:
     return scene_with(scene, start=start, surface=dataclasses.replace(cast(Any, element.surface), tilt=tilt))
 
 
-def _check_names(found: BallTables, where: str) -> None:
+def _check_names(tables: BallTables, place: str) -> None:
     """Raises InputError unless contacts and starts name balls and surfaces of the file, and all names are unique."""
-    balls, surfaces = [ball.name for ball in found.balls], [surface.name for surface in found.surfaces]
+    balls, surfaces = [ball.name for ball in tables.balls], [surface.name for surface in tables.surfaces]
     for kind, names in (("balls", balls), ("surfaces", surfaces)):
         for index, name in enumerate(names):
             if name in names[:index]:
-                raise InputError(f"{where}: {kind}.{index}.name", name, "two have this name; give each its own")
-    for kind, items in (("contacts", found.contacts), ("initial", found.initial)):
+                raise InputError(f"{place}: {kind}.{index}.name", name, "two have this name; give each its own")
+    for kind, items in (("contacts", tables.contacts), ("initial", tables.initial)):
         for index, item in enumerate(items):
-            for key, known in (("body", balls), ("surface", surfaces)):
+            for key, known_names in (("body", balls), ("surface", surfaces)):
                 named = getattr(item, key, None)
                 if named is not None:
-                    require_known(f"{where}: {kind}.{index}.{key}", named, known)
-    for index, contact in enumerate(found.contacts):
-        ball, wall = found.balls[balls.index(contact.body)], found.surfaces[surfaces.index(contact.surface)]
+                    require_known(f"{place}: {kind}.{index}.{key}", named, known_names)
+    for index, contact in enumerate(tables.contacts):
+        ball, wall = tables.balls[balls.index(contact.body)], tables.surfaces[surfaces.index(contact.surface)]
         try:
             wall.offset(ball.radius)
         except InputError as error:
-            raise error.within(f"{where}: contacts.{index}", contact.body) from None
+            raise error.within(f"{place}: contacts.{index}", contact.body) from None

@@ -140,8 +140,8 @@ def observe(body: RollingBall, dataset: xr.Dataset) -> dict[str, FloatArray]:
     if dataset.sizes["time"] > 2 * (DEGREE + 1) + 2 * ENDS:
         # The energy that impacts dissipate is unknown.
         dissipates = body.contact.rolling_resistance or body.wall_rate is not None or "sticking" in dataset
-        known = whole or not dissipates
-        if known and not body.flies:
+        balanced = whole or not dissipates
+        if balanced and not body.flies:
             curves["energy_balance"] = energy_balance(body, dataset)
         if whole:
             audited = force_audit(body, dataset)
@@ -196,12 +196,12 @@ def energy_balance(body: RollingBall, dataset: xr.Dataset) -> FloatArray:
     dataset = _with_forces(dataset)
     balance = dataset["energy"].to_numpy() - float(dataset["energy"][0])
     t, f = dataset["time"].to_numpy(), body.contact.rolling_resistance
-    at, few = np.zeros(0), np.zeros(0)
+    between, few = np.zeros(0), np.zeros(0)
     if BETWEEN in dataset:
-        at = dataset[BETWEEN].to_numpy()
+        between = dataset[BETWEEN].to_numpy()
         few = energy(body, *(dataset[f"{BETWEEN}.{name}"].to_numpy() for name in ("p_WB", "v_WB", "w_WB")))
         few = few - float(dataset["energy"][0])
-        at, few = at[at > t[0]], few[at > t[0]]
+        between, few = between[between > t[0]], few[between > t[0]]
     bounded = "sticking" in dataset
     power, rests = np.zeros_like(t), False
     if f:
@@ -221,7 +221,7 @@ def energy_balance(body: RollingBall, dataset: xr.Dataset) -> FloatArray:
 
         # Power has kinks where slip begins or ends and where the ball stops; a smooth spline would ring there.
         work = make_interp_spline(t, power, k=1 if bounded or rests else DEGREE).antiderivative()
-        balance, few = balance + work(t) - work(t[0]), few + work(at) - work(t[0])
+        balance, few = balance + work(t) - work(t[0]), few + work(between) - work(t[0])
     return np.concatenate([balance, few])
 
 
@@ -259,11 +259,11 @@ def _joined(audited: Iterable[FloatArray]) -> FloatArray:
 def _audited(body: RollingBall, dataset: xr.Dataset) -> FloatArray:
     """Audit of forces in a stretch without events [N]: on the grid but for its ends, then off it."""
 
-    def apart(given: Mapping[str, FloatArray], at: FloatArray) -> FloatArray:
-        u, acceleration = accelerations(body.surface, dataset, at)
+    def apart(columns: Mapping[str, FloatArray], instants: FloatArray) -> FloatArray:
+        u, acceleration = accelerations(body.surface, dataset, instants)
         force = body.ball.mass * (acceleration - body.gravity)
         local = np.einsum("tij,ti->tj", body.surface.frame(u), force) * [-1.0, 1.0, 1.0]
-        reported = np.stack([given[name] for name in _FORCES], axis=-1)
+        reported = np.stack([columns[name] for name in _FORCES], axis=-1)
         return np.asarray(np.max(np.abs(reported - local), axis=-1))
 
     t, (few, between) = dataset["time"].to_numpy(), _off_grid(dataset)
@@ -282,8 +282,8 @@ def _rates_audited(body: RollingBall, dataset: xr.Dataset) -> FloatArray:
 
     def apart(times: FloatArray, v_WB: FloatArray) -> FloatArray:
         moving = np.einsum("tij,tj->ti", surface.tangents(curve(times)), rate(times))
-        along = np.einsum("tij,ti->tj", surface.frame(curve(times))[..., 1:], v_WB - moving)
-        return np.asarray(np.linalg.norm(along, axis=-1))
+        tangential = np.einsum("tij,ti->tj", surface.frame(curve(times))[..., 1:], v_WB - moving)
+        return np.asarray(np.linalg.norm(tangential, axis=-1))
 
     audit = apart(t, dataset["v_WB"].to_numpy())[ENDS:-ENDS]
     if "q_WB" in dataset:
@@ -328,5 +328,5 @@ def _apart(q_WB: FloatArray, times: tuple[FloatArray, FloatArray], spin: tuple[F
     """
     from scipy.spatial.transform import Rotation
 
-    before, after = (Rotation.from_quat(each, scalar_first=True) for each in q_WB)
-    return np.asarray((after * carried(before, *spin, _SUBSTEPS, times).inv()).magnitude())
+    start, end = (Rotation.from_quat(quaternions, scalar_first=True) for quaternions in q_WB)
+    return np.asarray((end * carried(start, *spin, _SUBSTEPS, times).inv()).magnitude())

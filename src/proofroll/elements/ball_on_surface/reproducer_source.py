@@ -55,8 +55,8 @@ def cut_program(
         raise Refused("programs are written only for walls that slide along themselves")
     uses = {*uses, "triad", "nearby", "surface"}
     cut = CutOut([*wanted, type(body.surface)], uses, instead)
-    given = f"\n\nBODY = {cut.literal(body)}\nSETTINGS = {cut.literal(settings)}\n"
-    return f"{cut.head}\n{assignment(**ball_numbers(body), **values)}\n\n{cut.text}{given}{WALL}{run}"
+    constants = f"\n\nBODY = {cut.literal(body)}\nSETTINGS = {cut.literal(settings)}\n"
+    return f"{cut.head}\n{assignment(**ball_numbers(body), **values)}\n\n{cut.text}{constants}{WALL}{run}"
 
 
 def ball_numbers(body: RollingBall) -> dict[str, float | FloatArray]:

@@ -75,6 +75,6 @@ def carried(
     begin, end = (t[:-1], t[1:]) if spans is None else spans
     spin, h = make_interp_spline(t, w_WB, k=min(DEGREE, len(t) - 1)), (end - begin)[:, None] / substeps
     for step in range(substeps):
-        one, two = (spin(begin + (step + 0.5 + side / np.sqrt(12)) * h[:, 0]) for side in (-1, 1))
-        start = Rotation.from_rotvec(h * (one + two) / 2 - np.sqrt(3) / 12 * h**2 * np.cross(one, two)) * start
+        early, late = (spin(begin + (step + 0.5 + side / np.sqrt(12)) * h[:, 0]) for side in (-1, 1))
+        start = Rotation.from_rotvec(h * (early + late) / 2 - np.sqrt(3) / 12 * h**2 * np.cross(early, late)) * start
     return start

@@ -74,7 +74,7 @@ def _check_inertia(mechanism: Mechanism, M: Array, C: Array) -> None:
         way = allowed @ vectors[:, 0] / size
         still = np.abs(way) > _PART * np.abs(way).max()
         joints = zip(mechanism.joints, mechanism.v_slices, strict=True)
-        names = ", ".join(joint.name for joint, at in joints if still[at].any())
+        names = ", ".join(joint.name for joint, columns in joints if still[columns].any())
         advice = "can move so that nothing with inertia does; give a body that they move mass and moments, or fix one"
         raise InputError("joints", names, advice)
 
@@ -114,8 +114,8 @@ def check_start(mechanism: Mechanism) -> None:
     near = CLOSED * extent(mechanism, motion) + away
     for spring in mechanism.springs:
         ends = ((spring.body_a, spring.position_a), (spring.body_b, spring.position_b))
-        one, two = (tree.point(motion, body, np.array(place))[0] for body, place in ends)
-        if np.linalg.norm(two - one) <= near:
+        end_a, end_b = (tree.point(motion, body, np.array(place))[0] for body, place in ends)
+        if np.linalg.norm(end_b - end_a) <= near:
             advice = "its ends are at one place at the start, so that it has no direction; move one"
             raise InputError(f"springs.{spring.name}", f"{spring.body_a} to {spring.body_b}", advice)
     for number, loop in enumerate(mechanism.loops):
@@ -138,17 +138,17 @@ def check_start(mechanism: Mechanism) -> None:
     _check_inertia(mechanism, equations.inertial(motion)[1], rows.C)
     _check_motions(mechanism, rows)
     with np.errstate(all="ignore"):  # the line below says it
-        found = equations.solve(q, v, ("free",) * len(equations.switched)).acceleration
-    if not np.isfinite(found).all():
+        acceleration = equations.solve(q, v, ("free",) * len(equations.switched)).acceleration
+    if not np.isfinite(acceleration).all():
         advice = "forces, gains or velocities are too large to be computed with"
         raise InputError("accelerations", "infinite", advice)
 
 
 def _check_motions(mechanism: Mechanism, rows: Rows) -> None:
     """Raises InputError if a prescribed motion already follows from the loops and the motions before it."""
-    first = len(rows.C) - rows.moved
-    rank = rank_of(singular_values(rows.C[:first]))
-    for number, (joint, _, _) in enumerate(mechanism.prescribed, first + 1):
+    first_row = len(rows.C) - rows.moved
+    rank = rank_of(singular_values(rows.C[:first_row]))
+    for number, (joint, _, _) in enumerate(mechanism.prescribed, first_row + 1):
         if rank_of(singular_values(rows.C[:number])) == rank:
             advice = "loops, couplings and other motions already decide this joint; remove one motion"
             raise InputError(f"joints.{joint.name}.motion", str(joint.motion), advice)

@@ -68,14 +68,14 @@ def _require_readable(built: MechanismBuilt, nv: int) -> None:
 def certify(element: MechanismElement, built: MechanismBuilt, sample: MechanismSample) -> list[Line]:
     """Lines that compare what was built, and the sample at time 0, with the mechanism; a missing value has one too."""
     _require_readable(built, element.mechanism.nv)
-    mechanism, start, found = element.mechanism, element.start, element.first_motion
+    mechanism, start, motion = element.mechanism, element.start, element.first_motion
     lines: list[Line] = []
 
-    def compare(quantity: str, unit: str, expected: Any, given: Any, scale: float) -> None:
+    def compare(quantity: str, unit: str, expected: Any, reported: Any, scale: float) -> None:
         want = np.asarray(expected, dtype=np.float64)
         if want.size and np.all(np.isnan(want)):
             return  # nothing is known: a line would pass without any comparison
-        if given is None or np.all(np.isnan(given)):
+        if reported is None or np.all(np.isnan(reported)):
             lines.append(
                 Line(
                     quantity=quantity,
@@ -87,17 +87,17 @@ def certify(element: MechanismElement, built: MechanismBuilt, sample: MechanismS
                 )
             )
             return
-        got = np.asarray(given, dtype=np.float64)
+        got = np.asarray(reported, dtype=np.float64)
         if len(mechanism.bodies) == 1 and got.size == want.size:
             got = got.reshape(want.shape)  # of one body the index may be left out
-        known = ~np.isnan(want) & ~np.isnan(got) if got.shape == want.shape else np.zeros(0, dtype=bool)
-        difference = float(np.max(np.abs(got - want)[known], initial=0.0)) / scale if known.size else float("inf")
+        finite = ~np.isnan(want) & ~np.isnan(got) if got.shape == want.shape else np.zeros(0, dtype=bool)
+        difference = float(np.max(np.abs(got - want)[finite], initial=0.0)) / scale if finite.size else float("inf")
         soft = built.regularised.get(quantity.replace(" ", "_"))
         if soft is None and quantity in _FORCES:  # as soft as what they accelerate
-            soft = max(built.regularised.values(), key=lambda one: one.tolerance, default=None)
+            soft = max(built.regularised.values(), key=lambda softness: softness.tolerance, default=None)
         tolerance, because = tolerated(soft, CAPS.get(quantity), *_ROUGH.get(quantity, (COMPOSED, _COMPOSED)))
-        own = scale if "acceleration" in quantity else found.scale
-        noise = _MARGIN * element.noise / own if quantity in _FROM_ACCELERATIONS else 0.0
+        unit_scale = scale if "acceleration" in quantity else motion.scale
+        noise = _MARGIN * element.noise / unit_scale if quantity in _FROM_ACCELERATIONS else 0.0
         tolerance, because = max((tolerance, because), (noise, _NOISY))
         roundings = max(ROUNDINGS, noise / EPSILON["double"])
         expected, numbers = tuple(np.ravel(want).tolist()), tuple(np.ravel(got).tolist())
@@ -135,10 +135,10 @@ def certify(element: MechanismElement, built: MechanismBuilt, sample: MechanismS
         turned = np.reshape(sample.q_WB, start.q_WB[0].shape)
         signs = np.sign(np.sum(turned * start.q_WB[0], axis=-1, keepdims=True))
         compare("orientation", "1", start.q_WB[0], turned * signs, 1.0)
-    compare("acceleration", "m/s^2", found.acceleration, _first(element, built, "acceleration"), found.scale)
+    compare("acceleration", "m/s^2", motion.acceleration, _first(element, built, "acceleration"), motion.scale)
     turning = _turning(element, soft="angular_acceleration" in built.regularised)
-    first = _first(element, built, "angular_acceleration")
-    compare("angular acceleration", "rad/s^2", found.angular_acceleration, first, turning)
+    angular = _first(element, built, "angular_acceleration")
+    compare("angular acceleration", "rad/s^2", motion.angular_acceleration, angular, turning)
     _compare_reactions(element, built, sample, compare)
     return lines
 
@@ -149,9 +149,9 @@ def _compare_matrices(element: MechanismElement, built: MechanismBuilt, compare:
     sizes = [float(np.max(np.abs(part), initial=0.0)) for part in true]
     natural = element.mechanism.mass * element.first_motion.scale * element.length
     for name, part, size in zip(true._fields, true, sizes, strict=True):
-        if (given := getattr(built, name)) is not None:
+        if (reported := getattr(built, name)) is not None:
             scale = size if name == "mass_matrix" else max(*sizes[1:], _LEAST * natural)
-            compare(name.replace("_", " "), "1", part, given, scale or 1.0)
+            compare(name.replace("_", " "), "1", part, reported, scale or 1.0)
 
 
 def _first(element: MechanismElement, built: MechanismBuilt, name: str) -> FloatArray | None:
@@ -166,23 +166,23 @@ def _compare_contacts(element: MechanismElement, built: MechanismBuilt, compare:
     contacts = element.mechanism.contacts
     if not contacts:
         return
-    found = touches(element.mechanism, element._solution.motion)
-    compare("gaps", "m", [each.gap for each in found], built.contact_gap, element.length)
-    compare("normals of contact", "1", [each.normal for each in found], built.contact_normal, 1.0)
+    touching = touches(element.mechanism, element._solution.motion)
+    compare("gaps", "m", [touch.gap for touch in touching], built.contact_gap, element.length)
+    compare("normals of contact", "1", [touch.normal for touch in touching], built.contact_normal, 1.0)
     # of a disc that lies parallel to its plane every point of the edge is as near
-    places = [np.full(3, np.nan) if each.flat else each.place for each in found]
+    places = [np.full(3, np.nan) if touch.flat else touch.place for touch in touching]
     compare("places of contact", "m", places, built.contact_place, element.length)
     friction = np.array([contact.friction for contact in contacts])
-    unbounded, given = np.isinf(friction), built.contact_friction
-    if given is not None and np.size(given) == len(friction):
-        given = np.reshape(given, len(friction))
+    unbounded, reported = np.isinf(friction), built.contact_friction
+    if reported is not None and np.size(reported) == len(friction):
+        reported = np.reshape(reported, len(friction))
         with np.errstate(divide="ignore"):
-            large = np.where(unbounded, 1 / np.asarray(given, dtype=np.float64), 0.0)
+            large = np.where(unbounded, 1 / np.asarray(reported, dtype=np.float64), 0.0)
         if unbounded.any():
             compare("inverse friction", "1", np.where(unbounded, 0.0, np.nan), large, 1.0)
-        given = np.where(unbounded, np.nan, given)
+        reported = np.where(unbounded, np.nan, reported)
     friction[unbounded] = np.nan
-    compare("friction of contacts", "1", friction, given, float(np.nanmax(friction, initial=0.0)) or 1.0)
+    compare("friction of contacts", "1", friction, reported, float(np.nanmax(friction, initial=0.0)) or 1.0)
     restitution = [contact.restitution for contact in contacts]
     compare("restitution of contacts", "1", restitution, built.contact_restitution, max(restitution) or 1.0)
     static = np.array([contact.static_friction or np.nan for contact in contacts])
@@ -206,12 +206,16 @@ def _compare_response(element: MechanismElement, built: MechanismBuilt, compare:
     if not shut:
         return
     normals = [np.outer(state.touching[k].normal, state.touching[k].normal) for k in shut]
-    along = np.array([np.eye(3) if mechanism.contacts[k].friction else nn for k, nn in zip(shut, normals, strict=True)])
-    J = along @ state.J[shut]
-    expected, given = np.einsum("kin,nm,ljm->kilj", J, state.W, J), built.contact_response
-    if given is not None and np.shape(given)[0] == np.shape(given)[2] == len(mechanism.contacts):
-        given = np.einsum("kai,kilj,lbj->kalb", along, given[np.ix_(shut, range(3), shut, range(3))], along)
-    compare("responses of contacts", "1/kg", expected, given, float(np.abs(expected).max()))
+    directions = np.array(
+        [np.eye(3) if mechanism.contacts[k].friction else nn for k, nn in zip(shut, normals, strict=True)]
+    )
+    J = directions @ state.J[shut]
+    expected, reported = np.einsum("kin,nm,ljm->kilj", J, state.W, J), built.contact_response
+    if reported is not None and np.shape(reported)[0] == np.shape(reported)[2] == len(mechanism.contacts):
+        reported = np.einsum(
+            "kai,kilj,lbj->kalb", directions, reported[np.ix_(shut, range(3), shut, range(3))], directions
+        )
+    compare("responses of contacts", "1/kg", expected, reported, float(np.abs(expected).max()))
 
 
 def _compare_press(
@@ -220,14 +224,14 @@ def _compare_press(
     """Compares first contact forces where they are determinate; those of a very soft model count as not given."""
     if not element.mechanism.contacts:
         return
-    wanted, given = element.first_press, sample.contact_force
+    true, reported = element.first_press, sample.contact_force
     softest = max((soft.tolerance for soft in built.regularised.values()), default=0.0)
-    if given is not None:
-        given = None if softest > CAPS["forces of contact"].tolerance else np.reshape(given, wanted.shape)
+    if reported is not None:
+        reported = None if softest > CAPS["forces of contact"].tolerance else np.reshape(reported, true.shape)
     natural = element.mechanism.mass * element.first_motion.scale
-    largest = float(np.nanmax(np.abs(wanted), initial=0.0))
+    largest = float(np.nanmax(np.abs(true), initial=0.0))
     # forces that are determinate may all be none but for round-off, as across the slide of a box on four corners
-    compare("forces of contact", "N", wanted, given, largest if largest > _LEAST * natural else natural)
+    compare("forces of contact", "N", true, reported, largest if largest > _LEAST * natural else natural)
 
 
 def _compare_reactions(
@@ -239,9 +243,9 @@ def _compare_reactions(
     _compare_named(element, sample, compare)
     if sample.joint_force is None or sample.joint_torque is None:
         return
-    found = element.first_motion
+    first_motion = element.first_motion
     wrench = np.where(element.analysis.determinate, element.first_wrench, np.nan)
-    natural = element.mechanism.mass * found.scale
+    natural = element.mechanism.mass * first_motion.scale
     force = max(float(np.nanmax(np.abs(wrench[:, :3]), initial=0.0)), natural)
     torque = max(float(np.nanmax(np.abs(wrench[:, 3:]), initial=0.0)), force * element.length)
     compare("forces", "N", wrench[:, :3], reactions(element, sample, "joint_force"), force)
@@ -257,16 +261,16 @@ def _compare_named(element: MechanismElement, sample: MechanismSample, compare: 
         mine = np.array([item.field == key for item in names], dtype=bool)
         if mine.any():
             expected = element.first_named[mine]
-            given = None if getattr(sample, key) is None else along(sample, key, counts[key])[numbers[mine]]
+            reported = None if getattr(sample, key) is None else along(sample, key, counts[key])[numbers[mine]]
             # a servo that starts at its target has an effort of round-off
-            compare(quantity, "N or N m", expected, given, max(float(np.max(np.abs(expected))), _FAINT * natural))
+            compare(quantity, "N or N m", expected, reported, max(float(np.max(np.abs(expected))), _FAINT * natural))
 
 
 def _turning(element: MechanismElement, soft: bool) -> float:
     """Scale of angular accelerations [rad/s²]: the largest, at least a part of the natural one (all, if soft)."""
-    found = element.first_motion
-    least = (1.0 if soft else _LEAST) * found.scale / element.length
-    return max(float(np.nanmax(np.abs(found.angular_acceleration), initial=0.0)), least)
+    first_motion = element.first_motion
+    least = (1.0 if soft else _LEAST) * first_motion.scale / element.length
+    return max(float(np.nanmax(np.abs(first_motion.angular_acceleration), initial=0.0)), least)
 
 
 def _axis(element: MechanismElement, joint: Joint) -> FloatArray:

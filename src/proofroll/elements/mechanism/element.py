@@ -342,9 +342,9 @@ class MechanismElement:
         variables = truth.variables
         reach, speed = (float(np.max(np.ptp(variables[name].values, axis=0))) for name in ("positions", "v_WB"))
         by_motion = not self._own_length and reach and speed
-        own = self.mechanism.natural_sizes(reach, speed) if by_motion else self._sizes
-        natural = {"attitudes": 1.0, "energy_error": own["J"], "drift": own["m"]}
-        natural |= {name: own[unit] for name, unit, _ in (*RESIDUALS, *LAWS)} | {"unpressed": 1.0}
+        natural_sizes = self.mechanism.natural_sizes(reach, speed) if by_motion else self._sizes
+        natural = {"attitudes": 1.0, "energy_error": natural_sizes["J"], "drift": natural_sizes["m"]}
+        natural |= {name: natural_sizes[unit] for name, unit, _ in (*RESIDUALS, *LAWS)} | {"unpressed": 1.0}
         sizes = {}
         for item in self.observables:
             if item.role == Role.EVENT:
@@ -355,7 +355,7 @@ class MechanismElement:
             else:
                 sizes[item.name] = natural.get(item.name) or float(np.max(np.ptp(values, axis=0)))
             if not self._own_length:
-                sizes[item.name] = max(sizes[item.name], _LEAST * own.get(item.unit, 0.0))
+                sizes[item.name] = max(sizes[item.name], _LEAST * natural_sizes.get(item.unit, 0.0))
         return sizes
 
     def watch(self, asks: Sequence[str]) -> RunWatch:  # noqa: ARG002 -- the protocol's

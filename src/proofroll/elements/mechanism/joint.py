@@ -160,28 +160,28 @@ class Joint:
                 raise InputError(f"{where}.q0", self.q0[0], advice)
         self._check_restitution(where)
 
-    def _check_motion(self, where: str) -> None:
+    def _check_motion(self, key_path: str) -> None:
         """Takes q0 and v0 from a motion. Raises InputError if the motion and other data contradict each other."""
         if self.motion is None:
             return
         if self.kind not in ONE_COORDINATE:
             raise InputError(
-                f"{where}.motion",
+                f"{key_path}.motion",
                 str(self.motion),
                 f"a {self.kind} joint has none; it is for {', '.join(ONE_COORDINATE)}",
             )
         for key in ("friction", "limits", "dependent"):
             if value := getattr(self, key):
                 advice = "the motion of the joint is prescribed, so that this changes nothing; remove it or the motion"
-                raise InputError(f"{where}.{key}", value, advice)
-        signal: Signal = checked(f"{where}.motion", self.motion)
-        place, rate, _ = checked_motion(f"{where}.motion", signal)
+                raise InputError(f"{key_path}.{key}", value, advice)
+        signal: Signal = checked(f"{key_path}.motion", self.motion)
+        place, rate, _ = checked_motion(f"{key_path}.motion", signal)
         for key, value in (("q0", place), ("v0", rate)):
-            given = getattr(self, key)
-            if not _none(given):
-                (number,) = checks.numbers(f"{where}.{key}", given, 1)
+            start = getattr(self, key)
+            if not _none(start):
+                (number,) = checks.numbers(f"{key_path}.{key}", start, 1)
                 if abs(number - value) > _START * max(abs(number), abs(value)):
-                    raise InputError(f"{where}.{key}", number, f"the motion begins with {value:g}; leave {key} out")
+                    raise InputError(f"{key_path}.{key}", number, f"the motion begins with {value:g}; leave {key} out")
         checks.assign(self, motion=signal, q0=(place,), v0=(rate,))
 
     @property
@@ -189,25 +189,29 @@ class Joint:
         """Distance from a stop that counts as none [rad or m]; 0 without stops."""
         return AT_STOP * (self.limits[1] - self.limits[0]) if self.limits else 0.0
 
-    def _check_restitution(self, where: str) -> None:
-        value = checks.number(f"{where}.restitution", self.restitution, at_least=0)
+    def _check_restitution(self, key_path: str) -> None:
+        value = checks.number(f"{key_path}.restitution", self.restitution, at_least=0)
         if value > 1:
-            raise InputError(f"{where}.restitution", value, "no impact returns more than it takes; give 0 to 1")
+            raise InputError(f"{key_path}.restitution", value, "no impact returns more than it takes; give 0 to 1")
         if value and self.limits is None:
-            raise InputError(f"{where}.restitution", value, "there is no stop without limits; add them or leave it out")
+            raise InputError(
+                f"{key_path}.restitution", value, "there is no stop without limits; add them or leave it out"
+            )
         checks.assign(self, restitution=value)
 
-    def _check_start(self, where: str) -> None:
+    def _check_start(self, key_path: str) -> None:
         zero = [0.0] * self.nq
         if self.kind in WITH_QUATERNION:
             zero[-4] = 1.0
-        q0 = list(checks.numbers(f"{where}.q0", zero if _none(self.q0) else self.q0, self.nq))
+        q0 = list(checks.numbers(f"{key_path}.q0", zero if _none(self.q0) else self.q0, self.nq))
         if self.kind in WITH_QUATERNION:
             length = float(np.linalg.norm(q0[-4:]))
             if length == 0.0:
-                raise InputError(f"{where}.q0", self.q0, "a quaternion of length zero is no rotation; give a unit one")
+                raise InputError(
+                    f"{key_path}.q0", self.q0, "a quaternion of length zero is no rotation; give a unit one"
+                )
             q0[-4:] = [component / length for component in q0[-4:]]
-        v0 = checks.numbers(f"{where}.v0", [0.0] * self.nv if _none(self.v0) else self.v0, self.nv)
+        v0 = checks.numbers(f"{key_path}.v0", [0.0] * self.nv if _none(self.v0) else self.v0, self.nv)
         checks.assign(self, q0=tuple(q0), v0=v0)
 
     @property

@@ -180,20 +180,20 @@ class Mechanism:
 
         In the frame of the body; the world comes last. A free joint attaches nothing.
         """
-        found: dict[str, list[Vector]] = {name: [] for name in [*(body.name for body in self.bodies), WORLD]}
+        places: dict[str, list[Vector]] = {name: [] for name in [*(body.name for body in self.bodies), WORLD]}
         for connection in self.connections:
             if connection.kind != JointKind.FREE:
-                found[connection.a].append(connection.position_a)
-                found[connection.b].append(connection.position_b)
+                places[connection.a].append(connection.position_a)
+                places[connection.b].append(connection.position_b)
         for link in self.links:
-            found[link.body_a].append(link.position_a)
-            found[link.body_b].append(link.position_b)
+            places[link.body_a].append(link.position_a)
+            places[link.body_b].append(link.position_b)
         for force in self.forces:
             if force.kind == "force":
-                found[force.body].append(force.position)
+                places[force.body].append(force.position)
         for point in self.points:
-            found[point.body].append(point.position)
-        return found
+            places[point.body].append(point.position)
+        return places
 
     @property
     def links(self) -> tuple[Spring | Bushing, ...]:
@@ -287,8 +287,10 @@ def _depth_first(bodies: Sequence[Body], joints: Sequence[Joint]) -> tuple[Joint
     holder: dict[str, Joint] = {}
     for joint in joints:
         if joint.child in holder:
-            other = holder[joint.child].name
-            advice = f"the body has two parents, through {other} and {joint.name}; make one of these joints a loop"
+            first_joint = holder[joint.child].name
+            advice = (
+                f"the body has two parents, through {first_joint} and {joint.name}; make one of these joints a loop"
+            )
             raise InputError(f"joints.{joint.name}.child", joint.child, advice)
         holder[joint.child] = joint
     for body in bodies:
@@ -297,17 +299,17 @@ def _depth_first(bodies: Sequence[Body], joints: Sequence[Joint]) -> tuple[Joint
     children: dict[str, list[Joint]] = {}
     for joint in joints:
         children.setdefault(joint.parent, []).append(joint)
-    found: list[Joint] = []
+    ordered: list[Joint] = []
     waiting = children.get(WORLD, [])[::-1]
     while waiting:  # without recursion: chains are long
         joint = waiting.pop()
-        found.append(joint)
+        ordered.append(joint)
         waiting += children.get(joint.child, [])[::-1]
-    if len(found) < len(joints):
-        lost = next(joint for joint in joints if joint not in found)
+    if len(ordered) < len(joints):
+        lost = next(joint for joint in joints if joint not in ordered)
         advice = "the joints form a cycle that never reaches the world; make one of its joints a loop"
         raise InputError(f"joints.{lost.name}.parent", lost.parent, advice)
-    return tuple(found)
+    return tuple(ordered)
 
 
 def _check_masses(bodies: Sequence[Body], joints: Sequence[Joint], coupled: Collection[str]) -> None:

@@ -73,12 +73,12 @@ class Placed:
     @cached_property
     def points(self) -> FloatArray:
         """Tracked points, or without any the centres of mass [m], shape (time, points, 3)."""
-        return read_only(np.stack([self.point(*each) for each in self.mechanism.followed], axis=1))
+        return read_only(np.stack([self.point(*point) for point in self.mechanism.followed], axis=1))
 
     def coordinates(self) -> dict[str, tuple[FloatArray, FloatArray]]:
         """Coordinate and rate of joints with one coordinate, by name [rad or m, per s]; angles count whole turns."""
-        found = {joint.name: self.along(joint) for joint in self.mechanism.joints if joint.nq == 1}
-        return {name: (q[:, 0], v[:, 0]) for name, (q, v) in found.items()}
+        by_joint = {joint.name: self.along(joint) for joint in self.mechanism.joints if joint.nq == 1}
+        return {name: (q[:, 0], v[:, 0]) for name, (q, v) in by_joint.items()}
 
     def of_tree(self) -> tuple[FloatArray, FloatArray]:
         """Coordinates and velocities of all joints, shapes (time, nq) and (time, nv)."""
@@ -114,8 +114,8 @@ class Placed:
         """Angle of a joint with whole turns added [rad], shape (time,)."""
         if self.known_q is None:
             return on_turns(self.time, angle, rate, joint.q0[number], TURN)
-        known = self.known_q[:, self.mechanism.q_slices[self.mechanism.joints.index(joint)].start + number]
-        return np.asarray(angle + TURN * np.round((known - angle) / TURN))
+        prescribed = self.known_q[:, self.mechanism.q_slices[self.mechanism.joints.index(joint)].start + number]
+        return np.asarray(angle + TURN * np.round((prescribed - angle) / TURN))
 
     def _apart(self, joint: Joint) -> tuple[FloatArray, FloatArray]:
         """Vector from a joint's point on the parent to that on the child [m]; its rate seen from the parent [m/s]."""
@@ -130,23 +130,23 @@ class Placed:
 
     def energies(self) -> FloatArray:
         """Kinetic, gravitational and elastic energies [J], shape (time, parts); they may cancel in the sum."""
-        found: list[FloatArray] = []
+        terms: list[FloatArray] = []
         for body in self.mechanism.bodies:
             R, w = self.R_WB[:, self.mechanism.body_index[body.name]], self.spin(body.name)
             local = np.einsum("tji,tj->ti", R, w)
             v = self.velocity(body.name, body.com)
-            found += [0.5 * body.mass * np.sum(v**2, -1), 0.5 * np.sum(local @ np.array(body.inertia) * local, -1)]
-            found += list(-body.mass * np.array(self.mechanism.gravity)[:, None] * self.point(body.name, body.com).T)
+            terms += [0.5 * body.mass * np.sum(v**2, -1), 0.5 * np.sum(local @ np.array(body.inertia) * local, -1)]
+            terms += list(-body.mass * np.array(self.mechanism.gravity)[:, None] * self.point(body.name, body.com).T)
         for spring in self.mechanism.springs:
             ends = self.point(spring.body_a, spring.position_a) - self.point(spring.body_b, spring.position_b)
-            found.append(0.5 * spring.stiffness * (np.linalg.norm(ends, axis=-1) - spring.length) ** 2)
+            terms.append(0.5 * spring.stiffness * (np.linalg.norm(ends, axis=-1) - spring.length) ** 2)
         for bushing in self.mechanism.bushings:
-            found += self._of_bushing(bushing)
+            terms += self._of_bushing(bushing)
         for joint in self.mechanism.joints:
             if joint.stiffness or joint.armature:
                 q, v = self.along(joint)
-                found.append(0.5 * np.sum(joint.stiffness * (q - joint.rest) ** 2 + joint.armature * v**2, -1))
-        return np.array(found).T
+                terms.append(0.5 * np.sum(joint.stiffness * (q - joint.rest) ** 2 + joint.armature * v**2, -1))
+        return np.array(terms).T
 
     def _of_bushing(self, bushing: Bushing) -> list[FloatArray]:
         from scipy.spatial.transform import Rotation
@@ -162,10 +162,13 @@ class Placed:
         """Momentum [N s] and moment of momentum about the world's origin [N m s], shapes (time, 3)."""
         linear, angular = np.zeros((len(self.time), 3)), np.zeros((len(self.time), 3))
         for body in self.mechanism.bodies:
-            R, own = self.R_WB[:, self.mechanism.body_index[body.name]], body.mass * self.velocity(body.name, body.com)
+            R, body_momentum = (
+                self.R_WB[:, self.mechanism.body_index[body.name]],
+                body.mass * self.velocity(body.name, body.com),
+            )
             local = np.einsum("tji,tj->ti", R, self.spin(body.name)) @ np.array(body.inertia)
-            linear += own
-            angular += cross(self.point(body.name, body.com), own) + np.einsum("tij,tj->ti", R, local)
+            linear += body_momentum
+            angular += cross(self.point(body.name, body.com), body_momentum) + np.einsum("tij,tj->ti", R, local)
         return linear, angular
 
     def drift(self) -> FloatArray:
@@ -180,8 +183,8 @@ class Placed:
                 continue
             for axis in FACTS[kind].translations:
                 worst = np.maximum(worst, np.abs(np.sum(apart * A[..., axis], -1)))
-            for first, second in FACTS[kind].rotations:
-                worst = np.maximum(worst, np.abs(np.sum(A[..., first] * B[..., second], -1)))
+            for axis_a, axis_b in FACTS[kind].rotations:
+                worst = np.maximum(worst, np.abs(np.sum(A[..., axis_a] * B[..., axis_b], -1)))
         for joint, _, _ in self.mechanism.prescribed:
             assert joint.motion is not None  # as of all prescribed ones
             worst = np.maximum(worst, np.abs(self.along(joint)[0][:, 0] - moved(joint.motion, self.time).place))

@@ -179,7 +179,7 @@ def checked(field: str, value: Any) -> Signal:
     return value if isinstance(value, Formula | Table | Held) else checks.number(field, value)
 
 
-def read_signal(field: str, given: Any, numbers: Parameters, unit: str = "") -> Any:
+def read_signal(field: str, entry: Any, numbers: Parameters, unit: str = "") -> Any:
     """Signal of a file, in this unit; a number or a formula without time is returned unchanged.
 
     A list of components gives a list of signals, and so does a table whose values are lists.
@@ -187,39 +187,39 @@ def read_signal(field: str, given: Any, numbers: Parameters, unit: str = "") -> 
     Raises:
         InputError: a formula or a table is wrong, or a formula has another unit.
     """
-    if isinstance(given, dict) and (columns := _columns(field, given)):
-        given = columns
-    if isinstance(given, list):
-        return [read_signal(f"{field}.{number}", part, numbers, unit) for number, part in enumerate(given)]
+    if isinstance(entry, dict) and (columns := _columns(field, entry)):
+        entry = columns
+    if isinstance(entry, list):
+        return [read_signal(f"{field}.{number}", part, numbers, unit) for number, part in enumerate(entry)]
     try:
-        if isinstance(given, str) and given.startswith("=") and TIME not in numbers.values:
-            used = names_in(given[1:])
+        if isinstance(entry, str) and entry.startswith("=") and TIME not in numbers.values:
+            used = names_in(entry[1:])
             if TIME in used or used - {*CONSTANTS, *OF_PARAMETERS, *numbers.values}:
                 for name in sorted(used - {TIME, "pi", *FUNCTIONS}):
                     require_known(
                         field, name, [TIME, *sorted(numbers.values)], "there is no such parameter; choose from"
                     )
                 constants = tuple((name, float(value)) for name, value in numbers.values.items() if name in used)
-                made = Formula(given[1:].strip(), constants)
+                made = Formula(entry[1:].strip(), constants)
                 _check_unit(field, made.text, numbers, unit)
                 return made
-        if isinstance(given, dict):
-            for key in given:
+        if isinstance(entry, dict):
+            for key in entry:
                 if key not in {"times", "values", "hold"}:
-                    raise no_such_key(key, given[key], ("times", "values", "hold"))
-            axes, hold = {"times": "s", "values": unit}, given.get("hold", False)
+                    raise no_such_key(key, entry[key], ("times", "values", "hold"))
+            axes, hold = {"times": "s", "values": unit}, entry.get("hold", False)
             if not isinstance(hold, bool):
                 raise InputError("hold", hold, "give true (each value holds until the next) or false")
-            filled = {key: numbers.filled(given.get(key, []), key, {}, axes[key]) for key in axes}
+            filled = {key: numbers.filled(entry.get(key, []), key, {}, axes[key]) for key in axes}
             return Table(**filled, hold=hold)
-        if isinstance(given, str) and not given.startswith(("=", "$")) and in_radians(field, given, unit) is None:
+        if isinstance(entry, str) and not entry.startswith(("=", "$")) and in_radians(field, entry, unit) is None:
             raise InputError(
-                field, given, "give a number, a formula that begins with =, or a table of times and values"
+                field, entry, "give a number, a formula that begins with =, or a table of times and values"
             )
     except InputError as error:
         inside = "" if error.field in {"formula", field} else f".{error.field}"
         raise InputError(f"{field}{inside}", error.value, error.advice) from None
-    return given
+    return entry
 
 
 def _columns(field: str, table: Mapping[str, Any]) -> list[dict[str, Any]]:

@@ -61,17 +61,17 @@ class SpringLaw:
         return f"= {self.text}"
 
 
-def read_spring_law(field: str, given: Any, numbers: Parameters) -> Any:
+def read_spring_law(field: str, entry: Any, numbers: Parameters) -> Any:
     """Law of a file. Units of its parameters are not checked: numbers in a formula have none.
 
     Raises:
         InputError: the formula is wrong, or has an unknown name.
     """
-    if not isinstance(given, str):
-        raise InputError(field, given, f'give a formula of {LENGTH} and {RATE}: "= 50*({LENGTH} - 0.3)^3"')
-    text = given.removeprefix("=").strip()
+    if not isinstance(entry, str):
+        raise InputError(field, entry, f'give a formula of {LENGTH} and {RATE}: "= 50*({LENGTH} - 0.3)^3"')
+    text = entry.removeprefix("=").strip()
     for name in sorted({LENGTH, RATE} & numbers.values.keys()):
-        raise InputError(field, given, f"the parameter {name} has the name of a variable of springs; rename it")
+        raise InputError(field, entry, f"the parameter {name} has the name of a variable of springs; rename it")
     used = names_in(text)
     for name in sorted(used - {LENGTH, RATE, "pi", *FUNCTIONS}):
         choices = [LENGTH, RATE, *sorted(numbers.values)]

@@ -129,7 +129,7 @@ def run_content(case: Case, result: Result, trajectory: Path) -> RunContent:
 
 def _bounces(scene: Scene, columns: Columns) -> list[Bounce]:
     """Energy and height of each impact of a scene with one element."""
-    stored, watches = bounces_of(columns), [one for one in scene.elements if isinstance(one, WatchesRuns)]
+    stored, watches = bounces_of(columns), [element for element in scene.elements if isinstance(element, WatchesRuns)]
     if stored is not None or len(scene.elements) != 1 or "event_kind" not in columns or not watches:
         return stored or []
     watch = watches[0].watch(())
@@ -211,8 +211,8 @@ def run_lines(content: RunContent, *, forces: bool = True) -> list[Any]:
     if content.bounces:
         table, note = bounce_table(content.bounces)
         lines += [table, Text(note)] if note else [table]
-    before = "" if content.build_seconds is None else f", after {number(content.build_seconds)} s before the first step"
-    lines.append(Text(f"{content.wall_seconds:.3g} s of wall time{before}"))
+    build = "" if content.build_seconds is None else f", after {number(content.build_seconds)} s before the first step"
+    lines.append(Text(f"{content.wall_seconds:.3g} s of wall time{build}"))
     files = ("trajectory", content.trajectory), ("table of events", content.event_table), ("plot", content.plot)
     for what, file in files:
         if file:

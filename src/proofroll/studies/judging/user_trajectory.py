@@ -214,8 +214,8 @@ def _wrong_times(times: Any) -> str:
     if np.any(late := ~np.isfinite(times)):
         return f"sample {int(np.argmax(late)) + 1} has no time; "
     if np.any(back := np.diff(times) <= 0):
-        first = int(np.argmax(back))
-        return f"{times[first + 1]:.9g} s follows {times[first]:.9g} s; "
+        index = int(np.argmax(back))
+        return f"{times[index + 1]:.9g} s follows {times[index]:.9g} s; "
     return f"it begins at {times[0]:.9g} s; "
 
 

@@ -102,14 +102,14 @@ class ContactRates:
         e1_rate = (bend @ v[..., None])[..., 0]
         free = body.gravity + a * cross(w, e1_rate)
         R1 = -m * (_dot(e1, body.gravity) + _dot(e1_rate, v))
-        along = free - _dot(e1, free) * e1
+        tangential = free - _dot(e1, free) * e1
         ahead = np.zeros_like(v)
         if f:
             speed = np.sqrt(_dot(v, v))
             ahead = np.divide(v, speed, out=ahead, where=speed != 0)
-            along = along - (a * f / J) * R1 * ahead
+            tangential = tangential - (a * f / J) * R1 * ahead
         if sticking:
-            T = along / -(1 / m + a * a / J)
+            T = tangential / -(1 / m + a * a / J)
         else:
             size = np.sqrt(_dot(u, u))
             T = body.contact.mu_kinetic * R1 * np.divide(u, size, out=np.zeros_like(u), where=size != 0)
@@ -117,5 +117,5 @@ class ContactRates:
         turning = a * cross(e1, T)
         if f:
             turning = turning + f * R1 * cross(ahead, e1)
-        u_rate = np.zeros_like(v) if sticking else along + (1 / m + a * a / J) * T - _dot(e1_rate, u) * e1
+        u_rate = np.zeros_like(v) if sticking else tangential + (1 / m + a * a / J) * T - _dot(e1_rate, u) * e1
         return np.concatenate([v, turning / J, u_rate], axis=-1), R

@@ -31,7 +31,7 @@ _NOTHING = 10.0
 def dataset_of(
     scene: Scene,
     times: FloatArray,
-    found: BallMotion,
+    solved: BallMotion,
     spin: Callable[[FloatArray], FloatArray],
     kinks: Iterable[float],
     quadrature: Quadrature,
@@ -42,9 +42,9 @@ def dataset_of(
     :func:`.orientation.orientation`. Variables: :func:`proofroll.elements.ball_on_surface.dataset.columns`.
     """
     q_WB = orientation(spin, times, kinks, quadrature) if BallCapability.ORIENTATION in scene.requires else None
-    motion = (found.p_WB, found.v_WB, found.w_WB)
-    result = columns(rolling_ball(scene), times, *motion, force=found.force, q_WB=q_WB).dataset()
-    return result.assign_attrs(route=found.route)
+    motion = (solved.p_WB, solved.v_WB, solved.w_WB)
+    result = columns(rolling_ball(scene), times, *motion, force=solved.force, q_WB=q_WB).dataset()
+    return result.assign_attrs(route=solved.route)
 
 
 def put_error_bars(result: xr.Dataset, check: xr.Dataset, floor: float) -> None:
@@ -57,15 +57,15 @@ def put_error_bars(result: xr.Dataset, check: xr.Dataset, floor: float) -> None:
         Diverged: a value is not finite, except needed friction at zero normal force.
     """
     for name, values in result.data_vars.items():
-        mine, other = (np.asarray(x.to_numpy(), dtype=np.float64) for x in (values, check[name]))
+        mine, second = (np.asarray(x.to_numpy(), dtype=np.float64) for x in (values, check[name]))
         if name == "needed_friction":  # N is earlier in data_vars, so it has its error bar
             pressed = np.minimum(*(np.abs(x["N"].to_numpy()) for x in (result, check)))
-            known = pressed > _NOTHING * result["N"].attrs["error_bar"]
-            mine, other = mine[known], other[known]
-        if not (np.all(np.isfinite(mine)) and np.all(np.isfinite(other))):
+            on_wall = pressed > _NOTHING * result["N"].attrs["error_bar"]
+            mine, second = mine[on_wall], second[on_wall]
+        if not (np.all(np.isfinite(mine)) and np.all(np.isfinite(second))):
             raise Diverged(f"the truth is not finite (NaN or overflow) in {name}; take less extreme parameters")
         size = 0.0 if values.dtype == bool else np.max(np.abs(mine), initial=0.0)
-        difference = np.max(np.abs(mine - other), initial=0.0)
+        difference = np.max(np.abs(mine - second), initial=0.0)
         if name in _DIFFERENCE_OF:  # plus the round-off of the large variable
             difference += ROUND_OFF * np.max(np.abs(result[_DIFFERENCE_OF[name]].to_numpy()), initial=0.0)
         values.attrs["error_bar"] = float(SAFETY * (difference + floor * size))

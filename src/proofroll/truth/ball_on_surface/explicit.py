@@ -51,9 +51,9 @@ class ExplicitRun:
         """See :class:`proofroll.truth.ball_on_surface.sliding.IntegratedRun`."""
         return self._ends, self._states
 
-    def at(self, where: FloatArray) -> FloatArray:
+    def at(self, places: FloatArray) -> FloatArray:
         """See :class:`proofroll.truth.ball_on_surface.sliding.IntegratedRun`."""
-        if not self._between or not len(where):
-            return np.broadcast_to(self._states[0], (len(where), self._states.shape[1])).copy()
-        index = np.searchsorted(self._ends[:-1], where, side="right") - 1
-        return np.array([self._between[i](x) for i, x in zip(index, where, strict=True)])
+        if not self._between or not len(places):
+            return np.broadcast_to(self._states[0], (len(places), self._states.shape[1])).copy()
+        index = np.searchsorted(self._ends[:-1], places, side="right") - 1
+        return np.array([self._between[i](x) for i, x in zip(index, places, strict=True)])

@@ -84,8 +84,8 @@ def friction_curve(body: RollingBall, until: float) -> FrictionCurve:
     pace = body.ball.radius / (np.linalg.norm(body.v0) + np.sqrt(body.ball.radius * np.linalg.norm(body.gravity)))
     times = np.linspace(0.0, stretch.end, max(int(np.ceil(stretch.end / pace)), 4) + 1)
 
-    def needed(at: FloatArray) -> FloatArray:
-        motion = stretch.motion(at)
+    def needed(times: FloatArray) -> FloatArray:
+        motion = stretch.motion(times)
         e1 = body.surface.normal(motion.p_WB)
         N = -np.sum(motion.force * e1, axis=-1)
         return np.asarray(np.linalg.norm(motion.force + N[:, None] * e1, axis=-1) / N)

@@ -34,20 +34,20 @@ def by_equations(
     a, m, J, contact = body.ball.radius, body.ball.mass, body.ball.inertia, body.contact
     e1 = body.surface.normal(p)
     cross = np.array([[0, -e1[2], e1[1]], [e1[2], 0, -e1[0]], [-e1[1], e1[0], 0]])
-    before = v - a * cross @ w  # velocity of the contact point; along e1 it equals that of the centre
-    slip = before - (before @ e1) * e1
+    contact_velocity = v - a * cross @ w  # velocity of the contact point; along e1 it equals that of the centre
+    slip = contact_velocity - (contact_velocity @ e1) * e1
     matrix, right = np.zeros((9, 9)), np.zeros(9)
     matrix[:3, :3], matrix[:3, 6:], right[:3] = m * np.eye(3), -np.eye(3), m * v
     matrix[3:6, 3:6], matrix[3:6, 6:], right[3:6] = J * np.eye(3), -a * cross, J * w
     matrix[6:, :3], matrix[6:, 3:6] = np.eye(3), -a * cross
-    right[6:] = -e * (before @ e1) * e1 - e_t * slip
+    right[6:] = -e * (contact_velocity @ e1) * e1 - e_t * slip
     solution = np.linalg.solve(matrix, right)
     press, size = -float(solution[6:] @ e1), float(np.linalg.norm(slip))
     if size and np.linalg.norm(solution[6:] + press * e1) > contact.mu_static * press:
-        along = slip / size
+        heading = slip / size
         matrix[6:] = 0.0
-        matrix[6:, 6:] = np.eye(3) - np.outer(e1 + contact.mu_kinetic * along, e1)
+        matrix[6:, 6:] = np.eye(3) - np.outer(e1 + contact.mu_kinetic * heading, e1)
         matrix[6:, :3] += np.outer(e1, e1)
-        right[6:] = -e * (before @ e1) * e1
+        right[6:] = -e * (contact_velocity @ e1) * e1
         solution = np.linalg.solve(matrix, right)
     return np.asarray(solution[:3]), np.asarray(solution[3:6])

@@ -91,8 +91,8 @@ class Implicit(Route):
             step, length = walk.step(min(length, self._approach(left)))
             ends = [] if self._held else [(End.LIFTOFF, partial(self._pull_along, step, True))]
             ends += [(End.CONE, partial(self._excess_along, step))] if np.isfinite(self._mu) else []
-            found = [(first_rise(g, step.time, step.time + step.length), why) for why, g in ends]
-            if ended := [(when, why) for when, why in found if when is not None]:
+            rises = [(first_rise(g, step.time, step.time + step.length), why) for why, g in ends]
+            if ended := [(when, why) for when, why in rises if when is not None]:
                 when, why = min(ended, key=lambda item: item[0])
                 return walk.stretch(self, True, when, walk.cut(when), why)
         return walk.stretch(self, True, until, walk.state, End.TIME)
@@ -194,9 +194,9 @@ class Implicit(Route):
         d = self._contact.slip_direction_at_rest(state)
 
         def growth(y: FloatArray) -> tuple[float, FloatArray]:
-            along = self._contact.slip_direction_at_rest(y)
-            rates = self._contact.rates(np.concatenate([y[:6], 1e-100 * along])[None, :], False)[0]
-            return float(rates[6:] @ along), rates
+            heading = self._contact.slip_direction_at_rest(y)
+            rates = self._contact.rates(np.concatenate([y[:6], 1e-100 * heading])[None, :], False)[0]
+            return float(rates[6:] @ heading), rates
 
         G, rates = growth(state)
         span = 1e-4 * self._pace
@@ -242,11 +242,11 @@ class _Walk:
             if self.time + length == self.time:
                 raise Diverged(f"the truth (implicit collocation) could not be integrated past {self.time:g} s")
             step = take(system, self.time, self.state, length, guess(length))
-            wanted = next_length(step, _TOLERANCE)
+            next_step = next_length(step, _TOLERANCE)
             if step.error <= _TOLERANCE:
                 self.steps.append(step)
-                return step, wanted
-            length, guess = min(wanted, 0.8 * length), self._tangent if self.steps else guess
+                return step, next_step
+            length, guess = min(next_step, 0.8 * length), self._tangent if self.steps else guess
 
     def _continued(self, length: float) -> FloatArray:
         """Guess from the last step's polynomial, or from the tangent at its end if that would extrapolate too far."""
@@ -265,11 +265,11 @@ class _Walk:
 
     def stretch(self, route: Implicit, sticking: bool, end: float, state: FloatArray, why: End) -> BallStretch:
         """Stretch made of the steps so far."""
-        steps, first = self.steps, self._state
+        steps, start_state = self.steps, self._state
         starts = np.array([step.time for step in steps])
 
         def motion(times: FloatArray) -> BallMotion:
-            y = np.broadcast_to(first, (len(times), 9)).copy()
+            y = np.broadcast_to(start_state, (len(times), 9)).copy()
             index = np.searchsorted(starts, times, side="right") - 1
             for number in np.unique(index[index >= 0]):
                 inside = index == number

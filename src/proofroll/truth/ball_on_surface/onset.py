@@ -85,9 +85,9 @@ def onset(scene: Scene, until: float, uncertainty: float = 1e-3) -> Onset:
     distances = [abs(float(edge) / mu - 1) for edge in (below, above) if edge is not None and mu > 0]
     # All corners of the ranges of f and μ: more resistance does not always mean an earlier slip.
     changed = [_changed(body, sign * uncertainty, until) for sign in (1, -1)]
-    stairs = [_stair(each, mu * (1 + sign * uncertainty)) for each in changed for sign in (1, -1)]
-    own = _stair(curve, mu)
-    times = [stair[0] for stair in (own, *stairs) if stair[0] is not None]
+    stairs = [_stair(changed_curve, mu * (1 + sign * uncertainty)) for changed_curve in changed for sign in (1, -1)]
+    true_stair = _stair(curve, mu)
+    times = [stair[0] for stair in (true_stair, *stairs) if stair[0] is not None]
     return Onset(
         time=time,
         by_mu=by_mu,
@@ -96,7 +96,7 @@ def onset(scene: Scene, until: float, uncertainty: float = 1e-3) -> Onset:
         edge_above=None if above is None else float(above),
         distance=min(distances, default=float("inf")),
         uncertainty=uncertainty,
-        verdict="well-posed" if all(stair[1] == own[1] for stair in stairs) else "ill-posed",
+        verdict="well-posed" if all(stair[1] == true_stair[1] for stair in stairs) else "ill-posed",
         earliest=min(times, default=None),
         latest=max(times, default=None),
     )

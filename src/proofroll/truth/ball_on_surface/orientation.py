@@ -42,8 +42,8 @@ def orientation(
     if len(h):
         # The end of a step belongs to that step, and the time of a kink to the step after it: an impact may let the
         # spin jump.
-        at = np.minimum(starts[:, None] + h[:, None] * nodes, np.nextafter(starts + h, 0)[:, None])
-        at_nodes = spin(at.ravel()).reshape(len(h), len(nodes), 3)
+        instants = np.minimum(starts[:, None] + h[:, None] * nodes, np.nextafter(starts + h, 0)[:, None])
+        at_nodes = spin(instants.ravel()).reshape(len(h), len(nodes), 3)
         for step in turns(h, at_nodes):
             q.append(_left(step) @ q[-1])
     ends = np.concatenate([[0], np.cumsum(parts)])[np.searchsorted(knots, times)]

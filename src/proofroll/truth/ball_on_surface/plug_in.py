@@ -97,19 +97,19 @@ def truth(scene: Scene, times: FloatArray) -> xr.Dataset:
         result, _ = stick_slip(scene, times)
         return result if bounded else result.drop_vars("sticking")
 
-    def first(at: FloatArray) -> BallMotion:
-        return closed_form(body, at) or rolling.reduced(body, at)
+    def first(instants: FloatArray) -> BallMotion:
+        return closed_form(body, instants) or rolling.reduced(body, instants)
 
-    def second(at: FloatArray) -> BallMotion:
-        return unreduced_taylor.unreduced(body, at) if by_series else rolling.unreduced(body, at)
+    def second(instants: FloatArray) -> BallMotion:
+        return unreduced_taylor.unreduced(body, instants) if by_series else rolling.unreduced(body, instants)
 
-    def second_spin(at: FloatArray) -> FloatArray:  # computing forces would take longer than the whole series
-        return unreduced_taylor.states(body, at)[:, 6:] if by_series else second(at).w_WB
+    def second_spin(instants: FloatArray) -> FloatArray:  # computing forces would take longer than the whole series
+        return unreduced_taylor.states(body, instants)[:, 6:] if by_series else second(instants).w_WB
 
     def from_start(spin: Callable[[FloatArray], FloatArray]) -> Callable[[FloatArray], FloatArray]:
-        return lambda at: spin(at) if at[0] == 0 else spin(np.append(0.0, at))[1:]
+        return lambda instants: spin(instants) if instants[0] == 0 else spin(np.append(0.0, instants))[1:]
 
-    result = dataset_of(scene, times, first(times), from_start(lambda at: first(at).w_WB), (), QUATERNIONS)
+    result = dataset_of(scene, times, first(times), from_start(lambda instants: first(instants).w_WB), (), QUATERNIONS)
     check = dataset_of(scene, times, second(times), from_start(second_spin), (), MATRICES)
     put_error_bars(result, check, ROUND_OFF)
     result.attrs["second_route"] = check.attrs["route"]

@@ -107,7 +107,7 @@ class Polar(Sliding):
 
         return ExplicitRun(rates, time, np.append(state, 0.0), until, atol=self._atol_slaved, ended=ended)
 
-    def _slide(self, first: FloatArray, floor: float, until: float) -> ExplicitRun:
+    def _slide(self, start_state: FloatArray, floor: float, until: float) -> ExplicitRun:
         stops: tuple[_Stop, ...] = (
             (End.LIFTOFF, lambda y: -self._drive(y)[1]),
             (End.TIME, lambda y: y[7] - until),
@@ -118,7 +118,7 @@ class Polar(Sliding):
             # The clock and ln|u| pass their limits only once, so values at the end of a step suffice.
             return _first(solver, [(end, g) for end, g in stops if g(solver.y) > 0])
 
-        return ExplicitRun(self._slipping, 0.0, first, np.inf, atol=self._atol, ended=ended)
+        return ExplicitRun(self._slipping, 0.0, start_state, np.inf, atol=self._atol, ended=ended)
 
     def _drive(self, y: FloatArray) -> tuple[FloatArray, float]:
         """Drive b along e2, e3 [m/s²], shape (2,), and normal force N [N]."""
@@ -176,8 +176,8 @@ class Polar(Sliding):
         grip = self._A * self._mu_k * N
         c, s = math.cos(phi), math.sin(phi)
         b2, b3 = b.tolist()
-        along, around = b2 * c + b3 * s - grip, b3 * c - b2 * s - size * turning
-        return np.array([*(size * rates).tolist(), along, around, size])
+        growth, around = b2 * c + b3 * s - grip, b3 * c - b2 * s - size * turning
+        return np.array([*(size * rates).tolist(), growth, around, size])
 
     def _slaved(self, states: FloatArray) -> FloatArray:
         return np.array([self._following(y)[1] for y in states])
@@ -223,8 +223,8 @@ class Polar(Sliding):
         b, N = np.array([d[0] for d in drives]).reshape(-1, 2), np.array([d[1] for d in drives])
         friction, u = -b / self._A, np.zeros((len(y), 2))
         if phi is not None:
-            along = np.stack([np.cos(phi), np.sin(phi)], axis=-1).reshape(-1, 2)
-            friction, u = -self._body.contact.mu_kinetic * N[:, None] * along, size[:, None] * along
+            heading = np.stack([np.cos(phi), np.sin(phi)], axis=-1).reshape(-1, 2)
+            friction, u = -self._body.contact.mu_kinetic * N[:, None] * heading, size[:, None] * heading
         local = np.einsum("nij,ni->nj", frame[..., 1:], v)
         return world_motion(
             self._body, y[:, :2], velocity=local, spin=y[:, 4], slip=u, friction=friction, press=N, route=self.name

@@ -34,15 +34,15 @@ def classify(body: RollingBall, until: float) -> tuple[Regime, int, float]:
     if path.ended:
         raise Refused(path.ended)
     slips = [time for kind, time in path.events if kind == EventKind.SLIP]
-    first = slips[0] if slips else float("nan")
+    first_slip = slips[0] if slips else float("nan")
     last = path.stretches[-1]
     if not slips:
-        return Regime.NEVER_SLIPS, 0, first
+        return Regime.NEVER_SLIPS, 0, first_slip
     if any(stretch.why is End.LIFTOFF for stretch in path.stretches):
-        return Regime.FALLS, len(slips), first
+        return Regime.FALLS, len(slips), first_slip
     if last.sticking or _carries(body, *route.world(last.state)[:2]):
-        return Regime.RECOVERS, len(slips), first
-    return Regime.FALLS, len(slips), first
+        return Regime.RECOVERS, len(slips), first_slip
+    return Regime.FALLS, len(slips), first_slip
 
 
 def _carries(body: RollingBall, p_WB: FloatArray, v_WB: FloatArray) -> bool:

@@ -32,7 +32,7 @@ class IntegratedRun(Protocol):
     def steps(self) -> tuple[FloatArray, FloatArray]:
         """Independent variable at the ends of all steps, from the start on, shape (n,), and states, shape (n, k)."""
 
-    def at(self, where: FloatArray) -> FloatArray:
+    def at(self, places: FloatArray) -> FloatArray:
         """States, shape (n, k), at values of the independent variable within the run."""
 
 
@@ -59,7 +59,7 @@ class Sliding(Route):
         """Integrates a slaved slip from rest, with |u| as sixth state, until |u| reaches ``handover`` [m/s]."""
 
     @abstractmethod
-    def _slide(self, first: FloatArray, floor: float, until: float) -> IntegratedRun:
+    def _slide(self, start_state: FloatArray, floor: float, until: float) -> IntegratedRun:
         """Integrates a slip over τ, with eight states, until ln|u| falls to ``floor`` or t reaches ``until`` [s]."""
 
     @abstractmethod
@@ -116,8 +116,8 @@ class Sliding(Route):
             _, e2, e3 = self._axes(state).T
             small, phi = np.append(state, np.linalg.norm(slip)), np.arctan2(slip @ e3, slip @ e2)
             handover = max(handover, _BEGUN * small[5])
-        first = np.array([*small[:5], np.log(small[5]), phi, creep.end])
-        run = self._slide(first, np.log(_FLOOR * handover), until)
+        start_state = np.array([*small[:5], np.log(small[5]), phi, creep.end])
+        run = self._slide(start_state, np.log(_FLOOR * handover), until)
 
         def slipping(times: FloatArray) -> BallMotion:
             y = _at_clock(run, times)

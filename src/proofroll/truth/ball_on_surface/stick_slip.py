@@ -73,18 +73,18 @@ def stick_slip(scene: Scene, times: FloatArray) -> tuple[xr.Dataset, list[Event]
         inside = times < until - MOVE * max(until, pace)
         inside[0] = True
         times = times[inside]
-    first, second = (path.events for path in paths)
-    number, known = in_common(first, second, pace, until)
+    events_1, events_2 = (path.events for path in paths)
+    number, posed_throughout = in_common(events_1, events_2, pace, until)
     why = "the two routes to the truth disagree about it"
     posed, well = _unmoved(body, paths[1], pace, until)
     if not well:
-        number, known = min(number, posed), False
+        number, posed_throughout = min(number, posed), False
         why = f"a relative {MOVE:g} of friction, resistance, restitution or gravity changes it"
     events = []
     certain = until - MOVE * max(until, pace)  # the last digits would say whether an event at the end is in
-    shared = [both for both in zip(first[:number], second, strict=False) if both[0][1] < certain]
-    for (kind, time), (_, other) in shared:
-        wide = SAFETY * (abs(time - other) + _FLOOR * time + paths[0].blurs.get(time, 0.0))
+    shared = [both for both in zip(events_1[:number], events_2, strict=False) if both[0][1] < certain]
+    for (kind, time), (_, second_time) in shared:
+        wide = SAFETY * (abs(time - second_time) + _FLOOR * time + paths[0].blurs.get(time, 0.0))
         events.append(Event(kind, time, max(time - wide, 0.0), time + wide))
     result, check = (
         _dataset(scene, times, path, route.name, quadrature)
@@ -94,10 +94,10 @@ def stick_slip(scene: Scene, times: FloatArray) -> tuple[xr.Dataset, list[Event]
     result.attrs["second_route"] = routes[1].name
     if end:
         result.attrs |= {ENDS: shorter.end, ENDED: shorter.ended or _landing(shorter)}
-    if not known:
-        after = events[-1].time if events else 0.0
+    if not posed_throughout:
+        last_event = events[-1].time if events else 0.0
         result.attrs["ill_posed"] = (
-            f"ill-posed: what happens after {after:.9g} s hangs on the last digits of the parameters: {why}"
+            f"ill-posed: what happens after {last_event:.9g} s hangs on the last digits of the parameters: {why}"
         )
     if bounded or events:
         result = with_bounces(with_events(result, events), _bounces(body, paths, events, until))
@@ -106,16 +106,16 @@ def stick_slip(scene: Scene, times: FloatArray) -> tuple[xr.Dataset, list[Event]
 
 def _bounces(body: RollingBall, paths: Sequence[Path], events: Sequence[Event], until: float) -> list[Bounce]:
     """Energies and heights of the impacts among the events, with error bars from both routes."""
-    found = []
+    bounces_by_route = []
     for path in paths:
 
         def sampled(times: FloatArray, path: Path = path) -> Course:
             motion = path.motion(times, "")
             return course_of(body, times, motion.p_WB, motion.v_WB, motion.w_WB)
 
-        own = [Event(kind, time, time, time) for kind, time in path.events[: len(events)]]
-        found.append(exact_bounces(sampled, own, bouncing_bodies(body), until))
-    bounces = with_bars(found[0], found[1], SAFETY, _FLOOR)
+        shared = [Event(kind, time, time, time) for kind, time in path.events[: len(events)]]
+        bounces_by_route.append(exact_bounces(sampled, shared, bouncing_bodies(body), until))
+    bounces = with_bars(bounces_by_route[0], bounces_by_route[1], SAFETY, _FLOOR)
     impacts = [event.time for event in events if event.kind in IMPACTS]
     return [replace(item, time=time) for item, time in zip(bounces, impacts, strict=False)]
 
@@ -151,11 +151,11 @@ def with_changes(body: RollingBall, part: float) -> RollingBall:
     return replace(body, contact=contact, gravity=body.gravity * (1 - part / 2))
 
 
-def _unmoved(body: RollingBall, own: Path, pace: float, until: float) -> tuple[int, bool]:
+def _unmoved(body: RollingBall, path_now: Path, pace: float, until: float) -> tuple[int, bool]:
     """See :func:`~proofroll.truth.conditioning.well_posed_events`; the second route takes few steps near an edge."""
     contact = body.contact
     if always_pressed(body) and not (body.gap0 or contact.rolling_resistance or np.isfinite(contact.mu_static)):
-        return len(own.events), True  # nothing can switch
+        return len(path_now.events), True  # nothing can switch
 
     def story(path: Path) -> Story:
         def states(times: FloatArray) -> FloatArray:
@@ -171,12 +171,12 @@ def _unmoved(body: RollingBall, own: Path, pace: float, until: float) -> tuple[i
     except (Diverged, Refused):
         return 0, False  # a changed ball has no known motion to the end
     until = min(until, *(path.end for path in others))
-    return well_posed_events(story(own), [story(path) for path in others], pace, until)
+    return well_posed_events(story(path_now), [story(path) for path in others], pace, until)
 
 
 def _dataset(scene: Scene, times: FloatArray, path: Path, route: str, quadrature: Quadrature) -> xr.Dataset:
     kinks = [stretch.end for stretch in path.stretches]
     motion = path.motion(times, route)
-    result = dataset_of(scene, times, motion, lambda at: path.motion(at, route).w_WB, kinks, quadrature)
+    result = dataset_of(scene, times, motion, lambda instants: path.motion(instants, route).w_WB, kinks, quadrature)
     attributes = {"units": "1", "long_name": "whether the ball sticks (rolls without slip)"}
     return result.assign(sticking=("time", path.sticking(times), attributes))

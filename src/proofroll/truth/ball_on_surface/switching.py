@@ -120,8 +120,8 @@ class SwitchedBall:
             return Transition(route.nudged(state, np.zeros(3)), RESTS, stopped)
         if stretch.why is End.HALT:
             state = route.nudged(state, setting_off(body, route.world(state)[0]))
-        before, span = self._spans
-        hastens = stretch.why is End.STILL and not stretch.sticking and span < (1 - _SHORTER) * before
+        last_span, span = self._spans
+        hastens = stretch.why is End.STILL and not stretch.sticking and span < (1 - _SHORTER) * last_span
         self._reversals = self._reversals + 1 if hastens else 0
         if self._reversals > _REVERSALS:
             raise Refused(
@@ -145,9 +145,9 @@ class SwitchedBall:
             )
         state = self.route.at(*outcome.world)
         state = state if outcome.slip is not None else self.route.nudged(state, outcome.world[1])
-        after = self._touching(state, outcome.slip)
-        happenings = ((EventKind.SETTLE, ""), *after.happenings)
-        return Transition(state, after.mode, happenings, delay=outcome.rest, blur=outcome.blur)
+        landing = self._touching(state, outcome.slip)
+        happenings = ((EventKind.SETTLE, ""), *landing.happenings)
+        return Transition(state, landing.mode, happenings, delay=outcome.rest, blur=outcome.blur)
 
     def _touching(self, state: FloatArray, slip: FloatArray | None) -> Transition[Mode]:
         """Mode of a ball that starts to touch the wall with the velocity ``slip`` of its contact point [m/s]."""

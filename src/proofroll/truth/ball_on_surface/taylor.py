@@ -91,8 +91,8 @@ class SlidingTaylor(Sliding):
     def _creep(self, time: float, state: FloatArray, until: float, handover: float) -> _Run:
         return _Run(self._model.creep, [*self._pars, handover], _CREEP_ENDS, time, np.append(state, 0.0), until)
 
-    def _slide(self, first: FloatArray, floor: float, until: float) -> _Run:
-        return _Run(self._model.slip, [*self._pars, floor, until], _SLIP_ENDS, 0.0, first, np.inf)
+    def _slide(self, start_state: FloatArray, floor: float, until: float) -> _Run:
+        return _Run(self._model.slip, [*self._pars, floor, until], _SLIP_ENDS, 0.0, start_state, np.inf)
 
     def _slaved(self, states: FloatArray) -> FloatArray:
         return np.asarray(self._model.direction(states.T, self._pars)[0])
@@ -118,8 +118,8 @@ class SlidingTaylor(Sliding):
         if phi is None:
             friction, u = -np.stack([b2, b3], axis=-1) / self._A, np.zeros((len(states), 2))
         else:
-            along = np.stack([np.cos(phi), np.sin(phi)], axis=-1)
-            friction, u = -self._body.contact.mu_kinetic * N[:, None] * along, size[:, None] * along
+            heading = np.stack([np.cos(phi), np.sin(phi)], axis=-1)
+            friction, u = -self._body.contact.mu_kinetic * N[:, None] * heading, size[:, None] * heading
         return world_motion(
             self._body,
             states[:, :2] / self._scales,
@@ -167,12 +167,12 @@ class _Run:
         knots = self._knots()
         return knots, self.at(knots)
 
-    def at(self, where: FloatArray) -> FloatArray:
+    def at(self, places: FloatArray) -> FloatArray:
         """See :class:`proofroll.truth.ball_on_surface.sliding.IntegratedRun`."""
         knots = self._knots()
-        if len(knots) < 2 or not len(where):
-            return np.broadcast_to(self.last, (len(where), len(self.last))).copy()
-        return np.array(self._series(np.clip(where, knots[0], knots[-1])), dtype=np.float64)
+        if len(knots) < 2 or not len(places):
+            return np.broadcast_to(self.last, (len(places), len(self.last))).copy()
+        return np.array(self._series(np.clip(places, knots[0], knots[-1])), dtype=np.float64)
 
     def _knots(self) -> FloatArray:
         if self._series is None and self.end > self._inputs[2]:

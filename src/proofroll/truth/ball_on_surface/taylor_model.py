@@ -58,9 +58,9 @@ def _compiled(resistance: bool, bounded: bool) -> TaylorModel:
     equations = expressions(resistance)
     q, h, v2, v3, w1 = equations.state
     A, N, b2, b3 = equations.A, equations.N, equations.b2, equations.b3
-    rates, along = equations.rates, equations.along
+    rates, derivative_along = equations.rates, equations.along
     rolling = equations.rolling()
-    b_rate = (along(b2, rolling), along(b3, rolling))
+    b_rate = (derivative_along(b2, rolling), derivative_along(b3, rolling))
 
     up, down = hy.event_direction.positive, hy.event_direction.negative
 
@@ -72,7 +72,7 @@ def _compiled(resistance: bool, bounded: bool) -> TaylorModel:
     strength = hy.sqrt(b2**2 + b3**2)
     c, s = b2 / strength, b3 / strength
     leading = rates(-mu_k * N * c, -mu_k * N * s, size * s)
-    turning = (b2 * along(b3, leading) - b3 * along(b2, leading)) / strength**2
+    turning = (b2 * derivative_along(b3, leading) - b3 * derivative_along(b2, leading)) / strength**2
     net = strength - A * mu_k * N
     delta = -size * turning / (strength + net)
     c_slip, s_slip = c - delta * s, s + delta * c  # δ² is below round-off before the handover

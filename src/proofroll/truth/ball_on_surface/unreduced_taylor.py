@@ -41,8 +41,8 @@ def available(body: RollingBall) -> bool:
     They cover cylinders, planes and declared surfaces with a distance formula, without rolling resistance.
     """
     surface = body.surface
-    known = surface.knows_distance if isinstance(surface, Declared) else isinstance(surface, (Cylinder, Plane))
-    return known and not body.contact.rolling_resistance and library.available()
+    exact = surface.knows_distance if isinstance(surface, Declared) else isinstance(surface, (Cylinder, Plane))
+    return exact and not body.contact.rolling_resistance and library.available()
 
 
 def unreduced(body: RollingBall, times: FloatArray) -> BallMotion:
@@ -160,9 +160,9 @@ def _compiled(surface: Declared | type[Surface], moves: bool, bounded: bool) -> 
     else:
         e1_rate = [0.0, 0.0, 0.0]
     driven = scaled(-a, cross(w, e1_rate))
-    first = 9 if surface is Cylinder else 8 if surface is Plane else 5  # first free parameter
+    free_parameter = 9 if surface is Cylinder else 8 if surface is Plane else 5  # first free parameter
     if moves:  # the wall's velocity W × (p + a e1) grows at this rate
-        driven = plus(driven, cross([hy.par[first + i] for i in range(3)], plus(v, scaled(a, e1_rate))))
+        driven = plus(driven, cross([hy.par[free_parameter + i] for i in range(3)], plus(v, scaled(a, e1_rate))))
     along_wall = across([x / (1 + kappa) for x in plus(g, scaled(kappa, driven))], e1)
     v_rate = plus(along_wall, scaled(-dot(e1_rate, v), e1))
     force = minus(v_rate, g)  # force of the wall per unit mass
@@ -171,7 +171,7 @@ def _compiled(surface: Declared | type[Surface], moves: bool, bounded: bool) -> 
         return hy.taylor_adaptive(
             list(zip([*p, *v, *w], [*v, *v_rate, *w_rate], strict=True)), [1.0] * 9, opt_level=_LEVEL
         )
-    mu = hy.par[first]
+    mu = hy.par[free_parameter]
     pressed = -dot(force, e1)
     friction = plus(force, scaled(pressed, e1))
     used_up = hy.t_event(dot(friction, friction) - (mu * pressed) ** 2, direction=hy.event_direction.positive)

@@ -60,9 +60,9 @@ class Structure:
 def structure(body: RollingBall, formulation: Formulation) -> Structure:
     """Form of the equations of a scene on a cylinder or plane, for which :func:`rolling.supports` is true."""
     curved = isinstance(body.surface, Cylinder)
-    first, quarter, half = (body.surface.frame(np.array([angle, 0.0])) for angle in (0.0, np.pi / 2, np.pi))
-    constant = (first + half) / 2 if curved else first
-    parts = np.stack([constant, first - constant, quarter - constant])
+    frame_at_zero, quarter, half = (body.surface.frame(np.array([angle, 0.0])) for angle in (0.0, np.pi / 2, np.pi))
+    constant = (frame_at_zero + half) / 2 if curved else frame_at_zero
+    parts = np.stack([constant, frame_at_zero - constant, quarter - constant])
     whole = np.round(parts)
     parts = np.where(np.abs(parts - whole) < _ZERO, whole, parts) + 0.0  # -0 is 0
     return Structure(

@@ -73,7 +73,7 @@ class Series:
         self._check(self._before, t, x)
 
 
-def still_moving(before: FloatArray, t: float, now: FloatArray) -> None:
+def still_moving(start_velocity: FloatArray, t: float, now: FloatArray) -> None:
     """Raises Diverged if the centre came to rest within a step, where the direction of rolling resistance reverses.
 
     The equations are smooth beyond rest on a straight path, so that a series may step across it. A reversal differs
@@ -81,11 +81,11 @@ def still_moving(before: FloatArray, t: float, now: FloatArray) -> None:
     turning bounds the step.
 
     Args:
-        before: velocity at the begin of the step [m/s], shape (k,).
+        start_velocity: velocity at the begin of the step [m/s], shape (k,).
         t: a time in the step [s].
         now: velocity at ``t`` [m/s], shape (k,).
     """
-    if float(before @ now) < 0 or not np.any(now):
+    if float(start_velocity @ now) < 0 or not np.any(now):
         raise Diverged(
             f"the ball comes to rest by {t:.6g} s, where rolling resistance has no direction; "
             "with a finite mu_static, however large, engines that can slip go on past that"

@@ -54,11 +54,11 @@ def starts_to_slip(evidence: Evidence) -> Iterator[Cause]:
     run, truth, contact = evidence.run, evidence.truth, evidence.element.contact
     if run is None or truth is None or not np.isfinite(contact.mu_static) or "sticking" not in truth:
         return
-    first, true = (
+    slip_time, true = (
         next((event.time for event in events_of(data) if event.kind == EventKind.SLIP), float(data["time"][-1]))
         for data in (run, truth)
     )
-    if contact.mu_kinetic >= contact.mu_static or first == true:
+    if contact.mu_kinetic >= contact.mu_static or slip_time == true:
         return
     time, needed = truth["time"].to_numpy(), truth["needed_friction"].to_numpy()
     held = (time <= true) & (truth["sticking"].to_numpy() > 0) & np.isfinite(needed)
@@ -71,14 +71,14 @@ def starts_to_slip(evidence: Evidence) -> Iterator[Cause]:
     both = f"the kinetic friction {contact.mu_kinetic:g}, not at the static {contact.mu_static:g}"
     says = f"the ball begins to slip at {both}"
     remedy = "the ball sticks up to the static friction, and only slips at the kinetic one"
-    before, after = abs(first - true), abs(first - crossing)
+    difference, remainder = abs(slip_time - true), abs(slip_time - crossing)
     yield Cause(
         id="static friction",
         says=says,
         quantity="first slip",
         unit="s",
-        before=before,
-        after=after,
+        before=difference,
+        after=remainder,
         remedy=remedy,
         fitted=0,
         covers=("motion", "force"),
@@ -104,16 +104,16 @@ def pyramidal_cone(evidence: Evidence) -> Iterator[Cause]:
         return
     if max(np.ptp(np.unwrap(np.arctan2(of[:, 1], of[:, 0]))) for of in (slip, reported)) < _TURNS:
         return
-    before, least = known_difference(reported, -most * slip / sizes), _PYRAMID * float(np.max(np.abs(most)))
-    if not before > least or known_difference(reported, true) <= least:
+    difference, least = known_difference(reported, -most * slip / sizes), _PYRAMID * float(np.max(np.abs(most)))
+    if not difference > least or known_difference(reported, true) <= least:
         return  # friction as the law has it, or the true one against a slip that is wrong
-    after = np.inf
+    remainder = np.inf
     for angle in np.arange(_ANGLES) * np.pi / 2 / _ANGLES:
         turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
-        along = slip @ turn
-        corner = np.abs(along) == np.max(np.abs(along), axis=-1, keepdims=True)
+        components = slip @ turn
+        corner = np.abs(components) == np.max(np.abs(components), axis=-1, keepdims=True)
         for kind in (corner, 1.0):
-            after = min(after, known_difference(reported, -most * (np.sign(along) * kind) @ turn.T))
+            remainder = min(remainder, known_difference(reported, -most * (np.sign(components) * kind) @ turn.T))
     says = "the friction cone is a pyramid: the friction depends on the direction of the slip"
     remedy = "choose an elliptic (quadratic) cone"
     covered = ("motion", *COVERED)
@@ -122,8 +122,8 @@ def pyramidal_cone(evidence: Evidence) -> Iterator[Cause]:
         says=says,
         quantity="friction while slipping",
         unit="N",
-        before=before,
-        after=after,
+        before=difference,
+        after=remainder,
         remedy=remedy,
         fitted=1,
         covers=covered,

@@ -165,14 +165,14 @@ def residuals_of(evidence: Evidence) -> Iterator[Residuals[Law]]:
         return
 
     def left_of_run(law: Law | None) -> FloatArray:
-        found = residuals(body, seen, law or plain)
-        return np.full_like(found, np.inf) if law is None else found
+        left = residuals(body, seen, law or plain)
+        return np.full_like(left, np.inf) if law is None else left
 
-    before = float(np.max(np.abs(left_of_run(plain))))
-    if np.isfinite(before) and before > ABOVE * float(np.max(np.abs(residuals(body, true, plain)))):
-        allowed = CLOSES * before / natural_acceleration(body)
+    largest = float(np.max(np.abs(left_of_run(plain))))
+    if np.isfinite(largest) and largest > ABOVE * float(np.max(np.abs(residuals(body, true, plain)))):
+        allowed = CLOSES * largest / natural_acceleration(body)
         yield Residuals(
-            left=left_of_run, quantity="motion", unit="m/s^2", before=before, closes=CLOSES, covers=COVERED,
+            left=left_of_run, quantity="motion", unit="m/s^2", before=largest, closes=CLOSES, covers=COVERED,
             plain=plain, others=lambda: _others(body),
             contradicted=lambda law: _contradicted(evidence.lines, body, law, allowed),
         )  # fmt: skip
@@ -190,11 +190,11 @@ def held_at_start(evidence: Evidence, body: RollingBall, wrong: Sequence[Mapping
         )
 
     what = " and ".join(str(line["quantity"]) for line in wrong[:2]) + (" and more" if len(wrong) > 2 else "")
-    before = float(np.max(np.abs(relative_differences(evidence.lines, {}, GIVEN)), initial=0.0))
+    largest = float(np.max(np.abs(relative_differences(evidence.lines, {}, GIVEN)), initial=0.0))
     return Residuals(
-        left=left_of_lines, quantity=f"at time 0 {what}, relative,", unit="1", before=before, closes=CLOSES_EXACTLY,
+        left=left_of_lines, quantity=f"at time 0 {what}, relative,", unit="1", before=largest, closes=CLOSES_EXACTLY,
         covers=COVERED, plain=Law(body), others=lambda: _others(body),
-        contradicted=lambda law: _contradicted(evidence.lines, body, law, CLOSES_EXACTLY * before),
+        contradicted=lambda law: _contradicted(evidence.lines, body, law, CLOSES_EXACTLY * largest),
     )  # fmt: skip
 
 
@@ -203,7 +203,7 @@ def _others(body: RollingBall) -> list[Law]:
     ball = body.ball
     lighter = [replace(ball, mass=0.9 * ball.mass), replace(ball, inertia_ratio=0.9 * ball.inertia_ratio)]
     laws = [Law(replace(body, gravity=body.gravity + axis)) for axis in np.eye(3)]
-    laws += [Law(replace(body, ball=other)) for other in lighter]
+    laws += [Law(replace(body, ball=lighter_ball)) for lighter_ball in lighter]
     laws += [Law(body, force=lambda v: -ball.mass * v), Law(body, moment=lambda _e1, _v, w: -ball.inertia * w)]
     return [*laws, *(Law(body, moment=lambda *_, axis=axis: ball.inertia * axis) for axis in np.eye(3))]
 

@@ -76,8 +76,8 @@ def number(
 
 def _snapped(factor: float) -> tuple[float, int]:
     """(factor, number of fitted values): the factor of a known mistake, and 0; or else the given one, and 1."""
-    known = known_factor(factor)
-    return (known[0], 0) if known else (factor, 1)
+    mistake = known_factor(factor)
+    return (mistake[0], 0) if mistake else (factor, 1)
 
 
 def damping(what: str, velocity: float, spin: float) -> Hypothesis:

@@ -89,14 +89,20 @@ def reported_force(evidence: Evidence) -> Iterator[Cause]:
     run, truth = pair
     time, axes = truth["time"].to_numpy(), frames(body, truth)
     reported, true = forces(body, run), forces(body, truth)
-    known = np.all(np.isfinite(reported) & np.isfinite(true), axis=-1)
-    own = {name: frame[known] for name, frame in axes.items()}
+    finite = np.all(np.isfinite(reported) & np.isfinite(true), axis=-1)
+    finite_axes = {name: frame[finite] for name, frame in axes.items()}
     vector = ReportedVector(
-        name="force", what=_FORCE, unit="N", reported=reported[known], true=true[known], time=time[known], frames=own
+        name="force",
+        what=_FORCE,
+        unit="N",
+        reported=reported[finite],
+        true=true[finite],
+        time=time[finite],
+        frames=finite_axes,
     ).after_start()
     if forced_otherwise(evidence, vector):
         return
-    yield _friction_reversed(vector, own[SURFACE][-len(vector.true) :, :, 0])
+    yield _friction_reversed(vector, finite_axes[SURFACE][-len(vector.true) :, :, 0])
     yield from vector.causes(evidence.step)
 
 
@@ -122,7 +128,7 @@ def starts_late(evidence: Evidence) -> Iterator[Cause]:
     ahead = float(off @ v / (v @ v))
     start = evidence.element.first_motion
     bend = start.acceleration[0] * ahead**2 / 2 if start is not None else 0.0
-    before, after = float(np.max(np.abs(off))), float(np.max(np.abs(off - v * ahead - bend)))
+    difference, remainder = float(np.max(np.abs(off))), float(np.max(np.abs(off - v * ahead - bend)))
     says = f"the start is {delay_text(-ahead, evidence.step)}: the ball has moved before time 0"
     remedy, change = "sample before the first step", in_steps(ahead, evidence.step)
     yield Cause(
@@ -130,8 +136,8 @@ def starts_late(evidence: Evidence) -> Iterator[Cause]:
         says=says,
         quantity="position at time 0",
         unit="m",
-        before=before,
-        after=after,
+        before=difference,
+        after=remainder,
         remedy=remedy,
         fitted=1,
         change=change,
@@ -157,14 +163,14 @@ def at_the_contact(evidence: Evidence) -> Iterator[Cause]:
         reported, true = run[name].to_numpy(), truth[name].to_numpy()
         if reported.shape == true.shape and len(reported) > 1:
             reported, true = reported[1:], true[1:]
-            before = known_difference(reported, true)
+            difference = known_difference(reported, true)
             remedy = f"give {name} of the ball's centre, along the axes of the world"
             yield Cause(
                 id="contact point",
                 says=says,
                 quantity=name,
                 unit=_UNITS[name][1],
-                before=before,
+                before=difference,
                 after=known_difference(reported, changed[1:]),
                 remedy=remedy,
             )
@@ -194,7 +200,7 @@ def stale_normal(evidence: Evidence) -> Iterator[Cause]:
         return  # the ball itself is as far off, which explains its force
     moment = delay_text(delay, evidence.step).removesuffix(" late")
     says = f"the force is along the axes of the normal of {moment} before"
-    after, remedy = (
+    remainder, remedy = (
         known_difference(reported, turned(delay)),
         "take the normal where the ball is when the force is read",
     )
@@ -205,7 +211,7 @@ def stale_normal(evidence: Evidence) -> Iterator[Cause]:
         quantity="force",
         unit="N",
         before=known_difference(reported, true),
-        after=after,
+        after=remainder,
         remedy=remedy,
         fitted=1,
         change=change,

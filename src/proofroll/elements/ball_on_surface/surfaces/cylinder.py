@@ -85,11 +85,11 @@ class Cylinder:
         gamma = np.asarray(u, dtype=np.float64)[..., 0]
         if gamma.ndim == 0 and math.isfinite(gamma):
             return self._frame(math.cos(gamma), math.sin(gamma))
-        cos, sin, zero, one = np.cos(gamma), np.sin(gamma), np.zeros_like(gamma), np.ones_like(gamma)
+        cos, sin, zeros, ones = np.cos(gamma), np.sin(gamma), np.zeros_like(gamma), np.ones_like(gamma)
         columns = [
-            np.stack([cos, sin, zero], axis=-1),
-            np.stack([-sin, cos, zero], axis=-1),
-            np.stack([zero, zero, one], axis=-1),
+            np.stack([cos, sin, zeros], axis=-1),
+            np.stack([-sin, cos, zeros], axis=-1),
+            np.stack([zeros, zeros, ones], axis=-1),
         ]
         return np.asarray(tilted(self.tilt) @ np.stack(columns, axis=-1), dtype=np.float64)
 

@@ -109,22 +109,22 @@ class Declared:
     def length_scales(self) -> tuple[float, float]:
         """See :class:`Surface`; the largest radius for an angle, 1 for a length."""
         lengths = np.linalg.norm(self.tangents(self.places()), axis=-2).max(axis=0)
-        first, second = (1.0 if unit == "m" else float(x) for unit, x in zip(self.units, lengths, strict=True))
-        return first, second
+        scale, second_scale = (1.0 if unit == "m" else float(x) for unit, x in zip(self.units, lengths, strict=True))
+        return scale, second_scale
 
     def position(self, u: npt.ArrayLike) -> FloatArray:
         """See :class:`Surface`."""
         return self._bent(u, 0, 1)[..., 0]
 
-    def _bent(self, u: npt.ArrayLike, first: int, count: int) -> FloatArray:
-        """Derivatives number ``first`` to ``first + count`` of x, y and z by the coordinates, shape (..., 3, count).
+    def _bent(self, u: npt.ArrayLike, lowest: int, count: int) -> FloatArray:
+        """Derivatives number ``lowest`` to ``lowest + count`` of x, y and z by the coordinates, shape (..., 3, count).
 
         Order: value, two first derivatives, three second derivatives.
         """
         u = np.asarray(u, dtype=np.float64)
         parts = _chart(self)[0](*u.tolist()) if u.ndim == 1 else _chart(self)[1](u[..., 0], u[..., 1])
-        wanted = [parts[6 * axis + index] for axis in range(3) for index in range(first, first + count)]
-        return _stacked(wanted, u.shape[:-1]).reshape(*u.shape[:-1], 3, count)
+        derivatives = [parts[6 * axis + index] for axis in range(3) for index in range(lowest, lowest + count)]
+        return _stacked(derivatives, u.shape[:-1]).reshape(*u.shape[:-1], 3, count)
 
     def tangents(self, u: npt.ArrayLike) -> FloatArray:
         """See :class:`Surface`."""
@@ -149,8 +149,8 @@ class Declared:
     def locate(self, p_WB: npt.ArrayLike) -> FloatArray:
         """See :class:`Surface`; Newton's method for the nearest point, from the nearest of a grid."""
         p = np.asarray(p_WB, dtype=np.float64)
-        flat, known = p.reshape(-1, 3), self.places()
-        u = known[np.argmin(np.linalg.norm(flat[:, None] - self.position(known)[None], axis=-1), axis=1)]
+        flat, samples = p.reshape(-1, 3), self.places()
+        u = samples[np.argmin(np.linalg.norm(flat[:, None] - self.position(samples)[None], axis=-1), axis=1)]
         for _ in range(_NEWTON):
             off, tangents = self.position(u) - flat, self.tangents(u)
             bent = np.einsum("ni,nijk->njk", off, self.second(u)) + np.swapaxes(tangents, -1, -2) @ tangents
@@ -160,14 +160,14 @@ class Declared:
                 u[:, column] -= period * np.ceil(u[:, column] / period - 0.5)
         return np.asarray(u.reshape(*p.shape[:-1], 2))
 
-    def _away(self, p_WB: npt.ArrayLike, first: int, count: int) -> FloatArray:
-        """Derivatives number ``first`` to ``first + count`` of the distance, shape (..., count).
+    def _away(self, p_WB: npt.ArrayLike, lowest: int, count: int) -> FloatArray:
+        """Derivatives number ``lowest`` to ``lowest + count`` of the distance, shape (..., count).
 
         Order: value, gradient by x, y, z, upper half of the Hessian, row by row.
         """
         p = np.asarray(p_WB, dtype=np.float64)
         parts = _field(self)[0](*p.tolist()) if p.ndim == 1 else _field(self)[1](p[..., 0], p[..., 1], p[..., 2])
-        return _stacked(parts[first : first + count], p.shape[:-1])
+        return _stacked(parts[lowest : lowest + count], p.shape[:-1])
 
     def gap(self, p_WB: npt.ArrayLike) -> FloatArray:
         """See :class:`Surface`."""
@@ -244,8 +244,8 @@ def _triad(x2: float, y2: float, z2: float, x: float, y: float, z: float) -> tup
     """Components of e1, e2, e3, nine numbers, from the two tangents; NaN where they are zero or parallel."""
     x1, y1, z1 = y2 * z - z2 * y, z2 * x - x2 * z, x2 * y - y2 * x
     across = math.sqrt(x1 * x1 + y1 * y1 + z1 * z1) or math.nan
-    along = math.sqrt(x2 * x2 + y2 * y2 + z2 * z2) or math.nan
-    x1, y1, z1, x2, y2, z2 = x1 / across, y1 / across, z1 / across, x2 / along, y2 / along, z2 / along
+    length = math.sqrt(x2 * x2 + y2 * y2 + z2 * z2) or math.nan
+    x1, y1, z1, x2, y2, z2 = x1 / across, y1 / across, z1 / across, x2 / length, y2 / length, z2 / length
     return x1, y1, z1, x2, y2, z2, y1 * z2 - z1 * y2, z1 * x2 - x1 * z2, x1 * y2 - y1 * x2
 
 

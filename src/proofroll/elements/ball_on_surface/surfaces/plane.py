@@ -99,9 +99,9 @@ class Plane:
 
     def frame(self, u: npt.ArrayLike) -> FloatArray:
         """See :class:`Surface`."""
-        before = np.shape(u)[:-1]
+        shape = np.shape(u)[:-1]
         # numpy takes ten times as long for the frame of one place as for its copy
-        return np.broadcast_to(self._axes, (*before, 3, 3)).copy() if before else self._axes.copy()
+        return np.broadcast_to(self._axes, (*shape, 3, 3)).copy() if shape else self._axes.copy()
 
     def locate(self, p_WB: npt.ArrayLike) -> FloatArray:
         """See :class:`Surface`."""

@@ -49,9 +49,9 @@ class Revolved(Declared):
         """Second coordinate of the nearest point of the curve: Newton's method, from the nearest of many points."""
         r, z = np.broadcast_arrays(r, z)
         low, high = self.extent
-        known = low + (high - low) * (np.arange(_PLACES) + 0.5) / _PLACES
-        at_r, at_z = (np.broadcast_to(part, known.shape) for part in self.profile(known))
-        s = known[np.argmin((r[..., None] - at_r) ** 2 + (z[..., None] - at_z) ** 2, axis=-1)]
+        samples = low + (high - low) * (np.arange(_PLACES) + 0.5) / _PLACES
+        at_r, at_z = (np.broadcast_to(part, samples.shape) for part in self.profile(samples))
+        s = samples[np.argmin((r[..., None] - at_r) ** 2 + (z[..., None] - at_z) ** 2, axis=-1)]
         for _ in range(_NEWTON):
             (r0, r1, r2), (z0, z1, z2) = (_derivatives(part) for part in self.profile(variables(s)[0]))
             off_r, off_z = r0 - r, z0 - z

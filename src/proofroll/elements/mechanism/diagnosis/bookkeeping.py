@@ -42,11 +42,11 @@ def of_bookkeeping(evidence: Evidence) -> Iterator[Cause]:
         return
     try:
         law = ControlLaw.of(asked.mechanism)
-        found = _at_start(evidence, law) if evidence.run is None else _of_run(evidence, law)
+        search = _at_start(evidence, law) if evidence.run is None else _of_run(evidence, law)
     except InputError:  # motors with gears
         return
-    if found is not None:
-        yield from (_cause(item, found.before, of_run=evidence.run is not None) for item in found.explanations[:2])
+    if search is not None:
+        yield from (_cause(item, search.before, of_run=evidence.run is not None) for item in search.explanations[:2])
 
 
 def _at_start(evidence: Evidence, law: ControlLaw) -> MistakeSearch | None:
@@ -78,16 +78,16 @@ def _in_air(mechanism: Mechanism) -> bool:
 
 
 def _cause(item: MistakesFound, before: float, *, of_run: bool) -> Cause:
-    first = item.mistakes[0]
+    first_mistake = item.mistakes[0]
     sized = [abs(size - 1) for mistake, size in zip(item.mistakes, item.sizes, strict=True) if mistake.sized]
     return Cause(
-        id=_SAME.get(first.id, f"bookkeeping: {first.id}"),
+        id=_SAME.get(first_mistake.id, f"bookkeeping: {first_mistake.id}"),
         says=f"it moves as if {item.sentence}",
         quantity="motion" if of_run else "accelerations at time 0",
         unit="rad or m" if of_run else "1/s^2",
         before=before,
         after=item.after,
-        remedy=f"look at the {first.layer} ({LAYERS[first.layer]}) in the program around the engine",
+        remedy=f"look at the {first_mistake.layer} ({LAYERS[first_mistake.layer]}) in the program around the engine",
         fitted=item.fitted,
         covers=("motion", *COVERED, "effort"),
         change=max(sized) if sized else np.inf,

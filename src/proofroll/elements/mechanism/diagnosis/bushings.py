@@ -42,14 +42,14 @@ def _mistakes(bushing: Bushing) -> Iterator[tuple[str, Bushing, str]]:
         if (stiffness, damping) != (bushing.stiffness, bushing.damping):
             remedy = "give each axis of its frame its stiffness and damping, along and then about it"
             yield says, replace(bushing, stiffness=stiffness, damping=damping), remedy
-    along, about = bushing.stiffness[:3], bushing.stiffness[3:]
+    translation, rotation = bushing.stiffness[:3], bushing.stiffness[3:]
     if any(bushing.orientation_a):
         # B turns with A, or the bushing would be loaded at rest
         along_body = replace(bushing, orientation_a=ZERO, orientation_b=_less(bushing))
         says = f"acts along the axes of {bushing.body_a}, not of its frame there"
         yield says, along_body, f"turn its frame by its orientation in {bushing.body_a}"
-    if any(about) and any(along):
-        without = replace(bushing, stiffness=(*along, 0.0, 0.0, 0.0))
+    if any(rotation) and any(translation):
+        without = replace(bushing, stiffness=(*translation, 0.0, 0.0, 0.0))
         yield "has no stiffness about axes", without, "give it all six values"
     if any(bushing.damping):
         yield "has no damping", replace(bushing, damping=(0.0,) * 6), "give it its six values of damping"

@@ -291,7 +291,7 @@ def forces_at_start(evidence: Evidence) -> Iterator[Cause]:
         return
     reported, true = np.reshape(line["found"], shape), np.reshape(line["expected"], shape)
     finite = np.isfinite(reported).all(axis=-1) & np.isfinite(true).all(axis=-1)
-    if all(other["holds"] for key, other in lines.items() if key != name) and finite.any():
+    if all(content["holds"] for key, content in lines.items() if key != name) and finite.any():
         yield from ReportedVector(
             name="contact_forces",
             what="the force of a contact on its first body",

@@ -103,21 +103,21 @@ class MechanismStates:
     @cached_property
     def coupled(self) -> FloatArray:
         """Rows of the couplings on the velocities, (couplings, nv)."""
-        found = np.zeros((len(self.mechanism.couplings), self.mechanism.nv))
-        for row, coupling in zip(found, self.mechanism.couplings, strict=True):
+        rows = np.zeros((len(self.mechanism.couplings), self.mechanism.nv))
+        for row, coupling in zip(rows, self.mechanism.couplings, strict=True):
             for name, factor in coupling.terms:
                 row[self.mechanism.place_of(name)[1]] = factor
-        return found
+        return rows
 
     @cached_property
     def v_rates(self) -> list[FloatArray]:
         """Accelerations along the tree's velocities, (nv), at each state."""
-        found: list[FloatArray] = []
+        rates: list[FloatArray] = []
         for state in self.each:
             J = state.motion.J[:-1].reshape(-1, self.mechanism.nv)
             off = (state.acceleration - state.motion.bias[:-1]).ravel()
-            found.append(np.asarray(np.linalg.lstsq(J, off, rcond=None)[0], dtype=np.float64))
-        return found
+            rates.append(np.asarray(np.linalg.lstsq(J, off, rcond=None)[0], dtype=np.float64))
+        return rates
 
     @cached_property
     def scale(self) -> FloatArray:
@@ -128,9 +128,9 @@ class MechanismStates:
         """
         sizes = self._own[:, :2].reshape(-1, self.mechanism.nv)
         largest = np.max(np.abs(sizes), axis=0, initial=0.0)
-        for joint, at in zip(self.mechanism.joints, self.mechanism.v_slices, strict=True):
+        for joint, part in zip(self.mechanism.joints, self.mechanism.v_slices, strict=True):
             if joint.kind in WITH_QUATERNION:  # about an axis of symmetry there may be round-off alone
-                vectors = largest[at].reshape(-1, 3)
+                vectors = largest[part].reshape(-1, 3)
                 vectors[:] = np.max(vectors, axis=1, keepdims=True)
         return np.where(largest > 1e-9 * np.max(largest), largest, np.max(largest) or 1.0)
 
@@ -144,13 +144,13 @@ class MechanismStates:
         Where a change removes all inertia and loads of a velocity, the unchanged mechanism's residual stands there: an
         empty balance proves nothing.
         """
-        found, parts, own = [], self.parts(change), self._own
-        gone = np.max(parts[:, 2], axis=0) <= _GONE * np.max(own[:, 2], axis=0)
-        balance = np.where(gone, own[:, 0] - own[:, 1], parts[:, 0] - parts[:, 1])
+        residuals, parts, plain = [], self.parts(change), self._own
+        gone = np.max(parts[:, 2], axis=0) <= _GONE * np.max(plain[:, 2], axis=0)
+        balance = np.where(gone, plain[:, 0] - plain[:, 1], parts[:, 0] - parts[:, 1])
         for i, row in enumerate(balance):
             directions = self.free(self.each[i], without) if without else self.allowed[i]
-            found.append(directions.T @ row / (np.abs(directions.T) @ self.scale))
-        return np.concatenate(found)
+            residuals.append(directions.T @ row / (np.abs(directions.T) @ self.scale))
+        return np.concatenate(residuals)
 
     @cached_property
     def _own(self) -> FloatArray:
@@ -205,11 +205,11 @@ class Change:
         motion, n = state.motion, len(m.bodies)
         mass = np.array([b.mass for b in mechanism.bodies]) if self.mass is None else self.mass
         com = np.array([b.com for b in mechanism.bodies]) if self.com is None else self.com
-        own = np.array([b.inertia for b in mechanism.bodies]) if self.inertia is None else self.inertia
+        inertias = np.array([b.inertia for b in mechanism.bodies]) if self.inertia is None else self.inertia
         g = np.array(mechanism.gravity) if self.gravity is None else self.gravity
         R, w = motion.R_WB[:n], motion.w_WB[:n]
         arm = np.einsum("nij,nj->ni", R, com)
-        inertia = R @ own @ R.transpose(0, 2, 1)
+        inertia = R @ inertias @ R.transpose(0, 2, 1)
         J = motion.J[:n].copy()
         J[:, :3] -= skews(arm) @ J[:, 3:]
         alpha = state.acceleration[:, 3:]
@@ -241,28 +241,28 @@ class Change:
         return np.array([sum(terms), acts, sum(map(np.abs, terms)) + np.abs(acts)])
 
     def _spring_loads(self, states: MechanismStates, state: MechanismState) -> FloatArray:
-        found: FloatArray = np.zeros(self.mechanism.nv)
+        load: FloatArray = np.zeros(self.mechanism.nv)
         for spring in self.mechanism.springs:
             (p_a, v_a, J_a, _), (p_b, v_b, J_b, _) = (
                 states.tree.point(state.motion, body, np.array(position))
                 for body, position in ((spring.body_a, spring.position_a), (spring.body_b, spring.position_b))
             )
             length = float(np.linalg.norm(p_b - p_a))
-            along = (p_b - p_a) / length
+            axis = (p_b - p_a) / length
             stretched = self.springs * spring.stiffness * (length - spring.length)
-            damped = self.spring_damping * spring.damping * float(along @ (v_b - v_a))
+            damped = self.spring_damping * spring.damping * float(axis @ (v_b - v_a))
             further = 0.0
             if spring.force is not None:
-                further = self.springs * float(spring.force.pull(length, float(along @ (v_b - v_a))))
-            found += (stretched + damped + further) * along @ (J_a - J_b)
-        return found
+                further = self.springs * float(spring.force.pull(length, float(axis @ (v_b - v_a))))
+            load += (stretched + damped + further) * axis @ (J_a - J_b)
+        return load
 
     def _bushing_loads(self, motion: BodyMotion) -> FloatArray:
         """Loads of bushings along each velocity, shape (nv,)."""
-        found: FloatArray = np.zeros(self.mechanism.nv)
+        load: FloatArray = np.zeros(self.mechanism.nv)
         for i, arm, force, moment in bushing_loads(self.mechanism, motion):
-            found += np.concatenate([force, moment + cross(arm, force)]) @ motion.J[i]
-        return self.bushings * found
+            load += np.concatenate([force, moment + cross(arm, force)]) @ motion.J[i]
+        return self.bushings * load
 
     def _applied_loads(self, states: MechanismStates, state: MechanismState) -> FloatArray:
         """Applied forces and moments along each velocity, shape (nv,)."""
@@ -318,7 +318,7 @@ def is_one_motion(run: Any, truth: Any, length: float) -> bool:
 def _modes(mechanism: Mechanism, placed: Placed) -> list[tuple[object, ...]]:
     """Mode of the switching laws at each sample: friction and stops, limited efforts, sections of tables."""
     corners = np.array(breaks(mechanism.signals))
-    found: list[tuple[object, ...]] = []
+    modes: list[tuple[object, ...]] = []
     joints = switched_joints(mechanism)
     q, v = placed.of_tree() if joints or mechanism.actuators else (np.zeros((len(placed.time), mechanism.nq)),) * 2
     still = _AT_REST * np.max(np.abs(v), axis=0, initial=0.0)
@@ -330,10 +330,10 @@ def _modes(mechanism: Mechanism, placed: Placed) -> list[tuple[object, ...]]:
             )
             for j in joints
         )
-        where = ((item, *mechanism.place_of(item.joint)) for item in mechanism.actuators if item.limit is not None)
-        efforts = tuple(item.mode(t, float(places[at]), float(rates[rated])) for item, at, rated in where)
-        found.append((rest, efforts, int(np.searchsorted(corners, t))))
-    return found
+        limited = ((item, *mechanism.place_of(item.joint)) for item in mechanism.actuators if item.limit is not None)
+        efforts = tuple(item.mode(t, float(places[place]), float(rates[rated])) for item, place, rated in limited)
+        modes.append((rest, efforts, int(np.searchsorted(corners, t))))
+    return modes
 
 
 def _moves(mode: tuple[object, ...]) -> bool:
@@ -350,9 +350,9 @@ def stretch(mechanism: Mechanism, *datasets: Any) -> slice | None:
     if not all(is_motion(dataset) for dataset in datasets):
         return None
     count = min(dataset.sizes["time"] for dataset in datasets)
-    each = list(zip(*(_modes(mechanism, placed_of(mechanism, dataset)) for dataset in datasets), strict=False))
-    ends = [0, *(k for k in range(1, count) if each[k] != each[k - 1]), count]
-    free = [slice(a, b) for a, b in itertools.pairwise(ends) if all(map(_moves, each[a]))]
+    modes = list(zip(*(_modes(mechanism, placed_of(mechanism, dataset)) for dataset in datasets), strict=False))
+    ends = [0, *(k for k in range(1, count) if modes[k] != modes[k - 1]), count]
+    free = [slice(a, b) for a, b in itertools.pairwise(ends) if all(map(_moves, modes[a]))]
     longest = max(free, key=lambda part: part.stop - part.start, default=slice(0, 0))
     return longest if _fit(longest) else None
 

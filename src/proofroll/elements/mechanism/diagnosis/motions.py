@@ -25,10 +25,10 @@ _DEGREE = np.pi / 180
 )
 def of_motions(evidence: Evidence) -> Iterator[Cause]:
     """Hypotheses: one prescribed motion is a step late, has the wrong sign, or is in other units of angle."""
-    mechanism, found = evidence.element.mechanism, run_and_truth(evidence)
+    mechanism, datasets = evidence.element.mechanism, run_and_truth(evidence)
     if not mechanism.prescribed:
         return
-    placed = placed_of(mechanism, found[0]) if found is not None and is_motion(found[0]) else None
+    placed = placed_of(mechanism, datasets[0]) if datasets is not None and is_motion(datasets[0]) else None
     start = of_start(evidence) if placed is None else None
     for joint, _, at_v in mechanism.prescribed:
         unit = "rad" if joint.kind == JointKind.REVOLUTE else "m"
@@ -41,19 +41,19 @@ def of_motions(evidence: Evidence) -> Iterator[Cause]:
             what, units, part = f"acceleration of {joint.name} at time 0", f"{unit}/s^2", 2
         else:
             return
-        own = _values(joint, 1.0, 0.0, times)[part]
-        before = float(np.max(np.abs(values - own), initial=0.0))
-        if not above_round_off(before, float(np.max(np.abs(own), initial=0.0))):
+        motion = _values(joint, 1.0, 0.0, times)[part]
+        difference = float(np.max(np.abs(values - motion), initial=0.0))
+        if not above_round_off(difference, float(np.max(np.abs(motion), initial=0.0))):
             continue
         for says, factor, delay, remedy in _mistakes(joint, evidence.step):
-            after = float(np.max(np.abs(values - _values(joint, factor, delay, times)[part])))
+            remainder = float(np.max(np.abs(values - _values(joint, factor, delay, times)[part])))
             yield Cause(
                 id=f"motion of {joint.name}",
                 says=f"the motion of {joint.name} {says}",
                 quantity=what,
                 unit=units,
-                before=before,
-                after=after,
+                before=difference,
+                after=remainder,
                 remedy=remedy,
                 fitted=0,
                 covers=_COVERS,

@@ -36,47 +36,47 @@ _BOX_EDGES = [pair for pair in itertools.combinations(_CORNERS, 2) if np.abs(np.
 def mechanism_drawing(element: MechanismElement) -> Drawing:
     """Drawing of a mechanism: lines from centres of mass to the fastenings of bodies, and marks of joints and parts."""
     mechanism, start, picture = element.mechanism, element.start, Drawing()
-    at = View(*direction(element), _SIZE / _reach(element))
+    view = View(*direction(element), _SIZE / _reach(element))
 
     def place(body: str, position: tuple[float, ...]) -> FloatArray:
         return np.asarray(start.point(body, position)[0])
 
-    _shapes(picture, at, element)
+    _shapes(picture, view, element)
     for spring in mechanism.springs:
         ends = place(spring.body_a, spring.position_a), place(spring.body_b, spring.position_b)
-        picture.path(_zigzag(at(np.stack(ends))), "thin")
+        picture.path(_zigzag(view(np.stack(ends))), "thin")
     for bushing in mechanism.bushings:
-        middle = at(place(bushing.body_a, bushing.position_a))
-        both = np.stack([middle, at(place(bushing.body_b, bushing.position_b))])
+        middle = view(place(bushing.body_a, bushing.position_a))
+        both = np.stack([middle, view(place(bushing.body_b, bushing.position_b))])
         picture.path(_zigzag(both) if np.linalg.norm(both[1] - both[0]) > _NEAR else middle + _BLOCK, "thin")
         _name(picture, middle, bushing.name, "letter", (0.0, 24.0))
     ends_of = mechanism.fastened
     for body in mechanism.bodies:
         com = place(body.name, body.com)
         for end in ends_of[body.name]:
-            picture.path(at(np.stack([com, place(body.name, end)])), "line")
-        picture.disc(at(com).tolist(), _MASS, "ball")
+            picture.path(view(np.stack([com, place(body.name, end)])), "line")
+        picture.disc(view(com).tolist(), _MASS, "ball")
     named: dict[tuple[int, ...], list[str]] = {}
-    for number, each in enumerate(mechanism.connections):
-        if each.kind == JointKind.FREE:
+    for number, connection in enumerate(mechanism.connections):
+        if connection.kind == JointKind.FREE:
             continue
-        here, there = place(each.a, each.position_a), place(each.b, each.position_b)
-        if each.kind in SLIDING:  # the line on which the child slides
+        here, there = place(connection.a, connection.position_a), place(connection.b, connection.position_b)
+        if connection.kind in SLIDING:  # the line on which the child slides
             way = there - here if np.linalg.norm(there - here) else 0.2 * element.length * _axis(element, number)
-            picture.path(at(np.stack([here - 0.3 * way, there + 0.3 * way])), "axis")
-        if each.kind == DISTANCE:
-            picture.path(at(np.stack([here, there])), "line")
-        picture.disc(at(there).tolist(), _JOINT, "ghost" if number >= len(mechanism.joints) else "wall")
-        named.setdefault(tuple(np.round(at(there)).astype(int).tolist()), []).append(each.name)
+            picture.path(view(np.stack([here - 0.3 * way, there + 0.3 * way])), "axis")
+        if connection.kind == DISTANCE:
+            picture.path(view(np.stack([here, there])), "line")
+        picture.disc(view(there).tolist(), _JOINT, "ghost" if number >= len(mechanism.joints) else "wall")
+        named.setdefault(tuple(np.round(view(there)).astype(int).tolist()), []).append(connection.name)
     for (x, y), names in named.items() if len(mechanism.connections) <= _MOST_NAMES else ():
         _name(picture, np.array([x, y]), ", ".join(names), "letter", (0.0, -9.0))
     for point in mechanism.points:
-        here = at(place(point.body, point.position))
+        here = view(place(point.body, point.position))
         picture.disc(here.tolist(), _POINT, "motion")
         _name(picture, here, point.name, "motion-letter", (0.0, 16.0))
-    _laws(picture, at, element)
+    _laws(picture, view, element)
     left, top, width, _ = picture.box
-    picture.gravity(at, np.array(mechanism.gravity), [left + width + 14.0, top + 10.0])
+    picture.gravity(view, np.array(mechanism.gravity), [left + width + 14.0, top + 10.0])
     return picture
 
 
@@ -92,44 +92,44 @@ def _reach(element: MechanismElement) -> float:
     return max([element.length, *sizes])
 
 
-def _shapes(picture: Drawing, at: View, element: MechanismElement) -> None:
+def _shapes(picture: Drawing, view: View, element: MechanismElement) -> None:
     """Draws outlines of shapes that may touch and of their bodies, a patch of each plane, names of closed contacts."""
     mechanism = element.mechanism
     motion = Tree(mechanism).at(*mechanism.start())
     touching, index = touches(mechanism, motion), mechanism.body_index
-    upright = np.cross(direction(element)[0], at.right)
-    rim = circle(np.zeros(3), at.right, upright, np.linspace(0.0, 2 * np.pi, _OUTLINE))
+    upright = np.cross(direction(element)[0], view.right)
+    rim = circle(np.zeros(3), view.right, upright, np.linspace(0.0, 2 * np.pi, _OUTLINE))
     drawn_already: set[bytes] = set()
     outlines: dict[str, list[FloatArray]] = {}
-    for contact, each in zip(mechanism.contacts, touching, strict=True):
+    for contact, touch in zip(mechanism.contacts, touching, strict=True):
         for body, shape in ((contact.body_a, contact.shape_a), (contact.body_b, contact.shape_b)):
             p, R = motion.p_WB[index[body]], motion.R_WB[index[body]]
             if isinstance(shape, HalfSpace):
                 n = R @ shape.normal
                 x, y = frame_of_axis(n)[:, 0], frame_of_axis(n)[:, 1]
-                middle = np.mean([one.place for one in touching], axis=0)
+                middle = np.mean([corner.place for corner in touching], axis=0)
                 middle = middle - n * (n @ (middle - p - R @ shape.point))
                 outline = middle + _PATCH * _reach(element) * np.array([x + y, y - x, -x - y, x - y, x + y])
             elif isinstance(shape, BowlWall) and _is_vertex(contact.shape_a, contact.shape_b):  # a cable
-                outline = np.stack([p + R @ shape.point, each.place])
+                outline = np.stack([p + R @ shape.point, touch.place])
             elif isinstance(shape, CurvedWall):  # the circle about its axis through the contact
                 axis, foot = R @ shape.axis, p + R @ shape.point
-                middle = foot + axis * (axis @ (each.place - foot))
-                x, y = frame_of_axis(axis)[:, :2].T * float(np.linalg.norm(each.place - middle))
+                middle = foot + axis * (axis @ (touch.place - foot))
+                x, y = frame_of_axis(axis)[:, :2].T * float(np.linalg.norm(touch.place - middle))
                 outline = circle(middle, x, y, np.linspace(0.0, 2 * np.pi, _OUTLINE))
             else:
                 outline = np.array([p + R @ shape.support(R.T @ d)[0] for d in rim])
-            path = np.asarray(at(outline))
+            path = np.asarray(view(outline))
             if path.round(3).tobytes() not in drawn_already:
                 picture.path(path, "hidden" if isinstance(shape, Wall) else "thin")
                 drawn_already.add(path.round(3).tobytes())
                 if not isinstance(shape, Wall):
                     outlines.setdefault(body, []).append(path)
-        if each.gap <= TOUCHING * element.length and len(touching) <= _MOST_NAMES:
-            _name(picture, np.asarray(at(each.place)), contact.name, "letter", (0.0, 14.0))
-    _boxes(picture, at, element)
+        if touch.gap <= TOUCHING * element.length and len(touching) <= _MOST_NAMES:
+            _name(picture, np.asarray(view(touch.place)), contact.name, "letter", (0.0, 14.0))
+    _boxes(picture, view, element)
     for body, paths in outlines.items():
-        com = at(motion.p_WB[index[body]] + motion.R_WB[index[body]] @ mechanism.bodies[index[body]].com)
+        com = view(motion.p_WB[index[body]] + motion.R_WB[index[body]] @ mechanism.bodies[index[body]].com)
         hull = _hull(np.array([com, *np.concatenate(paths)]))
         if len(paths) > 1 or np.any(np.all(hull == com, axis=1)):  # else the body is drawn by its only shape
             picture.path(hull, "line")
@@ -139,7 +139,7 @@ def _is_vertex(*shapes: Shape) -> bool:
     return any(isinstance(shape, SphereShape) and not shape.radius for shape in shapes)
 
 
-def _boxes(picture: Drawing, at: View, element: MechanismElement) -> None:
+def _boxes(picture: Drawing, view: View, element: MechanismElement) -> None:
     """Draws the edges of boxes that may touch."""
     mechanism = element.mechanism
     motion = Tree(mechanism).at(*mechanism.start())
@@ -148,23 +148,23 @@ def _boxes(picture: Drawing, at: View, element: MechanismElement) -> None:
         if box.kind != "box" or box.size is None or box.name not in in_pairs:
             continue
         number = mechanism.body_index[box.body]
-        for one, other in _BOX_EDGES:
-            ends = np.array([one, other]) * np.array(box.size) / 2
+        for corner, next_corner in _BOX_EDGES:
+            ends = np.array([corner, next_corner]) * np.array(box.size) / 2
             places = motion.p_WB[number] + (np.array(box.position) + ends @ box.frame.T) @ motion.R_WB[number].T
-            picture.path(np.asarray(at(places)), "line")
+            picture.path(np.asarray(view(places)), "line")
 
 
 def _hull(places: FloatArray) -> FloatArray:
     """Closed outline around places of the picture, or the line through them; shapes (n, 2)."""
     _, sizes, axes = np.linalg.svd(places - places.mean(axis=0), full_matrices=False)
     if sizes[-1] < 1.0:
-        along = places @ axes[0]
-        return places[[along.argmin(), along.argmax()]]
+        heights = places @ axes[0]
+        return places[[heights.argmin(), heights.argmax()]]
     corners = ConvexHull(places).vertices
     return places[[*corners, corners[0]]]
 
 
-def _laws(picture: Drawing, at: View, element: MechanismElement) -> None:
+def _laws(picture: Drawing, view: View, element: MechanismElement) -> None:
     """Draws a ring and name for an actuator, a dashed line for a coupling, and a stroke where a stop is."""
     mechanism, start = element.mechanism, element.start
 
@@ -173,11 +173,11 @@ def _laws(picture: Drawing, at: View, element: MechanismElement) -> None:
         return np.asarray(start.point(joint.child, joint.child_position)[0])
 
     for actuator in mechanism.actuators:
-        here = at(place(actuator.joint))
+        here = view(place(actuator.joint))
         picture.disc(here.tolist(), 2.0 * _JOINT, "force")
         _name(picture, here, actuator.name, "force-letter", (0.0, 2.0 * _JOINT + 12.0))
     for coupling in mechanism.couplings:
-        ends = at(np.stack([place(name) for name, _ in coupling.terms]))
+        ends = view(np.stack([place(name) for name, _ in coupling.terms]))
         picture.path(ends, "hidden")
         apart = np.linalg.norm(ends[1] - ends[0]) > _NEAR  # else below the names of joint and actuator
         _name(picture, ends.mean(axis=0), coupling.name, "letter", (0.0, -6.0 if apart else 36.0))
@@ -187,14 +187,14 @@ def _laws(picture: Drawing, at: View, element: MechanismElement) -> None:
             if abs(limit) * (element.length if joint.kind == JointKind.REVOLUTE else 1.0) > _FARTHEST * element.length:
                 continue  # beyond the drawing
             if joint.kind == JointKind.PRISMATIC:
-                there = at(here + (limit - joint.q0[0]) * axis)
-                side = _STROKE * across(at(axis))
+                there = view(here + (limit - joint.q0[0]) * axis)
+                side = _STROKE * across(view(axis))
                 picture.path(np.stack([there - side, there + side]), "line")
                 continue
             com = mechanism.bodies[mechanism.body_index[joint.child]].com
             arm = np.asarray(start.point(joint.child, com)[0]) - here
             turned = Rotation.from_rotvec((limit - joint.q0[0]) * axis).apply(arm)
-            picture.path(at(np.stack([here, here + turned])), "faint")
+            picture.path(view(np.stack([here, here + turned])), "faint")
 
 
 def direction(element: MechanismElement) -> tuple[FloatArray, FloatArray]:
@@ -220,9 +220,9 @@ def direction(element: MechanismElement) -> tuple[FloatArray, FloatArray]:
 
 def _from_z_up(direction: FloatArray, up: FloatArray) -> FloatArray:
     """A direction given for z up, turned along with z to another upward direction."""
-    first = np.eye(3)[int(np.argmin(np.abs(up)))]
-    second = unit(np.cross(up, first))
-    return np.asarray(np.stack([np.cross(second, up), second, up], axis=1) @ direction)
+    x_axis = np.eye(3)[int(np.argmin(np.abs(up)))]
+    y_axis = unit(np.cross(up, x_axis))
+    return np.asarray(np.stack([np.cross(y_axis, up), y_axis, up], axis=1) @ direction)
 
 
 def _axis(element: MechanismElement, number: int) -> FloatArray:
@@ -234,10 +234,10 @@ def _axis(element: MechanismElement, number: int) -> FloatArray:
 
 def _zigzag(ends: FloatArray) -> FloatArray:
     """Zigzag line of a spring between two places of the picture; ``ends`` has shape (2, 2)."""
-    along = ends[1] - ends[0]
-    side = 5.0 * across(along)
-    inner = [ends[0] + (0.15 + 0.7 * (k + 0.5) / _TEETH) * along + (1 if k % 2 else -1) * side for k in range(_TEETH)]
-    return np.stack([ends[0], ends[0] + 0.15 * along, *inner, ends[0] + 0.85 * along, ends[1]])
+    axis = ends[1] - ends[0]
+    side = 5.0 * across(axis)
+    inner = [ends[0] + (0.15 + 0.7 * (k + 0.5) / _TEETH) * axis + (1 if k % 2 else -1) * side for k in range(_TEETH)]
+    return np.stack([ends[0], ends[0] + 0.15 * axis, *inner, ends[0] + 0.85 * axis, ends[1]])
 
 
 def _name(picture: Drawing, place: FloatArray, name: str, look: str, beside: tuple[float, float]) -> None:

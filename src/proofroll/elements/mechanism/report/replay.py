@@ -83,7 +83,7 @@ def draw_mechanism(replayed: Replayed) -> tuple[dict[str, Any], list[int], Packe
     coms = {body.name: body.com for body in mechanism.bodies}
     com = np.stack([placed.point(*place) for place in coms.items()], axis=1)
     reached = np.concatenate(
-        [placed.point(body, at) for body, places in mechanism.fastened.items() for at in places]
+        [placed.point(body, position) for body, places in mechanism.fastened.items() for position in places]
         + [_outline(contact, placed) for contact in mechanism.contacts]
         + [com.reshape(-1, 3)]
     )
@@ -114,7 +114,7 @@ def draw_mechanism(replayed: Replayed) -> tuple[dict[str, Any], list[int], Packe
         "readings": [{"symbol": symbol(name), "unit": unit(text), "size": float(np.abs(shown[:, column]).max())}
                      for column, (name, text) in enumerate(readings)],
         "bodies": [{"com": coms.get(name), "rods": rods.get(name, [])} for name in bodies],
-        "joints": [{"body": index[body], "at": at} for _, body, at in joints],
+        "joints": [{"body": index[body], "at": position} for _, body, position in joints],
         "contacts": len(touching),
         "slips": SLIDES * element.speed,
         "shapes": [_shape(geometry, index[geometry.body], element, com) for geometry in mechanism.geometries],
@@ -174,8 +174,8 @@ def _shape(geometry: Geometry, body: int, element: MechanismElement, com: FloatA
         half[2] = (geometry.length or 0.0) / 2
     if geometry.kind in {"bore", "shaft"}:
         foot, axis = place, frame[:, 2]
-        along = (com - foot) @ axis if geometry.body == WORLD else np.zeros(1)
-        place, half[2] = foot + along.mean() * axis, np.ptp(along) / 2 + half[0]
+        heights = (com - foot) @ axis if geometry.body == WORLD else np.zeros(1)
+        place, half[2] = foot + heights.mean() * axis, np.ptp(heights) / 2 + half[0]
     if geometry.kind == "plane":
         if geometry.body == WORLD:  # centred below the moving bodies
             middle, n = com.mean(axis=(0, 1)), frame[:, 2]
