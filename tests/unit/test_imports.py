@@ -201,7 +201,7 @@ def test_the_harness_names_no_observable_and_no_failure_of_an_element() -> None:
         for folder in sorted(HARNESS)
         for file in (ROOT / folder).rglob("*.py")
         for _, text in _texts(file)
-        if text in known
+        if text in known and file != ROOT / "core" / "events.py"  # the one list of kinds of events
     ]
     newtons = ["core/quantity.py", "core/unit_conversion.py", "files/scene_file.py", "report/run/last_values.py"]
     assert sorted(set(wrong)) == [f"{file} names N" for file in newtons]

@@ -22,6 +22,7 @@ _INSTEAD = {
     "InputError": "class InputError(RuntimeError):\n    pass",
     "read_only": "def read_only(item):\n    return item",
 }
+_OVERRIDE = "override"  # a decorator for readers and type checkers alone
 _Place = tuple[str, str]  # module, name
 _Function = ast.FunctionDef | ast.AsyncFunctionDef
 
@@ -113,7 +114,7 @@ class CutOut:
                 self._kept[place], self._needs[place] = ast.Pass(), []
             return place
         read = _read(module)
-        if name in read.imported:
+        if name in read.imported and name != _OVERRIDE:
             source = read.imported[name]
             if isinstance(source, list):
                 self._imports |= set(source)
@@ -173,7 +174,7 @@ class CutOut:
         while lines[begin - 2].startswith("#"):  # comment above a constant
             begin -= 1
         for number in range(begin, (node.end_lineno or 0) + 1):
-            if number not in gone and short.get(number, "-"):
+            if number not in gone and short.get(number, "-") and lines[number - 1].strip() != f"@{_OVERRIDE}":
                 kept.append(short.get(number) or _COMMENT.sub("", lines[number - 1]))
         text = "\n".join(kept)
         if isinstance(node, ast.ClassDef) and not ast.unparse(ast.parse(text + "\n    pass")).count("\n    "):

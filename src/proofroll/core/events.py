@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from enum import StrEnum
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from proofroll.core.columns import Columns, Variable
+from proofroll.core.kinds import Kind
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -19,8 +19,8 @@ if TYPE_CHECKING:
 EVENT_ORDER = "event_order"
 
 
-class EventKind(StrEnum):
-    """What begins or happens in an event of our own kinds of elements; other packages may name more."""
+class EventKind(Kind):
+    """Kinds of events of our own elements; other packages may add their own."""
 
     SLIP = "slip"  # a contact or a joint begins to slip
     STICK = "stick"  # friction holds it again

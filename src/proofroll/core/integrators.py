@@ -10,6 +10,7 @@ from collections.abc import Callable, Mapping
 from typing import ClassVar, Literal
 
 import numpy as np
+from typing_extensions import override
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.dop853 import Accept, controlled_step, integrated_to, solver_from
@@ -132,19 +133,19 @@ class RungeKutta4(Integrator):
     stability = 2.78
     reach = 0.25  # nothing else keeps the error of such a step small
 
+    @override
     def advance(self, t: float) -> None:
-        """See :class:`Integrator`."""
         rates, h, start, x = self._rates, self._resolution, self.t, self.x
         for step in range(1, whole_steps(start, t, h) + 1):
             x = self._accept(start + step * h, classical_step(rates, x, h))
         self.t, self.x = t, x
 
+    @override
     def aim(self, t: float) -> None:
-        """See :class:`Integrator`."""
         whole_steps(self.t, t, self._resolution)
 
+    @override
     def step(self, until: float, longest: float) -> None:
-        """See :class:`Integrator`."""
         dt = self._resolution
         end = (math.floor(self.t / dt + _SLIVER) + 1) * dt
         if end > until - _SLIVER * dt:
@@ -156,8 +157,8 @@ class RungeKutta4(Integrator):
         self.t_before, self.x_before = self.t, self.x
         self.x, self.t = self.inside(end), end
 
+    @override
     def inside(self, t: float) -> FloatArray:
-        """See :class:`Integrator`."""
         if t == self.t_before:
             return self.x_before
         return self._accept(t, classical_step(self._rates, self.x_before, t - self.t_before))
@@ -179,27 +180,27 @@ class DormandPrince853(Integrator):
     stability = 6.3  # its step multiplies exp(-λ t) by less than 1 up to 6.39
     reach = 0.6
 
+    @override
     def begin(self, t: float, x: FloatArray, rates: Rates, accept: Accept, scales: FloatArray) -> None:
-        """See :class:`Integrator`."""
         super().begin(t, x, rates, accept, scales)
         self._solver = solver_from(lambda _, y: rates(y), t, np.array(x), self._resolution, self._resolution * scales)
         self._watch = StepWatch()
         self._inside = [(t, x)]  # times within the last step, its start first, and states there
 
+    @override
     def advance(self, t: float) -> None:
-        """See :class:`Integrator`."""
         while self.t < t:
             self.step(t, math.inf)
             self._watch.took(self.t, self.t - self.t_before, self.t == t)
 
+    @override
     def step(self, until: float, longest: float) -> None:
-        """See :class:`Integrator`."""
         self.t_before, self.x_before, self._inside = self.t, self.x, [(self.t, self.x)]
         controlled_step(self._solver, self._accept, until, longest)
         self.t, self.x = float(self._solver.t), self._solver.y
 
+    @override
     def inside(self, t: float) -> FloatArray:
-        """See :class:`Integrator`."""
         if t == self.t_before:
             return self.x_before
         if t == self.t:

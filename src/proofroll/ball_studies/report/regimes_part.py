@@ -7,6 +7,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar
 
+from typing_extensions import override
+
 from proofroll.ball_studies.regimes import STUDY, RegimesStudy, load_regimes, regime_maps
 from proofroll.report.parts import Part, PartEntry
 
@@ -31,8 +33,8 @@ class RegimesPart(Part):
     maps: list[xr.Dataset] = field(default_factory=list)
 
     @classmethod
-    def load(cls, path: Path, engines: Sequence[str]) -> RegimesPart:  # noqa: ARG003 -- the maps are the truth's
-        """See the protocol."""
+    @override
+    def load(cls, path: Path, engines: Sequence[str]) -> RegimesPart:
         return cls(load_regimes(str(path)))
 
     @staticmethod

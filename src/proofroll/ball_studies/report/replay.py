@@ -43,7 +43,7 @@ _SPEED = 0.1
 _FROM = (-1.15, 0.5)
 
 SLIPS, STICKS, AWAY = 0, 1, 2
-_AFTER = {
+_AFTER: Mapping[str, int] = {
     EventKind.SLIP: SLIPS,
     EventKind.STICK: STICKS,
     EventKind.LIFT_OFF: AWAY,

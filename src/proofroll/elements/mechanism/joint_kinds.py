@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from enum import StrEnum
 from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from proofroll.core.kinds import Kind
 
-class JointKind(StrEnum):
+
+class JointKind(Kind):
     """Relative motion of its two bodies that a joint allows."""
 
     FIXED = "fixed"

@@ -8,7 +8,6 @@ import numpy as np
 
 from proofroll.core.engine import Regularised, Sample
 from proofroll.core.errors import Refused
-from proofroll.elements.mechanism import joint
 from proofroll.elements.mechanism.analysis import Start, general_place
 from proofroll.elements.mechanism.commands import begun
 from proofroll.elements.mechanism.model import Mechanism
@@ -19,7 +18,6 @@ from proofroll.elements.mechanism.rotations import Array
 DEPENDENT = 1e-9
 # Length of a constraint row relative to the longest, below which the row is round-off.
 ROUND_OFF = 1e-12
-WITH_AXIS = joint.WITH_AXIS
 
 
 @dataclass(frozen=True, slots=True)

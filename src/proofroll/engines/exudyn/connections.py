@@ -18,7 +18,7 @@ from proofroll.elements.mechanism.signal import varies
 from proofroll.engines.exudyn.native import Output, data_node, exu, items
 
 # 1 for each of three translations and three rotations that Exudyn's joint locks, in the axes of its first frame.
-_HELD = {
+_HELD: Mapping[str, tuple[int, ...]] = {
     JointKind.FIXED: (1, 1, 1, 1, 1, 1),
     JointKind.PRISMATIC: (1, 1, 0, 1, 1, 1),
     JointKind.CYLINDRICAL: (1, 1, 0, 1, 1, 0),
@@ -30,7 +30,7 @@ _IN_PLANE = (1, 1, 0, 0, 0, 0)
 # The two axes, one of each frame, that each rotational row keeps perpendicular. Components of ``TorqueLocal`` are the
 # multipliers of these rows, not a moment. Found from residuals of the rows; Exudyn's documents do not describe it.
 _THREE, _TWO = ((2, 1), (2, 0), (0, 1)), ((2, 0), (2, 1))
-_ROWS = {
+_ROWS: Mapping[str, tuple[tuple[int, int] | None, ...]] = {
     JointKind.FIXED: _THREE,
     JointKind.PRISMATIC: _THREE,
     JointKind.REVOLUTE: _TWO,

@@ -9,6 +9,7 @@ from dataclasses import replace
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
+from typing_extensions import override
 
 from proofroll.core.errors import Refused
 from proofroll.elements.mechanism import WORLD, Mechanism, Tree
@@ -107,16 +108,16 @@ class Discs(Redundant):
         """Lateral, longitudinal and normal direction of a joint in the world, as columns."""
         return np.reshape(self.system.GetObjectOutput(made.item, Output.RotationMatrix), (3, 3))
 
+    @override
     def sample(self) -> MechanismSample:
-        """See :class:`proofroll.core.engine.Engine`."""
         force = [
             made.sign * self._directions(made) @ self.system.GetObjectOutput(made.item, Output.ForceLocal)
             for made in self._discs
         ]
         return replace(super().sample(), contact_force=np.reshape(force, (len(force), 3)))
 
+    @override
     def built(self) -> MechanismBuilt:
-        """See :class:`proofroll.core.engine.Engine`."""
         model = super().built()
         if not self._discs:
             return model

@@ -14,11 +14,10 @@ from proofroll.core.errors import Refused
 from proofroll.elements.mechanism import WORLD, Mechanism, Tree
 from proofroll.elements.mechanism.capabilities import ALL_JOINTS, ALL_LOOPS, FORCES, MechanismCapability, require
 from proofroll.elements.mechanism.commands import drive
-from proofroll.elements.mechanism.joint_kinds import JointKind
+from proofroll.elements.mechanism.joint_kinds import WITH_AXIS, JointKind
 from proofroll.elements.mechanism.loop_points import is_planar
 from proofroll.elements.mechanism.rotations import Array, quaternion_rate, to_quaternion
 from proofroll.elements.mechanism.sampling import (
-    WITH_AXIS,
     MechanismBuilt,
     MechanismSample,
     mechanism_of,

@@ -16,7 +16,7 @@ from proofroll.robots.protocol import AtState, Reading, Request, evaluate
 
 # Exudyn's joint type and axis of each link that stands for a joint.
 _FREE = tuple((kind, axis) for kind in ("prismatic", "revolute") for axis in "XYZ")
-_CHAINS = {
+_CHAINS: Mapping[str, tuple[tuple[str, str], ...]] = {
     JointKind.FREE: _FREE,
     JointKind.SPHERICAL: _FREE[3:],
     JointKind.REVOLUTE: (("revolute", "Z"),),

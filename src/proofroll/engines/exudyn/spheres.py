@@ -11,6 +11,7 @@ from dataclasses import replace
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
+from typing_extensions import override
 
 from proofroll.core.engine import Regularised
 from proofroll.core.errors import NotUnique, Refused
@@ -141,13 +142,13 @@ class Spheres(Redundant):
         masses = {body.name: body.mass for body in self._mechanism.bodies}
         return 1 / sum(1 / masses[body] for body in bodies if body in masses)
 
+    @override
     def sample(self) -> MechanismSample:
-        """See :class:`proofroll.core.engine.Engine`."""
         force = [made.sign * np.array(self.system.GetObjectOutput(made.item, Output.Force)) for made in self._contacts]
         return replace(super().sample(), contact_force=np.reshape(force, (len(force), 3)))
 
+    @override
     def built(self) -> MechanismBuilt:
-        """See :class:`proofroll.core.engine.Engine`."""
         model = super().built()
         if not self._contacts:
             return model

@@ -14,12 +14,11 @@ from proofroll.elements.mechanism import WORLD, Joint, Mechanism
 from proofroll.elements.mechanism.capabilities import ALL_JOINTS, FORCES, MechanismCapability, require
 from proofroll.elements.mechanism.commands import drive
 from proofroll.elements.mechanism.joint import child_in_parent
-from proofroll.elements.mechanism.joint_kinds import DISTANCE, JointKind
+from proofroll.elements.mechanism.joint_kinds import DISTANCE, WITH_AXIS, JointKind
 from proofroll.elements.mechanism.named_forces import named_forces
 from proofroll.elements.mechanism.rotations import Array, to_quaternion
 from proofroll.elements.mechanism.sampling import (
     DEPENDENT,
-    WITH_AXIS,
     MechanismBuilt,
     MechanismSample,
     mechanism_of,

@@ -6,6 +6,7 @@ from typing import Any, ClassVar
 
 import mujoco
 import numpy as np
+from typing_extensions import override
 
 from proofroll.core.arrays import longest
 from proofroll.core.engine import Regularised
@@ -91,13 +92,13 @@ class MujocoGeoms(MujocoMechanism):
         mujoco.mj_fwdConstraint(self._model, data)
         mujoco.mj_sensorAcc(self._model, data)
 
+    @override
     def sample(self) -> MechanismSample:
-        """See :class:`proofroll.core.engine.Engine`."""
         sample = super().sample()
         return replace(sample, contact_force=self._contacts.forces(self._scratch))
 
+    @override
     def built(self) -> MechanismBuilt:
-        """See :class:`proofroll.core.engine.Engine`."""
         plain = super().built()
         with self._without_steps():
             read = self._contacts.read(self._evaluated(), self._rows)

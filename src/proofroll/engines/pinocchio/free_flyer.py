@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pinocchio as pin
+from typing_extensions import override
 
 from proofroll.core.arrays import FloatArray, cross
 from proofroll.elements.ball_on_surface.model import RollingBall
@@ -23,8 +24,8 @@ class FreeFlyer(BallWithRows):
     wall's force along e1, e2 and e3. If the orientation is not integrated, the ball's axes stay the world's.
     """
 
+    @override
     def __init__(self, body: RollingBall, orientation: bool) -> None:
-        """See :class:`~proofroll.engines.pinocchio.ball_with_rows.BallWithRows`."""
         super().__init__(body)
         self._surface, self._wall_rate = body.surface, body.wall_rate
         self._orientation = orientation
@@ -144,8 +145,8 @@ class FreeFlyer(BallWithRows):
         acceleration[0], acceleration[1], acceleration[2] = ax + bx, ay + by, az + bz
         return acceleration
 
+    @override
     def normal_force(self, data: Any) -> float:
-        """See :class:`~proofroll.engines.pinocchio.ball_with_rows.BallWithRows`."""
         return -float(data.lambda_c[0])
 
     def reaction(self, data: Any, q: FloatArray, v: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -187,8 +188,8 @@ class FreeFlyer(BallWithRows):
             e1=e1,
         )
 
+    @override
     def slide(self, data: Any, q: FloatArray, v: FloatArray, direction: FloatArray) -> SlidingContact:
-        """See :class:`~proofroll.engines.pinocchio.ball_with_rows.BallWithRows`."""
         sliding = self._slide(data, q, v, direction)
         if not self._orientation:  # as in accelerate
             sliding.acceleration[:3] += pin.skew(v[3:]) @ v[:3]
@@ -201,7 +202,7 @@ class FreeFlyer(BallWithRows):
         sliding = self._slide(data, q, v, direction)
         return sliding.acceleration, np.asarray(sliding.friction - sliding.normal_force * sliding.e1)
 
+    @override
     def project_sliding(self, data: Any, q: FloatArray, v: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """See :class:`~proofroll.engines.pinocchio.ball_with_rows.BallWithRows`."""
         q = self.on_surface(q)
         return q, np.array(pin.impulseDynamics(self.model, data, v, self.rows(data, q, v).rows[:1]))

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 import pinocchio as pin
+from typing_extensions import override
 
 from proofroll.core.arrays import longest
 from proofroll.core.engine import Regularised, whole_steps
@@ -37,8 +38,8 @@ class ImpulseRun(MechanismRun):
         self.dynamics = NullSpace(self.tree, LoopRows(self.tree))
         self.steps, self._dt = ImpulseSteps(self.tree, settings), float(settings.dt or 0.0)
 
+    @override
     def advance(self, t: float) -> None:
-        """See :class:`proofroll.core.engine.Engine`."""
         start, steps = self.steps.t, self.steps
         for number in range(whole_steps(start, t, self._dt)):
             steps.t = start + number * self._dt
@@ -90,8 +91,8 @@ class ImpulseRun(MechanismRun):
         forces = self.steps.joints.along_joints(self.steps.q, joint_forces) if joint_forces.size else {}
         return replace(super().sample(), contact_force=pressing if self.steps.contacts else None, **forces)
 
+    @override
     def built(self) -> MechanismBuilt:
-        """See :class:`proofroll.core.engine.Engine`."""
         plain, span = super().built(), _PART * self._dt
         hard, twice = (
             self._accelerations(self.steps.beginning(length, convex=False), length) for length in (span, 2 * span)

@@ -14,6 +14,7 @@ from enum import Enum, auto
 from typing import Any
 
 import numpy as np
+from typing_extensions import override
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.event_location import Rise, locate_rise
@@ -79,8 +80,8 @@ class AdaptiveStickSlip(Adaptive):
         """True if the ball sticks now."""
         return self._mode is FrictionLaw.STICKING
 
+    @override
     def reaction(self, data: Any) -> tuple[FloatArray, FloatArray]:
-        """See :class:`~proofroll.engines.pinocchio.integrators.TangentIntegrator`."""
         if self.sticking:
             return super().reaction(data)
         direction = self._direction(data, self._joined(self.q, self.v))
@@ -268,8 +269,8 @@ class FixedStickSlip(FixedStep):
         if not self.sticking:
             self.events.append(Event(EventKind.SLIP, 0.0, 0.0, 0.0))
 
+    @override
     def reaction(self, data: Any) -> tuple[FloatArray, FloatArray]:
-        """See :class:`~proofroll.engines.pinocchio.integrators.TangentIntegrator`."""
         if self.sticking:
             return super().reaction(data)
         direction = self._direction(data, self.q, self.v)

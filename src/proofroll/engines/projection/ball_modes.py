@@ -20,6 +20,7 @@ from enum import Enum, auto
 from typing import ClassVar, NamedTuple
 
 import numpy as np
+from typing_extensions import override
 
 from proofroll.core.arrays import FloatArray
 from proofroll.engines.projection.friction import Friction, SlidingForces, along
@@ -136,20 +137,20 @@ class _Held(BallMode):
     def __init__(self, ball: ProjectedBall, friction: Friction) -> None:
         self._ball, self._friction = ball, friction
 
+    @override
     def rates(self, y: FloatArray) -> FloatArray:
-        """See :class:`BallMode`."""
         return self._ball.rates(y)
 
+    @override
     def x(self, y: FloatArray) -> FloatArray:
-        """See :class:`BallMode`."""
         return y
 
+    @override
     def eliminated(self, y: FloatArray) -> FloatArray:
-        """See :class:`BallMode`."""
         return self._ball.eliminated(y)
 
+    @override
     def force(self, y: FloatArray) -> FloatArray:
-        """See :class:`BallMode`."""
         return self._ball.contact_force(self._ball.response_at(y))
 
 
@@ -225,8 +226,8 @@ class Rest(_Held):
         result[-5:-3] += speed / pull * np.array(response.acceleration[:2])
         return ball.eliminated(result)
 
-    def survey(self, y: FloatArray) -> Survey:  # noqa: ARG002 -- nothing changes any more
-        """See :class:`BallMode`."""
+    @override
+    def survey(self, y: FloatArray) -> Survey:
         return Survey(())
 
 
@@ -250,12 +251,12 @@ class _Slip(BallMode):
     def look(self, y: FloatArray) -> SlidingForces:
         """Equations solved for the slip at y."""
 
+    @override
     def x(self, y: FloatArray) -> FloatArray:
-        """See :class:`BallMode`."""
         return y[: -self.size]
 
+    @override
     def force(self, y: FloatArray) -> FloatArray:
-        """See :class:`BallMode`."""
         return self._ball.contact_force(self.look(y).response)
 
 
@@ -287,18 +288,18 @@ class SlavedSlip(_Slip):
             return span
         return min(span, 0.1 * math.hypot(*kin.v[1:3]) / (math.hypot(*sliding.response.rate[1:3]) or 1.0))
 
+    @override
     def rates(self, y: FloatArray) -> FloatArray:
-        """See :class:`BallMode`."""
         sliding = self.look(y)
         return np.append(self._ball.derivative(sliding.kin, sliding.response), sliding.growth)
 
+    @override
     def eliminated(self, y: FloatArray) -> FloatArray:
-        """See :class:`BallMode`."""
         (d2, d3), rho = self.look(y).direction, float(y[-1])
         return np.append(self._friction.rolling.eliminated(y[:-1], (rho * d2, rho * d3)), rho)
 
+    @override
     def survey(self, y: FloatArray) -> Survey:
-        """See :class:`BallMode`."""
         sliding, rho = self.look(y), float(y[-1])
         slow = START * self._pace.time * sliding.strength - rho
         dying = sliding.growth + _DYING * sliding.strength
@@ -324,14 +325,14 @@ class FreeSlip(_Slip):
         """Equations solved for the slip at y."""
         return self._friction.slide(self._ball.kinematics(y[:-2]), along(float(y[-1])))
 
+    @override
     def rates(self, y: FloatArray) -> FloatArray:
-        """See :class:`BallMode`."""
         sliding = self.look(y)
         rate = self._ball.derivative(sliding.kin, sliding.response)
         return np.concatenate([rate, [sliding.growth, sliding.across / float(y[-2])]])
 
+    @override
     def eliminated(self, y: FloatArray) -> FloatArray:
-        """See :class:`BallMode`."""
         (d2, d3), rho = along(float(y[-1])), float(y[-2])
         x = self._friction.rolling.eliminated(y[:-2], (rho * d2, rho * d3))
         return np.concatenate([x, y[-2:]])

@@ -13,9 +13,9 @@ from proofroll.core.integrators import INTEGRATORS, Integrator
 from proofroll.core.stalling import Stalled
 from proofroll.elements.mechanism.capabilities import ALL_JOINTS, ALL_LOOPS, FORCES, MechanismCapability, require
 from proofroll.elements.mechanism.commands import drive
+from proofroll.elements.mechanism.joint_kinds import WITH_AXIS
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.elements.mechanism.sampling import (
-    WITH_AXIS,
     MechanismBuilt,
     MechanismSample,
     mechanism_of,

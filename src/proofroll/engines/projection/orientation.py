@@ -12,6 +12,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
+from typing_extensions import override
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Diverged
@@ -131,12 +132,12 @@ class EulerAngles(Orientation):
             raise FloatingPointError("the Euler angles overflow inside a step")
         return math.sin(theta), math.cos(theta), math.sin(psi), math.cos(psi)
 
+    @override
     def angular_velocity(self, pose: tuple[float, ...], r: Sequence[float], frame: Frame) -> Vector:
-        """See :class:`Orientation`."""
         return along(frame, *_turning(pose, r))
 
+    @override
     def solved(self, pose: tuple[float, ...], rate: Vector, frame: Frame) -> Vector:
-        """See :class:`Orientation`."""
         return _about_the_axes(pose, *in_world(frame, *rate))
 
     def acceleration(
@@ -155,8 +156,8 @@ class EulerAngles(Orientation):
         x, y = x - level * cos_psi - across * sin_psi, y - level * sin_psi + across * cos_psi
         return _about_the_axes(pose, x, y, z + phi_rate * theta_rate * sin)
 
-    def rates(self, angles: Sequence[float], r: Sequence[float], frame: Frame) -> Sequence[float]:  # noqa: ARG002 -- r is their rate
-        """See :class:`Orientation`."""
+    @override
+    def rates(self, angles: Sequence[float], r: Sequence[float], frame: Frame) -> Sequence[float]:
         return r
 
     def check(self, t: float, angles: FloatArray, r: FloatArray, step: float) -> None:
@@ -188,8 +189,8 @@ class EulerAngles(Orientation):
         self.renewals.append(t)
         return np.array(chosen), np.array(_about_the_axes(self.pose(chosen), *w))
 
+    @override
     def quaternion(self, angles: FloatArray) -> FloatArray:
-        """See :class:`Orientation`."""
         return np.asarray(np.roll(self._orientation(angles).as_quat(), 1), dtype=np.float64)
 
     def _orientation(self, angles: FloatArray) -> Rotation:
@@ -228,21 +229,21 @@ class RotatingFrame(Orientation):
     A ball's inertia is the same in all orientations, so the equations do not need the orientation.
     """
 
-    def start(self, frame: FloatArray, w: FloatArray) -> tuple[FloatArray, FloatArray]:  # noqa: ARG002 -- no angles
-        """See :class:`Orientation`."""
+    @override
+    def start(self, frame: FloatArray, w: FloatArray) -> tuple[FloatArray, FloatArray]:
         return np.empty(0), w
 
-    def pose(self, angles: Sequence[float]) -> tuple[float, ...]:  # noqa: ARG002 -- there are none
-        """See :class:`Orientation`."""
+    @override
+    def pose(self, angles: Sequence[float]) -> tuple[float, ...]:
         return ()
 
-    def angular_velocity(self, pose: tuple[float, ...], r: Sequence[float], frame: Frame) -> Vector:  # noqa: ARG002 -- A = 1
-        """See :class:`Orientation`."""
+    @override
+    def angular_velocity(self, pose: tuple[float, ...], r: Sequence[float], frame: Frame) -> Vector:
         w1, w2, w3 = r
         return w1, w2, w3
 
-    def solved(self, pose: tuple[float, ...], rate: Vector, frame: Frame) -> Vector:  # noqa: ARG002 -- A = 1
-        """See :class:`Orientation`."""
+    @override
+    def solved(self, pose: tuple[float, ...], rate: Vector, frame: Frame) -> Vector:
         return rate
 
     def acceleration(
@@ -264,8 +265,8 @@ class FollowedFrame(RotatingFrame):
     size: ClassVar[int] = 4
     periodic: ClassVar[tuple[bool, ...]] = (False,) * 4
 
-    def start(self, frame: FloatArray, w: FloatArray) -> tuple[FloatArray, FloatArray]:  # noqa: ARG002 -- it starts at the identity
-        """See :class:`Orientation`."""
+    @override
+    def start(self, frame: FloatArray, w: FloatArray) -> tuple[FloatArray, FloatArray]:
         return np.array([1.0, 0.0, 0.0, 0.0]), w
 
     def rates(self, angles: Sequence[float], r: Sequence[float], frame: Frame) -> Sequence[float]:
@@ -279,6 +280,6 @@ class FollowedFrame(RotatingFrame):
             z * q0 - y * q1 + x * q2,
         )
 
+    @override
     def quaternion(self, angles: FloatArray) -> FloatArray:
-        """See :class:`Orientation`."""
         return np.asarray(angles / np.linalg.norm(angles))

@@ -7,6 +7,7 @@ from typing import Annotated, ClassVar, Literal
 
 import numpy as np
 from annotated_types import Gt
+from typing_extensions import override
 
 import proofroll
 from proofroll.core.arrays import FloatArray, cross
@@ -102,14 +103,14 @@ class ClosedFormModel(ReducedModel):
             )
         self._motion = motion
 
+    @override
     def advance(self, t: float) -> None:
-        """See :class:`ReducedModel`."""
         motion = closed_form(self._body, np.array([t]))
         assert motion is not None  # whether there is one does not depend on time
         self._motion = motion
 
+    @override
     def motion(self) -> BallMotion:
-        """See :class:`ReducedModel`."""
         return self._motion
 
 
@@ -128,8 +129,8 @@ class Integrated(ReducedModel):
         self._motion.begin(0.0, x, lambda x: reduced_rates(body, x)[0], self._accepted, scales)
         self._last, self._until = (0.0, x), 0.0
 
+    @override
     def advance(self, t: float) -> None:
-        """See :class:`ReducedModel`."""
         self._span, self._until = t - self._motion.t, t
         self._motion.advance(t)
 
@@ -147,14 +148,14 @@ class Integrated(ReducedModel):
         """Velocity of the centre along the coordinates [m/s], shape (2,)."""
         return np.asarray(x[2:4] * self._scales)
 
+    @override
     def motion(self) -> BallMotion:
-        """See :class:`ReducedModel`."""
         x = self._motion.x
         _, v, force = reduced_rates(self._body, x)
         return BallMotion(*placed(self._body, x[None, :], v[None, :]), force[None, :], "reduced equations")
 
+    @override
     def spin_rate(self) -> float:
-        """See :class:`ReducedModel`."""
         return float(reduced_rates(self._body, self._motion.x)[0][4])
 
 
@@ -177,12 +178,12 @@ class Compiled(ReducedModel):
         if self._resistance:
             still_moving(old_state[2:4], t, x[2:4])
 
+    @override
     def advance(self, t: float) -> None:
-        """See :class:`ReducedModel`."""
         self._series.advance(t)
 
+    @override
     def motion(self) -> BallMotion:
-        """See :class:`ReducedModel`."""
         x, ball = self._series.x, self._body.ball
         held2, held3, N = self._evaluate(x, self._pars)[5:]
         return world_motion(
@@ -196,8 +197,8 @@ class Compiled(ReducedModel):
             route="reduced equations, Taylor series",
         )
 
+    @override
     def spin_rate(self) -> float:
-        """See :class:`ReducedModel`."""
         return float(self._evaluate(self._series.x, self._pars)[4])
 
 

@@ -7,6 +7,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, ClassVar
 
+from typing_extensions import override
+
 from proofroll.core.number_format import number
 from proofroll.report.parts import Part, PartEntry, Tell, claims_sentence
 from proofroll.report.stability import map as stability_map
@@ -80,8 +82,8 @@ class StabilityPart(Part):
         """Axes of a quick map: those that change the numbers of a step."""
         return [axis for axis in self.asked.axes if not axis.scale_free]
 
+    @override
     def entry(self) -> StabilityEntry:
-        """See the protocol."""
         study = self.study
         assert study is not None  # it was made
         mapped = {axis.name for axis in study.axes}

@@ -7,6 +7,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, ClassVar
 
+from typing_extensions import override
+
 from proofroll.core.comparison import Tolerance
 from proofroll.core.convergence import floor_text
 from proofroll.core.engine_abilities import by_hand
@@ -73,8 +75,8 @@ class TradeoffPart(Part):
     study: TradeoffStudy | None = None
 
     @classmethod
+    @override
     def load(cls, path: Path, engines: Sequence[str]) -> TradeoffPart:
-        """See the protocol."""
         return cls(load_claims(path), tuple(engines))
 
     @staticmethod
@@ -99,8 +101,8 @@ class TradeoffPart(Part):
             progress=lambda text: tell(text, 1),
         )
 
+    @override
     def entry(self) -> TradeoffEntry:
-        """See the protocol."""
         study = self.study
         assert study is not None  # it was made
         return TradeoffEntry(

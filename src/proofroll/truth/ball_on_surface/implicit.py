@@ -7,6 +7,7 @@ from dataclasses import replace
 from functools import partial
 
 import numpy as np
+from typing_extensions import override
 
 from proofroll.core.arrays import FloatArray, cross
 from proofroll.core.errors import Diverged
@@ -46,12 +47,12 @@ class Implicit(Route):
         self._mu = body.contact.mu_static
         self._held = always_pressed(body)  # then no step is searched for a lift-off
 
+    @override
     def start(self) -> FloatArray:
-        """See :class:`Route`."""
         return np.concatenate([self._body.p0, self._body.w0, np.zeros(3)])
 
+    @override
     def at(self, p_WB: FloatArray, v_WB: FloatArray, w_WB: FloatArray) -> FloatArray:
-        """See :class:`Route`."""
         gap, e1 = float(self._body.surface.gap(p_WB)), self._body.surface.normal(p_WB)
         slip = v_WB + self._body.ball.radius * cross(w_WB, e1)
         return np.concatenate([p_WB + gap * e1, w_WB, slip - (slip @ e1) * e1])
@@ -61,22 +62,22 @@ class Implicit(Route):
         needed, available = (float(x[0]) for x in self._needed_and_available(state[None, :]))
         return needed, available
 
+    @override
     def rates(self, state: FloatArray) -> FloatArray:
-        """See :class:`Route`."""
         return np.asarray(self._contact.rates(state[None, :], True)[0])
 
+    @override
     def world(self, state: FloatArray) -> World:
-        """See :class:`Route`."""
         return state[:3], self._contact.velocity(state[None, :])[0], state[3:6]
 
+    @override
     def nudged(self, state: FloatArray, v_WB: FloatArray) -> FloatArray:
-        """See :class:`Route`."""
         e1 = self._body.surface.normal(state[:3])
         w = (state[3:6] @ e1) * e1 - cross(e1, v_WB) / self._body.ball.radius
         return np.concatenate([state[:3], w, np.zeros(3)])
 
+    @override
     def stick(self, time: float, state: FloatArray, until: float) -> BallStretch:
-        """See :class:`Route`."""
         walk = _Walk(self._contact.system(sticking=True), time, state, until)
         resisted = self._body.contact.rolling_resistance > 0
         length = self._pace
@@ -119,8 +120,8 @@ class Implicit(Route):
             motion=motion,
         )
 
+    @override
     def slip(self, time: float, state: FloatArray, until: float, slip: FloatArray | None = None) -> BallStretch:
-        """See :class:`Route`."""
         if slip is not None:
             state = np.concatenate([state[:6], slip])
         walk = _Walk(self._contact.system(sticking=False), time, state, until)

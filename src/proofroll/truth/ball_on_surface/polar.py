@@ -11,6 +11,7 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
+from typing_extensions import override
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.event_location import locate_rise
@@ -46,12 +47,12 @@ class Polar(Sliding):
         self._atol = 1e-15 * np.array([*scales, 1.0, 1.0, self._pace])
         self._atol_slaved = 1e-15 * np.array([*scales, pace])
 
+    @override
     def start(self) -> FloatArray:
-        """See :class:`Route`."""
         return start(self._body)
 
+    @override
     def at(self, p_WB: FloatArray, v_WB: FloatArray, w_WB: FloatArray) -> FloatArray:
-        """See :class:`Route`."""
         u = self._body.surface.locate(p_WB)
         udot = np.linalg.pinv(self._body.surface.tangents(u)) @ v_WB
         return np.concatenate([u, udot, [w_WB @ self._body.surface.normal(p_WB)]])
@@ -66,12 +67,12 @@ class Polar(Sliding):
         needed, available = self.friction(state)
         return needed - available
 
+    @override
     def rates(self, state: FloatArray) -> FloatArray:
-        """See :class:`Route`."""
         return reduced_rates(self._body, state)[0]
 
+    @override
     def nudged(self, state: FloatArray, v_WB: FloatArray) -> FloatArray:
-        """See :class:`Route`."""
         udot = np.linalg.pinv(self._body.surface.tangents(state[:2])) @ v_WB
         return np.concatenate([state[:2], udot, state[4:]])
 

@@ -4,6 +4,7 @@ from abc import abstractmethod
 from typing import Protocol
 
 import numpy as np
+from typing_extensions import override
 
 from proofroll.core.arrays import FloatArray
 from proofroll.elements.ball_on_surface.model import RollingBall
@@ -82,13 +83,13 @@ class Sliding(Route):
     def _motion(self, y: FloatArray, size: FloatArray, phi: FloatArray | None) -> BallMotion:
         """Motion of states, shape (n, 5), with slip ``size`` [m/s] and direction ``phi`` [rad]; phi None: sticking."""
 
+    @override
     def world(self, state: FloatArray) -> World:
-        """See :class:`Route`."""
         motion = self._motion(state[None, :5], np.zeros(1), None)
         return motion.p_WB[0], motion.v_WB[0], motion.w_WB[0]
 
+    @override
     def stick(self, time: float, state: FloatArray, until: float) -> BallStretch:
-        """See :class:`Route`."""
         run = self._stick(time, state, until)
 
         def motion(times: FloatArray) -> BallMotion:
@@ -96,8 +97,8 @@ class Sliding(Route):
 
         return BallStretch(start=time, end=run.end, sticking=True, state=run.last, why=run.why, motion=motion)
 
+    @override
     def slip(self, time: float, state: FloatArray, until: float, slip: FloatArray | None = None) -> BallStretch:
-        """See :class:`Route`."""
         handover = self._grown(time, state, until)
         # A slip that does not start from rest has no slaved part.
         creep = self._creep(time, state, until if slip is None else time, handover)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from typing_extensions import override
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Diverged
@@ -56,12 +57,12 @@ class SlidingTaylor(Sliding):
         bounded = bool(np.isfinite(contact.mu_static))
         self._model: TaylorModel = model(contact.rolling_resistance > 0, bounded)
 
+    @override
     def start(self) -> FloatArray:
-        """See :class:`Route`."""
         return start(self._body)
 
+    @override
     def at(self, p_WB: FloatArray, v_WB: FloatArray, w_WB: FloatArray) -> FloatArray:
-        """See :class:`Route`."""
         u = self._body.surface.locate(p_WB)
         frame = self._body.surface.frame(u)
         return np.concatenate([u * self._scales, frame[:, 1:].T @ v_WB, [w_WB @ frame[:, 0]]])
@@ -71,12 +72,12 @@ class SlidingTaylor(Sliding):
         b2, b3, _, N = self._model.drive(state, self._pars)
         return float(np.hypot(b2, b3)), self._A * self._body.contact.mu_static * float(N)
 
+    @override
     def rates(self, state: FloatArray) -> FloatArray:
-        """See :class:`Route`."""
         return self._model.rates(state, self._pars)
 
+    @override
     def nudged(self, state: FloatArray, v_WB: FloatArray) -> FloatArray:
-        """See :class:`Route`."""
         return np.concatenate([state[:2], self._axes(state)[:, 1:].T @ v_WB, state[4:]])
 
     def _stick(self, time: float, state: FloatArray, until: float) -> _Run:

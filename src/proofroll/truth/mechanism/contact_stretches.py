@@ -10,6 +10,7 @@ from dataclasses import replace
 from typing import Protocol
 
 import numpy as np
+from typing_extensions import override
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Diverged
@@ -162,8 +163,8 @@ class ContactStretches(Stretches[ContactMode]):
         normals = pressing(solved.mode, solved.touching, solved.force, solved.splits)
         return np.array([guard_value(guard, mode, contacts, solved, normals) for guard in guards])
 
+    @override
     def walk(self, time: float, state: Array, mode: ContactMode, until: float) -> Stretch[ContactMode]:
-        """See the protocol."""
         if self._stands(state, mode):
             return Stretch(start=time, end=until, mode=mode, first=state, last=state, guard=None)
         if any(own.leads for own in mode):
@@ -231,8 +232,8 @@ class ContactStretches(Stretches[ContactMode]):
         signs = np.where(equations.excess(ahead) > 0, equations.pushes(ahead), 0.0)
         return tuple(int(sign) for sign in signs)
 
+    @override
     def within(self, stretch: Stretch[ContactMode], times: Array) -> Array:
-        """See the protocol."""
         if isinstance(stretch, BegunSlip):
             return np.array([self._equations.eliminated(state, stretch.mode) for state in stretch.at(times)])
         if isinstance(stretch, CompiledStretch) and stretch.by is not None:
@@ -307,8 +308,7 @@ class ContactStretches(Stretches[ContactMode]):
         leaving = self._leaving(stretch.last, stretch.mode, k)
         for number, own in leaving.items():
             mode[number] = own
-        slips = tuple((EventKind.SLIP, contacts[number].name) for number in leaving)
-        return Transition(stretch.last, tuple(mode), slips)
+        return Transition(stretch.last, tuple(mode), tuple((EventKind.SLIP, contacts[k].name) for k in leaving))
 
     def _leaving(self, state: Array, mode: ContactMode, k: int) -> dict[int, Acting]:
         """Slip that starts at the bound of friction, opposite to the friction that held, of each contact that slips."""

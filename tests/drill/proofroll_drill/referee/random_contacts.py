@@ -12,6 +12,7 @@ from scipy.spatial.transform import Rotation
 from proofroll.elements.mechanism import Body, Joint, Mechanism
 from proofroll.elements.mechanism.contacts.geometry import Geometry, Pair
 from proofroll.elements.mechanism.drives import Actuator
+from proofroll.elements.mechanism.joint_kinds import JointKind
 from proofroll.elements.mechanism.signal import Formula
 
 _G = (0.0, 0.0, -9.81)  # m/s²
@@ -68,7 +69,7 @@ def _sled(rng: np.random.Generator, friction: float, _: str) -> Made:
     reach = rng.uniform(0.12, 0.22, 3)
     feet = np.array([reach * np.cos(angles), reach * np.sin(angles), np.full(3, radius - height)]).T
     v = (*_floats(rng.normal(size=2) * 0.3), 0.0, 0.0, 0.0, float(rng.normal() * 3))
-    joint = Joint("j", "free", "world", "b", q0=(*_floats(n * height), *_quaternion(turn)), v0=v)
+    joint = Joint("j", JointKind.FREE, "world", "b", q0=(*_floats(n * height), *_quaternion(turn)), v0=v)
     pairs = tuple(Pair(f"c{k}", (f"s{k}", "f"), friction * (1 + 0.1 * k)) for k in range(3))
     return (body,), (joint,), (_plane(n), *_feet(feet, radius)), pairs
 
@@ -86,7 +87,7 @@ def _rod(rng: np.random.Generator, friction: float, style: str) -> Made:
     along, spin = float(rng.normal() * 0.5), float(rng.normal() * 1.5)
     rises = 0.0 if gap else spin * float(low[0])  # so that a foot that touches has no speed along the normal
     joint = Joint(
-        "j", "planar", "world", "b", axis=(0, 1, 0), second_axis=(1, 0, 0),
+        "j", JointKind.PLANAR, "world", "b", axis=(0, 1, 0), second_axis=(1, 0, 0),
         q0=(0.0, -(radius - float(low[2]) + gap), angle), v0=(along, -rises, spin),
     )  # fmt: skip
     restitution = float(rng.choice([0, 0, 0.5]))
@@ -139,7 +140,7 @@ def _plate(rng: np.random.Generator, friction: float, _: str) -> Made:
     axis /= np.linalg.norm(axis)
     plate, ball = _body(rng, "p", mass=3, size=0.3), _body(rng, "b", size=0.05)
     hinge = Joint(
-        "h", "revolute", "world", "p", axis=_floats(axis), q0=(float(rng.uniform(-0.2, 0.2)),),
+        "h", JointKind.REVOLUTE, "world", "p", axis=_floats(axis), q0=(float(rng.uniform(-0.2, 0.2)),),
         v0=(float(rng.normal()),), stiffness=float(rng.uniform(5, 40)), damping=0.3,
         armature=float(rng.choice([0, 0.02])),
     )  # fmt: skip
@@ -163,7 +164,15 @@ def _arm(rng: np.random.Generator, friction: float, _: str) -> Made:
     q: tuple[float, ...] = (float(rng.uniform(0.3, 1)), float(rng.uniform(-0.5, 0.5)))
     v: tuple[float, ...] = (float(rng.normal() * 2), float(rng.normal()))
     shoulder = Joint(
-        "j1", "revolute", "world", "l1", axis=(0, 1, 0), position=(0, 0, 0.5), q0=(first,), v0=(rate,), torque=torque
+        "j1",
+        JointKind.REVOLUTE,
+        "world",
+        "l1",
+        axis=(0, 1, 0),
+        position=(0, 0, 0.5),
+        q0=(first,),
+        v0=(rate,),
+        torque=torque,
     )
     if kind == "revolute":
         q, v, second_axis = q[:1], v[:1], None
@@ -193,7 +202,9 @@ def _pin(rng: np.random.Generator, friction: float, _: str) -> Made:
     upright = np.array([0.0, 0.0, 1.0])
     axis = upright if clutch else _tilted(rng, 0.1)
     disc, other = _body(rng, "d", mass=1, size=0.2), _body(rng, "a", size=0.1)
-    hinge = Joint("h", "revolute", "world", "d", axis=_floats(axis), v0=(spin,), damping=float(rng.choice([0, 0.02])))
+    hinge = Joint(
+        "h", JointKind.REVOLUTE, "world", "d", axis=_floats(axis), v0=(spin,), damping=float(rng.choice([0, 0.02]))
+    )
     place = np.array([*rng.uniform(-0.15, 0.15, 2), height])
     bodies: tuple[Body, ...]
     joints: tuple[Joint, ...]
@@ -201,15 +212,15 @@ def _pin(rng: np.random.Generator, friction: float, _: str) -> Made:
         tip = np.array([*rng.uniform(0.05, 0.2, 2), -height])
         hub = _body(rng, "hub", size=0.05)
         press = float(rng.uniform(2, 20))
-        guide = Joint("g", "prismatic", "world", "hub", _floats(place), axis=(0, 0, 1), torque=-press)
-        shaft = Joint("s", "revolute", "hub", "a", axis=(0, 0, 1), v0=(float(rng.normal() * 6),))
+        guide = Joint("g", JointKind.PRISMATIC, "world", "hub", _floats(place), axis=(0, 0, 1), torque=-press)
+        shaft = Joint("s", JointKind.REVOLUTE, "hub", "a", axis=(0, 0, 1), v0=(float(rng.normal() * 6),))
         bodies, joints = (disc, hub, other), (hinge, guide, shaft)
     else:
         across = np.cross(upright, _unit(rng))
         across /= np.linalg.norm(across)
         tip = 0.25 * np.cross(upright, across) - height * upright + 0.05 * across
         rate = spin * float(upright @ np.cross(axis, place + tip)) / 0.25  # the tip stays on the disc
-        arm = Joint("s", "revolute", "world", "a", _floats(place), axis=_floats(across), v0=(rate,))
+        arm = Joint("s", JointKind.REVOLUTE, "world", "a", _floats(place), axis=_floats(across), v0=(rate,))
         bodies, joints = (disc, replace(other, com=_floats(tip / 2))), (hinge, arm)
     geometries = Geometry("s", "a", "sphere", position=_floats(tip), radius=0.0), Geometry("f", "d", "plane")
     return bodies, joints, geometries, (Pair("c", ("s", "f"), friction),)
@@ -317,4 +328,4 @@ def _free(name: str, body: str, place: Any, turn: Any, v: Any, w: Any) -> Joint:
     """A free joint from place, rotation, velocity and angular velocity in world axes."""
     back = turn.inv()
     q0, v0 = (*_floats(place), *_quaternion(turn)), (*_floats(back.apply(v)), *_floats(back.apply(w)))
-    return Joint(name, "free", "world", body, q0=q0, v0=v0)
+    return Joint(name, JointKind.FREE, "world", body, q0=q0, v0=v0)

@@ -8,6 +8,7 @@ from typing import Any, Literal
 
 import numpy as np
 import numpy.typing as npt
+from typing_extensions import override
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.bounds import require_bounds
@@ -40,30 +41,30 @@ class Bowl(Declared):
         require_bounds("radius", self.radius, above=0)
 
     @property
+    @override
     def domain(self) -> tuple[tuple[float, float], tuple[float, float]]:
-        """See :class:`Declared`."""
         equator = 2 * self.radius
         return (-equator, equator), (-equator, equator)
 
+    @override
     def offset(self, ball_radius: float) -> Bowl:
-        """See :class:`Surface`."""
         if not ball_radius < self.radius:
             raise InputError("radius", ball_radius, f"the ball must be smaller than {self.name} with {self.radius:g} m")
         return dataclasses.replace(self, radius=self.radius - ball_radius)
 
+    @override
     def point(self, u1: Any, u2: Any) -> tuple[Any, Any, Any]:
-        """See :class:`Declared`."""
         x, y = u1 / (2 * self.radius), u2 / (2 * self.radius)
         square = x * x + y * y
         size = self.radius / (1.0 + square)
         return 2.0 * x * size, -2.0 * y * size, (square - 1.0) * size
 
+    @override
     def distance(self, x: Any, y: Any, z: Any) -> Any:
-        """See :class:`Declared`."""
         return bowl_distance(self.radius, x, y, z)
 
+    @override
     def locate(self, p_WB: npt.ArrayLike) -> FloatArray:
-        """See :class:`Surface`."""
         p = np.asarray(p_WB, dtype=np.float64)
         below = np.linalg.norm(p, axis=-1, keepdims=True) - p[..., 2:]
         return np.asarray(2 * self.radius * p[..., :2] / below * [1.0, -1.0])

@@ -9,6 +9,7 @@ from typing import Any, Literal
 
 import numpy as np
 import numpy.typing as npt
+from typing_extensions import override
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.bounds import OutOfBounds, require_bounds
@@ -62,31 +63,31 @@ class Revolved(Declared):
         period = self.periods[1]
         return np.asarray(s if period is None else s - period * np.ceil(s / period - 0.5))
 
+    @override
     def offset(self, ball_radius: float) -> Revolved:
-        """See :class:`Surface`."""
         return Parallel(self, ball_radius)
 
     @property
+    @override
     def knows_distance(self) -> bool:
-        """See :class:`Declared`."""
         return type(self).away is not Revolved.away
 
     @property
+    @override
     def domain(self) -> tuple[tuple[float, float], tuple[float, float]]:
-        """See :class:`Declared`."""
         return (-math.pi, math.pi), self.extent
 
+    @override
     def point(self, u1: Any, u2: Any) -> tuple[Any, Any, Any]:
-        """See :class:`Declared`."""
         r, z = self.profile(u2)
         return r * cos(u1), r * sin(u1), z
 
+    @override
     def distance(self, x: Any, y: Any, z: Any) -> Any:
-        """See :class:`Declared`."""
         return self.away(sqrt(x * x + y * y), z)
 
+    @override
     def locate(self, p_WB: npt.ArrayLike) -> FloatArray:
-        """See :class:`Surface`."""
         x, y, z = np.moveaxis(np.asarray(p_WB, dtype=np.float64), -1, 0)
         return np.stack([np.arctan2(y, x), self.along(np.hypot(x, y), z)], axis=-1)
 
@@ -119,17 +120,17 @@ class Parallel(Revolved):
             )
 
     @property
+    @override
     def extent(self) -> tuple[float, float]:
-        """See :class:`Revolved`."""
         return self.of.extent
 
     @property
+    @override
     def knows_distance(self) -> bool:
-        """See :class:`Declared`."""
         return self.of.knows_distance
 
+    @override
     def offset(self, ball_radius: float) -> Parallel:
-        """See :class:`Surface`."""
         return Parallel(self.of, self.apart + ball_radius)
 
     def profile(self, s: Any) -> tuple[Any, Any]:
@@ -138,12 +139,12 @@ class Parallel(Revolved):
         by = self.apart / sqrt(r_slope * r_slope + z_slope * z_slope)
         return r - z_slope * by, z + r_slope * by
 
+    @override
     def away(self, r: Any, z: Any) -> Any:
-        """See :class:`Revolved`."""
         return self.of.away(r, z) - self.apart
 
+    @override
     def along(self, r: FloatArray, z: FloatArray) -> FloatArray:
-        """See :class:`Revolved`."""
         return self.of.along(r, z)
 
 
@@ -175,24 +176,24 @@ class Cone(Revolved):
         require_bounds("tip", self.tip)
 
     @property
+    @override
     def extent(self) -> tuple[float, float]:
-        """See :class:`Revolved`."""
         return 0.0, self.length
 
+    @override
     def offset(self, ball_radius: float) -> Cone:
-        """See :class:`Surface`."""
         return dataclasses.replace(self, tip=self.tip + ball_radius / math.cos(self.slope))
 
+    @override
     def profile(self, s: Any) -> tuple[Any, Any]:
-        """See :class:`Revolved`."""
         return s * math.cos(self.slope), s * math.sin(self.slope) + self.tip
 
+    @override
     def away(self, r: Any, z: Any) -> Any:
-        """See :class:`Revolved`."""
         return cone_distance(self.slope, r, z - self.tip)
 
+    @override
     def along(self, r: FloatArray, z: FloatArray) -> FloatArray:
-        """See :class:`Revolved`."""
         return np.asarray(r * math.cos(self.slope) + (z - self.tip) * math.sin(self.slope))
 
 
@@ -223,8 +224,8 @@ class Torus(Revolved):
         if not self.wire_radius < self.ring_radius:
             raise OutOfBounds("wire_radius", self.wire_radius, f"the value must be below {self.ring_radius:g}")
 
+    @override
     def offset(self, ball_radius: float) -> Torus:
-        """See :class:`Surface`."""
         if not ball_radius + self.wire_radius < self.ring_radius:
             room = self.ring_radius - self.wire_radius
             raise InputError("radius", ball_radius, f"the ball must be smaller than the {room:g} m inside {self.name}")
@@ -234,10 +235,10 @@ class Torus(Revolved):
         """See :class:`Revolved`; the angle starts at the top of the wire and grows outwards."""
         return sin(s) * self.wire_radius + self.ring_radius, cos(s) * self.wire_radius
 
+    @override
     def away(self, r: Any, z: Any) -> Any:
-        """See :class:`Revolved`."""
         return ring_distance(self.ring_radius, self.wire_radius, r, z)
 
+    @override
     def along(self, r: FloatArray, z: FloatArray) -> FloatArray:
-        """See :class:`Revolved`."""
         return np.arctan2(r - self.ring_radius, z)

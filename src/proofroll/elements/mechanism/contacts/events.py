@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -38,7 +38,7 @@ _ROUNDED = 1.01
 _REVERSED = -0.9
 # Kinds of events that samples cannot distinguish from others: a resting contact may still begin to move, and a settling
 # one may go on rebounding.
-_ALIKE = {EventKind.REST: EventKind.STICK, EventKind.SETTLE: EventKind.IMPACT}
+_ALIKE: Mapping[str, str] = {EventKind.REST: EventKind.STICK, EventKind.SETTLE: EventKind.IMPACT}
 
 
 class ContactWatch:

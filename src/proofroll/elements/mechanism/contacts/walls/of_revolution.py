@@ -4,6 +4,8 @@ import math
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
+from typing_extensions import override
+
 from proofroll.elements.mechanism.contacts.walls.curved import CurvedWall
 from proofroll.elements.mechanism.contacts.walls.formula import sqrt
 
@@ -15,8 +17,8 @@ class Bore(CurvedWall):
     radius: float
     kind: ClassVar[str] = "bore"
 
-    def away(self, x: Any, y: Any, z: Any) -> Any:  # noqa: ARG002 -- the same along the axis
-        """See :class:`CurvedWall`."""
+    @override
+    def away(self, x: Any, y: Any, z: Any) -> Any:
         return self.radius - sqrt(x * x + y * y)
 
 
@@ -27,8 +29,8 @@ class Shaft(CurvedWall):
     radius: float
     kind: ClassVar[str] = "shaft"
 
-    def away(self, x: Any, y: Any, z: Any) -> Any:  # noqa: ARG002 -- the same along the axis
-        """See :class:`CurvedWall`."""
+    @override
+    def away(self, x: Any, y: Any, z: Any) -> Any:
         return sqrt(x * x + y * y) - self.radius
 
 
@@ -39,8 +41,8 @@ class BowlWall(CurvedWall):
     radius: float
     kind: ClassVar[str] = "bowl"
 
+    @override
     def away(self, x: Any, y: Any, z: Any) -> Any:
-        """See :class:`CurvedWall`."""
         return bowl_distance(self.radius, x, y, z)
 
 
@@ -51,8 +53,8 @@ class ConeWall(CurvedWall):
     slope: float
     kind: ClassVar[str] = "cone"
 
+    @override
     def away(self, x: Any, y: Any, z: Any) -> Any:
-        """See :class:`CurvedWall`."""
         return cone_distance(self.slope, sqrt(x * x + y * y), z)
 
 
@@ -64,8 +66,8 @@ class TorusWall(CurvedWall):
     radius: float
     kind: ClassVar[str] = "torus"
 
+    @override
     def away(self, x: Any, y: Any, z: Any) -> Any:
-        """See :class:`CurvedWall`."""
         return ring_distance(self.ring_radius, self.radius, sqrt(x * x + y * y), z)
 
 
