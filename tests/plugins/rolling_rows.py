@@ -18,8 +18,8 @@ import numpy as np
 
 from proofroll.elements.ball_on_surface.surfaces import Cylinder, Declared, Plane, Surface
 from proofroll.elements.ball_on_surface.surfaces.formula import Jet, sqrt, variables
-from proofroll.elements.mechanism.checks import WORLD, Vector
-from proofroll.elements.mechanism.model import Mechanism
+from proofroll.elements.mechanism import WORLD, Mechanism
+from proofroll.elements.mechanism.checks import Vector
 from proofroll.truth.mechanism.constraint_rows import AXES, NONE, ConstraintRow, ConstraintRows
 from proofroll.truth.mechanism.maximal_bodies import BodyInScalars
 from proofroll.truth.mechanism.maximal_equations import MaximalEquations

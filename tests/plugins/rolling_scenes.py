@@ -11,11 +11,9 @@ from proofroll.core.errors import Refused
 from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.element import BallOnSurface
 from proofroll.elements.ball_on_surface.model import RollingBall
-from proofroll.elements.mechanism.checks import WORLD, Vector
+from proofroll.elements.mechanism import WORLD, Body, Joint, Mechanism
+from proofroll.elements.mechanism.checks import Vector
 from proofroll.elements.mechanism.element import MechanismElement
-from proofroll.elements.mechanism.joint import Joint
-from proofroll.elements.mechanism.model import Mechanism
-from proofroll.elements.mechanism.parts import Body
 
 
 def rolling_scene(scene: Scene) -> tuple[Mechanism, tuple[RollingContact, ...]]:

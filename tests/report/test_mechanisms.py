@@ -16,11 +16,9 @@ from scipy.spatial.transform import Rotation
 from proofroll.core.errors import Refused
 from proofroll.core.scene import Scene
 from proofroll.core.truth import truth
+from proofroll.elements.mechanism import Body, Joint, Mechanism
 from proofroll.elements.mechanism.contacts.geometry import Geometry, GeometryKind, Pair
 from proofroll.elements.mechanism.element import MechanismElement
-from proofroll.elements.mechanism.joint import Joint
-from proofroll.elements.mechanism.model import Mechanism
-from proofroll.elements.mechanism.parts import Body
 from proofroll.elements.mechanism.report.drawing import mechanism_drawing
 from proofroll.elements.mechanism.report.replay import _orientations, draw_mechanism
 from proofroll.files.comparison_file import load_comparison

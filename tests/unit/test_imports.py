@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import graphlib
+import importlib
 import re
 from collections.abc import Iterator
 from functools import cache
@@ -320,3 +321,18 @@ def test_a_circle_is_seen(tmp_path: Path) -> None:
     assert set(circle(leading(package))) == {"pack.a", "pack.b"}
     inner = {"pack.x.a": {"pack.y.b"}, "pack.y.b": set(), "pack.y.c": {"pack.x.d"}, "pack.x.d": set()}
     assert set(circle(folders_of(inner, "pack"))) == {"x", "y"}, "of folders, though no two modules do"
+
+
+def test_names_of_mechanisms_have_one_address() -> None:
+    """Outside its folder a name that the package hands on is imported from the package; inside, from its module."""
+    package, folder = "proofroll.elements.mechanism", ROOT / "elements" / "mechanism"
+    handed_on = set(importlib.import_module(package).__all__)
+    wrong = [
+        f"{file.relative_to(ROOT)}:{node.lineno}"
+        for file in ROOT.rglob("*.py")
+        for node in _nodes(file)
+        if isinstance(node, ast.ImportFrom) and (node.module or "").startswith(package)
+        if handed_on & {alias.name for alias in node.names}
+        if (node.module == package) == (folder in file.parents)
+    ]
+    assert wrong == []

@@ -11,15 +11,13 @@ from numpy.typing import NDArray
 
 from proofroll.core.errors import InputError, ProofrollError, Refused, require_known
 from proofroll.core.scene import Scene
+from proofroll.elements.mechanism import Joint, Mechanism, Tree
 from proofroll.elements.mechanism.analysis import analyse
 from proofroll.elements.mechanism.commands import at_start
 from proofroll.elements.mechanism.dataset import along, reactions
 from proofroll.elements.mechanism.element import MechanismElement
-from proofroll.elements.mechanism.joint import Joint
 from proofroll.elements.mechanism.joint_coordinates import JointCoordinates
 from proofroll.elements.mechanism.joint_kinds import JointKind
-from proofroll.elements.mechanism.kinematics import Tree
-from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.named_forces import lengths, named_forces, pick_named
 from proofroll.elements.mechanism.prescribed import moved
 from proofroll.elements.mechanism.rotations import Array

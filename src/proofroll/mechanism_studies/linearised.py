@@ -10,9 +10,9 @@ from scipy.linalg import null_space
 from scipy.optimize import linear_sum_assignment
 
 from proofroll.core.errors import Refused
+from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.analysis import RANK
 from proofroll.elements.mechanism.joint_coordinates import JointCoordinates
-from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.truth.mechanism.maximal_coordinates import MaximalCoordinates
 

@@ -11,11 +11,9 @@ import pytest
 import proofroll
 from proofroll.core.errors import Refused
 from proofroll.core.scene import Scene
+from proofroll.elements.mechanism import Body, Joint, Mechanism
 from proofroll.elements.mechanism.contacts.geometry import Geometry, Pair
 from proofroll.elements.mechanism.element import MechanismElement
-from proofroll.elements.mechanism.joint import Joint
-from proofroll.elements.mechanism.model import Mechanism
-from proofroll.elements.mechanism.parts import Body
 
 pytest.importorskip("exudyn")
 

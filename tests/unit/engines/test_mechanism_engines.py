@@ -10,11 +10,10 @@ import numpy as np
 import pytest
 
 from proofroll.core.errors import Refused
-from proofroll.elements.mechanism import Body, Joint, Mechanism, Spring
+from proofroll.elements.mechanism import Body, Force, Joint, Mechanism, Spring
 from proofroll.elements.mechanism.analysis import analyse
 from proofroll.elements.mechanism.capabilities import required
 from proofroll.elements.mechanism.joint_kinds import WITH_AXIS
-from proofroll.elements.mechanism.parts import Force
 from proofroll.elements.mechanism.rotations import from_quaternion
 from proofroll.elements.mechanism.spring_law import SpringLaw
 from proofroll.files.scene_file import load_scene

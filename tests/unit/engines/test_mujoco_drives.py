@@ -9,10 +9,8 @@ from one_coordinate import moved
 
 from proofroll.core.errors import Refused
 from proofroll.core.plugins import load_engine
+from proofroll.elements.mechanism import Body, Joint, Mechanism
 from proofroll.elements.mechanism.drives import Actuator, Coupling
-from proofroll.elements.mechanism.joint import Joint
-from proofroll.elements.mechanism.model import Mechanism
-from proofroll.elements.mechanism.parts import Body
 from proofroll.elements.mechanism.signal import Formula, Table
 from proofroll.files.scene_file import load_scene
 from proofroll.truth.mechanism.switched_truth import truth_of

@@ -12,14 +12,12 @@ from scipy.integrate import solve_ivp
 from proofroll.core.errors import Refused
 from proofroll.core.first_steps import first_steps
 from proofroll.core.plugins import load_engine
+from proofroll.elements.mechanism import Body, Joint, Mechanism
 from proofroll.elements.mechanism.contacts.acting import Acting
 from proofroll.elements.mechanism.contacts.geometry import Geometry, Pair
 from proofroll.elements.mechanism.contacts.touching import Touching
 from proofroll.elements.mechanism.drives import Actuator, Coupling
 from proofroll.elements.mechanism.element import MechanismElement
-from proofroll.elements.mechanism.joint import Joint
-from proofroll.elements.mechanism.model import Mechanism
-from proofroll.elements.mechanism.parts import Body
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.elements.mechanism.sampling import mechanism_of
 from proofroll.elements.mechanism.signal import Formula

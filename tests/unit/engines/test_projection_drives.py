@@ -7,10 +7,8 @@ import pytest
 from one_coordinate import moved
 
 from proofroll.core.errors import Refused
+from proofroll.elements.mechanism import Body, Joint, Mechanism
 from proofroll.elements.mechanism.drives import Actuator
-from proofroll.elements.mechanism.joint import Joint
-from proofroll.elements.mechanism.model import Mechanism
-from proofroll.elements.mechanism.parts import Body
 from proofroll.elements.mechanism.signal import Formula, Table
 from proofroll.engines.projection.mechanism import ProjectionMechanism
 from proofroll.engines.projection.settings import PRESETS

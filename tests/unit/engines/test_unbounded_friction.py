@@ -11,13 +11,11 @@ import proofroll
 from proofroll.core.errors import InputError, NotUnique, Refused
 from proofroll.core.scene import Scene
 from proofroll.core.truth import truth
+from proofroll.elements.mechanism import Body, Joint, Mechanism
 from proofroll.elements.mechanism.contacts.coulomb import contact_forces
 from proofroll.elements.mechanism.contacts.geometry import Geometry, Pair
 from proofroll.elements.mechanism.contacts.start import check_contacts
 from proofroll.elements.mechanism.element import MechanismElement
-from proofroll.elements.mechanism.joint import Joint
-from proofroll.elements.mechanism.model import Mechanism
-from proofroll.elements.mechanism.parts import Body
 from proofroll.truth.mechanism.body_impacts import impulse_of_a_contact
 
 

@@ -6,11 +6,9 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+from proofroll.elements.mechanism import Body, Joint, Mechanism
 from proofroll.elements.mechanism.drives import Actuator, Coupling
-from proofroll.elements.mechanism.joint import Joint
 from proofroll.elements.mechanism.joint_coordinates import JointCoordinates
-from proofroll.elements.mechanism.model import Mechanism
-from proofroll.elements.mechanism.parts import Body
 from proofroll.elements.mechanism.signal import Formula, Table
 from proofroll.files.scene_file import load_scene
 from proofroll.truth.mechanism.switched_truth import truth_of

@@ -7,12 +7,10 @@ import numpy as np
 import pytest
 
 from proofroll.core.errors import InputError, Refused
+from proofroll.elements.mechanism import Body, Joint, Mechanism
 from proofroll.elements.mechanism.complementarity import complementary
 from proofroll.elements.mechanism.drives import Coupling
-from proofroll.elements.mechanism.joint import Joint
 from proofroll.elements.mechanism.joint_coordinates import JointCoordinates
-from proofroll.elements.mechanism.model import Mechanism
-from proofroll.elements.mechanism.parts import Body
 from proofroll.files.scene_file import load_scene
 from proofroll.truth.hybrid import HybridPath, Stretch, first_close, follow
 from proofroll.truth.mechanism import followed_paths

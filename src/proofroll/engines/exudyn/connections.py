@@ -9,10 +9,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from proofroll.core.errors import Refused
-from proofroll.elements.mechanism import WORLD, Joint, Mechanism
+from proofroll.elements.mechanism import WORLD, Force, Joint, Mechanism, Spring
 from proofroll.elements.mechanism.joint_kinds import DISTANCE, JointKind
 from proofroll.elements.mechanism.model import JointOrLoop
-from proofroll.elements.mechanism.parts import Force, Spring
 from proofroll.elements.mechanism.rotations import Array, cross
 from proofroll.elements.mechanism.signal import varies
 from proofroll.engines.exudyn.native import Output, data_node, exu, items

@@ -11,7 +11,7 @@ import mujoco
 import numpy as np
 
 from proofroll.core.errors import Refused
-from proofroll.elements.mechanism import WORLD, Mechanism
+from proofroll.elements.mechanism import WORLD, Mechanism, Tree
 from proofroll.elements.mechanism.contacts.geometry import BodyContact
 from proofroll.elements.mechanism.contacts.shapes import (
     CircleShape,
@@ -23,7 +23,6 @@ from proofroll.elements.mechanism.contacts.shapes import (
 from proofroll.elements.mechanism.contacts.start import touches
 from proofroll.elements.mechanism.contacts.touching import Moving
 from proofroll.elements.mechanism.contacts.walls import CurvedWall
-from proofroll.elements.mechanism.kinematics import Tree
 from proofroll.elements.mechanism.rotations import Array, cross, frame_of_axis, to_quaternion
 from proofroll.elements.mechanism.sampling import DEPENDENT
 from proofroll.engines.mujoco.friction import NEAR_CONE, check_coefficients

@@ -12,10 +12,9 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from proofroll.elements.mechanism import WORLD, Body, Joint, Mechanism
+from proofroll.elements.mechanism import WORLD, Body, Joint, Mechanism, Tree
 from proofroll.elements.mechanism.drives import Actuator, Coupling
 from proofroll.elements.mechanism.joint_kinds import DISTANCE, WITH_QUATERNION, JointKind
-from proofroll.elements.mechanism.kinematics import Tree
 from proofroll.elements.mechanism.loop_points import held_points
 from proofroll.elements.mechanism.rotations import to_quaternion
 from proofroll.elements.mechanism.signal import varies

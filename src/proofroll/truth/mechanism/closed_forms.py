@@ -11,11 +11,9 @@ import numpy as np
 from scipy.linalg import expm
 from scipy.special import ellipj, ellipk, ellipkinc
 
-from proofroll.elements.mechanism.checks import WORLD
-from proofroll.elements.mechanism.joint import Joint
+from proofroll.elements.mechanism import WORLD, Joint, Mechanism
 from proofroll.elements.mechanism.joint_coordinates import JointCoordinates
 from proofroll.elements.mechanism.joint_kinds import JointKind
-from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.record import Record
 from proofroll.elements.mechanism.rotations import Array, from_rpy
 from proofroll.elements.mechanism.signal import varies

@@ -7,9 +7,9 @@ from scipy.spatial.transform import Rotation
 
 from proofroll.core.bounces import Bounce, Course, exact_bounces, with_bars
 from proofroll.core.events import IMPACTS, Event
+from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.contacts.acting import ContactMode
 from proofroll.elements.mechanism.contacts.bounces import bouncing_bodies, course_of
-from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.placed import Placed
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.truth import SAFETY

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from proofroll.core.last_results import LastResults
+from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.contacts.acting import (
     EXACT,
     ContactMode,
@@ -18,7 +19,6 @@ from proofroll.elements.mechanism.contacts.geometry import BodyContact
 from proofroll.elements.mechanism.contacts.joint_laws import JointContact, joint_contacts, mode_of_joints
 from proofroll.elements.mechanism.contacts.touching import Moving, Touching, touch
 from proofroll.elements.mechanism.contacts.turning import TurningFriction, moments_by_pressing, turning_frictions
-from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.rotations import Array, cross, frame_of_axis
 from proofroll.elements.mechanism.switches import HOLDING, STOPPED, switched_joints
 from proofroll.truth.mechanism.maximal_coordinates import RANK, NumericEquations

@@ -16,6 +16,7 @@ from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Diverged
 from proofroll.core.events import EventKind
 from proofroll.core.last_results import LastResults
+from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.contacts.acting import (
     FAINT,
     Acting,
@@ -28,7 +29,6 @@ from proofroll.elements.mechanism.contacts.acting import (
 from proofroll.elements.mechanism.contacts.joint_laws import rebounding
 from proofroll.elements.mechanism.contacts.touching import Touching, lying, torn
 from proofroll.elements.mechanism.contacts.turning import opened, shut_by_pressing
-from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.elements.mechanism.signal import varies
 from proofroll.truth.hybrid import Stretch, StretchLaw, Transition

@@ -8,12 +8,12 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any
 
+from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.contacts.acting import ContactMode
 from proofroll.elements.mechanism.contacts.dynamics import ContactDynamics
 from proofroll.elements.mechanism.contacts.joint_laws import JointContact
 from proofroll.elements.mechanism.contacts.turning import TurningFriction
 from proofroll.elements.mechanism.joint_kinds import AXES, SLIDING, WITH_QUATERNION, JointKind
-from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.prescribed import moved
 from proofroll.elements.mechanism.signal import Held, Table, value_at
 from proofroll.truth.mechanism.contact_scalars import ScalarMotion, ScalarTouch, floats, known_shapes, touch_in_scalars

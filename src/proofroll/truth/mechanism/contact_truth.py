@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 
 from proofroll.core.errors import Refused
+from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.analysis import RANK
 from proofroll.elements.mechanism.commands import has_held
 from proofroll.elements.mechanism.contacts.acting import ContactMode, kinds
 from proofroll.elements.mechanism.contacts.dynamics import ContactDynamics
 from proofroll.elements.mechanism.contacts.geometry import pair_sums
-from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.record import record_of
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.elements.mechanism.signal import breaks

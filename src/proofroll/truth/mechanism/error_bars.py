@@ -9,10 +9,10 @@ from numpy.typing import NDArray
 from proofroll.core.bounces import Bounce
 from proofroll.core.errors import Refused
 from proofroll.core.events import Event
+from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.joint_coordinates import JointCoordinates
 from proofroll.elements.mechanism.joint_kinds import WITH_QUATERNION, JointKind
 from proofroll.elements.mechanism.link_forces import link_values, works
-from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.placed import Placed
 from proofroll.elements.mechanism.record import Record, record_of
 from proofroll.elements.mechanism.rotations import Array

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from proofroll.core.errors import Refused
 from proofroll.core.events import Event, EventKind
+from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.analysis import analyse
-from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.record import Record
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.truth import SAFETY

@@ -11,6 +11,7 @@ import numpy as np
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.engine import Sample
+from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.commands import (
     Commands,
     celled,
@@ -20,7 +21,6 @@ from proofroll.elements.mechanism.commands import (
     values_of,
     with_values,
 )
-from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.elements.mechanism.signal import Table
 from proofroll.truth.hybrid import HybridPath, HybridRoute, State, Stretch, Transition

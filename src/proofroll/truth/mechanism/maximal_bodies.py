@@ -11,10 +11,8 @@ import numpy as np
 from scipy.linalg import block_diag
 from scipy.spatial.transform import Rotation
 
-from proofroll.elements.mechanism.checks import WORLD
-from proofroll.elements.mechanism.joint import Joint
+from proofroll.elements.mechanism import WORLD, Joint, Mechanism
 from proofroll.elements.mechanism.joint_kinds import IN_PLANE, SLIDING, JointKind
-from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.rotations import Array, frame_of_axis
 from proofroll.truth.scalars import Scalar, add, cross, dot, mul, plus, scaled, turned, turned_back
 

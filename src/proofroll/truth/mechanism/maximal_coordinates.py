@@ -18,8 +18,8 @@ from scipy.spatial.transform import Rotation
 
 from proofroll.core.dop853 import integrate
 from proofroll.core.errors import Missing
+from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.complementarity import refuse_switching
-from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.named_forces import joint_force_shares, lengths, pick_named
 from proofroll.elements.mechanism.record import Record, record_of
 from proofroll.elements.mechanism.rotations import Array

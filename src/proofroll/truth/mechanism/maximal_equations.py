@@ -13,11 +13,9 @@ import numpy as np
 from scipy.linalg import block_diag
 
 from proofroll.core.arrays import slices
-from proofroll.elements.mechanism.checks import WORLD
+from proofroll.elements.mechanism import WORLD, Joint, Mechanism
 from proofroll.elements.mechanism.drives import Coupling
-from proofroll.elements.mechanism.joint import Joint
 from proofroll.elements.mechanism.joint_kinds import TURNING, JointKind
-from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.prescribed import moved
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.elements.mechanism.signal import FUNCTIONS as SMOOTH

@@ -18,10 +18,9 @@ from proofroll.core.errors import Diverged, Refused
 from proofroll.core.parameters import Unit
 from proofroll.core.quantity import OR, powers_of
 from proofroll.core.validation import units_of_kind
+from proofroll.elements.mechanism import Joint, Mechanism
 from proofroll.elements.mechanism.contacts.start import natural_scale
-from proofroll.elements.mechanism.joint import Joint
 from proofroll.elements.mechanism.joint_kinds import JointKind
-from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.named_forces import named_forces
 from proofroll.elements.mechanism.record import Record
 from proofroll.elements.mechanism.signal import FUNCTIONS, Formula, Table

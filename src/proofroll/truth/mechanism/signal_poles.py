@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from proofroll.elements.mechanism.model import Mechanism
+from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.elements.mechanism.signal import Formula, Signal
 

@@ -4,9 +4,9 @@ from collections.abc import Iterable
 
 import numpy as np
 
+from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.analysis import RowSign, singular_values
 from proofroll.elements.mechanism.joint_coordinates import JointCoordinates
-from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.truth.mechanism.closed_forms import ClosedForm
 

@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 
 from proofroll.core.dop853 import integrate
 from proofroll.core.errors import Diverged, Missing, Refused
+from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.analysis import analyse
 from proofroll.elements.mechanism.complementarity import refuse_switching
 from proofroll.elements.mechanism.joint_coordinates import JointCoordinates
-from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.record import Record, record_of
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.truth import SAFETY

@@ -12,8 +12,8 @@ from typing import NamedTuple
 import numpy as np
 
 from proofroll.core.errors import Diverged, Missing
+from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.joint_coordinates import JointCoordinates
-from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.record import Record, record_of
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.truth.collocation import Step, System, by_states, next_length, nodes, take

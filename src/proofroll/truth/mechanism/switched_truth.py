@@ -7,10 +7,9 @@ import numpy as np
 
 from proofroll.core.errors import Diverged, Refused
 from proofroll.core.events import EventKind
+from proofroll.elements.mechanism import Joint, Mechanism
 from proofroll.elements.mechanism.commands import has_held
-from proofroll.elements.mechanism.joint import Joint
 from proofroll.elements.mechanism.joint_coordinates import JointCoordinates
-from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.record import Record, record_of
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.elements.mechanism.signal import breaks

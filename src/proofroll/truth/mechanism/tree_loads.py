@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from proofroll.elements.mechanism.model import Mechanism
+from proofroll.elements.mechanism import Mechanism
 from proofroll.truth.mechanism.bushing_scalars import bushing_load
 from proofroll.truth.mechanism.contact_symbols import Vector
 from proofroll.truth.mechanism.maximal_bodies import clean

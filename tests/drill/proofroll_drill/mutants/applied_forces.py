@@ -5,8 +5,7 @@ from __future__ import annotations
 import dataclasses
 from typing import Any, ClassVar
 
-from proofroll.elements.mechanism import Mechanism
-from proofroll.elements.mechanism.parts import Force
+from proofroll.elements.mechanism import Force, Mechanism
 from proofroll.elements.mechanism.signal import Formula, delayed
 from proofroll_drill.mutants.base import STEP
 from proofroll_drill.mutants.mechanism_models import MechanismMutant

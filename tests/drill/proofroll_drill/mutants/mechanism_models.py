@@ -8,10 +8,10 @@ from typing import Any, ClassVar
 import numpy as np
 
 from proofroll.core.scene import Scene
-from proofroll.elements.mechanism import Mechanism
+from proofroll.elements.mechanism import BodyMotion, Mechanism
 from proofroll.elements.mechanism.element import MechanismElement
 from proofroll.elements.mechanism.joint_coordinates import JointCoordinates
-from proofroll.elements.mechanism.kinematics import BodyMotion, Rows
+from proofroll.elements.mechanism.kinematics import Rows
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.elements.mechanism.sampling import MechanismSample
 from proofroll_drill.mutants.base import STEP, Mutant

@@ -10,10 +10,9 @@ from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
 from proofroll.core.errors import Diverged
-from proofroll.elements.mechanism import Body, Joint, Mechanism
+from proofroll.elements.mechanism import Body, Joint, Mechanism, Tree
 from proofroll.elements.mechanism.bushing import Bushing
 from proofroll.elements.mechanism.element import MechanismElement
-from proofroll.elements.mechanism.kinematics import Tree
 from proofroll.elements.mechanism.placed import Placed
 from proofroll.elements.mechanism.point_loads import point_loads
 from proofroll.elements.mechanism.rotations import Array

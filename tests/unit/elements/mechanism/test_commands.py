@@ -17,12 +17,10 @@ from proofroll.core.parameters import Parameters
 from proofroll.core.plugins import load_engine, resolve_settings
 from proofroll.core.scene import Scene
 from proofroll.core.time_grid import time_grid
-from proofroll.elements.mechanism import Joint
+from proofroll.elements.mechanism import Body, Joint, Mechanism
 from proofroll.elements.mechanism.control import Control
 from proofroll.elements.mechanism.drives import Actuator
 from proofroll.elements.mechanism.element import MechanismElement
-from proofroll.elements.mechanism.model import Mechanism
-from proofroll.elements.mechanism.parts import Body
 from proofroll.elements.mechanism.policy import Observation, PolicySource
 from proofroll.elements.mechanism.signal import Table, read_signal
 from proofroll.running.recording import record

@@ -14,14 +14,12 @@ from proofroll.core.errors import Diverged, InputError
 from proofroll.core.observable import Role
 from proofroll.core.scene import Scene
 from proofroll.core.truth import truth
+from proofroll.elements.mechanism import Body, Joint, Mechanism
 from proofroll.elements.mechanism.certificate import CAPS
 from proofroll.elements.mechanism.contacts.dynamics import ContactDynamics
 from proofroll.elements.mechanism.dataset import UNDETERMINED, UNSAID
 from proofroll.elements.mechanism.drives import Actuator
 from proofroll.elements.mechanism.element import ENERGY_GAIN, OPENED, MechanismElement
-from proofroll.elements.mechanism.joint import Joint
-from proofroll.elements.mechanism.model import Mechanism
-from proofroll.elements.mechanism.parts import Body
 from proofroll.elements.mechanism.report.drawing import mechanism_drawing
 from proofroll.elements.mechanism.sampling import MechanismBuilt, MechanismSample
 from proofroll.elements.mechanism.signal import Formula

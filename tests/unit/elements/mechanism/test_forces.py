@@ -9,10 +9,9 @@ import pytest
 from one_body_scenes import one_body, refusal
 from scipy.spatial.transform import Rotation
 
-from proofroll.elements.mechanism import Body, Joint, Mechanism
+from proofroll.elements.mechanism import Body, Force, Joint, Mechanism
 from proofroll.elements.mechanism.contacts.geometry import Geometry, Pair
 from proofroll.elements.mechanism.element import MechanismElement
-from proofroll.elements.mechanism.parts import Force
 from proofroll.elements.mechanism.placed import Placed
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.elements.mechanism.signal import Formula

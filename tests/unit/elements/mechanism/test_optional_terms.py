@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from proofroll.elements.mechanism.model import Mechanism
+from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.optional_terms import optional_terms
 from proofroll.files.scene_file import load_scene
 

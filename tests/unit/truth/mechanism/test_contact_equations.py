@@ -6,12 +6,10 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from proofroll.elements.mechanism import Body, Joint, Mechanism
 from proofroll.elements.mechanism.contacts.acting import Acting
 from proofroll.elements.mechanism.contacts.dynamics import ContactDynamics
 from proofroll.elements.mechanism.contacts.geometry import Geometry, Pair
-from proofroll.elements.mechanism.joint import Joint
-from proofroll.elements.mechanism.model import Mechanism
-from proofroll.elements.mechanism.parts import Body
 from proofroll.truth.mechanism.contact_equations import ContactEquations
 from proofroll.truth.mechanism.error_bars import TwoRouteMotion
 from proofroll.truth.mechanism.maximal_coordinates import MaximalCoordinates

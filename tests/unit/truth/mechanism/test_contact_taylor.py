@@ -8,10 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from proofroll.elements.mechanism import Force, Mechanism, Spring
 from proofroll.elements.mechanism.contacts.dynamics import ContactDynamics
 from proofroll.elements.mechanism.drives import Actuator
-from proofroll.elements.mechanism.model import Mechanism
-from proofroll.elements.mechanism.parts import Force, Spring
 from proofroll.elements.mechanism.signal import Formula, Table
 from proofroll.elements.mechanism.spring_law import SpringLaw
 from proofroll.files.scene_file import load_scene

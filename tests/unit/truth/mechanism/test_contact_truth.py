@@ -20,15 +20,12 @@ from proofroll.core.plugins import load_engine
 from proofroll.core.scene import Scene
 from proofroll.core.truth import truth
 from proofroll.elements.ball_on_surface.element import scene_with
-from proofroll.elements.mechanism import switches
+from proofroll.elements.mechanism import Body, Joint, Mechanism, Spring, switches
 from proofroll.elements.mechanism.contacts import coulomb
 from proofroll.elements.mechanism.contacts.geometry import Geometry, Pair
 from proofroll.elements.mechanism.drives import Actuator
 from proofroll.elements.mechanism.element import MechanismElement
-from proofroll.elements.mechanism.joint import Joint
-from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.named_forces import named_forces
-from proofroll.elements.mechanism.parts import Body, Spring
 from proofroll.elements.mechanism.signal import Formula
 from proofroll.files.scene_file import load_scene
 from proofroll.running.simulation import simulate

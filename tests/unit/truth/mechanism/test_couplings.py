@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from pulleys import MASSES, accelerations, massless_pulley, one_rope
 
+from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.assembly import check_start
-from proofroll.elements.mechanism.model import Mechanism
 from proofroll.truth.mechanism.smooth_truth import find_truth
 
 

@@ -11,16 +11,14 @@ import pytest
 from proofroll.core.errors import InputError, Refused
 from proofroll.core.quantity import powers_of
 from proofroll.core.validation import units_of_kind
+from proofroll.elements.mechanism import Body, Force, Joint, Loop, Mechanism, Point, Spring
 from proofroll.elements.mechanism.assembly import assemble, check_start
 from proofroll.elements.mechanism.bushing import Bushing
 from proofroll.elements.mechanism.contacts.dynamics import ContactDynamics
 from proofroll.elements.mechanism.contacts.geometry import Geometry, Pair
 from proofroll.elements.mechanism.drives import Actuator, Coupling
 from proofroll.elements.mechanism.element import MechanismElement
-from proofroll.elements.mechanism.joint import Joint
 from proofroll.elements.mechanism.joint_coordinates import JointCoordinates
-from proofroll.elements.mechanism.model import Mechanism
-from proofroll.elements.mechanism.parts import Body, Force, Loop, Point, Spring
 from proofroll.elements.mechanism.reader import KINDS
 from proofroll.elements.mechanism.record import record_of
 from proofroll.elements.mechanism.signal import Formula, Table

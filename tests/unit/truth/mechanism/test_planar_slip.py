@@ -8,11 +8,9 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 from proofroll.elements.ball_on_surface.element import rolling_ball
+from proofroll.elements.mechanism import Body, Joint, Mechanism
 from proofroll.elements.mechanism.contacts.geometry import Geometry, Pair
 from proofroll.elements.mechanism.drives import Actuator
-from proofroll.elements.mechanism.joint import Joint
-from proofroll.elements.mechanism.model import Mechanism
-from proofroll.elements.mechanism.parts import Body
 from proofroll.elements.mechanism.signal import Formula
 from proofroll.files.scene_file import load_scene
 from proofroll.truth.mechanism.switched_truth import truth_of

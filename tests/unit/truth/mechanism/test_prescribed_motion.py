@@ -8,10 +8,8 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from proofroll.elements.mechanism import Mechanism
+from proofroll.elements.mechanism import Body, Joint, Mechanism
 from proofroll.elements.mechanism.contacts.geometry import Geometry, Pair
-from proofroll.elements.mechanism.joint import Joint
-from proofroll.elements.mechanism.parts import Body
 from proofroll.elements.mechanism.prescribed import moved
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.elements.mechanism.signal import Formula, Signal, Table

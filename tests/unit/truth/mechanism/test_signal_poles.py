@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from proofroll.core.errors import Refused
-from proofroll.elements.mechanism import Body, Joint, Mechanism
-from proofroll.elements.mechanism.parts import Force
+from proofroll.elements.mechanism import Body, Force, Joint, Mechanism
 from proofroll.elements.mechanism.signal import Formula
 from proofroll.truth.mechanism.signal_poles import first_pole
 from proofroll.truth.mechanism.switched_truth import truth_of

@@ -13,11 +13,9 @@ import proofroll
 from proofroll.core.errors import InputError, Refused
 from proofroll.core.scene import Scene
 from proofroll.core.truth import truth
+from proofroll.elements.mechanism import Body, Joint, Mechanism
 from proofroll.elements.mechanism.contacts.geometry import Geometry, Pair
 from proofroll.elements.mechanism.element import MechanismElement
-from proofroll.elements.mechanism.joint import Joint
-from proofroll.elements.mechanism.model import Mechanism
-from proofroll.elements.mechanism.parts import Body
 
 RADIUS, MASS, MOMENT, G = 0.05, 0.7, 0.0009, 9.81
 

@@ -6,10 +6,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from proofroll.elements.mechanism import Body, Force, Joint, Mechanism
 from proofroll.elements.mechanism.contacts.geometry import Geometry, Pair
-from proofroll.elements.mechanism.joint import Joint
-from proofroll.elements.mechanism.model import Mechanism
-from proofroll.elements.mechanism.parts import Body, Force
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.elements.mechanism.signal import Formula
 from proofroll.truth.mechanism.switched_truth import truth_of

@@ -12,10 +12,10 @@ from scipy.spatial.transform import Rotation
 
 from proofroll.core.engine import whole_steps
 from proofroll.core.errors import Diverged
-from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.bookkeeping.law import ControlLaw, RobotState
 from proofroll.elements.mechanism.joint_coordinates import JointCoordinates
 from proofroll.elements.mechanism.joint_kinds import JointKind
+from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.policy import Observation
 from proofroll.elements.mechanism.rotations import Array
 

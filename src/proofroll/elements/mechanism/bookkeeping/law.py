@@ -12,8 +12,8 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from proofroll.core.errors import InputError
-from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.control import EFFORT
+from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.policy import Observation, PolicySource
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.elements.mechanism.signal import Signal, value_at

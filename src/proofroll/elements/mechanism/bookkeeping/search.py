@@ -16,11 +16,11 @@ import numpy as np
 
 from proofroll.core.diagnosis.fitting import least_squares_parameters
 from proofroll.core.errors import Diverged, Refused
-from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.bookkeeping.air import SCHEMES, AirRobot, Scheme, steps_in_air
 from proofroll.elements.mechanism.bookkeeping.law import ControlLaw
 from proofroll.elements.mechanism.bookkeeping.mistakes import Mistake, fitted, mistakes, offsets_told
 from proofroll.elements.mechanism.joint_kinds import WITH_QUATERNION, JointKind
+from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.rotations import Array
 
 SHOWN = 0.1  # s: a mistake of bookkeeping shows in the air within it

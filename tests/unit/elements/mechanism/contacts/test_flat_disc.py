@@ -5,11 +5,9 @@ from __future__ import annotations
 import pytest
 
 from proofroll.core.scene import Scene
+from proofroll.elements.mechanism import Body, Joint, Mechanism
 from proofroll.elements.mechanism.contacts.geometry import Geometry, Pair
 from proofroll.elements.mechanism.element import MechanismElement
-from proofroll.elements.mechanism.joint import Joint
-from proofroll.elements.mechanism.model import Mechanism
-from proofroll.elements.mechanism.parts import Body
 from proofroll.running.simulation import simulate
 
 

@@ -12,11 +12,10 @@ from scipy.spatial.transform import Rotation
 from proofroll.core.errors import InputError
 from proofroll.core.scene import Scene
 from proofroll.core.truth import truth
-from proofroll.elements.mechanism import Body, Joint, Mechanism
+from proofroll.elements.mechanism import Body, Joint, Mechanism, Tree
 from proofroll.elements.mechanism.contacts.geometry import Geometry, Pair
 from proofroll.elements.mechanism.contacts.start import touches
 from proofroll.elements.mechanism.element import MechanismElement
-from proofroll.elements.mechanism.kinematics import Tree
 
 RADIUS, LENGTH, MASS, GRAVITY = 0.1, 0.4, 2.0, 9.81
 LEVEL = (0.0, 0.0, -GRAVITY)

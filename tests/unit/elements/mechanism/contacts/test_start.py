@@ -6,12 +6,10 @@ import numpy as np
 import pytest
 
 from proofroll.core.errors import InputError
+from proofroll.elements.mechanism import Body, Joint, Mechanism
 from proofroll.elements.mechanism.contacts.dynamics import ContactDynamics
 from proofroll.elements.mechanism.contacts.geometry import Geometry, Pair
 from proofroll.elements.mechanism.contacts.start import check_contacts
-from proofroll.elements.mechanism.joint import Joint
-from proofroll.elements.mechanism.model import Mechanism
-from proofroll.elements.mechanism.parts import Body
 
 
 def door_and_ball(size: float, apart: float, *, gap: float = 0.0, speed: float = 0.0) -> Mechanism:

@@ -16,12 +16,12 @@ from proofroll.core.certificate import Line
 from proofroll.core.diagnosis import Evidence, hypotheses_of
 from proofroll.core.first_steps import OF_FIRST_STEPS
 from proofroll.core.scene import Scene
+from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.diagnosis.contacts_at_start import _FirstAccelerations, _other_friction
 from proofroll.elements.mechanism.diagnosis.equations import Change, MechanismStates
 from proofroll.elements.mechanism.diagnosis.joint_laws import _effort
 from proofroll.elements.mechanism.drives import Actuator
 from proofroll.elements.mechanism.element import MechanismElement
-from proofroll.elements.mechanism.model import Mechanism
 from proofroll.files.scene_file import load_scene
 from proofroll.running.simulation import simulate
 

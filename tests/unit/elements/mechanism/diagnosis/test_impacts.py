@@ -13,11 +13,9 @@ from proofroll.core.arrays import FloatArray
 from proofroll.core.diagnosis import Evidence, diagnose, hypotheses_of
 from proofroll.core.scene import Scene
 from proofroll.core.truth import truth
+from proofroll.elements.mechanism import Body, Joint, Mechanism
 from proofroll.elements.mechanism.contacts.geometry import Geometry, Pair
 from proofroll.elements.mechanism.element import MechanismElement
-from proofroll.elements.mechanism.joint import Joint
-from proofroll.elements.mechanism.model import Mechanism
-from proofroll.elements.mechanism.parts import Body
 from proofroll.files.scene_file import load_scene
 from proofroll.running.simulation import simulate
 
