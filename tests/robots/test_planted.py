@@ -13,11 +13,12 @@ from robot_templates import inertial, mjcf, spherical, urdf
 from scipy.spatial.transform import Rotation
 
 from proofroll.core.plugins import parse_engine
-from proofroll.robots import mjcf_compiler, reading
+from proofroll.robots import reading
 from proofroll.robots.check import check
 from proofroll.robots.importer_row import importer_row
 from proofroll.robots.layers import RobotTruth
 from proofroll.robots.meaning import CheckSettings
+from proofroll.robots.mjcf.compiler import compiled_robot
 from proofroll.robots.model import Robot
 from proofroll.robots.opening import open_robot
 from proofroll.robots.protocol import Request
@@ -296,7 +297,7 @@ def test_real_engines(
     place.mkdir()
     written = reading.write(file, place)
     if robot is None:
-        robot, _ = mjcf_compiler.compiled_robot(robot_workers("mujoco"), file, written, 60)
+        robot, _ = compiled_robot(robot_workers("mujoco"), file, written, 60)
     truth = RobotTruth.of(robot, random_states(robot, 5, 1))
     request = _request(written, file, truth, reading.options_of(spec.options, spec.name))
 
@@ -481,7 +482,7 @@ def test_planted_causes_in_mjcf(
         files.append(open_robot(path))
         (tmp_path / f"{name}-given").mkdir()
         written = reading.write(files[-1], tmp_path / f"{name}-given")
-        robots.append(mjcf_compiler.compiled_robot(robot_workers("mujoco"), files[-1], written, 60)[0])
+        robots.append(compiled_robot(robot_workers("mujoco"), files[-1], written, 60)[0])
     truth = RobotTruth.of(robots[0], random_states(robots[0], 5, 1))
     answer = reading.ReaderAnswer("1", "", {}, reading_of(robots[1], truth), "")
     row = importer_row(files[0], truth, 1e-14, parse_engine("planted"), answer)

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from typing import Any
 from xml.etree.ElementTree import Element
 
-from proofroll.robots.mjcf_classes import class_of, with_classes
+from proofroll.robots.mjcf.defaults import class_of, with_classes
 from proofroll.robots.model import Robot
 from proofroll.robots.robot_file import floats
 

@@ -21,7 +21,7 @@ from proofroll.robots.importer_row import importer_row, row_with_copy
 from proofroll.robots.layers import LAYERS, RobotTruth
 from proofroll.robots.lint import lint
 from proofroll.robots.meaning import USUAL, CheckSettings, moving_robot, source_of
-from proofroll.robots.mjcf_compiler import Compiler
+from proofroll.robots.mjcf.compiler import Compiler
 from proofroll.robots.model import RobotJoint
 from proofroll.robots.protocol import Request
 from proofroll.robots.records import DrawnBody, DrawnJoint, DrawnRobot, ImporterRow, RobotCheck, UsedTruth

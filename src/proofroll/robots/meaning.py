@@ -10,7 +10,8 @@ from xml.etree.ElementTree import Element, fromstring
 
 from proofroll.core.errors import InputError
 from proofroll.core.limits import TIME_LIMIT
-from proofroll.robots import mjcf_compiler, reading
+from proofroll.robots import reading
+from proofroll.robots.mjcf.compiler import Compiler, compiled_robot, expand
 from proofroll.robots.model import Robot
 from proofroll.robots.opening import open_robot
 from proofroll.robots.robot_file import RobotFile
@@ -49,7 +50,7 @@ USUAL = CheckSettings()
 
 def moving_robot(
     path: Path, settings: CheckSettings, workers: Workers, folder: Path
-) -> tuple[RobotFile, Path, Robot, mjcf_compiler.Compiler | None]:
+) -> tuple[RobotFile, Path, Robot, Compiler | None]:
     """A file, its copy for engines in a folder, and what :func:`meaning` says of it.
 
     Raises:
@@ -64,14 +65,14 @@ def moving_robot(
     return file, written, robot, compiler
 
 
-def source_of(compiler: mjcf_compiler.Compiler | None) -> str:
+def source_of(compiler: Compiler | None) -> str:
     """Clause on whose reading is the meaning of a file."""
     return f"the model that {' '.join(compiler)} compiles" if compiler else "our own reading of the file"
 
 
 def meaning(
     file: RobotFile, written: Path, time_limit: float, workers: Workers | None = None
-) -> tuple[Robot, mjcf_compiler.Compiler | None]:
+) -> tuple[Robot, Compiler | None]:
     """The robot that a file describes, and the engine whose compiler says so; None: our own reading (URDF).
 
     Args:
@@ -86,7 +87,7 @@ def meaning(
     if file.kind == "urdf":
         return read_urdf(file), None
     robot, by = _by_definer(
-        file.kind, file.path, workers, lambda worker: mjcf_compiler.compiled_robot(worker, file, written, time_limit)
+        file.kind, file.path, workers, lambda worker: compiled_robot(worker, file, written, time_limit)
     )
     return robot.change(name=file.root.get("model", "robot")), by
 
@@ -99,15 +100,15 @@ def opened(
     The engine that defines the format writes them out within ``time_limit`` [s].
     """
 
-    def expand(parts: Mapping[str, Element]) -> Element:
-        return _by_definer("mjcf", path, workers, lambda w: mjcf_compiler.expand(w, path, parts, time_limit))[0]
+    def expanded(parts: Mapping[str, Element]) -> Element:
+        return _by_definer("mjcf", path, workers, lambda w: expand(w, path, parts, time_limit))[0]
 
-    return open_robot(path, base, root, expand)
+    return open_robot(path, base, root, expanded)
 
 
 def _by_definer(
-    kind: str, path: Path, workers: Workers | None, ask: Callable[[Worker], tuple[_Answer, mjcf_compiler.Compiler]]
-) -> tuple[_Answer, mjcf_compiler.Compiler]:
+    kind: str, path: Path, workers: Workers | None, ask: Callable[[Worker], tuple[_Answer, Compiler]]
+) -> tuple[_Answer, Compiler]:
     """Answer of the engine that defines a format, and its name. Raises InputError if its process dies."""
     asked = _defines.get(kind, kind)
     with lent_workers(workers) as lent:

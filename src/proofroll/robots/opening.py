@@ -5,7 +5,8 @@ from pathlib import Path
 from xml.etree.ElementTree import Element
 
 from proofroll.core.errors import InputError, error_location, require_known
-from proofroll.robots import mjcf, urdf
+from proofroll.robots import urdf
+from proofroll.robots.mjcf.parse import neutral_mjcf
 from proofroll.robots.robot_file import RUN_XACRO, Expand, RobotFile, names_files_inside, read_xml
 
 # More bodies than any robot has; each costs a row and a column of dense matrices.
@@ -46,7 +47,7 @@ def _opened(path: Path, base: str, inside: Path, expand: Expand | None) -> Robot
         driven = urdf.driven_joints(root)
         kind, (root, remarks), body = "urdf", urdf.neutral_urdf(root), "link"
     elif root.tag in {"mujoco", "mujocoinclude"}:
-        kind, (root, remarks, contained), body = "mjcf", mjcf.neutral_mjcf(root, path, inside, expand), "body"
+        kind, (root, remarks, contained), body = "mjcf", neutral_mjcf(root, path, inside, expand), "body"
     else:
         raise InputError("file", path, f"<{root.tag[:40]}> is neither a URDF (<robot>) nor an MJCF (<mujoco>)")
     count = sum(1 for _ in root.iter(body))

@@ -8,7 +8,7 @@ import numpy as np
 from proofroll.core.bounds import DENSEST
 from proofroll.elements.mechanism.joint_kinds import JointKind
 from proofroll.elements.mechanism.plausibility import FAR, LARGE, TIMES
-from proofroll.robots.mjcf_classes import with_classes
+from proofroll.robots.mjcf.defaults import with_classes
 from proofroll.robots.model import Robot, RobotBody
 from proofroll.robots.robot_file import RobotFile, floats
 

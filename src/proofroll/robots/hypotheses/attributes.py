@@ -8,7 +8,7 @@ from xml.etree.ElementTree import Element
 import numpy as np
 
 from proofroll.robots.hypotheses import WRITE_INERTIALS, RobotEvidence, hypothesis
-from proofroll.robots.mjcf_classes import with_classes
+from proofroll.robots.mjcf.defaults import with_classes
 from proofroll.robots.model import Robot, RobotBody
 from proofroll.robots.protocol import Reading
 

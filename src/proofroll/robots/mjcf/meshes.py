@@ -6,7 +6,7 @@ from pathlib import Path
 from xml.etree.ElementTree import Element
 
 from proofroll.core.number_format import counted
-from proofroll.robots.mjcf_classes import Classed
+from proofroll.robots.mjcf.defaults import Classed
 from proofroll.robots.robot_file import LintRemark, file_inside, required_file
 
 

@@ -9,8 +9,8 @@ from pathlib import Path
 from xml.etree.ElementTree import Element
 
 from proofroll.core.errors import InputError
-from proofroll.robots.mjcf_classes import classed
-from proofroll.robots.mjcf_meshes import remove_height_fields, remove_meshes
+from proofroll.robots.mjcf.defaults import classed
+from proofroll.robots.mjcf.meshes import remove_height_fields, remove_meshes
 from proofroll.robots.robot_file import MOST_ELEMENTS, Expand, LintRemark, names_files_inside, read_xml, required_file
 
 # Largest depth of includes.

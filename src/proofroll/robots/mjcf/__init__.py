@@ -1,0 +1,1 @@
+"""MJCF files: parsing, default classes, compilation by MuJoCo, meshes that give no mass."""
