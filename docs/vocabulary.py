@@ -17,7 +17,7 @@ from proofroll.core.gravity import Gravity
 from proofroll.elements.ball_on_surface import model as balls
 from proofroll.elements.ball_on_surface.surfaces import surface_kinds
 from proofroll.elements.mechanism import model as mechanisms
-from proofroll.elements.mechanism.composed import Cable, Gimbal, Screw
+from proofroll.elements.mechanism.composed import Cable, Gimbal, Screw, SprungJoint
 from proofroll.elements.mechanism.contacts import geometry as contacts
 from proofroll.elements.mechanism.drives import ActuatorKind
 from proofroll.elements.mechanism.joint_kinds import LOOP_FACTS, JointKind
@@ -57,6 +57,7 @@ CHAPTERS: dict[str, tuple[Table, ...]] = {
         Table("[[joints]]", mechanisms.Joint),
         Table("[[joints]]", Screw),
         Table("[[joints]]", Gimbal),
+        Table("[[joints]]", SprungJoint),
         Table("[[loops]]", mechanisms.Loop),
         Table("[[loops]]", Cable),
         Table("[[springs]]", mechanisms.Spring),

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -17,15 +18,20 @@ from proofroll.core.errors import InputError
 from proofroll.core.parameters import Unit
 from proofroll.elements.mechanism import checks, rotations
 from proofroll.elements.mechanism.checks import METRES, RADIANS, ZERO, Vector
+from proofroll.elements.mechanism.joint_kinds import JointKind
 from proofroll.elements.mechanism.rotations import Array, cross
+
+if TYPE_CHECKING:
+    from proofroll.elements.mechanism.joint import Joint
 
 Six = tuple[float, float, float, float, float, float]
 NONE: Six = (0.0,) * 6
 # Largest rotation [rad]: at half a turn the rotation vector is not unique, and its moment jumps.
 LARGEST = 3.0
+_SAME = 1e-12  # components of two rotations up to which they are the same: round-off of angles
 _SMALL = 0.03  # rad, below which a series has more digits than the quotient
-_STIFFNESS: tuple[Unit, ...] = ("N/m",) * 3 + ("N m/rad",) * 3
-_DAMPING: tuple[Unit, ...] = ("N s/m",) * 3 + ("N m s/rad",) * 3
+SIX_STIFFNESSES: tuple[Unit, ...] = ("N/m",) * 3 + ("N m/rad",) * 3
+SIX_DAMPINGS: tuple[Unit, ...] = ("N s/m",) * 3 + ("N m s/rad",) * 3
 
 
 @dataclass(frozen=True)
@@ -53,8 +59,8 @@ class Bushing:
     position_b: Vector = field(default=ZERO, metadata=METRES)
     orientation_a: Vector = field(default=ZERO, metadata=RADIANS)
     orientation_b: Vector = field(default=ZERO, metadata=RADIANS)
-    stiffness: Six = field(default=NONE, metadata={"unit": _STIFFNESS})
-    damping: Six = field(default=NONE, metadata={"unit": _DAMPING})
+    stiffness: Six = field(default=NONE, metadata={"unit": SIX_STIFFNESSES})
+    damping: Six = field(default=NONE, metadata={"unit": SIX_DAMPINGS})
 
     def __post_init__(self) -> None:
         place = f"bushings.{checks.name(self.name, 'bushings')}"
@@ -78,6 +84,16 @@ class Bushing:
     def frame_b(self) -> Array:
         """Axes of B in the axes of body_b, as columns."""
         return read_only(rotations.from_rpy(self.orientation_b))
+
+    def is_spring_of(self, joint: Joint) -> bool:
+        """True if this is a spring alone of a ball joint, at rest at q = 0 and the same in all directions."""
+        ends = (self.body_a, self.position_a, self.body_b, self.position_b)
+        there = ends == (joint.parent, joint.position, joint.child, joint.child_position)
+        alike = len(set(self.stiffness[3:])) == 1 and not any(self.stiffness[:3] + self.damping)
+        if joint.kind != JointKind.SPHERICAL or not there or not alike:
+            return False
+        at_rest = joint.parent_frame @ joint.child_frame.T - self.frame_a @ self.frame_b.T
+        return bool(np.abs(at_rest).max() <= _SAME)
 
     def load(self, R_a: Array, R_b: Array, apart: Array, slide: Array, w_a: Array, w_b: Array) -> tuple[Array, Array]:
         """Force [N] and moment [N m] on body_b at the origin of B; the opposite acts on body_a at the same place.

@@ -1,23 +1,25 @@
-"""Screw, gimbal and cable: tables of a file that stand for simpler parts.
+"""Screw, gimbal, sprung joint and cable: tables of a file that stand for simpler parts.
 
-Screws and gimbals are read as joints in series through bodies without mass, and a screw's coupling; cables as a
-contact: truth, engines and results know these parts alone.
+Screws and gimbals are read as joints in series through bodies without mass, and a screw's coupling; springs of ball
+joints and free bodies as bushings; cables as a contact: truth, engines and results know these parts alone.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from proofroll.core.errors import InputError
 from proofroll.elements.mechanism import checks, rotations
+from proofroll.elements.mechanism.bushing import LARGEST, SIX_DAMPINGS, SIX_STIFFNESSES, Bushing
 from proofroll.elements.mechanism.checks import METRES, RADIANS, RATIO, ZERO, Numbers, Vector, Z
 from proofroll.elements.mechanism.contacts.geometry import Geometry, Pair
 from proofroll.elements.mechanism.drives import Coupling
-from proofroll.elements.mechanism.joint import Joint
+from proofroll.elements.mechanism.joint import UNITS, Joint
 from proofroll.elements.mechanism.joint_kinds import DISTANCE, JointKind
 from proofroll.elements.mechanism.parts import Body
 from proofroll.elements.mechanism.signal import Formula, Table
@@ -170,6 +172,85 @@ class Gimbal:
 
 
 @dataclass(frozen=True)
+class SprungJoint:
+    """A spherical or free joint with a spring: that joint, and a bushing ``<name>.spring`` at it.
+
+    The spring has the energy ½ Σ k θ² of the rotation vector θ of the child from where it is at rest (below 3 rad), and
+    ½ Σ k d² of the distance d of the joint's two points from there, along axes of the parent.
+
+    Attributes:
+        name: unique among joints and loops.
+        kind: ``spherical`` or ``free``.
+        parent, child: names of bodies; the parent may be ``world``.
+        position: of the joint in the parent's frame [m].
+        orientation: roll, pitch, yaw of the child's frame against the parent's at q = 0 [rad].
+        child_position: of the joint in the child's frame [m].
+        q0, v0: as of the joint.
+        stiffness, damping: of a spherical joint one number for all directions, or about three axes; of a free one along
+            and about three axes. The axes are the child's where the spring is at rest.
+        rest: pose without load of the spring: rotation vector from q = 0 along the axes that the child has there; of a
+            free joint behind the place, along the same axes.
+        dependent: q0 and v0 are to be found from the loops.
+    """
+
+    name: str
+    kind: Literal[JointKind.SPHERICAL, JointKind.FREE]
+    parent: str
+    child: str
+    position: Vector = field(default=ZERO, metadata=METRES)
+    orientation: Vector = field(default=ZERO, metadata=RADIANS)
+    child_position: Vector = field(default=ZERO, metadata=METRES)
+    q0: Numbers = field(default=(), metadata=UNITS["q"])
+    v0: Numbers = field(default=(), metadata=UNITS["v"])
+    stiffness: float | Numbers = field(
+        default=(), metadata={"unit": {JointKind.SPHERICAL: "N m/rad", JointKind.FREE: SIX_STIFFNESSES}}
+    )
+    damping: float | Numbers = field(
+        default=(), metadata={"unit": {JointKind.SPHERICAL: "N m s/rad", JointKind.FREE: SIX_DAMPINGS}}
+    )
+    rest: Numbers = field(
+        default=(), metadata={"unit": {JointKind.SPHERICAL: "rad", JointKind.FREE: ("m",) * 3 + ("rad",) * 3}}
+    )
+    dependent: bool = False
+
+    def parts(self) -> Parts:
+        """Its parts by kind, as the tables of a file: joint, bushing.
+
+        Raises:
+            InputError: its data are wrong.
+        """
+        laws = {key: self._six(key, at_least=0) for key in ("stiffness", "damping")}
+        damping = 0.0
+        if self.kind == JointKind.SPHERICAL and len(set(laws["damping"][3:])) == 1:  # the joint's own
+            damping, laws["damping"] = laws["damping"][3], (0.0,) * 6
+        joint = Joint(
+            self.name, self.kind, self.parent, self.child, self.position, self.orientation,
+            child_position=self.child_position, q0=self.q0, v0=self.v0, damping=damping, dependent=self.dependent,
+        )  # fmt: skip
+        rest = self._six("rest")
+        if np.linalg.norm(rest[3:]) >= LARGEST:
+            advice = f"a rotation vector is shorter than {LARGEST:g} rad; turn the joint by its orientation"
+            raise InputError(f"joints.{self.name}.rest", self.rest, advice)
+        frame = rotations.from_rpy(joint.orientation)
+        place = np.array(joint.position) + frame @ rest[:3]
+        at_rest = frame @ Rotation.from_rotvec(rest[3:]).as_matrix()
+        spring = Bushing(
+            f"{self.name}.spring", self.parent, self.child, position_a=tuple(place), position_b=joint.child_position,
+            orientation_a=rotations.to_rpy(at_rest), **laws,
+        )  # fmt: skip
+        return {"joints": [joint], "bushings": [spring]}
+
+    def _six(self, key: str, at_least: float | None = None) -> Any:
+        """Numbers along and about three axes of a key; a ball joint has none along them."""
+        value, turns = getattr(self, key), self.kind == JointKind.SPHERICAL
+        spread = 3 * (value,) if isinstance(value, (int, float)) and turns else value
+        count = 3 if turns else 6
+        given = (0.0,) * count if isinstance(spread, tuple) and not spread else spread
+        numbers = checks.numbers(f"joints.{self.name}.{key}", given, count, at_least=at_least)
+        return (0.0,) * (6 - count) + numbers
+
+
+@dataclass(frozen=True)
 class Cable:
     """A cable without mass, which pulls where it is taut and goes slack: a distance that is at most its length.
 
@@ -217,10 +298,17 @@ class Cable:
 
 _RIGHT = 1e-9  # cosine of axes that count as perpendicular, as of universal joints
 COMPOSED: Mapping[str, type[Any]] = {"screw": Screw, "gimbal": Gimbal}
+# Keys by which a joint of a kind has a spring of its own; a ball joint has damping without one.
+_SPRUNG: Mapping[str, set[str]] = {
+    JointKind.SPHERICAL: {"stiffness", "rest"},
+    JointKind.FREE: {"stiffness", "rest", "damping"},
+}
 
 
 def reader_of(kind: str, table: Mapping[str, Any], simple: type[Any]) -> type[Any]:
     """Dataclass that reads a table of a kind, ``simple`` unless its keys name something composed."""
+    if kind == "joints" and _SPRUNG.get(str(table.get("kind")), set()) & table.keys():
+        return SprungJoint
     if kind == "joints":
         return COMPOSED.get(str(table.get("kind")), simple)
     return Cable if kind == "loops" and table.get("kind") == DISTANCE and "at_most" in table else simple

@@ -37,7 +37,7 @@ _ABOUT: dict[str, dict[str, Unit]] = {
     "damping": {JointKind.SPHERICAL: "N m s/rad"},
 }
 # Units along a coordinate, by kind of joint: turning, sliding, other.
-_UNITS: dict[str, dict[str, dict[str, Unit]]] = {
+UNITS: dict[str, dict[str, dict[str, Unit]]] = {
     name: {
         "unit": {
             JointKind.REVOLUTE: turning,
@@ -108,16 +108,16 @@ class Joint:
     axis: Vector = field(default=Z, metadata=RATIO)
     second_axis: Vector | None = field(default=None, metadata=RATIO)
     child_position: Vector = field(default=ZERO, metadata=METRES)
-    q0: Numbers = field(default=(), metadata=_UNITS["q"])
-    v0: Numbers = field(default=(), metadata=_UNITS["v"])
-    stiffness: float = field(default=0.0, metadata=_UNITS["stiffness"])
-    rest: float = field(default=0.0, metadata=_UNITS["coordinate"])
-    damping: float = field(default=0.0, metadata=_UNITS["damping"])
-    friction: float = field(default=0.0, metadata=_UNITS["effort"])
-    torque: float | Formula | Table = field(default=0.0, metadata={**_UNITS["effort"], "signal": True})
-    motion: float | Formula | Table | None = field(default=None, metadata={**_UNITS["coordinate"], "signal": True})
-    armature: float = field(default=0.0, metadata=_UNITS["armature"])
-    limits: tuple[float, float] | None = field(default=None, metadata=_UNITS["coordinate"])
+    q0: Numbers = field(default=(), metadata=UNITS["q"])
+    v0: Numbers = field(default=(), metadata=UNITS["v"])
+    stiffness: float = field(default=0.0, metadata=UNITS["stiffness"])
+    rest: float = field(default=0.0, metadata=UNITS["coordinate"])
+    damping: float = field(default=0.0, metadata=UNITS["damping"])
+    friction: float = field(default=0.0, metadata=UNITS["effort"])
+    torque: float | Formula | Table = field(default=0.0, metadata={**UNITS["effort"], "signal": True})
+    motion: float | Formula | Table | None = field(default=None, metadata={**UNITS["coordinate"], "signal": True})
+    armature: float = field(default=0.0, metadata=UNITS["armature"])
+    limits: tuple[float, float] | None = field(default=None, metadata=UNITS["coordinate"])
     restitution: float = field(default=0.0, metadata=RATIO)
     dependent: bool = False
 

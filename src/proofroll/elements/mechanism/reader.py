@@ -17,7 +17,7 @@ from proofroll.elements.mechanism import checks
 from proofroll.elements.mechanism.assembly import assemble, check_start
 from proofroll.elements.mechanism.bushing import Bushing
 from proofroll.elements.mechanism.commands import check_commands
-from proofroll.elements.mechanism.composed import COMPOSED, Cable, Gimbal, Screw, reader_of
+from proofroll.elements.mechanism.composed import COMPOSED, Cable, Gimbal, Screw, SprungJoint, reader_of
 from proofroll.elements.mechanism.contacts.geometry import Geometry, Pair
 from proofroll.elements.mechanism.contacts.start import check_contacts
 from proofroll.elements.mechanism.control import made_control
@@ -42,7 +42,7 @@ KINDS: dict[str, type[Any]] = {
     "actuators": Actuator,
     "couplings": Coupling,
 }
-strict(*KINDS.values(), *COMPOSED.values(), Cable, Table)
+strict(*KINDS.values(), *COMPOSED.values(), SprungJoint, Cable, Table)
 _MOST = 10_000  # largest number of repetitions: more are taken for a typing error
 
 
@@ -61,7 +61,7 @@ def made_mechanism(content: Mapping[str, Any], gravity: checks.Vector, numbers: 
     cables: list[Cable] = []
     for kind, item in _all_made(content, numbers):
         cables += [item] if isinstance(item, Cable) else []
-        tables = item.parts() if isinstance(item, Screw | Gimbal | Cable) else {kind: [item]}
+        tables = item.parts() if isinstance(item, Screw | Gimbal | SprungJoint | Cable) else {kind: [item]}
         for table, items in tables.items():
             made[table] += items
     if not made["bodies"]:

@@ -1,5 +1,6 @@
 """Loads on bodies that MuJoCo's model has none for: springs with a formula, bushings, applied forces."""
 
+import itertools
 from collections.abc import Mapping
 from typing import Any
 
@@ -8,7 +9,14 @@ import numpy as np
 
 from proofroll.core.arrays import cross
 from proofroll.elements.mechanism import Mechanism
+from proofroll.elements.mechanism.bushing import Bushing
 from proofroll.elements.mechanism.rotations import Array
+
+
+def springs_of_balls(mechanism: Mechanism) -> dict[str, Bushing]:
+    """Joint -> spring that MuJoCo's ball joint has itself: the first bushing there that is alike in all directions."""
+    pairs = itertools.product(mechanism.joints, reversed(mechanism.bushings))
+    return {joint.name: bushing for joint, bushing in pairs if bushing.is_spring_of(joint)}
 
 
 class AppliedLoads:
@@ -28,7 +36,12 @@ class AppliedLoads:
         self._springs = [
             (s, s.force, index[s.body_a], index[s.body_b]) for s in mechanism.springs if s.force is not None
         ]
-        self._bushings = [(bushing, index[bushing.body_a], index[bushing.body_b]) for bushing in mechanism.bushings]
+        balls = springs_of_balls(mechanism)
+        self._balls = [
+            (mechanism.joint_index[joint], b, index[b.body_a], index[b.body_b]) for joint, b in balls.items()
+        ]
+        own = {bushing.name for bushing in balls.values()}
+        self._bushings = [(b, index[b.body_a], index[b.body_b]) for b in mechanism.bushings if b.name not in own]
         self._forces = [(force, index[force.body], index[force.reaction]) for force in mechanism.forces]
         self.any = bool(self._springs or self._bushings or self._forces)
 
@@ -60,6 +73,13 @@ class AppliedLoads:
             force, moment = (load, none) if applied.kind == "force" else (none, load)
             _add(data, body, place, force, moment)
             _add(data, reaction, place, -force, -moment)
+
+    def take_springs(self, data: Any, torque: Array) -> None:
+        """Subtracts the moments of springs that ball joints have themselves from those of joints, (joints, 3) [N m]."""
+        none = np.zeros(3)
+        for number, bushing, a, b in self._balls:
+            R_a, R_b = (data.xmat[body].reshape(3, 3) for body in (a, b))
+            torque[number] -= bushing.load(R_a, R_b, none, none, none, none)[1]
 
     def _point(self, data: Any, body: int, position: Any) -> tuple[Array, Array, Array]:
         """Place [m] and velocity [m/s] of a point of a body in the world, and the body's angular velocity [rad/s]."""

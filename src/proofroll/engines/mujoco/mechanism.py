@@ -248,6 +248,7 @@ class MujocoMechanism(SteppedModel):
         for number, site in enumerate(self._sites):
             R = data.site_xmat[site].reshape(3, 3)
             force[number], torque[number] = (R @ data.sensordata[at : at + 3] for at in self._sensors[number])
+        self._loads.take_springs(data, torque)
         rows = {int(data.efc_id[row]): row for row in reversed(range(data.ne))}  # first row of each constraint
         for number, loop in enumerate(self._mechanism.loops):
             if loop.kind == JointKind.FIXED:

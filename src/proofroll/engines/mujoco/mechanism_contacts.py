@@ -14,7 +14,10 @@ from proofroll.core.errors import Refused
 from proofroll.elements.mechanism import WORLD, Mechanism, Tree
 from proofroll.elements.mechanism.contacts.geometry import BodyContact
 from proofroll.elements.mechanism.contacts.shapes import (
+    BoxShape,
+    CapsuleShape,
     CircleShape,
+    CylinderShape,
     EllipsoidShape,
     HalfSpace,
     Shape,
@@ -112,6 +115,12 @@ def _set_shape(geom: Any, shape: Shape, moves: bool) -> None:
         geom.type, geom.size = mujoco.mjtGeom.mjGEOM_SPHERE, (max(shape.radius, _VERTEX), 0.0, 0.0)
     elif isinstance(shape, EllipsoidShape):
         geom.type, geom.size, geom.quat = mujoco.mjtGeom.mjGEOM_ELLIPSOID, shape.axes, to_quaternion(shape.frame)
+    elif isinstance(shape, BoxShape):
+        geom.type, geom.size, geom.quat = mujoco.mjtGeom.mjGEOM_BOX, shape.half, to_quaternion(shape.frame)
+    elif isinstance(shape, CapsuleShape | CylinderShape):
+        kind = "CAPSULE" if isinstance(shape, CapsuleShape) else "CYLINDER"
+        geom.type, geom.size = getattr(mujoco.mjtGeom, f"mjGEOM_{kind}"), (shape.radius, shape.half, 0.0)
+        geom.quat = to_quaternion(frame_of_axis(shape.axis))
     else:
         assert isinstance(shape, CircleShape)
         geom.type, geom.size = mujoco.mjtGeom.mjGEOM_CYLINDER, (shape.radius, _FLAT * shape.radius, 0.0)

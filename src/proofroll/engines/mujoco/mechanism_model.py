@@ -18,6 +18,7 @@ from proofroll.elements.mechanism.joint_kinds import DISTANCE, WITH_QUATERNION, 
 from proofroll.elements.mechanism.loop_points import held_points
 from proofroll.elements.mechanism.rotations import to_quaternion
 from proofroll.elements.mechanism.signal import varies
+from proofroll.engines.mujoco.applied_loads import springs_of_balls
 from proofroll.engines.mujoco.mechanism_contacts import write_contacts
 from proofroll.engines.mujoco.settings import MujocoSettings
 
@@ -65,9 +66,13 @@ def write(mechanism: Mechanism, settings: MujocoSettings) -> Any:
     if not mechanism.contacts:
         option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONTACT)
     bodies, added = {WORLD: spec.worldbody}, damping_armatures(mechanism, settings)
+    springs = springs_of_balls(mechanism)
     data = {body.name: body for body in mechanism.bodies}
     for number, joint in enumerate(mechanism.joints):
         bodies[joint.child] = _add_body(spec, bodies[joint.parent], number, joint, data[joint.child], settings)
+        bushing = springs.get(joint.name)
+        if bushing is not None:
+            _set_law(spec.joint(part_names(joint)[0]), bushing.stiffness[3], joint.damping)
         for name in part_names(joint) if joint.name in added else ():
             spec.joint(name).armature += added[joint.name]
     for number, loop in enumerate(mechanism.loops):

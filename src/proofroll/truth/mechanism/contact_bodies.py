@@ -10,11 +10,15 @@ from proofroll.elements.mechanism.contacts.acting import (
     OPEN,
     Acting,
     ContactMode,
+    Features,
+    closed_in,
     direction_of,
+    features_of,
     first_mode,
     following,
     modes_of,
     slip_velocity,
+    with_features,
 )
 from proofroll.elements.mechanism.contacts.joint_laws import off_stops
 from proofroll.elements.mechanism.contacts.sequences import groups_of
@@ -57,18 +61,25 @@ class ContactBodies(ContactStretches):
     def begin(self) -> Transition[ContactMode]:
         """See the protocol."""
         state = np.append(self.equations.equations.equations.start(), 0.0)
-        closed, still = closed_and_still(self.equations.at(state).touching, np.ones(len(self.contacts)), 1.0)
+        touching = self.equations.at(state).touching
+        features = tuple(each.feature for each in touching)
+        closed, still = closed_and_still(touching, np.ones(len(self.contacts)), 1.0)
         closed = shut_by_pressing(self.contacts, closed)
-        state = self.equations.eliminated(state, modes_of(closed, still))
-        mode, margin = self._decided(state, closed, still)
+        rough = modes_of(closed, still, features)
+        state = self.equations.eliminated(state, rough)
+        mode, margin = self._decided(state, rough)
         return Transition(state, mode, (), margin)
 
-    def _decided(
-        self, state: Array, closed: Sequence[bool], still: Sequence[bool], leaving: int | None = None
-    ) -> tuple[ContactMode, float]:
+    def _decided(self, state: Array, rough: ContactMode, leaving: int | None = None) -> tuple[ContactMode, float]:
+        mode, margin = self._by_trial(state, rough, leaving)
+        return with_features(mode, features_of(rough)), margin
+
+    def _by_trial(self, state: Array, rough: ContactMode, leaving: int | None) -> tuple[ContactMode, float]:
+        """See :meth:`_decided`; the features of the mode are still to be set."""
+        closed, still = closed_in(rough), [own.kind == "stick" for own in rough]
         if not any(closed):
-            return tuple(OPEN for _ in closed), np.inf
-        bodies, ways = self.equations.at(state), off_stops(self.contacts, closed)
+            return rough, np.inf
+        bodies, ways = self.equations.at(state, features_of(rough)), off_stops(self.contacts, closed)
         still = [rests and k not in ways for k, rests in enumerate(still)]
 
         def trial(mode: ContactMode, headings: Sequence[Array | None]) -> BodiesSolution:
@@ -137,10 +148,10 @@ class ContactBodies(ContactStretches):
         return tuple(whole), max(0.0, min(margins))
 
     def _struck(
-        self, state: Array, closed: Sequence[bool], laws: Sequence[float], sideways: Sequence[float]
+        self, state: Array, rough: ContactMode, laws: Sequence[float], sideways: Sequence[float]
     ) -> tuple[Array, list[bool], float]:
-        bodies = self.equations.at(state)
-        which = np.flatnonzero(closed).tolist()
+        bodies = self.equations.at(state, features_of(rough))
+        which = np.flatnonzero(closed_in(rough)).tolist()
         ways, G = self.equations.coupled_responses(bodies, which)
         slides = np.concatenate(
             [frame_of_axis(bodies.touching[k].normal)[:, [2, 0, 1]].T @ bodies.touching[k].slide for k in which]
@@ -359,14 +370,14 @@ class ContactBodies(ContactStretches):
 
     def forces(self, state: Array, mode: ContactMode) -> tuple[Array, Array]:
         """Contact forces [N], (contacts, 3), and wrenches on the bodies about their centres of mass, (bodies, 6)."""
-        bodies = self.equations.at(self.equations.equations.normalised(state))
+        bodies = self.equations.at(self.equations.equations.normalised(state), features_of(mode))
         return self.equations.applied(bodies, self.equations.accelerated(bodies, mode).force)
 
-    def _touching(self, state: Array) -> Sequence[Touching]:
-        return self.equations.at(state).touching
+    def _touching(self, state: Array, features: Features) -> Sequence[Touching]:
+        return self.equations.at(state, features).touching
 
     def _solution(self, state: Array, mode: ContactMode) -> SolvedContacts:
-        bodies = self.equations.at(self.equations.equations.normalised(state))
+        bodies = self.equations.at(self.equations.equations.normalised(state), features_of(mode))
         solution = self.equations.accelerated(bodies, mode)
         return SolvedContacts(
             touching=bodies.touching,

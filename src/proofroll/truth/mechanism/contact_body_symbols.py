@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
-from proofroll.elements.mechanism.contacts.acting import ContactMode
+from proofroll.elements.mechanism.contacts.acting import ContactMode, Features, features_of
 from proofroll.elements.mechanism.contacts.joint_laws import JointContact
 from proofroll.elements.mechanism.contacts.turning import TurningFriction
 from proofroll.elements.mechanism.signal import Held, Table
@@ -78,7 +78,7 @@ class BodySymbols:
         ]
         numbers = [law.joint.number for law in self._laws]
         at = _Now(now.views, e.rate_rows(state[:-1], numbers, functions))
-        touching = [*self._touching(now.views, functions), *self._of_joints(state, at)]
+        touching = [*self._touching(now.views, features_of(mode), functions), *self._of_joints(state, at)]
         turns = [(friction, touching[friction.pressed_by]) for friction in self._frictions]
         touching += [of_turning(friction, touch, self._relative(friction, at)) for friction, touch in turns]
         at = at._replace(pressing=[touch for _, touch in turns])
@@ -152,13 +152,14 @@ class BodySymbols:
         rate = add(*(mul(value, u[n]) for n, value in row.coefficients.items()))
         return (row.residual if index is None else state[e.nx + e.nu + index]), rate
 
-    def _touching(self, views: Sequence[BodyInScalars], functions: Any) -> list[ScalarTouch]:
+    def _touching(self, views: Sequence[BodyInScalars], features: Features, functions: Any) -> list[ScalarTouch]:
         bodies = []
         for view, body in zip(views, [*self._bodies.mechanism.bodies, None], strict=True):
             arm = [0.0, 0.0, 0.0] if body is None else turned(view.R, floats(body.com))  # type: ignore[arg-type]
             bodies.append(ScalarMotion(minus(view.r, arm), view.R, minus(view.v, cross(view.w, arm)), view.w))
-        pairs = zip(self._bodies.mechanism.contacts, self._equations.pairs, strict=True)
-        return [touch_in_scalars(contact, bodies[a], bodies[b], functions["sqrt"]) for contact, (a, b) in pairs]
+        pairs = zip(self._bodies.mechanism.contacts, self._equations.pairs, features, strict=False)
+        root = functions["sqrt"]
+        return [touch_in_scalars(contact, bodies[a], bodies[b], root, feature) for contact, (a, b), feature in pairs]
 
     def _of_joints(self, state: Sequence[Scalar], at: _Now) -> list[ScalarTouch]:
         """Laws of joints as contacts."""

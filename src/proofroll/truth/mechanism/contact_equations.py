@@ -10,6 +10,8 @@ from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.contacts.acting import (
     EXACT,
     ContactMode,
+    Features,
+    features_of,
     forbidding_rows,
     heading_of,
     held_directions,
@@ -105,14 +107,17 @@ class ContactEquations:
         self.pairs = [(index[contact.body_a], index[contact.body_b]) for contact in mechanism.contacts]
         self._com = [np.array(body.com) for body in mechanism.bodies] + [np.zeros(3)]
         self._limited = {k: actuator for k, actuator in enumerate(mechanism.actuators) if actuator.limit is not None}
-        self._last = LastResults[bytes, BodiesState](_KEPT)
+        self._last = LastResults[tuple[bytes, Features | None], BodiesState](_KEPT)
         self._driven = [mechanism.joint_index[actuator.joint] for actuator in self._limited.values()]
 
-    def at(self, state: Array) -> BodiesState:
-        """Rows and loads of the bodies at a state: coordinates, velocities, angles, and last the time [s]."""
-        return self._last.of(state.tobytes(), lambda: self._at(state.copy()))
+    def at(self, state: Array, features: Features | None = None) -> BodiesState:
+        """Rows and loads of the bodies at a state: coordinates, velocities, angles, and last the time [s].
 
-    def _at(self, state: Array) -> BodiesState:
+        ``features``: of solids that touch; None: the nearest.
+        """
+        return self._last.of((state.tobytes(), features), lambda: self._at(state.copy(), features))
+
+    def _at(self, state: Array, features: Features | None) -> BodiesState:
         e = self.equations.equations
         constrained, C, bias, half, force = self.equations.loaded(state[:-1], float(state[-1]), self.clamped(state))
         bodies = []
@@ -120,8 +125,9 @@ class ContactEquations:
             R, v, w = (np.array(part, dtype=float) for part in (view.R, view.v, view.w))
             arm = R @ com
             bodies.append(Moving(np.array(view.r) - arm, R, v - cross(w, arm), w))
-        pairs = zip(self.mechanism.contacts, self.pairs, strict=True)
-        touching = tuple(touch(c, bodies[a], bodies[b]) for c, (a, b) in pairs)
+        given = [None] * len(self.pairs) if features is None else features[: len(self.pairs)]
+        pairs = zip(self.mechanism.contacts, self.pairs, given, strict=True)
+        touching = tuple(touch(c, bodies[a], bodies[b], feature) for c, (a, b), feature in pairs)
         J, rates = np.zeros((len(self.contacts), 3, e.nu)), np.zeros((len(self.contacts), 3))
         for k, (pair, each) in enumerate(zip(self.pairs, touching, strict=True)):
             for body, sign in zip(pair, (1.0, -1.0), strict=True):
@@ -308,7 +314,7 @@ class ContactEquations:
     def rate(self, state: Array, mode: ContactMode) -> Array:
         """Time derivative of a state in a mode."""
         e, unit = self.equations.equations, self.equations.normalised(state)
-        solution = self.accelerated(self.at(unit), mode)
+        solution = self.accelerated(self.at(unit, features_of(mode)), mode)
         x, u = state[: e.nx], unit[e.nx : e.nx + e.nu]
         angles = self.equations.loaded(unit[:-1])[0].angle_rate if e.angles else []
         return np.array([*self.equations.moving(x, u), *solution.moved, *angles, 1.0], dtype=float)
@@ -348,7 +354,8 @@ class ContactEquations:
         e = self.equations.equations
         unit = np.append(self.equations.normalised(state[:-1]), state[-1])
         state = unit if np.abs(unit - state).max() > EXACT else state
-        presses, bodies = [contact.presses for contact in self.contacts], self.at(state)
+        features = features_of(mode)
+        presses, bodies = [contact.presses for contact in self.contacts], self.at(state, features)
         closed = [k for k, own in enumerate(mode) if own.kind != "open" and presses[k]]
         gaps = np.array([bodies.touching[k].gap for k in closed])
         slides = forbidding_rows(mode, bodies.touching, bodies.J, presses) @ bodies.u
@@ -358,14 +365,14 @@ class ContactEquations:
         state = np.append(self.equations.eliminated(state[:-1]), state[-1])
         if not len(slides):
             return state
-        bodies = self.at(state)
+        bodies = self.at(state, features)
         if closed:
             normals = np.array([bodies.touching[k].normal @ bodies.J[k] for k in closed])
             gaps = np.array([bodies.touching[k].gap for k in closed])
             back = _least_motion(bodies, normals, gaps)
             state[: e.nx] -= self.equations.moving(state[: e.nx], back)
             state = self.equations.normalised(state)
-            bodies = self.at(state)
+            bodies = self.at(state, features)
         K = forbidding_rows(mode, bodies.touching, bodies.J, presses)
         state[e.nx : e.nx + e.nu] -= _least_motion(bodies, K, K @ bodies.u)
         return state

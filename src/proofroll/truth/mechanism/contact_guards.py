@@ -1,14 +1,22 @@
 """Guards that end a stretch with contacts, for both routes: values that are negative while a mode lasts."""
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Literal, NamedTuple
 
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
 from proofroll.elements.mechanism.analysis import RANK
-from proofroll.elements.mechanism.contacts.acting import FAINT, Acting, ContactMode, heading_of, slip_velocity
+from proofroll.elements.mechanism.contacts.acting import (
+    FAINT,
+    Acting,
+    ContactMode,
+    Features,
+    features_of,
+    heading_of,
+    slip_velocity,
+)
 from proofroll.elements.mechanism.contacts.geometry import BodyContact
 from proofroll.elements.mechanism.contacts.joint_laws import JointContact, off_stops
 from proofroll.elements.mechanism.contacts.touching import FLAT, Touching
@@ -29,6 +37,9 @@ TURNED = 0.5  # cosine of the angle by which a line may turn in a stretch
 # Speed, in natural units, by which slips may differ that share a load: round-off leaves 4e-15 of parallel ones.
 SHARED = 1e-11
 _TOGETHER = 1e-13  # relative to the mechanism's size: gaps of contacts of a face that bounces, by round-off
+# Borders between features of solids that are passed at one instant at most, and length, relative to the mechanism's
+# size, by which features are left and still the nearest: round-off.
+_MOST_BORDERS, _ON_BORDER = 4, 1e-13
 _DIGITS = 1e-14  # relative to the mechanism's size: round-off of a gap that has just opened
 
 
@@ -42,12 +53,15 @@ class ContactGuard(NamedTuple):
         contact: index of the contact; -1: all contacts.
         kind: ``close``: a gap closes; ``lift``: a normal force reaches zero; ``still``: a slip stops; ``break``: the
             friction of a sticking contact reaches its bound; ``turn``: its line has turned so far that its sense has
-            to be taken anew; ``flat``: a disc lies flat; ``tear``: Painlevé's measure reaches zero; ``share``: the
-            motion begins to depend on how contacts share a load.
+            to be taken anew; ``flat``: a disc lies flat, or capsules touch along a line; ``tear``: Painlevé's measure
+            reaches zero; ``share``: the motion begins to depend on how contacts share a load; ``pass``: the nearest
+            features of solids are left.
+        border: number of the border by which features are left.
     """
 
     contact: int
-    kind: Literal["close", "lift", "still", "break", "turn", "flat", "tear", "share"]
+    kind: Literal["close", "lift", "still", "break", "turn", "flat", "tear", "share", "pass"]
+    border: int = 0
 
 
 class SolvedContacts(NamedTuple):
@@ -82,6 +96,10 @@ def guards_of(contacts: Sequence[Touchable], mode: ContactMode) -> list[ContactG
     guards: list[ContactGuard] = []
     on_stops = off_stops(contacts, [own.kind != "open" for own in mode])
     for k, (contact, own) in enumerate(zip(contacts, mode, strict=True)):
+        features = contact.features if isinstance(contact, BodyContact) else None
+        if features is not None:
+            borders = features.borders(own.feature, 0.0, 0.0, 0.0)
+            guards += [ContactGuard(k, "pass", number) for number in range(len(borders))]
         if own.kind == "open":
             if contact.pressed_by is None:
                 guards.append(ContactGuard(k, "close"))
@@ -92,7 +110,8 @@ def guards_of(contacts: Sequence[Touchable], mode: ContactMode) -> list[ContactG
             guards.append(ContactGuard(k, "still" if own.kind == "slip" else "break"))
         if own.along is not None and contact.friction:  # a joint that rubs has none, and its line never turns
             guards.append(ContactGuard(k, "turn"))
-        if isinstance(contact, BodyContact) and contact.of_disc:
+        parallel = features is not None and features.needs_angle(own.feature)
+        if parallel or (isinstance(contact, BodyContact) and contact.of_disc):
             guards.append(ContactGuard(k, "flat"))
     if any(own.kind == "slip" and contact.friction for contact, own in zip(contacts, mode, strict=True)):
         guards.append(ContactGuard(-1, "tear"))
@@ -116,8 +135,9 @@ def guard_value(
     if guard.contact < 0:
         return LEAST_RESPONSE - solved.response if guard.kind == "tear" else _undecided(contacts, solved)
     own, touch = solved.mode[guard.contact], solved.touching[guard.contact]
-    if guard.kind in {"close", "flat"}:
-        return -float(touch.gap) if guard.kind == "close" else FLAT - touch.tilt
+    if guard.kind in {"close", "flat", "pass"}:
+        left = touch.borders[guard.border].left_by if guard.kind == "pass" else 0.0
+        return {"close": -float(touch.gap), "flat": FLAT - touch.tilt, "pass": float(left)}[guard.kind]
     if guard.kind == "turn":
         began = mode[guard.contact].along
         assert began is not None  # a contact without a line
@@ -128,6 +148,35 @@ def guard_value(
     if guard.kind == "lift":
         return -float(normals[guard.contact])
     return _beyond_its_bound(guard.contact, contacts, solved)
+
+
+def features_beyond(
+    mode: ContactMode,
+    k: int,
+    border: int,
+    touching: Callable[[Array, Features], Sequence[Touching]],
+    state: Array,
+    size: float,
+) -> Features:
+    """Nearest features of all contacts after those of the contact ``k`` are left by a border.
+
+    Args:
+        mode: before.
+        k: number of the contact.
+        border: number of its border.
+        touching: contacts at a state with given features.
+        state: at the border.
+        size: of the mechanism.
+    """
+    found = list(features_of(mode))
+    borders = touching(state, tuple(found))[k].borders
+    for _ in range(_MOST_BORDERS):
+        found[k] = borders[border].beyond
+        borders = touching(state, tuple(found))[k].borders
+        border = int(np.argmax([each.left_by for each in borders]))
+        if borders[border].left_by <= size * _ON_BORDER:
+            break
+    return tuple(found)
 
 
 def _beyond_its_bound(k: int, contacts: Sequence[Touchable], solved: SolvedContacts) -> float:
@@ -284,8 +333,8 @@ def striking(mode: ContactMode, touching: Sequence[Touching], hit: int, time: fl
 
 
 def noise_of(guards: Sequence[ContactGuard], size: float) -> FloatArray:
-    """Round-off of the guards: a gap that just opened and a slip that just began are still zero."""
-    return np.array([_DIGITS * size if guard.kind in {"close", "still"} else 0.0 for guard in guards])
+    """Round-off of the guards: a gap that just opened, a slip that just began, a border just passed are still zero."""
+    return np.array([_DIGITS * size if guard.kind in {"close", "still", "pass"} else 0.0 for guard in guards])
 
 
 def faint_time(touch: Touching, slide_rate: Array) -> float:

@@ -6,18 +6,20 @@ It repeats :mod:`proofroll.elements.mechanism.contacts.touching` for symbols, fr
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
+from proofroll.elements.mechanism.contacts.features import Border, CapsuleFeatures, SolidFeatures
 from proofroll.elements.mechanism.contacts.geometry import BodyContact
 from proofroll.elements.mechanism.contacts.shapes import (
     CircleShape,
     ConvexShape,
     EllipsoidShape,
     HalfSpace,
+    Shape,
     SphereShape,
     Wall,
 )
-from proofroll.elements.mechanism.contacts.walls import CurvedWall
+from proofroll.elements.mechanism.contacts.walls import CurvedWall, Shaft
 from proofroll.elements.mechanism.rotations import Array
-from proofroll.truth.scalars import Scalar, cross, dot, minus, plus, product, scaled, sub, turned, turned_back
+from proofroll.truth.scalars import Scalar, add, cross, dot, minus, mul, plus, product, scaled, sub, turned, turned_back
 
 # Square of a sine far below that of a flat disc (touching.FLAT): a disc exactly flat in flight has numbers.
 _LEAST = 1e-32
@@ -49,16 +51,54 @@ class ScalarTouch(NamedTuple):
     place_rate: Vector
     slide: Vector
     tilt: Scalar = 1.0
+    borders: Sequence[Border] = ()
 
     def across(self, vector: Vector) -> list[Scalar]:
         """Part of a vector along the surfaces."""
         return minus(vector, scaled(dot(self.normal, vector), self.normal))
 
 
-def touch_in_scalars(contact: BodyContact, a: ScalarMotion, b: ScalarMotion, root: Root) -> ScalarTouch:
-    """Contact at given motions of its bodies; ``root``: square root for the scalars."""
-    one, two = contact.shape_a, contact.shape_b
-    if isinstance(two, Wall):
+def touch_in_scalars(
+    contact: BodyContact, a: ScalarMotion, b: ScalarMotion, root: Root, feature: int = 0
+) -> ScalarTouch:
+    """Contact at given motions of its bodies; ``root``: square root for the scalars; ``feature``: of solids."""
+    features = contact.features
+    if features is None:
+        found = _touch(contact.shape_a, a, contact.shape_b, b, root)
+        for disc, of in ((contact.shape_a, a), (contact.shape_b, b)):
+            if isinstance(disc, CircleShape):
+                leaning = cross(turned(of.R, floats(disc.normal)), found.normal)
+                found = found._replace(tilt=root(dot(leaning, leaning)))
+        return found
+    *measures, tilt = _measures(features, a, b, root)
+    one, two = features.shapes(feature)
+    found = _touch(one, a, two, b, root)
+    if isinstance(one, Wall) and not isinstance(two, Wall):
+        place = plus(found.place, scaled(found.gap, found.normal))
+        rate = plus(found.place_rate, scaled(dot(found.normal, found.slide), found.normal))
+        rate = plus(rate, scaled(found.gap, found.normal_rate))
+        found = found._replace(place=place, place_rate=rate, slide=minus(a.velocity(place), b.velocity(place)))
+    tilt = tilt if features.needs_angle(feature) else 1.0
+    return found._replace(tilt=tilt, borders=features.borders(feature, *measures))
+
+
+def _measures(features: SolidFeatures, a: ScalarMotion, b: ScalarMotion, root: Root) -> tuple[Scalar, ...]:
+    """Measures of two solids, and the sine of the angle between two capsules, or 1."""
+    of_a, of_b = features.centres
+    apart = minus(plus(a.p, turned(a.R, floats(of_a))), plus(b.p, turned(b.R, floats(of_b))))
+    if isinstance(features, CapsuleFeatures):
+        u, w = turned(a.R, floats(features.first.axis)), turned(b.R, floats(features.second.axis))
+        across = cross(u, w)
+        return dot(apart, u), dot(apart, w), dot(u, w), root(dot(across, across) + _LEAST)
+    R, apart = (b.R, apart) if features.ball_first else (a.R, scaled(-1.0, apart))
+    return *turned_back(product(R, [floats(row) for row in features.axes]), apart), 1.0
+
+
+def _touch(one: Shape, a: ScalarMotion, two: Shape, b: ScalarMotion, root: Root) -> ScalarTouch:
+    """Contact of two shapes with one rule."""
+    if isinstance(one, Shaft) and isinstance(two, Shaft):
+        gap, n, n_rate, place, rate = _two_shafts(one, a, two, b, root)
+    elif isinstance(two, Wall):
         assert not isinstance(one, Wall)  # two walls are no contact
         gap, n, n_rate, place, rate = _on_wall(one, a, two, b, root)
     elif isinstance(one, Wall):
@@ -68,11 +108,6 @@ def touch_in_scalars(contact: BodyContact, a: ScalarMotion, b: ScalarMotion, roo
         assert isinstance(one, SphereShape)
         assert isinstance(two, SphereShape)
         gap, n, n_rate, place, rate = _two_spheres(one, a, two, b, root)
-    tilt: Scalar = 1.0
-    for disc, of in ((one, a), (two, b)):
-        if isinstance(disc, CircleShape):
-            leaning = cross(turned(of.R, floats(disc.normal)), n)
-            tilt = root(dot(leaning, leaning))
     return ScalarTouch(
         gap=gap,
         normal=n,
@@ -80,7 +115,6 @@ def touch_in_scalars(contact: BodyContact, a: ScalarMotion, b: ScalarMotion, roo
         place=place,
         place_rate=rate,
         slide=minus(a.velocity(place), b.velocity(place)),
-        tilt=tilt,
     )
 
 
@@ -160,7 +194,30 @@ def _two_spheres(one: SphereShape, a: ScalarMotion, two: SphereShape, b: ScalarM
     return sub(distance, one.radius + two.radius), n, n_rate, place, rate
 
 
+def _two_shafts(one: Shaft, a: ScalarMotion, two: Shaft, b: ScalarMotion, root: Root) -> _Lying:
+    u, w = turned(a.R, floats(one.axis)), turned(b.R, floats(two.axis))
+    u_rate, w_rate = cross(a.w, u), cross(b.w, w)
+    foot_a = plus(a.p, turned(a.R, floats(one.point)))
+    foot_b = plus(b.p, turned(b.R, floats(two.point)))
+    d, d_rate = minus(foot_a, foot_b), minus(a.velocity(foot_a), b.velocity(foot_b))
+    across, across_rate = cross(u, w), plus(cross(u_rate, w), cross(u, w_rate))
+    square, apart = dot(across, across), dot(d, across)
+    factor = apart / (root(mul(apart, apart)) * root(square))  # the sign of ``apart``
+    n, n_rate = scaled(factor, across), scaled(factor, across_rate)
+    n_rate = minus(n_rate, scaled(dot(n, n_rate), n))
+    cosine, cosine_rate = dot(u, w), add(dot(u_rate, w), dot(u, w_rate))
+    along_a, along_b = dot(d, u), dot(d, w)
+    rate_a, rate_b = add(dot(d_rate, u), dot(d, u_rate)), add(dot(d_rate, w), dot(d, w_rate))
+    s = sub(mul(cosine, along_b), along_a) / square
+    turning = mul(2.0, mul(s, mul(cosine, cosine_rate)))
+    s_rate = add(sub(add(mul(cosine_rate, along_b), mul(cosine, rate_b)), rate_a), turning) / square
+    place = minus(plus(foot_a, scaled(s, u)), scaled(one.radius, n))
+    rate = plus(plus(a.velocity(foot_a), scaled(s_rate, u)), scaled(s, u_rate))
+    return sub(dot(n, d), one.radius + two.radius), n, n_rate, place, minus(rate, scaled(one.radius, n_rate))
+
+
 def known_shapes(contact: BodyContact) -> bool:
     """True if both shapes have a rule here."""
     rules = SphereShape | EllipsoidShape | CircleShape | HalfSpace | CurvedWall
-    return isinstance(contact.shape_a, rules) and isinstance(contact.shape_b, rules)
+    simple = isinstance(contact.shape_a, rules) and isinstance(contact.shape_b, rules)
+    return simple or contact.features is not None

@@ -19,12 +19,15 @@ from proofroll.core.last_results import LastResults
 from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.contacts.acting import (
     FAINT,
-    Acting,
     ContactMode,
+    Features,
     changes,
+    closed_in,
+    features_of,
     headed,
     modes_of,
     slip_velocity,
+    with_features,
 )
 from proofroll.elements.mechanism.contacts.joint_laws import rebounding
 from proofroll.elements.mechanism.contacts.touching import Touching, lying, torn
@@ -40,6 +43,7 @@ from proofroll.truth.mechanism.contact_guards import (
     SolvedContacts,
     Touchable,
     faint_time,
+    features_beyond,
     guard_value,
     guards_of,
     leaves,
@@ -47,11 +51,10 @@ from proofroll.truth.mechanism.contact_guards import (
     pressing,
     sharing,
     striking,
-    whole_grip,
 )
 from proofroll.truth.mechanism.contact_taylor import CompiledMode, CompiledModes, CompiledStretch, ModeSymbols
 from proofroll.truth.mechanism.followed_paths import CLOSE
-from proofroll.truth.mechanism.planar_slip import BegunSlip, begun_slip, leading
+from proofroll.truth.mechanism.planar_slip import BegunSlip, begun_slip, leaving_slips
 from proofroll.truth.mechanism.stretches import Stretches
 from proofroll.truth.picard import PicardSteps
 
@@ -118,29 +121,24 @@ class ContactStretches(Stretches[ContactMode]):
         """Motion and forces at a state."""
 
     @abstractmethod
-    def _touching(self, state: Array) -> Sequence[Touching]:
-        """Geometry and sliding velocity of each contact at a state."""
+    def _touching(self, state: Array, features: Features) -> Sequence[Touching]:
+        """Geometry and sliding velocity of each contact at a state; ``features``: of solids that touch."""
 
     @abstractmethod
-    def _decided(
-        self, state: Array, closed: Sequence[bool], still: Sequence[bool], leaving: int | None = None
-    ) -> tuple[ContactMode, float]:
+    def _decided(self, state: Array, rough: ContactMode, leaving: int | None = None) -> tuple[ContactMode, float]:
         """Mode that follows from the forces, and its relative margin from another mode.
 
-        ``leaving``: contact that static friction no longer holds.
+        ``rough``: what is open, moves or stands; ``leaving``: contact that static friction no longer holds.
         """
 
     @abstractmethod
     def _struck(
-        self, state: Array, closed: Sequence[bool], laws: Sequence[float], sideways: Sequence[float]
+        self, state: Array, rough: ContactMode, laws: Sequence[float], sideways: Sequence[float]
     ) -> tuple[Array, list[bool], float]:
         """State after an impact, contacts that stay closed, and the relative margin from another outcome.
 
-        Args:
-            state: before the impact.
-            closed: contacts that may take impulses.
-            laws: restitution of each contact in this impact.
-            sideways: tangential restitution of each.
+        Contacts that are not open in ``rough`` may take impulses; ``laws``, ``sideways``: normal and tangential
+        restitution of each contact in this impact.
         """
 
     def _law(self, state: Array, mode: ContactMode) -> StretchLaw:
@@ -177,7 +175,7 @@ class ContactStretches(Stretches[ContactMode]):
         stretch = self._walked(begun, start, mode, until)
         end, last = stretch.end, stretch.last
         if stretch.guard is not None and stretch.guard < len(guards):
-            k, kind = guards[stretch.guard]
+            k, kind, _ = guards[stretch.guard]
             if kind == "still":
                 last = self._spent(last, mode, k, stretch)
                 end += float(last[-1] - stretch.last[-1])
@@ -249,7 +247,7 @@ class ContactStretches(Stretches[ContactMode]):
             return state
 
         def one(y: Array) -> tuple[float, Array]:
-            touching = self._touching(y)
+            touching = self._touching(y, features_of(mode))
             now = tuple(headed(own, each) for own, each in zip(mode, touching, strict=True))
             change = faint_time(touching[k], self._solved(y, now).slide_rate[k]) * self._equations.rate(y, now)
             return float(np.linalg.norm(slip_velocity(touching[k]))), change
@@ -281,21 +279,21 @@ class ContactStretches(Stretches[ContactMode]):
         guards = guards_of(self.contacts, stretch.mode)
         if stretch.guard is None or stretch.guard >= len(guards):  # a break of the rates, an effort, a slip begun
             return Transition(stretch.last, stretch.mode, ())
-        k, kind = guards[stretch.guard]
-        name = self.contacts[k].name
+        k, kind, border = guards[stretch.guard]
         if kind == "tear":
             slipping = zip(self.contacts, stretch.mode, strict=True)
             raise torn(next(c.name for c, own in slipping if own.kind == "slip" and c.friction), stretch.end)
         if kind == "flat":
-            raise lying(name, stretch.end)
+            raise lying(self._equations.mechanism.contacts[k], stretch.end)
         solved = self._solved(stretch.last, stretch.mode)
-        if kind == "turn":
-            return Transition(stretch.last, solved.mode, ())
+        if kind in {"turn", "pass"}:
+            return Transition(stretch.last, solved.mode, ()) if kind == "turn" else self._passed(stretch, k, border)
         if kind == "share" or (kind == "lift" and k in sharing(solved.splits)):
             # No split of the load is left, or each moves another way.
             return Transition(stretch.last, None, (), margin=0.0)
         if kind == "lift" or (kind == "break" and leaves(self.contacts[k], k, solved)):
-            return Transition(stretch.last, opened(self.contacts, stretch.mode, k), ((EventKind.LIFT_OFF, name),))
+            lifted = EventKind.LIFT_OFF, self.contacts[k].name
+            return Transition(stretch.last, opened(self.contacts, stretch.mode, k), (lifted,))
         if kind == "break":
             return self._broken(stretch, k)
         return self._stopped(stretch) if kind == "still" else self._impact(stretch, k)
@@ -305,30 +303,23 @@ class ContactStretches(Stretches[ContactMode]):
         contacts, mode = self.contacts, list(stretch.mode)
         if contacts[k].static > contacts[k].friction:
             return self._after(stretch, stretch.last, [own.kind != "open" for own in mode], (), leaving=k)
-        leaving = self._leaving(stretch.last, stretch.mode, k)
+        leaving = leaving_slips(contacts, stretch.mode, self._solved(stretch.last, stretch.mode), k)
         for number, own in leaving.items():
             mode[number] = own
         return Transition(stretch.last, tuple(mode), tuple((EventKind.SLIP, contacts[k].name) for k in leaving))
 
-    def _leaving(self, state: Array, mode: ContactMode, k: int) -> dict[int, Acting]:
-        """Slip that starts at the bound of friction, opposite to the friction that held, of each contact that slips."""
-        solved = self._solved(state, mode)
-        whole = whole_grip(self.contacts, solved, k)
-        slipping, held = ([k], solved.force[k]) if whole is None else (whole.contacts, whole.friction)
-        found = {}
-        for number in slipping:
-            line = solved.mode[number].along
-            if line is None:
-                found[number] = leading(mode[number], solved.touching[number].normal, held)
-                continue
-            sign = -1.0 if np.dot(line, held) > 0 else 1.0
-            x, y, z = (sign * component for component in line)
-            found[number] = Acting("slip", (x, y, z), (x, y, z))
-        return found
+    def _passed(self, stretch: Stretch[ContactMode], k: int, border: int) -> Transition[ContactMode]:
+        """Transition where the nearest features of solids are left by a border: rates of normals jump, slips go on."""
+        features = features_beyond(stretch.mode, k, border, self._touching, stretch.last, self._size)
+        if stretch.mode[k].kind == "open":
+            return Transition(stretch.last, with_features(stretch.mode, features), ())
+        after = self._after(stretch, stretch.last, closed_in(stretch.mode), (), features=features)
+        return replace(after, happenings=tuple(item for item in after.happenings if item[0] != EventKind.TURN))
 
     def _impact(self, stretch: Stretch[ContactMode], hit: int) -> Transition[ContactMode]:
         """Transition at an impact."""
-        contacts, touching, law = self.contacts, self._touching(stretch.last), self.contacts[hit].restitution
+        contacts, law, features = self.contacts, self.contacts[hit].restitution, features_of(stretch.mode)
+        touching = self._touching(stretch.last, features)
         hits = striking(stretch.mode, touching, hit, stretch.end, self._size)
         # dry friction of joints and of turning gives no impulse
         closed = [
@@ -338,12 +329,13 @@ class ContactStretches(Stretches[ContactMode]):
         laws = [contact.restitution if k in hits else 0.0 for k, contact in enumerate(contacts)]
         sideways = [contact.tangential_restitution if k in hits else 0.0 for k, contact in enumerate(contacts)]
         speed, delay = -float(touching[hit].normal @ touching[hit].slide), 0.0
-        state, stays, margin = self._struck(stretch.last, closed, laws, sideways)
+        rough = modes_of(closed, closed, features)
+        state, stays, margin = self._struck(stretch.last, rough, laws, sideways)
         if self._settles(hit, speed, law):
             modes, normal = (rebounding(contacts, stretch.mode, hit), stretch.mode), touching[hit].normal
             pull, falling = (-float(normal @ self._solved(state, mode).slide_rate[hit]) for mode in modes)
             delay = self._bouncing(self.contacts[hit].name, speed * law, pull, law, max(falling, 0.0))
-            state, stays, margin = self._struck(stretch.last, closed, [0.0] * len(closed), [0.0] * len(closed))
+            state, stays, margin = self._struck(stretch.last, rough, [0.0] * len(closed), [0.0] * len(closed))
         stays = [stay or bool(contact.bound) for stay, contact in zip(stays, contacts, strict=True)]
         settled = [bool(delay) and contacts[k].pair == contacts[hit].pair for k in hits]
         kinds = (EventKind.SETTLE if over else EventKind.IMPACT for over in settled)
@@ -355,7 +347,7 @@ class ContactStretches(Stretches[ContactMode]):
 
         Bodies that turn while they slide stop all their slips at once: then all slips below FAINT count as stopped.
         """
-        closed, solved = [own.kind != "open" for own in stretch.mode], self._solved(stretch.last, stretch.mode)
+        closed, solved = closed_in(stretch.mode), self._solved(stretch.last, stretch.mode)
         slides = [k for k, own in enumerate(stretch.mode) if own.kind == "slip"]
         slips = np.linalg.norm([slip_velocity(solved.touching[k]) for k in slides], axis=1)
         if slips.max() <= FAINT:
@@ -374,15 +366,21 @@ class ContactStretches(Stretches[ContactMode]):
         delay: float = 0.0,
         stopped: float = SLIP_ENDED,
         leaving: int | None = None,
+        features: Features | None = None,
     ) -> Transition[ContactMode]:
-        """Transition to the mode that follows from the forces; contacts not faster than ``stopped`` are at rest."""
-        closed = shut_by_pressing(self.contacts, closed)
-        slips = [float(np.linalg.norm(slip_velocity(each))) for each in self._touching(state)]
+        """Transition to the mode that follows from the forces; contacts not faster than ``stopped`` are at rest.
+
+        ``features``: of solids that touch from now on; None: the same.
+        """
+        closed, before = shut_by_pressing(self.contacts, closed), features_of(stretch.mode)
+        features = before if features is None else features
+        slips = [float(np.linalg.norm(slip_velocity(each))) for each in self._touching(state, features)]
         still = [shut and slip <= stopped for shut, slip in zip(closed, slips, strict=True)]
-        state = self._equations.eliminated(state, modes_of(closed, still))
-        mode, sure = self._decided(state, closed, still, leaving)
+        rough = modes_of(closed, still, features)
+        state = self._equations.eliminated(state, rough)
+        mode, sure = self._decided(state, rough, leaving)
         # A slip in the plane may have turned since it began: its sense is that of the last step.
-        sliding = self._touching(stretch.visited[-1][1] if stretch.visited else stretch.first)
+        sliding = self._touching(stretch.visited[-1][1] if stretch.visited else stretch.first, before)
         was = tuple(
             own._replace(along=own.along or headed(own, each).heading)
             for own, each in zip(stretch.mode, sliding, strict=True)

@@ -123,6 +123,8 @@ def guard_symbols(
     def value(guard: ContactGuard) -> Scalar:
         k = guard.contact
         touch, line, force = solved.touching[k], solved.lines[k], solved.forces[k]
+        if guard.kind == "pass":
+            return touch.borders[guard.border].left_by
         if guard.kind == "turn":
             start = began[k]
             assert line is not None

@@ -119,7 +119,7 @@ class CompiledModes:
         self._symbols, self._contacts, self._length = symbols, contacts, length
         self._by_collocation = by_collocation
         self._covers = heyoka is not None and symbols.covers
-        self._modes: dict[tuple[tuple[int, ...], tuple[tuple[str, bool], ...]], CompiledMode] = {}
+        self._modes: dict[tuple[tuple[int, ...], tuple[tuple[str, bool, int], ...]], CompiledMode] = {}
 
     def of(self, mode: ContactMode, clamped: tuple[int, ...]) -> CompiledMode | None:
         """Compiled mode, by the signs of efforts at their limits.
@@ -128,7 +128,7 @@ class CompiledModes:
         """
         if not self._covers or not follows(mode, self._contacts):
             return None
-        key = clamped, tuple((own.kind, own.along is not None) for own in mode)
+        key = clamped, tuple((own.kind, own.along is not None, own.feature) for own in mode)
         if key not in self._modes:
             self._modes[key] = CompiledMode(
                 self._symbols, self._contacts, mode, clamped, self._length, self._by_collocation

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from proofroll.elements.mechanism.contacts.acting import ContactMode
+from proofroll.elements.mechanism.contacts.acting import ContactMode, Features, closed_in, features_of
 from proofroll.elements.mechanism.contacts.dynamics import ContactDynamics
 from proofroll.elements.mechanism.contacts.states import ContactSolution
 from proofroll.elements.mechanism.contacts.touching import Touching
@@ -38,12 +38,13 @@ class ContactTree(ContactStretches):
         return Transition(state, mode, (), margin)
 
     def _struck(
-        self, state: Array, closed: Sequence[bool], laws: Sequence[float], sideways: Sequence[float]
+        self, state: Array, rough: ContactMode, laws: Sequence[float], sideways: Sequence[float]
     ) -> tuple[Array, list[bool], float]:
-        (q, v, time), which = self.dynamics.parts(state), np.flatnonzero(closed).tolist()
+        (q, v, time), features, closed = self.dynamics.parts(state), features_of(rough), closed_in(rough)
+        which = np.flatnonzero(closed).tolist()
         normal, tangential = (np.array([law[k] for k in which]) for law in (laws, sideways))
-        after, impulse, margin = self.dynamics.struck(q, v, which, normal, time, tangential)
-        stays, touching = list(closed), self.dynamics.at(q, after, time).touching
+        after, impulse, margin = self.dynamics.struck(q, v, which, normal, time, tangential, features)
+        stays, touching = list(closed), self.dynamics.at(q, after, time, features).touching
         for pressed, k in zip(impulse[:, 0] > 0, which, strict=True):
             leaves = float(touching[k].normal @ touching[k].slide) > SLIP_ENDED
             stays[k] = not laws[k] if pressed else not leaves
@@ -53,8 +54,8 @@ class ContactTree(ContactStretches):
         q, v, time = self.dynamics.parts(state)
         return self.dynamics.solve(q, v, mode, time)
 
-    def _touching(self, state: Array) -> Sequence[Touching]:
-        return self.dynamics.at(*self.dynamics.parts(state)).touching
+    def _touching(self, state: Array, features: Features) -> Sequence[Touching]:
+        return self.dynamics.at(*self.dynamics.parts(state), features).touching
 
     def _solution(self, state: Array, mode: ContactMode) -> SolvedContacts:
         solution, v = self._forces(state, mode), self.dynamics.parts(state)[1]
@@ -71,8 +72,6 @@ class ContactTree(ContactStretches):
             shifts=solution.shifts,
         )
 
-    def _decided(
-        self, state: Array, closed: Sequence[bool], still: Sequence[bool], leaving: int | None = None
-    ) -> tuple[ContactMode, float]:
+    def _decided(self, state: Array, rough: ContactMode, leaving: int | None = None) -> tuple[ContactMode, float]:
         q, v, time = self.dynamics.parts(state)
-        return self.dynamics.decided(q, v, closed, still, time, leaving)
+        return self.dynamics.decided(q, v, rough, time, leaving)

@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from proofroll.elements.mechanism import Mechanism
-from proofroll.elements.mechanism.contacts.acting import ContactMode
+from proofroll.elements.mechanism.contacts.acting import ContactMode, Features, features_of
 from proofroll.elements.mechanism.contacts.dynamics import ContactDynamics
 from proofroll.elements.mechanism.contacts.joint_laws import JointContact
 from proofroll.elements.mechanism.contacts.turning import TurningFriction
@@ -82,7 +82,7 @@ class TreeSymbols:
         q, v = state[: m.nq], state[m.nq : -1]
         bodies, rates = _tree(m, q, v, functions)
         mass, load, limits = self._inertial(bodies, q, v, state[-1], clamped, functions)
-        touching, slides = self._contacts(bodies, q, v, functions["sqrt"])
+        touching, slides = self._contacts(bodies, q, v, functions["sqrt"], features_of(mode))
         for k, start in enumerate(began[len(m.contacts) :], len(m.contacts)):
             bound = float(self._dynamics.contacts[k].bound)
             if start is not None and mode[k].kind == "slip" and bound:  # dry friction, which is as large as it can be
@@ -146,13 +146,14 @@ class TreeSymbols:
         q: Sequence[Scalar],
         v: Sequence[Scalar],
         root: Callable[[Scalar], Scalar],
+        features: Features,
     ) -> tuple[list[ScalarTouch], list[tuple[dict[int, Vector], Vector]]]:
         """All contacts, and of each slide the derivative by the velocities and the rate at v̇ = 0."""
         m = self._mechanism
         motions = [ScalarMotion(body.p, body.R, turned(body.R, body.v), turned(body.R, body.w)) for body in bodies]
         touching = [
-            touch_in_scalars(contact, motions[a], motions[b], root)
-            for contact, (a, b) in zip(m.contacts, self._pairs, strict=True)
+            touch_in_scalars(contact, motions[a], motions[b], root, feature)
+            for contact, (a, b), feature in zip(m.contacts, self._pairs, features, strict=False)
         ]
         slides: list[tuple[dict[int, Vector], Vector]] = [
             _slide(touch, [(bodies[a], motions[a], 1.0), (bodies[b], motions[b], -1.0)])

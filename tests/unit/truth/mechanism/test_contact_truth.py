@@ -22,6 +22,7 @@ from proofroll.core.truth import truth
 from proofroll.elements.ball_on_surface.element import scene_with
 from proofroll.elements.mechanism import Body, Joint, Mechanism, Spring, switches
 from proofroll.elements.mechanism.contacts import coulomb
+from proofroll.elements.mechanism.contacts.acting import modes_of
 from proofroll.elements.mechanism.contacts.geometry import Geometry, Pair
 from proofroll.elements.mechanism.drives import Actuator
 from proofroll.elements.mechanism.element import MechanismElement
@@ -865,7 +866,8 @@ def test_an_impact_on_one_edge_of_a_face_opens_the_other() -> None:
     state = np.append(equations.equations.equations.start(), 0.0)
     closed = [each.gap < 1e-9 for each in equations.at(state).touching]
     assert sum(closed) == 4
-    _, stays, _ = bodies._struck(state, closed, [0.0] * 8, [0.0] * 8)
+    rough = modes_of(closed, closed, (0,) * 8)
+    _, stays, _ = bodies._struck(state, rough, [0.0] * 8, [0.0] * 8)
     assert sum(stays) == 2
 
 

@@ -27,21 +27,39 @@ class Acting(NamedTuple):
             its sense too.
         heading: initial direction of a slip that begins from rest.
         leads: True if friction acts against ``heading`` whatever the slip is, which has just begun.
+        feature: number of the features that are nearest; 0 of shapes that have one only.
     """
 
     kind: Literal["open", "slip", "stick"]
     along: Direction | None = None
     heading: Direction | None = None
     leads: bool = False
+    feature: int = 0
 
 
 ContactMode = tuple[Acting, ...]
+Features = tuple[int, ...]
 OPEN = Acting("open")
 
 
-def kinds(mode: ContactMode) -> tuple[str, ...]:
-    """Kind of each contact's mode, without directions."""
-    return tuple(own.kind for own in mode)
+def kinds(mode: ContactMode) -> tuple[tuple[str, int], ...]:
+    """Kind and nearest features of each contact's mode, without directions."""
+    return tuple((own.kind, own.feature) for own in mode)
+
+
+def features_of(mode: ContactMode) -> Features:
+    """Number of the nearest features of each contact."""
+    return tuple(own.feature for own in mode)
+
+
+def closed_in(mode: ContactMode) -> list[bool]:
+    """True for each contact that is not open."""
+    return [own.kind != "open" for own in mode]
+
+
+def with_features(mode: ContactMode, features: Features) -> ContactMode:
+    """The mode with other nearest features."""
+    return tuple(own._replace(feature=feature) for own, feature in zip(mode, features, strict=True))
 
 
 def slip_velocity(found: Touching) -> Array:
@@ -205,8 +223,9 @@ def headed(own: Acting, touch: Touching) -> Acting:
     return own._replace(heading=(x, y, z))
 
 
-def modes_of(closed: Sequence[bool], still: Sequence[bool]) -> ContactMode:
+def modes_of(closed: Sequence[bool], still: Sequence[bool], features: Features) -> ContactMode:
     """Modes of contacts: stick if closed and still, slip if only closed, else open."""
     return tuple(
-        Acting("stick" if stands else "slip" if shut else "open") for shut, stands in zip(closed, still, strict=True)
+        Acting("open" if not shut else "stick" if stands else "slip", feature=feature)
+        for shut, stands, feature in zip(closed, still, features, strict=True)
     )

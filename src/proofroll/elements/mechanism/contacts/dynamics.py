@@ -15,11 +15,16 @@ from proofroll.elements.mechanism.contacts.acting import (
     OPEN,
     Acting,
     ContactMode,
+    Features,
+    closed_in,
+    features_of,
     first_mode,
     forbidding_rows,
     heading_of,
     held_directions,
+    modes_of,
     turned,
+    with_features,
 )
 from proofroll.elements.mechanism.contacts.coulomb import contact_forces, least_motion_for, returning, robust_forces
 from proofroll.elements.mechanism.contacts.geometry import BodyContact, pair_sums
@@ -71,18 +76,22 @@ class ContactDynamics:
         self.sums = np.pad(pair_sums(mechanism.contacts), ((0, 0), (0, others)))
         index = mechanism.body_index
         self._bodies = [(index[contact.body_a], index[contact.body_b]) for contact in mechanism.contacts]
-        self._last = LastResults[tuple[bytes, bytes, float], ContactsNow](4)
+        self._last = LastResults[tuple[bytes, bytes, float, Features | None], ContactsNow](4)
 
-    def at(self, q: Array, v: Array, time: float = 0.0) -> ContactsNow:
-        """Kinematics and free accelerations for coordinates (nq) and velocities (nv) at a time [s]."""
-        return self._last.of((q.tobytes(), v.tobytes(), time), lambda: self._at(q.copy(), v.copy(), time))
+    def at(self, q: Array, v: Array, time: float = 0.0, features: Features | None = None) -> ContactsNow:
+        """Kinematics and free accelerations for coordinates (nq) and velocities (nv) at a time [s].
 
-    def _at(self, q: Array, v: Array, time: float) -> ContactsNow:
+        ``features``: of solids that touch; None: the nearest.
+        """
+        key = q.tobytes(), v.tobytes(), time, features
+        return self._last.of(key, lambda: self._at(q.copy(), v.copy(), time, features))
+
+    def _at(self, q: Array, v: Array, time: float, features: Features | None) -> ContactsNow:
         found = self.equations.solve(q, v, (), time=time)
         W: Array = np.asarray(np.linalg.inv(self.equations.inertial(found.motion)[1]), dtype=np.float64)
         if found.split is not None:
             W = W - found.split[0] @ found.split[0].T
-        touching = touches(self.mechanism, found.motion)
+        touching = touches(self.mechanism, found.motion, features)
         parts = [slide_row(found.motion, self._bodies[k], each) for k, each in enumerate(touching)]
         for contact in self._of_joints:
             at = contact.joint.velocity
@@ -104,7 +113,7 @@ class ContactDynamics:
         Raises:
             Diverged: a velocity moves nothing with inertia in this pose.
         """
-        return self.solved(self.at(q, v, time), mode)
+        return self.solved(self.at(q, v, time, features_of(mode)), mode)
 
     def solved(self, state: ContactsNow, mode: ContactMode) -> ContactSolution:
         """Accelerations and forces at a state while each contact keeps the given mode; see :meth:`solve`."""
@@ -206,7 +215,8 @@ class ContactDynamics:
         closed = [k for k, own in enumerate(mode) if own.kind != "open" and presses[k]]
         unit = self.equations.tree.normalised(q)
         q = unit if np.abs(unit - q).max(initial=0.0) > EXACT else q
-        state = self.at(q, v, time)
+        features = features_of(mode)
+        state = self.at(q, v, time, features)
         gaps = np.array([state.touching[k].gap for k in closed])
         found, K = state.solution, forbidding_rows(mode, state.touching, state.J, presses)
         left = [found.rows.residual, found.C @ v, gaps, K @ v]
@@ -214,11 +224,11 @@ class ContactDynamics:
             y = np.append(self.equations.eliminated(y[:-1], ()), time)
             if not len(K):
                 return y
-            (q, v, _), state = self.parts(y), self.at(*self.parts(y))
+            (q, v, _), state = self.parts(y), self.at(*self.parts(y), features)
             normals = np.array([state.touching[k].normal @ state.J[k] for k in closed]).reshape(-1, len(v))
             gaps = np.array([state.touching[k].gap for k in closed])
             q = self.equations.tree.moved(q, -least_motion_for(state.W, normals, gaps)) if closed else q
-            state = self.at(q, v, time)
+            state = self.at(q, v, time, features)
             K = forbidding_rows(mode, state.touching, state.J, presses)
             v = v - least_motion_for(state.W, K, K @ v)
         return np.concatenate([q, v, [time]])
@@ -234,37 +244,31 @@ class ContactDynamics:
         turns = [isinstance(c, JointContact) and self.mechanism.joints[c.joint.number].kind != JointKind.PRISMATIC
                  for c in self.contacts]  # fmt: skip
         lengths = np.where(turns, 1.0, scale.length)
-        closed, still = closed_and_still(self.at(q, v).touching, lengths, scale.rate)
+        touching = self.at(q, v).touching
+        closed, still = closed_and_still(touching, lengths, scale.rate)
         closed = shut_by_pressing(self.contacts, closed)
-        return self.decided(q, v, closed, still)
+        return self.decided(q, v, modes_of(closed, still, tuple(each.feature for each in touching)))
 
     def decided(
-        self,
-        q: Array,
-        v: Array,
-        closed: Sequence[bool],
-        still: Sequence[bool],
-        time: float = 0.0,
-        leaving: int | None = None,
+        self, q: Array, v: Array, rough: ContactMode, time: float = 0.0, leaving: int | None = None
     ) -> tuple[ContactMode, float]:
         """Mode that follows from the forces, and its margin to another one: inf, or 0 if it is not unique.
 
         Args:
             q: coordinates.
             v: velocities.
-            closed: True for contacts whose gap is closed and does not open by its speed.
-            still: True for those of them that do not slide either.
+            rough: modes by the gaps and the slides: open, slip where a closed contact slides, stick where it does not.
             time: at which drives and targets are taken [s].
             leaving: contact that static friction no longer holds.
 
         Raises:
-            NotUnique: a disc lies flat.
+            NotUnique: a disc lies flat, or capsules touch along a line.
         """
-        state = self.at(q, v, time)
+        state, closed = self.at(q, v, time, features_of(rough)), closed_in(rough)
         which = [k for k, shut in enumerate(closed) if shut]
         self._refuse_flat(state, which, time)
         if not which:
-            return tuple(OPEN for _ in closed), np.inf
+            return rough, np.inf
         frames = {k: frame_of_axis(state.touching[k].normal)[:, [2, 0, 1]] for k in which}
         J = np.concatenate([frames[k].T @ state.J[k] for k in which])
         c = J @ state.solution.acceleration + np.concatenate([frames[k].T @ state.bias[k] for k in which])
@@ -274,7 +278,7 @@ class ContactDynamics:
             if self.contacts[k].presses:
                 c[3 * place] += found.normal_rate @ found.slide
             across = frames[k][:, 1:].T @ ways.get(k, found.slide)
-            sliding.append(None if still[k] and k not in ways else across / np.linalg.norm(across))
+            sliding.append(None if rough[k].kind == "stick" and k not in ways else across / np.linalg.norm(across))
         G, names = J @ state.W @ J.T, [self.contacts[k].name for k in which]
         static = self._static.copy()
         if leaving is not None:
@@ -297,7 +301,7 @@ class ContactDynamics:
             if slides is None:  # friction acts against the slide, and one that carries nothing has none
                 slides = -force[place, 1:] if force[place, 1:].any() else moves[place, 1:]
             mode[k] = first_mode(done[place], frames[k], slides, G[own, own])
-        return tuple(mode), np.inf if same else 0.0
+        return with_features(tuple(mode), features_of(rough)), np.inf if same else 0.0
 
     def struck(
         self,
@@ -307,6 +311,7 @@ class ContactDynamics:
         restitution: Array,
         time: float = 0.0,
         sideways: Array | None = None,
+        features: Features | None = None,
     ) -> tuple[Array, Array, float]:
         """Velocities after an impact, by Newton's law of restitution and Coulomb's law with the slip after the impact.
 
@@ -317,14 +322,15 @@ class ContactDynamics:
             restitution: of each of them.
             time: of the impact, for messages [s].
             sideways: tangential restitution of each of them; None: none has any.
+            features: of solids that touch; None: the nearest.
 
         Returns:
             The velocities, the impulses (closed, 3), and the margin to another outcome: inf, or 0 if it is not unique.
 
         Raises:
-            NotUnique: several contacts press each other, so that the outcome depends on an order; or a disc lies flat.
+            NotUnique: several contacts press each other, so that their order counts; or one is along a line.
         """
-        state = self.at(q, v, time)
+        state = self.at(q, v, time, features)
         self._refuse_flat(state, closed, time)
         frames = [frame_of_axis(state.touching[k].normal)[:, [2, 0, 1]] for k in closed]
         J = np.concatenate([frame.T @ state.J[k] for frame, k in zip(frames, closed, strict=True)])
@@ -361,10 +367,10 @@ class ContactDynamics:
         return after, impulse, np.inf if same else 0.0
 
     def _refuse_flat(self, state: ContactsNow, closed: Sequence[int], time: float) -> None:
-        """Raises NotUnique if one of these contacts is of a disc that lies flat at a time [s]."""
+        """Raises NotUnique if one of these contacts is along an edge or a line at a time [s]."""
         for k in closed:
             if state.touching[k].flat:
-                raise lying(self.contacts[k].name, time)
+                raise lying(self.mechanism.contacts[k], time)
 
     def sample(self, q: Array, v: Array, mode: ContactMode, time: float = 0.0) -> tuple[dict[str, Any], Array, Array]:
         """Fields of a record at one time [s], contact forces between bodies, and sums of pairs with several contacts.

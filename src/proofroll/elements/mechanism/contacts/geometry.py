@@ -14,8 +14,13 @@ from proofroll.core.arrays import read_only
 from proofroll.core.errors import InputError, require_known
 from proofroll.elements.mechanism import checks, rotations
 from proofroll.elements.mechanism.checks import METRES, RADIANS, RATIO, WORLD, ZERO, Vector, Z
+from proofroll.elements.mechanism.contacts.features import SolidFeatures, features_between
+from proofroll.elements.mechanism.contacts.pair_rules import CURVED, require_rule
 from proofroll.elements.mechanism.contacts.shapes import (
+    BoxShape,
+    CapsuleShape,
     CircleShape,
+    CylinderShape,
     EllipsoidShape,
     HalfSpace,
     Shape,
@@ -42,17 +47,9 @@ _KEYS: Mapping[str, tuple[str, ...]] = {
     "cone": ("slope", "axis"),
     "torus": ("ring_radius", "radius", "axis"),
 }
-# Walls that a sphere alone touches; all but a bowl have an axis.
-CURVED = ("bore", "shaft", "bowl", "cone", "torus")
 # Largest semi-axis of an ellipsoid over its smallest. The support function squares the ratio, which costs 1e-10 of the
 # height at 1e3; and a contact on a flat side is as stiff as that ratio.
 _FLATTEST = 1e3
-# Room of a sphere in a wall, relative to the wall's radius, that counts as none: digits of a file.
-_ROOM = 1e-9
-_RULES = (
-    "only a plane with a sphere, ellipsoid, circle, box, capsule or cylinder, a curved wall (bore, shaft, bowl, cone, "
-    "torus) with a sphere, and two spheres have a rule; choose one of these pairs"
-)
 
 
 @dataclass(frozen=True)
@@ -62,10 +59,12 @@ class Geometry:
     Attributes:
         name: unique among geometries.
         body: name of the body that carries it, or ``world``.
-        kind: a box touches with its eight vertices, a ``capsule`` with the spheres and a ``cylinder`` with the rims at
-            its two ends; a plane pairs with these, a sphere, ellipsoid or circle, a sphere also with a sphere or a
-            curved wall: ``bore``, an endless cylindrical hole; ``shaft``, an endless cylinder; ``bowl``, the inside of
-            a sphere; ``cone``, its inside; ``torus``, the outside of a ring of round wire.
+        kind: on a plane a box touches with its eight vertices, a ``capsule`` with the spheres and a ``cylinder`` with
+            the rims at its two ends; a plane pairs with these, a sphere, ellipsoid or circle. A sphere also pairs with
+            a sphere, box, capsule or cylinder, which it meets at the nearest face, edge, corner, side or end, as two
+            capsules meet each other, and with a curved wall: ``bore``, an endless cylindrical hole; ``shaft``, an
+            endless cylinder; ``bowl``, the inside of a sphere; ``cone``, its inside; ``torus``, the outside of a ring
+            of round wire.
         position: of its centre, of a cone's tip, or of any point of a plane or of the axis of a bore or shaft, in the
             body's frame [m].
         orientation: roll, pitch, yaw of an ellipsoid's or a box's axes in the body's frame [rad].
@@ -170,6 +169,16 @@ class Geometry:
             return tuple(CircleShape(middle, radius, normal) for middle in centres)
         return tuple(SphereShape(middle, radius) for middle in centres)
 
+    @property
+    def solid(self) -> Shape:
+        """The whole shape, in the body's frame, as it meets others than planes."""
+        if self.kind == "box":
+            return BoxShape(np.array(self.position), np.array(self.size) / 2, self.frame)
+        if self.kind in {"capsule", "cylinder"}:
+            kind = CapsuleShape if self.kind == "capsule" else CylinderShape
+            return kind(np.array(self.position), np.array(self.axis), 0.5 * (self.length or 0.0), self.radius or 0.0)
+        return self.shapes[0]
+
     def _curved(self, point: Array, axis: Array) -> CurvedWall:
         if self.kind == "cone":
             return ConeWall(point, axis, self.slope or 0.0)
@@ -244,7 +253,7 @@ class BodyContact:
     Attributes:
         name: of the pair; a box adds ``.1`` to ``.8``, a capsule or cylinder ``.1`` and ``.2``.
         body_a, body_b: of the first and the second geometry.
-        shape_a, shape_b: in the frames of these; one of them may be a wall.
+        shape_a, shape_b: in the frames of these; one of them may be a wall, and a solid meets spheres and solids.
         friction, restitution: of the pair.
         pair: its name.
         static_friction: coefficient while it sticks; None: the same.
@@ -276,6 +285,11 @@ class BodyContact:
         """Coefficient of the contact while it sticks."""
         return self.friction if self.static_friction is None else self.static_friction
 
+    @cached_property
+    def features(self) -> SolidFeatures | None:
+        """Features by which solids meet; None: the shapes have one rule."""
+        return features_between(self.shape_a, self.shape_b)
+
     @property
     def of_disc(self) -> bool:
         """True if one of the shapes is a circle."""
@@ -299,19 +313,10 @@ def contacts_of(geometries: Sequence[Geometry], pairs: Sequence[Pair]) -> tuple[
             advice = f"these are the pair {listed[frozenset(pair.geometries)]} already; remove one"
             raise InputError(where, pair.geometries, advice)
         listed[frozenset(pair.geometries)] = pair.name
-        kinds = {a.kind, b.kind}
-        wall = next((geometry for geometry in (a, b) if geometry.kind in CURVED), None)
-        if wall is None:
-            ruled = kinds == {"sphere"} or ("plane" in kinds and kinds != {"plane"})
-        else:
-            ruled = kinds == {wall.kind, "sphere"}
-            _require_room(where, pair, wall, b if wall is a else a)
-        if not ruled:
-            raise InputError(where, pair.geometries, _RULES)
-        if kinds == {"sphere"} and not (a.radius or b.radius):
-            raise InputError(where, pair.geometries, "two points have no direction between them; give one a radius")
-        _require_one_place(pair, kinds)
-        touching = list(itertools.product(a.shapes, b.shapes))
+        require_rule(where, pair, a, b)
+        touching = (
+            [(a.solid, b.solid)] if "plane" not in {a.kind, b.kind} else list(itertools.product(a.shapes, b.shapes))
+        )
         for number, (one, other) in enumerate(touching, 1):
             name = pair.name if len(touching) == 1 else f"{pair.name}.{number}"
             found.append(
@@ -331,24 +336,6 @@ def contacts_of(geometries: Sequence[Geometry], pairs: Sequence[Pair]) -> tuple[
                 )
             )
     return tuple(found)
-
-
-def _require_one_place(pair: Pair, kinds: set[GeometryKind]) -> None:
-    """Raises InputError for friction against turning at the two ends of a capsule or cylinder."""
-    long_body = next(iter(kinds & {"capsule", "cylinder"}), None)
-    for key in ("rolling_resistance", "spinning_friction"):
-        if long_body and getattr(pair, key):
-            advice = f"a {long_body} touches at two ends, whose moments are not followed together; leave it out"
-            raise InputError(f"pairs.{pair.name}.{key}", getattr(pair, key), advice)
-
-
-def _require_room(where: str, pair: Pair, wall: Geometry, ball: Geometry) -> None:
-    """Raises InputError if a sphere has no room in a curved wall."""
-    inner = {"bore": wall.radius, "bowl": wall.radius, "torus": (wall.ring_radius or 0.0) - (wall.radius or 0.0)}
-    room = inner.get(wall.kind)
-    if room is not None and (ball.radius or 0.0) >= (1 - _ROOM) * room:
-        size = f"a sphere of radius {ball.radius:g} m has no room in a {wall.kind} of {room:g} m"
-        raise InputError(where, pair.geometries, f"{size}; make it smaller")
 
 
 def coefficients_of(contacts: Sequence[BodyContact]) -> dict[str, Array]:

@@ -1,6 +1,7 @@
 """Shapes that touch: convex ones by their support function, and the walls that these lie on.
 
-A support function gives the farthest point in a direction, and its derivative by the direction.
+A support function gives the farthest point in a direction, and its derivative by the direction. Solids meet each other
+with those of their features that are nearest: see :mod:`proofroll.elements.mechanism.contacts.features`.
 
 All coordinates are in the frame of the body that a shape is fixed to.
 """
@@ -79,5 +80,49 @@ class HalfSpace:
     normal: Array
 
 
+@dataclass(frozen=True, eq=False)
+class BoxShape:
+    """A solid box with half its edges along the columns of a frame."""
+
+    centre: Array
+    half: Array
+    frame: Array
+
+    def support(self, d: Array) -> tuple[Array, Array]:
+        """See :class:`ConvexShape`; a corner, which does not move with the direction."""
+        return self.centre + self.frame @ (self.half * np.where(d @ self.frame < 0, -1.0, 1.0)), np.zeros((3, 3))
+
+
+@dataclass(frozen=True, eq=False)
+class CapsuleShape:
+    """A solid capsule; ``half``: from its centre to that of an end [m]."""
+
+    centre: Array
+    axis: Array
+    half: float
+    radius: float
+
+    def support(self, d: Array) -> tuple[Array, Array]:
+        """See :class:`ConvexShape`; a point of one of its ends."""
+        end = self.centre + float(np.sign(d @ self.axis)) * self.half * self.axis
+        return end + self.radius * d, self.radius * np.eye(3)
+
+
+@dataclass(frozen=True, eq=False)
+class CylinderShape:
+    """A solid cylinder; ``half``: from its centre to an end [m]."""
+
+    centre: Array
+    axis: Array
+    half: float
+    radius: float
+
+    def support(self, d: Array) -> tuple[Array, Array]:
+        """See :class:`ConvexShape`; a point of one of its rims."""
+        side = float(np.sign(d @ self.axis)) * self.half
+        return CircleShape(self.centre + side * self.axis, self.radius, self.axis).support(d)
+
+
+Solid = BoxShape | CapsuleShape | CylinderShape
 Wall = HalfSpace | CurvedWall
 Shape = ConvexShape | Wall

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import InputError
 from proofroll.core.last_results import kept
-from proofroll.elements.mechanism.contacts.touching import Moving, Touching, touch
+from proofroll.elements.mechanism.contacts.touching import PARALLEL, Moving, Touching, touch
 from proofroll.elements.mechanism.joint_coordinates import JointCoordinates, Solution
 from proofroll.elements.mechanism.joint_kinds import JointKind
 from proofroll.elements.mechanism.kinematics import BodyMotion, Tree
@@ -24,11 +24,13 @@ STILL = 1e-9
 _STANDS = 1e-12
 
 
-def touches(mechanism: Mechanism, motion: BodyMotion) -> tuple[Touching, ...]:
-    """Gap, normal and slide of all contacts at one instant."""
+def touches(mechanism: Mechanism, motion: BodyMotion, features: Sequence[int] | None = None) -> tuple[Touching, ...]:
+    """Gap, normal and slide of all contacts at one instant; ``features``: that touch; None: the nearest."""
     index = mechanism.body_index
     bodies = [Moving(*each) for each in zip(motion.p_WB, motion.R_WB, motion.v_WB, motion.w_WB, strict=True)]
-    return tuple(touch(c, bodies[index[c.body_a]], bodies[index[c.body_b]]) for c in mechanism.contacts)
+    given = [None] * len(mechanism.contacts) if features is None else features[: len(mechanism.contacts)]
+    pairs = zip(mechanism.contacts, given, strict=True)
+    return tuple(touch(c, bodies[index[c.body_a]], bodies[index[c.body_b]], feature) for c, feature in pairs)
 
 
 def extent(mechanism: Mechanism, motion: BodyMotion) -> float:
@@ -159,6 +161,8 @@ def check_contacts(mechanism: Mechanism) -> None:
             raise InputError(f"pairs.{contact.name}.friction", contact.friction, advice)
         if each.flat and each.gap <= scale.gap:
             advice = "the disc lies flat and touches along its whole edge, not at one point; give it three spheres"
+            if contact.features is not None:
+                advice = f"the capsules touch along a line: {PARALLEL}; turn one"
             raise InputError(f"pairs.{contact.name}", between, advice)
         closing = -float(each.normal @ each.slide)
         if each.gap <= scale.gap and closing > scale.speed:

@@ -5,13 +5,16 @@ from typing import NamedTuple
 import numpy as np
 
 from proofroll.core.errors import NotUnique
+from proofroll.elements.mechanism.contacts.features import Border, CapsuleFeatures, SolidFeatures
 from proofroll.elements.mechanism.contacts.geometry import BodyContact
-from proofroll.elements.mechanism.contacts.shapes import CircleShape, ConvexShape, HalfSpace, SphereShape, Wall
-from proofroll.elements.mechanism.contacts.walls import CurvedWall
+from proofroll.elements.mechanism.contacts.shapes import CircleShape, ConvexShape, HalfSpace, Shape, SphereShape, Wall
+from proofroll.elements.mechanism.contacts.walls import CurvedWall, Shaft
 from proofroll.elements.mechanism.rotations import Array, cross
 
-# Sine of the angle between a disc and its plane up to which it lies flat: digits of a file.
+# Sine of the angle between a disc and its plane, or two capsules, up to which they are parallel: digits of a file.
 FLAT = 1e-9
+
+PARALLEL = "parallel sides have no one point that is nearest, and where along the line the load acts is not determinate"
 
 
 class Moving(NamedTuple):
@@ -38,10 +41,13 @@ class Touching(NamedTuple):
         normal: unit vector from b to a; a force along it pushes a away.
         normal_rate: its time derivative [1/s].
         place: point of contact, or of an open contact the point that would touch: on the shape that is no wall, for two
-            spheres on a [m].
+            spheres, and for solids, on a [m].
         place_rate: velocity of that point in the world, as it moves over both bodies [m/s].
         slide: velocity of a's material relative to b's at that point [m/s]; along the normal it is the gap's rate.
-        tilt: sine of the angle between a disc and its plane; 1 for other shapes.
+        tilt: sine of the angle between a disc and its plane, or between two capsules whose sides are the nearest; 1 for
+            other shapes.
+        feature: number of the nearest features of solids.
+        borders: of these features.
     """
 
     gap: float
@@ -51,18 +57,25 @@ class Touching(NamedTuple):
     place_rate: Array
     slide: Array
     tilt: float = 1.0
+    feature: int = 0
+    borders: tuple[Border, ...] = ()
 
     @property
     def flat(self) -> bool:
-        """True for a disc that lies on its plane, so that it touches along its whole edge and not at one point."""
+        """True for a disc on its plane, or parallel capsules, which touch along an edge or a line, not at one point."""
         return self.tilt <= FLAT
 
 
-def lying(name: str, time: float) -> NotUnique:
-    """Error of a disc that lies flat from a time on [s]."""
+def lying(contact: BodyContact, time: float) -> NotUnique:
+    """Error of a disc that lies flat, or of capsules that are parallel, from a time on [s]."""
+    if contact.features is not None:
+        return NotUnique(
+            f"the capsules of {contact.name} touch along a line at t = {time:.6g} s: {PARALLEL}; end before, or turn "
+            "one"
+        )
     return NotUnique(
-        f"the disc of {name} lies flat at t = {time:.6g} s: what its whole edge does at once is not determinate; end "
-        "before, or give it three spheres"
+        f"the disc of {contact.name} lies flat at t = {time:.6g} s: what its whole edge does at once is not "
+        "determinate; end before, or give it three spheres"
     )
 
 
@@ -74,20 +87,57 @@ def torn(name: str, time: float) -> NotUnique:
     )
 
 
-def touch(contact: BodyContact, a: Moving, b: Moving) -> Touching:
-    """Gap, normal, point of contact and rates of a contact at given motions of its bodies."""
-    if isinstance(contact.shape_b, Wall):
-        assert not isinstance(contact.shape_a, Wall)  # two walls are no contact
-        gap, n, n_rate, place, rate = _on_wall(contact.shape_a, a, contact.shape_b, b)
-    elif isinstance(contact.shape_a, Wall):
-        gap, n, n_rate, place, rate = _on_wall(contact.shape_b, b, contact.shape_a, a)
+def touch(contact: BodyContact, a: Moving, b: Moving, feature: int | None = None) -> Touching:
+    """Gap, normal, point of contact and rates of a contact at given motions of its bodies.
+
+    ``feature``: features of solids that touch; None: the nearest.
+    """
+    features = contact.features
+    if features is None:
+        found = _touch(contact.shape_a, a, contact.shape_b, b)
+        discs = ((contact.shape_a, a), (contact.shape_b, b))
+        tilts = (
+            float(np.linalg.norm(cross(of.R @ disc.normal, found.normal)))
+            for disc, of in discs
+            if isinstance(disc, CircleShape)
+        )
+        return found._replace(tilt=next(tilts, 1.0))
+    *measures, tilt = _measures(features, a, b)
+    feature = features.nearest(*measures) if feature is None else feature
+    one, two = features.shapes(feature)
+    found = _touch(one, a, two, b)
+    if isinstance(one, Wall) and not isinstance(two, Wall):
+        found = _on_first(found, a, b)
+    tilt = tilt if features.needs_angle(feature) else 1.0
+    return found._replace(tilt=tilt, feature=feature, borders=tuple(features.borders(feature, *measures)))
+
+
+def _measures(features: SolidFeatures, a: Moving, b: Moving) -> tuple[float, float, float, float]:
+    """Measures of two solids, see :mod:`.features`, and the sine of the angle between two capsules, or 1."""
+    of_a, of_b = features.centres
+    apart = a.p + a.R @ of_a - b.p - b.R @ of_b
+    if isinstance(features, CapsuleFeatures):
+        u, w = a.R @ features.first.axis, b.R @ features.second.axis
+        return float(apart @ u), float(apart @ w), float(u @ w), float(np.linalg.norm(cross(u, w)))
+    R, apart = (b.R, apart) if features.ball_first else (a.R, -apart)
+    x, y, z = ((R @ features.axes).T @ apart).tolist()
+    return x, y, z, 1.0
+
+
+def _touch(one: Shape, a: Moving, two: Shape, b: Moving) -> Touching:
+    """Contact of two shapes with one rule."""
+    if isinstance(one, Shaft) and isinstance(two, Shaft):
+        gap, n, n_rate, place, rate = _two_shafts(one, a, two, b)
+    elif isinstance(two, Wall):
+        assert not isinstance(one, Wall)  # two walls are no contact
+        gap, n, n_rate, place, rate = _on_wall(one, a, two, b)
+    elif isinstance(one, Wall):
+        gap, n, n_rate, place, rate = _on_wall(two, b, one, a)
         n, n_rate = -n, -n_rate
     else:
-        assert isinstance(contact.shape_a, SphereShape)
-        assert isinstance(contact.shape_b, SphereShape)
-        gap, n, n_rate, place, rate = _two_spheres(contact.shape_a, a, contact.shape_b, b)
-    discs = ((contact.shape_a, a), (contact.shape_b, b))
-    tilts = (float(np.linalg.norm(cross(of.R @ disc.normal, n))) for disc, of in discs if isinstance(disc, CircleShape))
+        assert isinstance(one, SphereShape)
+        assert isinstance(two, SphereShape)
+        gap, n, n_rate, place, rate = _two_spheres(one, a, two, b)
     return Touching(
         gap=gap,
         normal=n,
@@ -95,8 +145,14 @@ def touch(contact: BodyContact, a: Moving, b: Moving) -> Touching:
         place=place,
         place_rate=rate,
         slide=a.velocity(place) - b.velocity(place),
-        tilt=next(tilts, 1.0),
     )
+
+
+def _on_first(found: Touching, a: Moving, b: Moving) -> Touching:
+    """The contact with its place moved from the second shape to the first."""
+    place = found.place + found.gap * found.normal
+    rate = found.place_rate + float(found.normal @ found.slide) * found.normal + found.gap * found.normal_rate
+    return found._replace(place=place, place_rate=rate, slide=a.velocity(place) - b.velocity(place))
 
 
 _Lying = tuple[float, Array, Array, Array, Array]
@@ -143,3 +199,24 @@ def _two_spheres(one: SphereShape, a: Moving, two: SphereShape, b: Moving) -> _L
     n_rate = (d_rate - n * (n @ d_rate)) / length
     place, rate = centre_a - one.radius * n, a.velocity(centre_a) - one.radius * n_rate
     return distance - one.radius - two.radius, n, n_rate, place, rate
+
+
+def _two_shafts(one: Shaft, a: Moving, two: Shaft, b: Moving) -> _Lying:
+    """Numbers of :func:`_on_wall` of two round shafts that cross, where their axes are nearest."""
+    u, w = a.R @ one.axis, b.R @ two.axis
+    u_rate, w_rate = cross(a.w, u), cross(b.w, w)
+    foot_a, foot_b = a.p + a.R @ one.point, b.p + b.R @ two.point
+    d, d_rate = foot_a - foot_b, a.velocity(foot_a) - b.velocity(foot_b)
+    across, across_rate = cross(u, w), cross(u_rate, w) + cross(u, w_rate)
+    square = float(across @ across) or 1.0  # of parallel shafts, which have no normal
+    n = across * (np.copysign(1.0, float(d @ across)) / np.sqrt(square))
+    n_rate = across_rate * (np.copysign(1.0, float(d @ across)) / np.sqrt(square))
+    n_rate = n_rate - n * (n @ n_rate)
+    cosine, cosine_rate = float(u @ w), float(u_rate @ w + u @ w_rate)
+    along_a, along_b = float(d @ u), float(d @ w)
+    rate_a, rate_b = float(d_rate @ u + d @ u_rate), float(d_rate @ w + d @ w_rate)
+    s = (cosine * along_b - along_a) / square
+    s_rate = (cosine_rate * along_b + cosine * rate_b - rate_a + 2 * s * cosine * cosine_rate) / square
+    place = foot_a + s * u - one.radius * n
+    rate = a.velocity(foot_a) + s_rate * u + s * u_rate - one.radius * n_rate
+    return float(n @ d) - one.radius - two.radius, n, n_rate, place, rate

@@ -50,9 +50,10 @@ class TurningFriction:
         """
         slide = self.part(touch.normal) @ turning
         if not self.spins:
-            return touch._replace(slide=slide, tilt=1.0)
+            return touch._replace(slide=slide, tilt=1.0, feature=0, borders=())
         across = frame_of_axis(touch.normal)[:, 0]
-        return touch._replace(normal=across, normal_rate=np.zeros(3), slide=slide, tilt=1.0)
+        touch = touch._replace(normal=across, normal_rate=np.zeros(3), tilt=1.0)
+        return touch._replace(slide=slide, feature=0, borders=())
 
     def part(self, normal: Array) -> Array:
         """Matrix that leaves the resisted part of an angular velocity."""
@@ -103,7 +104,10 @@ class _Pressed(Protocol):
 def opened(contacts: Sequence[_Pressed], mode: ContactMode, k: int) -> ContactMode:
     """Mode in which a contact opens, and friction against turning with it."""
     pairs = zip(contacts, mode, strict=True)
-    return tuple(OPEN if k in {number, contact.pressed_by} else own for number, (contact, own) in enumerate(pairs))
+    return tuple(
+        OPEN._replace(feature=own.feature) if k in {number, contact.pressed_by} else own
+        for number, (contact, own) in enumerate(pairs)
+    )
 
 
 def shut_by_pressing(contacts: Sequence[_Pressed], closed: Sequence[bool]) -> list[bool]:

@@ -7,6 +7,7 @@ from scipy.spatial import ConvexHull
 from scipy.spatial.transform import Rotation
 
 from proofroll.core.arrays import FloatArray
+from proofroll.elements.mechanism.checks import WORLD
 from proofroll.elements.mechanism.contacts.shapes import HalfSpace, Shape, SphereShape, Wall
 from proofroll.elements.mechanism.contacts.start import TOUCHING, touches
 from proofroll.elements.mechanism.contacts.walls import BowlWall, CurvedWall
@@ -123,7 +124,7 @@ def _shapes(picture: Drawing, view: View, element: MechanismElement) -> None:
             if path.round(3).tobytes() not in drawn_already:
                 picture.path(path, "hidden" if isinstance(shape, Wall) else "thin")
                 drawn_already.add(path.round(3).tobytes())
-                if not isinstance(shape, Wall):
+                if not isinstance(shape, Wall) and body != WORLD:
                     outlines.setdefault(body, []).append(path)
         if touch.gap <= TOUCHING * element.length and len(touching) <= _MOST_NAMES:
             _name(picture, np.asarray(view(touch.place)), contact.name, "letter", (0.0, 14.0))

@@ -16,7 +16,7 @@ from proofroll.core.scene import Scene
 from proofroll.elements.mechanism.checks import WORLD, ZERO, Vector
 from proofroll.elements.mechanism.contacts.geometry import BodyContact, Geometry
 from proofroll.elements.mechanism.contacts.observables import SLIDES
-from proofroll.elements.mechanism.contacts.shapes import Wall
+from proofroll.elements.mechanism.contacts.shapes import SphereShape, Wall
 from proofroll.elements.mechanism.element import MechanismElement, the_mechanism
 from proofroll.elements.mechanism.joint_kinds import SLIDING, JointKind
 from proofroll.elements.mechanism.placed import Placed
@@ -60,7 +60,7 @@ def draw_mechanism(replayed: Replayed) -> tuple[dict[str, Any], list[int], Packe
         for connection in mechanism.connections
         if connection.kind != JointKind.FREE
     ]
-    # The force of a contact is drawn at the middle of the shape that is no wall; undetermined forces are not drawn.
+    # The force of a contact is drawn at the middle of the sphere, or of what is no wall, unless it is not determinate.
     touching = [_touching(contact) for contact in mechanism.contacts]
     joints += [
         (contact.name, body, middle) for contact, (body, middle, _) in zip(mechanism.contacts, touching, strict=True)
@@ -149,12 +149,14 @@ def _outline(contact: BodyContact, placed: Placed) -> FloatArray:
 
 
 def _touching(contact: BodyContact) -> tuple[str, Vector, float]:
-    """The contact's convex shape: its body, its centre there [m], and +1 if the force is the one on body a, else -1."""
-    if isinstance(contact.shape_a, Wall):
-        assert not isinstance(contact.shape_b, Wall)  # two walls are no contact
+    """The contact's convex shape: its body, its centre there [m], and +1 if the force is the one on body a, else -1.
+
+    Of a solid and a sphere it is the sphere.
+    """
+    body, shape, sign = contact.body_a, contact.shape_a, 1.0
+    if isinstance(shape, Wall) or (contact.features is not None and isinstance(contact.shape_b, SphereShape)):
         body, shape, sign = contact.body_b, contact.shape_b, -1.0
-    else:
-        body, shape, sign = contact.body_a, contact.shape_a, 1.0
+    assert not isinstance(shape, Wall)  # two walls are no contact
     x, y, z = shape.centre.tolist()
     return body, (x, y, z), sign
 

@@ -130,9 +130,9 @@ def test_resistance_at_two_ends_is_refused(key: str) -> None:
         on_plane("capsule", (0, 0, 1, 1, 0, 0, 0), **{key: 1e-3})
 
 
-def test_two_long_bodies_have_no_rule() -> None:
-    """A capsule meets planes alone so far; another pair is refused with those that there are."""
+def test_a_capsule_and_a_cylinder_have_no_rule() -> None:
+    """Such a pair is refused with those that there are."""
     body = on_plane("capsule", (0, 0, 1, 1, 0, 0, 0))
-    shapes = (body.geometries[0], Geometry("post", "world", "capsule", radius=0.1, length=1.0))
+    shapes = (body.geometries[0], Geometry("post", "world", "cylinder", radius=0.1, length=1.0))
     with pytest.raises(InputError, match="only a plane with a sphere, ellipsoid, circle, box, capsule or cylinder"):
         Mechanism(body.bodies, body.joints, geometries=shapes, pairs=(Pair("hit", ("log", "post"), 0.1),))

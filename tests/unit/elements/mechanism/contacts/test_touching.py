@@ -7,7 +7,15 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from proofroll.elements.mechanism.contacts.geometry import BodyContact
-from proofroll.elements.mechanism.contacts.shapes import CircleShape, EllipsoidShape, HalfSpace, SphereShape
+from proofroll.elements.mechanism.contacts.shapes import (
+    BoxShape,
+    CapsuleShape,
+    CircleShape,
+    CylinderShape,
+    EllipsoidShape,
+    HalfSpace,
+    SphereShape,
+)
 from proofroll.elements.mechanism.contacts.touching import Moving, Touching, touch
 from proofroll.elements.mechanism.contacts.walls import Bore, BowlWall, ConeWall, Shaft, TorusWall
 
@@ -42,6 +50,9 @@ def some_shape(kind: str, rng: np.random.Generator) -> Any:
         "cone": lambda: ConeWall(centre, frame[:, 1].copy(), 0.6),
         "ring": lambda: TorusWall(centre, frame[:, 1].copy(), 4.0, 0.2),
         "plane": lambda: HalfSpace(centre, frame[:, 1].copy()),
+        "box": lambda: BoxShape(centre, axes, frame),
+        "capsule": lambda: CapsuleShape(centre, centre / np.linalg.norm(centre), 0.9, 0.1),
+        "cylinder": lambda: CylinderShape(centre, frame[:, 1].copy(), 0.4, 0.7),
     }[kind]()
 
 
@@ -79,6 +90,11 @@ def test_a_ball_on_the_axis_of_its_bore_has_numbers() -> None:
         "ball cone",
         "vertex cone",
         "ring ball",
+        "ball box",
+        "box ball",
+        "ball capsule",
+        "cylinder ball",
+        "capsule capsule",
     ],
 )
 @pytest.mark.parametrize("seed", [0, 1, 2])
