@@ -194,7 +194,7 @@ def test_conformance() -> None:
             check()
         except SkipTest as skipped:
             refused.append(str(skipped))
-    assert set(refused) == {"the engine does not say what is in its model", "the step is fixed"}
+    assert set(refused) == {"the engine does not report its model", "the step is fixed"}
 
 
 @pytest.mark.usefixtures("springs")

@@ -85,7 +85,7 @@ def test_no_sentence_speaks_of_agreement_with_a_truth(content: ReportContent) ->
     for word in ("with the truth", "from the truth", "Closest", "closest is", "obvious model", "nothing was run"):
         assert word not in text, word
     assert content.findings.sentences[0].startswith(
-        "Of 4 settings held to laws of mechanics alone, for there is no unique truth (invented), 3 keep the "
+        "Of 4 settings judged by laws of mechanics alone, as there is no unique truth (invented), 3 keep the "
         "laws that are judged in every case and 1 gives no result at some points."
     )
     assert content.findings.sentences[1] == "No setting that ran to its end breaks a law of mechanics."
@@ -135,7 +135,7 @@ def test_page_terminal_and_json_show_the_spread(alone: Outcome, content: ReportC
     assert point_curves(alone) == []
     text = " ".join(parse(whole(page(content, [[]]))).text.split())
     assert "Spread of the settings at speed=3" in text
-    assert "Held to laws of mechanics alone, for there is no unique truth: two hit at once." in text
+    assert "Judged by laws of mechanics alone, as there is no unique truth: two hit at once." in text
     assert "checked against" not in text
     out = io.StringIO()
     console = Console(file=out, width=100, highlight=False)
@@ -153,4 +153,4 @@ def test_an_ordinary_comparison_beside_it_is_told_as_ever(made: tuple[Outcome, S
     ordinary = report_content([made[0]], "").findings.sentences
     both = report_content([made[0], dataclasses.replace(alone, comparison=alone.comparison)], "").findings.sentences
     assert both[0].startswith(ordinary[0].removesuffix("."))
-    assert "; of 4 settings held to laws of mechanics alone" in both[0]
+    assert "; of 4 settings judged by laws of mechanics alone" in both[0]

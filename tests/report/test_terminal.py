@@ -74,7 +74,7 @@ def test_a_comparison_without_its_truth_is_one_sentence(everything: Any, tmp_pat
     unjudged = Verdict.NOT_JUDGED
     rows = [replace(row, verdict=unjudged, verdicts={unjudged: 2}) for row in found.rows]
     lacking = replace(found, name="lacking", title="Lacking", rows=rows, beyond_budget=["the truth", "alpha, dt 0.1"])
-    said = "Not judged, for the processor time did not suffice for the truth: 4 settings."
+    said = "Not judged: the processor time did not suffice for the truth: 4 settings."
     assert list(verdict_parts(lacking)) == ["Lacking", said, ""]
     content = replace(everything.content, comparisons=[found, lacking])
     both = replace(everything, content=content, curves=2 * everything.curves)

@@ -212,7 +212,7 @@ def test_where_nothing_is_claimed_nothing_is_said_to_be_expected(made: tuple[Out
     content = outcome_content(dataclasses.replace(made[0], comparison=open_to_all, runs=runs))
     found = conclusions(content, NOTHING, [], None)
     assert "expected" not in found.answer
-    assert found.sentences[-1] == "No file says what to expect here, so that nothing can contradict it."
+    assert found.sentences[-1] == "No file states expectations here, so nothing can contradict them."
     assert not re.search("expected|contradicted", counted(content))
 
 

@@ -44,9 +44,7 @@ def scene(name: Name) -> None:
 
     folder = _fresh(name, name)
     if name in scene_names():
-        raise InputError(
-            "name", name, f"a scene of the package is called so, and commands would take that one; {_ANOTHER}"
-        )
+        raise InputError("name", name, f"the package has a scene of this name, and commands would use it; {_ANOTHER}")
     _write(folder / "scene.toml", _filled(_TEMPLATES / "scene.toml", {"name": name}))
     _say(folder, f"proofroll check {folder}", f"proofroll run {folder} --engine truth")
 
@@ -59,9 +57,7 @@ def comparison(name: Name, scene: Annotated[str, typer.Option(help="The scene, o
 
     file = _fresh(name, f"{name}.toml")
     if named_file(name) is not None:
-        raise InputError(
-            "name", name, f"a study of the package is called so, and commands would take that one; {_ANOTHER}"
-        )
+        raise InputError("name", name, f"the package has a study of this name, and commands would use it; {_ANOTHER}")
     _write(file, _comparison(name, scene, load_scene(scene)))
     _say(file, f"proofroll check {file}", f"proofroll compare {file}")
 
@@ -80,7 +76,7 @@ def engine(
     package = f"proofroll_{name}"  # of its own: one called NAME would hide the library of the engine
     folder = _fresh(name, package)
     if name in {*engine_names(), "truth"} or find_spec(package):
-        raise InputError("name", name, f"an engine or its package that is installed is called so; {_ANOTHER}")
+        raise InputError("name", name, f"an installed engine or its package has this name; {_ANOTHER}")
     require_known("--for", kind, _EXAMPLES, "say what the engine moves:")
     file, former, scene, does = _EXAMPLES[kind]
     names = {
@@ -105,7 +101,7 @@ def _fresh(name: str, path: str) -> Path:
     if not re.fullmatch(r"[a-z][a-z0-9_]*", name):
         raise InputError("name", name, "write small letters, digits and _, a letter first")
     if keyword.iskeyword(name):
-        raise InputError("name", name, f"a word of Python's is written so; {_ANOTHER}")
+        raise InputError("name", name, f"this is a keyword of Python; {_ANOTHER}")
     if Path(path).exists():
         raise InputError("name", path, f"this is there already; {_ANOTHER} or folder")
     return Path(path)

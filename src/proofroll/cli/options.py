@@ -58,7 +58,7 @@ def runs_like(incomplete: str) -> list[str]:
 
 
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON document on standard output, nothing else.")]
-Out = Annotated[Path, typer.Option("--out", help="Folder for results; what is there is reused.")]
+Out = Annotated[Path, typer.Option("--out", help="Folder for results; stored results are reused.")]
 Fresh = Annotated[bool, typer.Option("--fresh", help="Run every case again, whatever is stored.")]
 Jobs = Annotated[int | None, typer.Option("--jobs", min=1, help="Workers at once; by default one per core.")]
 Scheduler = Annotated[
@@ -76,7 +76,7 @@ SceneName = Annotated[
 Budget = Annotated[
     float | None,
     typer.Option(
-        "--budget", min=1, help="Processor-seconds for a scene or robot file, with what engines compile; by default 60."
+        "--budget", min=1, help="Processor-seconds for a scene or robot file, compilation included; by default 60."
     ),
 ]
 Until = Annotated[

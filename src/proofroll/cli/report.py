@@ -88,7 +88,7 @@ def report(
     earlier = EarlierReport.read(against) if against else None
     workers, assigned = Workers(), options.assignments(settings)
     if budget and scheduler:
-        raise InputError("--budget", budget, "what runs on a cluster has none; drop --scheduler")
+        raise InputError("--budget", budget, "runs on a cluster have none; drop --scheduler")
     left_out = [] if studies or only or budget else further_comparison_names()
     all_names = [*comparison_names(), *([] if left_out else further_comparison_names())]
     names, parts = parts_of(studies, engine or []) if studies else (all_names, all_parts(engine or [], out))

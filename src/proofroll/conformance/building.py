@@ -81,12 +81,12 @@ def builds_only_what_is_required(subject: Subject) -> None:
     engine = subject.build()
     terms = getattr(engine.built(), "terms", None)
     if terms is None:
-        raise SkipTest("the engine does not say what is in its model")
+        raise SkipTest("the engine does not report its model")
     elements = subject.scene.elements
     optional = frozenset().union(*(item.optional for item in elements if isinstance(item, HasOptionalCapabilities)))
     required = subject.scene.requires & optional
     left_out = required - terms
-    require(not left_out, f"the scene requires {_listed(left_out)}, of which nothing was built")
+    require(not left_out, f"the scene requires {_listed(left_out)}, which the engine did not build")
     settings = subject.settings
     excused = set(getattr(subject.engine, "inherent", {}).get(settings.formulation, {}))
     wished = [field.name for field in dataclasses.fields(settings) if getattr(settings, field.name) is True]
@@ -96,7 +96,7 @@ def builds_only_what_is_required(subject: Subject) -> None:
     follows = engine.sample().q_WB is not None
     listed = bool(terms & {item.askable.get("orientation") for item in elements})
     require(
-        follows == listed, f"the orientation is {'' if listed else 'not '}in the model, yet a sample tells otherwise"
+        follows == listed, f"the orientation is {'' if listed else 'not '}in the model, but a sample contradicts this"
     )
 
 

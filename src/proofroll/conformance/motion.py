@@ -86,7 +86,7 @@ def samples_cost_the_same(subject: Subject) -> None:
             after_long <= _DEARER * after_short or after_long <= advancing,
             f"sample() takes {after_long:.2g} s after an advance by {long - short:.2g} s, which returned within "
             f"{advancing:.2g} s, and {after_short:.2g} s after one by {short:.2g} s: advance must return when the "
-            "state is there, or its cost is not what is timed",
+            "state is there, or the timing misses a part of its cost",
         )
         if advancing > _DEARER * (handed_over + after_short):
             return  # the steps are made there

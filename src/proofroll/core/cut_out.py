@@ -122,7 +122,7 @@ class CutOut:
                 if name != source[1].name:
                     raise ValueError(f"{module} takes {source[1].name} under another name: {name}")
                 if name not in {*self._instead, *_read(source[0]).defined, *_read(source[0]).imported}:
-                    raise ValueError(f"{module} takes the module {name}, of which no part can be cut out")
+                    raise ValueError(f"{module} takes the whole module {name}, which cannot be cut out")
                 return self._take((source[0], name))
             else:
                 self._imports.add(f"from {source[0]} import {ast.unparse(source[1])}")

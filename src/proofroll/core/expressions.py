@@ -84,7 +84,7 @@ def evaluated(
         raise InputError(field, text, "is not finite; change the expression or its parameters")
     if unit and quantity.powers is not None and quantity.powers not in map(powers_of, unit.split(OR)):
         advice = f"this number is in {unit}, the formula gives {quantity.unit}; a bare number in a product has no unit"
-        raise InputError(field, text, f"{advice}: make a parameter of what has one")
+        raise InputError(field, text, f"{advice}: make a parameter of the number with a unit")
     return number
 
 

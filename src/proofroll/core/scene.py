@@ -19,7 +19,7 @@ from proofroll.core.errors import InputError, choices, require_known
 from proofroll.core.observable import Observable
 from proofroll.core.source_code import code_of
 
-_NOTHING = "nothing of this scene can be asked for besides its motion; leave it out"
+_NOTHING = "this scene has no results besides its motion; leave it out"
 
 
 @dataclass(frozen=True)
@@ -52,10 +52,10 @@ class Scene:
         read_only(self.elements)
         names = [element.name for element in self.elements]
         if not names:
-            raise InputError("scene", self.name, "it holds no element; add what it is made of")
+            raise InputError("scene", self.name, "it holds no element; add bodies or balls")
         for name in names:
             if names.count(name) > 1:
-                raise InputError("scene", name, "two elements have this name; give each its own")
+                raise InputError("scene", name, "two elements have this name; rename one")
             if "." in name and len(names) > 1:
                 raise InputError("scene", name, "a dot parts a quantity from its element; name the element without")
         for name in self.asks:

@@ -56,5 +56,5 @@ class StepCount:
         if self._steps + ahead > _MOST:
             raise Diverged(
                 f"at the pace of its first {self._steps} steps, which reached t = {t:.6g} s, DOP853 needs more than "
-                f"{_MOST}: slow down or soften what swings fastest, or ask for a shorter time"
+                f"{_MOST}: slow down or soften the fastest oscillation, or ask for a shorter time"
             )

@@ -27,7 +27,7 @@ _WORDS = {
     "tuple": "give a list: [value, value]",
     "dict": "give a table of names and values",
     "mapping": "give a table of names and values",
-    "missing": "the list is too short; add what is missing",
+    "missing": "the list is too short; add the missing entries",
     "dataclass": "give a table of names and values",
 }
 

@@ -298,7 +298,7 @@ def _reason(
     truth_error_bar, tolerance, unit = true.error_bar, allowance.tolerance, allowance.shown_unit
     shown_error, allowed, bar = *_distinct_texts(error, tolerance), f"{number(truth_error_bar)}{unit}"
     if np.isinf(truth_error_bar):
-        return "not judged: the truth does not tell it here"
+        return "not judged: the truth does not determine it here"
     if truth_error_bar > tolerance:
         why = f"; ill-posed: {true.ill_posed.removeprefix('ill-posed: ')}" if true.ill_posed else ""
         return f"not judged: the truth's error bar {bar} exceeds the tolerance {allowed}{unit}{why}"

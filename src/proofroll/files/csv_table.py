@@ -86,7 +86,7 @@ def read_csv(text: str, new_names: Mapping[str, str] | None = None) -> xr.Datase
     if "time" not in columns:
         raise ValueError(
             f"it has no column time [s]; its first line has the names, here {listed}; "
-            "--map t=time,theta=q.pivot[deg] says which column is what"
+            "--map t=time,theta=q.pivot[deg] names the columns"
         )
     variables: dict[str, Any] = {}
     coordinates: dict[str, list[str]] = {}

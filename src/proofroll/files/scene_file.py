@@ -218,7 +218,7 @@ def _of_each(names_by_kind: Sequence[Sequence[str]], tables: Mapping[str, Any], 
                 if table in names_by_kind[k] and any(str(text) in names for text in texts)
             ]
             if len(homes) != 1:
-                advice = "several kinds of elements have such rows; name a thing of one of them, which another has not"
+                advice = "several kinds of elements have such rows; name a table that only one of them has"
                 raise InputError(f"{place}: {table}.{index}", row, advice)
             own_tables[homes[0]].setdefault(table, []).append(row)
     return own_tables

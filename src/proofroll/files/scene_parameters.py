@@ -91,7 +91,7 @@ def check_parameters(parameters: Mapping[str, Parameter], units: Iterable[str], 
                 continue
             if end == name or end not in parameters:
                 suggestions = choices(item for item in parameters if item != name)
-                advice = f"there is no such parameter to refer to; choose from {suggestions}"
+                advice = f"no parameter has this name; choose from {suggestions}"
                 if end.removeprefix("$") in parameters:
                     advice = "a parameter refers to another one by its name alone, without $, and never to itself"
                 raise InputError(f"{place}.{key}", end, advice)

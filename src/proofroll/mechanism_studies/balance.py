@@ -225,7 +225,7 @@ class _InEngine:
         q = self._place.pose(displaced)
         built = self._made(at_pose(self._mechanism, q, velocities)).built()
         if built.acceleration is None or built.angular_acceleration is None:
-            raise Refused("it does not say what accelerations it has")
+            raise Refused("it does not report its accelerations")
         reported = np.hstack([np.reshape(part, (-1, 3)) for part in (built.acceleration, built.angular_acceleration)])
         motion = self._tree.at(q, velocities)
         off = (reported - motion.bias[:-1]).ravel()

@@ -35,7 +35,7 @@ SYMBOLS = {
 }
 MEANINGS = {
     "agrees": "within tolerance at this step; where there is a ladder of steps, so is its limit",
-    "unconfirmed": "agrees at this step, limit not confirmed: the ladder of steps does not tell it that closely",
+    "unconfirmed": "agrees at this step, limit not confirmed: the ladder of steps is not accurate enough",
     "incomplete": "agrees in all that it reports, but does not report all that is judged",
     "converges": "not within tolerance yet, but the limit of small steps is: right physics, step too coarse",
     "ill-posed": "here the answer depends on less than the precision of the parameters: no engine is judged by it",

@@ -32,7 +32,7 @@ def check(
     ] = None,
     accept: Annotated[
         list[str] | None,
-        typer.Option(help="Causes of differences that are no news: damping_left_out,friction_left_out; or repeat."),
+        typer.Option(help="Accepted causes of differences: damping_left_out,friction_left_out; or repeat."),
     ] = None,
     plot: Annotated[Path | None, typer.Option(help="Draw a scene at its start to this page (.html).")] = None,
     as_json: options.Json = False,

@@ -95,7 +95,7 @@ class ControlledScenes:
         """
         controller = read_controller(self._path)
         if controller.rate is None:
-            advice = "mistakes of bookkeeping are told at a controller's instants; give the rate in Hz"
+            advice = "mistakes of bookkeeping are found at a controller's instants; give the rate in Hz"
             raise InputError(f"{self._path}: rate", None, advice)
         if controller.start.base is not None:
             start = dataclasses.replace(controller.start, base=None, base_velocity=(0.0,) * 6)

@@ -132,7 +132,12 @@ class Controller:
     def _rules(self) -> Iterable[tuple[str, object, bool, str]]:
         """Field, value, whether it is wrong, and advice."""
         rate = self.rate
-        yield "rate", rate, rate is not None and rate <= 0, "give instants per second, above 0; or leave it out"
+        yield (
+            "rate",
+            rate,
+            rate is not None and rate <= 0,
+            "give a positive number of instants per second, or leave it out",
+        )
         yield "held", self.held, self.held not in HELD, f"choose one of {', '.join(HELD)}"
         yield "delay", self.delay, self.delay < 0, "a delay is a whole number of instants, at least 0"
         for name, value, active in (
@@ -142,7 +147,7 @@ class Controller:
         ):
             yield name, value, active and rate is None, "it needs instants; give the rate in Hz"
         repeated = [name for name in self.order if self.order.count(name) > 1]
-        yield "order", repeated[:1], bool(repeated), "a joint stands in the order twice; name each once"
+        yield "order", repeated[:1], bool(repeated), "a joint is in the order twice; name each once"
         for number, gain in enumerate(self.gains):
             for key in ("kp", "kd", "armature"):
                 value = getattr(gain, key)

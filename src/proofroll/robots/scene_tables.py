@@ -54,7 +54,7 @@ def laws(robot: Robot) -> dict[str, ParameterRow]:
             parameters[law] = (1.0, "1", words, {"at_least": 0})
     if any(joint.lower is not None or joint.upper is not None for joint in robot.moving):
         parameters["limits"] = (0, "1", "whether the joints have their stops (1) or turn through them (0)", SWITCH)
-    parameters["couplings"] = (1, "1", "whether what couples joints besides the tree is asked for", SWITCH)
+    parameters["couplings"] = (1, "1", "whether couplings of joints outside the tree are asked for", SWITCH)
     if any(body.impossible for body in robot.bodies.values()):
         words = "whether each link must be physically possible (1), or only all that a joint moves together (0)"
         parameters["possible"] = (1, "1", words, SWITCH)

@@ -212,7 +212,7 @@ class Cluster:
             return error
         if error is None or isinstance(error, (CancelledError, OSError)):
             gone = f"the Dask scheduler at {self.address} is gone"
-            return ProofrollError(f"{gone}; what was finished is kept, and the same command goes on from there")
+            return ProofrollError(f"{gone}; finished runs are kept, and the same command continues from there")
         text = " ".join(str(error).split())[:200]
         return ProofrollError(f"the workers of {self.address} cannot run a case ({type(error).__name__}: {text})")
 

@@ -104,8 +104,8 @@ def clean_runs(kind: Any, scene: Scene, settings: Any, recording: Recording) -> 
     longer = recording.advancing[1] / last / max(timed.processor / sum(run.t for run in runs), 1e-12)
     if recording.advancing[1] > _LONG_SECONDS and longer > _TIMES_AS_LONG:
         timed.remarks.append(
-            f"the judged run took {longer:.0f} times as long as those that are timed: what the engine prepares or "
-            "keeps of an earlier run is not in its speed"
+            f"the judged run took {longer:.0f} times as long as the timed ones: the engine's preparations, and "
+            "results that it keeps from an earlier run, are not in its speed"
         )
     usual = recording.sampling[0] / len(recording.passed)
     put_off = min(runs, key=lambda run: run.sampling)

@@ -39,7 +39,7 @@ MEANINGS = {
     CRASHED: "the engine's process ended",
     TOO_SLOW: "no result within the time that the map allows",
     REFUSED: "the engine said before the run that it cannot represent the scene",
-    WRONG_MODEL: "what the engine built is not the scene, so it was not run",
+    WRONG_MODEL: "the engine built a different scene, so it was not run",
 }
 # Failures of runs that were not made, so that they tell nothing about the boundaries.
 NOT_RUN = frozenset({REFUSED, WRONG_MODEL})

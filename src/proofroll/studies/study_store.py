@@ -114,7 +114,7 @@ def valid_study(path: Path, kind: type[_Study]) -> tuple[_Study | None, list[str
     try:
         content = json.loads(ordinary_content(path))
         if content.pop("seal") != seal(content):
-            return None, ["what is stored is not what had been put there"]
+            return None, ["the stored data differ from those that were written"]
         reasons = changes(record(Measured, content["measured"]))
         return (None, reasons) if reasons else (record(kind, content), [])
     except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError):  # absent, truncated or not ours

@@ -170,4 +170,4 @@ def test_a_budget_is_for_scenes(command_line: Callable[..., tuple[int, str, str]
     assert "a comparison file runs all that it asks for" in err
     code, _, err = command_line("compare", "pendulum", "--budget", "10", "--scheduler", "local:1")
     assert code == 2
-    assert "what runs on a cluster has none" in err
+    assert "runs on a cluster have none" in err

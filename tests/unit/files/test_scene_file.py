@@ -373,7 +373,7 @@ def test_two_kinds_have_rows_of_one_table(monkeypatch: pytest.MonkeyPatch) -> No
     assert rolling.contact.surface == "wall"
     assert other.tables == {"blocks": [{"name": "crate"}], "contacts": [block]}
     tables["contacts"].append({"of": ["another"]})
-    with pytest.raises(InputError, match=r"scene.toml: contacts.2 = .*name a thing of one of them"):
+    with pytest.raises(InputError, match=r"scene.toml: contacts.2 = .*name a table that only one of them has"):
         scene_file._elements(*given)
     tables["contacts"] = ball
     with pytest.raises(InputError, match=r"scene.toml: contacts = .*\[\[contacts\]\]"):

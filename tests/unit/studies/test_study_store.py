@@ -91,7 +91,7 @@ def test_a_study_of_another_code_version_or_machine_does_not(path: Path, values:
 def test_a_study_that_was_tampered_with_does_not(path: Path) -> None:
     """One number that is not what was put there, and it is not given."""
     path.write_text(path.read_text().replace('"points": [1]', '"points": [2]'))
-    assert valid_study(path, Study) == (None, ["what is stored is not what had been put there"])
+    assert valid_study(path, Study) == (None, ["the stored data differ from those that were written"])
 
 
 def test_another_file_has_a_map_of_its_own(tmp_path: Path) -> None:

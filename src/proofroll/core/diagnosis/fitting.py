@@ -27,7 +27,7 @@ FACTORS: Mapping[float, str] = {
     -1.0: "with the wrong sign",
     0.5: "halved",
     2.0: "counted twice",
-    1000.0: "a thousand times, as with a wrong prefix of its unit",
+    1000.0: "by a factor of a thousand, as from a wrong prefix of its unit",
     1e-3: "a thousandth, as with a wrong prefix of its unit",
     180 / np.pi: "in degrees instead of radians",
     np.pi / 180: "taken for degrees",

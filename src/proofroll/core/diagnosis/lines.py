@@ -111,7 +111,7 @@ def single_precision(lines: Sequence[Mapping[str, Any]]) -> Iterator[Cause]:
     exact = [line for line in differing(lines) if _is_single(line)]
     if exact:
         difference = max(line["difference"] for line in exact)
-        name, says = str(exact[0]["quantity"]), "what the engine holds are single-precision numbers (float32)"
+        name, says = str(exact[0]["quantity"]), "the engine holds single-precision numbers (float32)"
         remedy = 'compute in double precision, or say precision = "single" in the settings'
         yield Cause(
             id="float32",

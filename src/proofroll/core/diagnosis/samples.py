@@ -168,8 +168,8 @@ def reported_vectors(
 
     @hypothesis(
         "said",
-        "the true vectors with another sign, unit, order of axes, frame, limit or time are what the engine says, "
-        "sample by sample; no equation is needed",
+        "the engine's vectors equal the true ones with another sign, unit, order of axes, frame, limit or time, at "
+        "every sample; no equation is needed",
     )
     def test(evidence: Evidence) -> Iterator[Cause]:
         pair = run_and_truth(evidence)
@@ -220,7 +220,9 @@ def reported_quaternions(true_ones: Callable[[Evidence], FloatArray]) -> Hypothe
     ``true_ones`` gives the true quaternions, scalar first, shape (time, …, 4).
     """
 
-    @hypothesis("quaternion", "the true quaternions in another order or inverted are what is said, up to their sign")
+    @hypothesis(
+        "quaternion", "the engine's quaternions equal the true ones in another order or inverted, up to their sign"
+    )
     def test(evidence: Evidence) -> Iterator[Cause]:
         pair = run_and_truth(evidence)
         if pair is None or "q_WB" not in pair[0]:

@@ -43,7 +43,7 @@ class Diagnosis:
     def sentence(self) -> str:
         """Sentence for a person."""
         if self.cause.alternative:
-            return f"or, which looks the same from outside: {self.cause.sentence}"
+            return f"or, which has the same effect: {self.cause.sentence}"
         return f"{self.seen}: {self.cause.sentence}" if self.seen else self.cause.sentence
 
     def as_dict(self) -> dict[str, Any]:

@@ -35,7 +35,7 @@ _HALF = 0.1
 _BARS = 10.0
 # Entries of a matrix below this part of its largest one count as zero.
 _SHARE = 1e-9
-_SIGN = "an engine may give what acts on the other body: look at whose vector it is"
+_SIGN = "an engine may give the vector on the other body: look at the body it acts on"
 
 
 @dataclass(frozen=True)

@@ -23,7 +23,7 @@ from proofroll.elements.ball_on_surface.sampling import BallBuilt, BallSample
 _DEEP = "a ball that is sunk in by its radius has its centre in the wall"
 _LEVER = "a soft contact rolls about a point midway in its depth, and the depth is at most the radius"
 _UNLOADED = "a contact that is not loaded yet lacks the whole force, and no more than that"
-_NUMBER = "a number must stand for friction without bound; whether it is enough, the run tells (another_scene)"
+_NUMBER = "a finite number stands for unbounded friction; the run shows whether it suffices (another_scene)"
 _DYNAMICS = ("acceleration", "angular acceleration", "N", "F2", "F3")
 # For a ball that starts slipping.
 _LIFTED = Regularised(float("inf"), "a convex cone of friction lifts what slips along it, the more the faster it slips")
@@ -36,7 +36,7 @@ CAPS: Mapping[str, Regularised] = {
     "slip": Regularised(0.5, _LEVER),
     "spin": Regularised(0.5, _LEVER),
     "velocity": Regularised(1e-5, "a velocity of half a step before is brought to time 0 by a sequence that converges"),
-    "rolling resistance": Regularised(1e-6, "its moment is read back by way of a normal force that a solver finds"),
+    "rolling resistance": Regularised(1e-6, "its moment is read back through a normal force, which a solver finds"),
     **dict.fromkeys(_DYNAMICS, Regularised(1.0, _UNLOADED)),
     **dict.fromkeys(("1 / static friction", "1 / kinetic friction"), Regularised(float("inf"), _NUMBER)),
 }

@@ -135,7 +135,7 @@ def _check_names(tables: BallTables, place: str) -> None:
     for kind, names in (("balls", balls), ("surfaces", surfaces)):
         for index, name in enumerate(names):
             if name in names[:index]:
-                raise InputError(f"{place}: {kind}.{index}.name", name, "two have this name; give each its own")
+                raise InputError(f"{place}: {kind}.{index}.name", name, "two have this name; rename one")
     for kind, items in (("contacts", tables.contacts), ("initial", tables.initial)):
         for index, item in enumerate(items):
             for key, known_names in (("body", balls), ("surface", surfaces)):

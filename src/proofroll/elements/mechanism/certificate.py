@@ -38,7 +38,7 @@ _FROM_ACCELERATIONS = ("acceleration", "angular acceleration", *_FORCES)
 # Quantities that a model may soften -> largest relative difference that is accepted for any reason, and why.
 CAPS: Mapping[str, Regularised] = {
     # with a tolerance of 1, a mechanism that does not set off at all would pass
-    name: Regularised(0.5, "a loop that is held by a stiff spring pulls by what it is open")
+    name: Regularised(0.5, "a loop that is held by a stiff spring pulls in proportion to its opening")
     for name in _FROM_ACCELERATIONS
 }
 # Quantities with a tolerance of their own, and why.

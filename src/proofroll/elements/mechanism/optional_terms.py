@@ -31,7 +31,7 @@ def optional_terms(mechanism: Mechanism, parameters: Mapping[str, float]) -> lis
         if key in _owned(parameters, key, mechanism.joints, mechanism.pairs)
     ]
     if "limit" in parameters and any(item.limit is not None for item in mechanism.actuators):
-        meaning = f"the scene has them; here without, as {_FAR:g} times what they are"
+        meaning = f"the scene has them; here they are switched off, and {_FAR:g} times what they are"
         terms.append(OptionalTerm("limits of efforts", meaning, {}, {"limit": _FAR * parameters["limit"]}))
     rubbing: dict[str, float] = {}
     for key, name in _OF_PAIRS.items():
@@ -39,7 +39,7 @@ def optional_terms(mechanism: Mechanism, parameters: Mapping[str, float]) -> lis
             terms.append(OptionalTerm(name, because, {}, dict.fromkeys(owners, 0.0)))
             rubbing = rubbing or {parameter: _ROLLS * value for parameter, value in owners.items() if key == "friction"}
     if rubbing:
-        meaning = f"friction is bounded; here by {_ROLLS:g} times as much, with which what touches sticks or rolls"
+        meaning = f"friction is bounded; here by {_ROLLS:g} times as much, so that contacts stick or roll"
         terms.append(OptionalTerm("slip of contacts", meaning, {}, rubbing))
     return terms
 

@@ -96,7 +96,7 @@ def _all_made(content: Mapping[str, Any], numbers: Parameters) -> Iterator[tuple
 def _repeated(field: str, repeat: Any, numbers: Parameters) -> Iterator[tuple[str, Any]]:
     """(kind, part) of the mechanism for every table that a [[repeat]] stands for."""
     if not isinstance(repeat, Mapping):
-        raise InputError(field, repeat, "give a table with count and what repeats")
+        raise InputError(field, repeat, "give a table with count and the tables that repeat")
     index, keys = repeat.get("index", "i"), ("index", "from", "count", *KINDS)
     for key in repeat:
         if key not in keys:

@@ -51,7 +51,7 @@ _HELD = "its constraint holds the ball on the wall"
 _ROLLS_AT_REST: Mapping[str, str] = {
     BallCapability.IMPACTS: _HELD,
     BallCapability.BOUNDED_FRICTION: "its joint rolls without slip",
-    BallCapability.MOVING_WALL: "its joint rolls on what is at rest",
+    BallCapability.MOVING_WALL: "its joint rolls on a body at rest",
 }
 # Formulations whose joints are given by whole frames (exudyn.HT).
 _WITH_FRAMES = {"carrier", *OF_MECHANISMS}

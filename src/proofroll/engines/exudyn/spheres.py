@@ -161,9 +161,9 @@ class Spheres(Redundant):
             contact_friction=np.array([self.system.GetObject(made.item)["dynamicFriction"] for made in self._contacts]),
             contact_restitution=np.zeros(len(self._contacts)),
         )
-        larger = Regularised(_DIFFERENCED + self._larger, "a sphere is larger by as much as it is pressed in")
+        larger = Regularised(_DIFFERENCED + self._larger, "a sphere is larger by its indentation")
         if self._builds_up:  # then the first accelerations lack friction and prove nothing
-            larger = Regularised(self._softness, "friction of what does not slip yet builds up with the creep")
+            larger = Regularised(self._softness, "friction of a sticking contact builds up with the creep")
             model = replace(model, acceleration=None, angular_acceleration=None)
         return replace(model, regularised=dict.fromkeys(("acceleration", "angular_acceleration"), larger))
 
@@ -191,5 +191,5 @@ def _check(contact: BodyContact) -> None:
             raise Refused(f"a corner touches in {contact.name}; Exudyn's contacts are of spheres with a radius")
         if not isinstance(shape, SphereShape | HalfSpace):
             raise Refused(
-                f"{contact.name} has a shape that is no sphere and no plane, of which this formulation makes no contact"
+                f"{contact.name} has a shape that is neither sphere nor plane; this formulation has no contact for it"
             )

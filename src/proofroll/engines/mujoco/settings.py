@@ -256,10 +256,10 @@ def _rules_of_contact(settings: MujocoSettings, bounded: bool) -> Iterator[tuple
         # MuJoCo ignores it with a pyramidal cone, whose rows mix normal and friction.
         yield pyramidal, "friction_damping", "it needs cone=elliptic"
         # The part of J̇v that the adapter adds is computed with the damping of the normal direction.
-        yield curvature, "friction_damping", "curvature=true sets what the slip needs; leave it out"
+        yield curvature, "friction_damping", "curvature=true sets this for the slip; leave it out"
     if settings.condim > SLIDES:
         # Sliding, turning and rolling share one cone: the bound of sliding depends on how the ball turns and rolls.
-        yield bounded, "condim", "with bounded friction stick and slip could not be told apart; set condim=3"
+        yield bounded, "condim", "with bounded friction stick and slip could not be distinguished; set condim=3"
         yield curvature, "condim", "curvature=true is made for sliding alone; set condim=3"
         yield corrects, "condim", "cone_correction=true is made for sliding alone; set condim=3"
     if curvature:

@@ -136,7 +136,7 @@ def _settled_depth(model: Any, data: Any, body: RollingBall, evaluate_at: Callab
     while excess(upper) > 0:
         if upper >= 0.1 * body.ball.radius:
             advice = "take a smaller dt or a larger impedance"
-            raise Refused(f"the contact is so soft that the ball would sink into the wall; {advice}")
+            raise Refused(f"the contact is too soft: the ball would sink into the wall; {advice}")
         low, upper = upper, min(1e3 * upper, body.ball.radius)
     # The depth has no more digits than the coordinates of the ball's centre.
     closest = max(_DEPTH * upper, float(np.spacing(np.max(np.abs(body.p0)))))

@@ -21,7 +21,7 @@ from proofroll.engines.pinocchio.settings import PinocchioSettings
 
 # Fraction of a step over which the initial accelerations are evaluated, and factor on their errors.
 _PART, _MARGIN = 1 / 16, 4.0
-_PARTS = "in the convex problem what slips parts"
+_PARTS = "in the convex problem a slipping contact separates"
 _FOUND = (
     "an impulse opposes the slip at its end, which turns, is found to solver_tolerance, and follows the turning of its "
     "contact (J̇v) one step later"

@@ -98,7 +98,7 @@ class PinocchioSettings:
         elif of_mechanisms is None:
             only = {"leapfrog": "contact", "midpoint": "impulses"}.get(integrator)
             yield only is not None, "integrator", f"only {only} has it"
-        yield solves and self.projection, "projection", "what touches is put back by the solver; leave it out"
+        yield solves and self.projection, "projection", "the solver corrects the contacts; leave it out"
         if of_mechanisms is not None:
             advice = "a mechanism always has its orientations; leave it out"
             yield self.orientation is not None, "orientation", advice

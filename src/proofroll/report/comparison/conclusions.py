@@ -67,8 +67,8 @@ def standings(rows: Sequence[ReportedRow], alone: bool) -> str:
         "incomplete": ("agrees", "agree", "without reporting all that is judged"),
         "converges": ("needs", "need", "a finer step"),
         "ill-posed": ("is", "are", "beyond judgement at some points, where the question is ill-posed"),
-        "another-scene": ("is", "are", "of another kind than the scene, so not judged"),
-        "not-judged": ("is", "are", "not judged, for there is no truth, or none exact enough for the tolerance"),
+        "another-scene": ("is", "are", "a different model than the scene's, so not judged"),
+        "not-judged": ("is", "are", "not judged: there is no truth, or it is not exact enough for the tolerance"),
         "refused": ("refuses", "refuse", "the scene, or some case of it, with the reason"),
         "differs": ("differs", "differ", "at some points, with no limit of small steps shown to be the truth"),
         "failed": ("gives", "give", "no result at some points"),
@@ -123,7 +123,9 @@ def _obvious(content: ReportedComparison, scored: list[Candidate]) -> str:
             worst = (score.motion / best.motion, score, best)
     failed = f" {_joined(lost)} did not even finish everywhere." if lost else ""
     if worst is None:
-        return "Nothing shows what accuracy the obvious model loses: no default setting stands beside another." + failed
+        return (
+            "The accuracy that the default model loses is not shown: no default setting stands beside another." + failed
+        )
     factor, score, best = worst
     blamed = with_caveat(score.name, rows[score.row].caveat)
     off = furthest_off(content, content.runs_of(score.row))
@@ -149,7 +151,7 @@ def _order(content: ReportedComparison) -> list[str]:
         if judgement.verdict not in {"agrees", "unconfirmed"}:
             wrong[run.row] = wrong.get(run.row, 0) + 1
     if not wrong:
-        return ["Every setting has the truth's events in the truth's order, wherever that is well posed."]
+        return ["Every setting has the truth's events in the truth's order, at all well-posed points."]
     shown = names(content.rows)
     cases = {row: sum(run.row == row for run, _ in judged) for row in wrong}
     rows = _joined([f"{shown[row]} ({count} of {cases[row]} cases)" for row, count in wrong.items()])
@@ -164,12 +166,12 @@ def _surprises(content: ReportedComparison) -> str:
         return f"Not expected: {contradictions[0]}{more}."
     unlike = [row for row in content.rows if row.verdict != "agrees"]
     if not content.claims:
-        return "No file says what to expect here, so that nothing can contradict it."
+        return "No file states expectations here, so nothing can contradict them."
     if not unlike:
         nothing = "no law is broken" if content.laws_alone else "nothing disagrees with the truth"
-        return f"Nothing contradicts what the comparison expects, and {nothing}."
+        return f"Nothing contradicts the comparison's expectations, and {nothing}."
     agree = "show that they keep the laws" if content.laws_alone else "agree"
     return (
-        f"Nothing contradicts what the comparison expects; {len(unlike)} of {counted(len(content.rows), 'settings')} "
-        f"do not {agree}, each for the reason that its row tells."
+        f"Nothing contradicts the comparison's expectations; {len(unlike)} of {counted(len(content.rows), 'settings')} "
+        f"do not {agree}, each for the reason in its row."
     )

@@ -255,7 +255,7 @@ class ReportedComparison:
         if not lacking or any(row.verdict != Verdict.NOT_JUDGED for row in self.rows):
             return ""
         many = counted(len(self.rows), "settings")
-        return f"Not judged, for the processor time did not suffice for the truth: {many}."
+        return f"Not judged: the processor time did not suffice for the truth: {many}."
 
     @property
     def laws_alone(self) -> bool:

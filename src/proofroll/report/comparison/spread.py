@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from proofroll.studies.comparison.outcome import ComparedPoint
 
 # Clause on how such runs are judged.
-ALONE = "held to laws of mechanics alone, for there is no unique truth"
+ALONE = "judged by laws of mechanics alone, as there is no unique truth"
 # Relative range below which a number counts as equal in all settings and is not listed.
 ALIKE = 1e-6
 

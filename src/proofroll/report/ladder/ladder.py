@@ -234,7 +234,7 @@ def _conclusions(content: LadderContent) -> Iterator[str]:
     for engine, absent in content.absent.items():
         yield f"{engine} is {absent.status}: {absent.message}."
     if content.unplaced:
-        yield f"Not on the ladder, for they tell no levels: {', '.join(content.unplaced)}."
+        yield f"Not on the ladder (no levels declared): {', '.join(content.unplaced)}."
 
 
 def _cheapest(useful: list[tuple[RungFound, float, float]], tolerance: float, bound: str) -> str:

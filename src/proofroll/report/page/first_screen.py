@@ -37,7 +37,7 @@ STATES: Mapping[str, tuple[str, str, str]] = {
     "converges": ("≈", "finer steps needed", "Beyond the tolerance at the steps that were run; smaller come closer."),
     "differs": ("✗", "differs", "Small steps lead elsewhere, or nowhere that could be shown."),
     "refused": ("⊘", "refused", "The engine was asked, declined the scene and says why."),
-    "unjudged": ("?", "not judged", "It ran; what is asked for is not judged there."),
+    "unjudged": ("?", "not judged", "It ran; the requested quantities are not judged there."),
     "cannot": ("—", "cannot", "The formulation lacks an element that the scene needs; nothing to run."),
     "none": ("·", "not run", "It could represent the scene, but this report did not try."),
 }  # fmt: skip

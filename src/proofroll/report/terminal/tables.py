@@ -186,7 +186,7 @@ def budget_lines(content: ReportedComparison) -> list[str]:
         return [f"Left out for lack of processor time: {left[0]}{more}."]
     seconds = f"{content.budget:g} s of processor time, building and compiling included,"
     left_out = f"Left out, for {seconds} did not suffice: {left[0]}{more}."
-    again = "" if left[0].startswith("the truth") else "The same command goes on with what is left; "
+    again = "" if left[0].startswith("the truth") else "The same command continues with the rest; "
     return [f"{left_out} {again}--budget {10 * content.budget:g} gives it more time."]
 
 

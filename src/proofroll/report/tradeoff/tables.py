@@ -125,7 +125,7 @@ def point_table(
     """
     caption = Text("cost: wall seconds per simulated second through this adapter")
     if ties:
-        caption += Text("; ≈ a tie: the cost cannot be told from that of a more accurate one")
+        caption += Text("; ≈ a tie: the cost of a more accurate one is the same within its interval")
     lucky = [
         name for p in points for name in quantities if name in p.error and p.envelope_of(name) > (p.error[name] or 0.0)
     ]
@@ -272,7 +272,7 @@ def answer_lines(advice: Recommendation) -> Iterator[str]:
     if answer.ties:
         tie = min(answer.ties, key=lambda t: t.point.envelope_of(answer.quantity))
         many = f"{len(answer.ties)} others tie in cost, as far as the intervals tell; the most accurate of them"
-        words = many if len(answer.ties) > 1 else "A tie in cost, as far as the intervals tell"
+        words = many if len(answer.ties) > 1 else "A tie in cost, within the intervals"
         yield f"{words}: {_line(tie, answer.unit)}"
     for choice, words in (
         (advice.best_affordable, "Of those that cost no more"),

@@ -83,7 +83,7 @@ def comparison_named(
     times = {key: value for key, value in (("until", until), ("every", every)) if value is not None}
     if means_scene(name, alone=bool(budget or parameters or times)):
         if budget and scheduler:
-            raise InputError("budget", budget, "what runs on a cluster has none; drop --scheduler")
+            raise InputError("budget", budget, "runs on a cluster have none; drop --scheduler")
         seconds = None if scheduler else budget or BUDGET
         return default_comparison(name, parameters, workers, seconds, engines, until, every)
     if budget:

@@ -24,7 +24,7 @@ _UNTIL, _FIRST, _SAMPLES = 1.0, 2.0, 50  # default length [s], longest length [s
 _STEP = 4e-3  # s: sampling intervals are multiples of it, so that a ladder of steps down to 1e-3 s divides them
 BUDGET = 60.0  # default processor time of all runs [s]
 _CLOSE = "close"
-_BECAUSE = "no file says what to expect of this scene"
+_BECAUSE = "no file states expectations of this scene"
 
 
 def default_comparison(
@@ -73,7 +73,7 @@ def default_comparison(
         until=until,
         every=every,
         vary={key: [scene.parameters[key]] for key in parameters},
-        bands={_CLOSE: Band("one per cent is what an eye sees of a motion: a first look", bounds(scene, every))},
+        bands={_CLOSE: Band("one per cent is visible to the eye: a first look", bounds(scene, every))},
         rows=rows,
         budget=budget,
         spent=processor_seconds() - begin,

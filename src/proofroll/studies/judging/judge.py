@@ -283,7 +283,7 @@ def _bounds(
             raise InputError("tolerance", bounds, f"say of which variable: {', '.join(able)}")
         bounds = {scene.deciding if scene.deciding in able else able[0]: bounds}
     if not bounds:
-        raise InputError("tolerance", "{}", "say how far what may be off")
+        raise InputError("tolerance", "{}", "give a tolerance for each quantity")
     for name in bounds:
         require_known("tolerance", name, able, "this trajectory has")
     units = {name: _unit(reference, name) for name in bounds}

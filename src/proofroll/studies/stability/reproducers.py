@@ -17,7 +17,7 @@ from proofroll.studies.stability.records import BOUNDARIES, BoundaryPoint, Stabi
 # Failures that no program can show -> the reason.
 _NOTHING_TO_SHOW = {
     REFUSED: "the run was refused before it began",
-    WRONG_MODEL: "what was built is not the scene, so it was not run",
+    WRONG_MODEL: "the engine built a different scene, so it was not run",
     TOO_SLOW: "the run was only too slow for the map",
 }
 

@@ -97,7 +97,7 @@ def stick_slip(scene: Scene, times: FloatArray) -> tuple[xr.Dataset, list[Event]
     if not posed_throughout:
         last_event = events[-1].time if events else 0.0
         result.attrs["ill_posed"] = (
-            f"ill-posed: what happens after {last_event:.9g} s hangs on the last digits of the parameters: {why}"
+            f"ill-posed: what happens after {last_event:.9g} s depends on the last digits of the parameters: {why}"
         )
     if bounded or events:
         result = with_bounces(with_events(result, events), _bounces(body, paths, events, until))

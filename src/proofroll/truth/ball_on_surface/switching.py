@@ -125,7 +125,7 @@ class SwitchedBall:
         self._reversals = self._reversals + 1 if hastens else 0
         if self._reversals > _REVERSALS:
             raise Refused(
-                f"from about {stretch.end:.6g} s on the ball slips to and fro ever faster, for resistance stops the "
+                f"from about {stretch.end:.6g} s on the ball slips to and fro ever faster: resistance stops the "
                 "rolling before friction stops the centre; "
                 "end the run earlier, or take more friction or less resistance"
             )

@@ -76,7 +76,7 @@ def _in_units(mechanism: Mechanism, units: Units, times: Array) -> TwoRouteMotio
     two = on_same_turns(own, one, second.recorded(times, states[:, :-1], switched, wrenches))
     routes = (
         f"joint coordinates, {tree.integrators}, contacts by Coulomb's law at all of them at once",
-        f"bodies alone, {bodies.integrators}, contacts by trial of what they can do",
+        f"bodies alone, {bodies.integrators}, contact modes by trial",
     )
     ended = first_close(paths, CLOSE)
     reason = _shared_load(dynamics, paths[0], ended) if ended == 0 or not paths[0].known else ""

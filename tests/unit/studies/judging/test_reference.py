@@ -62,7 +62,7 @@ def test_nothing_is_held_against_what_the_truth_does_not_tell() -> None:
     allowance = Allowance("contact_forces", "N", tolerance=1.0, scale=1.0)
     judgement = judge_curve(allowance, RunCurve(told), held.true("contact_forces", told))
     assert judgement.verdict is Verdict.NOT_JUDGED
-    assert judgement.reason == "not judged: the truth does not tell it here"
+    assert judgement.reason == "not judged: the truth does not determine it here"
 
 
 def test_forces_are_compared_where_and_while_they_are_determinate() -> None:

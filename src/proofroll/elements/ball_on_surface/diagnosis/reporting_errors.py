@@ -78,7 +78,7 @@ def _frames(evidence: Evidence) -> dict[str, FloatArray]:
 CLOCK = another_clock(_state, ("p_WB", "v_WB", "w_WB", "force", "motion"))
 
 
-@hypothesis("said force", "the true force with another sign, unit, frame or time is what the engine says")
+@hypothesis("said force", "the engine's force equals the true one with another sign, unit, frame or time")
 def reported_force(evidence: Evidence) -> Iterator[Cause]:
     """Hypotheses on the wall's force along the run, and on its friction alone."""
     pair, body = run_and_truth(evidence), evidence.element.rolling

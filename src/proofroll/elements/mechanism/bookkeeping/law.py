@@ -106,7 +106,7 @@ class ControlLaw:
         """
         control = mechanism.control
         if control is None or not control.actuators:
-            advice = "mistakes of bookkeeping are told at a controller's instants; give the rate, and gains"
+            advice = "mistakes of bookkeeping are found at a controller's instants; give the rate and the gains"
             raise InputError("rate", None, advice)
         by_name = {item.name: item for item in mechanism.actuators}
         servos = [by_name[name] for name in control.actuators]

@@ -74,8 +74,8 @@ def lying(contact: BodyContact, time: float) -> NotUnique:
             "one"
         )
     return NotUnique(
-        f"the disc of {contact.name} lies flat at t = {time:.6g} s: what its whole edge does at once is not "
-        "determinate; end before, or give it three spheres"
+        f"the disc of {contact.name} lies flat at t = {time:.6g} s: the forces along its edge are not determinate; end "
+        "before, or give it three spheres"
     )
 
 

@@ -150,9 +150,7 @@ def contact_forces(evidence: Evidence) -> Iterator[Cause]:
             ).causes(evidence.step)
 
 
-@hypothesis(
-    "friction of contacts", "friction of what slides is one factor times its bound, against its slip, in every sample"
-)
+@hypothesis("friction of contacts", "sliding friction is one factor times its bound, against the slip, in every sample")
 def friction_factor(evidence: Evidence) -> Iterator[Cause]:
     """Hypothesis: one contact, or all, have a coefficient of friction with a factor."""
     for touch in touch_of(evidence):
@@ -229,7 +227,7 @@ def convex_cone_from_rest(evidence: Evidence) -> Iterator[Cause]:
     which = closed & (rises > least) & (friction * of_scene.slip[0] > least) & (np.abs(true) < _SUNK * rises)
     if which.any():
         rate = np.sum(of_run.normal * of_run.slide, axis=-1)[0, which]
-        says = "convex cone: what starts to slide with the acceleration a rises with μa, and hops"
+        says = "convex cone: a body that starts to slide with the acceleration a rises with μa, and hops"
         difference, remainder = float(rises[which].max()), float(np.abs(rate - rises[which]).max())
         yield contact_cause(
             "convex cone", says, "acceleration along the normal at time 0", "m/s^2", difference, remainder, _UNCONVEX

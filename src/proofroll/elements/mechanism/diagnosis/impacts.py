@@ -33,7 +33,7 @@ _JUMP = 1e-4  # least velocity that counts as missed, relative to the mechanism'
 _NO_JUMP = 1e-6  # of the origins of bodies beside that of the gap's rate: round-off
 _ROUNDS = 4
 _CONTRACTIONS = 20  # until slip and speed along the normal fit each other
-_REMEDY = "look at what the engine makes of it"
+_REMEDY = "look at the value that the engine uses"
 _EXACT = 1e-3  # part of the difference at impacts that no error of a step leaves by chance
 _REAL = 1e-9  # imaginary part of a real root, in intervals of samples
 # If a gap has a cubic term, and its parabola misses by m one interval T back, it misses by 5 m one interval ahead, and
@@ -42,7 +42,7 @@ _OFF, _OFF_RATE = 5.0, 12.0
 
 
 @hypothesis(
-    "impacts", "flights before and after an impact, extended to where they meet, tell its time and its restitution"
+    "impacts", "the flights before and after an impact, extended until they meet, give its time and its restitution"
 )
 def impacts(evidence: Evidence) -> Iterator[Cause]:
     """Hypotheses: impacts come late, or with the restitution of another pair."""

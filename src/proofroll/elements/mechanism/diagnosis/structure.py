@@ -93,7 +93,7 @@ def _axes_at_start(evidence: Evidence) -> Iterator[Cause]:
 
 @hypothesis(
     "joint axis at time 0",
-    "the child's first turning tells the axis; a mechanism with that axis has the other accelerations and reactions",
+    "the child's first rotation gives the axis; with it the mechanism has the engine's accelerations and reactions",
 )
 def axis_of_first_steps(evidence: Evidence) -> Iterator[Cause]:
     """Hypothesis: in the scene's pose, a joint starts to turn about another axis than the scene's."""
@@ -179,7 +179,7 @@ _BALANCED = 1e-3
 
 @hypothesis(
     "tree out of order",
-    "without the terms that an algorithm loses that expects depth-first order, the equations balance",
+    "the equations balance without the terms that an algorithm for depth-first order loses",
 )
 def lost_coupling(evidence: Evidence) -> Iterator[Cause]:
     """Hypothesis: the mass matrix lacks terms between a body and its descendants."""
