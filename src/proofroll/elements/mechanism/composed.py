@@ -224,7 +224,7 @@ class SprungJoint:
         if self.kind == JointKind.SPHERICAL and len(set(laws["damping"][3:])) == 1:  # the joint's own
             damping, laws["damping"] = laws["damping"][3], (0.0,) * 6
         joint = Joint(
-            self.name, self.kind, self.parent, self.child, self.position, self.orientation,
+            self.name, self.kind, self.parent, self.child, position=self.position, orientation=self.orientation,
             child_position=self.child_position, q0=self.q0, v0=self.v0, damping=damping, dependent=self.dependent,
         )  # fmt: skip
         rest = self._six("rest")

@@ -82,8 +82,8 @@ def lying(contact: BodyContact, time: float) -> NotUnique:
 def torn(name: str, time: float) -> NotUnique:
     """Error of Painlevé's paradox at a contact, from a time on [s]."""
     return NotUnique(
-        f"{name} would not press but tear from t = {time:.6g} s on: its friction makes what follows not unique or not "
-        "possible (Painlevé)"
+        f"{name} would not press but tear from t = {time:.6g} s on: with its friction the motion that follows is "
+        "not unique or does not exist (Painlevé)"
     )
 
 
