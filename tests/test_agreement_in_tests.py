@@ -98,7 +98,7 @@ def test_a_tolerance_below_the_truths_own_bar_passes_nothing() -> None:
         ({"tolerance": {"q.pivto": "1 %"}}, "this trajectory has "),
         ({"tolerance": {"positions": "1e-3 rad"}}, "its unit is m"),
         ({"tolerance": "close"}, "write a positive number and a unit"),
-        ({"tolerance": {}}, "say how far"),
+        ({"tolerance": {}}, "give a tolerance"),
     ],
 )
 def test_what_makes_no_sense_is_one_line(change: dict[str, Any], words: str) -> None:

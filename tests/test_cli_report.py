@@ -175,7 +175,7 @@ def test_a_stopped_report_keeps_what_has_ended_and_goes_on(
     assert (code, said) == (130, "")
     assert "the first of 2 comparisons is in" in err
     assert "stopped: 1 of 2 comparisons are in" in err
-    assert "the same command goes on from there" in err
+    assert "the same command continues from there" in err
     content = json.loads((tmp_path / "out" / "report.json").read_text(encoding="utf-8"))
     assert [item["title"] for item in content["comparisons"]] == ["A claim"]
     assert content["awaited"] == ["Another claim"]

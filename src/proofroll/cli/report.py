@@ -63,7 +63,7 @@ def report(
     Without names it makes those that lie in the folder of studies itself: the main comparisons, and all further studies
     but those on request. The comparisons of folders inside, as mechanisms/pendulum, it leaves out and names. The files
     are there after the first comparison, and are written again now and then, after all of them and after each further
-    study. A report that is stopped (Ctrl-C) keeps what has ended; the same command goes on from there. A study that is
+    study. A report that is stopped (Ctrl-C) keeps what has ended; the same command continues from there. A study that is
     kept and still holds is used as it is; otherwise it is made briefly, as is a comparison that says so, and the report
     names the command that makes it whole. With --budget every comparison is brief first, and grows while there is time;
     no further study begins once it is used. What is left out is named, and the same command goes on. --set is for
@@ -174,7 +174,7 @@ class _Growing:
             if self._ended:
                 self._write()
                 many = f"{len(self._ended)} of {len(self._comparisons)} comparisons are in {self._out / 'report.html'}"
-                options.complain(f"stopped: {many}; the same command goes on from there")
+                options.complain(f"stopped: {many}; the same command continues from there")
             raise
 
     def _write(self) -> None:

@@ -46,7 +46,7 @@ def test_a_ball_in_a_bore_agrees(engine: str, largest: float, bored: Scene) -> N
             "mujoco[formulation=geoms]",
             "contact has the wall bore; this adapter builds convex geoms alone, as facets are another surface",
         ),
-        ("exudyn[formulation=spheres]", "contact has a shape that is no sphere and no plane"),
+        ("exudyn[formulation=spheres]", "contact has a shape that is neither sphere nor plane"),
     ],
 )
 def test_who_has_no_bore_says_so(engine: str, why: str, bored: Scene) -> None:

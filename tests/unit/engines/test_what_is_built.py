@@ -162,7 +162,7 @@ def test_mujoco_contact_of_more_dimensions(formulation: str, condim: int, coeffi
     [
         ("condim=4,cone_correction=true", {}, "cone_correction=true is made for sliding alone; set condim=3"),
         ("formulation=free,preset=tuned,condim=6", {}, "curvature=true is made for sliding alone; set condim=3"),
-        ("condim=6", {"mu_static": 0.35}, "stick and slip could not be told apart; set condim=3"),
+        ("condim=6", {"mu_static": 0.35}, "stick and slip could not be distinguished; set condim=3"),
         ("condim=5", {}, "it must be 3, 4 or 6"),
     ],
 )

@@ -116,7 +116,14 @@ class ReportedVector:
             remainder = np.inf  # most of the difference is in what is left aside
         proof = self.name, self.unit, difference, remainder
         return Cause(
-            f"{kind}.{self.name}", says, *proof, remedy, number, closes=closes, explains=explains, change=change
+            f"{kind}.{self.name}",
+            says,
+            *proof,
+            remedy=remedy,
+            fitted=number,
+            closes=closes,
+            explains=explains,
+            change=change,
         )
 
     def causes(self, step: float | None) -> Iterator[Cause]:

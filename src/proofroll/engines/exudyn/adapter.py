@@ -157,12 +157,12 @@ class Exudyn:
 
         defaults: dict[str, Any] = {}
 
-        def flatten(where: str, values: Mapping[str, Any]) -> None:
+        def flatten(path: str, values: Mapping[str, Any]) -> None:
             for name, value in values.items():
                 if isinstance(value, Mapping):
-                    flatten(f"{where}{name}.", value)
+                    flatten(f"{path}{name}.", value)
                 else:
-                    defaults[where + name] = value.tolist() if hasattr(value, "tolist") else str(value)
+                    defaults[path + name] = value.tolist() if hasattr(value, "tolist") else str(value)
 
         flatten("", exudyn.SimulationSettings().GetDictionary())
         return defaults

@@ -72,8 +72,8 @@ class Carrier(BallRun):
         """
         frame, a = body.surface.frame(body.u0), body.ball.radius
         result = []
-        for along, about, sign in ((1, 2, 1.0), (2, 1, -1.0)):
-            row = local.tangents[along] + sign * a * local.turn[about]
+        for direction, about, sign in ((1, 2, 1.0), (2, 1, -1.0)):
+            row = local.tangents[direction] + sign * a * local.turn[about]
             (columns,) = np.nonzero(np.abs(row) > 1e-12 * np.max(np.abs(row)))
             if len(columns) != 1:
                 raise Refused("rolling along one direction needs both of the carrier's coordinates at once")
@@ -125,14 +125,14 @@ def _joint_axes(generators: tuple[Generator, Generator]) -> tuple[FloatArray, li
     """
     if all(generator.kind == "rotation" for generator in generators):
         raise Refused("one joint cannot guide the carrier about two axes")
-    first, second = (np.asarray(generator.axis) for generator in generators)
-    parallel = bool(abs(first @ second) > 1 - 1e-12)
-    if not parallel and abs(first @ second) > 1e-12:
+    axis_1, axis_2 = (np.asarray(generator.axis) for generator in generators)
+    parallel = bool(abs(axis_1 @ axis_2) > 1 - 1e-12)
+    if not parallel and abs(axis_1 @ axis_2) > 1e-12:
         raise Refused("one joint cannot guide the carrier along skew axes")
-    side = np.eye(3)[np.argmin(np.abs(first))] if parallel else second
-    side = side - (side @ first) * first
+    side = np.eye(3)[np.argmin(np.abs(axis_1))] if parallel else axis_2
+    side = side - (side @ axis_1) * axis_1
     side = side / np.linalg.norm(side)
-    axes = np.stack([np.cross(side, first), side, first], axis=-1)
+    axes = np.stack([np.cross(side, axis_1), side, axis_1], axis=-1)
     constrained = [1] * 6
     for generator, axis in zip(generators, (2, 2 if parallel else 1), strict=True):
         constrained[axis + (3 if generator.kind == "rotation" else 0)] = 0

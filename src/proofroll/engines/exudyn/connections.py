@@ -243,8 +243,8 @@ class Connections:
             torque -= A @ system.GetObjectOutput(made.spring, Output.TorqueLocal)
         return force, torque
 
-    def body(self, name: str, output: Any, at: Array) -> Array:
-        """Exudyn's output variable of a body at the place ``at`` relative to its centre of mass [m], our body axes."""
+    def body(self, name: str, output: Any, place: Array) -> Array:
+        """Exudyn's output variable of a body at a place relative to its centre of mass [m], our body axes."""
         turn, now = self._turns[name], exu.ConfigurationType.Current
-        quantity = np.array(self._system.GetObjectOutputBody(self._bodies[name], output, turn @ at, now))
+        quantity = np.array(self._system.GetObjectOutputBody(self._bodies[name], output, turn @ place, now))
         return (quantity.reshape(3, 3) @ turn).ravel() if output == Output.RotationMatrix else quantity

@@ -61,8 +61,8 @@ class PenaltyContact(BallRun):
         mu = law.mu_kinetic if self.bounded else self._grip
         e1 = body.surface.normal(body.p0)
         slips = bool(np.any(body.slip0))
-        given = slips or body.gap0 > 0
-        force = initial_response(body)[1] if given else newton_euler(body, body.p0, body.v0, body.w0)[2]
+        unsteady = slips or body.gap0 > 0
+        force = initial_response(body)[1] if unsteady else newton_euler(body, body.p0, body.v0, body.w0)[2]
         N = float(-force @ e1)
         if N <= 0 and not body.gap0:
             raise Refused("nothing presses the ball against the wall at time 0, so its contact is not closed")

@@ -123,7 +123,7 @@ def needed_function(body: RollingBall) -> NeededAt:
 
 
 def slip_direction(
-    at: Touch, rate: tuple[float, float], friction: float, beta: float, dt: float, *, inside: bool
+    touch: Touch, rate: tuple[float, float], friction: float, beta: float, dt: float, *, inside: bool
 ) -> tuple[float, float]:
     """Unit direction of slip (e2, e3) that is used throughout the coming step.
 
@@ -133,7 +133,7 @@ def slip_direction(
     the step that brings the ball to rest, it is the one direction in which both components of slip end together.
 
     Args:
-        at: the contact at the start of the step.
+        touch: the contact at the start of the step.
         rate: rate of the needed friction [N/s].
         friction: μk N [N].
         beta: see :func:`mobility`.
@@ -141,30 +141,30 @@ def slip_direction(
         inside: the mean direction inside the step instead of the one at its end.
     """
     later = 0.5 * dt if inside else dt
-    need2, need3 = at.need2 + later * rate[0], at.need3 + later * rate[1]
-    slip, need = at.slip, math.hypot(need2, need3)
+    need2, need3 = touch.need2 + later * rate[0], touch.need3 + later * rate[1]
+    slip, need = touch.slip, math.hypot(need2, need3)
     if slip <= max(AT_REST * dt * beta * need, ROUND_OFF) and need >= friction and need:
         return -need2 / need, -need3 / need
     if slip == 0:
         return 1.0, 0.0  # friction holds the ball in any direction
-    ahead = _time_to_rest(at, need2, need3, friction, beta)
+    ahead = _time_to_rest(touch, need2, need3, friction, beta)
     if ahead > dt:
         x = min(dt * beta * need / slip, 1 / AT_REST)
         ahead = dt * (_mean(x) if inside else _end(x))
-    w2, w3 = at.u2 - ahead * beta * need2, at.u3 - ahead * beta * need3
+    w2, w3 = touch.u2 - ahead * beta * need2, touch.u3 - ahead * beta * need3
     size = math.hypot(w2, w3)
-    if at.u2 * w2 + at.u3 * w3 <= ACROSS * slip * size:
+    if touch.u2 * w2 + touch.u3 * w3 <= ACROSS * slip * size:
         # Friction and need together stop the ball before it is turned around.
-        return at.u2 / slip, at.u3 / slip
+        return touch.u2 / slip, touch.u3 / slip
     return w2 / size, w3 / size
 
 
-def _time_to_rest(at: Touch, need2: float, need3: float, friction: float, beta: float) -> float:
+def _time_to_rest(touch: Touch, need2: float, need3: float, friction: float, beta: float) -> float:
     """Time to rest with a constant direction [s]: smallest τ > 0 with |u - τ β need| = τ β friction; else infinity."""
     # A τ² - 2 B τ + u² = 0, solved for 1/τ, which stays well-defined for A = 0.
     A = beta * beta * (need2 * need2 + need3 * need3 - friction * friction)
-    B = beta * (at.u2 * need2 + at.u3 * need3)
-    u = at.u2 * at.u2 + at.u3 * at.u3
+    B = beta * (touch.u2 * need2 + touch.u3 * need3)
+    u = touch.u2 * touch.u2 + touch.u3 * touch.u3
     discriminant = B * B - A * u
     inverse = (B + math.sqrt(discriminant)) / u if discriminant >= 0 else 0.0
     return 1 / inverse if inverse > 0 else math.inf

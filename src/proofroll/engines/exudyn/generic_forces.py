@@ -28,11 +28,11 @@ def quadratic_terms(body: RollingBall, local: LocalGeometry) -> list[tuple[int, 
     """
     m, J = body.ball.mass, body.ball.inertia
     c = np.zeros((SIZE, SIZE, SIZE))
-    along = base(local)
-    c[:3, 1:3, 1:3] = -m * np.einsum("ir,ijk->rjk", along, local.second)
+    derivatives = base(local)
+    c[:3, 1:3, 1:3] = -m * np.einsum("ir,ijk->rjk", derivatives, local.second)
     for k in range(2):
         turn = local.turn[:, k]
-        c[:3, 0, 1 + k] -= 2 * m * along.T @ np.cross(turn, [1.0, 0.0, 0.0])
+        c[:3, 0, 1 + k] -= 2 * m * derivatives.T @ np.cross(turn, [1.0, 0.0, 0.0])
         c[3:, 1 + k, 3:] -= J * np.cross(turn, np.eye(3)).T
     return [(int(r), int(i), int(j), float(c[r, i, j])) for r, i, j in np.argwhere(np.abs(c) > 0)]
 
@@ -78,7 +78,7 @@ def _written_out(
     sums = [[f"weight[{row}]" if constant is None else repr(constant[row])] for row in range(SIZE)]
     for row, i, j, factor in terms:
         sums[row].append(f"{factor!r} * rates[{i}] * rates[{j}]")
-    text = "lambda rates, weight: [" + ", ".join(" + ".join(each) for each in sums) + "]"
+    text = "lambda rates, weight: [" + ", ".join(" + ".join(summands) for summands in sums) + "]"
     sums_of: Callable[[list[float], list[float] | None], list[float]] = eval(text)
     return sums_of
 
@@ -103,9 +103,9 @@ def weight_function(body: RollingBall, local: LocalGeometry, scaled: FloatArray)
     if len(rotations) > 1:
         raise Refused("gravity along a wall with two rotations is not built")
     axis = np.asarray(local.generators[rotations[0]].axis)
-    along = axis * (axis @ body.gravity)
-    cosine, sine = body.gravity - along, np.cross(axis, body.gravity)
-    steady, with_cosine, with_sine = (scaled.T @ to_local @ part for part in (along, cosine, sine))
+    axial = axis * (axis @ body.gravity)
+    cosine, sine = body.gravity - axial, np.cross(axis, body.gravity)
+    steady, with_cosine, with_sine = (scaled.T @ to_local @ part for part in (axial, cosine, sine))
     column, start = 1 + rotations[0], float(body.u0[rotations[0]])
 
     def weight(q: list[float]) -> list[float]:

@@ -60,10 +60,10 @@ class JointLaws:
         for entry, actuator in enumerate(mechanism.actuators):
             self._add(self._acting(actuator), actuator.joint, field="effort", entry=entry)
         for entry, coupling in enumerate(mechanism.couplings):
-            (first, _), (second, factor) = coupling.terms
-            item = self._coupled([self._coordinate(first), self._coordinate(second)], -factor, coupling.place)
-            self._add(item, first, factor=1.0, field="coupling", entry=entry)
-            self._add(item, second, factor=factor)
+            (follower, _), (leader, factor) = coupling.terms
+            item = self._coupled([self._coordinate(follower), self._coordinate(leader)], -factor, coupling.place)
+            self._add(item, follower, factor=1.0, field="coupling", entry=entry)
+            self._add(item, leader, factor=factor)
         for joint, _, _ in mechanism.prescribed:
             number = mechanism.joint_index[joint.name]
             self._add(self._moved(joint), joint.name, field="drive", entry=number)

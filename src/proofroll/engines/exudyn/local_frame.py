@@ -43,8 +43,10 @@ def local_geometry(surface: Surface, u0: FloatArray) -> LocalGeometry:
     # Two generators that do not commute give a frame that slides along itself but derivatives that change.
     for step in ((0.3, 0.0), (0.0, 0.3), (-0.7, 0.4)):
         elsewhere = _coefficients(surface, generators, u0 + np.asarray(step))
-        for name, one, other in zip(("tangents", "second derivatives", "turn"), at_start, elsewhere, strict=True):
-            if not np.allclose(one, other, rtol=1e-9, atol=1e-12 * float(np.max(np.abs(one)))):
+        for name, values, values_elsewhere in zip(
+            ("tangents", "second derivatives", "turn"), at_start, elsewhere, strict=True
+        ):
+            if not np.allclose(values, values_elsewhere, rtol=1e-9, atol=1e-12 * float(np.max(np.abs(values)))):
                 raise Refused(f"the {name} of the wall change from place to place in the local frame")
     return LocalGeometry(*at_start, generators)
 

@@ -159,8 +159,8 @@ class Redundant(ExudynModel):
             force[number], torque[number] = self._connections.reaction(made)
         pushes = self._laws.pushes()
         for law, push in pushes:
-            along = push * self._connections.axes(self._joints[law.number])[0][:, 2]
-            (force if self._mechanism.joints[law.number].kind == JointKind.PRISMATIC else torque)[law.number] += along
+            vector = push * self._connections.axes(self._joints[law.number])[0][:, 2]
+            (force if self._mechanism.joints[law.number].kind == JointKind.PRISMATIC else torque)[law.number] += vector
         return MechanismSample(
             p_WB=self._over_bodies(Output.Position),
             v_WB=self._over_bodies(Output.Velocity),

@@ -134,15 +134,15 @@ class _Tree:
             position, rotation = np.zeros(3), np.eye(3)
         elif home != NO_BODY:
             parent = self.link[home]
-            before = next(other for other in robot.moving if other.name == home)
+            carrier = next(joint_of_home for joint_of_home in robot.moving if joint_of_home.name == home)
             B = self.turn[home]
-            position, rotation = B.T @ (position - before.child_position), B.T @ rotation
+            position, rotation = B.T @ (position - carrier.child_position), B.T @ rotation
         self.link[joint.name] = start + joint.dofs - 1
-        at, empty = (parent, rotation, position), (0.0, np.zeros(3), np.zeros((3, 3)))
+        frame, empty = (parent, rotation, position), (0.0, np.zeros(3), np.zeros((3, 3)))
         rows: list[tuple[Any, ...]] = []
         for index, kind in enumerate(_CHAINS[joint.kind], start=start):
-            rows.append((kind, *at, *(carried if index == self.link[joint.name] else empty)))
-            at = (index, np.eye(3), np.zeros(3))
+            rows.append((kind, *frame, *(carried if index == self.link[joint.name] else empty)))
+            frame = (index, np.eye(3), np.zeros(3))
         return rows
 
     def state(self, k: int) -> tuple[Array, Array, Array, Array]:

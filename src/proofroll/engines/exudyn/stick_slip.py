@@ -122,8 +122,8 @@ class SwitchedIntegration:
     def _begin_to_slip(self, t: float) -> bool:
         """Stops Exudyn after the step in which the needed friction exceeds the static bound; returns False."""
         if self._earlier is not None:
-            (now, *latest), (before, *earlier) = self._latest, self._earlier
-            self._last_step = self.model.touch(*latest), self.model.touch(*earlier), now - before
+            (now, *latest), (last_time, *earlier) = self._latest, self._earlier
+            self._last_step = self.model.touch(*latest), self.model.touch(*earlier), now - last_time
         self._before, self._before_t = self._state(exu.ConfigurationType.StartOfStep), self.t
         self.state, self.t = self._state(exu.ConfigurationType.Current), t
         self._stopped = True

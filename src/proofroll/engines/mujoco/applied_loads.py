@@ -40,8 +40,8 @@ class AppliedLoads:
         self._balls = [
             (mechanism.joint_index[joint], b, index[b.body_a], index[b.body_b]) for joint, b in balls.items()
         ]
-        own = {bushing.name for bushing in balls.values()}
-        self._bushings = [(b, index[b.body_a], index[b.body_b]) for b in mechanism.bushings if b.name not in own]
+        native = {bushing.name for bushing in balls.values()}
+        self._bushings = [(b, index[b.body_a], index[b.body_b]) for b in mechanism.bushings if b.name not in native]
         self._forces = [(force, index[force.body], index[force.reaction]) for force in mechanism.forces]
         self.any = bool(self._springs or self._bushings or self._forces)
 
@@ -53,8 +53,8 @@ class AppliedLoads:
                 self._point(data, *end) for end in ((a, spring.position_a), (b, spring.position_b))
             )
             length = float(np.linalg.norm(place_b - place_a))
-            along = (place_b - place_a) / length
-            pull = law.pull(length, float(along @ (velocity_b - velocity_a))) * along
+            direction = (place_b - place_a) / length
+            pull = law.pull(length, float(direction @ (velocity_b - velocity_a))) * direction
             _add(data, a, place_a, pull)
             _add(data, b, place_b, -pull)
         for bushing, a, b in self._bushings:

@@ -33,12 +33,12 @@ def _velocities(mechanism: Mechanism, model: Any) -> tuple[Array, Array]:
     """Derivative of MuJoCo's velocities by the tree's, (nv, nv), and their rate at constant velocities of the tree."""
     T, still = np.zeros((model.nv, mechanism.nv)), np.zeros(model.nv)
     q, v = mechanism.start()
-    for joint, at_q, at in zip(mechanism.joints, mechanism.q_slices, mechanism.v_slices, strict=True):
+    for joint, at_q, columns in zip(mechanism.joints, mechanism.q_slices, mechanism.v_slices, strict=True):
         parts = [model.joint(name) for name in mechanism_model.part_names(joint)]
         if not parts:
             continue
-        first = int(parts[0].dofadr[0])
-        T[first : first + joint.nv, at] = np.eye(joint.nv)
+        dof = int(parts[0].dofadr[0])
+        T[dof : dof + joint.nv, columns] = np.eye(joint.nv)
         if joint.kind != JointKind.FREE:
             continue
         R = child_in_parent(joint.kind, q[at_q])[1]
@@ -46,8 +46,8 @@ def _velocities(mechanism: Mechanism, model: Any) -> tuple[Array, Array]:
         if len(parts) == 1:  # velocity of the origin of the body's frame in the world
             R = joint.parent_frame @ R
             arm = R @ joint.child_position
-        linear, turning = R @ v[at][:3], R @ v[at][3:]
-        T[first : first + 3, at.start : at.start + 3] = R
-        T[first : first + 3, at.start + 3 : at.stop] = skews(arm[None])[0] @ R
-        still[first : first + 3] = cross(turning, linear - cross(turning, arm))
+        linear, turning = R @ v[columns][:3], R @ v[columns][3:]
+        T[dof : dof + 3, columns.start : columns.start + 3] = R
+        T[dof : dof + 3, columns.start + 3 : columns.stop] = skews(arm[None])[0] @ R
+        still[dof : dof + 3] = cross(turning, linear - cross(turning, arm))
     return T, still

@@ -93,7 +93,7 @@ class MujocoMechanism(SteppedModel):
             equality = self._model.equality(mechanism_model.motion_name(joint)).id
             equalities[equality] = "drive", mechanism.joint_index[joint.name]
         single = {self._model.joint(joint.name).id: k for k, joint in enumerate(mechanism.joints) if joint.nq == 1}
-        dofs = {int(self._model.jnt_dofadr[own]): k for own, k in single.items()}
+        dofs = {int(self._model.jnt_dofadr[joint_id]): k for joint_id, k in single.items()}
         self._numbers = single, dofs, equalities
         self._armature = self._model.dof_armature.copy()
         extra = mechanism_model.damping_armatures(mechanism, settings)
@@ -151,10 +151,10 @@ class MujocoMechanism(SteppedModel):
         elif joint.kind == JointKind.FREE:
             v = np.concatenate([child_in_parent(joint.kind, q)[1] @ v[:3], v[3:]])
         self._data.qpos[parts[0].qposadr[0] :][: len(q)] = q
-        first = parts[0].dofadr[0]
-        self._data.qvel[first : first + len(v)] = v
+        dof = parts[0].dofadr[0]
+        self._data.qvel[dof : dof + len(v)] = v
         if joint.torque and not varies(joint.torque):
-            self._data.qfrc_applied[first] = joint.torque
+            self._data.qfrc_applied[dof] = joint.torque
 
     def _run(self, steps: int) -> None:
         """Makes ``steps`` steps; sets changing drives and targets before each, with RK4 before each of its stages.
@@ -207,7 +207,7 @@ class MujocoMechanism(SteppedModel):
         for row, body in zip(twists, self._bodies, strict=True):
             mujoco.mj_objectVelocity(self._model, data, mujoco.mjtObj.mjOBJ_XBODY, body, row, 0)
         force, torque = self._reactions(data)
-        along = self._along(data) if self._named else {}
+        by_law = self._along(data) if self._named else {}
         return MechanismSample(
             p_WB=data.xpos[self._bodies],
             v_WB=twists[:, 3:],
@@ -215,7 +215,7 @@ class MujocoMechanism(SteppedModel):
             q_WB=data.xquat[self._bodies],
             joint_force=force,
             joint_torque=torque,
-            **along,
+            **by_law,
         )
 
     def _along(self, data: Any) -> dict[str, Array]:
@@ -225,16 +225,16 @@ class MujocoMechanism(SteppedModel):
         held = {"coupling": np.zeros(len(self._mechanism.couplings)), "drive": np.full(len(friction), np.nan)}
         kinds = data.efc_type[: data.nefc].tolist()
         rows = self._rows(data, data.nefc) if kinds else None
-        for row, (kind, own) in enumerate(zip(kinds, data.efc_id[: data.nefc].tolist(), strict=True)):
+        for row, (kind, item_id) in enumerate(zip(kinds, data.efc_id[: data.nefc].tolist(), strict=True)):
             force = float(data.efc_force[row])
-            if kind == _ROW.mjCNSTR_EQUALITY and own in equalities:
-                field, number = equalities[own]
+            if kind == _ROW.mjCNSTR_EQUALITY and item_id in equalities:
+                field, number = equalities[item_id]
                 held[field][number] = force
-            elif kind == _ROW.mjCNSTR_FRICTION_DOF and own in dofs:
-                friction[dofs[own]] = force
-            elif kind == _ROW.mjCNSTR_LIMIT_JOINT and own in single and rows is not None:
+            elif kind == _ROW.mjCNSTR_FRICTION_DOF and item_id in dofs:
+                friction[dofs[item_id]] = force
+            elif kind == _ROW.mjCNSTR_LIMIT_JOINT and item_id in single and rows is not None:
                 # a stop pushes up where the coordinate has a positive sign in its row
-                stop[single[own]] += force * float(np.sign(rows[row, int(model.jnt_dofadr[own])]))
+                stop[single[item_id]] += force * float(np.sign(rows[row, int(model.jnt_dofadr[item_id])]))
         return {"effort": data.actuator_force * self._gears, **held, "friction": friction, "stop": stop}
 
     def _reactions(self, data: Any) -> tuple[Array, Array]:
@@ -247,7 +247,7 @@ class MujocoMechanism(SteppedModel):
         count = len(self._mechanism.joints)
         for number, site in enumerate(self._sites):
             R = data.site_xmat[site].reshape(3, 3)
-            force[number], torque[number] = (R @ data.sensordata[at : at + 3] for at in self._sensors[number])
+            force[number], torque[number] = (R @ data.sensordata[place : place + 3] for place in self._sensors[number])
         self._loads.take_springs(data, torque)
         rows = {int(data.efc_id[row]): row for row in reversed(range(data.ne))}  # first row of each constraint
         for number, loop in enumerate(self._mechanism.loops):
@@ -256,9 +256,9 @@ class MujocoMechanism(SteppedModel):
             force[count + number] = torque[count + number] = 0.0
             origin = data.site(f"loop{number}b0").xpos
             if loop.kind == DISTANCE:
-                along = origin - data.site(f"loop{number}a0").xpos
+                strut = origin - data.site(f"loop{number}a0").xpos
                 equality = mujoco.mj_name2id(self._model, mujoco.mjtObj.mjOBJ_EQUALITY, f"loop{number}.0")
-                force[count + number] = data.efc_force[rows[equality]] * along / np.linalg.norm(along)
+                force[count + number] = data.efc_force[rows[equality]] * strut / np.linalg.norm(strut)
                 continue
             for point in range(2):
                 equality = mujoco.mj_name2id(self._model, mujoco.mjtObj.mjOBJ_EQUALITY, f"loop{number}.{point}")
@@ -345,8 +345,8 @@ class MujocoMechanism(SteppedModel):
             regularised[name] = Regularised(_MARGIN * difference + DEPENDENT, because)
         if self._mechanism.couplings or self._mechanism.prescribed:
             hard_forces = self._forces(data)
-            along = [np.abs(hard_forces[name]).max() for name in ("couplings", "drives") if name in hard_forces]
-            least = DEPENDENT * float(max(along)) or 1.0
+            law_sizes = [np.abs(hard_forces[name]).max() for name in ("couplings", "drives") if name in hard_forces]
+            least = DEPENDENT * float(max(law_sizes)) or 1.0
             for name, hard in hard_forces.items():
                 difference = float(np.nanmax(np.abs(hard - forces[name])))
                 size = max(float(np.nanmax(np.abs(hard))), least)
@@ -360,12 +360,13 @@ class MujocoMechanism(SteppedModel):
         mujoco.mj_sensorAcc(self._model, data)
         self._model.opt.disableflags |= _NO_SENSORS
         force, torque = self._reactions(data)
-        along, driven = (
+        by_law, driven = (
             self._along(data),
             [self._mechanism.joint_index[k.name] for k, _, _ in self._mechanism.prescribed],
         )
-        found = {"forces": force, "torques": torque, "couplings": along["coupling"], "drives": along["drive"][driven]}
-        return {name: values for name, values in found.items() if values.size}
+        couplings, drives = by_law["coupling"], by_law["drive"][driven]
+        forces = {"forces": force, "torques": torque, "couplings": couplings, "drives": drives}
+        return {name: values for name, values in forces.items() if values.size}
 
     def _evaluate(self, data: Any) -> None:
         self._drive_at_pose(data)

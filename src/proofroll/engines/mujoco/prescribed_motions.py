@@ -38,8 +38,8 @@ class PrescribedMotions:
                 place, rate, acceleration = (float(part) for part in moved(signal, time))
             else:
                 h = option.timestep
-                before, place, after = (float(moved(signal, time + part * h).place) for part in (-1, 0, 1))
-                rate, acceleration = (place - before) / h, (after - 2 * place + before) / h**2
+                last_place, place, next_place = (float(moved(signal, time + part * h).place) for part in (-1, 0, 1))
+                rate, acceleration = (place - last_place) / h, (next_place - 2 * place + last_place) / h**2
             self._model.eq_data[equality, 0] = place + self._lead(equality, rate, acceleration)
 
     def apply_in_step(self, data: Any) -> None:

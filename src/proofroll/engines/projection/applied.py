@@ -192,8 +192,8 @@ class Applied:
         """Angle [rad], on the branch nearest to the last accepted one, or distance [m]."""
         A, B = ends.A[law.connection], ends.B[law.connection]
         if law.axis == "slide":
-            along: float = A[:, 2] @ ends.d[law.connection]
-            return along
+            slide: float = A[:, 2] @ ends.d[law.connection]
+            return slide
         if law.axis == "z":
             angle = math.atan2(B[:, 0] @ A[:, 1], B[:, 0] @ A[:, 0])
         else:

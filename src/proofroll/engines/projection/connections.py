@@ -172,8 +172,8 @@ class Constraints:
         """Rows at one state."""
         i, j, points = self._point, self._angle, self.points
         n, x, y = ends.A[i, :, self._axis], ends.A[j, :, self._x], ends.B[j, :, self._y]
-        along = ends.d[i[self._struts]]
-        n[self._struts] = along / np.sqrt((along * along).sum(1))[:, None]
+        strut = ends.d[i[self._struts]]
+        n[self._struts] = strut / np.sqrt((strut * strut).sum(1))[:, None]
         t = cross(y, x)
         force, torque = np.zeros((2, len(self.owner), 3), dtype=n.dtype)
         force[:points], torque[points:] = n, t
@@ -206,9 +206,9 @@ class Constraints:
         of_points = (rows.force[:points] * cross(w, ends.e)[self._point]).sum(1)
         if len(self._struts):
             number = self._point[self._struts]
-            e, along = ends.e[number], ends.d[number]
+            e, strut = ends.e[number], ends.d[number]
             across = (e * e).sum(1) - (rows.force[self._struts] * e).sum(1) ** 2
-            of_points[self._struts] += across / np.sqrt((along * along).sum(1))
+            of_points[self._struts] += across / np.sqrt((strut * strut).sum(1))
         wx, wy = (turning * rows.x).sum(1), (turning * rows.y).sum(1)
         return np.concatenate([of_points, wx * wy - (turning * turning).sum(1) * rows.residual[points:]])
 

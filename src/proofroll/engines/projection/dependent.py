@@ -132,14 +132,14 @@ class DependentCoordinates:
         r, q, v, w = self.parts(x)
         origin, R = self._mean @ r, rotations(q)
         back = R.swapaxes(1, 2)
-        pose, inverse, own = np.zeros((3, n + 1, 4, 4), dtype=x.dtype)
+        pose, inverse, twist = np.zeros((3, n + 1, 4, 4), dtype=x.dtype)
         pose[:n, :3, :3], pose[:n, :3, 3], pose[n, :3, :3], pose[n, :3, 3] = R, r - origin, np.eye(3), -origin
         pose[:, 3, 3] = inverse[:, 3, 3] = 1.0
         inverse[:, :3, :3] = pose[:, :3, :3].swapaxes(1, 2)
         inverse[:, :3, 3:] = -inverse[:, :3, :3] @ pose[:, :3, 3:]
-        own[:n, :3, :3] = (w @ SKEW).reshape(n, 3, 3)
-        own[:n, :3, 3:] = back @ v[:, :, None]
-        return Bodies(pose=pose, inverse=inverse, own=own, twist=pose @ own @ inverse, origin=origin)
+        twist[:n, :3, :3] = (w @ SKEW).reshape(n, 3, 3)
+        twist[:n, :3, 3:] = back @ v[:, :, None]
+        return Bodies(pose=pose, inverse=inverse, own=twist, twist=pose @ twist @ inverse, origin=origin)
 
     def solve(
         self, x: Array, drives: Array | float = 0.0, closing: Closing | None = None, held: Sequence[int] = ()
@@ -154,8 +154,8 @@ class DependentCoordinates:
             held: indices of velocities that do not change.
         """
         bodies, joints = self.bodies(x), self._joints
-        pose, inverse, own = bodies.pose[:-1], bodies.inverse[:-1], bodies.own[:-1]
-        bent = own @ own
+        pose, inverse, twist = bodies.pose[:-1], bodies.inverse[:-1], bodies.own[:-1]
+        bent = twist @ twist
         bent[:, :3, 3:] -= inverse[:, :3, :3] @ self.gravity[:, None]
         of_a, of_b = bodies.twist[self.connections.a], bodies.twist[self.connections.b]
         # rates of relative twists that are constant in body a
@@ -175,10 +175,10 @@ class DependentCoordinates:
             rows = self._loop_rows.at(ends)
             drift = self._loop_rows.bending(ends, rows)
             drift -= (rows.form * still[joints:][self._loop_rows.owner]).sum(1)
-            wanted = self._with_zeros(-drift, held)
+            row_rates = self._with_zeros(-drift, held)
             for row, (_, signal) in zip(range(*self.moved.indices(self.coupled)), self._moved, strict=True):
-                wanted[row] = moved(signal, self.applied.now).acceleration
-            closing = partial(self._closed, rows, wanted, held)
+                row_rates[row] = moved(signal, self.applied.now).acceleration
+            closing = partial(self._closed, rows, row_rates, held)
         motions, velocities, multipliers = self.tree.motions(bodies, relative, loads, closing)
         rates = inverse @ motions[..., :-1, :, :] @ pose
         linear = (pose @ (rates + bent))[..., :3, 3] + self.gravity
@@ -198,10 +198,10 @@ class DependentCoordinates:
         return np.concatenate([of_loops, np.zeros((*of_loops.shape[:-1], more))], axis=-1) if more else of_loops
 
     def _closed(
-        self, rows: ConnectionRows, wanted: Array, held: Sequence[int], space: Space, given: Array, push: Array
+        self, rows: ConnectionRows, row_rates: Array, held: Sequence[int], space: Space, free: Array, push: Array
     ) -> Any:
-        """Velocities (…, nv) and multipliers that give the rows the rates ``wanted``, (…, rows)."""
-        flat = given.reshape(*given.shape[:-2], 16)
+        """Velocities (…, nv) and multipliers that give the rows the rates ``row_rates``, (…, rows)."""
+        flat = free.reshape(*free.shape[:-2], 16)
         C = rows.form @ space.S.T * self._between
         of_given = (rows.form * (flat[..., self._loop_b, :] - flat[..., self._loop_a, :])).sum(-1)
         if self.coupled > self.loop_rows or held:
@@ -211,7 +211,7 @@ class DependentCoordinates:
             self.regularity = split.least
         elif split.least < DEPENDENT:
             raise Refused(REDUNDANT)
-        velocities, multipliers = split(push.T, np.broadcast_to(wanted - of_given, (*push.shape[:-1], len(C))).T)
+        velocities, multipliers = split(push.T, np.broadcast_to(row_rates - of_given, (*push.shape[:-1], len(C))).T)
         return velocities.T, multipliers.T
 
     def responses(self, x: Array, drives: Array, at: Sequence[int]) -> tuple[Array, Array]:
@@ -240,12 +240,14 @@ class DependentCoordinates:
 
     def _apart(self, bodies: Bodies) -> Array:
         """Violations of couplings and motions in coordinates and in velocities, (2, couplings + motions)."""
-        at = self.applied.watched(self.connections.ends(bodies, slice(0, self._joints)))
+        coordinates = self.applied.watched(self.connections.ends(bodies, slice(0, self._joints)))
         violations = [
-            factors @ np.array([at[joint] for joint in joints]) - (place, 0.0)
+            factors @ np.array([coordinates[joint] for joint in joints]) - (place, 0.0)
             for joints, factors, place in self._couplings
         ]
-        violations += [np.array(at[joint]) - moved(signal, self.applied.now)[:2] for joint, signal in self._moved]
+        violations += [
+            np.array(coordinates[joint]) - moved(signal, self.applied.now)[:2] for joint, signal in self._moved
+        ]
         return np.transpose(violations)
 
     def rates(self, x: Array, drives: Array | float = 0.0, held: Sequence[int] = ()) -> Array:
@@ -268,10 +270,10 @@ class DependentCoordinates:
         relative = -self._joint_rows.twists(rows, np.stack([rows.residual, rows.rate]))
         if self._locked or held:
             rows = self._loop_rows.at(self.connections.ends(bodies, self._loops_at))
-            wanted = self._with_zeros(-np.stack([rows.residual, rows.rate]), held)
+            corrections = self._with_zeros(-np.stack([rows.residual, rows.rate]), held)
             if len(self._geared):
-                wanted[:, self.loop_rows : self.coupled] = -self._apart(bodies)
-            closing = partial(self._closed, rows, wanted, held)
+                corrections[:, self.loop_rows : self.coupled] = -self._apart(bodies)
+            closing = partial(self._closed, rows, corrections, held)
         motion = self.tree.motions(bodies, relative, Loads(), closing)[0][:, :-1]
         pose, inverse = bodies.pose[:-1], bodies.inverse[:-1]
         linear = (motion @ pose[:, :, 3:])[:, :, :3, 0]
@@ -302,9 +304,9 @@ class DependentCoordinates:
             np.add.at(pulls, self._loop_a, -on_b)
             forces -= pulls[:-1]
         total = (self.tree.behind @ forces.reshape(-1, 16)).reshape(-1, 4, 4)
-        at = slice(0, self._joints)
-        force[at] = total[:, :3, 3]
-        torque[at] = total[:, :3, :3].reshape(-1, 9) @ SKEW.T - cross(ends.place[at], force[at])
+        joints = slice(0, self._joints)
+        force[joints] = total[:, :3, 3]
+        torque[joints] = total[:, :3, :3].reshape(-1, 9) @ SKEW.T - cross(ends.place[joints], force[joints])
         return force, torque
 
     def efforts(self, bodies: Bodies) -> Array:

@@ -43,7 +43,7 @@ class Recursion(Elimination):
         if isinstance(loads.bent, np.ndarray):
             pushes[...] = _moments(loads.pulls - self.forces(bodies, loads.bent))
         drives = np.zeros(len(S)) + loads.drives
-        inertia = [_spatial(one) for one in self.inertia(bodies)]
+        inertia = [_spatial(body_inertia) for body_inertia in self.inertia(bodies)]
         parts: list[tuple[Array, Array]] = [(S[0], S[0])] * len(S)
         for number in reversed(range(len(self._child))):
             body, parent = self._child[number], self._parent[number]

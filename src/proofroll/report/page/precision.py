@@ -110,12 +110,17 @@ def _point(
     )
     verdict = max((line.verdict for line in lines if line.verdict), key=lambda x: _SEVERITY.get(x, 0), default="")
     return PrecisionPoint(
-        step(lines[0].resolution or None, lines[0].step),
-        _short(max(costs)),
-        all(line.clean for line in lines),
-        verdict,
-        *([None if x is None else _short(x) if math.isfinite(x) else 1e300 for x in sizes] for sizes in (errors, held)),
+        step=step(lines[0].resolution or None, lines[0].step),
+        cost=_short(max(costs)),
+        clean=all(line.clean for line in lines),
+        verdict=verdict,
+        errors=_shown(errors),
+        held=_shown(held),
     )
+
+
+def _shown(sizes: Sequence[float | None]) -> list[float | None]:
+    return [None if size is None else _short(size) if math.isfinite(size) else 1e300 for size in sizes]
 
 
 def _short(value: float) -> float:

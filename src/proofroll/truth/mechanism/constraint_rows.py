@@ -165,7 +165,8 @@ class ConstraintRows:
                 for index, entry in enumerate(entries, self._u_slices[body].start):
                     if not is_zero(entry):
                         coefficients[index] = entry
-        return ConstraintRow(residual, coefficients, bias, number, *at_joint)
+        force, torque = at_joint
+        return ConstraintRow(residual, coefficients, bias, number, force=force, torque=torque)
 
 
 def speed_at(view: BodyInScalars, arm: Sequence[Scalar]) -> list[Scalar]:

@@ -98,22 +98,22 @@ def check_start(first: JointCoordinates, second: MaximalCoordinates, unit: float
         )
 
 
-def on_same_turns(mechanism: Mechanism, guide: Record, other: Record) -> Record:
+def on_same_turns(mechanism: Mechanism, guide: Record, record: Record) -> Record:
     """Record with quaternions of the same sign and angles on the same turn as in ``guide``."""
-    q_WB = _same_sign(guide.q_WB, other.q_WB)
-    q = other.q.copy()
-    for joint, at in zip(mechanism.joints, mechanism.q_slices, strict=True):
+    q_WB = _same_sign(guide.q_WB, record.q_WB)
+    q = record.q.copy()
+    for joint, columns in zip(mechanism.joints, mechanism.q_slices, strict=True):
         if joint.kind in WITH_QUATERNION:
-            quaternion = slice(at.stop - 4, at.stop)
+            quaternion = slice(columns.stop - 4, columns.stop)
             q[:, quaternion] = _same_sign(guide.q[:, quaternion], q[:, quaternion])
         elif joint.kind in {JointKind.REVOLUTE, JointKind.CYLINDRICAL, JointKind.UNIVERSAL, JointKind.PLANAR}:
-            angles = at if joint.kind == JointKind.UNIVERSAL else slice(at.stop - 1, at.stop)
+            angles = columns if joint.kind == JointKind.UNIVERSAL else slice(columns.stop - 1, columns.stop)
             q[:, angles] += 2 * np.pi * np.round((guide.q[:, angles] - q[:, angles]) / (2 * np.pi))
-    return replace(other, q_WB=q_WB, q=q)
+    return replace(record, q_WB=q_WB, q=q)
 
 
-def _same_sign(best: Array, other: Array) -> Array:
-    return np.where((best * other).sum(axis=-1, keepdims=True) < 0, -other, other)
+def _same_sign(best: Array, quaternions: Array) -> Array:
+    return np.where((best * quaternions).sum(axis=-1, keepdims=True) < 0, -quaternions, quaternions)
 
 
 def largest(values: Array) -> Array:

@@ -168,12 +168,12 @@ def placed_bodies(mechanism: Mechanism, at_zero: bool = False) -> dict[str, Body
         v = np.zeros(joint.nv) if at_zero else np.array(joint.v0)
         # in the axes of A turned to the child's at q = 0
         shift, turn, slide, spin = _moved(joint, q, v)
-        at = parent.R.apply(joint.position) + frame.apply(shift)
+        arm_on_parent = parent.R.apply(joint.position) + frame.apply(shift)
         R = frame * turn
         w = parent.w + frame.apply(spin)
         arm = -R.apply(joint.child_position)
-        v_joint = parent.v + np.cross(parent.w, at) + frame.apply(slide)
-        placed[joint.child] = BodyStart(parent.p + at + arm, R, v_joint + np.cross(w, arm), w)
+        v_joint = parent.v + np.cross(parent.w, arm_on_parent) + frame.apply(slide)
+        placed[joint.child] = BodyStart(parent.p + arm_on_parent + arm, R, v_joint + np.cross(w, arm), w)
     return placed
 
 
@@ -187,8 +187,8 @@ def _moved(joint: Joint, q: Array, v: Array) -> tuple[Array, Rotation, Array, Ar
         angle, spin = (0.0, 0.0) if joint.kind == JointKind.PRISMATIC else (q[1], v[1])
         return q[0] * e3, Rotation.from_rotvec(angle * e3), v[0] * e3, spin * e3
     if joint.kind == JointKind.UNIVERSAL:
-        first = Rotation.from_rotvec(q[0] * e3)
-        return none, first * Rotation.from_rotvec(q[1] * e1), none, v[0] * e3 + v[1] * first.apply(e1)
+        first_turn = Rotation.from_rotvec(q[0] * e3)
+        return none, first_turn * Rotation.from_rotvec(q[1] * e1), none, v[0] * e3 + v[1] * first_turn.apply(e1)
     if joint.kind == JointKind.PLANAR:
         return q[0] * e1 + q[1] * e2, Rotation.from_rotvec(q[2] * e3), v[0] * e1 + v[1] * e2, v[2] * e3
     if joint.kind == JointKind.FIXED:

@@ -178,9 +178,9 @@ class NumericEquations:
     def normalised(self, state: Array) -> Array:
         """State with quaternions of unit length."""
         state = state.copy()
-        for body, at in zip(self.equations.bodies, self.equations.x_slices, strict=True):
+        for body, part in zip(self.equations.bodies, self.equations.x_slices, strict=True):
             if body.nx == 7:
-                state[at][3:] /= np.linalg.norm(state[at][3:])
+                state[part][3:] /= np.linalg.norm(state[part][3:])
         return state
 
     def rate(self, time: float, state: Array) -> Array:

@@ -115,22 +115,22 @@ class Units(NamedTuple):
             return Table(self._valued(value.times, "s"), self._valued(value.values, unit), value.hold)
         return value / self.size(unit)
 
-    def record(self, mechanism: Mechanism, own: Record) -> Record:
+    def record(self, mechanism: Mechanism, natural: Record) -> Record:
         """Record in SI units, from one in these units; ``mechanism`` is in SI units."""
         moment = self.force * self.length
         q, v = (np.array(self._along(mechanism, name)) for name in ("q0", "v0"))
         named = [self.force if item.unit == "N" else moment for item in named_forces(mechanism)]
         return Record(
-            time=own.time * self.time,
-            p_WB=own.p_WB * self.length,
-            v_WB=own.v_WB * (self.length / self.time),
-            q_WB=own.q_WB,
-            w_WB=own.w_WB / self.time,
-            q=own.q * q[: own.q.shape[1]],
-            v=own.v * v[: own.v.shape[1]],
-            wrench=own.wrench * np.repeat([self.force, moment], 3),
-            named=own.named * np.array(named[: own.named.shape[1]]),
-            residual=own.residual,
+            time=natural.time * self.time,
+            p_WB=natural.p_WB * self.length,
+            v_WB=natural.v_WB * (self.length / self.time),
+            q_WB=natural.q_WB,
+            w_WB=natural.w_WB / self.time,
+            q=natural.q * q[: natural.q.shape[1]],
+            v=natural.v * v[: natural.v.shape[1]],
+            wrench=natural.wrench * np.repeat([self.force, moment], 3),
+            named=natural.named * np.array(named[: natural.named.shape[1]]),
+            residual=natural.residual,
         )
 
     @contextmanager
@@ -147,11 +147,11 @@ class Units(NamedTuple):
 
     def _along(self, mechanism: Mechanism, name: str) -> list[float]:
         """Units of all coordinates (``q0``) or velocities (``v0``) of a mechanism's tree."""
-        found: list[float] = []
+        sizes: list[float] = []
         for joint in mechanism.joints:
             unit, count = units_of_kind(Joint, joint.kind)[name], len(getattr(joint, name))
-            found += map(self.size, (unit,) * count if isinstance(unit, str) else unit)
-        return found
+            sizes += map(self.size, (unit,) * count if isinstance(unit, str) else unit)
+        return sizes
 
 
 def natural_units(mechanism: Mechanism) -> Units:

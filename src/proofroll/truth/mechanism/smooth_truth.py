@@ -134,9 +134,9 @@ def _singular(mechanism: Mechanism, until: float) -> str:
     return f" ({clause})" if clause else ""
 
 
-def _apart(one: Record, two: Record) -> Array:
+def _apart(record: Record, second: Record) -> Array:
     """Largest difference of two motions at each time, in positions [m] and quaternions [1]."""
-    return np.maximum(largest(one.p_WB - two.p_WB), largest(one.q_WB - two.q_WB))
+    return np.maximum(largest(record.p_WB - second.p_WB), largest(record.q_WB - second.q_WB))
 
 
 def _check_branch(one: Record, precise: Record, chaotic: NDArray[np.bool_]) -> None:
@@ -189,10 +189,12 @@ def _check_limits(mechanism: Mechanism, record: Record) -> None:
     Raises:
         Refused: a joint does.
     """
-    for joint, at in zip(mechanism.joints, mechanism.q_slices, strict=True):
+    for joint, columns in zip(mechanism.joints, mechanism.q_slices, strict=True):
         if joint.limits is not None:
             low, high = joint.limits[0] - AT_LIMIT, joint.limits[1] + AT_LIMIT
-            beyond = np.flatnonzero((record.q[:, at] < low).any(axis=1) | (record.q[:, at] > high).any(axis=1))
+            beyond = np.flatnonzero(
+                (record.q[:, columns] < low).any(axis=1) | (record.q[:, columns] > high).any(axis=1)
+            )
             if len(beyond):
                 time = record.time[beyond[0]]
                 raise Refused(f"joint {joint.name} passes its limit before t = {time:.6g} s; no route follows a stop")

@@ -89,15 +89,15 @@ def _rates(lean: NumericEquations) -> Callable[[Array], Array]:
     try:
         return compiled_rates(lean.equations, lean.independent_rows())
     except Missing:
-        return lambda states: np.array([lean.rate(each[-1], each[:-1]) for each in states])
+        return lambda states: np.array([lean.rate(state[-1], state[:-1]) for state in states])
 
 
 def _jacobian(rates: Callable[[Array], Array], states: Array) -> Array:
     """Jacobians of the rates, (stages, n) -> (stages, n, n): seven digits suffice for Newton's method."""
     stages, n = states.shape
     near = (states[:, None] + _NEAR * np.concatenate([np.zeros((1, n)), np.eye(n)])).reshape(-1, n)
-    found = rates(near).reshape(stages, n + 1, -1)
-    return np.asarray((found[:, 1:] - found[:, :1]).transpose(0, 2, 1) / _NEAR)
+    stacked = rates(near).reshape(stages, n + 1, -1)
+    return np.asarray((stacked[:, 1:] - stacked[:, :1]).transpose(0, 2, 1) / _NEAR)
 
 
 def _collocated(
@@ -112,7 +112,7 @@ def _collocated(
     state, now, end = np.append(start, 0.0), 0.0, float(times[-1])
     speed = float(np.abs(with_time(state[None])).max())
     length, last = 1e-3 / max(1.0, speed), None
-    found = [np.repeat(start[None], np.count_nonzero(times <= 0.0), axis=0)]
+    parts = [np.repeat(start[None], np.count_nonzero(times <= 0.0), axis=0)]
     while now < end:
         length = min(length, end - now)
         if now + length == now:
@@ -120,15 +120,15 @@ def _collocated(
         scaled = replace(system, scale=np.maximum(1.0, np.abs(state)))
         step = take(scaled, now, state, length, _guess(system, last, now, state, length))
         error, alone = by_states(step, scaled.scale)
-        wanted = next_length(replace(step, error=max(alone, error if error > tolerance else 0.0)), tolerance)
+        next_step = next_length(replace(step, error=max(alone, error if error > tolerance else 0.0)), tolerance)
         if error > tolerance:
-            length, last = min(wanted, 0.8 * length), last if np.isfinite(error) else None
+            length, last = min(next_step, 0.8 * length), last if np.isfinite(error) else None
             continue
         reached = end if length == end - now else now + length
-        found.append(step(times[(times > now) & (times <= reached)])[:, :-1])
-        now, last, length = reached, step, wanted
+        parts.append(step(times[(times > now) & (times <= reached)])[:, :-1])
+        now, last, length = reached, step, next_step
         state = np.append(corrected(step.last[:-1]), now)
-    return np.concatenate(found)
+    return np.concatenate(parts)
 
 
 def _guess(system: System, last: Step | None, now: float, state: Array, length: float) -> Array:
