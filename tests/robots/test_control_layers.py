@@ -15,6 +15,7 @@ from robot_templates import urdf
 
 from proofroll.elements.mechanism.bookkeeping.air import Scheme
 from proofroll.elements.mechanism.bookkeeping.law import ControlLaw
+from proofroll.elements.mechanism.bookkeeping.mistakes import IMPLICIT
 from proofroll.robots.control_layers import record_layers
 from proofroll.robots.controlled import ControlledScenes
 
@@ -89,6 +90,29 @@ def test_implicit_damping_is_no_armature() -> None:
     armed = LAW.change(armature=LAW.armature + 2e-3 * LAW.kd)
     layers = record_layers(recorded(ROBOT, armed, LAW, step=1e-3), LAW, ROBOT, grounded=False)
     assert [item.id for item in next(layer for layer in layers if not layer.holds).causes][:1] == ["armature"]
+
+
+def test_implicit_damping_and_an_armature_are_named_together() -> None:
+    """Where no effort is clamped, one step cannot tell implicit kd from an armature h kd: both are named."""
+    law = LAW.change(limit=np.full(len(LAW.joints), 100.0))
+    armed = law.change(armature=law.armature + 1e-3 * law.kd)
+    for wrong, scheme in ((law, "implicit"), (armed, "explicit")):
+        layer = record_layers(recorded(ROBOT, wrong, law, scheme=scheme), law, ROBOT, grounded=False)[-1]  # type: ignore[arg-type]
+        assert (layer.name, layer.holds, layer.reason) == ("acceleration", True, IMPLICIT)
+    layer = record_layers(recorded(ROBOT, armed, law, step=2e-3, count=50), law, ROBOT, grounded=False)[-1]
+    assert [item.id for item in layer.causes] == ["armature"]
+    clamped = record_layers(recorded(ROBOT, LAW, LAW, scheme="implicit"), LAW, ROBOT, grounded=False)[-1]
+    assert clamped.holds
+    assert not clamped.reason
+
+
+def test_efforts_that_hold_between_instants() -> None:
+    """A record whose efforts hold between instants holds in every layer, and breaks at the effort otherwise."""
+    held = LAW.change(hold_effort=True)
+    record = recorded(ROBOT, held, LAW)
+    assert all(layer.holds for layer in record_layers(record, held, ROBOT, grounded=False))
+    layers = record_layers(record, LAW, ROBOT, grounded=False)
+    assert next(layer for layer in layers if not layer.holds).name == "effort"
 
 
 CONTROL = """rate = 50
@@ -177,6 +201,15 @@ def test_robot_and_control_belong_together(proofroll: Proofroll, files: tuple[st
         code, _, err = proofroll("judge", record, *asked)
         assert code == 2
         assert said in err
+
+
+def test_a_step_that_is_too_long_comes_first(proofroll: Proofroll, files: tuple[str, str, str]) -> None:
+    """The step that explicit servos need is the first line where the rows are farther apart, and else no line."""
+    record, robot, control = files
+    for kd, first in ((1.5, "every 0.001 s"), (150.0, "explicit PD needs h ≤ ")):
+        Path(control).write_text(CONTROL.format(kd=kd))
+        _, out, _ = proofroll("judge", record, "--robot", robot, "--control", control)
+        assert first in out.splitlines()[0]
 
 
 def test_on_the_ground_accelerations_are_left_out() -> None:

@@ -164,6 +164,23 @@ def test_another_policy_is_another_scene(written: Any, tmp_path: Path) -> None:
     assert commands.values(0.0, start).tolist() == pytest.approx([0.65, 0.35, -0.05])
 
 
+def test_a_package_announces_a_policy(written: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A policy that an installed package announces is called by its name, and acts as that of its module."""
+    info = tmp_path / "site" / "striders-1.0.dist-info"
+    info.mkdir(parents=True)
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: striders\nVersion: 1.0\n")
+    (info / "entry_points.txt").write_text("[proofroll.policies]\nstrider = striders_of_test:make\n")
+    (tmp_path / "site" / "striders_of_test.py").write_text(MODULE)
+    monkeypatch.syspath_prepend(str(tmp_path / "site"))
+    by_name = written(CONTROL + POLICY.replace("policy_beside:make", "strider") + START)
+    told = simulate(by_name[0], "mujoco", until=0.04, control=by_name[1])
+    by_module = written(CONTROL + POLICY + START)
+    assert np.array_equal(told["p_WB"], simulate(by_module[0], "mujoco", until=0.04, control=by_module[1])["p_WB"])
+    unknown = written(CONTROL + POLICY.replace("policy_beside:make", "stroller"))
+    with pytest.raises(InputError, match=r"give module:make, or one of .*strider"):
+        _mechanism(unknown)
+
+
 RANDOM = "import random\ndef make(joints):\n    return lambda seen: [random.random() for _ in joints]\n"
 SHORT = "def make(joints):\n    return lambda seen: [0.0]\n"
 NAN = "def make(joints):\n    return lambda seen: [float('nan')] * len(joints)\n"

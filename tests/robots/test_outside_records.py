@@ -99,6 +99,40 @@ def test_states_alone_tell_a_mistake(name: str, said: str, proofroll: Proofroll,
     assert said in " ".join(out.split())
 
 
+@pytest.mark.parametrize(("begin", "named"), [(0.04, False), (0.033, False), (0.033, True)])
+def test_a_record_that_begins_later(begin: float, named: bool, proofroll: Proofroll, tmp_path: Path) -> None:
+    """A record that begins at an instant, or between two, holds in every layer, and a mistake in it is named."""
+    (tmp_path / "legs.urdf").write_text(urdf())
+    (tmp_path / "legs.toml").write_text(CONTROL)
+    columns = columns_of(Loop(steps=100, **(MISTAKES["state before"][2] if named else {})).record(PROGRAMS["mujoco"]))
+    rows = columns["time"] >= begin - 1e-9
+    record = written({key: values[rows] for key, values in columns.items()}, tmp_path / "record.csv")
+    asked = ["--robot", str(tmp_path / "legs.urdf"), "--control", str(tmp_path / "legs.toml")]
+    code, out, err = proofroll("judge", str(record), *asked)
+    assert code == int(named), out + err
+    said = "servos see the state of the step before" if named else "every layer that was looked at holds"
+    assert said in " ".join(out.split())
+
+
+@pytest.mark.drill
+def test_states_of_a_record_that_begins_later(proofroll: Proofroll, tmp_path: Path) -> None:
+    """States alone from a later instant on need what a policy saw before, and are judged with its actions."""
+    (tmp_path / "legs.urdf").write_text(urdf())
+    (tmp_path / "legs.toml").write_text(CONTROL)
+    asked = ["--robot", str(tmp_path / "legs.urdf"), "--control", str(tmp_path / "legs.toml")]
+    for kinds, mistake, code, said in (
+        ({"time", "q", "v", *BASE}, {}, 3, "a policy that observes its last action needs what was before"),
+        ({"time", "q", "v", "action", *BASE}, {}, 0, "every layer that was looked at holds"),
+        ({"time", "q", "v", "action", *BASE}, MISTAKES["half kd"][2], 1, "kd is 0.5 of the right one"),
+    ):
+        columns = columns_of(Loop(step=5e-3, steps=40, **mistake).record(PROGRAMS["mujoco"]))
+        rows = columns["time"] >= 0.035 - 1e-9
+        states = {key: values[rows] for key, values in columns.items() if key.split(".")[0] in kinds}
+        got, out, err = proofroll("judge", str(written(states, tmp_path / "record.csv")), *asked)
+        assert got == code, out + err
+        assert said in " ".join(out.split())
+
+
 def test_a_record_with_names_and_units_of_its_own(proofroll: Proofroll, tmp_path: Path) -> None:
     """Columns of another program are named by ``--map``; milliseconds, degrees and axes of the base are converted.
 

@@ -18,6 +18,7 @@ from proofroll.robots.model import Array
 _MOST_ROWS = 40  # rows of a record whose accelerations are looked at
 _FEWEST_ROWS = 4
 _SAFETY = 10.0  # on the standard error: what is left over is an error of the scheme, and no noise
+_ALIKE = 10.0  # sums of squares that are left and tell nothing apart differ by no more
 _EQUAL = 1e-3  # part of an interval by which intervals may differ
 
 
@@ -29,14 +30,15 @@ class AirFit:
         names: of the parameters: gravity and the scale of efforts, in parts of the right ones; armature in parts of the
             law's, or in kg m² where the law has none.
         values, right, errors: fitted, by the law, and error bars; shape (3,).
-        implicit: True if the record fits implicit kd, which is an armature of h kd, better than explicit.
+        imitated: True if the record fits kd at the velocity after a step h, and explicit kd with an armature of h kd
+            more as well.
     """
 
     names: tuple[str, ...]
     values: Array
     right: Array
     errors: Array
-    implicit: bool
+    imitated: bool
 
 
 def acceleration_fit(record: ControlRecord, law: ControlLaw, mechanism: Mechanism) -> AirFit | str:
@@ -74,10 +76,13 @@ def acceleration_fit(record: ControlRecord, law: ControlLaw, mechanism: Mechanis
             fits.append((*_solved(table, step if implicit else 0.0), implicit))
     if not fits:
         return "too few rows lie between instants"
-    values, errors, _, implicit = min(fits, key=lambda fit: fit[2])
     right = np.array([law.gravity, 1.0, 1.0 if law.armature.any() else 0.0])
+    least = min(square for _, _, square, _ in fits)
+    alike = [fit for fit in fits if fit[2] <= _ALIKE * least]
+    values, errors, _, implicit = min(alike, key=lambda fit: float((np.abs(fit[0] - right) / fit[1]).max()))
+    imitated = implicit and not all(fit[3] for fit in alike)
     return AirFit(
-        names=("gravity", "effort scale", "armature"), values=values, right=right, errors=errors, implicit=implicit
+        names=("gravity", "effort scale", "armature"), values=values, right=right, errors=errors, imitated=imitated
     )
 
 

@@ -9,8 +9,11 @@ from pathlib import Path
 import numpy as np
 
 from proofroll.core.number_format import counted, error
+from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.bookkeeping.law import ControlLaw
 from proofroll.elements.mechanism.bookkeeping.mistakes import LAYERS
+from proofroll.elements.mechanism.joint_coordinates import JointCoordinates
+from proofroll.elements.mechanism.steps import servo_steps
 from proofroll.robots.control_layers import record_layers
 from proofroll.robots.control_record import ControlRecord, read_record
 from proofroll.robots.controlled import ControlledScenes
@@ -28,6 +31,7 @@ class RecordJudgement:
         step: mean interval between them [s].
         layers: in their order.
         remarks: sentences on limits of the robot file that the record passes.
+        step_bound: clause on the longest stable step of explicit servos, if the rows are farther apart; else empty.
     """
 
     record: str
@@ -38,6 +42,7 @@ class RecordJudgement:
     step: float
     layers: Sequence[Layer]
     remarks: Sequence[str] = ()
+    step_bound: str = ""
 
     @property
     def agrees(self) -> bool:
@@ -53,6 +58,8 @@ class RecordJudgement:
         """Lines of text: a headline, one for each layer, and the causes at the first that does not hold."""
         first = next((layer for layer in self.layers if not layer.holds), None)
         rows = f"{counted(self.rows, 'rows')} every {self.step:.4g} s, {self.base} base"
+        if self.step_bound:
+            yield f"{self.step_bound}."
         if not self.looked_at:
             yield f"{self.record} ({rows}): no layer could be looked at"
         elif first is None:
@@ -76,7 +83,8 @@ def _found(layer: Layer) -> str:
     if layer.residual is None:
         return layer.reason
     where = "" if layer.holds else f", most in {layer.column} at {layer.time:.4g} s"
-    return f"off by {error(layer.residual)}, rounding {error(layer.bar)}{where}"
+    remark = f"; {layer.reason}" if layer.reason else ""
+    return f"off by {error(layer.residual)}, rounding {error(layer.bar)}{where}{remark}"
 
 
 def judge_record(record: Path, robot: Path, control: Path, names: Mapping[str, str] | None = None) -> RecordJudgement:
@@ -102,7 +110,17 @@ def judge_record(record: Path, robot: Path, control: Path, names: Mapping[str, s
         step=_step(read),
         layers=layers,
         remarks=[*_too_fast(read, model.speeds)],
+        step_bound=_step_bound(model.mechanism, _step(read)),
     )
+
+
+def _step_bound(mechanism: Mechanism, step: float) -> str:
+    """Clause on the longest stable step of explicit servos, if rows are farther apart [s]; else empty."""
+    bounds = servo_steps(JointCoordinates(mechanism))
+    if bounds is None or step <= bounds.explicit:
+        return ""
+    rows = f"rows are {step:.4g} s apart, {step / bounds.explicit:.2g} times that"
+    return f"{bounds.sentence(())}; {rows}: too much if the program steps so"
 
 
 def _too_fast(record: ControlRecord, speeds: Mapping[str, float]) -> Iterator[str]:

@@ -12,7 +12,7 @@ import numpy as np
 
 from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.bookkeeping.law import VECTORS, ControlLaw, RobotState
-from proofroll.elements.mechanism.bookkeeping.mistakes import Mistake, fitted, mistakes, offsets_told
+from proofroll.elements.mechanism.bookkeeping.mistakes import IMPLICIT, Mistake, fitted, mistakes, offsets_told
 from proofroll.elements.mechanism.policy import Observation
 from proofroll.robots.air_fit import acceleration_fit
 from proofroll.robots.control_motion import motion_layer
@@ -31,12 +31,16 @@ _SAME_TIME = 1e-6  # part of the time between instants that is round-off
 
 @dataclass(frozen=True)
 class _Compared:
-    """Differences of a layer with its columns: ``difference`` (times, columns), in their units, and their sizes."""
+    """Differences of a layer with its columns: ``difference`` (times, columns), in their units, and their sizes.
+
+    ``remark``: on what the record cannot tell.
+    """
 
     columns: tuple[str, ...]
     time: Array
     difference: Array
     sizes: Array
+    remark: str = ""
 
 
 def record_layers(record: ControlRecord, law: ControlLaw, mechanism: Mechanism, *, grounded: bool) -> list[Layer]:
@@ -81,6 +85,8 @@ class _Evidence:
 
 def _layer(name: str, evidence: _Evidence) -> Layer:
     compared = evidence.difference(name)
+    if not isinstance(compared, str) and not len(compared.time):
+        compared = "no row that counts lies at an instant of the controller"
     if isinstance(compared, str):
         return Layer(name, reason=compared)
     # What rounding does to accelerations is in the error bars of their fit.
@@ -88,7 +94,14 @@ def _layer(name: str, evidence: _Evidence) -> Layer:
     parts = np.abs(compared.difference) / bars
     row, column = np.unravel_index(int(np.argmax(parts)), parts.shape)
     residual, bar = abs(float(compared.difference[row, column])), float(bars[column])
-    return Layer(name=name, residual=residual, bar=bar, column=compared.columns[column], time=float(compared.time[row]))
+    return Layer(
+        name=name,
+        residual=residual,
+        bar=bar,
+        column=compared.columns[column],
+        time=float(compared.time[row]),
+        reason=compared.remark,
+    )
 
 
 def _bars(name: str, evidence: _Evidence, compared: _Compared) -> Array:
@@ -167,23 +180,35 @@ def _norm(evidence: _Evidence, name: str, law: ControlLaw) -> float:
 
 
 def _compared(columns: list[str], time: Array, given: Array, computed: Array) -> _Compared:
-    sizes = np.maximum(np.abs(given).max(axis=0), np.abs(computed).max(axis=0))
+    sizes = np.maximum(np.abs(given).max(axis=0, initial=0.0), np.abs(computed).max(axis=0, initial=0.0))
     sizes = np.maximum(sizes, 1e-3 * sizes.max(initial=0.0))
     return _Compared(tuple(columns), time, given - computed, np.where(sizes > 0, sizes, 1.0))
 
 
+def _told(record: ControlRecord) -> list[str]:
+    """Columns that change at instants."""
+    return [name for name in record.columns if name.startswith(("action.", "target."))]
+
+
 def instant_rows(record: ControlRecord, law: ControlLaw) -> Any:
-    """Rows at which a record's action or target changes, the first row among them."""
-    names = [name for name in record.columns if name.startswith(("action.", "target."))]
+    """Rows at which a record's action or target changes, and the first row if an instant can lie there."""
+    names = _told(record)
     if not names:
         near = np.abs(record.time * law.rate - np.round(record.time * law.rate)) < _SAME_TIME
         return np.flatnonzero(near)
     values = np.stack([record.columns[name] for name in names], axis=1)
     changed = np.any(np.abs(np.diff(values, axis=0)) > 0, axis=1)
-    return np.concatenate([[0], 1 + np.flatnonzero(changed)])
+    later = 1 + np.flatnonzero(changed)
+    if record.time[0] != 0 and len(later):  # a record may begin between two instants
+        periods = (record.time[later[0]] - record.time[0]) * law.rate
+        if abs(periods - np.round(periods)) > _SAME_TIME:
+            return later
+    return np.concatenate([[0], later])
 
 
 def _instants(record: ControlRecord, law: ControlLaw, _: Mechanism) -> _Compared | str:
+    if not _told(record):
+        return "the record has no columns action.JOINT or target.JOINT, which change at instants"
     time = record.time[instant_rows(record, law)]
     if len(time) < 2:
         return "nothing in the record changes at instants"
@@ -236,6 +261,8 @@ def _observation(record: ControlRecord, law: ControlLaw, _: Mechanism) -> _Compa
     at = states(record, law)
     if isinstance(at, str):
         return at
+    if not at:
+        return "no row lies at an instant of the controller"
     seen = [law.observed(state, np.zeros(len(law.joints))) for state in at]
     computed = np.concatenate([np.stack([_part(item, name) for item in seen]) for name in given], axis=1)
     return _compared(columns, record.time, np.concatenate([*given.values()], axis=1), computed)
@@ -300,17 +327,24 @@ def _effort(record: ControlRecord, law: ControlLaw, _: Mechanism) -> _Compared |
     q, v = record.stacked("q", law.joints), record.stacked("v", law.joints)
     if q is None or v is None:
         return "the record has no columns q.JOINT and v.JOINT"
-    if law.lag:
-        q, v = (np.concatenate([item[:1].repeat(law.lag, axis=0), item[: -law.lag]]) for item in (q, v))
+    rows = np.arange(len(q))
+    if law.hold_effort:
+        instants = instant_rows(record, law)
+        rows = instants[np.searchsorted(instants, rows, side="right") - 1]
+        rows[: instants[0]] = -1  # since an instant before the record
+    seen = rows - law.lag
+    computed = law.effort(target, q[seen], v[seen])
     columns = [f"effort.{name}" for name in law.joints]
-    return _compared(columns, record.time, given, law.effort(target, q, v))
+    return _compared(columns, record.time[seen >= 0], given[seen >= 0], computed[seen >= 0])
 
 
 def _acceleration(record: ControlRecord, law: ControlLaw, mechanism: Mechanism) -> _Compared | str:
     fit = acceleration_fit(record, law, mechanism)
     if isinstance(fit, str):
         return fit
-    return _Compared(fit.names, np.array([record.time[0]]), (fit.values - fit.right)[None], fit.errors / _ROUND_OFF)
+    remark = IMPLICIT if fit.imitated else ""
+    difference = (fit.values - fit.right)[None]
+    return _Compared(fit.names, np.array([record.time[0]]), difference, fit.errors / _ROUND_OFF, remark)
 
 
 _DIFFERENCES: dict[str, Callable[[ControlRecord, ControlLaw, Mechanism], _Compared | str]] = {

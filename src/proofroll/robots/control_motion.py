@@ -6,13 +6,50 @@ import numpy as np
 
 from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.bookkeeping.air import AirRobot
-from proofroll.elements.mechanism.bookkeeping.law import ControlLaw
-from proofroll.elements.mechanism.bookkeeping.search import SHOWN, WHOLE, MistakeSearch, SeenMotion, explained
+from proofroll.elements.mechanism.bookkeeping.law import ControlLaw, RobotState
+from proofroll.elements.mechanism.bookkeeping.mistakes import IMPLICIT
+from proofroll.elements.mechanism.bookkeeping.search import MistakeSearch, explained
+from proofroll.elements.mechanism.bookkeeping.seen import SHOWN, WHOLE, SeenMotion
 from proofroll.robots.air_fit import states_of
 from proofroll.robots.control_record import ControlRecord
 from proofroll.robots.record_layer import Layer, LayerCause
 
 _STEPS, _LEAST_STEP = (1, 2, 5, 10), 4.9e-4  # steps between rows that are tried, and the shortest [s]
+_ON_INSTANT, _FEWEST = 1e-5, 4  # part of the time between instants that is round-off, and least rows of a motion
+
+
+def _begun(record: ControlRecord, law: ControlLaw) -> tuple[int, ControlLaw] | str:
+    """First row at which a motion can begin, and the law that begins there; or the reason why there is none.
+
+    That is the controller's first instant, or a later one, if nothing of what was before it counts or it is recorded.
+    """
+    if abs(record.time[0]) * law.rate <= WHOLE:
+        return 0, law
+    rest = record.time * law.rate - np.round(record.time * law.rate)
+    rows = np.flatnonzero(np.abs(rest) < _ON_INSTANT).tolist()
+    if not rows:
+        return "no row lies at an instant of the controller, a multiple of the time between instants"
+    needed = max(law.delay, int(_looks_back(law)))
+    if not needed:
+        return rows[0], law.change(begins=float(record.time[rows[0]]))
+    actions = record.stacked("action", law.joints)
+    if actions is None or len(rows) <= needed:
+        what = "targets that come late" if law.delay else "a policy that observes its last action"
+        return f"the record begins at {record.time[0]:.6g} s, after the controller; {what} needs what was before"
+    earlier = tuple(actions[row] for row in rows[:needed])
+    return rows[needed], law.change(begins=float(record.time[rows[needed]]), earlier=earlier)
+
+
+def _looks_back(law: ControlLaw) -> bool:
+    """True if the policy of a law answers differently where its last action was another."""
+    count = len(law.joints)
+    still = RobotState(0.0, law.pose, np.zeros(count), np.zeros(3), np.array([1.0, 0, 0, 0]), np.zeros(3), np.zeros(3))
+    answers = []
+    for last in (np.zeros(count), np.full(count, 0.1)):
+        if (answer := law.answer()) is None:
+            return False
+        answers.append(answer(law.observed(still, last)))
+    return bool(np.any(answers[0] != answers[1]))
 
 
 def motion_layer(record: ControlRecord, law: ControlLaw, mechanism: Mechanism) -> Layer:
@@ -21,9 +58,12 @@ def motion_layer(record: ControlRecord, law: ControlLaw, mechanism: Mechanism) -
     motion = states_of(record, robot)
     if isinstance(motion, str):
         return Layer("motion", reason=motion)
-    if abs(record.time[0]) * law.rate > WHOLE:
-        return Layer("motion", reason="the record does not begin at time 0, the first instant of the controller")
-    q, v = (np.array(part) for part in zip(*motion, strict=True))
+    if isinstance(begun := _begun(record, law), str):
+        return Layer("motion", reason=begun)
+    first, law = begun
+    q, v = (np.array(part) for part in zip(*motion[first:], strict=True))
+    if len(q) < _FEWEST:
+        return Layer("motion", reason="too few rows follow the first instant of the controller")
     every = float(np.diff(record.time).mean())
     names = [name for name in record.rounding if name.startswith(("q.", "v.", "p_WB.", "q_WB."))]
     rounding = max(float(record.rounding[name].max()) for name in names)
@@ -58,5 +98,6 @@ def motion_layer(record: ControlRecord, law: ControlLaw, mechanism: Mechanism) -
         bar=bar,
         column="the state",
         time=float(seen.time[-1]),
+        reason=IMPLICIT if best.imitated else "",
         causes=tuple(causes),
     )

@@ -155,7 +155,7 @@ def run_in_air(
 def steps_in_air(
     robot: AirRobot, law: ControlLaw, start: tuple[Array, Array], step: float, scheme: Scheme
 ) -> Iterator[AirStep]:
-    """Motion of a robot in the air without an end, at time 0 and after each step [s].
+    """Motion of a robot in the air without an end, at the first instant and after each step [s].
 
     Raises:
         InputError: the step does not divide the time between instants.
@@ -163,17 +163,17 @@ def steps_in_air(
     """
     q, v = start
     period = max(1, whole_steps(0.0, 1 / law.rate, step) + law.extra_steps)
-    answer, waiting = law.answer(), [law.pose.copy()] * law.delay
-    last, target = np.zeros(len(law.joints)), law.pose.copy()
-    before = [robot.state(0.0, q, v)]
+    answer, (last, waiting) = law.answer(), law.waiting()
+    target, before = law.pose.copy(), [robot.state(law.begins, q, v)]
     efforts = np.zeros(len(law.joints))
     for k in itertools.count():
-        state, observation = robot.state(k * step, q, v), None
+        time = law.begins + k * step
+        state, observation = robot.state(time, q, v), None
         if k % period == 0:
             observation = law.observed(state, last)
             action = None if answer is None else answer(observation)
             last = last if action is None else action
-            waiting.append(law.target(action, k * step))
+            waiting.append(law.target(action, time))
             target = waiting.pop(0)
         servo = before[-law.lag] if law.lag and len(before) >= law.lag else state
         if not law.hold_effort or k % period == 0:
@@ -181,7 +181,7 @@ def steps_in_air(
         yield AirStep(q=q, v=v, efforts=efforts, target=target, action=last, observation=observation)
         q, v = _stepped(robot, law, (q, v), (efforts, target), step, scheme)
         if not np.abs(v).max() < _STOP:
-            raise Diverged(f"the motion blows up at t = {k * step:.4g} s")
+            raise Diverged(f"the motion blows up at t = {time:.4g} s")
         before = [*before[-1:], state]
 
 

@@ -69,6 +69,8 @@ class ControlLaw:
         effort_factor: on what a servo's effort is before it acts, shape (n,).
         lag: steps by which the state of the servos is late.
         extra_steps: steps by which the time between two instants is longer.
+        begins: time of the first instant of a motion [s].
+        earlier: actions at the instants before it, the last one last.
     """
 
     joints: tuple[str, ...]
@@ -96,6 +98,8 @@ class ControlLaw:
     effort_factor: Array = dataclasses.field(default_factory=lambda: np.ones(1))
     lag: int = 0
     extra_steps: int = 0
+    begins: float = 0.0
+    earlier: tuple[Array, ...] = ()
 
     @classmethod
     def of(cls, mechanism: Mechanism) -> ControlLaw:
@@ -174,6 +178,12 @@ class ControlLaw:
             targets[self._entries[0]] = action
             targets = self.pose + self.scale * targets
         return np.asarray(self.signs * targets, float)
+
+    def waiting(self) -> tuple[Array, list[Array]]:
+        """Action before the first instant, (n), and the targets that wait then, the next to act first."""
+        last = self.earlier[-1] if self.earlier else np.zeros(len(self.joints))
+        late = [self.target(action, self.begins) for action in self.earlier[len(self.earlier) - self.delay :]]
+        return last, [self.pose.copy()] * (self.delay - len(late)) + late
 
     def effort(self, target: Array, q: Array, v: Array) -> Array:
         """Efforts of the servos [N m or N], clamped; arrays have the joints last."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 
@@ -24,6 +24,11 @@ LAYERS = {
 }
 
 
+# Two causes that no motion at one step tells apart: (M + h kd) dv is the same either way.
+IMPLICIT = (
+    "kd acts at the velocity after the step, or explicit kd has an armature of h kd more at each joint: the same "
+    "motion at this step h; a second step tells them apart, for an armature stays and h kd does not"
+)
 _TOLD = 1e-3  # least part of the largest offset of a pose that is told
 
 
@@ -36,9 +41,10 @@ class Mistake:
         words: clause that names it, perhaps with ``{size}``.
         layer: of :data:`LAYERS`, where a record shows it.
         changed: law with the mistake, for a size.
-        sized: True if its size is a number to be fitted, 1 being right.
+        sized: True if its size is a number to be fitted.
         starts: sizes from which a fit begins.
         numbers: count of further fitted numbers.
+        none: size with which nothing is wrong.
     """
 
     id: str
@@ -48,6 +54,7 @@ class Mistake:
     sized: bool = False
     starts: tuple[float, ...] = (0.95,)
     numbers: int = 0
+    none: float = 1.0
 
     def sentence(self, size: float) -> str:
         """The mistake with its size."""
@@ -57,6 +64,13 @@ class Mistake:
 def mistakes(law: ControlLaw) -> list[Mistake]:
     """All mistakes that change a law, in the order of layers."""
     return sorted(_mistakes(law), key=lambda item: list(LAYERS).index(item.layer))
+
+
+def changed(law: ControlLaw, chosen: Sequence[Mistake], sizes: Sequence[float]) -> ControlLaw:
+    """The law with some mistakes of these sizes."""
+    for item, size in zip(chosen, sizes, strict=True):
+        law = item.changed(law, size)
+    return law
 
 
 def _mistakes(law: ControlLaw) -> Iterator[Mistake]:
@@ -92,6 +106,7 @@ def _mistakes(law: ControlLaw) -> Iterator[Mistake]:
             changed=_armed,
             sized=True,
             starts=(1e-4, 1e-2),
+            none=0.0,
         )
     yield _sized("gravity", "gravity is {size} of the right one", "acceleration", "gravity")
 

@@ -10,16 +10,14 @@ from proofroll.core.diagnosis import Cause, Evidence, hypothesis
 from proofroll.core.diagnosis.samples import run_and_truth
 from proofroll.core.errors import InputError
 from proofroll.elements.mechanism.bookkeeping.law import ControlLaw
-from proofroll.elements.mechanism.bookkeeping.mistakes import LAYERS
+from proofroll.elements.mechanism.bookkeeping.mistakes import IMPLICIT, LAYERS
 from proofroll.elements.mechanism.bookkeeping.search import (
-    SHOWN,
-    WHOLE,
     MistakeSearch,
     MistakesFound,
-    SeenMotion,
     explained,
     explained_start,
 )
+from proofroll.elements.mechanism.bookkeeping.seen import SHOWN, WHOLE, SeenMotion
 from proofroll.elements.mechanism.diagnosis.equations import is_motion, of_start, placed_of
 from proofroll.elements.mechanism.diagnosis.residuals import COVERED
 from proofroll.elements.mechanism.model import Mechanism
@@ -45,8 +43,20 @@ def of_bookkeeping(evidence: Evidence) -> Iterator[Cause]:
         search = _at_start(evidence, law) if evidence.run is None else _of_run(evidence, law)
     except InputError:  # motors with gears
         return
-    if search is not None:
-        yield from (_cause(item, search.before, of_run=evidence.run is not None) for item in search.explanations[:2])
+    if search is None:
+        return
+    yield from (_cause(item, search.before, of_run=evidence.run is not None) for item in search.explanations[:2])
+    if search.imitated:
+        yield Cause(
+            id="bookkeeping: implicit kd",
+            says=IMPLICIT,
+            quantity="motion",
+            unit="rad or m",
+            before=search.explicit,
+            after=search.before,
+            remedy="run it at a second step, and look at its armatures and at its integrator",
+            covers=("motion", *COVERED, "effort"),
+        )
 
 
 def _at_start(evidence: Evidence, law: ControlLaw) -> MistakeSearch | None:

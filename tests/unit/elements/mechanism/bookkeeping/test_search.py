@@ -13,7 +13,8 @@ from outside_records import CONTROL, MISTAKES, PROGRAMS, SERVOS, Loop, urdf
 from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.bookkeeping.air import AirRobot
 from proofroll.elements.mechanism.bookkeeping.law import ControlLaw
-from proofroll.elements.mechanism.bookkeeping.search import MistakeSearch, SeenMotion, explained
+from proofroll.elements.mechanism.bookkeeping.search import MistakeSearch, explained
+from proofroll.elements.mechanism.bookkeeping.seen import SeenMotion
 from proofroll.robots.controlled import ControlledScenes
 
 EVERY = {1e-3: 4, 2e-3: 2, 5e-3: 1}  # steps between samples
@@ -64,6 +65,52 @@ def test_a_mistake_is_named_from_states_alone(program: str, step: float, name: s
     found = _found(program, step, **MISTAKES[name][2])
     assert [item.id for item in found.explanations[0].mistakes] == [MISTAKES[name][0]]
     assert found.explanations[0].after < 1e-3 * found.before
+
+
+PAIRS = (
+    ("half kd", "half scale"),
+    ("half scale", "xyzw"),
+    ("order in the observation", "half kd"),
+    ("half kp", "an instant late"),
+    ("half kp", "no armature"),
+    ("half kd", "spin in the world"),
+    ("pose missing", "state before"),
+    ("pose off", "sign of gravity"),
+    ("place by place", "half the clamp"),
+    ("legs swapped", "velocity in the base"),
+    ("order in the observation", "pose missing"),
+    ("pose missing", "double scale"),
+    ("place by place", "spin in the world"),
+    ("no armature", "xyzw"),
+)
+
+
+def _named_together(program: str, step: float, names: tuple[str, str]) -> None:
+    found = _found(program, step, **MISTAKES[names[0]][2], **MISTAKES[names[1]][2])
+    first = found.explanations[0]
+    assert {item.id for item in first.mistakes} == {MISTAKES[name][0] for name in names}
+    assert first.after < 1e-6 * found.before
+
+
+def test_two_mistakes_at_once_are_named() -> None:
+    """Two mistakes in a loop are named together from its states alone, where neither alone explains them."""
+    _named_together("mujoco", 5e-3, ("pose missing", "no armature"))
+
+
+@pytest.mark.drill
+@pytest.mark.nightly
+@pytest.mark.parametrize("names", PAIRS, ids=" + ".join)
+def test_pairs_at_random_are_named(names: tuple[str, str]) -> None:
+    """Fourteen pairs drawn at random are named from states alone."""
+    _named_together("mujoco", 2e-3, names)
+
+
+@pytest.mark.drill
+@pytest.mark.parametrize("program", [*PROGRAMS, *SERVOS])
+@pytest.mark.parametrize("step", EVERY)
+def test_right_loops_are_accused_of_nothing(program: str, step: float) -> None:
+    """A right loop is accused of nothing at any step, with gains treated explicitly and implicitly."""
+    assert _found(program, step).explanations == ()
 
 
 @pytest.mark.drill
