@@ -60,14 +60,13 @@ def report(
 ) -> None:
     """Run the comparisons and the further studies, and write report.html and report.json.
 
-    Without names it makes those that lie in the folder of studies itself: the main comparisons, and all further studies
-    but those on request. The comparisons of folders inside, as mechanisms/pendulum, it leaves out and names. The files
-    are there after the first comparison, and are written again now and then, after all of them and after each further
-    study. A report that is stopped (Ctrl-C) keeps what has ended; the same command continues from there. A study that is
-    kept and still holds is used as it is; otherwise it is made briefly, as is a comparison that says so, and the report
-    names the command that makes it whole. With --budget every comparison is brief first, and grows while there is time;
-    no further study begins once it is used. What is left out is named, and the same command goes on. --set is for
-    scenes and robot files.
+    Without names it makes the main comparisons, which lie in the folder of studies itself, and all further studies but
+    those on request. Comparisons in folders inside, as mechanisms/pendulum, are left out and named. The files are
+    written after the first comparison, again now and then, after all comparisons and after each further study. If a
+    report is stopped (Ctrl-C), finished comparisons are kept; the same command continues from there. A stored study
+    that is valid is used; otherwise a brief one is made, as of a comparison marked brief, and the report names the
+    command that makes it whole. With --budget every comparison is brief first and grows while there is time; when the
+    budget is used, no further study begins. What is left out is named. --set is for scenes and robot files.
     """
     from dataclasses import replace
 
