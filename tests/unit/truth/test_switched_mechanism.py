@@ -9,14 +9,15 @@ import pytest
 from proofroll.core.errors import InputError, Refused
 from proofroll.elements.mechanism import Body, Joint, Mechanism
 from proofroll.elements.mechanism.complementarity import complementary
+from proofroll.elements.mechanism.contacts.dynamics import ContactDynamics
 from proofroll.elements.mechanism.drives import Coupling
-from proofroll.elements.mechanism.joint_coordinates import JointCoordinates
 from proofroll.files.scene_file import load_scene
 from proofroll.truth.hybrid import HybridPath, Stretch, first_close, follow
 from proofroll.truth.mechanism import followed_paths
-from proofroll.truth.mechanism.body_switching import SwitchedBodies
+from proofroll.truth.mechanism.contact_bodies import ContactBodies
+from proofroll.truth.mechanism.contact_equations import ContactEquations
+from proofroll.truth.mechanism.contact_tree import ContactTree
 from proofroll.truth.mechanism.followed_paths import CLOSE, TOLERANCES
-from proofroll.truth.mechanism.joint_switching import SwitchedTree
 from proofroll.truth.mechanism.maximal_coordinates import MaximalCoordinates
 from proofroll.truth.mechanism.natural_units import natural_units
 from proofroll.truth.mechanism.switched_truth import truth_of
@@ -80,7 +81,7 @@ def test_an_impact_that_presses_two_stops_has_no_unique_outcome() -> None:
     )  # fmt: skip
     bodies = tuple(Body(name, 1.0, inertia=(1.0, 1.0, 1.0)) for name in ("box", "block"))
     found = truth_of(Mechanism(bodies, joints, gravity=(0.0, 0.0, 0.0)), np.array([0.0, 0.05, 0.3]))
-    assert "presses several stops at once" in found.ended
+    assert re.search(r"presses box and slot at once: its outcome depends on their order", found.ended)
     assert found.end == pytest.approx(0.1, abs=TIGHT)
     assert found.record.q[:, 1] == pytest.approx([0.0, -0.05], abs=TIGHT)
 
@@ -100,7 +101,7 @@ def test_rebounds_that_nothing_pulls_back_are_refused_by_name() -> None:
 def test_rebounds_are_summed_by_the_fastest_impact() -> None:
     """An impact settles against the fastest one at its stop, which need not be the first."""
     mechanism = load_scene("stop").elements[0].mechanism  # type: ignore[attr-defined]
-    tree = SwitchedTree(JointCoordinates(mechanism), 1e-14)
+    tree = ContactTree(ContactDynamics(mechanism), 1e-14, 1.0)
     assert [tree._settles(0, speed, 0.5) for speed in (1.0, 100.0, 1e-4)] == [False, False, True]
 
 
@@ -162,9 +163,10 @@ def test_what_lies_on_a_stop_or_nearly_so_comes_to_rest(height: float, restituti
     stop = load_scene("stop", restitution=restitution).elements[0].mechanism  # type: ignore[attr-defined]
     joint = replace(stop.joints[0], q0=(height,))
     found = truth_of(replace(stop, joints=(joint,)), np.array([0.0, 0.01]))
-    assert found.record.q[-1, 0] == 0.0
-    ends = [event.time for event in found.events if event.kind == "settle"]
-    assert ends == [pytest.approx(3 * np.sqrt(2 * height / 9.81), rel=1e-12)] * bool(height)
+    assert abs(found.record.q[-1, 0]) <= found.bars["q"][-1]
+    ends = [event for event in found.events if event.kind == "settle"]
+    assert len(ends) == bool(height)
+    assert all(event.time_low <= 3 * np.sqrt(2 * height / 9.81) <= event.time_high for event in ends)
 
 
 @pytest.mark.arithmetic
@@ -365,9 +367,9 @@ def test_friction_that_just_holds_is_ill_posed(scene: str, parameters: dict[str,
 
 def test_routes_share_ends_and_events_and_no_decision() -> None:
     """What happens at an end is told in one place; what holds next, and what an impact does, by each route alone."""
-    assert SwitchedTree.change is SwitchedBodies.change
-    for name in ("begin", "_law", "_at_rest", "_hit", "holding"):
-        assert getattr(SwitchedTree, name) is not getattr(SwitchedBodies, name)
+    assert ContactTree.change is ContactBodies.change
+    for name in ("begin", "_solution", "_decided", "_struck", "_symbols"):
+        assert getattr(ContactTree, name) is not getattr(ContactBodies, name)
 
 
 def two_pendulums(later: float, restitution: float, *, cart: bool) -> Mechanism:
@@ -387,17 +389,25 @@ def two_pendulums(later: float, restitution: float, *, cart: bool) -> Mechanism:
 
 def paths_of(mechanism: Mechanism, until: float):
     """Paths of both routes, coarse ones."""
-    tree = JointCoordinates(mechanism)
-    bodies = SwitchedBodies(MaximalCoordinates(mechanism).lean, tree.switched, 1e-11)
-    return [follow(route, until, (), CLOSE) for route in (SwitchedTree(tree, 1e-11), bodies)]
+    bodies = ContactBodies(ContactEquations(mechanism, MaximalCoordinates(mechanism).lean), 1e-11, 1.0)
+    return [follow(route, until, (), CLOSE) for route in (ContactTree(ContactDynamics(mechanism), 1e-11, 1.0), bodies)]
 
 
 @pytest.mark.arithmetic
-@pytest.mark.parametrize(("later", "restitution"), [(0.0, 0.5), (1e-15, 0.5), (-1e-10, 0.5), (1e-12, 0.0)])
-def test_stops_hit_at_once_are_ill_posed_where_one_impact_moves_the_other(later: float, restitution: float) -> None:
+@pytest.mark.parametrize("later", [0.0, 1e-15, -1e-10])
+def test_stops_hit_at_once_have_no_outcome_where_one_impact_moves_the_other(later: float) -> None:
     """On a cart the first impact decides what the second does: round-off is not asked which comes first."""
-    for path in paths_of(two_pendulums(later, restitution, cart=True), 0.53):
-        assert first_close([path], CLOSE) == pytest.approx(0.521447, abs=1e-6)
+    for path in paths_of(two_pendulums(later, 0.5, cart=True), 0.53):
+        assert not path.known
+        assert path.stretches[-1].end == pytest.approx(0.521447, abs=1e-6)
+        assert "presses left and right at once: its outcome depends on their order" in path.ended
+
+
+def test_stops_hit_at_once_without_a_rebound_leave_one_motion() -> None:
+    """On a cart, pendulums that both stay where they hit do so in either order."""
+    paths = paths_of(two_pendulums(1e-12, 0.0, cart=True), 0.53)
+    assert first_close(paths, CLOSE) == np.inf
+    assert [[item.name for item in path.happenings] for path in paths] == [["left", "right"]] * 2
 
 
 @pytest.mark.arithmetic

@@ -4,13 +4,12 @@ Engines decide modes with code of their own: sharing this code would make their 
 """
 
 import itertools
-import math
 from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
-from proofroll.core.errors import NotUnique, Refused
+from proofroll.core.errors import Refused
 from proofroll.elements.mechanism.analysis import RANK
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.rotations import Array
@@ -86,22 +85,6 @@ def _turning(free: Array, G: Array, low: Array, high: Array, scale: Array) -> tu
     raise Refused(REDUNDANT)
 
 
-def margin(free: Array, G: Array, low: Array, high: Array, f: Array, a: Array) -> float:
-    """Margin of a solution of :func:`complementary` to the nearest change of mode, relative to the forces in play.
-
-    For a force between its bounds it is the distance to the nearer bound; for a force at a bound, the additional force
-    that would stop the motion.
-    """
-    least = math.inf
-    for k in range(len(free)):
-        inertia = 1.0 / G[k, k]
-        size = abs(f[k]) + abs(free[k]) * inertia + sum(abs(x) for x in (low[k], high[k]) if math.isfinite(x))
-        apart = max(abs(a[k]) * inertia, min(high[k] - f[k], f[k] - low[k]))
-        if size > 0:
-            least = min(least, apart / size)
-    return least
-
-
 def load_of(joints: Sequence[SwitchedJoint], mode: Mode, nv: int) -> Array:
     """Kinetic friction along the velocities of the tree [N, N m], (nv); modes of efforts come last and are ignored."""
     load = np.zeros(nv)
@@ -115,8 +98,8 @@ def load_of(joints: Sequence[SwitchedJoint], mode: Mode, nv: int) -> Array:
 Responses = Callable[[Mode, Sequence[int]], tuple[Array, Array]]
 
 
-def decided_mode(joints: Sequence[SwitchedJoint], q: Array, v: Array, responses: Responses) -> tuple[Mode, float]:
-    """Mode of the switched joints that follows from the forces, and its relative margin to another mode.
+def decided_mode(joints: Sequence[SwitchedJoint], q: Array, v: Array, responses: Responses) -> Mode:
+    """Mode of the switched joints that follows from the forces.
 
     A joint at rest stays at rest if the force that this needs lies between its bounds. All joints at rest are solved
     together, for they affect each other.
@@ -127,48 +110,17 @@ def decided_mode(joints: Sequence[SwitchedJoint], q: Array, v: Array, responses:
     ]
     still = held_joints(tuple(mode))
     if not still:
-        return tuple(mode), np.inf
+        return tuple(mode)
     velocities = [joints[number].velocity for number in still]
     free, response = responses(
         tuple("free" if number in still else joint_mode for number, joint_mode in enumerate(mode)), velocities
     )
     low, high = np.array([joints[number].bounds(mode[number]) for number in still]).T
-    state, force, acceleration = complementary(free[velocities], response[velocities], low, high)
+    state = complementary(free[velocities], response[velocities], low, high)[0]
     for number, side in zip(still, state, strict=True):
         if side:
             mode[number] = joints[number].moving(-side)
-    return tuple(mode), margin(free[velocities], response[velocities], low, high, force, acceleration)
-
-
-def after_impact(
-    joints: Sequence[SwitchedJoint], q: Array, v: Array, hit: int, responses: Responses
-) -> tuple[Array, float]:
-    """Velocities after switched joint number ``hit`` strikes its stop, by Newton's law of impact.
-
-    Other joints that rest at a stop take part; friction has no impulse.
-
-    Returns:
-        The velocities, (nv), and the relative margin to another outcome.
-
-    Raises:
-        NotUnique: several stops share the impact and one of them has restitution, so that their order decides.
-    """
-    resting = [k for k, j in enumerate(joints) if v[j.velocity] == 0 and j.stop_at(q[j.coordinate])]
-    at_stop = sorted({hit, *resting})
-    velocities = [joints[number].velocity for number in at_stop]
-    _, response = responses(tuple("free" for _ in joints), velocities)
-    returned = np.array([1 + joints[number].restitution for number in at_stop]) * v[velocities]
-    below = np.array([joints[k].stop_at(q[joints[k].coordinate]) == "low" for k in at_stop])
-    low, high = np.where(below, 0.0, -np.inf), np.where(below, np.inf, 0.0)
-    _, impulse, left = complementary(returned, response[velocities], low, high)
-    if np.count_nonzero(impulse) > 1 and any(joints[number].restitution for number in at_stop):
-        raise NotUnique("an impact presses several stops at once: with restitution its outcome depends on their order")
-    v = v + response @ impulse
-    for number, rest in zip(at_stop, left, strict=True):
-        joint = joints[number]
-        if not rest and not joint.restitution:
-            v[joint.velocity] = 0.0
-    return v, margin(returned, response[velocities], low, high, impulse, left)
+    return tuple(mode)
 
 
 def refuse_switching(mechanism: Mechanism) -> None:

@@ -17,7 +17,7 @@ from proofroll.core.arrays import cross
 from proofroll.core.dop853 import integrate
 from proofroll.core.errors import Diverged, Refused
 from proofroll.elements.mechanism.analysis import BRANCHES, RANK, RowSign, analyse, reactions
-from proofroll.elements.mechanism.complementarity import after_impact, decided_mode, load_of, refuse_switching
+from proofroll.elements.mechanism.complementarity import decided_mode, load_of, refuse_switching
 from proofroll.elements.mechanism.kinematics import BodyMotion, Rows, Tree
 from proofroll.elements.mechanism.light_joints import lacks_inertia
 from proofroll.elements.mechanism.model import Mechanism
@@ -96,7 +96,7 @@ class JointCoordinates:
             Refused: joints that are held and loops lock the same direction, so that their forces are not determinate.
         """
         if mode is None:
-            mode = self.decided(q, v, time)[0] if self.switched else ()
+            mode = self.decided(q, v, time) if self.switched else ()
         motion = self.tree.at(q, v)
         J, M, loads = self.inertial(motion)
         b = self._torque - self._damping * v - loads.ravel() @ J.reshape(-1, len(v))
@@ -173,14 +173,9 @@ class JointCoordinates:
             for (actuator, at_q, at_v), clamped in zip(self.actuators, self._clamped, strict=True)
         ]
 
-    def decided(self, q: Array, v: Array, time: float = 0.0) -> tuple[Mode, float]:
-        """Mode of joints (by complementarity) and of limited efforts (by size), and the joints' relative margin."""
-        mode, apart = decided_mode(self.switched, q, v, partial(self._responses, time, q, v))
-        return mode + tuple(item.mode(time, float(q[at_q]), float(v[at_v])) for item, at_q, at_v in self.limited), apart
-
-    def struck(self, q: Array, v: Array, hit: int) -> tuple[Array, float]:
-        """See :func:`proofroll.elements.mechanism.complementarity.after_impact`."""
-        return after_impact(self.switched, q, v, hit, partial(self._responses, 0.0, q, v))
+    def decided(self, q: Array, v: Array, time: float = 0.0) -> Mode:
+        """Mode of joints, by complementarity."""
+        return decided_mode(self.switched, q, v, partial(self._responses, time, q, v))
 
     def _responses(self, time: float, q: Array, v: Array, mode: Mode, at: Sequence[int]) -> tuple[Array, Array]:
         """Accelerations in a mode, (nv), and how much a unit force along each velocity ``at`` adds, (nv, forces)."""
@@ -205,10 +200,14 @@ class JointCoordinates:
 
         It raises Diverged where a step passes a singular pose of the loops, or comes too near to one to tell.
         """
+        return self.watching(lambda y: self.eliminated(y, mode))
+
+    def watching(self, eliminated: Callable[[Array], Array]) -> Callable[[Array], Array]:
+        """A correction of the state that raises Diverged as :meth:`followed` does."""
         sign = RowSign(self.rank)
 
         def corrected(y: Array) -> Array:
-            y = self.eliminated(y, mode)
+            y = eliminated(y)
             if self.rank and (sign.changes(self.rows(y[: self.mechanism.nq]).C) or sign.least < BRANCHES):
                 raise Diverged("a step passes a singular pose of the loops, or one as near as lengths are known")
             return y
@@ -316,7 +315,7 @@ class JointCoordinates:
         ``load`` comes from, about the world's origin, (bodies + 1, 6).
         """
         if mode is None and self.switched:
-            mode = self.decided(q, v, time)[0]
+            mode = self.decided(q, v, time)
         found = self.solve(q, v, mode, load, time)
         motion, rows, mechanism = found.motion, found.rows, self.mechanism
         n = len(mechanism.bodies)

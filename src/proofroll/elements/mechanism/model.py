@@ -25,7 +25,7 @@ from proofroll.elements.mechanism.joint import Joint
 from proofroll.elements.mechanism.joint_kinds import JointKind
 from proofroll.elements.mechanism.parts import Body, Force, Loop, Point, Spring
 from proofroll.elements.mechanism.rotations import Array
-from proofroll.elements.mechanism.signal import Held, Signal
+from proofroll.elements.mechanism.signal import Held, Signal, Table
 
 # Laws of impacts of several contacts at once, see Mechanism.impacts.
 IN_ANY_ORDER, TOGETHER = "any order", "together"
@@ -83,6 +83,11 @@ class Mechanism:
     control: Control | None = None
     cells: tuple[Held, ...] = ()
     bushings: tuple[Bushing, ...] = ()
+
+    @property
+    def held(self) -> tuple[float, ...]:
+        """Present values of its held signals."""
+        return tuple(cell.value for cell in self.cells)
 
     def __post_init__(self) -> None:
         kinds = ("bodies", "joints", "loops", "springs", "forces", "points", "geometries", "pairs", "actuators")
@@ -250,6 +255,11 @@ class Mechanism:
     def prescribed(self) -> tuple[tuple[Joint, int, int], ...]:
         """Joints with a prescribed motion, each with its indices in q and v."""
         return tuple((joint, *self.place_of(joint.name)) for joint in self.joints if joint.motion is not None)
+
+    @property
+    def moved_by_tables(self) -> bool:
+        """True if the prescribed motion of a joint is a table, a spline of many pieces."""
+        return any(isinstance(joint.motion, Table) for joint, _, _ in self.prescribed)
 
     @cached_property
     def signals(self) -> tuple[Signal, ...]:

@@ -18,6 +18,7 @@ from proofroll.core.quantity import Quantity
 from proofroll.elements.mechanism import checks
 
 TIME = "t"
+PIECE = "piece of a signal"  # key of a function of a table or held value and a symbol of time
 # Smooth functions that a formula may call; other modules map their names to functions of symbols or of compiled code.
 FUNCTIONS: Mapping[str, Callable[[Any], Any]] = {
     name: getattr(np, {"asin": "arcsin", "atan": "arctan"}.get(name, name))
@@ -112,6 +113,14 @@ class Table:
             return np.asarray(self.values)[np.maximum(np.searchsorted(self.times, time, side="right") - 1, 0)]
         return np.interp(time, self.times, self.values)
 
+    def piece(self, time: float) -> tuple[float, float, float]:
+        """Line on which it goes on from a time [s] to its next break: time and value at one place, and slope."""
+        place = int(np.searchsorted(self.times, time, side="right")) - 1
+        if self.hold or place < 0 or place + 1 == len(self.times):
+            return time, float(self.at(time)), 0.0
+        (begin, end), (first, last) = self.times[place : place + 2], self.values[place : place + 2]
+        return begin, first, (last - first) / (end - begin)
+
 
 class Held:
     """Value that is set from outside at instants, and constant between them.
@@ -129,15 +138,24 @@ class Held:
         """The present value; of a run that is over, the value at a time [s]."""
         return self.value if self.past is None else self.past.at(time)
 
+    def piece(self, time: float) -> tuple[float, float, float]:
+        """Value that it holds from a time [s] on, as :meth:`Table.piece`."""
+        return time, float(self.at(time)), 0.0
+
 
 Signal = float | Formula | Table | Held
 
 
-def value_at(signal: Signal, time: Any, functions: Mapping[str, Callable[[Any], Any]] = FUNCTIONS) -> Any:
-    """Value of a signal at a time [s]; for a formula the time may be an array or a symbol."""
+def value_at(signal: Signal, time: Any, functions: Mapping[str, Callable[..., Any]] = FUNCTIONS) -> Any:
+    """Value of a signal at a time [s]; for a formula the time may be an array or a symbol.
+
+    For a table or a held value it may be a symbol if ``functions`` have a rule for these, under :data:`PIECE`.
+    """
     if isinstance(signal, Formula):
         return signal.at(time, functions)
-    return signal.at(time) if isinstance(signal, Table | Held) else signal
+    if isinstance(signal, Table | Held):
+        return functions[PIECE](signal, time) if PIECE in functions else signal.at(time)
+    return signal
 
 
 @dataclass(frozen=True)

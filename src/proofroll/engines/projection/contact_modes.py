@@ -30,7 +30,7 @@ from proofroll.elements.mechanism.contacts.acting import (
 from proofroll.elements.mechanism.contacts.coulomb import contact_forces, largest_friction
 from proofroll.elements.mechanism.contacts.geometry import BodyContact, coefficients_of
 from proofroll.elements.mechanism.contacts.joint_laws import JointContact, joint_contacts, refuse_rubbing_stops
-from proofroll.elements.mechanism.contacts.start import closed_and_still, natural_scale
+from proofroll.elements.mechanism.contacts.start import closed_and_still, natural_scale, start_digits
 from proofroll.elements.mechanism.contacts.touching import Moving, Touching, torn, touch
 from proofroll.elements.mechanism.joint_kinds import JointKind
 from proofroll.elements.mechanism.rotations import Array, frame_of_axis
@@ -96,7 +96,9 @@ class ContactMotion(AlternatingMotion[ContactMode]):
         start = np.append(equations.start, 0.0)
         self._limit_efforts(start)
         now = self.at(start)
-        closed, still = closed_and_still(now.touching, scale.length / self._arms, scale.rate)
+        closed, still = closed_and_still(
+            now.touching, scale.length / self._arms, scale.rate, start_digits(self.contacts)
+        )
         refuse_rubbing_stops(self.contacts, closed, 0.0)
         self.mode = tuple(OPEN for _ in self.contacts)
         self._enter(0.0, start, self._decided(now, closed, still))

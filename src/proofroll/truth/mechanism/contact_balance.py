@@ -6,10 +6,10 @@ import numpy as np
 
 from proofroll.elements.mechanism.analysis import RANK
 from proofroll.elements.mechanism.rotations import Array, frame_of_axis
-from proofroll.truth.mechanism.body_switching import SLACK
 from proofroll.truth.mechanism.contact_equations import BodiesState, ContactEquations
 from proofroll.truth.mechanism.contact_guards import AT_REST
 
+SLACK = 1e-9  # violation of an inequality, relative to the forces involved, up to which it counts as kept
 _SHARING = 2  # least number of contacts that may share a load
 _SIDES = 180  # sides of a pyramid inside each friction cone, for the test of balance at rest
 

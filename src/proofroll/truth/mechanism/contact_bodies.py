@@ -1,4 +1,4 @@
-"""Route 2 of a mechanism whose bodies touch: separate bodies, contact modes found by trial."""
+"""Route 2 of a mechanism that switches: separate bodies, modes of contacts and laws of joints found by trial."""
 
 from collections.abc import Callable, Iterator, Sequence
 
@@ -22,20 +22,20 @@ from proofroll.elements.mechanism.contacts.acting import (
 )
 from proofroll.elements.mechanism.contacts.joint_laws import off_stops
 from proofroll.elements.mechanism.contacts.sequences import groups_of
-from proofroll.elements.mechanism.contacts.start import closed_and_still
+from proofroll.elements.mechanism.contacts.start import closed_and_still, start_digits
 from proofroll.elements.mechanism.contacts.touching import Touching
 from proofroll.elements.mechanism.contacts.turning import shut_by_pressing
 from proofroll.elements.mechanism.rotations import Array, cross, frame_of_axis
 from proofroll.truth.hybrid import Transition
 from proofroll.truth.mechanism.body_impacts import ImpactLaw, impulses_in_turn
-from proofroll.truth.mechanism.body_switching import SLACK
-from proofroll.truth.mechanism.contact_balance import balanced, held_together
+from proofroll.truth.mechanism.contact_balance import SLACK, balanced, held_together
 from proofroll.truth.mechanism.contact_body_symbols import BodySymbols
 from proofroll.truth.mechanism.contact_equations import BodiesSolution, BodiesState, ContactEquations
 from proofroll.truth.mechanism.contact_guards import SLIP_ENDED, SolvedContacts, pressing, sharing
 from proofroll.truth.mechanism.contact_stretches import ContactStretches
 from proofroll.truth.mechanism.contact_taylor import ModeSymbols
 from proofroll.truth.mechanism.contact_trials import consistent, follow, next_trial
+from proofroll.truth.mechanism.held_route import BodyStates
 
 _MOST = 6  # largest number of closed contacts of which all modes are tried: each has up to four
 _PIVOTS = 4  # exchanges at most of a search by pivots, for each contact
@@ -58,14 +58,21 @@ class ContactBodies(ContactStretches):
     def _symbols(self) -> ModeSymbols:
         return BodySymbols(self.equations)
 
+    @property
+    def start(self) -> Array:
+        """State at time 0."""
+        return np.append(self.equations.equations.equations.start(), 0.0)
+
+    def bodies(self, state: Array) -> BodyStates:
+        """Places, velocities, quaternions and angular velocities of all bodies, world axes."""
+        return self.equations.equations.poses(state[:-1])
+
     def begin(self) -> Transition[ContactMode]:
         """See the protocol."""
-        state = np.append(self.equations.equations.equations.start(), 0.0)
-        touching = self.equations.at(state).touching
+        touching = self.equations.at(state := self.start).touching
+        closed, still = closed_and_still(touching, np.ones(len(touching)), 1.0, start_digits(self.contacts))
         features = tuple(each.feature for each in touching)
-        closed, still = closed_and_still(touching, np.ones(len(self.contacts)), 1.0)
-        closed = shut_by_pressing(self.contacts, closed)
-        rough = modes_of(closed, still, features)
+        rough = modes_of(shut_by_pressing(self.contacts, closed), still, features)
         state = self.equations.eliminated(state, rough)
         mode, margin = self._decided(state, rough)
         return Transition(state, mode, (), margin)

@@ -8,7 +8,6 @@ from typing import Any, NamedTuple
 from proofroll.elements.mechanism.contacts.acting import ContactMode, Features, features_of
 from proofroll.elements.mechanism.contacts.joint_laws import JointContact
 from proofroll.elements.mechanism.contacts.turning import TurningFriction
-from proofroll.elements.mechanism.signal import Held, Table
 from proofroll.truth.mechanism.constraint_rows import ConstraintRow
 from proofroll.truth.mechanism.contact_equations import ContactEquations
 from proofroll.truth.mechanism.contact_scalars import ScalarMotion, ScalarTouch, floats, known_shapes, touch_in_scalars
@@ -22,7 +21,7 @@ from proofroll.truth.mechanism.contact_symbols import (
     rows_of,
 )
 from proofroll.truth.mechanism.maximal_bodies import AXES, BodyInScalars
-from proofroll.truth.mechanism.maximal_equations import Switched
+from proofroll.truth.mechanism.maximal_equations import Drive, Switched
 from proofroll.truth.mechanism.turning_symbols import TurningMoments, of_turning, resisted, resisted_rate
 from proofroll.truth.scalars import Scalar, add, cross, dot, is_zero, minus, mul, plus, scaled, sub, turned
 
@@ -54,9 +53,7 @@ class BodySymbols:
         """True if all parts of the mechanism have a rule here."""
         bodies = self._bodies
         shapes = all(map(known_shapes, bodies.mechanism.contacts))
-        laws = any(joint.armature for joint in bodies.mechanism.joints)
-        tables = any(isinstance(signal, Held | Table) for signal in bodies.mechanism.signals)
-        return shapes and not bodies.light and not laws and not tables
+        return shapes and not (bodies.light or bodies.mechanism.moved_by_tables)
 
     def solved(
         self,
@@ -84,14 +81,18 @@ class BodySymbols:
         at = at._replace(pressing=[touch for _, touch in turns])
         joints = [now.rows[k] for k in self._kept]
         held = [(row.coefficients, row.bias) for row in joints]
+        mass = self._mass(now.drives)
         lines = [
             start
             if start is None or self._touchings <= k < self._alone
-            else self._line(k, touching[k], start, at, held, functions)
+            else self._line(k, touching[k], start, at, (mass, held), functions)
             for k, start in enumerate(began)
         ]
         rows, pushes, aims = [row for row, _ in held], [row for row, _ in held], [sub(0.0, bias) for _, bias in held]
         force = list(now.force)
+        for row, inertia in now.drives:
+            for n, value in row.coefficients.items():
+                force[n] = sub(force[n], mul(inertia, mul(value, row.bias)))
         owner: list[tuple[int, Vector]] = []
         contacts, root = self._equations.contacts, functions["sqrt"]
         turning = TurningMoments(mode, contacts, touching, lines, root)
@@ -113,10 +114,10 @@ class BodySymbols:
                 beyond = dot(touch.normal_rate, touch.slide) if own.kind == "slip" else 0.0
                 aims.append(sub(sub(0.0, dot(direction, rate)), beyond))
                 owner.append((k, along))
-        (answer,), pivots = self._eliminated(rows, pushes, [[*force, *aims]])
+        (answer,), pivots = self._eliminated(mass, rows, pushes, [[*force, *aims]])
         response: Scalar = 1.0
         if any(own.kind == "slip" and mu for own, mu in zip(mode, self._equations.friction, strict=True)):
-            smooth = self._eliminated(rows, rows, [])[1]
+            smooth = self._eliminated(mass, rows, rows, [])[1]
             for one, other in zip(pivots[e.nu :], smooth[e.nu :], strict=True):
                 response = mul(response, one / other)
         forces: list[Vector | None] = [None if own.kind == "open" else [0.0, 0.0, 0.0] for own in mode]
@@ -218,26 +219,34 @@ class BodySymbols:
         touch: ScalarTouch,
         start: Vector,
         now: _Now,
-        held: Sequence[tuple[Row, Scalar]],
+        bodies: tuple[Sequence[Row], Sequence[tuple[Row, Scalar]]],
         functions: Any,
     ) -> Vector:
         """Present direction of the only line along which a contact can slide: where a force across would move it."""
-        push = self._row(k, touch, touch.across(start), now)
+        push, (mass, held) = self._row(k, touch, touch.across(start), now), bodies
         right = [push.get(at, 0.0) for at in range(self._bodies.nu)] + [0.0] * len(held)
         joints = [row for row, _ in held]
-        (answer,), _ = self._eliminated(joints, joints, [right])
+        (answer,), _ = self._eliminated(mass, joints, joints, [right])
         way = touch.across(self._moved(k, touch, answer, now))
         return scaled(1.0 / functions["sqrt"](dot(way, way)), way)
 
-    def _eliminated(
-        self, rows: Sequence[Row], pushes: Sequence[Row], rights: Sequence[Sequence[Scalar]]
-    ) -> tuple[list[list[Scalar]], list[Scalar]]:
-        """Solutions and pivots of M u̇ − pushesᵀ z = loads, rows u̇ = aims."""
-        nu = self._bodies.nu
-        system: list[Row] = [
+    def _mass(self, drives: Sequence[Drive]) -> list[Row]:
+        """Mass matrix with the armature of joints."""
+        mass: list[Row] = [
             {j: float(value) for j, value in enumerate(line) if value} for line in self._bodies.mass_matrix
         ]
-        for number, push in enumerate(pushes, nu):
+        for row, inertia in drives:
+            for i, value in row.coefficients.items():
+                for j, other in row.coefficients.items():
+                    mass[i][j] = add(mass[i].get(j, 0.0), mul(inertia, mul(value, other)))
+        return mass
+
+    def _eliminated(
+        self, mass: Sequence[Row], rows: Sequence[Row], pushes: Sequence[Row], rights: Sequence[Sequence[Scalar]]
+    ) -> tuple[list[list[Scalar]], list[Scalar]]:
+        """Solutions and pivots of M u̇ − pushesᵀ z = loads, rows u̇ = aims."""
+        system: list[Row] = [dict(row) for row in mass]
+        for number, push in enumerate(pushes, self._bodies.nu):
             for at, value in push.items():
                 system[at][number] = scaled(-1.0, [value])[0]
         return eliminated([*system, *(dict(row) for row in rows)], rights)

@@ -107,7 +107,7 @@ class ContactEquations:
         self.pairs = [(index[contact.body_a], index[contact.body_b]) for contact in mechanism.contacts]
         self._com = [np.array(body.com) for body in mechanism.bodies] + [np.zeros(3)]
         self._limited = {k: actuator for k, actuator in enumerate(mechanism.actuators) if actuator.limit is not None}
-        self._last = LastResults[tuple[bytes, Features | None], BodiesState](_KEPT)
+        self._last = LastResults[tuple[bytes, tuple[float, ...], Features | None], BodiesState](_KEPT)
         self._driven = [mechanism.joint_index[actuator.joint] for actuator in self._limited.values()]
 
     def at(self, state: Array, features: Features | None = None) -> BodiesState:
@@ -115,7 +115,8 @@ class ContactEquations:
 
         ``features``: of solids that touch; None: the nearest.
         """
-        return self._last.of((state.tobytes(), features), lambda: self._at(state.copy(), features))
+        key = state.tobytes(), self.mechanism.held, features
+        return self._last.of(key, lambda: self._at(state.copy(), features))
 
     def _at(self, state: Array, features: Features | None) -> BodiesState:
         e = self.equations.equations

@@ -332,6 +332,12 @@ def striking(mode: ContactMode, touching: Sequence[Touching], hit: int, time: fl
     ]
 
 
+def lies_against(own: Acting, touch: Touching, size: float) -> bool:
+    """True if a contact is closed and at rest along its normal, though nothing may press it; ``size`` as above."""
+    parting = float(touch.normal @ touch.slide)
+    return own.kind != "open" or (abs(touch.gap) <= size * _TOGETHER and abs(parting) <= AT_REST)
+
+
 def noise_of(guards: Sequence[ContactGuard], size: float) -> FloatArray:
     """Round-off of the guards: a gap that just opened, a slip that just began, a border just passed are still zero."""
     return np.array([_DIGITS * size if guard.kind in {"close", "still", "pass"} else 0.0 for guard in guards])

@@ -1,22 +1,19 @@
-"""Integration and events of a mechanism whose bodies touch, as both routes share them.
+"""Events and transitions of a mechanism whose bodies touch or whose joints switch, as both routes share them.
 
 Each route adds its own equations and its own decisions on the next mode.
 """
 
+import math
 from abc import abstractmethod
-from collections.abc import Sequence
-from contextlib import suppress
+from collections.abc import Mapping, Sequence
+from copy import copy
 from dataclasses import replace
-from typing import Protocol
+from typing import Self
 
 import numpy as np
-from typing_extensions import override
 
-from proofroll.core.arrays import FloatArray
-from proofroll.core.errors import Diverged
+from proofroll.core.errors import Refused
 from proofroll.core.events import EventKind
-from proofroll.core.last_results import LastResults
-from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.contacts.acting import (
     FAINT,
     ContactMode,
@@ -30,99 +27,43 @@ from proofroll.elements.mechanism.contacts.acting import (
     with_features,
 )
 from proofroll.elements.mechanism.contacts.joint_laws import rebounding
-from proofroll.elements.mechanism.contacts.touching import Touching, lying, torn
+from proofroll.elements.mechanism.contacts.touching import lying, torn
 from proofroll.elements.mechanism.contacts.turning import opened, shut_by_pressing
 from proofroll.elements.mechanism.rotations import Array
-from proofroll.elements.mechanism.signal import varies
-from proofroll.truth.hybrid import Stretch, StretchLaw, Transition
+from proofroll.elements.mechanism.switches import Settling
+from proofroll.truth.hybrid import Stretch, Transition
 from proofroll.truth.mechanism.contact_guards import (
-    AT_REST,
     SLIP_ENDED,
-    STANDS,
-    ContactGuard,
-    SolvedContacts,
-    Touchable,
-    faint_time,
     features_beyond,
-    guard_value,
     guards_of,
     leaves,
-    noise_of,
-    pressing,
+    lies_against,
     sharing,
     striking,
 )
-from proofroll.truth.mechanism.contact_taylor import CompiledMode, CompiledModes, CompiledStretch, ModeSymbols
-from proofroll.truth.mechanism.followed_paths import CLOSE
-from proofroll.truth.mechanism.planar_slip import BegunSlip, begun_slip, leaving_slips
-from proofroll.truth.mechanism.stretches import Stretches
-from proofroll.truth.picard import PicardSteps
+from proofroll.truth.mechanism.contact_walks import ContactWalks, SwitchedEquations
+from proofroll.truth.mechanism.planar_slip import leaving_slips
 
-_KEPT = 4  # solutions that are kept
-_AHEAD = 1e-9  # time step, relative to the natural time, after which an effort is compared with its limit
-_CLAMPED = 1e-9  # difference of an effort from its limit, relative to the limit, up to which it starts at the limit
-# Difference of compiled accelerations from others, relative to the largest, up to which they are the same: the
-# direction of a slip of 2e-8 is known to 1e-8.
-_SAME_RATES = 1e-6
-# Integration of a slip to rest: decrease of its logarithm in a step, and slip speed at the end.
-_DECAY, _NOTHING = 2.0, 1e-12
+# Least deceleration of rebounds whose time is summed, in natural units; below it is round-off.
+_PULL = 1e-9
 
 
-class _Equations(Protocol):
-    mechanism: Mechanism
-    contacts: tuple[Touchable, ...]
-
-    def rate(self, state: Array, mode: ContactMode, /) -> Array: ...
-
-    def eliminated(self, state: Array, mode: ContactMode, /) -> Array: ...
-
-    def excess(self, state: Array, /) -> Array: ...
-
-    def pushes(self, state: Array, /) -> Array: ...
-
-
-class ContactStretches(Stretches[ContactMode]):
-    """Stretches of a mechanism with contacts, and transitions; the last component of a state is the time.
+class ContactStretches(ContactWalks):
+    """Stretches of a mechanism that switches, and transitions between them.
 
     Implements :class:`proofroll.truth.hybrid.HybridRoute`.
     """
 
-    _after_velocities = 0  # components of a state after the velocities, without the time
-    _begins_by = 14  # nodes of the first instants of a slip from rest
-    _by_collocation = False  # integrator of compiled modes: collocation, or Taylor series
-
-    def __init__(self, equations: _Equations, length: int, tolerance: float, size: float) -> None:
+    def __init__(self, equations: SwitchedEquations, length: int, tolerance: float, size: float) -> None:
         """Takes the length of a state without time, the tolerance of each step, the mechanism's size."""
-        super().__init__(length + 1, tolerance)
-        self._equations, self.contacts, self._size = equations, equations.contacts, size
-        self._timed = any(map(varies, equations.mechanism.signals))
-        self._last = LastResults[tuple[bytes, ContactMode], SolvedContacts](_KEPT)
-        self._used: dict[str, None] = {}
-        symbols = self._symbols()
-        self._compiled = (
-            None if symbols is None else CompiledModes(symbols, self.contacts, length + 1, self._by_collocation)
-        )
+        super().__init__(equations, length, tolerance, size)
+        self._settles = Settling()
 
-    @property
-    def integrators(self) -> str:
-        """Names of the integrators that this route has used."""
-        return " and ".join(self._used) or "DOP853"
-
-    def _symbols(self) -> ModeSymbols | None:
-        """Equations in symbols; None: the route has none."""
-        return None
-
-    def _solved(self, state: Array, mode: ContactMode) -> SolvedContacts:
-        """Motion and forces at a state."""
-        return self._last.of((state.tobytes(), mode), lambda: self._solution(state, mode))
-
-    @abstractmethod
-    def _solution(self, state: Array, mode: ContactMode) -> SolvedContacts:
-        """Motion and forces at a state."""
-
-    @abstractmethod
-    def _touching(self, state: Array, features: Features) -> Sequence[Touching]:
-        """Geometry and sliding velocity of each contact at a state; ``features``: of solids that touch."""
+    def early(self) -> Self:
+        """The same route, which sums rebounds one before, at twice the speed at least."""
+        route = copy(self)
+        route._settles, route._span = Settling(early=True), None
+        return route
 
     @abstractmethod
     def _decided(self, state: Array, rough: ContactMode, leaving: int | None = None) -> tuple[ContactMode, float]:
@@ -141,144 +82,29 @@ class ContactStretches(Stretches[ContactMode]):
         restitution of each contact in this impact.
         """
 
-    def _law(self, state: Array, mode: ContactMode) -> StretchLaw:
-        guards, equations = guards_of(self.contacts, mode), self._equations
-        # sign of the guard of an effort: it reaches its limit, or comes back from it
-        side = np.zeros(0)
-        if len(equations.excess(state)):
-            side = np.where(equations.excess(state + _AHEAD * equations.rate(state, mode)) > 0, 1.0, -1.0)
-        noise = np.where(np.abs(excess := equations.excess(state)) < _CLAMPED, 2 * np.abs(excess), 0.0)
-        return StretchLaw(
-            rates=lambda y: equations.rate(y, mode),
-            guards=lambda y: np.append(self._guards(y, mode, guards), -side * equations.excess(y)),
-            corrected=lambda y: equations.eliminated(y, mode),
-            noise=np.append(noise_of(guards, self._size), noise),
-            near=np.append([CLOSE * (guard.kind == "close") for guard in guards], np.zeros_like(noise)),
-        )
+    @staticmethod
+    def _bouncing(name: str, rebound: float, pull: float, restitution: float, falling: float | None = None) -> float:
+        """Time until the rebounds of a joint or contact are over, from the speed of the first and its decelerations.
 
-    def _guards(self, state: Array, mode: ContactMode, guards: Sequence[ContactGuard]) -> FloatArray:
-        solved, contacts = self._solved(state, mode), self.contacts
-        normals = pressing(solved.mode, solved.touching, solved.force, solved.splits)
-        return np.array([guard_value(guard, mode, contacts, solved, normals) for guard in guards])
+        ``pull``: on the way out; ``falling``: on the way back, less by friction (None: the same).
 
-    @override
-    def walk(self, time: float, state: Array, mode: ContactMode, until: float) -> Stretch[ContactMode]:
-        if self._stands(state, mode):
-            return Stretch(start=time, end=until, mode=mode, first=state, last=state, guard=None)
-        if any(own.leads for own in mode):
-            return self._begun(time, state, mode, until)
-        guards = guards_of(self.contacts, mode)
-        share = next((number for number, guard in enumerate(guards) if guard.kind == "share"), None)
-        if share is not None and self._guards(state, mode, [guards[share]])[0] > 0:
-            return Stretch(start=time, end=time, mode=mode, first=state, last=state, guard=share)
-        start, begun = self._kicked(time, state, mode)
-        stretch = self._walked(begun, start, mode, until)
-        end, last = stretch.end, stretch.last
-        if stretch.guard is not None and stretch.guard < len(guards):
-            k, kind, _ = guards[stretch.guard]
-            if kind == "still":
-                last = self._spent(last, mode, k, stretch)
-                end += float(last[-1] - stretch.last[-1])
-        return replace(stretch, start=time, first=state, end=end, last=last)
-
-    def _begun(self, time: float, state: Array, mode: ContactMode, until: float) -> Stretch[ContactMode]:
-        """First instants of a slip from rest in the plane, which end before another contact changes."""
-        name = next(contact.name for contact, own in zip(self.contacts, mode, strict=True) if own.leads)
-        guards = guards_of(self.contacts, mode)
-        others = [guard for guard in guards if guard.kind != "still" or not mode[guard.contact].leads]
-
-        def clear(y: Array, now: ContactMode) -> bool:
-            return bool(np.all(self._guards(y, now, others) <= noise_of(others, self._size)))
-
-        rate, solve, count = self._equations.rate, self._solved, self._begins_by
-        begun = begun_slip(time, state, mode, until, rate, solve, clear, count, name)
-        last = self._equations.eliminated(begun.last, begun.mode)
-        goes_on = None if begun.end >= until else len(guards)
-        return replace(begun, last=last, guard=goes_on)
-
-    def _walked(self, time: float, state: Array, mode: ContactMode, until: float) -> Stretch[ContactMode]:
-        """Stretch by a compiled mode, or by DOP853 where there is none, and near singular poses, where it fails."""
-        compiled = self._by_symbols(state, mode)
-        if compiled is not None:
-            with suppress(Diverged):
-                stretch = compiled.walk(self._law(state, mode), mode, time, state, until)
-                self._used.setdefault("collocation" if self._by_collocation else "Taylor series")
-                return stretch
-        self._used.setdefault("DOP853")
-        return super().walk(time, state, mode, until)
-
-    def _by_symbols(self, state: Array, mode: ContactMode) -> CompiledMode | None:
-        """Compiled mode, if all parts of the mechanism have a rule in symbols and no load is shared."""
-        solved = self._solved(state, mode)
-        if self._compiled is None or solved.splits.shape[1]:
-            return None
-        compiled = self._compiled.of(mode, self._clamped(state, mode))
-        if compiled is None:
-            return None
-        rates = compiled.values(state[None], mode)[2][0]
-        place = len(state) - 1 - len(solved.acceleration) - self._after_velocities
-        apart = np.abs(rates[place : place + len(solved.acceleration)] - solved.acceleration).max()
-        agrees = apart <= _SAME_RATES * max(1.0, float(np.abs(solved.acceleration).max()))
-        return compiled if agrees else None
-
-    def _clamped(self, state: Array, mode: ContactMode) -> tuple[int, ...]:
-        """Sign of each effort that is at its limit in a stretch from a state, 0 of others, of those with a limit."""
-        equations = self._equations
-        if not len(equations.excess(state)):
-            return ()
-        ahead = state + _AHEAD * equations.rate(state, mode)
-        signs = np.where(equations.excess(ahead) > 0, equations.pushes(ahead), 0.0)
-        return tuple(int(sign) for sign in signs)
-
-    @override
-    def within(self, stretch: Stretch[ContactMode], times: Array) -> Array:
-        if isinstance(stretch, BegunSlip):
-            return np.array([self._equations.eliminated(state, stretch.mode) for state in stretch.at(times)])
-        if isinstance(stretch, CompiledStretch) and stretch.by is not None:
-            return stretch.by.within(self._law(stretch.first, stretch.mode), stretch, times)
-        return super().within(stretch, times)
-
-    def _spent(self, state: Array, mode: ContactMode, k: int, stretch: Stretch[ContactMode]) -> Array:
-        """State at the end of a slip below FAINT, by collocation in the logarithm of the slip speed.
-
-        The slower a slip, the faster it turns: its equations are stiff in time, and smooth in that logarithm.
+        Raises:
+            Refused: nothing pulls it back, in natural units, as where impacts on another joint end its rebounds.
         """
-        if mode[k].along is not None:
-            return state
-
-        def one(y: Array) -> tuple[float, Array]:
-            touching = self._touching(y, features_of(mode))
-            now = tuple(headed(own, each) for own, each in zip(mode, touching, strict=True))
-            change = faint_time(touching[k], self._solved(y, now).slide_rate[k]) * self._equations.rate(y, now)
-            return float(np.linalg.norm(slip_velocity(touching[k]))), change
-
-        def decay(states: Array) -> tuple[Array, Array]:
-            """Slip speeds, and changes of states (state, places) until the slip would stop at its present rate."""
-            speeds, changes = zip(*map(one, states.T), strict=True)
-            return np.array(speeds), np.array(changes).T
-
-        compiled = stretch.by if isinstance(stretch, CompiledStretch) else None
-        function = decay if compiled is None else compiled.decay_of(mode, k)
-        steps, place = PicardSteps(lambda states: function(states)[1]), 0.0
-        last = float(np.log(np.maximum(function(state[:, None])[0], _NOTHING) / _NOTHING)[0])
-        while place < last:
-            place, state, _ = steps.step(place, state, min(last, place + _DECAY))
-        return np.asarray(state + function(state[:, None])[1][:, 0])
-
-    def _kicked(self, time: float, state: Array, mode: ContactMode) -> tuple[Array, float]:
-        """State and time shortly after a slip in the plane starts from rest, when it has a direction."""
-        solved, wait = self._solved(state, mode), 0.0
-        for k, own in enumerate(mode):
-            begins = own.kind == "slip" and own.along is None and self.contacts[k].friction
-            if begins and np.linalg.norm(slip_velocity(solved.touching[k])) < FAINT:
-                wait = max(wait, 2 * FAINT / float(np.linalg.norm(solved.slide_rate[k])))
-        return (state, time) if not wait else (state + wait * self._equations.rate(state, mode), time + wait)
+        if not pull > _PULL:
+            raise Refused(
+                f"rebounds of {name} shrink to nothing, and no force pulls it back between them, as where joints or "
+                "contacts hit each other without end: no route sums these; ask for an earlier end of the run"
+            )
+        slower = 1.0 if falling is None else math.sqrt(falling / pull)  # impact speed over rebound speed
+        return (1 + (1 / slower if slower else 0.0)) * rebound / (pull * (1 - restitution * slower))
 
     def change(self, stretch: Stretch[ContactMode]) -> Transition[ContactMode]:
         """See the protocol."""
         guards = guards_of(self.contacts, stretch.mode)
-        if stretch.guard is None or stretch.guard >= len(guards):  # a break of the rates, an effort, a slip begun
-            return Transition(stretch.last, stretch.mode, ())
+        if stretch.guard is None or not 0 <= stretch.guard < len(guards):  # a break, a slip begun, an effort
+            k = -1 if stretch.guard is None else stretch.guard - len(guards)
+            return Transition(stretch.last, stretch.mode, self._of_efforts({k: not self._signs[k]} if k >= 0 else {}))
         k, kind, border = guards[stretch.guard]
         if kind == "tear":
             slipping = zip(self.contacts, stretch.mode, strict=True)
@@ -297,6 +123,22 @@ class ContactStretches(Stretches[ContactMode]):
         if kind == "break":
             return self._broken(stretch, k)
         return self._stopped(stretch) if kind == "still" else self._impact(stretch, k)
+
+    def jumped(self, stretch: Stretch[ContactMode]) -> Transition[ContactMode]:
+        """Transition at the end of a stretch where forces jump: the mode is decided anew."""
+        before, after = self._signs, self._after(stretch, stretch.last, closed_in(stretch.mode), ())
+        if after.mode is None:
+            return after
+        pairs = enumerate(zip(before, self._clamped(after.state, after.mode), strict=True))
+        jumps = self._of_efforts({k: bool(now) for k, (was, now) in pairs if was != now})
+        return replace(after, happenings=(*after.happenings, *jumps))
+
+    def _of_efforts(self, limited: Mapping[int, bool]) -> tuple[tuple[str, str], ...]:
+        """Events of efforts, by their numbers: True for one that reaches its limit, False for one that leaves it."""
+        if self._equations.mechanism.contacts:
+            return ()  # beside contacts of bodies no engine reports them
+        kinds = {True: EventKind.SATURATE, False: EventKind.RELEASE}
+        return tuple((kinds[at], self._limited[k]) for k, at in limited.items())
 
     def _broken(self, stretch: Stretch[ContactMode], k: int) -> Transition[ContactMode]:
         """Transition where friction no longer holds a contact; of a slip with less friction all forces jump."""
@@ -323,8 +165,8 @@ class ContactStretches(Stretches[ContactMode]):
         hits = striking(stretch.mode, touching, hit, stretch.end, self._size)
         # dry friction of joints and of turning gives no impulse
         closed = [
-            (own.kind != "open" or k in hits) and contact.presses
-            for k, (own, contact) in enumerate(zip(stretch.mode, contacts, strict=True))
+            (k in hits or lies_against(own, touch, self._size)) and contact.presses
+            for k, (own, touch, contact) in enumerate(zip(stretch.mode, touching, contacts, strict=True))
         ]
         laws = [contact.restitution if k in hits else 0.0 for k, contact in enumerate(contacts)]
         sideways = [contact.tangential_restitution if k in hits else 0.0 for k, contact in enumerate(contacts)]
@@ -389,10 +231,3 @@ class ContactStretches(Stretches[ContactMode]):
         struck = {name for _, name in happened}
         happenings = (*happened, *(item for item in changed if item[1] not in struck))
         return Transition(state, mode, happenings, margin=np.inf if delay else min(margin, sure), delay=delay)
-
-    def _stands(self, state: Array, mode: ContactMode) -> bool:
-        """True if nothing moves or is about to move."""
-        if self._timed or any(own.kind == "slip" for own in mode):
-            return False
-        solved = self._solved(state, mode)
-        return float(np.abs(solved.velocity).max()) <= AT_REST and float(np.abs(solved.acceleration).max()) <= STANDS

@@ -74,10 +74,8 @@ def held_rows(
 
 def of_joint(contact: JointContact, q: Scalar, v: Scalar) -> ScalarTouch:
     """A law of a joint as a contact, at a coordinate and its rate; see :meth:`JointContact.touching`."""
-    stop = contact.joint.low if contact.side > 0 else contact.joint.high
-    gap = mul(float(contact.side), sub(q, float(stop))) if contact.side else 0.0
     return ScalarTouch(
-        gap=gap,
+        gap=mul(float(contact.side), sub(q, float(contact.stop))) if contact.side else 0.0,
         normal=(1.0, 0.0, 0.0),
         normal_rate=_NONE,
         place=_NONE,

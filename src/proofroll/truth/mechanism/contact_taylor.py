@@ -194,7 +194,7 @@ class CompiledMode:
         self._turning = [k for k, pair in enumerate(zip(mode, contacts, strict=True)) if turning_slip(*pair)]
         self._count, self._slips, self._lined = len(guards), len(slips), lined
         expressions = [constants.symbol(value) for value in values]
-        self._constants = constants.values
+        self._constants = constants
         squares = expressions[len(guards) : len(guards) + len(slips) : 3]
         if squares:
             inverse = [1.0 / square for square in squares]
@@ -213,14 +213,15 @@ class CompiledMode:
             raise Diverged(f"a guard is not finite near t = {states[-1, 0]:.6g} s")
         return guards
 
-    def _parameters(self, mode: ContactMode) -> Array:
-        """Run-time parameters: directions of the lines at the start of a mode, and the numbers of the scene."""
+    def _parameters(self, mode: ContactMode, time: float) -> Array:
+        """Run-time parameters of a stretch: lines of contacts at its start, numbers of the scene, lines of signals."""
         own = [x for k in self._lined for x in mode[k].along or ()]
-        return np.concatenate([own, self._constants])[: self._values.nparams]
+        return np.concatenate([own, self._constants.values(time)])[: self._values.nparams]
 
     def values(self, states: Array, mode: ContactMode) -> tuple[Array, Array, Array]:
-        """Guards, numbers of slips and rates of states (times, state), each (times, …)."""
-        found, first = self._called(states.T, self._parameters(mode)), self._count + self._slips
+        """Guards, numbers of slips and rates of states (times, state) of one stretch, each (times, …)."""
+        pars = self._parameters(mode, float(states[0, -1]))
+        found, first = self._called(states.T, pars), self._count + self._slips
         return found[: self._count].T, found[self._count : first].T, found[first : first + states.shape[1]].T
 
     def _called(self, states: Array, pars: Array) -> Array:
@@ -238,7 +239,7 @@ class CompiledMode:
         """
         if not until > time:
             return Stretch(start=time, end=time, mode=mode, first=state, last=state, guard=None)
-        count, watch, pars = StepCount(time, until), StepWatch(), self._parameters(mode)
+        count, watch, pars = StepCount(time, until), StepWatch(), self._parameters(mode, time)
         steps, grazes, visited, rise = list[ModeStep](), list[float](), list[tuple[float, Array]](), None
         for step in self._steps(pars, state, until):
             leaving, crests = not steps, list[float]()
@@ -338,9 +339,9 @@ class CompiledMode:
 
         return step
 
-    def decay_of(self, mode: ContactMode, k: int) -> Callable[[Array], tuple[Array, Array]]:
-        """Function of states (state, places): slip speeds of a contact, and changes until the slip would stop so."""
-        pars, place = self._parameters(mode), self._count + 3 * self._turning.index(k)
+    def decay_of(self, mode: ContactMode, k: int, time: float) -> Callable[[Array], tuple[Array, Array]]:
+        """Function of states (state, places) after a time [s]: slip speeds, changes until the slip would stop so."""
+        pars, place = self._parameters(mode, time), self._count + 3 * self._turning.index(k)
         first = self._count + self._slips
 
         def decay(states: Array) -> tuple[Array, Array]:
@@ -354,7 +355,7 @@ class CompiledMode:
         """States at increasing times [s] within a stretch that this mode integrated, shape (times, state)."""
         begun, first = stretch.visited[0]
         states = np.empty((len(times), len(first)))
-        early, pars = times <= begun, self._parameters(stretch.mode)
+        early, pars = times <= begun, self._parameters(stretch.mode, stretch.start)
         states[early] = first + (times[early] - begun)[:, None] * self.values(first[None], stretch.mode)[2]
         number = int(early.sum())
         for step in stretch.steps:

@@ -1,19 +1,21 @@
-"""Route 1 of a mechanism whose bodies touch: joint coordinates, Coulomb's law solved for all contacts at once."""
+"""Route 1 of a mechanism that switches: joint coordinates, Coulomb's law solved for all contacts at once."""
 
 from collections.abc import Sequence
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from proofroll.elements.mechanism.contacts.acting import ContactMode, Features, closed_in, features_of
 from proofroll.elements.mechanism.contacts.dynamics import ContactDynamics
 from proofroll.elements.mechanism.contacts.states import ContactSolution
 from proofroll.elements.mechanism.contacts.touching import Touching
 from proofroll.elements.mechanism.rotations import Array
-from proofroll.truth.hybrid import Transition
+from proofroll.truth.hybrid import StretchLaw, Transition
 from proofroll.truth.mechanism.contact_guards import SLIP_ENDED, SolvedContacts
 from proofroll.truth.mechanism.contact_stretches import ContactStretches
 from proofroll.truth.mechanism.contact_taylor import ModeSymbols
 from proofroll.truth.mechanism.contact_tree_symbols import TreeSymbols
+from proofroll.truth.mechanism.held_route import BodyStates
 
 
 class ContactTree(ContactStretches):
@@ -31,10 +33,25 @@ class ContactTree(ContactStretches):
     def _symbols(self) -> ModeSymbols:
         return TreeSymbols(self.dynamics)
 
+    @property
+    def start(self) -> Array:
+        """State at time 0."""
+        return np.append(np.concatenate(self.dynamics.mechanism.start()), 0.0)
+
+    def bodies(self, state: Array) -> BodyStates:
+        """Places, velocities, quaternions and angular velocities of all bodies, world axes."""
+        motion = self.dynamics.equations.tree.at(*self.dynamics.parts(state)[:2])
+        turned = Rotation.from_matrix(motion.R_WB[:-1]).as_quat(scalar_first=True)
+        return motion.p_WB[:-1], motion.v_WB[:-1], turned, motion.w_WB[:-1]
+
+    def _law(self, state: Array, mode: ContactMode) -> StretchLaw:
+        law = super()._law(state, mode)
+        return law._replace(corrected=self.dynamics.equations.watching(law.corrected))
+
     def begin(self) -> Transition[ContactMode]:
         """See the protocol."""
         mode, margin = self.dynamics.begin()
-        state = self.dynamics.eliminated(np.concatenate([*self.dynamics.mechanism.start(), [0.0]]), mode)
+        state = self.dynamics.eliminated(self.start, mode)
         return Transition(state, mode, (), margin)
 
     def _struck(

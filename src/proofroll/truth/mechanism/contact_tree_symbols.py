@@ -15,7 +15,7 @@ from proofroll.elements.mechanism.contacts.joint_laws import JointContact
 from proofroll.elements.mechanism.contacts.turning import TurningFriction
 from proofroll.elements.mechanism.joint_kinds import AXES, SLIDING, WITH_QUATERNION, JointKind
 from proofroll.elements.mechanism.prescribed import moved
-from proofroll.elements.mechanism.signal import Held, Table, value_at
+from proofroll.elements.mechanism.signal import value_at
 from proofroll.truth.mechanism.contact_scalars import ScalarMotion, ScalarTouch, floats, known_shapes, touch_in_scalars
 from proofroll.truth.mechanism.contact_symbols import (
     Row,
@@ -66,8 +66,7 @@ class TreeSymbols:
         """True if all parts of the mechanism have a rule here."""
         m = self._mechanism
         shapes = all(map(known_shapes, m.contacts))
-        tables = any(isinstance(signal, Held | Table) for signal in m.signals)
-        return shapes and not (m.loops or m.couplings or tables)
+        return shapes and not (m.loops or m.couplings or m.moved_by_tables)
 
     def solved(
         self,

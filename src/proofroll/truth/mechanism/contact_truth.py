@@ -1,22 +1,29 @@
-"""Truth of a mechanism whose bodies touch, by two routes that share the root finder of guards and the shapes."""
+"""Truth of a mechanism that switches, by two routes that share the root finder of guards and the shapes.
 
+Contacts of bodies, dry friction, stops and effort limits of joints are rows with bounds of the same machine.
+"""
+
+from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
 from proofroll.core.errors import Refused
+from proofroll.core.events import EventKind
 from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.analysis import RANK
 from proofroll.elements.mechanism.commands import has_held
-from proofroll.elements.mechanism.contacts.acting import ContactMode, kinds
+from proofroll.elements.mechanism.contacts.acting import ContactMode
 from proofroll.elements.mechanism.contacts.dynamics import ContactDynamics
 from proofroll.elements.mechanism.contacts.geometry import pair_sums
+from proofroll.elements.mechanism.contacts.joint_laws import JointContact
 from proofroll.elements.mechanism.record import record_of
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.elements.mechanism.signal import breaks
-from proofroll.truth.hybrid import HybridPath, Stretch, first_close, states_of
+from proofroll.truth.hybrid import HybridPath, HybridRoute, Stretch, first_close, states_of
 from proofroll.truth.mechanism.contact_bodies import ContactBodies
-from proofroll.truth.mechanism.contact_bounces import body_poses, contact_bounces, tree_poses
+from proofroll.truth.mechanism.contact_bounces import contact_bounces
 from proofroll.truth.mechanism.contact_equations import ContactEquations
 from proofroll.truth.mechanism.contact_tree import ContactTree
 from proofroll.truth.mechanism.error_bars import TwoRouteMotion, check_start, on_same_turns
@@ -32,8 +39,11 @@ from proofroll.truth.mechanism.followed_paths import (
     times_known,
     two_route_motion,
 )
+from proofroll.truth.mechanism.held_route import HeldPath, HeldRoute
 from proofroll.truth.mechanism.maximal_coordinates import MaximalCoordinates
 from proofroll.truth.mechanism.natural_units import Units, natural_units
+
+_Path = HybridPath[Stretch[ContactMode]]
 
 
 def contact_truth(mechanism: Mechanism, times: Array) -> TwoRouteMotion:
@@ -45,7 +55,7 @@ def contact_truth(mechanism: Mechanism, times: Array) -> TwoRouteMotion:
         Diverged: a route stopped.
     """
     refuse_uncovered(mechanism)
-    if has_held(mechanism):
+    if mechanism.contacts and has_held(mechanism):
         raise Refused("no route of the truth follows contacts under held targets yet; it follows them in the air")
     units = natural_units(mechanism)
     with units.errors_in_seconds():
@@ -55,68 +65,113 @@ def contact_truth(mechanism: Mechanism, times: Array) -> TwoRouteMotion:
 def _in_units(mechanism: Mechanism, units: Units, times: Array) -> TwoRouteMotion:
     """Truth at times in natural units, by routes in these units."""
     own = units.mechanism(mechanism)
-    dynamics, second = ContactDynamics(own), MaximalCoordinates(own)
+    held = tuple(HeldPath(mechanism, units, own) for _ in range(2)) if has_held(mechanism) else ()
+    plain = [values.own for values in held] or [own, own]
+    dynamics, second = ContactDynamics(plain[0]), MaximalCoordinates(plain[1])
     check_start(dynamics.equations, second, units.length)
     size = _size(dynamics)
-    tree = ContactTree(dynamics, TOLERANCES[0], size)
-    equations = ContactEquations(own, second.lean)
+    tree, equations = ContactTree(dynamics, TOLERANCES[0], size), ContactEquations(plain[1], second.lean)
     bodies = ContactBodies(equations, TOLERANCES[1], size)
-    until, kinks = float(times[-1]), breaks(own.signals)
-    paths = followed(tree, bodies, until, kinks)
-    times = times_known(paths, times)
+    until, breaking, kinds = float(times[-1]), breaks(own.signals), partial(_kinds, dynamics)
+    paths, routes = _followed(tree, bodies, held, until, breaking)
+    asked = times_known(paths, times)
+    times = held[1].on_instants(held[0].on_instants(asked)) if held else asked
     stretches = paths[0].stretch_at(times)
     others = at_times(paths[1], counterparts(paths, stretches, kinds), times, kinds)
-    first = _by_the_tree(tree, paths[0], times)
-    one, cut = first.record, cut_early(tree.early(), paths[0], until, kinks, times, kinds)
-    states = states_of(bodies, paths[1], times, others)
+    states = states_of(routes[0], paths[0], times, stretches), states_of(routes[1], paths[1], times, others)
+    for values in held:
+        values.finish()
+    first = _by_the_tree(tree, paths[0], times, states[0])
+    one, cut = first.record, None if held else cut_early(tree.early(), paths[0], until, breaking, times, kinds)
     modes = [paths[1].stretches[number].mode for number in others]
-    applied = [bodies.forces(state, mode) for state, mode in zip(states, modes, strict=True)]
+    applied = [bodies.forces(state, mode) for state, mode in zip(states[1], modes, strict=True)]
+    switched = [equations.switched(state, mode) for state, mode in zip(states[1], modes, strict=True)]
     wrenches = [wrench for _, wrench in applied]
-    switched = [equations.switched(state, mode) for state, mode in zip(states, modes, strict=True)]
-    two = on_same_turns(own, one, second.recorded(times, states[:, :-1], switched, wrenches))
-    routes = (
-        f"joint coordinates, {tree.integrators}, contacts by Coulomb's law at all of them at once",
-        f"bodies alone, {bodies.integrators}, contact modes by trial",
-    )
-    ended = first_close(paths, CLOSE)
-    reason = _shared_load(dynamics, paths[0], ended) if ended == 0 or not paths[0].known else ""
-    reason = reason or "a change of the parameters within their accuracy changes which contacts stick, slide or open"
+    two = on_same_turns(own, one, second.recorded(times, states[1][:, :-1], switched, wrenches))
     other = np.array([force for force, _ in applied])
     others_sums = np.einsum("pk,tki->tpi", pair_sums(own.contacts), other) * units.force
-    first, two = _in_si(mechanism, units, first), units.record(mechanism, two)
+    # samples at instants are at the times that were asked for, to the last bit
+    one, two = (units.record(mechanism, replace(record, time=asked)) for record in (one, two))
     left = None
     if cut is not None:
-        early = _by_the_tree(tree, cut[0], times)
-        early = early._replace(record=on_same_turns(own, one, early.record))
+        early = _by_the_tree(tree, cut[0], times, states_of(tree, cut[0], times, cut[0].stretch_at(times)))
+        early = early._replace(record=on_same_turns(own, first.record, early.record))
         left = _in_si(mechanism, units, early), cut[1]
-    assert first.pressed is not None  # of a mechanism with contacts
-    assert first.sums is not None  # of a mechanism with contacts
     motion = two_route_motion(
         mechanism,
         paths,
-        first.record,
+        one,
         two,
-        routes,
-        reason,
+        _names(tree, bodies),
+        _reason(dynamics, paths),
         units,
         kinds=kinds,
-        pressed=(first.pressed, other * units.force),
-        sums=(first.sums, others_sums),
+        pressed=(first.pressed * units.force, other * units.force) if own.contacts else None,
+        sums=(first.sums * units.force, others_sums) if own.contacts else None,
         until=until * units.time,
         cut=left,
     )
-    by_routes = (tree, paths[0], tree_poses(tree)), (bodies, paths[1], body_poses(second))
+    if not own.contacts:
+        return motion
     last = min(until, *(path.stretches[-1].end for path in paths))
-    return replace(motion, bounces=contact_bounces(own, by_routes, motion.events, units, last))
+    return replace(
+        motion, bounces=contact_bounces(own, list(zip((tree, bodies), paths, strict=True)), motion.events, units, last)
+    )
 
 
-def _by_the_tree(tree: ContactTree, path: HybridPath[Stretch[ContactMode]], times: Array) -> Routed:
-    """Motion and forces of the first route along a path, in natural units."""
-    stretches, dynamics = path.stretch_at(times), tree.dynamics
+def _followed(
+    tree: ContactTree, bodies: ContactBodies, held: Sequence[HeldPath], until: float, breaking: Sequence[float]
+) -> tuple[tuple[_Path, _Path], tuple[HybridRoute[ContactMode], HybridRoute[ContactMode]]]:
+    """Paths of both routes to a time in natural units, and the routes, which hold values if the mechanism does.
+
+    ``breaking``: times at which the rates are not smooth.
+    """
+    if not held:
+        return followed(tree, bodies, until, breaking), (tree, bodies)
+    first, second = HeldRoute(tree, held[0]), HeldRoute(bodies, held[1])
+    one, two = followed(first, second, until, sorted({*breaking, *held[0].breaks(until)}))
+    if any(item.kind == EventKind.SETTLE for item in one.happenings):
+        raise Refused("no route of the truth follows rebounds to their end under held targets yet")
+    return (first.completed(one), second.completed(two)), (first, second)
+
+
+def _kinds(dynamics: ContactDynamics, mode: ContactMode) -> tuple[tuple[str, bool], ...]:
+    """Part of a mode in which both routes must agree: kinds, and the sense of a joint that slides against friction."""
+    return tuple(
+        (own.kind, isinstance(law, JointContact) and own.kind == "slip" and own.along is not None and own.along[1] > 0)
+        for own, law in zip(mode, dynamics.contacts, strict=True)
+    )
+
+
+def _names(tree: ContactTree, bodies: ContactBodies) -> tuple[str, str]:
+    """Names of both routes."""
+    if not tree.dynamics.mechanism.contacts:
+        return (
+            f"joint coordinates, {tree.integrators}, modes by complementarity",
+            f"maximal coordinates, {bodies.integrators}, modes by trial",
+        )
+    return (
+        f"joint coordinates, {tree.integrators}, contacts by Coulomb's law at all of them at once",
+        f"bodies alone, {bodies.integrators}, contact modes by trial",
+    )
+
+
+def _reason(dynamics: ContactDynamics, paths: tuple[_Path, _Path]) -> str:
+    """Reason why the motion is not unique from its horizon or its end on."""
+    if not dynamics.mechanism.contacts:
+        return "a change of the parameters within their accuracy changes which joints hold or hit a stop"
+    ended = first_close(paths, CLOSE)
+    reason = _shared_load(dynamics, paths[0], ended) if ended == 0 or not paths[0].known else ""
+    return reason or "a change of the parameters within their accuracy changes which contacts stick, slide or open"
+
+
+def _by_the_tree(tree: ContactTree, path: _Path, times: Array, states: Array) -> Routed:
+    """Motion and forces of the first route along a path with these states, in natural units."""
+    dynamics = tree.dynamics
     records, forces, sums = zip(
         *(
             dynamics.sample(*dynamics.parts(state)[:2], path.stretches[number].mode, float(state[-1]))
-            for state, number in zip(states_of(tree, path, times, stretches), stretches, strict=True)
+            for state, number in zip(states, path.stretch_at(times), strict=True)
         ),
         strict=True,
     )
@@ -125,12 +180,10 @@ def _by_the_tree(tree: ContactTree, path: HybridPath[Stretch[ContactMode]], time
 
 def _in_si(mechanism: Mechanism, units: Units, own: Routed) -> Routed:
     """Motion and forces in SI units."""
-    assert own.pressed is not None  # of a mechanism with contacts
-    assert own.sums is not None  # of a mechanism with contacts
     return Routed(units.record(mechanism, own.record), own.pressed * units.force, own.sums * units.force)
 
 
-def _shared_load(dynamics: ContactDynamics, path: HybridPath[Stretch[ContactMode]], time: float) -> str:
+def _shared_load(dynamics: ContactDynamics, path: _Path, time: float) -> str:
     """Reason why a motion is not unique from a time on [s], naming contacts whose normal forces are not determinate.
 
     Empty: all are.

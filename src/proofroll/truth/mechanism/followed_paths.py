@@ -66,8 +66,8 @@ class Routed(NamedTuple):
     """
 
     record: Record
-    pressed: Array | None = None
-    sums: Array | None = None
+    pressed: Array
+    sums: Array
 
 
 def cut_early(
@@ -201,7 +201,7 @@ def _left_by_a_cut(
     routed, counts = cut
     record = replace(routed.record, wrench=np.where(determinate, routed.record.wrench, np.nan))
     others = fields_with_bars(mechanism, record)
-    others |= {name: values for name in ("pressed", "sums") if (values := getattr(routed, name)) is not None}
+    others |= {"pressed": routed.pressed, "sums": routed.sums} if mechanism.contacts else {}
     for name, values in fields.items():
         left[name] = np.where(counts, largest(others[name] - values), 0.0)
     return left

@@ -34,6 +34,13 @@ BodyStates = tuple[Array, Array, Array, Array]
 class JumpingRoute(HybridRoute[ModeT], Protocol):
     """Protocol of a route that decides its mode anew after forces have jumped."""
 
+    @property
+    def start(self) -> State:
+        """State at time 0."""
+
+    def bodies(self, state: State) -> BodyStates:
+        """States of all bodies."""
+
     def jumped(self, stretch: Stretch[ModeT]) -> Transition[ModeT]:
         """Transition at the end of a stretch, where held values have changed."""
 
@@ -107,15 +114,12 @@ class HeldPath:
 class HeldRoute(Generic[ModeT]):
     """Route whose held values change at instants; implements :class:`proofroll.truth.hybrid.HybridRoute`."""
 
-    def __init__(
-        self, route: JumpingRoute[ModeT], values: HeldPath, start: State, bodies: Callable[[State], BodyStates]
-    ) -> None:
-        """Takes the route's first state, and a function from a state to those of the bodies."""
-        self._route, self._values, self._start, self._bodies = route, values, start, bodies
+    def __init__(self, route: JumpingRoute[ModeT], values: HeldPath) -> None:
+        self._route, self._values = route, values
 
     def begin(self) -> Transition[ModeT]:
         """See the protocol."""
-        self._values.reach(0.0, lambda: self._bodies(self._start))
+        self._values.reach(0.0, lambda: self._route.bodies(self._route.start))
         return self._route.begin()
 
     def walk(self, time: float, state: State, mode: ModeT, until: float) -> Stretch[ModeT]:
@@ -138,7 +142,7 @@ class HeldRoute(Generic[ModeT]):
 
     def change(self, stretch: Stretch[ModeT]) -> Transition[ModeT]:
         """See the protocol."""
-        reached = self._values.reach(stretch.end, lambda: self._bodies(stretch.last))
+        reached = self._values.reach(stretch.end, lambda: self._route.bodies(stretch.last))
         if stretch.guard is None and reached:
             return self._route.jumped(stretch)
         return self._route.change(stretch)

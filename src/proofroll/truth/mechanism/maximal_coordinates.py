@@ -146,23 +146,6 @@ class NumericEquations:
             force = force - G.T @ (inertia * np.array([drive.row.bias for drive in added], dtype=float))
         return half, force
 
-    def struck(self, state: Array, held: Sequence[int], after: Sequence[float]) -> tuple[Array, Array]:
-        """Velocities u after an impact that gives joints prescribed speeds, and its impulses along their coordinates.
-
-        Args:
-            state: before the impact.
-            held: indices of the joints.
-            after: their speeds after the impact, m/s or rad/s.
-        """
-        constrained = self.equations.at(state.tolist(), switched=Switched(tuple(held)))
-        A, (half, _) = self._matrix(constrained.rows), self._driven(constrained)
-        e = self.equations
-        u = state[e.nx : e.nx + e.nu]
-        inverse, opening = np.linalg.pinv(A @ half, RANK), constrained.opening(A @ u)
-        opening[len(A) - len(held) :] -= after
-        change = -inverse @ opening
-        return u + half @ change, (inverse.T @ change)[len(A) - len(held) :]
-
     def along(self, state: Array, joints: Sequence[int]) -> tuple[Array, Array]:
         """Coordinates and rates of joints with one coordinate, rad or m and per s.
 
@@ -174,6 +157,13 @@ class NumericEquations:
         kept = {number: state[e.nx + e.nu + index] for index, (number, _) in enumerate(e.angles)}
         positions = [kept.get(number, float(row.residual)) for number, row in zip(joints, rows, strict=True)]
         return np.array(positions, dtype=float), np.asarray(rates, dtype=float)
+
+    def poses(self, state: Array) -> tuple[Array, Array, Array, Array]:
+        """Places, velocities, quaternions and angular velocities of all bodies, world axes."""
+        views = self.equations.at(self.normalised(state).tolist()).views[:-1]
+        R, r, v, w = (np.array([getattr(view, name) for view in views], float) for name in "Rrvw")
+        arm = np.einsum("nij,nj->ni", R, np.array([body.com for body in self.equations.mechanism.bodies]))
+        return r - arm, v - np.cross(w, arm), Rotation.from_matrix(R).as_quat(scalar_first=True), w
 
     def normalised(self, state: Array) -> Array:
         """State with quaternions of unit length."""

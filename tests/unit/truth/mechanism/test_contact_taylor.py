@@ -102,20 +102,37 @@ def driven_turntable(target: Any, torque: Any) -> Mechanism:
     return replace(m, joints=(axle, *m.joints[1:]), actuators=(motor,), springs=(spring,), forces=forces)
 
 
-def test_springs_forces_motors_and_drives_are_compiled_but_tables_are_not() -> None:
-    """Loads of the joints and between bodies have rules in both routes, also as formulas of time; a table has none."""
+@pytest.mark.parametrize(
+    ("target", "torque"),
+    [
+        (Formula("0.4*sin(3*t)"), Formula("0.01*t^2")),
+        (Table((0.0, 0.1), (0.0, 0.2)), Table((0.0, 0.2), (0.1, 0.3), hold=True)),
+    ],
+)
+def test_springs_forces_motors_and_drives_are_compiled(target: Any, torque: Any) -> None:
+    """Loads of the joints and between bodies have rules in both routes, also as formulas of time and tables."""
     pytest.importorskip("heyoka")
-    formula = driven_turntable(Formula("0.4*sin(3*t)"), Formula("0.01*t^2"))
-    for route in routes_of(formula):
+    for route in routes_of(driven_turntable(target, torque)):
         begun = route.begin()
         assert begun.mode is not None
         compiled, law = route._by_symbols(begun.state, begun.mode), route._law(begun.state, begun.mode)
         assert compiled is not None
         state = law.corrected(begun.state + 0.01 * law.rates(begun.state))
         assert compiled.values(state[None], begun.mode)[2][0] == pytest.approx(law.rates(state), abs=1e-12)
-    table = driven_turntable(Table((0.0, 0.1), (0.0, 0.2)), 0.0)
-    found = truth_of(table, np.array([0.0, 0.02]))
-    assert [route.split(", ")[1] for route in found.routes] == ["DOP853", "DOP853"]
+
+
+def test_another_table_compiles_nothing_anew() -> None:
+    """Values and times of a table are parameters at run time: a motor that follows another one moves its own way."""
+    pytest.importorskip("heyoka")
+    ends, counts = [], []
+    for value in (0.23, 0.37):
+        table = Table((0.0, 0.013, 0.05), (0.0, value, -0.11))
+        found = truth_of(driven_turntable(table, 0.0), np.array([0.0, 0.02]))
+        assert [route.split(", ")[1] for route in found.routes] == ["collocation", "Taylor series"]
+        ends.append(float(found.record.q[-1, 0]))
+        counts.append(len(contact_taylor._MODES))
+    assert counts[0] == counts[1]
+    assert ends[0] != ends[1]
 
 
 @pytest.mark.parametrize("law", [{"friction": 0.003}, {"limits": (-1.0, 0.5), "restitution": 0.5}])

@@ -24,5 +24,5 @@ def test_numbers_become_parameters_and_those_of_formulas_stay() -> None:
     x = Symbol(Text("x"), constants)
     assert (-(x * 0.3) * 2.0 * np.float64(0.7) * 0.3).expression == "(((-(x*p3)*2)*p4)*p3)"
     assert (x - 1.0).expression == "(x-1)"
-    assert constants.values.tolist() == [0.3, 0.7]
+    assert constants.values(0.0).tolist() == [0.3, 0.7]
     assert constants.functions({"half": lambda y: Text(f"half({y})")})["half"](0.7).expression == "half(p4)"

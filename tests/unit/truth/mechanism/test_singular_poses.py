@@ -9,11 +9,12 @@ from scipy.spatial.transform import Rotation
 from proofroll.core.errors import Diverged, Refused
 from proofroll.elements.mechanism import Body, Joint, Loop, Mechanism
 from proofroll.elements.mechanism.analysis import RowSign, analyse
+from proofroll.elements.mechanism.contacts.dynamics import ContactDynamics
 from proofroll.elements.mechanism.element import MechanismElement
 from proofroll.elements.mechanism.joint_coordinates import JointCoordinates
 from proofroll.truth.hybrid import follow
 from proofroll.truth.mechanism.closed_forms import closed_form
-from proofroll.truth.mechanism.joint_switching import SwitchedTree
+from proofroll.truth.mechanism.contact_tree import ContactTree
 from proofroll.truth.mechanism.plug_in import MechanismTruth
 from proofroll.truth.mechanism.singular_poses import singular_poses
 from proofroll.truth.mechanism.smooth_truth import find_truth
@@ -122,9 +123,9 @@ def test_a_stop_elsewhere_ends_no_other_way_at_a_singular_pose(scene):
     """A mechanism with a stop that it does not reach is followed by other steps, to the same pose."""
     mechanism = scene("slider_crank", crank=0.4 * (1 - 1e-10), speed=3.0)
     crank = replace(mechanism.joints[0], limits=(-9.0, 9.0), friction=1e-3)
-    equations = JointCoordinates(replace(mechanism, joints=(crank, *mechanism.joints[1:])))
+    dynamics = ContactDynamics(replace(mechanism, joints=(crank, *mechanism.joints[1:])))
     with pytest.raises(Diverged, match=r"at t = 0\.38\d* s: a step passes a singular pose of the loops"):
-        follow(SwitchedTree(equations, 1e-9), 0.5)
+        follow(ContactTree(dynamics, 1e-9, 1.0), 0.5)
 
 
 @pytest.mark.arithmetic

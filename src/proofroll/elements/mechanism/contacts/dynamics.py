@@ -33,10 +33,11 @@ from proofroll.elements.mechanism.contacts.joint_laws import (
     joint_contacts,
     mode_of_joints,
     off_stops,
+    on_stops,
 )
 from proofroll.elements.mechanism.contacts.sequences import groups_of, ordered, refuse_spread, sequences
 from proofroll.elements.mechanism.contacts.slide_rows import slide_row, turning_row
-from proofroll.elements.mechanism.contacts.start import STILL, closed_and_still, natural_scale, touches
+from proofroll.elements.mechanism.contacts.start import STILL, closed_and_still, natural_scale, start_digits, touches
 from proofroll.elements.mechanism.contacts.states import ContactsNow, ContactSolution
 from proofroll.elements.mechanism.contacts.touching import Touching, lying
 from proofroll.elements.mechanism.contacts.turning import (
@@ -76,14 +77,14 @@ class ContactDynamics:
         self.sums = np.pad(pair_sums(mechanism.contacts), ((0, 0), (0, others)))
         index = mechanism.body_index
         self._bodies = [(index[contact.body_a], index[contact.body_b]) for contact in mechanism.contacts]
-        self._last = LastResults[tuple[bytes, bytes, float, Features | None], ContactsNow](4)
+        self._last = LastResults[tuple[bytes, bytes, float, tuple[float, ...], Features | None], ContactsNow](4)
 
     def at(self, q: Array, v: Array, time: float = 0.0, features: Features | None = None) -> ContactsNow:
         """Kinematics and free accelerations for coordinates (nq) and velocities (nv) at a time [s].
 
         ``features``: of solids that touch; None: the nearest.
         """
-        key = q.tobytes(), v.tobytes(), time, features
+        key = q.tobytes(), v.tobytes(), time, self.mechanism.held, features
         return self._last.of(key, lambda: self._at(q.copy(), v.copy(), time, features))
 
     def _at(self, q: Array, v: Array, time: float, features: Features | None) -> ContactsNow:
@@ -214,9 +215,8 @@ class ContactDynamics:
         (q, v, time), presses = self.parts(y), [contact.presses for contact in self.contacts]
         closed = [k for k, own in enumerate(mode) if own.kind != "open" and presses[k]]
         unit = self.equations.tree.normalised(q)
-        q = unit if np.abs(unit - q).max(initial=0.0) > EXACT else q
-        features = features_of(mode)
-        state = self.at(q, v, time, features)
+        q = on_stops([self.contacts[k] for k in closed], unit if np.abs(unit - q).max(initial=0.0) > EXACT else q)
+        state = self.at(q, v, time, features := features_of(mode))
         gaps = np.array([state.touching[k].gap for k in closed])
         found, K = state.solution, forbidding_rows(mode, state.touching, state.J, presses)
         left = [found.rows.residual, found.C @ v, gaps, K @ v]
@@ -245,7 +245,7 @@ class ContactDynamics:
                  for c in self.contacts]  # fmt: skip
         lengths = np.where(turns, 1.0, scale.length)
         touching = self.at(q, v).touching
-        closed, still = closed_and_still(touching, lengths, scale.rate)
+        closed, still = closed_and_still(touching, lengths, scale.rate, start_digits(self.contacts))
         closed = shut_by_pressing(self.contacts, closed)
         return self.decided(q, v, modes_of(closed, still, tuple(each.feature for each in touching)))
 

@@ -66,14 +66,18 @@ class JointContact:
         return self.joint.restitution
 
     @property
+    def stop(self) -> float:
+        """Coordinate of the stop [rad, m]."""
+        return self.joint.low if self.side > 0 else self.joint.high
+
+    @property
     def direction(self) -> Array:
         """Direction of the slide for a positive rate of the coordinate, unit vector."""
         return np.asarray(self.side * _X if self.side else _Y)
 
     def touching(self, q: float, v: float) -> Touching:
         """Gap, normal and slide of the contact at a coordinate and its rate."""
-        stop = self.joint.low if self.side > 0 else self.joint.high
-        gap = self.side * (q - stop) if self.side else 0.0
+        gap = self.side * (q - self.stop) if self.side else 0.0
         return Touching(gap=gap, normal=_X, normal_rate=_NONE, place=_NONE, place_rate=_NONE, slide=v * self.direction)
 
 
@@ -85,6 +89,15 @@ def joint_contacts(joints: Sequence[SwitchedJoint]) -> tuple[JointContact, ...]:
         if joint.friction:
             found.append(JointContact(joint, 0))
     return tuple(found)
+
+
+def on_stops(closed: Sequence[object], q: Array) -> Array:
+    """Coordinates with those of joints that rest on a stop, of the contacts that are closed, exactly at it."""
+    q = q.copy()
+    for contact in closed:
+        if isinstance(contact, JointContact):
+            q[contact.joint.coordinate] = contact.stop
+    return q
 
 
 def off_stops(contacts: Sequence[object], closed: Sequence[bool]) -> dict[int, Array]:

@@ -9,12 +9,14 @@ from numpy.typing import ArrayLike
 from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import InputError
 from proofroll.core.last_results import kept
+from proofroll.elements.mechanism.contacts.joint_laws import JointContact
 from proofroll.elements.mechanism.contacts.touching import PARALLEL, Moving, Touching, touch
 from proofroll.elements.mechanism.joint_coordinates import JointCoordinates, Solution
 from proofroll.elements.mechanism.joint_kinds import JointKind
 from proofroll.elements.mechanism.kinematics import BodyMotion, Tree
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.rotations import skew
+from proofroll.elements.mechanism.switches import NEAR
 
 # Gap or overlap of shapes that counts as touching, relative to a natural length, or in rad: digits of a file.
 TOUCHING = 1e-9
@@ -109,22 +111,31 @@ def _largest(values: ArrayLike) -> float:
     return float(np.max(np.abs(values), initial=0.0))
 
 
-def closed_and_still(found: Sequence[Touching], lengths: FloatArray, rate: float) -> tuple[list[bool], list[bool]]:
+def start_digits(contacts: Sequence[object]) -> FloatArray:
+    """Gap and speed of each contact that count as none: digits of a file, and of laws of joints rounding alone."""
+    return np.array([NEAR if isinstance(contact, JointContact) else TOUCHING for contact in contacts])
+
+
+def closed_and_still(
+    found: Sequence[Touching], lengths: FloatArray, rate: float, digits: FloatArray | float = TOUCHING
+) -> tuple[list[bool], list[bool]]:
     """Two lists over the contacts: True if closed at the start and not opening, True if also at rest.
 
     Args:
         found: the contacts.
         lengths: natural length along each, 1 for an angle.
         rate: natural rate [1/s].
+        digits: gap and speed of each that count as none, relative to its natural ones.
     """
     rate = max([rate, *(float(np.linalg.norm(each.slide)) / size for each, size in zip(found, lengths, strict=True))])
+    least = lengths * digits
     closed = [
-        each.gap <= TOUCHING * size and abs(float(each.normal @ each.slide)) <= STILL * size * rate
-        for each, size in zip(found, lengths, strict=True)
+        each.gap <= size and abs(float(each.normal @ each.slide)) <= size * rate
+        for each, size in zip(found, least, strict=True)
     ]
     still = [
-        shut and bool(np.linalg.norm(each.slide) <= STILL * size * rate)
-        for shut, each, size in zip(closed, found, lengths, strict=True)
+        shut and bool(np.linalg.norm(each.slide) <= size * rate)
+        for shut, each, size in zip(closed, found, least, strict=True)
     ]
     return closed, still
 

@@ -1,0 +1,271 @@
+"""Integration of a mechanism whose bodies touch or whose joints switch, as both routes share it.
+
+Each route adds its own equations and its own decisions on the next mode.
+"""
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import replace
+from typing import Protocol
+
+import numpy as np
+
+from proofroll.core.arrays import FloatArray
+from proofroll.core.errors import Diverged, Refused
+from proofroll.core.last_results import LastResults
+from proofroll.elements.mechanism import Mechanism
+from proofroll.elements.mechanism.contacts.acting import (
+    FAINT,
+    ContactMode,
+    Features,
+    features_of,
+    headed,
+    slip_velocity,
+)
+from proofroll.elements.mechanism.contacts.touching import Touching
+from proofroll.elements.mechanism.rotations import Array
+from proofroll.elements.mechanism.signal import varies
+from proofroll.elements.mechanism.switches import REDUNDANT
+from proofroll.truth.hybrid import Stretch, StretchLaw, integrate_to_guard, states_at
+from proofroll.truth.mechanism.contact_guards import (
+    AT_REST,
+    STANDS,
+    ContactGuard,
+    SolvedContacts,
+    Touchable,
+    faint_time,
+    guard_value,
+    guards_of,
+    noise_of,
+    pressing,
+)
+from proofroll.truth.mechanism.contact_taylor import CompiledMode, CompiledModes, CompiledStretch, ModeSymbols
+from proofroll.truth.mechanism.followed_paths import CLOSE
+from proofroll.truth.mechanism.planar_slip import BegunSlip, begun_slip
+from proofroll.truth.picard import PicardSteps
+
+_KEPT = 4  # solutions that are kept
+_AHEAD = 1e-9  # time step, relative to the natural time, after which an effort is compared with its limit
+_CLAMPED = 1e-9  # difference of an effort from its limit, relative to the limit, up to which it starts at the limit
+# Difference of compiled accelerations from others, relative to the largest, up to which they are the same: the
+# direction of a slip of 2e-8 is known to 1e-8.
+_SAME_RATES = 1e-6
+# Integration of a slip to rest: decrease of its logarithm in a step, and slip speed at the end.
+_DECAY, _NOTHING = 2.0, 1e-12
+
+
+# Guard of the first instants of a slip, which goes on.
+_GOES_ON = -1
+
+
+class SwitchedEquations(Protocol):
+    """Equations of a route."""
+
+    mechanism: Mechanism
+    contacts: tuple[Touchable, ...]
+
+    def rate(self, state: Array, mode: ContactMode, /) -> Array:
+        """Time derivative of a state in a mode."""
+
+    def eliminated(self, state: Array, mode: ContactMode, /) -> Array:
+        """State without violations of what holds."""
+
+    def excess(self, state: Array, /) -> Array:
+        """Efforts before clamping over their limits, minus 1."""
+
+    def pushes(self, state: Array, /) -> Array:
+        """Sign of each effort with a limit."""
+
+
+class ContactWalks(ABC):
+    """Stretches of a mechanism that switches; the last component of a state is the time."""
+
+    _after_velocities = 0  # components of a state after the velocities, without the time
+    _begins_by = 14  # nodes of the first instants of a slip from rest
+    _by_collocation = False  # integrator of compiled modes: collocation, or Taylor series
+
+    def __init__(self, equations: SwitchedEquations, length: int, tolerance: float, size: float) -> None:
+        """Takes the length of a state without time, the tolerance of each step, the mechanism's size."""
+        self._tolerance = np.full(length + 1, tolerance)
+        self._span: float | None = None  # length of the last stretch by DOP853
+        self._equations, self.contacts, self._size = equations, equations.contacts, size
+        self._timed = any(map(varies, equations.mechanism.signals))
+        self._last = LastResults[tuple[bytes, tuple[float, ...], ContactMode], SolvedContacts](_KEPT)
+        self._limited = [item.name for item in equations.mechanism.actuators if item.limit is not None]
+        self._signs: tuple[int, ...] = ()  # of efforts at their limits, in the present stretch
+        self._used: dict[str, None] = {}
+        symbols = self._symbols()
+        self._compiled = (
+            None if symbols is None else CompiledModes(symbols, self.contacts, length + 1, self._by_collocation)
+        )
+
+    @property
+    def integrators(self) -> str:
+        """Names of the integrators that this route has used."""
+        return " and ".join(self._used) or "DOP853"
+
+    def _symbols(self) -> ModeSymbols | None:
+        """Equations in symbols; None: the route has none."""
+        return None
+
+    def _solved(self, state: Array, mode: ContactMode) -> SolvedContacts:
+        """Motion and forces at a state."""
+        key = state.tobytes(), self._equations.mechanism.held, mode
+        return self._last.of(key, lambda: self._solution(state, mode))
+
+    @abstractmethod
+    def _solution(self, state: Array, mode: ContactMode) -> SolvedContacts:
+        """Motion and forces at a state."""
+
+    @abstractmethod
+    def _touching(self, state: Array, features: Features) -> Sequence[Touching]:
+        """Geometry and sliding velocity of each contact at a state; ``features``: of solids that touch."""
+
+    def _law(self, state: Array, mode: ContactMode) -> StretchLaw:
+        guards, equations = guards_of(self.contacts, mode), self._equations
+        # sign of the guard of an effort: it reaches its limit, or comes back from it
+        side = np.zeros(0)
+        if len(equations.excess(state)):
+            side = np.where(equations.excess(state + _AHEAD * equations.rate(state, mode)) > 0, 1.0, -1.0)
+        noise = np.where(np.abs(excess := equations.excess(state)) < _CLAMPED, 2 * np.abs(excess), 0.0)
+        return StretchLaw(
+            rates=lambda y: equations.rate(y, mode),
+            guards=lambda y: np.append(self._guards(y, mode, guards), -side * equations.excess(y)),
+            corrected=lambda y: equations.eliminated(y, mode),
+            noise=np.append(noise_of(guards, self._size), noise),
+            near=np.append([CLOSE * (guard.kind == "close") for guard in guards], np.zeros_like(noise)),
+        )
+
+    def _guards(self, state: Array, mode: ContactMode, guards: Sequence[ContactGuard]) -> FloatArray:
+        solved, contacts = self._solved(state, mode), self.contacts
+        normals = pressing(solved.mode, solved.touching, solved.force, solved.splits)
+        return np.array([guard_value(guard, mode, contacts, solved, normals) for guard in guards])
+
+    def walk(self, time: float, state: Array, mode: ContactMode, until: float) -> Stretch[ContactMode]:
+        """See the protocol."""
+        state = np.append(state[:-1], time)
+        self._signs = self._clamped(state, mode)
+        if not self._equations.mechanism.contacts and self._solved(state, mode).shifts.any():
+            raise Refused(REDUNDANT)
+        if self._stands(state, mode):
+            return Stretch(start=time, end=until, mode=mode, first=state, last=state, guard=None)
+        if any(own.leads for own in mode):
+            return self._begun(time, state, mode, until)
+        guards = guards_of(self.contacts, mode)
+        share = next((number for number, guard in enumerate(guards) if guard.kind == "share"), None)
+        if share is not None and self._guards(state, mode, [guards[share]])[0] > 0:
+            return Stretch(start=time, end=time, mode=mode, first=state, last=state, guard=share)
+        start, begun = self._kicked(time, state, mode)
+        stretch = self._walked(begun, start, mode, until)
+        end, last = stretch.end, stretch.last
+        if stretch.guard is not None and stretch.guard < len(guards):
+            k, kind, _ = guards[stretch.guard]
+            if kind == "still":
+                last = self._spent(last, mode, k, stretch)
+                end += float(last[-1] - stretch.last[-1])
+        return replace(stretch, start=time, first=state, end=end, last=last)
+
+    def _begun(self, time: float, state: Array, mode: ContactMode, until: float) -> Stretch[ContactMode]:
+        """First instants of a slip from rest in the plane, which end before another contact changes."""
+        name = next(contact.name for contact, own in zip(self.contacts, mode, strict=True) if own.leads)
+        guards = guards_of(self.contacts, mode)
+        others = [guard for guard in guards if guard.kind != "still" or not mode[guard.contact].leads]
+
+        def clear(y: Array, now: ContactMode) -> bool:
+            return bool(np.all(self._guards(y, now, others) <= noise_of(others, self._size)))
+
+        rate, solve, count = self._equations.rate, self._solved, self._begins_by
+        begun = begun_slip(time, state, mode, until, rate, solve, clear, count, name)
+        last = self._equations.eliminated(begun.last, begun.mode)
+        goes_on = None if begun.end >= until else _GOES_ON
+        return replace(begun, last=last, guard=goes_on)
+
+    def _walked(self, time: float, state: Array, mode: ContactMode, until: float) -> Stretch[ContactMode]:
+        """Stretch by a compiled mode, or by DOP853 where there is none, and near singular poses, where it fails."""
+        compiled = self._by_symbols(state, mode)
+        if compiled is not None:
+            with suppress(Diverged):
+                stretch = compiled.walk(self._law(state, mode), mode, time, state, until)
+                self._used.setdefault("collocation" if self._by_collocation else "Taylor series")
+                return stretch
+        self._used.setdefault("DOP853")
+        stretch = integrate_to_guard(self._law(state, mode), mode, time, state, until, self._tolerance, self._span)
+        self._span = stretch.end - time if stretch.end > time else None
+        return stretch
+
+    def _by_symbols(self, state: Array, mode: ContactMode) -> CompiledMode | None:
+        """Compiled mode, if all parts of the mechanism have a rule in symbols and no load is shared."""
+        solved = self._solved(state, mode)
+        if self._compiled is None or solved.splits.shape[1]:
+            return None
+        compiled = self._compiled.of(mode, self._signs)
+        if compiled is None:
+            return None
+        rates = compiled.values(state[None], mode)[2][0]
+        place = len(state) - 1 - len(solved.acceleration) - self._after_velocities
+        apart = np.abs(rates[place : place + len(solved.acceleration)] - solved.acceleration).max()
+        agrees = apart <= _SAME_RATES * max(1.0, float(np.abs(solved.acceleration).max()))
+        return compiled if agrees else None
+
+    def _clamped(self, state: Array, mode: ContactMode) -> tuple[int, ...]:
+        """Sign of each effort that is at its limit in a stretch from a state, 0 of others, of those with a limit."""
+        equations = self._equations
+        if not len(equations.excess(state)):
+            return ()
+        ahead = state + _AHEAD * equations.rate(state, mode)
+        signs = np.where(equations.excess(ahead) > 0, equations.pushes(ahead), 0.0)
+        return tuple(int(sign) for sign in signs)
+
+    def within(self, stretch: Stretch[ContactMode], times: Array) -> Array:
+        """See the protocol."""
+        if isinstance(stretch, BegunSlip):
+            return np.array([self._equations.eliminated(state, stretch.mode) for state in stretch.at(times)])
+        if isinstance(stretch, CompiledStretch) and stretch.by is not None:
+            return stretch.by.within(self._law(stretch.first, stretch.mode), stretch, times)
+        if not stretch.visited:
+            return np.array([stretch.first for _ in times])
+        return states_at(self._law(stretch.first, stretch.mode), stretch.visited, times, self._tolerance)
+
+    def _spent(self, state: Array, mode: ContactMode, k: int, stretch: Stretch[ContactMode]) -> Array:
+        """State at the end of a slip below FAINT, by collocation in the logarithm of the slip speed.
+
+        The slower a slip, the faster it turns: its equations are stiff in time, and smooth in that logarithm.
+        """
+        if mode[k].along is not None:
+            return state
+
+        def one(y: Array) -> tuple[float, Array]:
+            touching = self._touching(y, features_of(mode))
+            now = tuple(headed(own, each) for own, each in zip(mode, touching, strict=True))
+            change = faint_time(touching[k], self._solved(y, now).slide_rate[k]) * self._equations.rate(y, now)
+            return float(np.linalg.norm(slip_velocity(touching[k]))), change
+
+        def decay(states: Array) -> tuple[Array, Array]:
+            """Slip speeds, and changes of states (state, places) until the slip would stop at its present rate."""
+            speeds, changes = zip(*map(one, states.T), strict=True)
+            return np.array(speeds), np.array(changes).T
+
+        compiled = stretch.by if isinstance(stretch, CompiledStretch) else None
+        function = decay if compiled is None else compiled.decay_of(mode, k, stretch.start)
+        steps, place = PicardSteps(lambda states: function(states)[1]), 0.0
+        last = float(np.log(np.maximum(function(state[:, None])[0], _NOTHING) / _NOTHING)[0])
+        while place < last:
+            place, state, _ = steps.step(place, state, min(last, place + _DECAY))
+        return np.asarray(state + function(state[:, None])[1][:, 0])
+
+    def _kicked(self, time: float, state: Array, mode: ContactMode) -> tuple[Array, float]:
+        """State and time shortly after a slip in the plane starts from rest, when it has a direction."""
+        solved, wait = self._solved(state, mode), 0.0
+        for k, own in enumerate(mode):
+            begins = own.kind == "slip" and own.along is None and self.contacts[k].friction
+            if begins and np.linalg.norm(slip_velocity(solved.touching[k])) < FAINT:
+                wait = max(wait, 2 * FAINT / float(np.linalg.norm(solved.slide_rate[k])))
+        return (state, time) if not wait else (state + wait * self._equations.rate(state, mode), time + wait)
+
+    def _stands(self, state: Array, mode: ContactMode) -> bool:
+        """True if nothing moves or is about to move."""
+        if self._timed or any(own.kind == "slip" for own in mode):
+            return False
+        solved = self._solved(state, mode)
+        return float(np.abs(solved.velocity).max()) <= AT_REST and float(np.abs(solved.acceleration).max()) <= STANDS
