@@ -38,6 +38,19 @@ def test_a_ton_rests_on_its_stop():
     assert run.sample().stop == pytest.approx([1000 * G], rel=1e-4)
 
 
+def test_a_stop_holds_what_its_joint_carries():
+    """A light hub with a heavy rod on it falls onto the stop of its hinge and rests there, within the stop's give."""
+    hub, rod = Body("hub", 0.1, inertia=(1e-4, 1e-4, 1e-4)), Body("rod", 10.0, com=(1.0, 0, 0), inertia=(0.1, 1.0, 1.0))
+    hinge = Joint("hinge", "revolute", "world", "hub", axis=(0, -1, 0), limits=(-0.5, 1.0))
+    mechanism = Mechanism((hub, rod), (hinge, Joint("weld", "fixed", "hub", "rod")))
+    run = runs.build("redundant", mechanism, dt=1e-3)
+    run.advance(1.5)
+    sample = run.sample()
+    moment = 10.0 * G * np.cos(0.5)
+    assert sample.stop[0] == pytest.approx(moment, rel=1e-3)
+    assert 2 * np.arcsin(sample.q_WB[0, 2]) == pytest.approx(0.5, abs=2 * moment * 1e-6 / 11.0 + 1e-5)
+
+
 def test_friction_slows_a_mass_and_holds_it():
     """The mass loses its speed at the rate F/m, and then stands."""
     mechanism = Mechanism(

@@ -2,9 +2,9 @@
 
 Friction and stops are Exudyn's ``CoordinateSpringDamperExt``. Friction is a bristle: a spring and damper that slips at
 the friction's force. A stop is a spring and damper. Their stiffness and damping, which the scene does not have, stop
-the joint's child within a step, so that their deflection vanishes with the step. A servo with a constant target and no
-limit is a ``CoordinateSpringDamper``; any other effort is a user function of one, evaluated at every iterate. A
-coupling is an ``ObjectConnectorCoordinate``; another one holds the rotor of an armature to its joint.
+what the joint carries at the start within a step, so that their deflection vanishes with the step. A servo with a
+constant target and no limit is a ``CoordinateSpringDamper``; any other effort is a user function of one, evaluated at
+every iterate. A coupling is an ``ObjectConnectorCoordinate``; another one holds the rotor of an armature to its joint.
 """
 
 from collections.abc import Callable
@@ -12,9 +12,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from proofroll.elements.mechanism import Body, Joint, Mechanism
+from proofroll.elements.mechanism import Joint, Mechanism
 from proofroll.elements.mechanism.drives import Actuator
 from proofroll.elements.mechanism.joint_kinds import JointKind
+from proofroll.elements.mechanism.matrices import matrices_of
 from proofroll.elements.mechanism.named_forces import joint_force_shares, lengths
 from proofroll.elements.mechanism.prescribed import moved
 from proofroll.elements.mechanism.rotations import Array
@@ -49,10 +50,11 @@ class JointLaws:
         self._coordinates: dict[str, Any] = {}
         self._ground: Any = None
         self._laws: list[JointLaw] = []
-        by_name = {body.name: body for body in mechanism.bodies}
-        for joint in mechanism.joints:
+        held = any(joint.friction or joint.limits for joint in mechanism.joints)
+        inertias = np.diag(matrices_of(mechanism).mass_matrix) if held else np.zeros(mechanism.nv)
+        for joint, at_v in zip(mechanism.joints, mechanism.v_slices, strict=True):
             if joint.friction or joint.limits:
-                self._add(self._holding(joint, by_name[joint.child]), joint.name, field="joint")
+                self._add(self._holding(joint, float(inertias[at_v.start])), joint.name, field="joint")
             if varies(joint.torque):
                 self._add(self._pushing(joint.name, _drive(joint)), joint.name)
             if joint.armature:
@@ -85,8 +87,9 @@ class JointLaws:
             self._ground = self._system.AddMarker(items.MarkerNodeCoordinate(nodeNumber=node, coordinate=0))
         return [self._ground, self._coordinate(joint)]
 
-    def _holding(self, joint: Joint, child: Body) -> Any:
-        inertia, law = _inertia(joint, child), dict[str, Any]()
+    def _holding(self, joint: Joint, inertia: float) -> Any:
+        """Adds friction and stops; ``inertia``: of all that the joint carries, along its coordinate [kg, kg m²]."""
+        law = dict[str, Any]()
         if joint.friction:
             law["dynamicFrictionForce"] = joint.friction
             law["stickingStiffness"], law["stickingDamping"] = inertia / self._dt**2, 2 * inertia / self._dt
@@ -186,12 +189,3 @@ class JointLaws:
 
 def _drive(joint: Joint) -> Callable[[float, float, float], float]:
     return lambda t, _q, _v: float(value_at(joint.torque, t))
-
-
-def _inertia(joint: Joint, child: Body) -> float:
-    """Inertia of the child alone along the joint's coordinate, plus the joint's armature [kg, kg m²]."""
-    if joint.kind == JointKind.PRISMATIC:
-        return child.mass + joint.armature
-    axis = joint.child_frame[:, 2]
-    arm = np.cross(axis, np.array(child.com) - joint.child_position)
-    return float(axis @ np.asarray(child.inertia) @ axis + child.mass * arm @ arm) + joint.armature

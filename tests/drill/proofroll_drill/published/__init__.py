@@ -5,6 +5,7 @@ Those of ``numbers.toml``, and ``[[published]]`` of the scenes.
 
 from __future__ import annotations
 
+import functools
 import itertools
 import tomllib
 from collections.abc import Iterator, Mapping
@@ -13,6 +14,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
+import xarray as xr
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import ProofrollError, require_known
@@ -82,8 +84,7 @@ def tables() -> dict[str, tuple[Published, ...]]:
 
 def of_scene(scene: str, entry: Published) -> Iterator[Held]:
     """Each observable of a ``[[published]]`` table beside the truth, at the instant at which it is furthest off."""
-    times = np.array([*([] if entry.times[0] == 0 else [0.0]), *entry.times])
-    found = truth(load_scene(scene, **entry.parameters), times)
+    found = _motion(scene, entry.times, tuple(entry.parameters.items()))
     for name, values in entry.values.items():
         if name not in found:
             yield Held(scene, "value", name, values[0], np.nan, True, "(the truth has no such observable)")
@@ -93,6 +94,12 @@ def of_scene(scene: str, entry: Published) -> Iterator[Held]:
         worst = int(np.argmax(np.nan_to_num(share, nan=np.inf)))
         said = f"{name} at {entry.times[worst]:g} s" + (f", of {len(values)}" if len(values) > 1 else "")
         yield Held(scene, "value", said, values[worst], float(ours[worst]), not share[worst] <= 1)
+
+
+@functools.lru_cache(maxsize=2)
+def _motion(scene: str, times: tuple[float, ...], parameters: tuple[tuple[str, float], ...]) -> xr.Dataset:
+    """Truth at the start and at these times [s]; tables of one scene often share them."""
+    return truth(load_scene(scene, **dict(parameters)), np.array([*([] if times[0] == 0 else [0.0]), *times]))
 
 
 def true_values(scene: str) -> list[dict[str, Any]]:
