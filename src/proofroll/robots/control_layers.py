@@ -344,7 +344,13 @@ def _acceleration(record: ControlRecord, law: ControlLaw, mechanism: Mechanism) 
         return fit
     remark = IMPLICIT if fit.imitated else ""
     difference = (fit.values - fit.right)[None]
-    return _Compared(fit.names, np.array([record.time[0]]), difference, fit.errors / _ROUND_OFF, remark)
+    return _Compared(
+        columns=fit.names,
+        time=np.array([record.time[0]]),
+        difference=difference,
+        sizes=fit.errors / _ROUND_OFF,
+        remark=remark,
+    )
 
 
 _DIFFERENCES: dict[str, Callable[[ControlRecord, ControlLaw, Mechanism], _Compared | str]] = {

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from proofroll.core.errors import Refused
+from proofroll.core.events import EventKind
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.rotations import Array
 
@@ -143,7 +144,7 @@ def first_change(joints: Sequence[SwitchedJoint], q: Array, v: Array, rates: Arr
 
 def end_event(mode: str) -> str:
     """Event that ends the mode of a held joint."""
-    return "slip" if mode == "stick" else "lift_off"
+    return EventKind.SLIP if mode == "stick" else EventKind.LIFT_OFF
 
 
 def changes(joints: Sequence[SwitchedJoint], old: Mode, new: Mode) -> tuple[tuple[str, str], ...]:
@@ -151,11 +152,11 @@ def changes(joints: Sequence[SwitchedJoint], old: Mode, new: Mode) -> tuple[tupl
     events = []
     for joint, was, now in zip(joints, old, new, strict=False):
         if now in HOLDING and was not in HOLDING:
-            events.append(("stick" if now == "stick" else "rest", joint.name))
+            events.append((EventKind.STICK if now == "stick" else EventKind.REST, joint.name))
         elif was in HOLDING and now not in HOLDING:
             events.append((end_event(was), joint.name))
         elif was != now and was not in HOLDING:
-            events.append(("turn", joint.name))
+            events.append((EventKind.TURN, joint.name))
     return tuple(events)
 
 
