@@ -149,7 +149,7 @@ def end_event(mode: str) -> str:
 
 def changes(joints: Sequence[SwitchedJoint], old: Mode, new: Mode) -> tuple[tuple[str, str], ...]:
     """Events (kind, joint) of joints that become held, reverse, or are set free by a change of mode."""
-    events = []
+    events: list[tuple[str, str]] = []
     for joint, was, now in zip(joints, old, new, strict=False):
         if now in HOLDING and was not in HOLDING:
             events.append((EventKind.STICK if now == "stick" else EventKind.REST, joint.name))
