@@ -31,7 +31,7 @@ from proofroll.cli.run import run
 from proofroll.cli.stability import stability
 from proofroll.cli.tradeoff import tradeoff
 from proofroll.cli.versions import versions
-from proofroll.core.announced import broken, leave_out, loaded
+from proofroll.core.entry_points import broken, leave_out, loaded
 from proofroll.core.errors import InputError, Missing, ProofrollError, choices
 from proofroll.running.process_end import INTERRUPTS, end_at_once
 

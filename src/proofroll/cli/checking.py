@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from proofroll.cli import options
-from proofroll.core.announced import announced
+from proofroll.core.entry_points import announced
 from proofroll.core.errors import InputError, choices, require_known
 from proofroll.core.number_format import counted
 

@@ -7,8 +7,8 @@ from collections.abc import Mapping
 from typing import Any
 
 from proofroll.conformance.subject import require
-from proofroll.core.announced import announced
 from proofroll.core.engine import EPSILON
+from proofroll.core.entry_points import announced
 from proofroll.core.errors import InputError
 from proofroll.core.plugins import GROUP, resolve_settings
 

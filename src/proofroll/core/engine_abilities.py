@@ -21,7 +21,7 @@ class LocatesEvents(Protocol):
 
 @runtime_checkable
 class TakesTargets(Protocol):
-    """Ability of an engine whose held signals are set from outside, see :mod:`proofroll.core.commanded`."""
+    """Ability of an engine whose held signals are set from outside, see :mod:`proofroll.core.controlled_engine`."""
 
     def drive(self, values: FloatArray) -> None:
         """Sets the held signals, constant until the next call; called between two calls of ``advance``."""

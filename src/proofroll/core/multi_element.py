@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
-from proofroll.core.commanded import CommandedEngine, commanded
+from proofroll.core.controlled_engine import CommandedEngine, commanded
 from proofroll.core.element import Element
 from proofroll.core.engine import Sample, fixed_step
 from proofroll.core.engine_abilities import LocatesEvents, TellsRemarks, require_provided

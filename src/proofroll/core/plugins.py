@@ -9,9 +9,9 @@ from importlib.metadata import EntryPoint, PackageNotFoundError, version
 from importlib.util import find_spec
 from typing import Any
 
-from proofroll.core.announced import announced, loaded
 from proofroll.core.element import ElementKind
 from proofroll.core.engine_abilities import MadeFor, SupportsFrom, offered
+from proofroll.core.entry_points import announced, loaded
 from proofroll.core.errors import InputError, Missing, ProofrollError, raised_at, require_known
 
 GROUP = "proofroll.engines"

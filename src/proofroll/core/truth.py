@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
 import numpy as np
 
-from proofroll.core.announced import loaded
 from proofroll.core.arrays import FloatArray, read_only
 from proofroll.core.columns import Columns
 from proofroll.core.dataset import ENDED, ENDS, ended_early, joined, off_grid_apart
 from proofroll.core.element import Element
+from proofroll.core.entry_points import loaded
 from proofroll.core.errors import InputError, Refused
 from proofroll.core.scene import Scene
 
@@ -86,7 +86,7 @@ def truth(scene: Scene, asked: FloatArray, counting: FloatArray = _NONE, between
     Args:
         scene: the scene.
         asked: times of the samples [s].
-        counting: further times at which turns are counted [s] (:func:`proofroll.core.turns.samples_between`).
+        counting: further times at which turns are counted [s] (:func:`proofroll.core.whole_turns.samples_between`).
         between: times of samples off the grid [s] (:func:`proofroll.core.dataset.off_grid_apart`).
 
     Raises:

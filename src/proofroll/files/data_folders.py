@@ -4,7 +4,7 @@ from functools import cache
 from pathlib import Path
 from types import ModuleType
 
-from proofroll.core.announced import loaded
+from proofroll.core.entry_points import loaded
 from proofroll.core.errors import ProofrollError
 from proofroll.core.source_code import OWN
 

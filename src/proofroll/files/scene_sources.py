@@ -7,7 +7,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any, ClassVar, Protocol, runtime_checkable
 
-from proofroll.core.announced import loaded
+from proofroll.core.entry_points import loaded
 from proofroll.core.errors import InputError
 
 GROUP = "proofroll.scene_sources"

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from functools import cache
 from typing import TYPE_CHECKING, Any, ClassVar, Protocol
 
-from proofroll.core.announced import loaded
+from proofroll.core.entry_points import loaded
 
 if TYPE_CHECKING:
     import xarray as xr

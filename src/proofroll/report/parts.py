@@ -12,7 +12,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any, ClassVar, Protocol
 
-from proofroll.core.announced import loaded
+from proofroll.core.entry_points import loaded
 from proofroll.core.errors import ProofrollError, require_known
 from proofroll.files.scene_sources import source_of
 from proofroll.files.toml import named_file, read_toml, study_files

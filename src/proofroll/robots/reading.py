@@ -11,7 +11,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from proofroll.core.announced import announced
+from proofroll.core.entry_points import announced
 from proofroll.core.errors import InputError, Missing, Refused, require_known
 from proofroll.files.json_data import plain
 from proofroll.robots.model import Mimic, Robot, RobotBody, RobotJoint, RobotLoop, Tie

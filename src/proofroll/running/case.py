@@ -148,7 +148,7 @@ class Case:
         time_limit: wall time after which the case is ended, without time in which others had the processor [s].
         asks: results wanted besides the motion; see :class:`proofroll.core.scene.Scene`.
         turns: True if further samples are taken where turns of angles have to be counted
-            (:func:`proofroll.core.turns.samples_between`). Studies do without, as an adaptive step ends at each.
+            (:func:`proofroll.core.whole_turns.samples_between`). Studies do without, as an adaptive step ends at each.
         between: for the truth, times off the grid at which some engine is sampled [s]
             (:func:`proofroll.core.time_grid.off_grid`); those of an engine follow from its step.
     """

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 import proofroll
-from proofroll.core.announced import announced
+from proofroll.core.entry_points import announced
 from proofroll.core.errors import InputError, ProofrollError
 from proofroll.core.plugins import GROUP, distribution_of
 from proofroll.files.scene_file import load_scene

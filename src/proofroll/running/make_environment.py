@@ -18,7 +18,7 @@ from importlib import metadata
 from importlib.util import find_spec
 from pathlib import Path
 
-from proofroll.core.announced import announced
+from proofroll.core.entry_points import announced
 from proofroll.core.errors import InputError, ProofrollError
 from proofroll.core.plugins import GROUP, distribution_of, engine_names, release
 from proofroll.running import environments

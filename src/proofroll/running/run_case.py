@@ -48,7 +48,7 @@ def _run(case: Case, out: Path, spent: _TimeAccounts) -> Result:
     from proofroll.core.first_steps import certificate
     from proofroll.core.multi_element import build, step_of
     from proofroll.core.time_grid import off_grid, require_whole_steps, time_grid
-    from proofroll.core.turns import samples_between
+    from proofroll.core.whole_turns import samples_between
     from proofroll.files.trajectory_file import write
     from proofroll.running.loading import engine_and_settings, scene_of
     from proofroll.running.recording import record

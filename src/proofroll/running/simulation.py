@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from proofroll.core import multi_element
 from proofroll.core.certificate import first_difference
-from proofroll.core.commanded import commanded
+from proofroll.core.controlled_engine import commanded
 from proofroll.core.dataset import truth_message
 from proofroll.core.engine import fixed_step
 from proofroll.core.errors import InputError, Refused
@@ -16,7 +16,7 @@ from proofroll.core.first_steps import certificate
 from proofroll.core.plugins import lacking_of, load_engine, parse_engine, resolve_settings
 from proofroll.core.scene import Scene
 from proofroll.core.time_grid import EVERY, off_grid, require_whole_steps, sampling_interval, time_grid
-from proofroll.core.turns import samples_between
+from proofroll.core.whole_turns import samples_between
 from proofroll.files.scene_file import load_scene
 from proofroll.files.scene_sources import with_control
 from proofroll.running.identity import truth_version

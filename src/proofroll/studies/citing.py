@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import proofroll
-from proofroll.core.announced import announced
+from proofroll.core.entry_points import announced
 from proofroll.core.errors import InputError
 from proofroll.core.plugins import GROUP, engine_names, parse_engine, plain_name
 from proofroll.core.truth import TRUTHS, load_truths

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import proofroll
-from proofroll.core.announced import announced
+from proofroll.core.entry_points import announced
 from proofroll.core.plugins import ELEMENTS, GROUP, distribution_of
 from proofroll.core.source_code import hash_of
 from proofroll.core.truth import TRUTHS

@@ -213,7 +213,7 @@ def test_a_path_that_changes_during_the_look_up_does_not_change_what_is_found(
         sys.path.insert(0, site)
         return found
 
-    monkeypatch.setattr("proofroll.core.announced.distributions", torn)
+    monkeypatch.setattr("proofroll.core.entry_points.distributions", torn)
     assert "late" in engine_names()
 
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from proofroll.core.arrays import FloatArray, on_turns
 from proofroll.core.columns import SMALLEST, Columns, Variable, axes
-from proofroll.core.turns import doubt
+from proofroll.core.whole_turns import doubt
 from proofroll.elements.ball_on_surface.mechanics import energy, slip_velocity, wall_velocity
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.natural_scales import turn_interval

@@ -10,7 +10,7 @@ import numpy as np
 from proofroll.core.arrays import FloatArray
 from proofroll.core.element import FirstMotion, StepNumber
 from proofroll.core.time_grid import EVERY
-from proofroll.core.turns import PART as PART_OF_TURNS
+from proofroll.core.whole_turns import PART as PART_OF_TURNS
 from proofroll.elements.ball_on_surface.mechanics import (
     initial_angular_acceleration,
     initial_response,

@@ -11,7 +11,7 @@ import numpy as np
 from proofroll.core.arrays import FloatArray
 from proofroll.core.columns import UNCERTAIN, Columns, Variable, axes
 from proofroll.core.errors import Diverged
-from proofroll.core.turns import doubt
+from proofroll.core.whole_turns import doubt
 from proofroll.elements.mechanism.contacts.geometry import shared_pairs
 from proofroll.elements.mechanism.contacts.observables import (
     LAWS,
@@ -235,7 +235,7 @@ def _put_contacts(
 
 
 def _doubts(placed: Placed, interval: float | None) -> dict[str, dict[str, Any]]:
-    """Warnings of joints whose angles may be off by whole turns, by joint; see :func:`proofroll.core.turns.doubt`."""
+    """Warnings of joints whose angles may be off by whole turns, by joint; see :func:`proofroll.core.whole_turns.doubt`."""
     warnings: dict[str, dict[str, Any]] = {}
     if placed.known_q is not None:
         return warnings

@@ -19,7 +19,7 @@ from proofroll.core.events import events_of
 from proofroll.core.observable import Observable, Role
 from proofroll.core.program_text import FailedRun
 from proofroll.core.time_grid import EVERY
-from proofroll.core.turns import PART
+from proofroll.core.whole_turns import PART
 from proofroll.elements.mechanism.analysis import Analysis, analyse
 from proofroll.elements.mechanism.capabilities import MechanismCapability, required
 from proofroll.elements.mechanism.certificate import CAPS, certify
@@ -37,9 +37,9 @@ from proofroll.elements.mechanism.optional_terms import optional_terms
 from proofroll.elements.mechanism.placed import Placed
 from proofroll.elements.mechanism.plausibility import implausible
 from proofroll.elements.mechanism.sampling import MechanismSample
-from proofroll.elements.mechanism.steps import law_rates, servo_steps, step_numbers
+from proofroll.elements.mechanism.sentences import start_facts
+from proofroll.elements.mechanism.step_limits import law_rates, servo_steps, step_numbers
 from proofroll.elements.mechanism.switches import first_change
-from proofroll.elements.mechanism.words import start_facts
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -131,7 +131,7 @@ class MechanismElement:
 
     @cached_property
     def law_rates(self) -> tuple[FloatArray, FloatArray]:
-        """See :func:`proofroll.elements.mechanism.steps.law_rates`."""
+        """See :func:`proofroll.elements.mechanism.step_limits.law_rates`."""
         return read_only(law_rates(JointCoordinates(self.mechanism, self._equations.rank)))
 
     def step_bound(self, taken: Iterable[float]) -> str | None:

@@ -16,8 +16,8 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from proofroll.core.announced import announced
 from proofroll.core.arrays import FloatArray
+from proofroll.core.entry_points import announced
 from proofroll.core.errors import InputError, ProofrollError
 
 GROUP = "proofroll.policies"

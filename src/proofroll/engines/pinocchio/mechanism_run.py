@@ -13,7 +13,7 @@ from proofroll.elements.mechanism.commands import drive
 from proofroll.elements.mechanism.joint_kinds import JointKind
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.elements.mechanism.sampling import MechanismBuilt, MechanismSample, row_rank, unsaid
-from proofroll.elements.mechanism.words import pose
+from proofroll.elements.mechanism.sentences import pose
 from proofroll.engines.pinocchio.constraint_dynamics import ConstraintDynamics
 from proofroll.engines.pinocchio.integrators import require_tangent_map
 from proofroll.engines.pinocchio.joint_tree import AXIS_COLUMN, JointTree

@@ -22,9 +22,9 @@ from proofroll.elements.mechanism.sampling import (
     row_rank,
     unsaid,
 )
+from proofroll.elements.mechanism.sentences import pose
 from proofroll.elements.mechanism.signal import breaks, varies
 from proofroll.elements.mechanism.switches import switched_joints
-from proofroll.elements.mechanism.words import pose
 from proofroll.engines.projection.contact_modes import ContactMotion
 from proofroll.engines.projection.dependent import DependentCoordinates, SolvedState
 from proofroll.engines.projection.joint_modes import SwitchedMotion

@@ -19,8 +19,8 @@ from proofroll.core.number_format import number, spaced
 from proofroll.core.observable import Observable, Role
 from proofroll.core.scene import Scene
 from proofroll.core.truth import truth
-from proofroll.core.turns import samples_between
 from proofroll.core.verdict import Allowance, Judgement, RunCurve, TrueCurve, Verdict, judge_curve
+from proofroll.core.whole_turns import samples_between
 from proofroll.files.scene_file import load_scene
 from proofroll.studies.html_table import gauge, html_table
 from proofroll.studies.judging import run_values

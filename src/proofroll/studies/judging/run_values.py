@@ -15,8 +15,8 @@ from proofroll.core.dataset import BETWEEN, observe, part
 from proofroll.core.events import EVENT_ORDER, events_of
 from proofroll.core.number_format import number
 from proofroll.core.observable import Role
-from proofroll.core.turns import on_turns_of
 from proofroll.core.verdict import RunCurve
+from proofroll.core.whole_turns import on_turns_of
 from proofroll.studies.judging.reference import Reference
 
 if TYPE_CHECKING:
@@ -87,7 +87,7 @@ def laws_behind_the_end(reference: Reference, dataset: xr.Dataset) -> dict[str, 
 def on_true_turns(reference: Reference, name: str, values: FloatArray, dataset: xr.Dataset) -> FloatArray | None:
     """Values of a variable with the truth's whole turns, where they are uncertain; None: no comparison is possible.
 
-    See :func:`proofroll.core.turns.on_turns_of`. A run that ended early has fewer values than the truth.
+    See :func:`proofroll.core.whole_turns.on_turns_of`. A run that ended early has fewer values than the truth.
     """
     true = reference.curves.get(name)
     if true is None and name in reference.dataset:

@@ -13,8 +13,8 @@ from proofroll.core.dataset import observe
 from proofroll.core.observable import Role
 from proofroll.core.plugins import parse_engine
 from proofroll.core.scene import Scene
-from proofroll.core.turns import on_turns_of
 from proofroll.core.verdict import Verdict
+from proofroll.core.whole_turns import on_turns_of
 from proofroll.running.case import Status
 from proofroll.studies.comparison.outcome import Outcome, Run
 from proofroll.studies.comparison.planning import point_name

@@ -6,7 +6,7 @@ import dataclasses
 from collections.abc import Callable, Sequence
 from typing import Any, ClassVar
 
-from proofroll.core.commanded import commanded
+from proofroll.core.controlled_engine import commanded
 from proofroll.core.engine import fixed_step
 from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.control import Control

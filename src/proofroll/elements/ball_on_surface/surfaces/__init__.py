@@ -4,7 +4,7 @@ from dataclasses import is_dataclass
 from functools import cache
 from typing import Any
 
-from proofroll.core.announced import leave_out, loaded
+from proofroll.core.entry_points import leave_out, loaded
 from proofroll.elements.ball_on_surface.surfaces.bowl import Bowl
 from proofroll.elements.ball_on_surface.surfaces.cylinder import Cylinder
 from proofroll.elements.ball_on_surface.surfaces.declared import Declared

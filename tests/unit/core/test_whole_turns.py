@@ -9,7 +9,7 @@ import proofroll
 from proofroll.core.columns import PERIOD, UNCERTAIN
 from proofroll.core.plugins import engine_names
 from proofroll.core.time_grid import EVERY, time_grid
-from proofroll.core.turns import doubt, on_turns_of, samples_between
+from proofroll.core.whole_turns import doubt, on_turns_of, samples_between
 from proofroll.files.scene_file import load_scene
 from proofroll.running.simulation import build, simulate_built
 from proofroll.studies.judging.reference import Reference

@@ -15,7 +15,7 @@ from proofroll.elements.mechanism import Body, Joint, Mechanism
 from proofroll.elements.mechanism.drives import Actuator, Coupling
 from proofroll.elements.mechanism.element import MechanismElement
 from proofroll.elements.mechanism.joint_coordinates import JointCoordinates
-from proofroll.elements.mechanism.steps import ServoSteps, servo_steps
+from proofroll.elements.mechanism.step_limits import ServoSteps, servo_steps
 from proofroll.report.comparison.summary import outcome_content
 from proofroll.report.terminal.tables import verdict_parts
 
