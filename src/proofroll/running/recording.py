@@ -75,8 +75,8 @@ def record(
         scene: source of the engine's model.
         asked: times of the samples [s].
         probes: a few times off that grid [s], from :func:`proofroll.core.time_grid.off_grid`.
-        counting: further times at which turns are counted [s], from :func:`proofroll.core.whole_turns.samples_between`; their
-            samples are left out of the result.
+        counting: further times at which turns are counted [s], from
+            :func:`proofroll.core.whole_turns.samples_between`; their samples are left out of the result.
     """
     began, processor = time.perf_counter(), -time.process_time()
     inside = 0.0

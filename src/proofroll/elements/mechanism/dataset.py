@@ -235,7 +235,7 @@ def _put_contacts(
 
 
 def _doubts(placed: Placed, interval: float | None) -> dict[str, dict[str, Any]]:
-    """Warnings of joints whose angles may be off by whole turns, by joint; see :func:`proofroll.core.whole_turns.doubt`."""
+    """Warnings, by joint, that angles may be off by whole turns; see :func:`proofroll.core.whole_turns.doubt`."""
     warnings: dict[str, dict[str, Any]] = {}
     if placed.known_q is not None:
         return warnings
