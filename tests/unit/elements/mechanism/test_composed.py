@@ -1,4 +1,4 @@
-"""Screws and gimbals: what a file may say, and closed forms; test_composed_joints.py runs their parts in engines."""
+"""Screws, gimbals, cylindrical joints: bad input and closed forms; test_composed_joints.py runs them in engines."""
 
 from pathlib import Path
 from typing import Any
@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 from one_body_scenes import one_body, refusal
+from scipy.integrate import solve_ivp
 
 from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.element import MechanismElement
@@ -36,10 +37,13 @@ def of_truth(mechanism: Mechanism) -> Any:
         ("gimbal", "second_axis = [1, 0, 1]", "joints.j.second_axis"),
         ("gimbal", "torque = 1", "joints.0.torque"),
         ("gimball", "", "choose one of"),
+        ("cylindrical", "q0 = 0.3", "joints.j.q0"),
+        ("cylindrical", "limits = [0, 1]", "joints.j.limits"),
+        ("cylindrical", "motion = 1", "a cylindrical joint has none"),
     ],
 )
-def test_a_wrong_screw_or_gimbal_gets_one_line(tmp_path: Path, kind: str, lines: str, words: str) -> None:
-    """A wrong screw or gimbal is refused by one line that names the field that the file has."""
+def test_a_wrong_composed_joint_gets_one_line(tmp_path: Path, kind: str, lines: str, words: str) -> None:
+    """A wrong screw, gimbal or cylindrical joint is refused by one line that names the field that the file has."""
     assert words in refusal(tmp_path, kind, lines)
 
 
@@ -66,6 +70,26 @@ def test_what_a_screw_has_along_its_angle_acts_there(tmp_path: Path) -> None:
     assert np.max(np.abs(content["q.j.turn"].to_numpy() - 0.1 - 0.4 * np.cos(rate * TIMES))) < 1e-12
     moved = of_truth(screw(tmp_path, 'motion = "= 1 + 0.3*sin(2*t)"\n'))
     assert np.max(np.abs(moved["q.j.slide"].to_numpy() - LEAD * (1 + 0.3 * np.sin(2 * TIMES)))) < 1e-13
+
+
+def test_a_body_on_an_inclined_cylindrical_joint_slides_and_swings(tmp_path: Path) -> None:
+    """Along its axis it falls by a parabola, about it it swings as the pendulum of the weight across it."""
+    lean, arm, start = 0.6, 0.4, 1.0
+    lines = f"orientation = [0, {lean}, 0]\nchild_position = [0, {arm}, 0]\nq0 = [0.2, {start}]\nv0 = [0.3, 0]\n"
+    content = of_truth(one_body(tmp_path, "cylindrical", lines + PUSH))
+    axis = np.array([np.sin(lean), 0, np.cos(lean)])
+    along = 0.2 + 0.3 * TIMES - 0.5 * WEIGHT * np.cos(lean) / MASS * TIMES**2
+    places = content["p_WB"].to_numpy()[:, 0]
+    assert np.max(np.abs(places @ axis - along)) < 1e-13
+    # From the axis to the centre of mass; the weight across the axis pulls along -x of the joint.
+    pull = WEIGHT * np.sin(lean) * arm / (INERTIA + MASS * arm**2)
+    x, y = places @ [np.cos(lean), 0, -np.sin(lean)], places[:, 1]
+    swing = np.arctan2(y, x)
+    first = np.arctan2(-arm * np.cos(start), arm * np.sin(start))
+    turn = solve_ivp(
+        lambda _, s: [s[1], -pull * np.sin(s[0])], (0, 1), [first, 0.0], "DOP853", TIMES, rtol=1e-12, atol=1e-13
+    )
+    assert np.max(np.abs(swing - turn.y[0])) < 1e-11
 
 
 def test_a_gimbal_is_a_ball_joint(tmp_path: Path) -> None:

@@ -9,6 +9,7 @@ import pytest
 from one_body_scenes import one_body, refusal
 from scipy.spatial.transform import Rotation
 
+from proofroll.core.events import events_of
 from proofroll.elements.mechanism import Body, Force, Joint, Mechanism
 from proofroll.elements.mechanism.contacts.geometry import Geometry, Pair
 from proofroll.elements.mechanism.element import MechanismElement
@@ -119,6 +120,24 @@ def test_a_pushed_body_slides_with_friction_of_its_load() -> None:
     a = (5.0 - 0.25 * (2.0 * 9.81 + 4.0)) / 2.0
     assert bar < 1e-9
     assert placed.p_WB[:, 0, 0] == pytest.approx(TIMES + a * TIMES**2 / 2, abs=1e-8)
+
+
+def test_a_push_that_grows_finds_static_and_then_kinetic_friction() -> None:
+    """At rest a body holds until the push is its static friction; from there kinetic friction acts against the push."""
+    mechanism, rise, static, kinetic = sliding((Formula("10*t"), 0.0, 0.0)), 10.0, 0.35, 0.25
+    still = replace(mechanism.joints[0], v0=(0.0,) * 6)
+    pair = replace(mechanism.pairs[0], friction=kinetic, static_friction=static)
+    content = MechanismTruth.truth(
+        MechanismElement(replace(mechanism, joints=(still,), pairs=(pair,))), np.append(TIMES, 1.2), ()
+    )
+    begins = static * 2.0 * 9.81 / rise
+    (slip,) = [event for event in events_of(content) if event.kind == "slip"]
+    assert slip.time == pytest.approx(begins, abs=1e-9)
+    t = np.maximum(content["time"].to_numpy(), begins)
+    place = (
+        rise / 12 * (t**3 - begins**3) - rise / 4 * begins**2 * (t - begins) - kinetic * 9.81 / 2 * (t - begins) ** 2
+    )
+    assert content["p_WB"].to_numpy()[:, 0, 0] == pytest.approx(place, abs=1e-8)
 
 
 def test_a_turned_scene_moves_alike() -> None:
