@@ -129,7 +129,7 @@ def test_a_statement_that_does_not_hold_is_a_contradiction(proofroll: Proofroll,
     names = files(tmp_path, figures=FIGURES.replace("STATED", "-150"))
     code, said, _ = proofroll("report", *names, "--out", str(out))
     assert code == 1
-    assert "Look first at what was not expected (1): ω3 is constant (free)" in said
+    assert "Look first at the unexpected result (1): ω3 is constant (free)" in said
     assert "Nothing was compared in this report" in (out / "report.html").read_text(encoding="utf-8")
 
 

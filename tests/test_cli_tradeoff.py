@@ -246,7 +246,7 @@ def test_tradeoff_and_then_recommend(proofroll: Proofroll, tmp_path: Path) -> No
     assert "use Exudyn generic matched" in out
     code, _, err = proofroll("recommend", "sphere_in_cylinder", "--tolerance", "1 %", *given[:4], *given[-2:])
     assert code == 2
-    assert f"what is stored is of {ENGINE}; choose among these" in err
+    assert f"the stored curves are of {ENGINE}; choose among these" in err
 
 
 def test_an_answer_over_a_range(proofroll: Proofroll, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -116,7 +116,7 @@ def test_what_to_look_at_first_is_three_sentences_at_most(
     assert not any("\n" in line for line in lines)
     assert not unexpected or lines[0].endswith("otherwise")
     assert lines[0].startswith(
-        "Look first at what was not expected (1)" if unexpected else ("Missing" if missing else "1 setting differs")
+        "Look first at the unexpected result (1)" if unexpected else ("Missing" if missing else "1 setting differs")
     )
     assert bool(missing) == any("It has not been made yet" in line for line in lines)
 

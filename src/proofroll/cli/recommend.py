@@ -266,7 +266,7 @@ def _stored_study(
     ):
         study, changes = valid_study(path, TradeoffStudy)
         if study is not None and not covers(study.engines, engines):
-            changes = [f"what is stored is of {', '.join(study.engines)}; choose among these with --engine"]
+            changes = [f"the stored curves are of {', '.join(study.engines)}; choose among these with --engine"]
             study = None
         if study is not None and ranges is not None and study.over != ranges:
             study, changes = None, ["the stored curves were not checked over these ranges"]

@@ -61,11 +61,7 @@ class Scene:
         for name in self.asks:
             if not any(name in element.askable for element in self.elements):
                 questions = dict.fromkeys(questions for element in self.elements for questions in element.askable)
-                advice = (
-                    f"no element of the scene has that to ask for; choose {choices(questions)}"
-                    if questions
-                    else _NOTHING
-                )
+                advice = f"no element of the scene offers this; choose {choices(questions)}" if questions else _NOTHING
                 raise InputError("asks", name, advice)
 
     @property

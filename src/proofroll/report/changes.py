@@ -87,7 +87,7 @@ class Against:
             "new": "new runs",
         }
         counts = ", ".join(f"{kinds.count(kind)} {text}" for kind, text in words.items() if kind in kinds)
-        costs = f"; costs are {number(self.drift)} of the old ones throughout, which is left out"
+        costs = f"; costs are {number(self.drift)} of the old ones throughout; this factor is left out"
         if not self.costs:
             costs = "; costs are of another machine and not compared"
         elif 1 / _COST < self.drift < _COST:

@@ -19,7 +19,7 @@ _LAYERS = {
     "joints": ("joints", "joints that are absent, added, or follow no other although the file says so"),
     "mass": ("mass", "mass carried by all moving joints [relative]"),
     "kinematics": ("poses", "position and rotation of each body [m, 1]"),
-    "bodies": ("bodies", "mass, first moment and inertia of what each joint carries [relative, m]"),
+    "bodies": ("bodies", "mass, first moment and inertia of the bodies that each joint carries [relative, m]"),
     "mass matrix": ("M", "M [relative]"),
     "gravity": ("g", "torque of gravity [relative]"),
     "bias": ("h", "torque of gravity and velocities [relative]"),

@@ -41,7 +41,7 @@ def _bodies(file: RobotFile, robot: Robot) -> Iterator[_Noticed]:
         if not body.mass:
             yield "error", place, "it has inertia but no mass; engines invent different masses"
         if body.impossible:
-            yield "error", place, f"its inertia {body.impossible}; correct it, for engines replace, refuse or take it"
+            yield "error", place, f"its inertia {body.impossible}; correct it: engines replace, refuse or accept it"
         elif body.moments[0] <= 0:
             yield "warning", place, "its inertia has a principal moment of zero; some engines refuse that"
     for joint in robot.moving:

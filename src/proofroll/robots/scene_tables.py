@@ -73,7 +73,7 @@ def tables_of(file: RobotFile, robot: Robot, start: RobotStates, values: Mapping
         raise InputError("file", path, f"nothing in it moves{hint}")
     for link, body in robot.bodies.items() if values.get("possible") else ():
         if body.impossible:
-            advice = f"it {body.impossible}; correct it, or take what each joint moves as a whole by possible=0"
+            advice = f"it {body.impossible}; correct it, or take the bodies of each joint as one by possible=0"
             raise InputError(f"{path}: <link {link}> inertia", body.moments.tolist(), advice)
     names = _names(robot)
     held = bool(values["couplings"])

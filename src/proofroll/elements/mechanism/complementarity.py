@@ -20,7 +20,7 @@ _ROUND_OFF = 1e-12  # of accelerations, in parts of what they are the sum of: no
 _MOST_TRIED = 6  # largest number of joints at rest where some share one degree of freedom
 _MOST_PIVOTS = 1000  # of the complementarity problem; usually about one for each joint
 _UNDECIDED = (
-    "which joints with friction or stops hold is not found by pivots, as where it is within rounding: "
+    "pivots do not find which joints with friction or stops hold; rounding may decide it: "
     "change the parameters, or leave out the friction or the stop of one joint"
 )
 

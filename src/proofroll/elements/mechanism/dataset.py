@@ -222,7 +222,7 @@ def _put_contacts(
         put(f"gap.{contact.name}", followed.gap[:, index], "m", f"distance of what {contact.name} may touch")
         put(f"slip.{contact.name}", followed.slip[:, index], "m/s", f"speed of slip of {contact.name}")
     put("gaps", followed.gap, "m", "distances between what may touch", "contact")
-    put("slips", followed.slip, "m/s", "speeds of slip of what may touch", "contact")
+    put("slips", followed.slip, "m/s", "slip speeds of the contacts", "contact")
     put("normal_forces", normal_forces(followed, pressed), "N", "normal forces between what may touch", "contact")
     put("contact_forces", pressed, "N", "forces between what may touch", "contact", "xyz")
     friction, static = (

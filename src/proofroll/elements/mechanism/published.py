@@ -80,7 +80,7 @@ def _read(field: str, table: Any) -> Published:
         if name not in _OWN
     }
     if not values:
-        raise InputError(field, "no numbers", 'give those of an observable, as "q.slide" = 0.25')
+        raise InputError(field, "no numbers", 'give values of an observable, as "q.slide" = 0.25')
     return Published(source=source, times=times, values=values, within=within, parameters=dict(parameters))
 
 

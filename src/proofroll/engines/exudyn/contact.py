@@ -238,7 +238,7 @@ def _softened(
         "angular acceleration": Regularised(m * a**2 / J * F / (m * natural) + ROUND_OFF, stiff),
     }
     if not math.isfinite(body.contact.mu_static):
-        grips = "a grip stands for friction without bound; a run that needs more of it is ended"
+        grips = "a finite bound stands for unbounded friction; a run that exceeds it is ended"
         softened |= {f"1 / {name} friction": Regularised(1 / mu + ROUND_OFF, grips) for name in ("static", "kinetic")}
     return softened
 

@@ -50,7 +50,7 @@ def softness(body: RollingBall, settings: MujocoSettings) -> Mapping[str, Regula
         lost = _law_of_friction(body, settings, supplied * body.ball.mass) + _lift_of_slip(body, settings)
         why += "; the ball starts at depth zero, where no depth makes up for it"
         if lost:
-            why += " and what normal force there is does not hold the friction"
+            why += " and the normal force that remains does not hold the friction"
         soft = _MARGIN * (missing + creep + lost) / scale + _SOLVER
         if soft >= 1 and not np.any(body.slip0):
             why += ": accelerations and forces at time 0 are not checked"

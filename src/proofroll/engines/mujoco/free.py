@@ -31,7 +31,7 @@ class Free(Formulation):
         self._radius = body.ball.radius
         self._wall_rate, self._geom = body.wall_rate, model.geom("ball").id
         if body.wall_rate is not None and not settings.curvature:
-            raise Refused("for MuJoCo a mocap plane has no velocity, so the wall's is added with curvature=true alone")
+            raise Refused("MuJoCo's mocap plane has no velocity; curvature=true adds the wall's")
         self._wall = model.geom("wall").id
         self._curvature = settings.curvature
         self._half = settings.velocity_lag

@@ -66,7 +66,7 @@ def standings(rows: Sequence[ReportedRow], alone: bool) -> str:
         "unconfirmed": ("agrees", "agree", "at this step with a limit that is not confirmed"),
         "incomplete": ("agrees", "agree", "without reporting all that is judged"),
         "converges": ("needs", "need", "a finer step"),
-        "ill-posed": ("is", "are", "beyond judgement at some points, where the question is ill-posed"),
+        "ill-posed": ("is", "are", "not judged at some points: the question is ill-posed there"),
         "another-scene": ("is", "are", "a different model than the scene's, so not judged"),
         "not-judged": ("is", "are", "not judged: there is no truth, or it is not exact enough for the tolerance"),
         "refused": ("refuses", "refuse", "the scene, or some case of it, with the reason"),

@@ -64,7 +64,7 @@ def growth(content: ReportedComparison, truths: Sequence[ReportedTruth]) -> Grow
             spent[rows[run.row]][run.parameters[parameter]] = run.seconds_per_second
     if not any(spent.values()):
         return None
-    spent["the truth, once, with all that it compiles"] = {
+    spent["the truth, first run, compilation included"] = {
         truth.parameters[parameter]: truth.wall_seconds for truth in truths if truth.wall_seconds
     }
     lines = []

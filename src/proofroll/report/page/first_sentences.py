@@ -120,7 +120,7 @@ def _silent(comparisons: Sequence[ReportedComparison], maps: Sequence[StabilityS
         off = " or ".join(filter(None, (truth and f"differs {truth}", laws and f"breaks {laws}")))
         nothing = f"No setting that ran to its end {off}"
         if not comparisons:
-            return f"{passed}." if maps else "Nothing that was run could be silently wrong: nothing was compared."
+            return f"{passed}." if maps else "No run could be silently wrong: nothing was compared."
         return f"{nothing}; {passed}." if maps else f"{nothing}."
     _, name, text = max(wrong)
     differ, breaks, run = ("differ", "break", "run") if len(wrong) > 1 else ("differs", "breaks", "runs")

@@ -221,7 +221,7 @@ def first_lines(content: ReportContent) -> list[str]:
     missing = [entry for entry in entries if entry.missing]
     lines = []
     if unexpected:
-        lines.append(_one_line(f"Look first at what was not expected ({len(unexpected)}): {unexpected[0]}"))
+        lines.append(_one_line(f"Look first at the unexpected result ({len(unexpected)}): {unexpected[0]}"))
     if missing:
         lines.append(_one_line(f"Missing ({len(missing)}): {missing[0].title}: {missing[0].missing}"))
     if not unexpected:

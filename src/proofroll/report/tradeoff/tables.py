@@ -282,7 +282,7 @@ def answer_lines(advice: Recommendation) -> Iterator[str]:
     ):
         if choice:
             yield f"{words}: {_line(choice, answer.unit)}"
-    yield "Costs are those of an engine through this adapter; another way to drive it may cost more or less."
+    yield "Costs are those of an engine through this adapter; other programs may cost more or less."
     yield _checked(advice)
     if advice.not_measured:
         yield f"Not among what was measured: {', '.join(advice.not_measured)}."

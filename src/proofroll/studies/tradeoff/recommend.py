@@ -20,7 +20,7 @@ _OF_A_POINT = (
 )  # fmt: skip
 # Ratio of the largest error of the next finer steps to a point's own above which the text gives both.
 _UNEVEN = 2.0
-_CLOSEST = "the most accurate that was measured, nothing beyond is guessed"
+_CLOSEST = "the most accurate measured one; nothing is extrapolated"
 
 
 @dataclass(frozen=True)

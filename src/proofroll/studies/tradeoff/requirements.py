@@ -132,7 +132,7 @@ def _blame(study: TradeoffStudy, point: MeasuredPoint, quantity: str, absolute: 
     """Clause on whether a finer step would help."""
     budget = _budget(study, point, quantity)
     if budget is None or budget.model_form is None:
-        return "too few finer runs reached the end to say whether a finer step would do"
+        return "too few finer runs reached the end to say whether a finer step would suffice"
     if budget.floor is not None and budget.best_step is not None and budget.floor > absolute:
         floor = floor_text(budget.best_step, budget.floor, study.quantities[quantity].unit)
         return f"no step would do: {floor}"
@@ -142,5 +142,5 @@ def _blame(study: TradeoffStudy, point: MeasuredPoint, quantity: str, absolute: 
         return f"no step would do, for {number(budget.model_form)} remain in the limit of small steps"
     if budget.model_form + (budget.model_form_bar or 0.0) > absolute:
         form = f"{number(budget.model_form)} off, known to {number(budget.model_form_bar or 0.0)}"
-        return f"whether a finer step would do is not known: the limit of small steps is {form}"
+        return f"whether a finer step would suffice is not known: the limit of small steps is {form}"
     return _COARSE

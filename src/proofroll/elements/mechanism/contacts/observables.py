@@ -29,7 +29,7 @@ RESIDUALS = (
     ("contact_pull", "N", "normal forces that pull"),
     ("cone_excess", "N", "friction beyond its coefficient times the normal force"),
     ("friction_direction", "1", "1 + T·u/(μN|u|): friction that is less than its bound or not against the slip u"),
-    ("hop_speed", "m/s", "speed along the normal of what presses"),
+    ("hop_speed", "m/s", "speed along the normal of pressing contacts"),
     ("natural_map", "N", "distance of forces from where Coulomb's law projects them with the slip"),
 )
 # Conservation laws that hold through impacts: energy, if nothing drives the bodies; momentum, if nothing else acts on
@@ -119,16 +119,16 @@ def contact_observables(mechanism: Mechanism, sizes: Mapping[str, float], least:
         return
     length, speed, force = (least * sizes[unit] for unit in ("m", "m/s", "N"))
     yield Observable("gaps", "m", "distances between what may touch", Role.MOTION, floor=length)
-    yield Observable("slips", "m/s", "speeds of slip of what may touch", Role.MOTION, floor=speed, asked_for=False)
+    yield Observable("slips", "m/s", "slip speeds of the contacts", Role.MOTION, floor=speed, asked_for=False)
     meaning = "normal forces between what may touch"
     yield Observable("normal_forces", "N", meaning, Role.REACTION, floor=force, headline=True, column=True)
-    meaning = "forces between what may touch, where they are determinate"
+    meaning = "contact forces, where they are determinate"
     told: dict[str, Any] = {"asked_for": False, "at_impacts": False}
     yield Observable("contact_forces", "N", meaning, Role.REACTION, floor=force, always=_WRONG, **told)
     if shared_pairs(mechanism.contacts):
         meaning = "sums of the forces of each pair that touches at several places, where they are determinate"
         yield Observable("pair_forces", "N", meaning, Role.REACTION, floor=force, **told)
-    meaning = "share of the samples so far in which what may touch does not press"
+    meaning = "share of the samples so far without a normal force"
     yield Observable("unpressed", "1", meaning, Role.REACTION, floor=1.0, asked_for=False)
     laws = [law for law in LAWS if law[0] in kept_laws(mechanism)]
     for name, unit, meaning in (*RESIDUALS, *laws):

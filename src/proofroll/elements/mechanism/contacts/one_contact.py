@@ -37,7 +37,7 @@ def rubbing(G: Array, c: Array, bound: float, sliding: Array | None) -> tuple[Ar
     for t in _parallel(moved, _cross(moved(_WAYS), _WAYS)):
         if moved(t) @ t > 0:
             return np.array([0.0, *(-bound * t)]), "slip"
-    raise Refused("friction against turning that is not alike in all directions finds none")
+    raise Refused("no solution for friction against turning that depends on the direction")
 
 
 def _cross(w: Array, t: Array) -> Array:
