@@ -298,8 +298,8 @@ BAD = {
         "a spherical joint has no axis",
     ),
     "stiffness without a coordinate": (
-        SLIDER_CRANK + ROD + joint("world", "extra", "free", "stiffness = 1"),
-        "a free joint has none",
+        SLIDER_CRANK + ROD + joint("world", "extra", "planar", "stiffness = 1"),
+        "a planar joint has none",
     ),
 }
 
