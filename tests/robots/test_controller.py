@@ -79,7 +79,7 @@ def test_targets_are_formulas_numbers_or_tables(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("change", "says"),
     [
-        (("rate = 50", "rate = 0"), "rate = 0.0: give instants per second"),
+        (("rate = 50", "rate = 0"), "rate = 0.0: give a positive number of instants per second"),
         (("rate = 50\n", ""), "delay = 1: it needs instants; give the rate in Hz"),
         (("rate = 50", "rte = 50"), "rte = 50: there is no such key here; the keys are rate, held,"),
         (('held = "target"', 'held = "both"'), "held = 'both': choose one of target, effort"),
@@ -99,7 +99,7 @@ def test_targets_are_formulas_numbers_or_tables(tmp_path: Path) -> None:
         (("{FOOT = 0.016}", '"cubes"'), """ground.feet = 'cubes': give "spheres","""),
         (("friction = 0.8", "friction = -1"), "ground.friction = -1.0: must be at least 0"),
         ((', "R_KNEE"]', "]"), "order = ['L_HIP', 'R_HIP', 'L_KNEE']: it lacks R_KNEE"),
-        ((', "R_KNEE"]', ', "L_HIP"]'), "order = ['L_HIP']: a joint stands in the order twice"),
+        ((', "R_KNEE"]', ', "L_HIP"]'), "order = ['L_HIP']: a joint is in the order twice"),
         (("[start]", "start = 3\n[x]"), "there is no such key"),
         (("q = {L_HIP = 0.1}", 'q = {"(base)" = 0.1}'), "start.q = '(base)': a free joint has no single coordinate"),
     ],
