@@ -7,6 +7,7 @@ seen. So errors do not add up, the state decides what a policy observes, and tho
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
@@ -21,10 +22,12 @@ from proofroll.elements.mechanism.bookkeeping.mistakes import Mistake, changed
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.rotations import Array
 
-_FACTORS = (0.0, 0.3, 0.6, 0.85, 0.95, 1.05, 1.2, 1.6, 2.5)  # sizes that are tried, 1 being right
+_FACTORS = (0.0, 0.3, 0.6, 0.85, 0.95, 1.0, 1.05, 1.2, 1.6, 2.5)  # sizes that are tried, 1 being right
 _ARMATURES = (1e-4, 1e-3, 1e-2, 0.1)  # kg m², where the right one is 0
 _AT_ONCE = 500  # laws that move at once: some 100 MB
 _SLOPE, _ROUNDS, _REFINED = 1e-3, 3, 40  # part of a size for slopes, rounds of a fit, and choices that are fitted
+_ALONE = (-0.4, -0.2, -0.1, 0.1, 0.2, 0.4)  # values of a number that are tried [rad, m, or parts]
+_SWEEPS, _HELPS = 4, 0.7  # sweeps through these values, and the part that a sweep must leave at most
 # Treatments of gains: kd at the velocity before a step, or after it; or at four stages.
 Treatment = Literal["explicit", "implicit", "rk4"]
 TREATMENTS: tuple[Treatment, ...] = ("explicit", "implicit", "rk4")
@@ -252,13 +255,38 @@ class MistakeScreen:
         return items
 
     def numbers(self, law: Callable[[Array], ControlLaw], count: int, treatment: Treatment) -> tuple[Array, float]:
-        """Numbers of a law, from zeros on, with which it leaves least, by Gauss-Newton; and what it leaves."""
-        values = np.zeros(count)
-        for _ in range(_ROUNDS):
-            changes = _SLOPE * np.eye(count)
-            rows = self.left([law(values), *(law(values + change) for change in changes)], treatment)
-            values = values - np.linalg.lstsq((rows[1:] - rows[0]).T / _SLOPE, rows[0], rcond=None)[0]
-        return values, float(np.square(self.left([law(values)], treatment)).mean())
+        """Numbers of a law with which it leaves least, and what it leaves.
+
+        Gauss-Newton, again from other values of each number alone: where an effort is clamped, slopes tell nothing.
+        """
+        best = np.zeros(count), float(np.square(self.left([law(np.zeros(count))], treatment)).mean())
+        for _ in range(_SWEEPS):
+            trials = np.array([best[0]] * (count * len(_ALONE)))
+            trials[np.arange(len(trials)), np.repeat(np.arange(count), len(_ALONE))] = np.tile(_ALONE, count)
+            squares = np.square(self.left([law(values) for values in trials], treatment)).mean(axis=1)
+            each = squares.reshape(count, -1)
+            several = np.where(each.min(axis=1) < best[1], np.array(_ALONE)[each.argmin(axis=1)], best[0])
+            starts = [best[0], trials[int(np.argmin(squares))], several]
+            found = min((self._descended(law, start, treatment) for start in starts), key=lambda pair: pair[1])
+            if found[1] > _HELPS * best[1]:
+                break
+            best = found
+        return best
+
+    def _descended(self, law: Callable[[Array], ControlLaw], start: Array, treatment: Treatment) -> tuple[Array, float]:
+        """Numbers of a law that leave least, and what they leave, by Gauss-Newton with halved steps."""
+        values, least, tried = start, math.inf, start
+        step = np.zeros(len(start))
+        for _ in range(2 * _ROUNDS):
+            rows = self.left([law(tried), *(law(tried + change) for change in _SLOPE * np.eye(len(start)))], treatment)
+            square = float(np.square(rows[0]).mean())
+            if square < least:
+                values, least = tried, square
+                step = -np.linalg.lstsq((rows[1:] - rows[0]).T / _SLOPE, rows[0], rcond=None)[0]
+            else:
+                step = step / 2
+            tried = values + step
+        return values, least
 
 
 def _change(size: float) -> float:

@@ -17,7 +17,7 @@ import numpy as np
 from proofroll.elements.mechanism.bookkeeping.air import AirRobot, Scheme, steps_in_air
 from proofroll.elements.mechanism.bookkeeping.law import ControlLaw
 from proofroll.elements.mechanism.bookkeeping.mistakes import Mistake, changed, fitted, mistakes, offsets_told
-from proofroll.elements.mechanism.bookkeeping.screen import TREATMENTS, MistakeScreen, Screened
+from proofroll.elements.mechanism.bookkeeping.screen import TREATMENTS, MistakeScreen, Screened, Treatment
 from proofroll.elements.mechanism.bookkeeping.seen import LawMotions, SeenMotion
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.rotations import Array
@@ -176,6 +176,7 @@ class _Trial:
         screen: of mistakes.
         window: number of the first samples in which a good part of the distance shows.
         plain: distance in the window without a mistake.
+        treatments: of gains with which poses are tried.
     """
 
     def __init__(self, search: LawMotions, before: float, scheme: Scheme) -> None:
@@ -185,6 +186,7 @@ class _Trial:
         largest = [float(np.abs(item).max()) for item in search.differences(search.law, scheme, count)]
         shows = next((row for row, size in enumerate(largest) if size >= _SHOWS * before), count - 1)
         self.window = min(count, max(_LEAST, shows + 2))
+        self.treatments: tuple[Treatment, ...] = TREATMENTS
         self.plain = max(largest[: self.window], default=before)
 
     def settled(self, found: Sequence[MistakesFound]) -> bool:
@@ -232,10 +234,11 @@ class _Trial:
         if law.policy is None and not all(isinstance(item, float) for item in law.targets):
             return []
         fits = []
-        for second, treatment in itertools.product(seconds, TREATMENTS):
+        for second, treatment in itertools.product(seconds, self.treatments):
             moved = partial(_moved, law, second)
             size = len(law.joints) + int(second is not None and second.sized)
             fits.append((*self.screen.numbers(moved, size, treatment), moved, second, treatment))
+        self.treatments = (min(fits, key=lambda fit: fit[1])[-1],)
         found = []
         for near, _, moved, second, treatment in sorted(fits, key=lambda fit: fit[1])[:_POSES]:
             for scheme in (name for name in search.schemes if name.startswith(treatment)):
