@@ -12,7 +12,7 @@ from scipy.linalg import block_diag
 from scipy.spatial.transform import Rotation
 
 from proofroll.elements.mechanism import WORLD, Joint, Mechanism
-from proofroll.elements.mechanism.joint_kinds import IN_PLANE, SLIDING, JointKind
+from proofroll.elements.mechanism.joint_kinds import JointKind
 from proofroll.elements.mechanism.rotations import Array, frame_of_axis
 from proofroll.truth.scalars import Scalar, add, cross, dot, mul, plus, scaled, turned, turned_back
 
@@ -183,7 +183,7 @@ def _moved(joint: Joint, q: Array, v: Array) -> tuple[Array, Rotation, Array, Ar
     e1, e2, e3 = joint.child_frame.copy().T
     if joint.kind == JointKind.REVOLUTE:
         return none, Rotation.from_rotvec(q[0] * e3), none, v[0] * e3
-    if joint.kind in SLIDING:
+    if joint.kind in {JointKind.PRISMATIC, JointKind.CYLINDRICAL}:
         angle, spin = (0.0, 0.0) if joint.kind == JointKind.PRISMATIC else (q[1], v[1])
         return q[0] * e3, Rotation.from_rotvec(angle * e3), v[0] * e3, spin * e3
     if joint.kind == JointKind.UNIVERSAL:
@@ -221,7 +221,7 @@ def _plane(mechanism: Mechanism) -> Array | None:
     placed = placed_bodies(mechanism)
     axes = [(joint, placed[joint.child].R.apply(joint.child_frame[:, 2].copy())) for joint in mechanism.joints]
     normals = [axis for joint, axis in axes if joint.kind in {JointKind.REVOLUTE, JointKind.PLANAR}]
-    if not normals or any(joint.kind not in IN_PLANE for joint in mechanism.joints):
+    if not normals or any(joint.kind in _OUT_OF_PLANE for joint in mechanism.joints):
         return None
     normal = normals[0]
     for joint, axis in axes:

@@ -15,7 +15,7 @@ from scipy.linalg import block_diag
 from proofroll.core.arrays import slices
 from proofroll.elements.mechanism import WORLD, Joint, Mechanism
 from proofroll.elements.mechanism.drives import Coupling
-from proofroll.elements.mechanism.joint_kinds import TURNING, JointKind
+from proofroll.elements.mechanism.joint_kinds import JointKind
 from proofroll.elements.mechanism.prescribed import moved
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.elements.mechanism.signal import FUNCTIONS as SMOOTH
@@ -131,7 +131,7 @@ class MaximalEquations:
         self.angles = [
             (k, n)
             for k, joint in enumerate(mechanism.joints)
-            if (joint.stiffness or joint.limits or k in held) and joint.kind in TURNING
+            if (joint.stiffness or joint.limits or k in held) and joint.kind in _COUNTED
             for n in range(joint.nq)
         ]
 
