@@ -19,6 +19,8 @@ from proofroll.truth.scalars import Scalar, add, cross, dot, mul, plus, scaled, 
 _PARALLEL = 1e-12  # cross product of axes of a planar mechanism up to which they are parallel
 # Smallest over largest moment of inertia up to which a body is a rod or a point, given with the digits of a file.
 _LIGHT = 1e-9
+# Kinds whose motion leaves a plane; the first route has a list of its own.
+_OUT_OF_PLANE = frozenset({JointKind.CYLINDRICAL, JointKind.UNIVERSAL, JointKind.SPHERICAL, JointKind.FREE})
 
 
 @dataclass(frozen=True)

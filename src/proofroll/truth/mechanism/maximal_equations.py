@@ -25,6 +25,8 @@ from proofroll.truth.mechanism.constraint_rows import NONE, Connection, Constrai
 from proofroll.truth.mechanism.maximal_bodies import GROUND, BodyInScalars, clean, made_bodies, placed_bodies
 from proofroll.truth.scalars import Scalar, add, cross, dot, is_zero, minus, mul, plus, product, scaled, sub, turned
 
+# Kinds whose coordinates are angles that may exceed a turn; the first route has a list of its own.
+_COUNTED = frozenset({JointKind.REVOLUTE, JointKind.UNIVERSAL})
 FUNCTIONS: Mapping[str, Callable[[Any], Any]] = {name: getattr(math, name) for name in SMOOTH}
 
 
