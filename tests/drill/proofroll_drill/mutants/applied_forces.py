@@ -54,6 +54,30 @@ class AtCentre(OfForce):
         return dataclasses.replace(force, position=(0, 0.02, -0.3))
 
 
+class Mirrored(OfForce):
+    """The place has the wrong sign."""
+
+    fault = "applied force at its mirrored point"
+    named = ("force thrust acts at the opposite place of craft",)
+
+    def changed(self, force: Force) -> Force:
+        """Force on the other side of the origin."""
+        x, y, z = force.position
+        return dataclasses.replace(force, position=(-x, -y, -z))
+
+
+class Elsewhere(OfForce):
+    """The place is another one, none that a hypothesis tries by name."""
+
+    fault = "applied force at the wrong point"
+    named = ("force wind acts along a line through (-0.0228, 0.127, -0.215) m of load",)
+    force = "wind"
+
+    def changed(self, force: Force) -> Force:
+        """Force at another point of the load."""
+        return dataclasses.replace(force, position=(0.05, 0.13, -0.2))
+
+
 class Unopposed(OfForce):
     """The second body feels nothing."""
 

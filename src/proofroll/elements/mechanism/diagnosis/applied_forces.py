@@ -3,13 +3,16 @@
 from collections.abc import Iterator
 from dataclasses import replace
 
+import numpy as np
+
 from proofroll.core.diagnosis import Cause, Evidence, hypothesis
-from proofroll.core.diagnosis.fitting import change_by, factor_text, possible
+from proofroll.core.diagnosis.fitting import Residuals, change_by, factor_text, possible
 from proofroll.elements.mechanism.checks import WORLD, ZERO
 from proofroll.elements.mechanism.diagnosis.equations import Change
 from proofroll.elements.mechanism.diagnosis.residuals import best, residuals_of
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.parts import Axes, Force
+from proofroll.elements.mechanism.rotations import Array
 from proofroll.elements.mechanism.signal import delayed, varies
 
 
@@ -34,6 +37,27 @@ def of_applied_forces(evidence: Evidence) -> Iterator[Cause]:
                 says = f"the engine moves it with the {force.kind} {force.name} {factor_text(factor)}"
                 remedy = f"give {force.name} its value, on {force.body}"
                 yield residuals.cause(f"size of {force.name}", says, scaled(factor), remedy, fitted, change_by(factor))
+            if force.kind == "force":
+                yield _elsewhere(residuals, mechanism, number, evidence.element.length)
+
+
+def _elsewhere(residuals: Residuals[Change], mechanism: Mechanism, number: int, length: float) -> Cause:
+    """Hypothesis: the force acts along another line, through its nearest place that balances the equations."""
+    force = mechanism.forces[number]
+
+    def at(place: Array) -> Change:
+        return Change(_with(mechanism, number, replace(force, position=tuple(map(float, place)))))
+
+    position = np.array(force.position)
+    left = residuals.left(at(position))
+    slopes = [residuals.left(at(position + axis)) - left for axis in np.eye(3)]
+    shift = -np.linalg.lstsq(np.stack(slopes, axis=-1), left, rcond=1e-6)[0]
+    place = np.where(np.abs(position + shift) < 1e-6 * length, 0.0, position + shift)
+    words = ", ".join(f"{x:.3g}" for x in place)
+    says = f"force {force.name} acts along a line through ({words}) m of {force.body}, not through its place"
+    remedy = f"give its place in the axes of {force.body}, from the origin of its frame"
+    size = float(np.linalg.norm(shift)) / length
+    return residuals.cause(f"place of {force.name}", says, at(place), remedy, 3, size)
 
 
 def _mistakes(mechanism: Mechanism, force: Force, step: float | None) -> Iterator[tuple[str, Force, str]]:
@@ -44,7 +68,9 @@ def _mistakes(mechanism: Mechanism, force: Force, step: float | None) -> Iterato
     yield says, replace(force, frame=frame), "look at whose axes its components are along"
     if force.kind == "force":
         com = next(body.com for body in mechanism.bodies if body.name == force.body)
-        for place, words in ((com, "the centre of mass"), (ZERO, "the origin")):
+        x, y, z = force.position
+        mirrored = (-x, -y, -z)
+        for place, words in ((com, "the centre of mass"), (ZERO, "the origin"), (mirrored, "the opposite place")):
             if place != force.position:
                 says = f"acts at {words} of {force.body}, not at its place"
                 yield says, replace(force, position=place), "add the moment of the force about the centre of mass"
