@@ -12,6 +12,7 @@ import numpy as np
 
 from proofroll.core.errors import Refused
 from proofroll.elements.mechanism import WORLD, Mechanism, Tree
+from proofroll.elements.mechanism.contacts.box_features import CORNERS, SLOTS
 from proofroll.elements.mechanism.contacts.geometry import BodyContact
 from proofroll.elements.mechanism.contacts.shapes import (
     BoxShape,
@@ -24,7 +25,7 @@ from proofroll.elements.mechanism.contacts.shapes import (
     SphereShape,
 )
 from proofroll.elements.mechanism.contacts.start import touches
-from proofroll.elements.mechanism.contacts.touching import Moving
+from proofroll.elements.mechanism.contacts.touching import Moving, touch
 from proofroll.elements.mechanism.contacts.walls import CurvedWall
 from proofroll.elements.mechanism.rotations import Array, cross, frame_of_axis, to_quaternion
 from proofroll.elements.mechanism.sampling import DEPENDENT
@@ -71,6 +72,8 @@ def write_contacts(spec: Any, bodies: dict[str, Any], mechanism: Mechanism, sett
     spec.option.cone = getattr(mujoco.mjtCone, f"mjCONE_{settings.cone.upper()}")
     moving = _moving(mechanism)
     for number, contact in enumerate(mechanism.contacts):
+        if contact.box_slot is not None and contact.slot:
+            continue  # the first contact of two boxes stands for all
         names = [f"contact{number}{end}" for end in "ab"]
         ends = ((contact.body_a, contact.shape_a), (contact.body_b, contact.shape_b))
         for name, (body, shape) in zip(names, ends, strict=True):
@@ -155,10 +158,12 @@ class Contacts:
 
     def __init__(self, model: Any, mechanism: Mechanism) -> None:
         self._model, self._mechanism = model, mechanism
-        self._geoms = [[model.geom(f"contact{k}{end}").id for end in "ab"] for k in range(len(mechanism.contacts))]
+        firsts = [k - contact.slot if contact.box_slot else k for k, contact in enumerate(mechanism.contacts)]
+        self._geoms = [[model.geom(f"contact{k}{end}").id for end in "ab"] for k in firsts]
+        self._boxes = {k for k, contact in enumerate(mechanism.contacts) if contact.box_slot and not contact.slot}
         # Geom -> number of its contact, and 1 if the geom is body a's or -1 if it is body b's.
-        self._of_geom = {a: (k, 1.0) for k, (a, _) in enumerate(self._geoms)}
-        self._of_geom |= {b: (k, -1.0) for k, (_, b) in enumerate(self._geoms)}
+        self._of_geom = {a: (k, 1.0) for k, (a, _) in zip(firsts, self._geoms, strict=True)}
+        self._of_geom |= {b: (k, -1.0) for k, (_, b) in zip(firsts, self._geoms, strict=True)}
         self._normal_rows: dict[int, list[Array]] = {}
 
     def forces(self, data: Any) -> Array:
@@ -167,7 +172,7 @@ class Contacts:
         for index in range(data.ncon):
             contact = data.contact[index]
             mujoco.mj_contactForce(self._model, data, index, wrench)
-            number, sign = self._of_geom[int(contact.geom[1])]
+            number, sign = self._contact(data, contact)
             # The frame's first axis points from geom[0] to geom[1], and the force is the one on geom[1].
             total[number] += sign * (contact.frame.reshape(3, 3).T @ wrench[:3])
         return total
@@ -219,6 +224,21 @@ class Contacts:
         """Number of the mechanism's contact to which MuJoCo's contact belongs."""
         return self._of_geom[int(contact.geom[1])][0]
 
+    def _contact(self, data: Any, contact: Any) -> tuple[int, float]:
+        """Number of the mechanism's contact that MuJoCo's contact is, and 1 or -1: its force acts on body a or b.
+
+        Of two boxes it is the nearest of their corners and crossings.
+        """
+        number, sign = self._of_geom[int(contact.geom[1])]
+        if number not in self._boxes:
+            return number, sign
+        contacts, none = self._mechanism.contacts, np.zeros(3)
+        bodies = [self._model.body(name).id for name in (contacts[number].body_a, contacts[number].body_b)]
+        a, b = (Moving(data.xpos[body], data.xmat[body].reshape(3, 3), none, none) for body in bodies)
+        found = [touch(contacts[k], a, b) for k in range(number, number + SLOTS)]
+        away = [np.inf if each.absent else float(np.linalg.norm(each.place - contact.pos)) for each in found]
+        return number + int(np.argmin(away)), sign
+
     def add_turning(self, data: Any) -> None:
         """Adds J̇v, which MuJoCo leaves out of the rows of contacts, to the reference accelerations at the start."""
         mechanism = self._mechanism
@@ -227,7 +247,7 @@ class Contacts:
         for index in range(data.ncon):
             contact = data.contact[index]
             row = int(contact.efc_address)
-            number, sign = self._of_geom[int(contact.geom[1])]
+            number, sign = self._contact(data, contact)
             contact_of_scene, touch = mechanism.contacts[number], touching[number]
             missing = np.zeros(3)
             for body, side in ((contact_of_scene.body_a, 1.0), (contact_of_scene.body_b, -1.0)):
@@ -278,7 +298,7 @@ class Contacts:
         all_rows = rows_of(data, data.nefc)
         for index in range(data.ncon):
             contact = data.contact[index]
-            number, sign = self._of_geom[int(contact.geom[1])]
+            number, sign = self._contact(data, contact)
             if not contact.dist >= gap[number]:  # a cylinder has several contact points: the nearest is taken
                 gap[number], normal[number] = contact.dist, sign * contact.frame[:3]
                 place[number] = contact.pos + self._to_surface(number) * contact.dist * normal[number]
@@ -300,4 +320,6 @@ class Contacts:
 
     def _to_surface(self, number: int) -> float:
         """Signed half: times the gap, the step along the normal from MuJoCo's contact point to the curved shape."""
-        return -0.5 if isinstance(self._mechanism.contacts[number].shape_a, HalfSpace) else 0.5
+        contact = self._mechanism.contacts[number]
+        of_second = contact.box_slot is not None and CORNERS <= contact.slot < 2 * CORNERS  # a corner of it
+        return -0.5 if isinstance(contact.shape_a, HalfSpace) or of_second else 0.5

@@ -165,7 +165,7 @@ class ImpulseSteps:
         ahead = self.terms(pin.integrate(self._model, self.q, span * self.v), self.v, span)[0]
         shifts = np.zeros((len(self._returned), 3))
         shifts[: len(touching)] = (ahead - J) @ self.v
-        apart = [touch.gap > self._touching for touch in touching] + [False] * len(self.joints.friction)
+        apart = [touch.absent or touch.gap > self._touching for touch in touching] + [False] * len(self.joints.friction)
         shifts[apart + [not item.closed(self.q) for item in self.joints.stops], 2] = np.inf
         return self._solved(J, free, inverse, touching, shifts, span, convex=convex)
 
@@ -272,7 +272,8 @@ class ImpulseSteps:
         """Terms added to slip and gap velocities [m/s], shape (contacts + joint rows, 3); inf: the gap cannot close."""
         begin, dt = len(touching) + len(self.joints.friction), self._dt
         shifts = np.zeros((len(self._returned), 3))
-        gaps = [(k, touch.gap, float(J[k, 2] @ v)) for k, touch in enumerate(touching)]
+        gaps = [(k, touch.gap, float(J[k, 2] @ v)) for k, touch in enumerate(touching) if not touch.absent]
+        shifts[[k for k, touch in enumerate(touching) if touch.absent], 2] = np.inf
         speeds = self.joints.J[len(self.joints.friction) :] @ v
         gaps += [(k, item.gap(q), float(speeds[k - begin])) for k, item in enumerate(self.joints.stops, begin)]
         for k, gap, approach in gaps:

@@ -73,6 +73,11 @@ class ProjectionMechanism:
         switched = bool(switched_joints(mechanism)) or limited or bool(breaks(mechanism.signals))
         if mechanism.contacts and (mechanism.loops or mechanism.couplings or mechanism.prescribed):
             raise Refused("contacts are followed in trees, without loops, couplings and prescribed motions")
+        if any(contact.box_slot is not None for contact in mechanism.contacts):
+            raise Refused(
+                "two boxes meet at corners and crossings that begin and end at borders of faces, and this solver ends "
+                "a mode where a gap closes, a force ends or a slip stops"
+            )
         if mechanism.contacts and mechanism.cells:
             raise Refused("contacts under held targets are not followed yet")
         if (switched or self._timed or mechanism.contacts or mechanism.prescribed) and settings.equations == "compiled":

@@ -380,7 +380,7 @@ class ContactBodies(ContactStretches):
         bodies = self.equations.at(self.equations.equations.normalised(state), features_of(mode))
         return self.equations.applied(bodies, self.equations.accelerated(bodies, mode).force)
 
-    def _touching(self, state: Array, features: Features) -> Sequence[Touching]:
+    def _touching(self, state: Array, features: Features | None) -> Sequence[Touching]:
         return self.equations.at(state, features).touching
 
     def _solution(self, state: Array, mode: ContactMode) -> SolvedContacts:

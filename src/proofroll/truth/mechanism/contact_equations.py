@@ -132,7 +132,7 @@ class ContactEquations:
         J, rates = np.zeros((len(self.contacts), 3, e.nu)), np.zeros((len(self.contacts), 3))
         for k, (pair, each) in enumerate(zip(self.pairs, touching, strict=True)):
             for body, sign in zip(pair, (1.0, -1.0), strict=True):
-                if body < 0:
+                if body < 0 or each.absent:
                     continue
                 view = constrained.views[body]
                 arm = each.place - np.array(view.r)

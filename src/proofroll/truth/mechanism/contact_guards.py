@@ -32,6 +32,7 @@ _UNLOADED = 1e-11  # normal force, in natural units, that is round-off where a c
 # Value of Painlevé's measure (1 without friction) that counts as zero.
 LEAST_RESPONSE = 1e-3
 _STRAIGHT = 1e-10  # moment of friction about the centre of pressure, relative to the load, that counts as zero
+_NO_LOAD = 1e-9  # normal force, relative to the largest, that counts as none where contacts share a load
 _FEW = 6  # contacts that share a load, up to which all groups of them are tried
 TURNED = 0.5  # cosine of the angle by which a line may turn in a stretch
 # Speed, in natural units, by which slips may differ that share a load: round-off leaves 4e-15 of parallel ones.
@@ -100,8 +101,11 @@ def guards_of(contacts: Sequence[Touchable], mode: ContactMode) -> list[ContactG
         if features is not None:
             borders = features.borders(own.feature, 0.0, 0.0, 0.0)
             guards += [ContactGuard(k, "pass", number) for number in range(len(borders))]
+        slot = contact.box_slot if isinstance(contact, BodyContact) else None
+        if slot is not None:
+            guards += [ContactGuard(k, "pass", number) for number in range(1 + slot.leads)]
         if own.kind == "open":
-            if contact.pressed_by is None:
+            if contact.pressed_by is None and not (slot is not None and slot.absent(own.feature)):
                 guards.append(ContactGuard(k, "close"))
             continue
         if contact.presses:
@@ -289,6 +293,26 @@ def pressing(mode: ContactMode, touching: Sequence[Touching], force: Array, spli
     return normals
 
 
+def unloaded(solved: SolvedContacts) -> list[int]:
+    """Indices of the contacts of a shared load that bear none of it in any split, where some bear all of it.
+
+    Empty: the load can be split in more ways, or in none.
+    """
+    from scipy.optimize import linprog
+
+    normals = np.array([each.normal @ force for each, force in zip(solved.touching, solved.force, strict=True)])
+    shares = sharing(solved.splits)
+    sizes, rows, free = float(np.abs(normals).max()) or 1.0, solved.splits[shares], (None, None)
+    bounds, none = [free] * rows.shape[1], []
+    for k, row in zip(shares, rows, strict=True):
+        found = linprog(-row, -rows, normals[shares] / sizes + _NO_LOAD, bounds=bounds, method="highs")
+        if found.status:
+            return []
+        if normals[k] / sizes - found.fun <= 2 * len(shares) * _NO_LOAD:
+            none.append(k)
+    return none if len(none) < len(shares) else []
+
+
 def _most_even(normals: Array, splits: Array) -> float:
     """Least normal force in the split whose least one is largest, by linear programming; inf: it has no bound.
 
@@ -323,7 +347,7 @@ def striking(mode: ContactMode, touching: Sequence[Touching], hit: int, time: fl
 
     def closes(touch: Touching) -> bool:
         closing = -float(touch.normal @ touch.slide)
-        return closing > 0 and touch.gap <= max(closing * time_accuracy(time), size * _TOGETHER)
+        return not touch.absent and closing > 0 and touch.gap <= max(closing * time_accuracy(time), size * _TOGETHER)
 
     return [
         k
@@ -334,6 +358,8 @@ def striking(mode: ContactMode, touching: Sequence[Touching], hit: int, time: fl
 
 def lies_against(own: Acting, touch: Touching, size: float) -> bool:
     """True if a contact is closed and at rest along its normal, though nothing may press it; ``size`` as above."""
+    if touch.absent:
+        return False
     parting = float(touch.normal @ touch.slide)
     return own.kind != "open" or (abs(touch.gap) <= size * _TOGETHER and abs(parting) <= AT_REST)
 

@@ -32,6 +32,7 @@ from proofroll.elements.mechanism.contacts.turning import opened, shut_by_pressi
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.elements.mechanism.switches import Settling
 from proofroll.truth.hybrid import Stretch, Transition
+from proofroll.truth.mechanism.box_passing import beside_border, passed_boxes
 from proofroll.truth.mechanism.contact_guards import (
     SLIP_ENDED,
     features_beyond,
@@ -40,8 +41,9 @@ from proofroll.truth.mechanism.contact_guards import (
     lies_against,
     sharing,
     striking,
+    unloaded,
 )
-from proofroll.truth.mechanism.contact_walks import ContactWalks, SwitchedEquations
+from proofroll.truth.mechanism.contact_walks import AHEAD, ContactWalks, SwitchedEquations
 from proofroll.truth.mechanism.planar_slip import leaving_slips
 
 # Least deceleration of rebounds whose time is summed, in natural units; below it is round-off.
@@ -112,11 +114,11 @@ class ContactStretches(ContactWalks):
         if kind == "flat":
             raise lying(self._equations.mechanism.contacts[k], stretch.end)
         solved = self._solved(stretch.last, stretch.mode)
-        if kind in {"turn", "pass"}:
-            return Transition(stretch.last, solved.mode, ()) if kind == "turn" else self._passed(stretch, k, border)
+        passes = kind == "pass" or (kind == "close" and self._beside(stretch, k))
+        if passes or kind == "turn":
+            return self._passed(stretch, k, border) if passes else Transition(stretch.last, solved.mode, ())
         if kind == "share" or (kind == "lift" and k in sharing(solved.splits)):
-            # No split of the load is left, or each moves another way.
-            return Transition(stretch.last, None, (), margin=0.0)
+            return self._unshared(stretch, unloaded(solved) if kind == "lift" else [])
         if kind == "lift" or (kind == "break" and leaves(self.contacts[k], k, solved)):
             lifted = EventKind.LIFT_OFF, self.contacts[k].name
             return Transition(stretch.last, opened(self.contacts, stretch.mode, k), (lifted,))
@@ -150,12 +152,38 @@ class ContactStretches(ContactWalks):
             mode[number] = own
         return Transition(stretch.last, tuple(mode), tuple((EventKind.SLIP, contacts[k].name) for k in leaving))
 
+    def _unshared(self, stretch: Stretch[ContactMode], leaving: Sequence[int]) -> Transition[ContactMode]:
+        """Transition where no even split of a load is left: contacts leave that bear nothing in any split.
+
+        Without these each split moves another way.
+        """
+        if not leaving:
+            return Transition(stretch.last, None, (), margin=0.0)
+        mode = stretch.mode
+        for number in leaving:
+            mode = opened(self.contacts, mode, number)
+        return Transition(stretch.last, mode, tuple((EventKind.LIFT_OFF, self.contacts[k].name) for k in leaving))
+
+    def _ahead(self, stretch: Stretch[ContactMode]) -> Array:
+        """State shortly after a stretch would have gone on."""
+        return np.asarray(stretch.last + AHEAD * self._equations.rate(stretch.last, stretch.mode))
+
+    def _beside(self, stretch: Stretch[ContactMode], k: int) -> bool:
+        """True for a corner of a box that comes down on a border of a face as it passes it: it strikes nothing."""
+        of_boxes = k < len(bodies := self._equations.mechanism.contacts) and bodies[k].box_slot is not None
+        return of_boxes and beside_border(stretch.mode, k, self._touching, self._ahead(stretch))
+
     def _passed(self, stretch: Stretch[ContactMode], k: int, border: int) -> Transition[ContactMode]:
         """Transition where the nearest features of solids are left by a border: rates of normals jump, slips go on."""
-        features = features_beyond(stretch.mode, k, border, self._touching, stretch.last, self._size)
-        if stretch.mode[k].kind == "open":
-            return Transition(stretch.last, with_features(stretch.mode, features), ())
-        after = self._after(stretch, stretch.last, closed_in(stretch.mode), (), features=features)
+        state, mode, of_bodies = stretch.last, stretch.mode, self._equations.mechanism.contacts
+        if of_bodies[k].box_slot is None:
+            closed, features = closed_in(mode), features_beyond(mode, k, border, self._touching, state, self._size)
+        else:
+            states = state, self._ahead(stretch)
+            closed, features = passed_boxes(of_bodies, mode, (k, border), self._touching, states, self._size)
+        if mode[k].kind == "open" and closed == closed_in(mode):
+            return Transition(state, with_features(mode, features), ())
+        after = self._after(stretch, state, closed, (), features=features)
         return replace(after, happenings=tuple(item for item in after.happenings if item[0] != EventKind.TURN))
 
     def _impact(self, stretch: Stretch[ContactMode], hit: int) -> Transition[ContactMode]:

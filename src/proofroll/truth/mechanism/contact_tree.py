@@ -71,7 +71,7 @@ class ContactTree(ContactStretches):
         q, v, time = self.dynamics.parts(state)
         return self.dynamics.solve(q, v, mode, time)
 
-    def _touching(self, state: Array, features: Features) -> Sequence[Touching]:
+    def _touching(self, state: Array, features: Features | None) -> Sequence[Touching]:
         return self.dynamics.at(*self.dynamics.parts(state), features).touching
 
     def _solution(self, state: Array, mode: ContactMode) -> SolvedContacts:

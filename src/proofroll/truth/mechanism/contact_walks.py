@@ -46,7 +46,7 @@ from proofroll.truth.mechanism.planar_slip import BegunSlip, begun_slip
 from proofroll.truth.picard import PicardSteps
 
 _KEPT = 4  # solutions that are kept
-_AHEAD = 1e-9  # time step, relative to the natural time, after which an effort is compared with its limit
+AHEAD = 1e-9  # time step, relative to the natural time, after which an effort is compared with its limit
 _CLAMPED = 1e-9  # difference of an effort from its limit, relative to the limit, up to which it starts at the limit
 # Difference of compiled accelerations from others, relative to the largest, up to which they are the same: the
 # direction of a slip of 2e-8 is known to 1e-8.
@@ -119,7 +119,7 @@ class ContactWalks(ABC):
         """Motion and forces at a state."""
 
     @abstractmethod
-    def _touching(self, state: Array, features: Features) -> Sequence[Touching]:
+    def _touching(self, state: Array, features: Features | None) -> Sequence[Touching]:
         """Geometry and sliding velocity of each contact at a state; ``features``: of solids that touch."""
 
     def _law(self, state: Array, mode: ContactMode) -> StretchLaw:
@@ -127,7 +127,7 @@ class ContactWalks(ABC):
         # sign of the guard of an effort: it reaches its limit, or comes back from it
         side = np.zeros(0)
         if len(equations.excess(state)):
-            side = np.where(equations.excess(state + _AHEAD * equations.rate(state, mode)) > 0, 1.0, -1.0)
+            side = np.where(equations.excess(state + AHEAD * equations.rate(state, mode)) > 0, 1.0, -1.0)
         noise = np.where(np.abs(excess := equations.excess(state)) < _CLAMPED, 2 * np.abs(excess), 0.0)
         return StretchLaw(
             rates=lambda y: equations.rate(y, mode),
@@ -213,7 +213,7 @@ class ContactWalks(ABC):
         equations = self._equations
         if not len(equations.excess(state)):
             return ()
-        ahead = state + _AHEAD * equations.rate(state, mode)
+        ahead = state + AHEAD * equations.rate(state, mode)
         signs = np.where(equations.excess(ahead) > 0, equations.pushes(ahead), 0.0)
         return tuple(int(sign) for sign in signs)
 

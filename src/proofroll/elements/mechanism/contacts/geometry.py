@@ -14,6 +14,7 @@ from proofroll.core.arrays import read_only
 from proofroll.core.errors import InputError, require_known
 from proofroll.elements.mechanism import checks, rotations
 from proofroll.elements.mechanism.checks import METRES, RADIANS, RATIO, WORLD, ZERO, Vector, Z
+from proofroll.elements.mechanism.contacts.box_features import SLOTS, BoxSlot
 from proofroll.elements.mechanism.contacts.features import SolidFeatures, features_between
 from proofroll.elements.mechanism.contacts.pair_rules import CURVED, require_rule
 from proofroll.elements.mechanism.contacts.shapes import (
@@ -62,7 +63,8 @@ class Geometry:
         kind: on a plane a box touches with its eight vertices, a ``capsule`` with the spheres and a ``cylinder`` with
             the rims at its two ends; a plane pairs with these, a sphere, ellipsoid or circle. A sphere also pairs with
             a sphere, box, capsule or cylinder, which it meets at the nearest face, edge, corner, side or end, as two
-            capsules meet each other, and with a curved wall: ``bore``, an endless cylindrical hole; ``shaft``, an
+            capsules meet each other; two boxes meet with corners of faces and edges that cross. A
+            sphere also pairs with a curved wall: ``bore``, an endless cylindrical hole; ``shaft``, an
             endless cylinder; ``bowl``, the inside of a sphere; ``cone``, its inside; ``torus``, the outside of a ring
             of round wire.
         position: of its centre, of a cone's tip, or of any point of a plane or of the axis of a bore or shaft, in the
@@ -251,7 +253,8 @@ class BodyContact:
     """A possible contact of two bodies: of a pair, or of a vertex of a box or an end of a capsule or cylinder.
 
     Attributes:
-        name: of the pair; a box adds ``.1`` to ``.8``, a capsule or cylinder ``.1`` and ``.2``.
+        name: of the pair; on a plane a box adds ``.1`` to ``.8``, a capsule or cylinder ``.1`` and ``.2``; two boxes
+            add ``.1`` to ``.24``.
         body_a, body_b: of the first and the second geometry.
         shape_a, shape_b: in the frames of these; one of them may be a wall, and a solid meets spheres and solids.
         friction, restitution: of the pair.
@@ -259,6 +262,7 @@ class BodyContact:
         static_friction: coefficient while it sticks; None: the same.
         tangential_restitution: of the pair.
         rolling_resistance, spinning_friction: of the pair [m].
+        slot: number among the contacts of two boxes.
         bound: largest friction without a normal force; always 0 between bodies [N].
         presses: True, as it has a normal force.
         pressed_by: None, as the force that bounds its friction is its own.
@@ -279,6 +283,7 @@ class BodyContact:
     tangential_restitution: float = 0.0
     rolling_resistance: float = 0.0
     spinning_friction: float = 0.0
+    slot: int = 0
 
     @property
     def static(self) -> float:
@@ -289,6 +294,13 @@ class BodyContact:
     def features(self) -> SolidFeatures | None:
         """Features by which solids meet; None: the shapes have one rule."""
         return features_between(self.shape_a, self.shape_b)
+
+    @cached_property
+    def box_slot(self) -> BoxSlot | None:
+        """The contact as one of two boxes; None: it is of other shapes."""
+        if isinstance(self.shape_a, BoxShape) and isinstance(self.shape_b, BoxShape):
+            return BoxSlot(self.shape_a, self.shape_b, self.slot)
+        return None
 
     @property
     def of_disc(self) -> bool:
@@ -314,9 +326,9 @@ def contacts_of(geometries: Sequence[Geometry], pairs: Sequence[Pair]) -> tuple[
             raise InputError(where, pair.geometries, advice)
         listed[frozenset(pair.geometries)] = pair.name
         require_rule(where, pair, a, b)
-        touching = (
-            [(a.solid, b.solid)] if "plane" not in {a.kind, b.kind} else list(itertools.product(a.shapes, b.shapes))
-        )
+        touching = [(a.solid, b.solid)] * (SLOTS if a.kind == b.kind == "box" else 1)
+        if "plane" in {a.kind, b.kind}:
+            touching = list(itertools.product(a.shapes, b.shapes))
         for number, (one, other) in enumerate(touching, 1):
             name = pair.name if len(touching) == 1 else f"{pair.name}.{number}"
             found.append(
@@ -333,6 +345,7 @@ def contacts_of(geometries: Sequence[Geometry], pairs: Sequence[Pair]) -> tuple[
                     tangential_restitution=pair.tangential_restitution,
                     rolling_resistance=pair.rolling_resistance,
                     spinning_friction=pair.spinning_friction,
+                    slot=number - 1,
                 )
             )
     return tuple(found)

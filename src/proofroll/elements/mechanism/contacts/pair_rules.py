@@ -17,7 +17,8 @@ _SOLID = frozenset({"box", "capsule", "cylinder"})
 _ROOM = 1e-9
 _RULES = (
     "only a plane with a sphere, ellipsoid, circle, box, capsule or cylinder, a sphere with a sphere, box, capsule, "
-    "cylinder or curved wall (bore, shaft, bowl, cone, torus), and two capsules have a rule; choose one of these pairs"
+    "cylinder or curved wall (bore, shaft, bowl, cone, torus), two capsules and two boxes have a rule; choose one of "
+    "these pairs"
 )
 
 
@@ -31,7 +32,7 @@ def require_rule(where: str, pair: Pair, a: Geometry, b: Geometry) -> None:
     elif "plane" in kinds:
         ruled = kinds != {"plane"}
     else:
-        ruled = kinds == {"capsule"} or ("sphere" in kinds and kinds <= {"sphere", *_SOLID})
+        ruled = kinds in ({"capsule"}, {"box"}) or ("sphere" in kinds and kinds <= {"sphere", *_SOLID})
     if not ruled:
         raise InputError(where, pair.geometries, _RULES)
     balls = [geometry for geometry in (a, b) if geometry.kind == "sphere"]
@@ -43,11 +44,13 @@ def require_rule(where: str, pair: Pair, a: Geometry, b: Geometry) -> None:
 
 
 def _require_one_place(pair: Pair, kinds: set[GeometryKind]) -> None:
-    """Raises InputError for friction against turning at the two ends of a capsule or cylinder."""
+    """Raises InputError for friction against turning at both ends of a capsule or cylinder, or between boxes."""
     long_body = next(iter(kinds & {"capsule", "cylinder"}), None) if "plane" in kinds else None
+    several = "two boxes touch at several places" if kinds == {"box"} else ""
+    several = f"a {long_body} touches at two ends" if long_body else several
     for key in ("rolling_resistance", "spinning_friction"):
-        if long_body and getattr(pair, key):
-            advice = f"a {long_body} touches at two ends, whose moments are not followed together; leave it out"
+        if several and getattr(pair, key):
+            advice = f"{several}, whose moments are not followed together; leave it out"
             raise InputError(f"pairs.{pair.name}.{key}", getattr(pair, key), advice)
 
 

@@ -16,8 +16,10 @@ def turning_row(motion: BodyMotion, bodies: tuple[int, int]) -> tuple[Array, Arr
 
 
 def slide_row(motion: BodyMotion, bodies: tuple[int, int], found: Touching) -> tuple[Array, Array]:
-    """Derivative of a contact's slide by the velocities, (3, nv), and rate of the slide at v̇ = 0, (3,)."""
+    """Derivative of a contact's slide by the velocities, (3, nv), and rate of the slide at v̇ = 0, (3,); 0: absent."""
     J, bias = np.zeros((3, motion.J.shape[2])), np.zeros(3)
+    if found.absent:
+        return J, bias
     for body, sign in zip(bodies, (1.0, -1.0), strict=True):
         arm, w = found.place - motion.p_WB[body], motion.w_WB[body]
         J += sign * (motion.J[body, :3] - skew(arm) @ motion.J[body, 3:])

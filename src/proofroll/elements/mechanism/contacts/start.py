@@ -130,7 +130,7 @@ def closed_and_still(
     rate = max([rate, *(float(np.linalg.norm(each.slide)) / size for each, size in zip(found, lengths, strict=True))])
     least = lengths * digits
     closed = [
-        each.gap <= size and abs(float(each.normal @ each.slide)) <= size * rate
+        not each.absent and each.gap <= size and abs(float(each.normal @ each.slide)) <= size * rate
         for each, size in zip(found, least, strict=True)
     ]
     still = [

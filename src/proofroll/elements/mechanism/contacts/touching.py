@@ -5,10 +5,19 @@ from typing import NamedTuple
 import numpy as np
 
 from proofroll.core.errors import NotUnique
+from proofroll.elements.mechanism.contacts.box_features import BoxSlot, Lying
 from proofroll.elements.mechanism.contacts.features import Border, CapsuleFeatures, SolidFeatures
 from proofroll.elements.mechanism.contacts.geometry import BodyContact
-from proofroll.elements.mechanism.contacts.shapes import CircleShape, ConvexShape, HalfSpace, Shape, SphereShape, Wall
-from proofroll.elements.mechanism.contacts.walls import CurvedWall, Shaft
+from proofroll.elements.mechanism.contacts.shapes import (
+    BoxShape,
+    CircleShape,
+    ConvexShape,
+    HalfSpace,
+    Shape,
+    SphereShape,
+    Wall,
+)
+from proofroll.elements.mechanism.contacts.walls import CurvedWall, EdgeLine, Shaft
 from proofroll.elements.mechanism.rotations import Array, cross
 
 # Sine of the angle between a disc and its plane, or two capsules, up to which they are parallel: digits of a file.
@@ -48,6 +57,7 @@ class Touching(NamedTuple):
             other shapes.
         feature: number of the nearest features of solids.
         borders: of these features.
+        absent: True for a contact of two boxes that lies beyond a border; its gap is the way there.
     """
 
     gap: float
@@ -59,6 +69,7 @@ class Touching(NamedTuple):
     tilt: float = 1.0
     feature: int = 0
     borders: tuple[Border, ...] = ()
+    absent: bool = False
 
     @property
     def flat(self) -> bool:
@@ -93,6 +104,8 @@ def touch(contact: BodyContact, a: Moving, b: Moving, feature: int | None = None
     ``feature``: features of solids that touch; None: the nearest.
     """
     features = contact.features
+    if contact.box_slot is not None:
+        return _touch_boxes(contact.box_slot, a, b, feature)
     if features is None:
         found = _touch(contact.shape_a, a, contact.shape_b, b)
         discs = ((contact.shape_a, a), (contact.shape_b, b))
@@ -110,6 +123,54 @@ def touch(contact: BodyContact, a: Moving, b: Moving, feature: int | None = None
         found = _on_first(found, a, b)
     tilt = tilt if features.needs_angle(feature) else 1.0
     return found._replace(tilt=tilt, feature=feature, borders=tuple(features.borders(feature, *measures)))
+
+
+def _touch_boxes(slot: BoxSlot, a: Moving, b: Moving, feature: int | None) -> Touching:
+    """One contact of two boxes; see :func:`touch`."""
+    lying = _lying_of(slot, a, b)
+    faces = lying.faces if feature is None else slot.faces(feature)
+    beyond, least = slot.beyond(lying, faces)
+    feature = slot.feature(faces, beyond > least) if feature is None else feature
+    absent = slot.absent(feature)
+    shape_a, shape_b = slot.shapes(feature)
+    borders = [Border(least - beyond if absent else beyond - least, feature ^ 1)]
+    borders += [Border(lying.turned_away(*faces), feature)] if slot.leads else []
+    if not absent:
+        return _touch(shape_a, a, shape_b, b)._replace(feature=feature, borders=tuple(borders))
+    gap = beyond if slot.of_edges else max(beyond, _touch(shape_a, a, shape_b, b).gap)
+    place = lying.place_a  # as edges may be parallel: with the normal of the faces
+    speed, other = a.velocity(place), b.velocity(place)
+    return Touching(
+        gap=gap,
+        normal=lying.normal(False, faces[1]),
+        normal_rate=np.zeros(3),
+        place=place,
+        place_rate=speed,
+        slide=speed - other,
+        feature=feature,
+        borders=tuple(borders),
+        absent=True,
+    )
+
+
+_LYING: list[tuple[Moving, Moving, BoxShape, BoxShape, Lying]] = []  # of the last boxes, which have many contacts
+
+
+def _lying_of(slot: BoxSlot, a: Moving, b: Moving) -> Lying:
+    one, two = slot.first, slot.second
+    for last in _LYING[:1]:
+        if last[0] is a and last[1] is b and last[2] is one and last[3] is two:
+            return last[4]
+    lying = Lying(
+        place_a=a.p + a.R @ one.centre,
+        axes_a=a.R @ one.frame,
+        half_a=one.half,
+        place_b=b.p + b.R @ two.centre,
+        axes_b=b.R @ two.frame,
+        half_b=two.half,
+    )
+    _LYING[:] = [(a, b, one, two, lying)]
+    return lying
 
 
 def _measures(features: SolidFeatures, a: Moving, b: Moving) -> tuple[float, float, float, float]:
@@ -209,8 +270,9 @@ def _two_shafts(one: Shaft, a: Moving, two: Shaft, b: Moving) -> _Lying:
     d, d_rate = foot_a - foot_b, a.velocity(foot_a) - b.velocity(foot_b)
     across, across_rate = cross(u, w), cross(u_rate, w) + cross(u, w_rate)
     square = float(across @ across) or 1.0  # of parallel shafts, which have no normal
-    n = across * (np.copysign(1.0, float(d @ across)) / np.sqrt(square))
-    n_rate = across_rate * (np.copysign(1.0, float(d @ across)) / np.sqrt(square))
+    ahead = b.R @ two.outward if isinstance(two, EdgeLine) else d
+    sign = np.copysign(1.0, float(ahead @ across)) / np.sqrt(square)
+    n, n_rate = sign * across, sign * across_rate
     n_rate = n_rate - n * (n @ n_rate)
     cosine, cosine_rate = float(u @ w), float(u_rate @ w + u @ w_rate)
     along_a, along_b = float(d @ u), float(d @ w)

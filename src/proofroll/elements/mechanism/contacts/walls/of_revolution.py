@@ -35,6 +35,13 @@ class Shaft(CurvedWall):
 
 
 @dataclass(frozen=True, eq=False)
+class EdgeLine(Shaft):
+    """Edge of a box, a shaft without radius; ``outward``: normal of a face at it, in the body's frame."""
+
+    outward: Any = None
+
+
+@dataclass(frozen=True, eq=False)
 class BowlWall(CurvedWall):
     """Inside of a sphere about the point."""
 
