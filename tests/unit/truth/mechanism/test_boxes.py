@@ -129,13 +129,13 @@ def test_edges_that_cross_rebound_from_each_other() -> None:
     across = Rotation.from_rotvec([np.pi / 4, 0, 0])
     size, side = (0.5, 0.1, 0.1), 0.1 / np.sqrt(2)
     roof = TURN * Rotation.from_rotvec([0, np.pi / 4, 0])
-    falling = on_box((0, 0, 2 * side + 0.05), size=size, turn=across.as_rotvec(), restitution=0.5, friction=0.2)
+    falling = on_box((0, 0, 2 * side + 0.005), size=size, turn=across.as_rotvec(), restitution=0.5, friction=0.2)
     lower = Geometry("lower", "world", "box", orientation=to_rpy(roof.as_matrix()), size=(0.1, 0.5, 0.1))
     mechanism = Mechanism(
         falling.bodies, falling.joints, gravity=falling.gravity, geometries=(falling.geometries[0], lower),
         pairs=falling.pairs,
     )  # fmt: skip
-    hits = np.sqrt(2 * 0.05 / GRAVITY)
+    hits = np.sqrt(2 * 0.005 / GRAVITY)
     found = followed(mechanism, [0.0, hits + 0.01])
     assert [event.kind for event in found.events] == ["impact"]
     assert found.events[0].time == pytest.approx(hits, abs=1e-12)
