@@ -46,7 +46,8 @@ def _elsewhere(residuals: Residuals[Change], mechanism: Mechanism, number: int, 
     force = mechanism.forces[number]
 
     def at(place: Array) -> Change:
-        return Change(_with(mechanism, number, replace(force, position=tuple(map(float, place)))))
+        x, y, z = map(float, place)
+        return Change(_with(mechanism, number, replace(force, position=(x, y, z))))
 
     position = np.array(force.position)
     left = residuals.left(at(position))
