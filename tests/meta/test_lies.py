@@ -413,7 +413,7 @@ def test_a_run_that_is_remembered(kind: type[Tiny], remarks: int, monkeypatch: p
     scene, settings = load_scene("inclined_plane"), TinySettings(dt=1e-4)
     clean_runs(Tiny, scene, settings, record(build(Tiny, scene, settings), scene, np.linspace(0, 0.1, 11)))  # warm
     found = clean_runs(kind, scene, settings, record(build(kind, scene, settings), scene, np.linspace(0, 0.5, 51)))
-    assert sum("times as long as those that are timed" in remark for remark in found.remarks) == remarks
+    assert sum("times as long as the timed ones" in remark for remark in found.remarks) == remarks
 
 
 @pytest.mark.parametrize("about", ALL)
