@@ -23,7 +23,7 @@ def _write_files(folder: Path) -> None:
 
 @pytest.mark.drill
 def test_the_page_ends_with_a_named_cause(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Engines agree; the loop of the page breaks at its effort by half of kd, and with the right gain nowhere."""
+    """Engines agree; the page's loops break by half of kd and by a late target, and without the mistakes nowhere."""
     _write_files(tmp_path)
     monkeypatch.chdir(tmp_path)
     runner = CliRunner()
@@ -39,3 +39,11 @@ def test_the_page_ends_with_a_named_cause(tmp_path: Path, monkeypatch: pytest.Mo
         assert result.exit_code == code, result.output
         assert ("✗ effort" in result.output) is (code == 1)
         assert ("kd is 0.5 of the right one" in result.output) is (code == 1)
+    late = (tmp_path / "other_loop.py").read_text(encoding="utf-8")
+    at_once = re.sub(r"( +target = computed).*\n( +computed = .*\n)", r"\2\1\n", late)
+    for loop, code in ((late, 1), (at_once, 0)):
+        (tmp_path / "loop.py").write_text(loop, encoding="utf-8")
+        subprocess.run([sys.executable, "loop.py"], check=True, cwd=tmp_path)
+        result = runner.invoke(app, ["judge", "states.csv", *judged[2:]])
+        assert result.exit_code == code, result.output
+        assert ("targets act one instant late" in result.output) is (code == 1)
