@@ -79,7 +79,7 @@ def round_off(fields: Mapping[str, Array], placed: Placed) -> dict[str, Array]:
     return {name: ROUND_OFF * np.maximum.accumulate(size) for name, size in sizes.items()}
 
 
-def check_start(first: JointCoordinates, second: MaximalCoordinates, unit: float = 1.0) -> None:
+def check_start(tree: JointCoordinates, bodies: MaximalCoordinates, unit: float = 1.0) -> None:
     """Checks that both routes place all bodies alike at the start, where only their formulas matter.
 
     Lengths of the routes are in a ``unit`` [m].
@@ -87,11 +87,13 @@ def check_start(first: JointCoordinates, second: MaximalCoordinates, unit: float
     Raises:
         Refused: the routes place a body apart.
     """
-    at = np.zeros(1)
-    one, two = record_of(at, [first.sample(*first.mechanism.start())]), second.at_start()
-    two = on_same_turns(first.mechanism, one, two)
-    apart = unit * max(float(largest(getattr(one, name) - getattr(two, name))[0]) for name in ("p_WB", "q_WB"))
-    if apart > SAME_START * unit * max(1.0, float(largest(one.p_WB)[0])):
+    start_time = np.zeros(1)
+    record, second_record = record_of(start_time, [tree.sample(*tree.mechanism.start())]), bodies.at_start()
+    second_record = on_same_turns(tree.mechanism, record, second_record)
+    apart = unit * max(
+        float(largest(getattr(record, name) - getattr(second_record, name))[0]) for name in ("p_WB", "q_WB")
+    )
+    if apart > SAME_START * unit * max(1.0, float(largest(record.p_WB)[0])):
         raise Refused(
             f"the two routes place the bodies {apart:.3g} m (or 1, of quaternions) apart at t = 0 s, where nothing has "
             "moved yet: an error of proofroll's truth, not a property of the scene; please report it"

@@ -121,10 +121,10 @@ class Planar:
         self.plane = plane
         self._columns = [clean(column) for column in plane.T]
         self._height = clean(normal * (normal @ com))
-        matrix, along = R.as_matrix(), np.outer(normal, normal)
+        matrix, projector = R.as_matrix(), np.outer(normal, normal)
         around = np.cross(normal, np.eye(3)).T  # normal × each column
         self._parts = [
-            [clean(row) for row in part] for part in (matrix - along @ matrix, around @ matrix, along @ matrix)
+            [clean(row) for row in part] for part in (matrix - projector @ matrix, around @ matrix, projector @ matrix)
         ]
 
     def start(self, placed: BodyStart, com: Array) -> tuple[list[float], list[float]]:

@@ -71,10 +71,10 @@ class NumericEquations:
 
     def switched(self, state: Array, switched: Switched) -> NumericEquations:
         """Copy of the equations with joints held or pushed; their rank is that at ``state``."""
-        other = copy(self)
-        other._switched = switched
-        other.rank = other._rank(state)
-        return other
+        equations = copy(self)
+        equations._switched = switched
+        equations.rank = equations._rank(state)
+        return equations
 
     def _rank(self, state: Array) -> int:
         C = self._matrix(self.equations.at(state.tolist(), switched=self._switched).rows)

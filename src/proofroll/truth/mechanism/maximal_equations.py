@@ -183,15 +183,15 @@ class MaximalEquations:
                 clamped = switched.clamped.get(k)
                 efforts[k] = actuator.wanted(time, q, speed, functions) if clamped is None else clamped
             drive = value_at(self.mechanism.joints[number].torque, time, functions)
-            own = [efforts[k] for k in self._driving.get(number, ())]
-            return add(drive, switched.push.get(number, 0.0), *own)
+            own_parts = [efforts[k] for k in self._driving.get(number, ())]
+            return add(drive, switched.push.get(number, 0.0), *own_parts)
 
         for number, connection in enumerate(self.connections):
             rows += made.of(number)
             if number < len(self.mechanism.joints):
-                own = [angle for angle, (k, _) in zip(angles, self.angles, strict=True) if k == number]
+                own_parts = [angle for angle, (k, _) in zip(angles, self.angles, strict=True) if k == number]
                 acts = bool(number in self._driving or number in switched.push)
-                law, rates = self._law(number, connection, views, own, force, effort, acts)
+                law, rates = self._law(number, connection, views, own_parts, force, effort, acts)
                 laws.append(law)
                 angle_rate += rates
         self._add_point_loads(force, views, functions, time)
@@ -228,7 +228,7 @@ class MaximalEquations:
         """Generalised forces along u of forces and moments about the centres of mass, world axes, (bodies, 6)."""
         bodies = zip(self.bodies, views, applied.tolist(), strict=False)
         return np.array(
-            [entry for body, view, one in bodies for entry in body.projected(view, one[:3], one[3:])], float
+            [entry for body, view, wrench in bodies for entry in body.projected(view, wrench[:3], wrench[3:])], float
         )
 
     def rate_rows(
@@ -245,8 +245,8 @@ class MaximalEquations:
         """Row of a coupling between rates; the start satisfies it between coordinates, so the motion does, too."""
         numbers = [self.mechanism.joint_index[name] for name, _ in coupling.terms]
         row, *others = (made.of_rate(number, self.mechanism.joints[number].kind) for number in numbers)
-        for other, (_, factor) in zip(others, coupling.terms[1:], strict=True):
-            row = row.less(-factor, other)
+        for term, (_, factor) in zip(others, coupling.terms[1:], strict=True):
+            row = row.less(-factor, term)
         return row
 
     def _prescribed(
@@ -307,8 +307,8 @@ class MaximalEquations:
         if body < 0:
             return
         entries = self.bodies[body].projected(views[body], push, plus(cross(arm, push), moment))
-        for at, entry in enumerate(entries, self.u_slices[body].start):
-            force[at] = add(force[at], entry)
+        for index, entry in enumerate(entries, self.u_slices[body].start):
+            force[index] = add(force[index], entry)
 
     def _add_point_loads(
         self, force: list[Scalar], views: list[BodyInScalars], functions: Mapping[str, Any], time: Scalar
@@ -376,15 +376,15 @@ class MaximalEquations:
             moment = scaled(-joint.damping, turning)
         elif joint.kind == JointKind.PRISMATIC:
             slide = minus(minus(speed_at(b, arm_b), speed_at(a, arm_a)), cross(a.w, d))
-            along, speed = dot(A[2], d), dot(A[2], slide)
-            push = scaled(add(_along(joint, along, speed), effort(number, along, speed)), A[2])
+            slid, speed = dot(A[2], d), dot(A[2], slide)
+            push = scaled(add(_along(joint, slid, speed), effort(number, slid, speed)), A[2])
         else:
             axes = [A[2]] if joint.kind == JointKind.REVOLUTE else [A[2], B[0]]
             speeds = [dot(axis, turning) for axis in axes]
             if angles:
                 rates = speeds
-            for at, (axis, speed) in enumerate(zip(axes, speeds, strict=True)):
-                angle = angles[at] if angles else 0.0
+            for axis_index, (axis, speed) in enumerate(zip(axes, speeds, strict=True)):
+                angle = angles[axis_index] if angles else 0.0
                 moment = plus(moment, scaled(add(_along(joint, angle, speed), effort(number, angle, speed)), axis))
         self._apply(force, views, c.b, push, arm_b, moment)
         self._apply(force, views, c.a, scaled(-1.0, push), plus(arm_a, d), scaled(-1.0, moment))

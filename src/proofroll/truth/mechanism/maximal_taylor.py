@@ -60,9 +60,9 @@ class MaximalTaylor:
         self._begin(self._number(0), self._start if start is None else start)
         integrator = self._integrator
         grid = np.array([self._number(time) for time in [0.0, *times]])  # heyoka's grid starts at its present time
-        grid, first = (grid[1:], 0) if times[0] == 0 else (grid, 1)
+        grid, begin = (grid[1:], 0) if times[0] == 0 else (grid, 1)
         outcome, *_, states = integrator.propagate_grid(grid)
-        states = states[first:]
+        states = states[begin:]
         if len(states) < len(times) or not np.isfinite(np.asarray(states, dtype=float)).all():
             raise Diverged(f"Taylor series stopped at t = {float(integrator.time):.6g} s ({outcome})")
         return np.asarray(states)
@@ -143,12 +143,12 @@ def accelerations(
                 A[i, j] = add(*(mul(weighted[i][k], rows[j].coefficients[k]) for k in sorted(shared)))
     for i, drive in enumerate(drives, held):
         A[i, i] = add(A.get((i, i), 0.0), 1.0 / drive.inertia)
-    after = _of_light_bodies(A, equations, rows, held)
+    predecessors = _of_light_bodies(A, equations, rows, held)
     right = [
         sub(sub(0.0, row.bias), add(*(mul(value, free[k]) for k, value in row.coefficients.items()))) for row in rows
     ]
     right += [sub(0.0, constrained.force[k]) for k in equations.light]
-    unknowns = _solved(A, right, after)
+    unknowns = _solved(A, right, predecessors)
     result = list(free)
     for weight, multiplier in zip(weighted, unknowns, strict=False):
         for k, value in weight.items():
@@ -166,26 +166,26 @@ def _of_light_bodies(
     Drives come before the accelerations that they hold, and these before the multipliers of the first ``held`` rows.
     Then no pivot is zero, as M plus the drives is positive definite.
     """
-    after: dict[int, set[int]] = {}
+    predecessors: dict[int, set[int]] = {}
     for p, k in enumerate(equations.light, len(rows)):
         for i, row in enumerate(rows):
             if k in row.coefficients:
                 A[p, i] = row.coefficients[k]
                 later, earlier = (i, p) if i < held else (p, i)
-                after.setdefault(later, set()).add(earlier)
-        for other, index in enumerate(equations.light[: p - len(rows) + 1], len(rows)):
-            A[p, other] = -float(equations.mass_matrix[k, index])
-    return after
+                predecessors.setdefault(later, set()).add(earlier)
+        for column, index in enumerate(equations.light[: p - len(rows) + 1], len(rows)):
+            A[p, column] = -float(equations.mass_matrix[k, index])
+    return predecessors
 
 
 def _inverse_blocks(equations: MaximalEquations) -> list[list[tuple[int, float]]]:
     """Rows of M⁻¹ by their nonzero entries; empty for bodies without inertia."""
     blocks: list[list[tuple[int, float]]] = [[] for _ in range(equations.nu)]
-    for body, at in zip(equations.bodies, equations.u_slices, strict=True):
+    for body, part in zip(equations.bodies, equations.u_slices, strict=True):
         if body.heavy:
             inverse = np.linalg.inv(body.mass_matrix)
             for i, row in enumerate(inverse):
-                blocks[at.start + i] = [(at.start + k, float(row[k])) for k in np.flatnonzero(row).tolist()]
+                blocks[part.start + i] = [(part.start + k, float(row[k])) for k in np.flatnonzero(row).tolist()]
     return blocks
 
 
@@ -197,10 +197,12 @@ def _times(coefficients: dict[int, Scalar], blocks: list[list[tuple[int, float]]
     return {k: value for k, value in product.items() if not is_zero(value)}
 
 
-def _solved(A: dict[tuple[int, int], Scalar], right: list[Scalar], after: Mapping[int, set[int]]) -> list[Scalar]:
+def _solved(
+    A: dict[tuple[int, int], Scalar], right: list[Scalar], predecessors: Mapping[int, set[int]]
+) -> list[Scalar]:
     """Solution x of the symmetric A x = right; A holds the lower triangle.
 
-    Pivots have the fewest neighbours; ``after``: unknown -> unknowns that must be eliminated before it.
+    Pivots have the fewest neighbours; ``predecessors``: unknown -> unknowns that must be eliminated before it.
     """
     entries = {frozenset(pair): value for pair, value in A.items() if not is_zero(value)}
     neighbours: dict[int, set[int]] = {i: set() for i in range(len(right))}
@@ -211,7 +213,11 @@ def _solved(A: dict[tuple[int, int], Scalar], right: list[Scalar], after: Mappin
             neighbours[j].add(i)
     b, order, factors = list(right), [], []
     while neighbours:
-        ready = neighbours if not after else [i for i in neighbours if after.get(i, set()).isdisjoint(neighbours)]
+        ready = (
+            neighbours
+            if not predecessors
+            else [i for i in neighbours if predecessors.get(i, set()).isdisjoint(neighbours)]
+        )
         pivot = min(ready, key=lambda i: (len(neighbours[i]), i))
         others = sorted(neighbours.pop(pivot))
         diagonal = entries[frozenset([pivot])]

@@ -66,14 +66,14 @@ class Units(NamedTuple):
 
         couplings = []
         for coupling in si.couplings:
-            first, *others = (slides[name] for name, _ in coupling.terms)
+            slide, *others = (slides[name] for name, _ in coupling.terms)
             if coupling.joints:
-                scales = [self.length ** (other - first) for other in (first, *others)]
+                scales = [self.length ** (power - slide) for power in (slide, *others)]
                 sizes = tuple(factor * scale for (_, factor), scale in zip(coupling.terms, scales, strict=True))
-                scaled = self._own(replace(coupling, offset=coupling.place, coefficients=sizes), first)
+                scaled = self._own(replace(coupling, offset=coupling.place, coefficients=sizes), slide)
             else:
-                ratio = coupling.ratio * self.length ** (others[0] - first)
-                scaled = replace(self._own(coupling, first), ratio=ratio)
+                ratio = coupling.ratio * self.length ** (others[0] - slide)
+                scaled = replace(self._own(coupling, slide), ratio=ratio)
             couplings.append(scaled)
         return replace(
             si,
@@ -94,18 +94,20 @@ class Units(NamedTuple):
     def _own(self, part: Any, slides: bool = False) -> Any:
         """Part of a mechanism in these units; a unit with a choice is that of a joint that turns, or ``slides``."""
         units = units_of_kind(type(part), getattr(part, "kind", None))
-        one = {
+        field_units = {
             name: unit.split(OR)[slides] if isinstance(unit, str) and OR in unit else unit
             for name, unit in units.items()
         }
-        return replace(part, **{name: self._valued(getattr(part, name), unit) for name, unit in one.items() if unit})
+        return replace(
+            part, **{name: self._valued(getattr(part, name), unit) for name, unit in field_units.items() if unit}
+        )
 
     def _valued(self, value: Any, unit: Unit) -> Any:
         """SI value in these units: a number, a tuple of numbers with one unit or one each, a signal; None stays."""
         if isinstance(unit, tuple):
-            return tuple(self._valued(each, own) for each, own in zip(value, unit, strict=True))
+            return tuple(self._valued(number, number_unit) for number, number_unit in zip(value, unit, strict=True))
         if isinstance(value, tuple):
-            return tuple(self._valued(each, unit) for each in value)
+            return tuple(self._valued(number, unit) for number in value)
         if isinstance(value, Formula):
             second, factor = (value.second, value.factor) if isinstance(value, _InUnits) else (1.0, 1.0)
             return _InUnits(value.text, value.numbers, second * self.time, factor / self.size(unit))

@@ -42,12 +42,12 @@ class Pole(NamedTuple):
 
 def first_pole(mechanism: Mechanism, until: float) -> Pole | None:
     """First time up to ``until`` [s] at which a formula of the mechanism has no finite value; None: there is none."""
-    found = [
-        Pole(field, str(signal), *where)
+    poles = [
+        Pole(field, str(signal), *place)
         for field, signal in _named(mechanism)
-        if isinstance(signal, Formula) and (where := _pole_of(signal, until)) is not None
+        if isinstance(signal, Formula) and (place := _pole_of(signal, until)) is not None
     ]
-    return min(found, key=lambda pole: pole.time, default=None)
+    return min(poles, key=lambda pole: pole.time, default=None)
 
 
 def _named(mechanism: Mechanism) -> Iterator[tuple[str, Signal]]:
@@ -72,9 +72,9 @@ def _pole_of(signal: Formula, until: float) -> tuple[float, float, float] | None
     finite = np.concatenate([[-np.inf], sizes[:end], [-np.inf]])
     peaks = np.flatnonzero((finite[1:-1] >= finite[:-2]) & (finite[1:-1] >= finite[2:]))
     for peak in np.sort(peaks[np.argsort(-sizes[peaks])][:_MOST]).tolist():
-        before, after = max(peak - 1, 0), min(peak + 1, end - 1)
-        if (where := _closer(signal, times[before], times[after], max(sizes[[before, after]]))) is not None:
-            return where
+        beside = [max(peak - 1, 0), min(peak + 1, end - 1)]
+        if (pole := _closer(signal, *times[beside], max(sizes[beside]))) is not None:
+            return pole
     return _broken(signal, times[end - 1], times[end]) if len(broken) and end else None
 
 
@@ -93,15 +93,15 @@ def _closer(signal: Formula, low: float, high: float, size: float) -> tuple[floa
     return None
 
 
-def _broken(signal: Formula, last: float, first: float) -> tuple[float, float, float]:
+def _broken(signal: Formula, last: float, beyond: float) -> tuple[float, float, float]:
     """First time without a finite value between the last with one and the first without."""
-    while np.nextafter(last, first) < first:
-        middle = (last + first) / 2
+    while np.nextafter(last, beyond) < beyond:
+        middle = (last + beyond) / 2
         if np.isfinite(_sizes(signal, np.array([middle]))[0]):
             last = middle
         else:
-            first = middle
-    return float(first), float(last), float(signal.at(last))
+            beyond = middle
+    return float(beyond), float(last), float(signal.at(last))
 
 
 def _sizes(signal: Formula, times: Array) -> Array:

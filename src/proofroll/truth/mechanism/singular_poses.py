@@ -37,17 +37,17 @@ def singular_poses_of(form: ClosedForm, equations: JointCoordinates, until: floa
 
 def branching(times: list[float]) -> str:
     """Clause about the times of singular poses, s; empty without any."""
-    where = ", ".join(f"{time:.4g}" for time in times[:3]) + (", …" if len(times) > 3 else "")
-    at = f"near t = {where} s the rows of the loops lose rank, where the motion may branch: lengths that differ by "
-    return at + "any amount lead elsewhere" if times else ""
+    instants = ", ".join(f"{time:.4g}" for time in times[:3]) + (", …" if len(times) > 3 else "")
+    branches = "the rows of the loops lose rank and the motion may branch: any change of the lengths may lead elsewhere"
+    return f"near t = {instants} s {branches}" if times else ""
 
 
 def _passed(equations: JointCoordinates, times: Array, poses: Iterable[Array]) -> list[float]:
-    sign, times_passed, before = RowSign(equations.rank), [], 0.0
+    sign, times_passed, last_value = RowSign(equations.rank), [], 0.0
     for k, q in enumerate(poses):
         C = equations.rows(q).C
         smallest = float(singular_values(C)[equations.rank - 1])
         if sign.changes(C):  # zero of the line through both values, with opposite signs
-            times_passed.append(float(times[k - 1] + (times[k] - times[k - 1]) * before / (before + smallest)))
-        before = smallest
+            times_passed.append(float(times[k - 1] + (times[k] - times[k - 1]) * last_value / (last_value + smallest)))
+        last_value = smallest
     return times_passed

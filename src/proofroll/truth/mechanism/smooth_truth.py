@@ -52,26 +52,26 @@ def find_truth(mechanism: Mechanism, times: Array, tolerance: float = 1e-15) -> 
         raise Refused(f"no route of the truth has {', '.join(mechanism.unmodelled)}")
     times = np.asarray(times, dtype=float)
     analysis, form = analyse(mechanism), closed_form(mechanism)
-    first = JointCoordinates(mechanism, analysis.rank)
-    exact = _from_form(first, form, times) if form is not None and form.motion is not None else None
+    tree = JointCoordinates(mechanism, analysis.rank)
+    exact = _from_form(tree, form, times) if form is not None and form.motion is not None else None
     if exact is None and analysis.singular_start:
         raise Refused("the start is a singular pose, where the motion may branch, and no closed form is known")
     try:
-        second = MaximalCoordinates(mechanism)
-        check_start(first, second)
-        one, two, precise, growth, routes = _runs(first, second, times, tolerance)
-        for record, name in ((one, routes[1]), (precise, routes[0])):
+        bodies = MaximalCoordinates(mechanism)
+        check_start(tree, bodies)
+        by_tree, by_bodies, precise, growth, routes = _runs(tree, bodies, times, tolerance)
+        for record, name in ((by_tree, routes[1]), (precise, routes[0])):
             _check_energy(mechanism, record, name)
         chaotic = growth * NUDGE > CHAOS
         if chaotic.any():
-            chaotic &= _first_growth(first, one) * NUDGE > CHAOS
-        _check_branch(one, precise, chaotic)
-        best = precise if exact is None else on_same_turns(mechanism, one, exact)
+            chaotic &= _first_growth(tree, by_tree) * NUDGE > CHAOS
+        _check_branch(by_tree, precise, chaotic)
+        best = precise if exact is None else on_same_turns(mechanism, by_tree, exact)
     except Diverged as stopped:
         if exact is None:
             poses = _singular(mechanism, float(times[-1]))
             raise Refused(f"no truth to the end: {stopped}; end before it{poses}") from None
-        one = two = precise = on_same_turns(mechanism, exact, first.run_rk4(times))
+        by_tree = by_bodies = precise = on_same_turns(mechanism, exact, tree.run_rk4(times))
         best, routes, chaotic = exact, ("joint coordinates, RK4",), np.zeros(len(times), dtype=bool)
     if exact is not None and form is not None:
         routes = (f"closed form: {form.title}", *routes)
@@ -81,9 +81,9 @@ def find_truth(mechanism: Mechanism, times: Array, tolerance: float = 1e-15) -> 
     bars, differences, least = {}, {}, round_off(fields, placed)
     late = np.flatnonzero(chaotic)
     horizon = float(times[late[0]]) if len(late) else np.inf
-    rest = [fields_with_bars(mechanism, record) for record in (one, two, precise)]
+    rest = [fields_with_bars(mechanism, record) for record in (by_tree, by_bodies, precise)]
     for field, values in fields.items():
-        others = [np.where(np.isnan(values), np.nan, other[field]) for other in rest]
+        others = [np.where(np.isnan(values), np.nan, content[field]) for content in rest]
         difference = np.maximum(largest(others[0] - values), largest(others[0] - others[2]))
         bar = SAFETY * difference + largest(others[1] - others[2]) + least[field]
         bars[field] = np.maximum.accumulate(bar)
@@ -94,7 +94,7 @@ def find_truth(mechanism: Mechanism, times: Array, tolerance: float = 1e-15) -> 
     checked = None
     if form is not None and form.motion is None:
         checked = (form.title, float(largest(form.part(times) - form.same(best)).max()))
-    branches = [] if exact is None or form is None else singular_poses_of(form, first, float(times[-1]))
+    branches = [] if exact is None or form is None else singular_poses_of(form, tree, float(times[-1]))
     return TwoRouteMotion(
         record=masked,
         bars=bars,
@@ -108,21 +108,21 @@ def find_truth(mechanism: Mechanism, times: Array, tolerance: float = 1e-15) -> 
 
 
 def _runs(
-    first: JointCoordinates, second: MaximalCoordinates, times: Array, tolerance: float
+    tree: JointCoordinates, second: MaximalCoordinates, times: Array, tolerance: float
 ) -> tuple[Record, Record, Record, Array, tuple[str, ...]]:
     """Three records, the best one last, growth of a small difference [1], and the names of the routes."""
-    mechanism = first.mechanism
+    mechanism = tree.mechanism
     refuse_switching(mechanism)
-    if stiff(first, float(times[-1])):
-        runs = run_stiff(mechanism, first.rank, times)
+    if stiff(tree, float(times[-1])):
+        runs = run_stiff(mechanism, tree.rank, times)
         names = "maximal coordinates, implicit collocation", "joint coordinates, implicit collocation"
         best = on_same_turns(mechanism, runs.one, runs.precise)
         return runs.one, best, best, runs.growth, names
-    one = first.run(times, tolerance)
-    two, precise, name = _second(second, times, tolerance)
+    by_tree = tree.run(times, tolerance)
+    by_bodies, precise, name = _second(second, times, tolerance)
     # route 1 alone counts turns; angles of the others are put on the same turns
-    two, precise = on_same_turns(mechanism, one, two), on_same_turns(mechanism, one, precise)
-    return one, two, precise, second.growth(times), (name, "joint coordinates, DOP853")
+    by_bodies, precise = on_same_turns(mechanism, by_tree, by_bodies), on_same_turns(mechanism, by_tree, precise)
+    return by_tree, by_bodies, precise, second.growth(times), (name, "joint coordinates, DOP853")
 
 
 def _singular(mechanism: Mechanism, until: float) -> str:
@@ -139,15 +139,15 @@ def _apart(record: Record, second: Record) -> Array:
     return np.maximum(largest(record.p_WB - second.p_WB), largest(record.q_WB - second.q_WB))
 
 
-def _check_branch(one: Record, precise: Record, chaotic: NDArray[np.bool_]) -> None:
+def _check_branch(record: Record, precise: Record, chaotic: NDArray[np.bool_]) -> None:
     """Checks that two routes do not part without chaos.
 
     Raises:
         Diverged: the difference shows that the routes have taken different branches.
     """
-    parted = np.flatnonzero((_apart(one, precise) > BRANCH) & ~chaotic)
+    parted = np.flatnonzero((_apart(record, precise) > BRANCH) & ~chaotic)
     if len(parted):
-        raise Diverged(f"the two routes part before t = {one.time[parted[0]]:.6g} s, as at a singular pose")
+        raise Diverged(f"the two routes part before t = {record.time[parted[0]]:.6g} s, as at a singular pose")
 
 
 def _check_energy(mechanism: Mechanism, record: Record, route: str) -> None:
@@ -166,20 +166,20 @@ def _check_energy(mechanism: Mechanism, record: Record, route: str) -> None:
         raise Diverged(f"the route in {route} changes the energy by {change[lost[0]]:.2g} J before t = {time:.6g} s")
 
 
-def _first_growth(first: JointCoordinates, record: Record) -> Array:
+def _first_growth(tree: JointCoordinates, record: Record) -> Array:
     """Growth of the distance to a neighbouring motion in joint coordinates, as a multiple of the initial distance.
 
     Raises:
         Diverged: the integration stops.
     """
-    mechanism, nq = first.mechanism, first.mechanism.nq
+    mechanism, nq = tree.mechanism, tree.mechanism.nq
     q, v = mechanism.start()
     ways = BESIDE * (1.0 + np.modf(np.arange(1, mechanism.nv + 1) * 0.6180339887498949)[0])
-    start = np.concatenate([first.tree.moved(q, ways), v * (1.0 + ways)])
+    start = np.concatenate([tree.tree.moved(q, ways), v * (1.0 + ways)])
     for _ in range(3):  # Newton's method doubles the number of digits
-        start = first.eliminated(start)
-    states = integrate(first.rate, start, record.time, BESIDE * 1e-4, first.followed())
-    samples = [first.sample(y[:nq], y[nq:], None, t) for t, y in zip(record.time, states, strict=True)]
+        start = tree.eliminated(start)
+    states = integrate(tree.rate, start, record.time, BESIDE * 1e-4, tree.followed())
+    samples = [tree.sample(y[:nq], y[nq:], None, t) for t, y in zip(record.time, states, strict=True)]
     return _apart(record_of(record.time, samples), record) / BESIDE
 
 
@@ -203,7 +203,7 @@ def _check_limits(mechanism: Mechanism, record: Record) -> None:
 def _from_form(equations: JointCoordinates, form: ClosedForm, times: Array) -> Record:
     assert form.motion is not None
     moves = form.motion(times)
-    if not all(np.all(np.isfinite(each)) for each in moves):
+    if not all(np.all(np.isfinite(values)) for values in moves):
         raise Refused(
             "its closed form has no finite numbers here: masses, lengths or gravity are too large or too small"
         )
