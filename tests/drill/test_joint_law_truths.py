@@ -239,7 +239,8 @@ def test_truths_agree_with_an_independent_solver(name: str, seed: int) -> None:
     found = truth_of(load_scene(name, **numbers).elements[0].mechanism, np.array(times))  # type: ignore[attr-defined]
     assert np.isinf(found.horizon)
     assert any("implicit collocation" in route for route in found.routes) == (name in STIFF)
-    sizes = {"wrench": max(1.0, float(np.abs(found.record.wrench).max()))}  # springs of the governor pull with 20 kN
+    pull = max(1.0, float(np.abs(found.record.wrench).max()))  # springs of the governor pull with 20 kN
+    sizes = dict.fromkeys(("wrench", "links"), pull)
     assert all(bar[-1] < KNOWN * sizes.get(field_, 1.0) for field_, bar in found.bars.items())
     assert np.abs(found.record.q - q).max() <= found.bars["q"].max() + OWN
     assert np.abs(found.record.v - v).max() <= found.bars["v"].max() + OWN * max(1.0, float(np.abs(v).max()))

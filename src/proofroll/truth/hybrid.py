@@ -96,6 +96,7 @@ class Stretch(Generic[ModeT]):
         guard: index of the guard that ended it; None: it reached its time limit.
         visited: time [s] and state at the start of each step, if they were kept.
         grazes: times [s] of crests of guards at zero: a small change decides whether they rise above it.
+        blur: uncertainty of the end by the error of a step in its guard, however slowly that reaches zero [s].
     """
 
     start: float
@@ -106,6 +107,7 @@ class Stretch(Generic[ModeT]):
     guard: int | None
     visited: Sequence[tuple[float, State]] = ()
     grazes: Sequence[float] = ()
+    blur: float = 0.0
 
 
 @dataclass(frozen=True)

@@ -473,6 +473,7 @@ def test_a_joint_that_passes_or_misses_its_stop_for_certain_is_well_posed(inside
     assert np.isinf(found.horizon)
     assert len(found.events) == impacts
     hit, reach = (np.arcsin(1 - inside), 1 - inside) if impacts else (np.pi / 2, 1.0)
+    assert all(event.time_low <= hit <= event.time_high for event in found.events)
     assert found.record.q[-1, 0] == pytest.approx(reach * np.cos(2.0 - hit), abs=TIGHT)
 
 

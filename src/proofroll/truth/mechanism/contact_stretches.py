@@ -103,6 +103,10 @@ class ContactStretches(ContactWalks):
 
     def change(self, stretch: Stretch[ContactMode]) -> Transition[ContactMode]:
         """See the protocol."""
+        changed = self._changed(stretch)
+        return replace(changed, blur=max(changed.blur, stretch.blur))
+
+    def _changed(self, stretch: Stretch[ContactMode]) -> Transition[ContactMode]:
         guards = guards_of(self.contacts, stretch.mode)
         if stretch.guard is None or not 0 <= stretch.guard < len(guards):  # a break, a slip begun, an effort
             k = -1 if stretch.guard is None else stretch.guard - len(guards)

@@ -25,6 +25,7 @@ from proofroll.elements.mechanism.rotations import Array
 from proofroll.truth.hybrid import Stretch, StretchLaw
 from proofroll.truth.mechanism.contact_guards import Touchable, guards_of
 from proofroll.truth.mechanism.contact_symbols import SolvedSymbols, Vector, guard_symbols, slip_symbols, turning_slip
+from proofroll.truth.mechanism.followed_paths import TOLERANCES
 from proofroll.truth.mechanism.maximal_equations import FUNCTIONS
 from proofroll.truth.mechanism.run_time_constants import Constants, Symbol
 from proofroll.truth.mechanism.turning_symbols import follows
@@ -36,6 +37,7 @@ try:
 except ImportError:  # no wheel for this platform
     heyoka = None
 
+_BACK = np.append(2.0 ** -np.arange(50.0), 0.0)  # places before the rise of a guard, in parts of the last step
 _CORRECTIONS = 6  # of Newton's method for the variable of integration at a time, at most
 
 
@@ -262,6 +264,7 @@ class CompiledMode:
                 break
         last = steps[-1].last if rise is None else steps[-1].inside(np.array([rise[0]]))[:, 0]
         end, guard = (until, None) if rise is None else (float(last[-1]), rise[1])
+        blur = 0.0 if rise is None else self._blur(pars, steps[-1], *rise)
         return CompiledStretch(
             start=time,
             end=end,
@@ -271,9 +274,17 @@ class CompiledMode:
             guard=guard,
             visited=visited,
             grazes=grazes,
+            blur=blur,
             by=self,
             steps=steps,
         )
+
+    def _blur(self, pars: Array, step: ModeStep, place: float, guard: int) -> float:
+        """Time before the rise of a guard [s] from which on it is within the error of a step below zero."""
+        error = TOLERANCES[0] * max(1.0, float(np.abs(step.guards[:, guard]).max()))
+        states = step.inside(place - (place - step.start) * _BACK)
+        near = self._called(states, pars)[guard] > -error
+        return float(states[-1, -1] - states[-1, max(int(near.argmax()) - 1, 0)])
 
     def _steps(self, pars: Array, state: Array, until: float) -> Iterator[ModeStep]:
         """Steps of the integrator to a time [s].

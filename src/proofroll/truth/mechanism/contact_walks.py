@@ -41,7 +41,7 @@ from proofroll.truth.mechanism.contact_guards import (
     pressing,
 )
 from proofroll.truth.mechanism.contact_taylor import CompiledMode, CompiledModes, CompiledStretch, ModeSymbols
-from proofroll.truth.mechanism.followed_paths import CLOSE
+from proofroll.truth.mechanism.followed_paths import CLOSE, TOLERANCES
 from proofroll.truth.mechanism.planar_slip import BegunSlip, begun_slip
 from proofroll.truth.picard import PicardSteps
 
@@ -52,7 +52,7 @@ _CLAMPED = 1e-9  # difference of an effort from its limit, relative to the limit
 # direction of a slip of 2e-8 is known to 1e-8.
 _SAME_RATES = 1e-6
 # Integration of a slip to rest: decrease of its logarithm in a step, and slip speed at the end.
-_DECAY, _NOTHING = 2.0, 1e-12
+_DECAY, _NOTHING = 2.0, 1e-14
 
 
 # Guard of the first instants of a slip, which goes on.
@@ -158,13 +158,13 @@ class ContactWalks(ABC):
             return Stretch(start=time, end=time, mode=mode, first=state, last=state, guard=share)
         start, begun = self._kicked(time, state, mode)
         stretch = self._walked(begun, start, mode, until)
-        end, last = stretch.end, stretch.last
+        end, last, blur = stretch.end, stretch.last, stretch.blur
         if stretch.guard is not None and stretch.guard < len(guards):
             k, kind, _ = guards[stretch.guard]
-            if kind == "still":
-                last = self._spent(last, mode, k, stretch)
+            if kind == "still" and mode[k].along is None:
+                last, blur = self._spent(last, mode, k, stretch)
                 end += float(last[-1] - stretch.last[-1])
-        return replace(stretch, start=time, first=state, end=end, last=last)
+        return replace(stretch, start=time, first=state, end=end, last=last, blur=blur)
 
     def _begun(self, time: float, state: Array, mode: ContactMode, until: float) -> Stretch[ContactMode]:
         """First instants of a slip from rest in the plane, which end before another contact changes."""
@@ -227,13 +227,12 @@ class ContactWalks(ABC):
             return np.array([stretch.first for _ in times])
         return states_at(self._law(stretch.first, stretch.mode), stretch.visited, times, self._tolerance)
 
-    def _spent(self, state: Array, mode: ContactMode, k: int, stretch: Stretch[ContactMode]) -> Array:
+    def _spent(self, state: Array, mode: ContactMode, k: int, stretch: Stretch[ContactMode]) -> tuple[Array, float]:
         """State at the end of a slip below FAINT, by collocation in the logarithm of the slip speed.
 
-        The slower a slip, the faster it turns: its equations are stiff in time, and smooth in that logarithm.
+        The slower a slip, the faster it turns: its equations are stiff in time, and smooth in that logarithm. Its last
+        part is a straight line, whose duration, with that of the error of the speed, is the uncertainty of the end.
         """
-        if mode[k].along is not None:
-            return state
 
         def one(y: Array) -> tuple[float, Array]:
             touching = self._touching(y, features_of(mode))
@@ -252,7 +251,10 @@ class ContactWalks(ABC):
         last = float(np.log(np.maximum(function(state[:, None])[0], _NOTHING) / _NOTHING)[0])
         while place < last:
             place, state, _ = steps.step(place, state, min(last, place + _DECAY))
-        return np.asarray(state + function(state[:, None])[1][:, 0])
+        change = np.asarray(function(state[:, None])[1][:, 0])
+        headings = zip(mode, self._touching(state, features_of(mode)), strict=True)
+        slows = self._solved(state, tuple(headed(own, each) for own, each in headings)).slide_rate[k]
+        return state + change, (_NOTHING + TOLERANCES[1]) / float(np.linalg.norm(slows))
 
     def _kicked(self, time: float, state: Array, mode: ContactMode) -> tuple[Array, float]:
         """State and time shortly after a slip in the plane starts from rest, when it has a direction."""

@@ -14,6 +14,7 @@ from proofroll.elements.mechanism.drives import Actuator
 from proofroll.elements.mechanism.signal import Formula
 from proofroll.files.scene_file import load_scene
 from proofroll.truth.mechanism.switched_truth import truth_of
+from proofroll_drill.referee.random_contacts import random_contacts
 
 # s: of a ball that starts with 3 m/s in a cylinder, by its own truth
 SLIPS, STICKS = 0.3220872132861903, 0.4999850902951998
@@ -50,6 +51,17 @@ def test_a_ball_slips_from_rest_and_sticks_when_its_own_truth_says() -> None:
         assert event.time == pytest.approx(right, abs=1e-14)
     assert found.bars["p_WB"][-1] < 1e-13
     assert found.bars["v_WB"][-1] < 1e-12
+
+
+@pytest.mark.arithmetic
+@pytest.mark.parametrize(("seed", "sticks"), [(38, 0.04395707855805324), (43, 0.044611843815633004)])
+def test_the_end_of_a_slip_lies_within_its_bracket(seed: int, sticks: float) -> None:
+    """A slip ends where the referee's long doubles say, by a speed known to the error of a step over its slowing."""
+    _, mechanism, until = random_contacts(seed)
+    found = truth_of(mechanism, np.linspace(0.0, until, 3))
+    assert {event.kind for event in found.events} == {"rest"}
+    assert all(event.time_low <= sticks <= event.time_high for event in found.events)
+    assert all(event.time_high - event.time_low < 1e-12 for event in found.events)
 
 
 def reference(mass: np.ndarray, hold: float, until: float) -> np.ndarray:
