@@ -73,7 +73,8 @@ def _pole_of(signal: Formula, until: float) -> tuple[float, float, float] | None
     peaks = np.flatnonzero((finite[1:-1] >= finite[:-2]) & (finite[1:-1] >= finite[2:]))
     for peak in np.sort(peaks[np.argsort(-sizes[peaks])][:_MOST]).tolist():
         beside = [max(peak - 1, 0), min(peak + 1, end - 1)]
-        if (pole := _closer(signal, *times[beside], max(sizes[beside]))) is not None:
+        low, high = times[beside].tolist()
+        if (pole := _closer(signal, low, high, max(sizes[beside]))) is not None:
             return pole
     return _broken(signal, times[end - 1], times[end]) if len(broken) and end else None
 
