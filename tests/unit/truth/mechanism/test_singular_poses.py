@@ -67,7 +67,7 @@ def parallelogram(damping):
     return Mechanism(tuple(rods.values()), joints, loops, gravity=(0.0, -9.81, 0.0))
 
 
-REPORTING_ERRORS = r"near t = 0.2\d*, 0.7\d* s the rows of the loops lose rank, where the motion may branch"
+REPORTING_ERRORS = r"near t = 0.2\d*, 0.7\d* s the rows of the loops lose rank and the motion may branch"
 
 
 @pytest.mark.drill
