@@ -123,7 +123,7 @@ def samples_are_well_formed(subject: Subject) -> None:
         old_values, new_values = (getattr(sample, name) for sample in (at_start, moved))
         require(
             not in_single_precision(new_values[new_values != old_values]),
-            f"after a step every number of {name} is one of single precision (float32), though settings say double, or "
+            f"after a step all numbers of {name} have single precision (float32), though the settings say double or "
             f"nothing: {SAY_SINGLE}",
         )
     for name in element.sample_type.widths:

@@ -170,7 +170,7 @@ def _check(place: str, row: Row, comparison: Comparison, observables: Mapping[st
     _check_bounds(place, observables, row.bound)
     _check_points(f"{place}.only", comparison, row.only)
     if len(row.short.split()) > _SHORTEST:
-        advice = f"it stands on a card and has {len(row.short.split())} words; say it in {_SHORTEST}"
+        advice = f"it is shown on a card and has {len(row.short.split())} words; say it in {_SHORTEST}"
         raise InputError(f"{place}.short", row.short, advice)
     for exception in row.except_at:
         _check_points(f"{place}.except_at", comparison, exception.where)

@@ -110,7 +110,7 @@ def _check_end(parameters: Mapping[str, Parameter], name: str, place: str) -> No
     passed = [name]
     while isinstance(following := parameters[passed[-1]].value, str) and following in parameters:
         if following in passed:
-            raise InputError(place, " -> ".join([*passed, following]), "this goes round in a circle; give a number")
+            raise InputError(place, " -> ".join([*passed, following]), "parameters refer in a circle; give a number")
         passed.append(following)
 
 

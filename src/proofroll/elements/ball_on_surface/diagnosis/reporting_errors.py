@@ -176,7 +176,7 @@ def at_the_contact(evidence: Evidence) -> Iterator[Cause]:
             )
 
 
-@hypothesis("stale normal", "N, F2 and F3 of the truth along e1, e2, e3 of one time before give the force that is said")
+@hypothesis("stale normal", "the engine's force is the true N, F2 and F3 along e1, e2, e3 of an earlier time")
 def stale_normal(evidence: Evidence) -> Iterator[Cause]:
     """Hypothesis: the force has the right components, but along the axes of another time."""
     run, truth, body = evidence.run, evidence.truth, evidence.element.rolling
@@ -199,7 +199,7 @@ def stale_normal(evidence: Evidence) -> Iterator[Cause]:
     if 2 * known_difference(run["p_WB"].to_numpy()[1:], p) > float(np.max(np.abs(delay * v))):
         return  # the ball itself is as far off, which explains its force
     moment = delay_text(delay, evidence.step).removesuffix(" late")
-    says = f"the force is along the axes of the normal of {moment} before"
+    says = f"the force is along the axes of the local frame {moment} earlier"
     remainder, remedy = (
         known_difference(reported, turned(delay)),
         "take the normal where the ball is when the force is read",
