@@ -108,6 +108,11 @@ class Allowance:
         """Unit for a text, with a space in front; empty for a ratio."""
         return spaced(self.unit)
 
+    @property
+    def items(self) -> str:
+        """Name of the values in a text: times are those of events."""
+        return "events" if self.unit == "s" else "values"
+
 
 @dataclass(frozen=True)
 class TrueCurve:
@@ -266,7 +271,7 @@ def _read(limit: Limit, allowance: Allowance, true: TrueCurve, round_off: float,
     )
     text = f"off by {number(error)} ± {number(bar, 1)}{unit}, {shown_order}"
     if not np.isfinite(error):
-        text = _unlike(limit.values, true.values)
+        text = _unlike(limit.values, true.values, allowance.items)
     elif limit.beside > bar:
         text += f"; one step beside an event does {number(limit.beside, 1)}{unit}"
     if faster and finding == LimitResult.NOT_SHOWN:
@@ -309,7 +314,7 @@ def _reason(
         return f"not judged: error {shown_error}{unit} ± {bar}, {whose}, may be within {allowed}{unit} or beyond"
     text = f"error {shown_error}{unit} {'within' if error <= tolerance else 'beyond'} {allowed}{unit}"
     if not np.isfinite(error):
-        text = _unlike(run.values, true.values)
+        text = _unlike(run.values, true.values, allowance.items)
     if rungs.finding == LimitResult.NO_LADDER:
         text += "; one step only, so the limit is unknown"
     elif not rungs.text:
@@ -319,9 +324,9 @@ def _reason(
     return f"the question is ill-posed here; {text}" if verdict == Verdict.ILL_POSED else text
 
 
-def _unlike(values: FloatArray, true: FloatArray) -> str:
-    """Clause on a curve without a finite distance from the truth."""
-    return "not finite" if values.shape == true.shape else f"{len(values)} values, the truth has {len(true)}"
+def _unlike(values: FloatArray, true: FloatArray, items: str) -> str:
+    """Clause on a curve without a finite distance from the truth; ``items``: name of its values."""
+    return "not finite" if values.shape == true.shape else f"{len(values)} {items}, the truth has {len(true)}"
 
 
 def _distinct_texts(value: float, rival: float) -> tuple[str, str]:

@@ -380,7 +380,7 @@ def test_a_limit_of_other_events_is_told_without_numbers() -> None:
         limit=Limit(np.ones(3), 0.0, math.nan),
     )  # fmt: skip
     assert found.verdict is Verdict.DIFFERS
-    assert found.reason.endswith("another limit: 3 values, the truth has 2")
+    assert found.reason.endswith("another limit: 3 events, the truth has 2")
 
 
 def test_a_reason_never_sets_a_number_against_itself() -> None:
@@ -422,7 +422,7 @@ def test_a_limit_of_events_that_are_not_the_truths_says_so() -> None:
         limit=Limit(three, 9e-13, 2.0), ladder=True,
     )  # fmt: skip
     assert found.verdict == Verdict.DIFFERS
-    assert found.reason.startswith("3 values, the truth has 2; ")
+    assert found.reason.startswith("3 events, the truth has 2; ")
     assert "–" not in found.reason
 
 
