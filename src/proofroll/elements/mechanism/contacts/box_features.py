@@ -10,13 +10,13 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 
 import numpy as np
 
 from proofroll.elements.mechanism.contacts.shapes import BoxShape, HalfSpace, Shape, SphereShape
 from proofroll.elements.mechanism.contacts.walls import EdgeLine
-from proofroll.elements.mechanism.rotations import Array, cross
+from proofroll.elements.mechanism.rotations import Array
 
 CORNERS = 4  # of a face, and its edges
 SLOTS = 2 * CORNERS + CORNERS**2  # contacts of a pair: corners of the first face, of the second, edges that cross
@@ -25,6 +25,7 @@ _SIGNS = tuple(itertools.product((-1.0, 1.0), repeat=2))
 # meet; and overlap of edges, or sine of the angle behind a face, up to which they may touch: far above the errors of
 # states within a step.
 _ON_BORDER, _BEHIND = 1e-13, 1e-4
+_NEXT, _LAST = [1, 2, 0], [2, 0, 1]  # axes of a vector product
 _PARALLEL = 1e-18  # square of the sine of the angle between edges that do not cross
 
 
@@ -81,6 +82,59 @@ class Lying:
             return float(self.half_a.max()) * (-1.0 if own.all() else 1.0)
         return float(apart[~own].max() - apart[own].max())
 
+    def beyond(self, faces: tuple[int, int]) -> tuple[Array, Array]:
+        """Lengths by which all contacts lie beyond their borders [m], (SLOTS), and heights of corners, (2 CORNERS)."""
+        if faces not in self._beyond:
+            self._beyond[faces] = self._all_beyond(*faces)
+        return self._beyond[faces]
+
+    @cached_property
+    def _beyond(self) -> dict[tuple[int, int], tuple[Array, Array]]:
+        return {}
+
+    def _all_beyond(self, face_a: int, face_b: int) -> tuple[Array, Array]:
+        size = float(max(self.half_a.max(), self.half_b.max()))
+        to_b = self._seen(self.place_b, self.axes_b, self.place_a, self.axes_a, face_a, self.half_a)
+        to_a = self._seen(self.place_a, self.axes_a, self.place_b, self.axes_b, face_b, self.half_b)
+        inside, heights = [], []
+        for places, half, face in ((to_b, self.half_b, face_b), (to_a, self.half_a, face_a)):
+            over = np.abs(places) - half
+            over[:, face // 2] = -np.inf
+            inside.append(over.max(axis=1))
+            heights.append(places[:, face // 2] * (1.0 if face % 2 == 0 else -1.0) - half[face // 2])
+        corners = np.concatenate(inside) - size * _ON_BORDER
+        edges = self._of_edges(face_a, face_b, size).ravel() + size * _ON_BORDER
+        return np.concatenate([corners, edges]), np.concatenate(heights)
+
+    @staticmethod
+    def _seen(place: Array, axes: Array, other: Array, other_axes: Array, face: int, half: Array) -> Array:
+        """Corners of a face of another box in the axes of one, (CORNERS, 3)."""
+        return np.asarray((other + (_corners_of(face) * half) @ other_axes.T - place) @ axes)
+
+    def _of_edges(self, face_a: int, face_b: int, size: float) -> Array:
+        (along_a, signs_a, sides_a), (along_b, signs_b, sides_b) = _edges_of(face_a), _edges_of(face_b)
+        u, w = self.axes_a.T[along_a], self.axes_b.T[along_b]
+        d = (self.place_a + (signs_a * self.half_a) @ self.axes_a.T)[:, None]
+        d = d - (self.place_b + (signs_b * self.half_b) @ self.axes_b.T)[None]
+        x, y = u[:, None], w[None]
+        across = x[..., _NEXT] * y[..., _LAST] - x[..., _LAST] * y[..., _NEXT]
+        square, cosine = np.sum(across**2, axis=-1), u @ w.T
+        parallel = square < _PARALLEL
+        square = np.where(parallel, 1.0, square)
+        of_u, of_w = np.sum(d * x, axis=-1), np.sum(d * y, axis=-1)
+        s = (cosine * of_w - of_u) / square
+        t = of_w + s * cosine
+        normal_a, normal_b = self.normal(True, face_a), self.normal(False, face_b)
+        n = across * (np.copysign(1.0, across @ normal_b) / np.sqrt(square))[..., None]
+        behind = [  # a normal between those of the faces at each edge
+            -(n @ normal_b), -np.sum(n * (sides_b @ self.axes_b.T), axis=-1),
+            n @ normal_a, np.sum(n * (sides_a @ self.axes_a.T)[:, None], axis=-1),
+        ]  # fmt: skip
+        ends = np.maximum(np.abs(s) - self.half_a[along_a][:, None], np.abs(t) - self.half_b[along_b])
+        beyond = np.maximum(ends, (np.maximum.reduce(behind) - _BEHIND) * size)
+        beyond = np.maximum(beyond, -np.sum(n * d, axis=-1) - _BEHIND * size)
+        return np.asarray(np.where(parallel, size, beyond))
+
 
 @dataclass(frozen=True, eq=False)
 class BoxSlot:
@@ -133,66 +187,35 @@ class BoxSlot:
                 self._shapes[faces] = _edge(self.first, faces[0], one), _edge(self.second, faces[1], two)
         return self._shapes[faces]
 
-    def beyond(self, lying: Lying, faces: tuple[int, int]) -> tuple[float, float]:
-        """Length by which the contact lies beyond its borders [m], and that which counts as none."""
-        size = float(max(lying.half_a.max(), lying.half_b.max()))
-        if not self.of_edges:
-            first = self.slot < CORNERS
-            box, at, axes = (self.first, lying.place_a, lying.axes_a) if first else (
-                self.second, lying.place_b, lying.axes_b)  # fmt: skip
-            corner = at + axes @ (_corner_signs(faces[0 if first else 1], self.slot % CORNERS) * box.half)
-            other, axes, half = (lying.place_b, lying.axes_b, lying.half_b) if first else (
-                lying.place_a, lying.axes_a, lying.half_a)  # fmt: skip
-            normal = faces[1 if first else 0] // 2
-            inside = np.abs(axes.T @ (corner - other)) - half
-            return max(value for axis, value in enumerate(inside.tolist()) if axis != normal), size * _ON_BORDER
-        return self._of_edges(lying, faces, size), -size * _ON_BORDER
-
-    def _of_edges(self, lying: Lying, faces: tuple[int, int], size: float) -> float:
-        numbers = divmod(self.slot - 2 * CORNERS, CORNERS)
-        (along_a, signs_a, side_a), (along_b, signs_b, side_b) = map(_edge_signs, faces, numbers)
-        u, w = lying.axes_a[:, along_a], lying.axes_b[:, along_b]
-        d = lying.place_a + lying.axes_a @ (signs_a * lying.half_a) - lying.place_b
-        d = d - lying.axes_b @ (signs_b * lying.half_b)
-        across, cosine = cross(u, w), float(u @ w)
-        square = float(across @ across)
-        if square < _PARALLEL:
-            return size
-        s = (cosine * float(d @ w) - float(d @ u)) / square
-        t = float(d @ w) + s * cosine
-        n = across * (np.copysign(1.0, float(across @ lying.normal(False, faces[1]))) / np.sqrt(square))
-        behind = [  # a normal between those of the faces at each edge
-            -float(n @ lying.normal(False, faces[1])), -float(n @ lying.axes_b @ side_b),
-            float(n @ lying.normal(True, faces[0])), float(n @ lying.axes_a @ side_a),
-        ]  # fmt: skip
-        ends = max(abs(s) - float(lying.half_a[along_a]), abs(t) - float(lying.half_b[along_b]))
-        return max(ends, (max(behind) - _BEHIND) * size, -float(n @ d) - _BEHIND * size)
-
 
 def _in_plane(face: int) -> tuple[int, int]:
     axis = face // 2
     return (axis + 1) % 3, (axis + 2) % 3
 
 
-def _corner_signs(face: int, number: int) -> Array:
-    """Sides of a corner of a face along the axes of its box."""
-    signs = np.zeros(3)
-    signs[face // 2] = 1.0 if face % 2 == 0 else -1.0
-    signs[list(_in_plane(face))] = _SIGNS[number]
+@cache
+def _corners_of(face: int) -> Array:
+    """Sides of the corners of a face along the axes of its box, (CORNERS, 3)."""
+    signs = np.zeros((CORNERS, 3))
+    signs[:, face // 2] = 1.0 if face % 2 == 0 else -1.0
+    signs[:, list(_in_plane(face))] = _SIGNS
     return signs
 
 
-def _edge_signs(face: int, number: int) -> tuple[int, Array, Array]:
-    """Axis along an edge of a face, sides of its middle, and normal of the other face at it, in the axes of its box."""
-    along, other = _in_plane(face) if number < 2 else _in_plane(face)[::-1]
-    signs, side = np.zeros(3), np.zeros(3)
-    signs[face // 2] = 1.0 if face % 2 == 0 else -1.0
-    signs[other] = side[other] = 1.0 if number % 2 == 0 else -1.0
-    return along, signs, side
+@cache
+def _edges_of(face: int) -> tuple[list[int], Array, Array]:
+    """Axes along the edges of a face, sides of their middles, normals of the other faces there, in the box's axes."""
+    along, signs, sides = [], np.zeros((CORNERS, 3)), np.zeros((CORNERS, 3))
+    signs[:, face // 2] = 1.0 if face % 2 == 0 else -1.0
+    for number in range(CORNERS):
+        axis, other = _in_plane(face) if number < 2 else _in_plane(face)[::-1]
+        along.append(axis)
+        signs[number, other] = sides[number, other] = 1.0 if number % 2 == 0 else -1.0
+    return along, signs, sides
 
 
 def _corner(box: BoxShape, face: int, number: int) -> SphereShape:
-    return SphereShape(box.centre + box.frame @ (_corner_signs(face, number) * box.half), 0.0)
+    return SphereShape(box.centre + box.frame @ (_corners_of(face)[number] * box.half), 0.0)
 
 
 def _face(box: BoxShape, face: int) -> HalfSpace:
@@ -201,6 +224,7 @@ def _face(box: BoxShape, face: int) -> HalfSpace:
 
 
 def _edge(box: BoxShape, face: int, number: int) -> EdgeLine:
-    along, signs, _ = _edge_signs(face, number)
+    along, signs, _ = _edges_of(face)
     outward = (1.0 if face % 2 == 0 else -1.0) * box.frame[:, face // 2]
-    return EdgeLine(box.centre + box.frame @ (signs * box.half), box.frame[:, along].copy(), 0.0, outward)
+    middle = box.centre + box.frame @ (signs[number] * box.half)
+    return EdgeLine(middle, box.frame[:, along[number]].copy(), 0.0, outward)

@@ -129,15 +129,16 @@ def _touch_boxes(slot: BoxSlot, a: Moving, b: Moving, feature: int | None) -> To
     """One contact of two boxes; see :func:`touch`."""
     lying = _lying_of(slot, a, b)
     faces = lying.faces if feature is None else slot.faces(feature)
-    beyond, least = slot.beyond(lying, faces)
-    feature = slot.feature(faces, beyond > least) if feature is None else feature
+    all_beyond, heights = lying.beyond(faces)
+    beyond = float(all_beyond[slot.slot])
+    feature = slot.feature(faces, beyond > 0) if feature is None else feature
     absent = slot.absent(feature)
-    shape_a, shape_b = slot.shapes(feature)
-    borders = [Border(least - beyond if absent else beyond - least, feature ^ 1)]
+    borders = [Border(-beyond if absent else beyond, feature ^ 1)]
     borders += [Border(lying.turned_away(*faces), feature)] if slot.leads else []
     if not absent:
-        return _touch(shape_a, a, shape_b, b)._replace(feature=feature, borders=tuple(borders))
-    gap = beyond if slot.of_edges else max(beyond, _touch(shape_a, a, shape_b, b).gap)
+        one, two = slot.shapes(feature)
+        return _touch(one, a, two, b)._replace(feature=feature, borders=tuple(borders))
+    gap = beyond if slot.of_edges else max(beyond, float(heights[slot.slot]))
     place = lying.place_a  # as edges may be parallel: with the normal of the faces
     speed, other = a.velocity(place), b.velocity(place)
     return Touching(
