@@ -120,7 +120,7 @@ def tolerated(soft: Regularised | None, cap: Regularised | None, tolerance: floa
     if soft.tolerance <= cap.tolerance:
         return soft.tolerance, soft.because
     asked = number(soft.tolerance)
-    return cap.tolerance, f"{soft.because}; of the {asked} asked for this much is allowed: {cap.because}"
+    return cap.tolerance, f"{soft.because}; of the {asked} requested this much is allowed: {cap.because}"
 
 
 def require_shapes(built: Any, shapes: Mapping[str, tuple[tuple[int, ...], ...]]) -> None:

@@ -8,7 +8,7 @@ import numpy as np
 from proofroll.core.arrays import FloatArray, largest_difference
 from proofroll.core.convergence import Limit
 from proofroll.core.engine import EPSILON
-from proofroll.core.number_format import number, spaced
+from proofroll.core.number_format import counted, number, spaced
 
 # A ladder whose rungs differ by less than this part of the tolerance needs no order: even if the differences never
 # shrank, twenty further halvings (a step a million times smaller) would move the curve by the tolerance at most.
@@ -273,13 +273,13 @@ def _read(limit: Limit, allowance: Allowance, true: TrueCurve, round_off: float,
     if not np.isfinite(error):
         text = _unlike(limit.values, true.values, allowance.items)
     elif limit.beside > bar:
-        text += f"; one step beside an event does {number(limit.beside, 1)}{unit}"
+        text += f"; one step beside an event contributes {number(limit.beside, 1)}{unit}"
     if faster and finding == LimitResult.NOT_SHOWN:
-        text += "; the errors of these steps fall ever faster, so a shorter step has to tell: --engine NAME[dt=…]"
+        text += "; the errors of these steps fall ever faster, so a shorter step is needed: --engine NAME[dt=…]"
     if limit.floor:
         text += f"; {limit.floor}"
     if limit.saturated:
-        text += "; two tolerances give the same run, so something else sets its steps, as samples do"
+        text += "; two tolerances give the same run, so something else sets its steps, e.g. the samples"
     return _Ladder(
         finding=finding, error=error, bar=bar, order=order, doubt=doubted, leaves=leaves, wrong_within=wrong, text=text
     )
@@ -310,7 +310,7 @@ def _reason(
     if verdict == Verdict.NOT_JUDGED:
         whose = "the truth's error bar"
         if own_bar > truth_error_bar:
-            bar, whose = f"{number(own_bar)}{unit}", "for the run shows it only between two times"
+            bar, whose = f"{number(own_bar)}{unit}", "known only between two times"
         return f"not judged: error {shown_error}{unit} ± {bar}, {whose}, may be within {allowed}{unit} or beyond"
     text = f"error {shown_error}{unit} {'within' if error <= tolerance else 'beyond'} {allowed}{unit}"
     if not np.isfinite(error):
@@ -326,7 +326,7 @@ def _reason(
 
 def _unlike(values: FloatArray, true: FloatArray, items: str) -> str:
     """Clause on a curve without a finite distance from the truth; ``items``: name of its values."""
-    return "not finite" if values.shape == true.shape else f"{len(values)} {items}, the truth has {len(true)}"
+    return "not finite" if values.shape == true.shape else f"{counted(len(values), items)}, the truth has {len(true)}"
 
 
 def _distinct_texts(value: float, rival: float) -> tuple[str, str]:

@@ -112,7 +112,7 @@ def test_steps_whose_errors_fall_ever_faster_show_no_other_limit() -> None:
         for faster in (False, True)
     )
     assert (blind.limit, found.limit) == (LimitResult.ANOTHER, LimitResult.NOT_SHOWN)
-    assert "a shorter step has to tell: --engine NAME[dt=…]" in found.reason
+    assert "a shorter step is needed: --engine NAME[dt=…]" in found.reason
     assert found.verdict is Verdict.DIFFERS
 
 
@@ -349,7 +349,7 @@ def test_a_difference_that_may_be_the_sampling_alone_is_not_judged() -> None:
     times = np.array([0.2727])
     found = judged_curve("first_slip", "s", times + 7e-3, times, own_bar=25e-3, **late)
     assert found.verdict is Verdict.NOT_JUDGED
-    assert "error 7e-3 s ± 0.025 s, for the run shows it only between two times" in found.reason
+    assert "error 7e-3 s ± 0.025 s, known only between two times" in found.reason
     assert judged_curve("first_slip", "s", times + 7e-3, times, own_bar=1e-3, **late).verdict is Verdict.DIFFERS
 
 
