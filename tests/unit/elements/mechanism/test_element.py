@@ -132,7 +132,7 @@ def test_how_far_a_model_may_soften_says_why() -> None:
     lines = element.certify(dataclasses.replace(right(element), regularised=asked), at_start(element))
     (line,) = (line for line in lines if line.quantity == "acceleration")
     assert line.tolerance == CAPS["acceleration"].tolerance < 0.8
-    assert line.because.startswith("a stiff spring; of the 0.8 asked for")
+    assert line.because.startswith("a stiff spring; of the 0.8 requested")
     assert line.because.endswith(CAPS["acceleration"].because)
 
 
