@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 
 from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.bookkeeping.air import AirRobot
 from proofroll.elements.mechanism.bookkeeping.law import ControlLaw, RobotState
 from proofroll.elements.mechanism.bookkeeping.mistakes import IMPLICIT
-from proofroll.elements.mechanism.bookkeeping.search import MistakeSearch, explained
-from proofroll.elements.mechanism.bookkeeping.seen import SHOWN, WHOLE, SeenMotion
+from proofroll.elements.mechanism.bookkeeping.search import EXACT, Depth, MistakeSearch, explained
+from proofroll.elements.mechanism.bookkeeping.seen import SHOWN, WHOLE, LawMotions, SeenMotion
 from proofroll.robots.air_fit import states_of
 from proofroll.robots.control_record import ControlRecord
 from proofroll.robots.record_layer import Layer, LayerCause
 
 _STEPS, _LEAST_STEP = (1, 2, 5, 10), 4.9e-4  # steps between rows that are tried, and the shortest [s]
+_DEPTHS: tuple[Depth, ...] = ("a mistake", "a pair")
 _ON_INSTANT, _FEWEST = 1e-5, 4  # part of the time between instants that is round-off, and least rows of a motion
 
 
@@ -60,6 +63,25 @@ def _looks_back(law: ControlLaw) -> bool:
     return bool(np.any(answers[0] != answers[1]))
 
 
+def _best(mechanism: Mechanism, law: ControlLaw, seen: SeenMotion, steps: list[float]) -> MistakeSearch:
+    """Search at the step of the program [s], which the record does not tell: the one whose motions come nearest."""
+    plain = {}
+    for step in steps:
+        motions = LawMotions(mechanism, law, seen, step)
+        plain[step] = min(motions.distance(law, scheme) for scheme in motions.schemes)
+        if plain[step] <= seen.bar:
+            return explained(mechanism, law, seen, step)
+    searches = {}
+    for depth, step in itertools.product(_DEPTHS, sorted(steps, key=lambda step: plain[step])):
+        search = searches[step] = explained(mechanism, law, seen, step, depth=depth)
+        if search.explanations and search.explanations[0].after <= max(EXACT * search.before, seen.bar):
+            return search
+    if all(search.before > search.spread and not search.explanations for search in searches.values()):
+        nearest = min(steps, key=lambda step: plain[step])
+        return explained(mechanism, law, seen, nearest)
+    return min(searches.values(), key=lambda item: item.explanations[0].after if item.explanations else item.before)
+
+
 def motion_layer(record: ControlRecord, law: ControlLaw, mechanism: Mechanism) -> Layer:
     """Layer of a record that lacks others: its states are those of a motion under the law, or under a known mistake."""
     robot = AirRobot(mechanism, law)
@@ -76,19 +98,12 @@ def motion_layer(record: ControlRecord, law: ControlLaw, mechanism: Mechanism) -
     names = [name for name in record.rounding if name.startswith(("q.", "v.", "p_WB.", "q_WB."))]
     rounding = max(float(record.rounding[name].max()) for name in names)
     seen = SeenMotion(np.array([every * k for k in range(len(q))]), q, v, rounding).until(SHOWN)
-    found: list[MistakeSearch] = []
-    for steps in _STEPS:
-        if (steps > 1 and every / steps < _LEAST_STEP) or abs(steps / every / law.rate % 1 - 0.5) < 0.5 - WHOLE:
-            continue
-        found.append(explained(mechanism, law, seen, every / steps, deep=False))
-        if found[-1].explanations:
-            break
-    if not found:
+    divided = [n for n in _STEPS if n == 1 or every / n >= _LEAST_STEP]
+    divided = [n for n in divided if abs(n / every / law.rate % 1 - 0.5) >= 0.5 - WHOLE]
+    if not divided:
         return Layer("motion", reason="no step divides both the interval of rows and the time between instants")
-    best = found[-1] if found[-1].explanations else min(found, key=lambda item: item.before)
+    best = _best(mechanism, law, seen, [every / n for n in divided])
     bar = max(best.spread, seen.bar)
-    if not best.explanations and best.before > bar:
-        best = explained(mechanism, law, seen, every, deep=True)
     if best.explanations:
         bar = best.explanations[0].after
     causes = (

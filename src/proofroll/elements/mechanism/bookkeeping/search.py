@@ -11,6 +11,7 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
+from typing import Literal
 
 import numpy as np
 
@@ -22,8 +23,10 @@ from proofroll.elements.mechanism.bookkeeping.seen import LawMotions, SeenMotion
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.rotations import Array
 
+# Most that is tried, where nothing simpler explains a motion.
+Depth = Literal["a mistake", "a pair", "a pair with a pose"]
 _CLOSES = 0.05  # part of a distance that an explanation may leave
-_EXACT = 1e-3  # part of a distance that leaves nothing to explain
+EXACT = 1e-3  # part of a distance that leaves nothing to explain
 _POSES = 5  # poses that are tried in full
 _ALIKE = 100.0  # explanations whose squares in the screen differ by no more are all tried
 _PAIRS = 8  # pairs that are tried in full
@@ -84,7 +87,7 @@ class MistakeSearch:
 
 
 def explained(
-    mechanism: Mechanism, law: ControlLaw, seen: SeenMotion, step: float, *, deep: bool = True
+    mechanism: Mechanism, law: ControlLaw, seen: SeenMotion, step: float, depth: Depth = "a pair with a pose"
 ) -> MistakeSearch:
     """Mistakes that explain the motion of a robot in the air.
 
@@ -93,7 +96,7 @@ def explained(
         law: its controller's law as it should be.
         seen: motion that a program says it made; its interval is a whole number of steps.
         step: of the program [s].
-        deep: True if another pose is tried with a second mistake, too, where no pair of others explains it.
+        depth: most that is tried, where nothing simpler explains the motion.
 
     Raises:
         InputError: the step does not divide the time between instants.
@@ -102,28 +105,29 @@ def explained(
     plain = {scheme: search.distance(law, scheme) for scheme in search.schemes}
     scheme = min(plain, key=lambda name: plain[name])
     before = plain[scheme]
-    if before <= seen.bar:
-        imitated, explicit = search.imitated(scheme), plain["explicit"]
-        return MistakeSearch(
-            before=before,
-            scheme=scheme,
-            spread=search.spread(),
-            explanations=(),
-            explicit=explicit,
-            imitated=imitated,
-        )
-    trial, every = _Trial(search, before, scheme), mistakes(law)
+    right = before <= seen.bar
+    return MistakeSearch(
+        before=before,
+        scheme=scheme,
+        spread=search.spread(),
+        explanations=() if right else tuple(_explanations(_Trial(search, before, scheme), depth)),
+        explicit=plain["explicit"],
+        imitated=right and search.imitated(scheme),
+    )
+
+
+def _explanations(trial: _Trial, depth: Depth) -> list[MistakesFound]:
+    """Explanations, the best first; the simplest are tried first, until nothing is left to explain."""
+    every = mistakes(trial.search.law)
     found = trial.best([(item,) for item in every], len(every) * len(TREATMENTS))
-    if not trial.settled(found):
+    if depth != "a mistake" and not trial.settled(found):
         both = [pair for pair in itertools.combinations(every, 2) if _together(*pair)]
         found = _sorted([*found, *trial.best(both, _PAIRS)])
-    if not trial.settled(found):
+    if depth != "a mistake" and not trial.settled(found):
         found = _sorted([*found, *trial.other_pose([None])])
-    if deep and not trial.settled(found):
+    if depth == "a pair with a pose" and not trial.settled(found):
         found = _sorted([*found, *trial.other_pose([item for item in every if item.id != "pose_missing"])])
-    return MistakeSearch(
-        before=before, scheme=scheme, spread=search.spread(), explanations=tuple(found), explicit=plain["explicit"]
-    )
+    return found
 
 
 def _together(one: Mistake, other: Mistake) -> bool:
@@ -191,7 +195,7 @@ class _Trial:
 
     def settled(self, found: Sequence[MistakesFound]) -> bool:
         """True if the best explanation leaves nothing to explain."""
-        return bool(found) and found[0].after <= max(_EXACT * self.before, self.search.seen.bar)
+        return bool(found) and found[0].after <= max(EXACT * self.before, self.search.seen.bar)
 
     def best(self, choices: Sequence[tuple[Mistake, ...]], most: int) -> list[MistakesFound]:
         """Explanations by these choices, the best first; ``most`` are tried, until nothing is left to explain."""

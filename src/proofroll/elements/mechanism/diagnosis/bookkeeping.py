@@ -77,7 +77,7 @@ def _of_run(evidence: Evidence, law: ControlLaw) -> MistakeSearch | None:
     if not whole or float(np.ptp(np.diff(time))) > WHOLE * every:
         return None
     q, v = placed_of(mechanism, pair[0]).of_tree()
-    return explained(mechanism, law, SeenMotion(time, q, v).until(SHOWN), step, deep=False)
+    return explained(mechanism, law, SeenMotion(time, q, v).until(SHOWN), step, depth="a pair")
 
 
 def _in_air(mechanism: Mechanism) -> bool:
