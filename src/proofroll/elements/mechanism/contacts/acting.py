@@ -1,11 +1,12 @@
 """Mode of a contact between two events: open, slip or stick."""
 
 from collections.abc import Sequence
-from typing import Literal, NamedTuple, Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
 from proofroll.core.events import EventKind
+from proofroll.elements.mechanism.contacts.one_contact import ModeKind
 from proofroll.elements.mechanism.contacts.touching import Touching
 from proofroll.elements.mechanism.rotations import Array, frame_of_axis
 
@@ -30,7 +31,7 @@ class Acting(NamedTuple):
         feature: number of the features that are nearest; 0 of shapes that have one only.
     """
 
-    kind: Literal["open", "slip", "stick"]
+    kind: ModeKind
     along: Direction | None = None
     heading: Direction | None = None
     leads: bool = False
@@ -129,7 +130,7 @@ def held_directions(own: Acting, found: Touching, presses: bool) -> Array:
     return np.vstack([normal, line / np.linalg.norm(line)])
 
 
-def first_mode(kind: Literal["open", "slip", "stick"], frame: Array, heading: Array, G: Array) -> Acting:
+def first_mode(kind: ModeKind, frame: Array, heading: Array, G: Array) -> Acting:
     """Mode in which a contact begins.
 
     Args:

@@ -14,7 +14,7 @@ import numpy as np
 from proofroll.core.errors import Refused
 from proofroll.elements.mechanism.analysis import RANK
 from proofroll.elements.mechanism.contacts.lemke import lemke
-from proofroll.elements.mechanism.contacts.one_contact import AT_BOUND, Outcome, force_of_one, rubbing
+from proofroll.elements.mechanism.contacts.one_contact import AT_BOUND, ModeKind, force_of_one, rubbing
 from proofroll.elements.mechanism.rotations import Array
 
 _SWEEPS = 1000
@@ -60,9 +60,9 @@ def contact_forces(
     time: float = 0.0,
     near: float = 0.0,
     static: Array | None = None,
-    guess: Sequence[Outcome] | None = None,
+    guess: Sequence[ModeKind] | None = None,
     pressed_by: Sequence[int | None] | None = None,
-) -> tuple[Array, list[Outcome]]:
+) -> tuple[Array, list[ModeKind]]:
     """Forces of all contacts, shape (contacts, 3), and outcome of each contact.
 
     Args:
@@ -84,7 +84,7 @@ def contact_forces(
         NotUnique: the force of a contact is not unique.
         Refused: no answer is found.
     """
-    done = list[Outcome](["open"] * len(friction))
+    done = list[ModeKind](["open"] * len(friction))
     bounds = np.zeros(len(friction)) if bounds is None else bounds
     pressing = [None] * len(friction) if pressed_by is None else pressed_by
     turns = any(by is not None for by in pressing)
@@ -129,7 +129,7 @@ def _guessed(
     friction: Array,
     sliding: Sequence[Array | None],
     bounds: Array,
-    guess: Sequence[Outcome] | None,
+    guess: Sequence[ModeKind] | None,
 ) -> Array:
     """Forces for a guess of outcomes, from which sweeps start; zero where a direction of slip is not known."""
     rows, along, f = list[int](), list[Array](), np.zeros(len(c))
@@ -175,7 +175,7 @@ def _all_sliding(G: Array, c: Array, friction: Array, ways: Sequence[Array]) -> 
 
 def _together(
     G: Array, c: Array, friction: Array, sliding: Sequence[Array | None], least: float
-) -> tuple[Array, list[Outcome]] | None:
+) -> tuple[Array, list[ModeKind]] | None:
     """Forces and outcomes of contacts that all slide already, or set off in one direction; None: neither."""
     if all(along is not None or not mu for along, mu in zip(sliding, friction, strict=True)):
         ways = [np.zeros(2) if along is None else along for along in sliding]
@@ -211,7 +211,7 @@ def _all_setting_off(G: Array, c: Array, friction: Array, least: float) -> Array
 
 
 def _idle(
-    G: Array, w: Array, friction: Array, sliding: Sequence[Array | None], done: Sequence[Outcome], least: float
+    G: Array, w: Array, friction: Array, sliding: Sequence[Array | None], done: Sequence[ModeKind], least: float
 ) -> list[int]:
     """Open contacts that do not part, if no split of the load that they share with others changes the motion.
 
@@ -270,7 +270,7 @@ def robust_forces(
     least: float = 0.0,
     static: Array | None = None,
     pressed_by: Sequence[int | None] | None = None,
-) -> tuple[Array, list[Outcome], bool]:
+) -> tuple[Array, list[ModeKind], bool]:
     """Solution as of :func:`contact_forces`, and True if slightly changed pressure and friction give the same outcomes.
 
     A contact whose force is at most a ``least`` part of the largest force counts as open.
@@ -283,7 +283,7 @@ def robust_forces(
     lift = np.where(own > 0, (1 + _APART * np.arange(len(own))) / np.where(own > 0, own, 1), 0.0)
     nudge = _NUDGE * float(np.abs(c).max()) * G[:, ::3] @ lift
 
-    def outcome(force: Array, done: Sequence[Outcome]) -> list[Outcome]:
+    def outcome(force: Array, done: Sequence[ModeKind]) -> list[ModeKind]:
         little = least * float(np.abs(force).max())
         return ["open" if each[0] <= little and least else own for each, own in zip(force, done, strict=True)]
 

@@ -9,7 +9,7 @@ from proofroll.core.errors import Refused
 from proofroll.elements.mechanism.contacts.touching import torn
 from proofroll.elements.mechanism.rotations import Array
 
-Outcome = Literal["open", "stick", "slip"]
+ModeKind = Literal["open", "stick", "slip"]  # of a contact between two events
 # Margin, relative to friction's bound, above which a contact slides: closer to the bound round-off decides, and no
 # direction of slip would be found. :func:`.robust_forces` tells if an outcome depends on a change within the accuracy
 # of the parameters.
@@ -19,7 +19,7 @@ _DIRECTIONS = np.linspace(-np.pi, np.pi, 73) + 0.01
 _WAYS = np.array([np.cos(_DIRECTIONS), np.sin(_DIRECTIONS)])
 
 
-def rubbing(G: Array, c: Array, bound: float, sliding: Array | None) -> tuple[Array, Outcome]:
+def rubbing(G: Array, c: Array, bound: float, sliding: Array | None) -> tuple[Array, ModeKind]:
     """Force and outcome of friction without a normal, along a line or in a plane, while all other forces stay."""
     if sliding is not None:
         return np.array([0.0, *(-bound * sliding)]), "slip"
@@ -72,7 +72,7 @@ def force_of_one(
     sliding: Array | None,
     where: tuple[str, float],
     least: float,
-) -> tuple[Array, Outcome]:
+) -> tuple[Array, ModeKind]:
     """Force and outcome of one contact while the other forces stay; a motion up to ``least`` counts as none.
 
     ``friction``: coefficients while it slips and sticks; ``where``: its name and the time [s], for messages.
