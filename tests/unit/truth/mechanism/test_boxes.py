@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+import mujoco
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
@@ -160,6 +161,50 @@ def test_a_box_that_tips_by_more_than_half_a_right_angle_ends_the_truth_with_the
     found = truth_of(on_box((0.02, 0, HALF), friction=np.inf), np.array([0.0, 0.5]))
     assert [event.kind for event in found.events] == []
     assert "have turned so far at t = 0." in found.ended
+
+
+@pytest.mark.drill
+@pytest.mark.parametrize("seed", [1, 4, 8])
+@pytest.mark.parametrize("swapped", [False, True])
+def test_boxes_that_tumble_collide_without_overlap(seed: int, swapped: bool) -> None:
+    """Boxes that meet anywhere, corner or edge first, stay apart by MuJoCo's own distance and keep their momentum."""
+    rng = np.random.default_rng(seed)
+    turns = [Rotation.random(random_state=seed + k) for k in (0, 99)]
+    way = rng.normal(size=3)
+    way /= np.linalg.norm(way)
+    v = turns[1].inv().apply(-3 * way + 0.2 * rng.normal(size=3))
+    spins = rng.normal(size=3), 2 * rng.normal(size=3)
+    starts = ((0, 0, 0), (0, 0, 0), spins[0]), (0.6 * way, v, spins[1])
+    joints = tuple(
+        Joint(f"j{name}", "free", "world", name, q0=(*p, *turn.as_quat(scalar_first=True)), v0=(*u, *w))
+        for name, turn, (p, u, w) in zip("ab", turns, starts, strict=True)
+    )
+    bodies = (
+        Body("a", 1.0, com=(0.01, 0, 0.02), inertia=(0.012, 0.013, 0.011)),
+        Body("b", 2.0, inertia=(0.05, 0.03, 0.04)),
+    )
+    sizes = {"a": (0.4, 0.3, 0.2), "b": (0.3, 0.3, 0.5)}
+    shapes = tuple(Geometry(f"hull_{name}", name, "box", size=size) for name, size in sizes.items())
+    pair = Pair("touch", ("hull_b", "hull_a") if swapped else ("hull_a", "hull_b"), 0.3, 0.5)
+    mechanism = Mechanism(bodies, joints, gravity=(0, 0, 0), geometries=shapes, pairs=(pair,))
+    found = followed(mechanism, np.linspace(0.0, 0.13, 27))
+    assert {event.kind for event in found.events} == {"impact"}
+    spec = mujoco.MjSpec()
+    for name, size in sizes.items():
+        body = spec.worldbody.add_body(name=name)
+        body.add_freejoint()
+        body.add_geom(type=mujoco.mjtGeom.mjGEOM_BOX, size=np.array(size) / 2)
+    model = spec.compile()
+    data, apart = mujoco.MjData(model), []
+    for places, attitudes in zip(found.record.p_WB, found.record.q_WB, strict=True):
+        data.qpos[:] = np.concatenate([places, attitudes], axis=1).ravel()
+        mujoco.mj_forward(model, data)
+        apart.append(mujoco.mj_geomDistance(model, data, 0, 1, 10.0, None))
+    assert min(apart) > -1e-9
+    arm = Rotation.from_quat(found.record.q_WB[:, 0], scalar_first=True).apply(bodies[0].com)
+    speeds = found.record.v_WB[:, 0] + np.cross(found.record.w_WB[:, 0], arm)
+    momentum = speeds + 2.0 * found.record.v_WB[:, 1]
+    assert np.abs(momentum - momentum[0]).max() < 1e-12
 
 
 @pytest.mark.drill
