@@ -12,13 +12,12 @@ from proofroll.files.scene_file import load_scene
 from proofroll.running.simulation import simulate
 
 PAGE = Path(__file__).resolve().parents[1] / "docs" / "compose_joints.md"
-HEAD = 'title = "a scene of the page"\nsource = "docs"\n[gravity]\nmagnitude = 9.81\n'
 SCENES = re.findall(r"^```toml\n(.*?)^```$", PAGE.read_text(encoding="utf-8"), flags=re.DOTALL | re.MULTILINE)
 
 
 def run(text: str, folder: Path) -> xr.Dataset:
     """Dataset of a scene of the page, 0.5 s of it."""
-    folder.joinpath("scene.toml").write_text(HEAD + text, encoding="utf-8")
+    folder.joinpath("scene.toml").write_text(text, encoding="utf-8")
     return simulate(load_scene(str(folder)), "projection", until=0.5, every=0.1)
 
 

@@ -263,7 +263,7 @@ def test_a_scheduler_that_ends(dask: DaskCluster, shared: Cluster, tmp_path: Pat
         until(lambda: list(room.glob("begun-*")))
         os.kill(dask.scheduler, signal.SIGKILL)
 
-    with pytest.raises(ProofrollError, match=r"scheduler at tcp://\S+ is gone; what was finished is kept") as found:
+    with pytest.raises(ProofrollError, match=r"scheduler at tcp://\S+ is gone; finished runs are kept") as found:
         runner.follow([done], lambda asked, _: then() if asked is done else [])
     assert "\n" not in str(found.value)
     (room / "go").touch()
