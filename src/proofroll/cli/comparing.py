@@ -148,12 +148,12 @@ def outcomes_of(
     """
     from proofroll.running.process import processor_seconds
     from proofroll.running.time_budget import TimeBudget
-    from proofroll.studies.comparison.compare import run_plan
+    from proofroll.studies.comparison.compare import affordable, run_plan
     from proofroll.studies.comparison.planning import plan
 
     begin = processor_seconds() - spent
     with options.spinner(f"{stage}cases"):
-        plans = [plan(comparison, engines, runner.workers) for comparison in comparisons]
+        plans = [affordable(plan(comparison, engines, runner.workers), runner) for comparison in comparisons]
     brief = [item.brief for item in plans]
     grown = [(index, item.cases) for index, item in enumerate(plans) if len(item.truths) > len(brief[index].truths)]
     if budget:

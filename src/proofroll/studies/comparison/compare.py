@@ -30,6 +30,8 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
+_OF_TRUTHS = 0.6  # largest part of a budget that truths take, at first and again for a shorter time
+_PARTS = (1, 8, 64)  # parts of the time, the first of which is tried
 _LEAST = 2  # samples of a truth with which a motion is judged: at the first one nothing has moved yet
 
 
@@ -122,6 +124,30 @@ def run_plan(
     return results
 
 
+def affordable(planned: Plan, runner: Runner) -> Plan:
+    """The plan, or as much of its time as the budget leaves a truth for; its truths have then been run.
+
+    A truth takes a part of the budget at most: with all of it spent on a truth that does not end, nothing is judged.
+    """
+    comparison = planned.comparison
+    if comparison.budget is None:
+        return planned
+    spent, intervals = comparison.spent, round(comparison.until / comparison.every)
+    for parts in _PARTS:
+        if parts > 1 and intervals // parts < _LEAST:
+            break
+        trial = planned if parts == 1 else planned.shortened(comparison.every * (intervals // parts))
+        reserved = (1 - _OF_TRUTHS) * max(0.0, comparison.budget - spent)
+        budget = TimeBudget(comparison.budget, spent + reserved)
+        before = budget.left
+        results = runner.run(trial.stages[0], budget=budget)
+        spent += before - budget.left
+        if not left_out(results):
+            return replace(trial, comparison=replace(trial.comparison, spent=spent))
+    # No truth ends in time: nothing is run that could not be judged.
+    return replace(planned, comparison=replace(comparison, spent=comparison.budget))
+
+
 def _beyond_budget(planned: Plan, results: Mapping[str, Result]) -> list[str]:
     """Texts of the cases that were left out for lack of processor time."""
     cases = [(f"the truth{at_point(case.parameters)}", case) for case in planned.truths.values()]
@@ -139,7 +165,7 @@ def compare(
     progress: Callable[[Case, Result], None] | None = None,
 ) -> Outcome:
     """Plans, runs and judges a comparison."""
-    planned = plan(comparison, engines, runner.workers)
+    planned = affordable(plan(comparison, engines, runner.workers), runner)
     return evaluate(planned, run_plan(planned, runner, progress), runner)
 
 

@@ -31,6 +31,8 @@ _USUAL = [4.0, 2.0, 1.0]
 # Ladders that replace it if its steps do not fit between samples, the cheapest first.
 _LADDERS = (_USUAL, [2.0, 1.0, 0.5], [1.0, 0.5, 0.25])
 
+_FIRST = " (the first "  # beginning of a remark in the title of a comparison
+
 
 def point_name(parameters: Mapping[str, float | Edge]) -> str:
     """Text of a point of the parameters, e.g.
@@ -96,6 +98,22 @@ class Plan:
     def brief(self) -> Plan:
         """The plan reduced to the combinations of a brief report."""
         return self._part(self.comparison.briefly())
+
+    def shortened(self, until: float) -> Plan:
+        """The plan up to an earlier time [s]."""
+
+        def earlier(case: Case) -> Case:
+            return replace(case, until=until, between=tuple(time for time in case.between if time < until))
+
+        title = f"{self.comparison.title.partition(_FIRST)[0]}{_FIRST}{until:g} s, for which the budget suffices)"
+        return replace(
+            self,
+            comparison=replace(self.comparison, until=until, title=title),
+            truths={name: earlier(case) for name, case in self.truths.items()},
+            runs=[
+                replace(run, ladder={factor: earlier(case) for factor, case in run.ladder.items()}) for run in self.runs
+            ],
+        )
 
     def ended(self, unfinished: Set[str]) -> Plan:
         """The plan without combinations that have ``unfinished`` cases; those of a brief report always stay."""

@@ -29,7 +29,8 @@ from proofroll.running.case import Case, EngineFacts, Result, Status
 from proofroll.running.runner import Runner
 from proofroll.running.simulation import simulate
 from proofroll.running.store import Store
-from proofroll.studies.comparison.compare import compare, evaluate
+from proofroll.running.time_budget import TimeBudget
+from proofroll.studies.comparison.compare import affordable, compare, evaluate
 from proofroll.studies.comparison.expectations import contradictions_of
 from proofroll.studies.comparison.outcome import Outcome
 from proofroll.studies.comparison.planning import Plan, Planned, point_name
@@ -502,6 +503,28 @@ def test_a_point_where_the_truth_is_lost(tmp_path: Path, status: Status) -> None
     for said in outcome.contradictions:
         assert "at speed=4" in said
         assert said.endswith("expected: agrees (there is no truth here: the ball is back on the wall)")
+
+
+@pytest.mark.parametrize(("longest", "until"), [(1.0, 0.4), (0.1, 0.05), (0.001, 0.4)])
+def test_a_budget_buys_the_time_that_a_truth_ends_in(longest: float, until: float) -> None:
+    """A truth that does not end in a part of the budget is asked for a shorter time; without one no engine is run."""
+    comparison = dataclasses.replace(claim([ROW], [4.0]), until=0.4, every=0.01, budget=60.0)
+    usual, file = load_scene(comparison.scene), read_scene_file(comparison.scene)
+    given = (comparison.scene, {}, usual.digest)
+    case, run = (Case(*given, facts, comparison.until, comparison.every) for facts in (TRUTH, FACTS))
+    asked = Plan(comparison, usual, file, {"": usual}, {"": case}, [Planned(ROW, {}, FACTS, {1.0: run})])
+
+    class Answering:
+        def run(self, cases: Sequence[Case], budget: TimeBudget) -> dict[str, Result]:
+            assert budget.left <= 0.6 * 60
+            done = Result(Status.DONE, "")
+            return {case.key: done if case.until <= longest else LEFT_OUT for case in cases}
+
+    found = affordable(asked, Answering())  # type: ignore[arg-type]
+    assert found.comparison.until == pytest.approx(until)
+    assert {case.until for case in found.cases} == {found.comparison.until}
+    assert (found.comparison.spent >= 60.0) is (longest < 0.01)
+    assert ("(the first 0.05 s, for which the budget suffices)" in found.comparison.title) is (until == 0.05)
 
 
 LEFT_OUT = Result(Status.LEFT_OUT, "the 60 s of processor time did not suffice")
