@@ -60,9 +60,9 @@ def compare(
 
     Exit 3 if an engine is missing or failed, or if nothing could be judged.
 
-    Of a scene or a robot file every formulation that can represent it is run, and nothing is claimed. --set, --until,
-    --every and --budget are for these: what 60 s of processor time do not suffice for is left out and named. An engine
-    of --engine that has no row in the file gets one that claims nothing.
+    For a scene or a robot file every formulation that can represent it is run, without claims. --set, --until, --every
+    and --budget are for these; runs beyond 60 s of processor time are left out and named. An --engine without a row in
+    the file gets a row without claims.
     """
     from proofroll.report.comparison.summary import outcome_content
     from proofroll.report.terminal.tables import verdict_parts

@@ -18,7 +18,7 @@ def findings(
     ] = PROGRAM_TIME_LIMIT,
     as_json: options.Json = False,
 ) -> None:
-    """Run what was found out about engines against what is installed: what still shows, and what is gone."""
+    """Run the programs of the findings with the installed engines: which still show, and which are gone."""
     import dataclasses
 
     from proofroll.report.terminal.findings import findings_list, findings_table

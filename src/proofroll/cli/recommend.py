@@ -67,10 +67,10 @@ def recommend(
     It chooses among models of engines; solutions of the scene's own equations (closed form, reduced, projection) are
     listed apart, unless --engine asks for them. Of the cheaper ones, which all fail, the most accurate is shown.
 
-    The runs of a report answer, OUT/report.json unless --report names another, for a group (as loops), several scenes
-    or studies, and a scene that it has: a choice for each, over all, and what every engine costs. Without --tolerance
-    it is 1e-4 of the path, as on the first screen. A scene that the report does not have is answered from measured
-    curves. Where --forces asks for forces that are not judged, the choice is for motion alone.
+    A group (as loops), several scenes or studies, and a scene in the report are answered from the report's runs
+    (OUT/report.json, or --report): a choice for each, one over all, and the cost of every engine. The default tolerance
+    is 1e-4 of the path, as on the first screen. Another scene is answered from measured curves. If --forces asks for
+    forces that are not judged, the choice is for motion alone.
     """
     if budget is not None:
         raise InputError("--budget", budget, "here it is --max-cost; elsewhere a budget is processor time")

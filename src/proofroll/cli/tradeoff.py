@@ -45,7 +45,7 @@ def tradeoff(
 ) -> None:
     """Measure error against cost for every engine, formulation and setting, from coarse to fine.
 
-    With all engines on a scene that no file asks about it is brief, and drops what --budget does not suffice for.
+    With all engines, and a scene that no file asks about, the study is brief and drops the points beyond --budget.
     """
     from proofroll.report.tradeoff.tables import default_quantities, tradeoff_parts
     from proofroll.report.tradeoff.work_precision import svg

@@ -39,8 +39,8 @@ def check(
 ) -> None:
     """Check a scene or a comparison without running it, or a robot file with every engine's own importer.
 
-    Of a scene it says where things start, with the normal force or the degrees of freedom, and --plot draws it.
-    Of a robot file: exit 1 if an engine (or the file of --against) does not hold the model that the file describes, or
+    For a scene it prints the start, with the normal force or the degrees of freedom; --plot draws it.
+    For a robot file: exit 1 if an engine (or the file of --against) does not hold the model that the file describes, or
     if the file is physically impossible. The other options are for these.
     """
     if is_text_check(file):
