@@ -21,6 +21,7 @@ from proofroll.elements.mechanism.composed import Cable, Gimbal, Screw, SprungJo
 from proofroll.elements.mechanism.contacts import geometry as contacts
 from proofroll.elements.mechanism.drives import ActuatorKind
 from proofroll.elements.mechanism.joint_kinds import LOOP_FACTS, JointKind
+from proofroll.elements.mechanism.parts import Axes, ForceKind
 from proofroll.files.scene_file import SceneFile
 from proofroll.files.scene_parameters import Parameter
 from proofroll.studies.stability import axes
@@ -191,8 +192,11 @@ def _type(annotation: Any) -> str:
         "Tolerance": '"1e-3 m" or "1 %"',
         "float | Formula | Table": "number, formula of t, or table",
         "GeometryKind": " or ".join(get_args(contacts.GeometryKind)),
+        "ForceKind": " or ".join(get_args(ForceKind)),
+        "Axes": " or ".join(get_args(Axes)),
         "ActuatorKind": " or ".join(get_args(ActuatorKind)),
     }
+    text = re.sub(r"JointKind\.(\w+)", lambda found: found[1].lower(), text)
     text = re.sub(r"Literal\[([^]]*)\]", lambda found: found[1].replace(", ", " or "), text)
     text = re.sub(r"\b(?:tuple|list)\[", "[", re.sub(r"\bstr\b", "text", text)).replace("FloatOrInf", "float")
     return known.get(text, text.replace(" | None", "").replace("Tolerance", '"1e-3 m"').replace("|", "or"))
