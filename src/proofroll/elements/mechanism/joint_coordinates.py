@@ -77,6 +77,7 @@ class JointCoordinates:
         self.actuators = [(actuator, *mechanism.place_of(actuator.joint)) for actuator in mechanism.actuators]
         self.limited = [place for place in self.actuators if place[0].limit is not None]
         self._clamped = [actuator.limit is not None for actuator in mechanism.actuators]
+        self.sides: Mode = ()  # modes of limited efforts that are kept; empty: they follow from the state
         self.switches = bool(self.switched or self.limited)
         self._light = self.rank > 0 and lacks_inertia(mechanism)
         self._armature = np.diag([joint.armature for joint in by_velocity])
@@ -167,7 +168,7 @@ class JointCoordinates:
 
     def efforts(self, time: float, q: Array, v: Array, mode: Mode = ()) -> list[float]:
         """Effort of each actuator at its joint [N m, N], by its mode if ``mode`` has one, else clamped to its limit."""
-        modes = iter(mode[len(self.switched) :])
+        modes = iter(mode[len(self.switched) :] or self.sides)
         return [
             actuator.effort(time, float(q[at_q]), float(v[at_v]), next(modes, None) if clamped else "linear")
             for (actuator, at_q, at_v), clamped in zip(self.actuators, self._clamped, strict=True)

@@ -16,9 +16,10 @@ from proofroll.truth.mechanism.contact_symbols import (
     SolvedSymbols,
     Vector,
     eliminated,
-    limit_guard,
+    limited,
     of_joint,
     rows_of,
+    worth_compiling,
 )
 from proofroll.truth.mechanism.maximal_bodies import AXES, BodyInScalars
 from proofroll.truth.mechanism.maximal_equations import Drive, Switched
@@ -53,26 +54,32 @@ class BodySymbols:
         """True if all parts of the mechanism have a rule here."""
         bodies = self._bodies
         shapes = all(map(known_shapes, bodies.mechanism.contacts))
-        return shapes and not (bodies.light or bodies.mechanism.moved_by_tables)
+        m = bodies.mechanism
+        return shapes and worth_compiling(m) and not (bodies.light or m.moved_by_tables)
 
     def solved(
         self,
         state: Sequence[Scalar],
         mode: ContactMode,
-        clamped: Sequence[int],
+        clamped: Sequence[Scalar],
         began: Sequence[Vector | None],
         functions: Any,
     ) -> SolvedSymbols:
         """Rates and forces for a state that ends with the time; ``began``: line of each contact at the start."""
         e = self._bodies
-        limited = [k for k, actuator in enumerate(e.mechanism.actuators) if actuator.limit is not None]
-        bounds = {k: float(e.mechanism.actuators[k].bound) for k in limited}
-        efforts = {k: sign * bounds[k] for k, sign in zip(limited, clamped, strict=True) if sign}
-        now = e.at(state[:-1], functions, Switched(clamped=efforts), time=state[-1])
-        limits = [
-            limit_guard(self._wanted(state, k, functions), bounds[k], sign, functions["sqrt"])
-            for k, sign in zip(limited, clamped, strict=True)
+        numbers_of_limits = [k for k, actuator in enumerate(e.mechanism.actuators) if actuator.limit is not None]
+        limited_ones = [
+            (
+                k,
+                limited(
+                    self._wanted(state, k, functions), float(e.mechanism.actuators[k].bound), sign, functions["sqrt"]
+                ),
+            )
+            for k, sign in zip(numbers_of_limits, clamped, strict=True)
         ]
+        efforts = {k: effort for k, (effort, _) in limited_ones}
+        now = e.at(state[:-1], functions, Switched(clamped=efforts), time=state[-1])
+        limits = [guard for _, (_, guard) in limited_ones]
         numbers = [law.joint.number for law in self._laws]
         at = _Now(now.views, e.rate_rows(state[:-1], numbers, functions))
         touching = [*self._touching(now.views, features_of(mode), functions), *self._of_joints(state, at)]

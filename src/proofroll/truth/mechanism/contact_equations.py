@@ -43,6 +43,7 @@ class BodiesState:
         residual: violations of all rows of joints and loops.
         u: velocities, (nu).
         centres: centres of mass of the bodies, and the world's origin, (bodies + 1, 3).
+        angle_rate: rates of the angles that are integrated.
     """
 
     touching: tuple[Touching, ...]
@@ -55,6 +56,7 @@ class BodiesState:
     residual: Array
     u: Array
     centres: Array
+    angle_rate: Array
 
 
 @dataclass(frozen=True)
@@ -107,6 +109,7 @@ class ContactEquations:
         self.pairs = [(index[contact.body_a], index[contact.body_b]) for contact in mechanism.contacts]
         self._com = [np.array(body.com) for body in mechanism.bodies] + [np.zeros(3)]
         self._limited = {k: actuator for k, actuator in enumerate(mechanism.actuators) if actuator.limit is not None}
+        self._sides: tuple[int, ...] = ()
         self._last = LastResults[tuple[bytes, tuple[float, ...], Features | None], BodiesState](_KEPT)
         self._driven = [mechanism.joint_index[actuator.joint] for actuator in self._limited.values()]
 
@@ -115,7 +118,7 @@ class ContactEquations:
 
         ``features``: of solids that touch; None: the nearest.
         """
-        key = state.tobytes(), self.mechanism.held, features
+        key = state.tobytes(), (*self.mechanism.held, *self._sides), features
         return self._last.of(key, lambda: self._at(state.copy(), features))
 
     def _at(self, state: Array, features: Features | None) -> BodiesState:
@@ -178,6 +181,7 @@ class ContactEquations:
             residual=residual,
             u=state[e.nx : e.nx + e.nu],
             centres=centres,
+            angle_rate=np.array(constrained.angle_rate, dtype=float),
         )
 
     def accelerated(self, state: BodiesState, mode: ContactMode) -> BodiesSolution:
@@ -315,30 +319,27 @@ class ContactEquations:
     def rate(self, state: Array, mode: ContactMode) -> Array:
         """Time derivative of a state in a mode."""
         e, unit = self.equations.equations, self.equations.normalised(state)
-        solution = self.accelerated(self.at(unit, features_of(mode)), mode)
+        solution = self.accelerated(bodies := self.at(unit, features_of(mode)), mode)
         x, u = state[: e.nx], unit[e.nx : e.nx + e.nu]
-        angles = self.equations.loaded(unit[:-1])[0].angle_rate if e.angles else []
-        return np.array([*self.equations.moving(x, u), *solution.moved, *angles, 1.0], dtype=float)
+        return np.array([*self.equations.moving(x, u), *solution.moved, *bodies.angle_rate, 1.0], dtype=float)
 
-    def _wanted(self, state: Array) -> Array:
-        """Efforts that the actuators with a limit would apply without it [N m, N]."""
+    def drawn(self, state: Array) -> Array:
+        """Efforts with a limit before they are clamped, in parts of their limits."""
         if not self._limited:
             return np.zeros(0)
-        q, v = self.equations.along(self.equations.normalised(state[:-1]), self._driven)
-        return np.array([m.wanted(state[-1], *at) for m, *at in zip(self._limited.values(), q, v, strict=True)])
+        along = self.equations.along(self.equations.normalised(state[:-1]), self._driven)
+        motors = zip(self._limited.values(), *along, strict=True)
+        return np.array([motor.wanted(state[-1], q, v) / motor.bound for motor, q, v in motors])
 
-    def excess(self, state: Array) -> Array:
-        """Efforts before clamping over their limits, minus 1."""
-        return np.abs(self._wanted(state)) / [actuator.bound for actuator in self._limited.values()] - 1
-
-    def pushes(self, state: Array) -> Array:
-        """Sign of each effort with a limit."""
-        return np.sign(self._wanted(state))
+    def hold_efforts(self, signs: Sequence[int]) -> None:
+        """See :meth:`ContactDynamics.hold_efforts`."""
+        self._sides = tuple(signs)
 
     def clamped(self, state: Array) -> Switched:
         """Switched state with the efforts that are clamped at their limits."""
-        wanted = zip(self._limited.items(), self._wanted(state), strict=True)
-        return Switched(clamped={k: float(np.clip(w, -m.bound, m.bound)) for (k, m), w in wanted if abs(w) > m.bound})
+        sides = self._sides or [np.clip(part, -1, 1) if abs(part) > 1 else 0 for part in self.drawn(state)]
+        pairs = zip(self._limited.items(), sides, strict=True)
+        return Switched(clamped={k: float(side * m.bound) for (k, m), side in pairs if side})
 
     def switched(self, state: Array, mode: ContactMode) -> Switched:
         """Joints that are held or slide with friction in a mode, and clamped efforts."""
@@ -380,10 +381,7 @@ class ContactEquations:
 
 
 def _independent(C: Array, bias: Array, most: int) -> tuple[Array, Array]:
-    """Independent rows that are equivalent to all rows, at ``most`` as many as at the start.
-
-    Rows that hold a planar body in its plane are none at all, but for the round-off of a turned frame.
-    """
+    """Independent rows equivalent to all, at ``most`` so many; those of a planar body in its plane are round-off."""
     if not C.size:
         return C, bias
     U, values, Vt = np.linalg.svd(C, full_matrices=False)

@@ -8,6 +8,8 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
+from proofroll.elements.mechanism import Mechanism
+from proofroll.elements.mechanism.checks import WORLD
 from proofroll.elements.mechanism.contacts.acting import FAINT, Acting, ContactMode
 from proofroll.elements.mechanism.contacts.joint_laws import JointContact
 from proofroll.elements.mechanism.contacts.touching import FLAT
@@ -19,11 +21,22 @@ from proofroll.truth.mechanism.contact_guards import (
     Touchable,
 )
 from proofroll.truth.mechanism.contact_scalars import ScalarTouch, floats
-from proofroll.truth.scalars import Scalar, dot, is_zero, minus, mul, scaled, sub
+from proofroll.truth.scalars import Scalar, add, dot, is_zero, minus, mul, scaled, sub
 
 Vector = Sequence[Scalar]
 Row = dict[int, Scalar]
+_MOST_VELOCITIES = 10  # of one tree whose modes are compiled: 8 take a quarter of a second, 12 take eight seconds
 _NONE = (0.0, 0.0, 0.0)
+
+
+def worth_compiling(mechanism: Mechanism) -> bool:
+    """True if no tree of bodies has so many velocities that to compile its elimination takes longer than to run it."""
+    moves: dict[str, int] = {WORLD: 0}
+    root: dict[str, str] = {}
+    for joint in mechanism.joints:  # parents come first
+        root[joint.child] = joint.child if joint.parent == WORLD else root[joint.parent]
+        moves[root[joint.child]] = moves.get(root[joint.child], 0) + joint.nv
+    return max(moves.values()) <= _MOST_VELOCITIES
 
 
 class SolvedSymbols(NamedTuple):
@@ -84,10 +97,11 @@ def of_joint(contact: JointContact, q: Scalar, v: Scalar) -> ScalarTouch:
     )
 
 
-def limit_guard(wanted: Scalar, bound: float, clamped: int, root: Callable[[Scalar], Scalar]) -> Scalar:
-    """Guard of an effort with a limit; ``clamped``: its sign if it is at the limit, else 0."""
+def limited(wanted: Scalar, bound: float, sign: Scalar, root: Callable[[Scalar], Scalar]) -> tuple[Scalar, Scalar]:
+    """Effort with a limit, and its guard; ``sign``: of an effort at its limit, 0 of one within, a parameter."""
+    within = sub(1.0, mul(sign, sign))
     excess = sub(root(mul(wanted, wanted)) / bound, 1.0)
-    return sub(0.0, excess) if clamped else excess
+    return add(mul(within, wanted), mul(sign, bound)), mul(sub(mul(2.0, within), 1.0), excess)
 
 
 def rows_of(

@@ -10,9 +10,10 @@ from __future__ import annotations
 
 from collections import OrderedDict
 from collections.abc import Callable, Iterator, Sequence
+from copy import copy
 from dataclasses import dataclass
 from threading import get_ident
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol, Self
 
 import numpy as np
 
@@ -65,7 +66,7 @@ class ModeSymbols(Protocol):
         self,
         state: Sequence[Scalar],
         mode: ContactMode,
-        clamped: Sequence[int],
+        clamped: Sequence[Scalar],
         began: Sequence[Vector | None],
         functions: Any,
     ) -> SolvedSymbols:
@@ -121,21 +122,21 @@ class CompiledModes:
         self._symbols, self._contacts, self._length = symbols, contacts, length
         self._by_collocation = by_collocation
         self._covers = heyoka is not None and symbols.covers
-        self._modes: dict[tuple[tuple[int, ...], tuple[tuple[str, bool, int], ...]], CompiledMode] = {}
+        self._modes: dict[tuple[tuple[str, bool, int], ...], CompiledMode] = {}
 
     def of(self, mode: ContactMode, clamped: tuple[int, ...]) -> CompiledMode | None:
-        """Compiled mode, by the signs of efforts at their limits.
+        """Compiled mode with these signs of efforts at their limits, 0 of one within.
 
         None: heyoka is missing, or a part of the mechanism has no rule in symbols.
         """
         if not self._covers or not follows(mode, self._contacts):
             return None
-        key = clamped, tuple((own.kind, own.along is not None, own.feature) for own in mode)
+        key = tuple((own.kind, own.along is not None, own.feature) for own in mode)
         if key not in self._modes:
             self._modes[key] = CompiledMode(
-                self._symbols, self._contacts, mode, clamped, self._length, self._by_collocation
+                self._symbols, self._contacts, mode, len(clamped), self._length, self._by_collocation
             )
-        return self._modes[key]
+        return self._modes[key].at_limits(clamped)
 
 
 class _Compiled(NamedTuple):
@@ -177,12 +178,14 @@ class CompiledMode:
         symbols: ModeSymbols,
         contacts: Sequence[Touchable],
         mode: ContactMode,
-        clamped: Sequence[int],
+        limits: int,
         length: int,
         by_collocation: bool,
     ) -> None:
         lined = [k for k, own in enumerate(mode) if own.along is not None]
-        constants = Constants(lambda index: heyoka.par[index], 3 * len(lined), heyoka.expression)
+        constants = Constants(lambda index: heyoka.par[index], 3 * len(lined) + limits, heyoka.expression)
+        clamped = [Symbol(heyoka.par[3 * len(lined) + number], constants) for number in range(limits)]
+        self._clamped: tuple[int, ...] = (0,) * limits
         state = [heyoka.make_vars(f"s{index}") for index in range(length)]
         functions = constants.functions({name: getattr(heyoka, name) for name in FUNCTIONS})
         began: list[Vector | None] = [None] * len(mode)
@@ -204,6 +207,12 @@ class CompiledMode:
             expressions += [pace * rate for rate in expressions[-len(state) :]]
         self._values, self._integrator = _compiled(expressions, state, by_collocation)
 
+    def at_limits(self, clamped: tuple[int, ...]) -> Self:
+        """The same mode with these signs of efforts at their limits."""
+        other = copy(self)
+        other._clamped = clamped
+        return other
+
     def _guards(self, pars: Array, states: Array) -> Array:
         """Guards at states (state, places), (places, guards).
 
@@ -216,9 +225,9 @@ class CompiledMode:
         return guards
 
     def _parameters(self, mode: ContactMode, time: float) -> Array:
-        """Run-time parameters of a stretch: lines of contacts at its start, numbers of the scene, lines of signals."""
+        """Run-time parameters of a stretch: lines of contacts, signs of efforts, numbers, lines of signals."""
         own = [x for k in self._lined for x in mode[k].along or ()]
-        return np.concatenate([own, self._constants.values(time)])[: self._values.nparams]
+        return np.concatenate([own, self._clamped, self._constants.values(time)])[: self._values.nparams]
 
     def values(self, states: Array, mode: ContactMode) -> tuple[Array, Array, Array]:
         """Guards, numbers of slips and rates of states (times, state) of one stretch, each (times, …)."""

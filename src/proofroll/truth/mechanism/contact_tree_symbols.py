@@ -22,9 +22,10 @@ from proofroll.truth.mechanism.contact_symbols import (
     SolvedSymbols,
     Vector,
     eliminated,
-    limit_guard,
+    limited,
     of_joint,
     rows_of,
+    worth_compiling,
 )
 from proofroll.truth.mechanism.maximal_bodies import clean
 from proofroll.truth.mechanism.tree_loads import NONE as _NONE
@@ -66,13 +67,13 @@ class TreeSymbols:
         """True if all parts of the mechanism have a rule here."""
         m = self._mechanism
         shapes = all(map(known_shapes, m.contacts))
-        return shapes and not (m.loops or m.couplings or m.moved_by_tables)
+        return shapes and worth_compiling(m) and not (m.loops or m.couplings or m.moved_by_tables)
 
     def solved(
         self,
         state: Sequence[Scalar],
         mode: ContactMode,
-        clamped: Sequence[int],
+        clamped: Sequence[Scalar],
         began: Sequence[Vector | None],
         functions: Any,
     ) -> SolvedSymbols:
@@ -199,7 +200,7 @@ class TreeSymbols:
         q: Sequence[Scalar],
         v: Sequence[Scalar],
         time: Scalar,
-        clamped: Sequence[int],
+        clamped: Sequence[Scalar],
         functions: Any,
     ) -> tuple[list[Row], list[Scalar], list[Scalar]]:
         """Mass matrix and loads along the velocities, and guards of efforts with a limit."""
@@ -233,9 +234,8 @@ class TreeSymbols:
             place, n = m.place_of(actuator.joint)
             wanted = actuator.wanted(time, q[place], v[n], functions)
             if actuator.limit is not None:
-                sign = clamped[len(limits)]
-                limits.append(limit_guard(wanted, float(actuator.bound), sign, functions["sqrt"]))
-                wanted = sign * float(actuator.bound) if sign else wanted
+                wanted, guard = limited(wanted, float(actuator.bound), clamped[len(limits)], functions["sqrt"])
+                limits.append(guard)
             load[n] = add(load[n], wanted)
         add_point_loads(m, bodies, load, time, functions)
         for joint, _, n in m.prescribed:

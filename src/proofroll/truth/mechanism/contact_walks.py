@@ -71,11 +71,11 @@ class SwitchedEquations(Protocol):
     def eliminated(self, state: Array, mode: ContactMode, /) -> Array:
         """State without violations of what holds."""
 
-    def excess(self, state: Array, /) -> Array:
-        """Efforts before clamping over their limits, minus 1."""
+    def drawn(self, state: Array, /) -> Array:
+        """Efforts with a limit before they are clamped, in parts of their limits."""
 
-    def pushes(self, state: Array, /) -> Array:
-        """Sign of each effort with a limit."""
+    def hold_efforts(self, signs: Sequence[int], /) -> None:
+        """Keeps efforts with a limit at it, by their sign, or within it (0); without signs they follow the state."""
 
 
 class ContactWalks(ABC):
@@ -123,21 +123,30 @@ class ContactWalks(ABC):
         """Geometry and sliding velocity of each contact at a state; ``features``: of solids that touch."""
 
     def _law(self, state: Array, mode: ContactMode) -> StretchLaw:
-        guards, equations = guards_of(self.contacts, mode), self._equations
+        guards, equations, signs = guards_of(self.contacts, mode), self._equations, self._clamped(state, mode)
         # sign of the guard of an effort: it reaches its limit, or comes back from it
-        side = np.zeros(0)
-        if len(equations.excess(state)):
-            side = np.where(equations.excess(state + AHEAD * equations.rate(state, mode)) > 0, 1.0, -1.0)
-        noise = np.where(np.abs(excess := equations.excess(state)) < _CLAMPED, 2 * np.abs(excess), 0.0)
+        side = np.array([1.0 if sign else -1.0 for sign in signs])
+        excess = np.abs(equations.drawn(state)) - 1
+        noise = np.where(np.abs(excess) < _CLAMPED, 2 * np.abs(excess), 0.0)
+
+        def rates(y: Array) -> Array:
+            equations.hold_efforts(signs)
+            try:
+                return equations.rate(y, mode)
+            finally:
+                equations.hold_efforts(())
+
         return StretchLaw(
-            rates=lambda y: equations.rate(y, mode),
-            guards=lambda y: np.append(self._guards(y, mode, guards), -side * equations.excess(y)),
+            rates=rates,
+            guards=lambda y: np.append(self._guards(y, mode, guards), -side * (np.abs(equations.drawn(y)) - 1)),
             corrected=lambda y: equations.eliminated(y, mode),
             noise=np.append(noise_of(guards, self._size), noise),
             near=np.append([CLOSE * (guard.kind == "close") for guard in guards], np.zeros_like(noise)),
         )
 
     def _guards(self, state: Array, mode: ContactMode, guards: Sequence[ContactGuard]) -> FloatArray:
+        if not guards:
+            return np.zeros(0)
         solved, contacts = self._solved(state, mode), self.contacts
         normals = pressing(solved.mode, solved.touching, solved.force, solved.splits)
         return np.array([guard_value(guard, mode, contacts, solved, normals) for guard in guards])
@@ -211,11 +220,10 @@ class ContactWalks(ABC):
     def _clamped(self, state: Array, mode: ContactMode) -> tuple[int, ...]:
         """Sign of each effort that is at its limit in a stretch from a state, 0 of others, of those with a limit."""
         equations = self._equations
-        if not len(equations.excess(state)):
+        if not self._limited:
             return ()
-        ahead = state + AHEAD * equations.rate(state, mode)
-        signs = np.where(equations.excess(ahead) > 0, equations.pushes(ahead), 0.0)
-        return tuple(int(sign) for sign in signs)
+        ahead = equations.drawn(state + AHEAD * equations.rate(state, mode))
+        return tuple(int(np.sign(part)) if abs(part) > 1 else 0 for part in ahead.tolist())
 
     def within(self, stretch: Stretch[ContactMode], times: Array) -> Array:
         """See the protocol."""

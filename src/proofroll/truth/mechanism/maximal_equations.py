@@ -50,7 +50,7 @@ class Switched(NamedTuple):
     held: tuple[int, ...] = ()
     stopped: tuple[int, ...] = ()
     push: Mapping[int, float] = {}
-    clamped: Mapping[int, float] = {}
+    clamped: Mapping[int, Scalar] = {}
 
 
 @dataclass(frozen=True)

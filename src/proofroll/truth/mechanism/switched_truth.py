@@ -70,7 +70,7 @@ def _reaches_none(mechanism: Mechanism, times: Array) -> bool:
     scout = ContactTree(ContactDynamics(_narrower(own)), _SCOUT, 1.0)
     begun = scout.begin()
     assert begun.mode is not None  # every start has a mode
-    if any(own.kind != "open" for own in begun.mode) or np.any(scout.dynamics.excess(begun.state) > 0):
+    if any(own.kind != "open" for own in begun.mode) or np.any(np.abs(scout.dynamics.drawn(begun.state)) > 1):
         return False
     with units.errors_in_seconds():
         return scout.walk(0.0, begun.state, begun.mode, float(times[-1]) / units.time).guard is None

@@ -47,6 +47,7 @@ from proofroll.elements.mechanism.contacts.turning import (
     shut_by_pressing,
     turning_frictions,
 )
+from proofroll.elements.mechanism.drives import MODES
 from proofroll.elements.mechanism.joint_coordinates import JointCoordinates
 from proofroll.elements.mechanism.joint_kinds import JointKind
 from proofroll.elements.mechanism.model import Mechanism
@@ -77,14 +78,14 @@ class ContactDynamics:
         self.sums = np.pad(pair_sums(mechanism.contacts), ((0, 0), (0, others)))
         index = mechanism.body_index
         self._bodies = [(index[contact.body_a], index[contact.body_b]) for contact in mechanism.contacts]
-        self._last = LastResults[tuple[bytes, bytes, float, tuple[float, ...], Features | None], ContactsNow](4)
+        self._last = LastResults[tuple[bytes, bytes, float, tuple[object, ...], Features | None], ContactsNow](4)
 
     def at(self, q: Array, v: Array, time: float = 0.0, features: Features | None = None) -> ContactsNow:
         """Kinematics and free accelerations for coordinates (nq) and velocities (nv) at a time [s].
 
         ``features``: of solids that touch; None: the nearest.
         """
-        key = q.tobytes(), v.tobytes(), time, self.mechanism.held, features
+        key = q.tobytes(), v.tobytes(), time, (*self.mechanism.held, *self.equations.sides), features
         return self._last.of(key, lambda: self._at(q.copy(), v.copy(), time, features))
 
     def _at(self, q: Array, v: Array, time: float, features: Features | None) -> ContactsNow:
@@ -198,17 +199,14 @@ class ContactDynamics:
         nq = self.mechanism.nq
         return y[:nq], y[nq:-1], float(y[-1])
 
-    def excess(self, y: Array) -> Array:
-        """Relative excess of wanted efforts over their limits, (limited actuators,); below 0 within the limit."""
+    def drawn(self, y: Array) -> Array:
+        """Efforts with a limit before they are clamped, in parts of their limits."""
         q, v, time = self.parts(y)
-        return np.array(
-            [abs(m.wanted(time, q[at_q], v[at_v])) / m.bound - 1 for m, at_q, at_v in self.equations.limited]
-        )
+        return np.array([m.wanted(time, q[at_q], v[at_v]) / m.bound for m, at_q, at_v in self.equations.limited])
 
-    def pushes(self, y: Array) -> Array:
-        """Sign of each effort with a limit, (limited actuators,)."""
-        q, v, time = self.parts(y)
-        return np.array([np.sign(m.wanted(time, q[at_q], v[at_v])) for m, at_q, at_v in self.equations.limited])
+    def hold_efforts(self, signs: Sequence[int]) -> None:
+        """Keeps efforts with a limit at it, by their sign, or within it (0); without signs they follow the state."""
+        self.equations.sides = tuple(MODES[sign + 1] for sign in signs)
 
     def eliminated(self, y: Array, mode: ContactMode) -> Array:
         """The state with violations of loops, closed contacts and unit quaternions removed."""
@@ -234,11 +232,7 @@ class ContactDynamics:
         return np.concatenate([q, v, [time]])
 
     def begin(self) -> tuple[ContactMode, float]:
-        """Mode at the start, and its margin to another one: inf, or 0 if it is not unique.
-
-        Raises:
-            Refused: a joint with dry friction starts on a stop.
-        """
+        """Mode at the start, and its margin to another one: inf, or 0 if it is not unique."""
         q, v = self.mechanism.start()
         scale = natural_scale(self.mechanism)
         turns = [isinstance(c, JointContact) and self.mechanism.joints[c.joint.number].kind != JointKind.PRISMATIC
