@@ -8,8 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
-from proofroll.elements.mechanism import Mechanism
-from proofroll.elements.mechanism.checks import WORLD
+from proofroll.elements.mechanism import WORLD, Mechanism
 from proofroll.elements.mechanism.contacts.acting import FAINT, Acting, ContactMode
 from proofroll.elements.mechanism.contacts.joint_laws import JointContact
 from proofroll.elements.mechanism.contacts.touching import FLAT
