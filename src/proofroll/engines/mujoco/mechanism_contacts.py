@@ -12,7 +12,7 @@ import numpy as np
 
 from proofroll.core.errors import Refused
 from proofroll.elements.mechanism import WORLD, Mechanism, Tree
-from proofroll.elements.mechanism.contacts.box_features import CORNERS, SLOTS
+from proofroll.elements.mechanism.contacts.box_features import CORNERS, BoxSlot
 from proofroll.elements.mechanism.contacts.geometry import BodyContact
 from proofroll.elements.mechanism.contacts.shapes import (
     BoxShape,
@@ -233,9 +233,11 @@ class Contacts:
         if number not in self._boxes:
             return number, sign
         contacts, none = self._mechanism.contacts, np.zeros(3)
+        slot = contacts[number].box_slot
+        assert slot is not None  # as of all of these
         bodies = [self._model.body(name).id for name in (contacts[number].body_a, contacts[number].body_b)]
         a, b = (Moving(data.xpos[body], data.xmat[body].reshape(3, 3), none, none) for body in bodies)
-        found = [touch(contacts[k], a, b) for k in range(number, number + SLOTS)]
+        found = [touch(contacts[k], a, b) for k in range(number, number + slot.count)]
         away = [np.inf if each.absent else float(np.linalg.norm(each.place - contact.pos)) for each in found]
         return number + int(np.argmin(away)), sign
 
@@ -321,5 +323,5 @@ class Contacts:
     def _to_surface(self, number: int) -> float:
         """Signed half: times the gap, the step along the normal from MuJoCo's contact point to the curved shape."""
         contact = self._mechanism.contacts[number]
-        of_second = contact.box_slot is not None and CORNERS <= contact.slot < 2 * CORNERS  # a corner of it
+        of_second = isinstance(contact.box_slot, BoxSlot) and CORNERS <= contact.slot < 2 * CORNERS  # a corner of it
         return -0.5 if isinstance(contact.shape_a, HalfSpace) or of_second else 0.5

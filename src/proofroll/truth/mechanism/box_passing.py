@@ -6,6 +6,7 @@ import numpy as np
 
 from proofroll.core.errors import NotUnique
 from proofroll.elements.mechanism.contacts.acting import ContactMode, Features, closed_in, features_of
+from proofroll.elements.mechanism.contacts.box_features import BoxSlot
 from proofroll.elements.mechanism.contacts.geometry import BodyContact
 from proofroll.elements.mechanism.contacts.touching import Touching
 from proofroll.elements.mechanism.rotations import Array
@@ -38,20 +39,19 @@ def passed_boxes(
     (k, border), (state, ahead) = guard, states
     closed, features, time = closed_in(mode), list(features_of(mode)), float(state[-1])
     group = [number for number, contact in enumerate(contacts) if contact.pair == contacts[k].pair]
-    there = touching(ahead, tuple(each | (number in group) for number, each in enumerate(features)))
-    inside = {number for number in group if there[number].borders[0].left_by > 0}
-    if border and any(closed[number] for number in inside):
-        raise NotUnique(
-            f"the boxes of {contacts[k].pair} have turned so far at t = {time:.6g} s that other faces meet than those "
-            "that touch, and what their corners and edges do then is not followed; end before"
-        )
-    if border:
-        nearest = touching(ahead, None)
-        for number in group:
-            features[number] = nearest[number].feature
-    else:
-        for number in group:
-            features[number] = (features[number] | 1) ^ (number in inside)
+    nearest = touching(ahead, None)
+    if isinstance(contacts[k].box_slot, BoxSlot):
+        there = touching(ahead, tuple(each | (number in group) for number, each in enumerate(features)))
+        inside = {number for number in group if there[number].borders[0].left_by > 0}
+        if border and any(closed[number] for number in inside):
+            raise NotUnique(
+                f"the boxes of {contacts[k].pair} have turned so far at t = {time:.6g} s that other faces meet than "
+                "those that touch, and what their corners and edges do then is not followed; end before"
+            )
+        same = {number: (features[number] | 1) ^ (number in inside) for number in group}
+    for number in group:
+        of_boxes = isinstance(contacts[k].box_slot, BoxSlot) and not border
+        features[number] = same[number] if of_boxes else nearest[number].feature
     here = touching(state, tuple(features))
     for number in group:
         each = here[number]
@@ -60,7 +60,7 @@ def passed_boxes(
         elif not closed[number]:
             slot = contacts[number].box_slot
             assert slot is not None  # as of all of the pair
-            if not slot.of_edges and each.gap < -_TOUCHES * size:
+            if not slot.strikes_sides and each.gap < -_TOUCHES * size:
                 raise NotUnique(
                     f"a corner of {contacts[k].pair} meets a side of the other box at t = {time:.6g} s, below its "
                     "edge, which is not followed; end before"
@@ -70,8 +70,14 @@ def passed_boxes(
 
 
 def beside_border(
-    mode: ContactMode, k: int, touching: Callable[[Array, Features | None], Sequence[Touching]], ahead: Array
+    contacts: Sequence[BodyContact],
+    mode: ContactMode,
+    k: int,
+    touching: Callable[[Array, Features | None], Sequence[Touching]],
+    ahead: Array,
 ) -> bool:
     """True if a contact ``k`` of two boxes is absent at a state a little ahead, with the same faces."""
-    features = tuple(each | (number == k) for number, each in enumerate(features_of(mode)))
-    return bool(touching(ahead, features)[k].borders[0].left_by <= 0)
+    if isinstance(contacts[k].box_slot, BoxSlot):
+        features = tuple(each | (number == k) for number, each in enumerate(features_of(mode)))
+        return bool(touching(ahead, features)[k].borders[0].left_by <= 0)
+    return touching(ahead, None)[k].absent

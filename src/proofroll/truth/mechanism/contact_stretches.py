@@ -175,7 +175,7 @@ class ContactStretches(ContactWalks):
     def _beside(self, stretch: Stretch[ContactMode], k: int) -> bool:
         """True for a corner of a box that comes down on a border of a face as it passes it: it strikes nothing."""
         of_boxes = k < len(bodies := self._equations.mechanism.contacts) and bodies[k].box_slot is not None
-        return of_boxes and beside_border(stretch.mode, k, self._touching, self._ahead(stretch))
+        return of_boxes and beside_border(bodies, stretch.mode, k, self._touching, self._ahead(stretch))
 
     def _passed(self, stretch: Stretch[ContactMode], k: int, border: int) -> Transition[ContactMode]:
         """Transition where the nearest features of solids are left by a border: rates of normals jump, slips go on."""

@@ -11,6 +11,7 @@ from __future__ import annotations
 import itertools
 from dataclasses import dataclass
 from functools import cache, cached_property
+from typing import ClassVar
 
 import numpy as np
 
@@ -133,7 +134,7 @@ class Lying:
         ends = np.maximum(np.abs(s) - self.half_a[along_a][:, None], np.abs(t) - self.half_b[along_b])
         beyond = np.maximum(ends, (np.maximum.reduce(behind) - _BEHIND) * size)
         beyond = np.maximum(beyond, -np.sum(n * d, axis=-1) - _BEHIND * size)
-        return np.asarray(np.where(parallel, size, beyond))
+        return np.asarray(np.where(parallel, size, np.minimum(beyond, size)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,6 +144,13 @@ class BoxSlot:
     first: BoxShape
     second: BoxShape
     slot: int
+
+    count: ClassVar[int] = SLOTS
+
+    @property
+    def strikes_sides(self) -> bool:
+        """False for a corner that comes on a face from beside it, below its border: it strikes a side there."""
+        return self.of_edges
 
     @property
     def leads(self) -> bool:

@@ -14,7 +14,8 @@ from proofroll.core.arrays import read_only
 from proofroll.core.errors import InputError, require_known
 from proofroll.elements.mechanism import checks, rotations
 from proofroll.elements.mechanism.checks import METRES, RADIANS, RATIO, WORLD, ZERO, Vector, Z
-from proofroll.elements.mechanism.contacts.box_features import SLOTS, BoxSlot
+from proofroll.elements.mechanism.contacts.box_features import BoxSlot
+from proofroll.elements.mechanism.contacts.capsule_box import CapsuleBoxSlot
 from proofroll.elements.mechanism.contacts.features import SolidFeatures, features_between
 from proofroll.elements.mechanism.contacts.pair_rules import CURVED, require_rule
 from proofroll.elements.mechanism.contacts.shapes import (
@@ -63,7 +64,8 @@ class Geometry:
         kind: on a plane a box touches with its eight vertices, a ``capsule`` with the spheres and a ``cylinder`` with
             the rims at its two ends; a plane pairs with these, a sphere, ellipsoid or circle. A sphere also pairs with
             a sphere, box, capsule or cylinder, which it meets at the nearest face, edge, corner, side or end, as two
-            capsules meet each other; two boxes meet with corners of faces and edges that cross. A
+            capsules meet each other; two boxes meet with corners of faces and edges that cross, a
+            capsule and a box with ends, and with its side at edges and corners. A
             sphere also pairs with a curved wall: ``bore``, an endless cylindrical hole; ``shaft``, an
             endless cylinder; ``bowl``, the inside of a sphere; ``cone``, its inside; ``torus``, the outside of a ring
             of round wire.
@@ -254,7 +256,7 @@ class BodyContact:
 
     Attributes:
         name: of the pair; on a plane a box adds ``.1`` to ``.8``, a capsule or cylinder ``.1`` and ``.2``; two boxes
-            add ``.1`` to ``.24``.
+            add ``.1`` to ``.24``, a box and a capsule ``.1`` to ``.22``.
         body_a, body_b: of the first and the second geometry.
         shape_a, shape_b: in the frames of these; one of them may be a wall, and a solid meets spheres and solids.
         friction, restitution: of the pair.
@@ -262,7 +264,7 @@ class BodyContact:
         static_friction: coefficient while it sticks; None: the same.
         tangential_restitution: of the pair.
         rolling_resistance, spinning_friction: of the pair [m].
-        slot: number among the contacts of two boxes.
+        slot: number among the contacts of two boxes, or of a box and a capsule.
         bound: largest friction without a normal force; always 0 between bodies [N].
         presses: True, as it has a normal force.
         pressed_by: None, as the force that bounds its friction is its own.
@@ -296,10 +298,15 @@ class BodyContact:
         return features_between(self.shape_a, self.shape_b)
 
     @cached_property
-    def box_slot(self) -> BoxSlot | None:
-        """The contact as one of two boxes; None: it is of other shapes."""
-        if isinstance(self.shape_a, BoxShape) and isinstance(self.shape_b, BoxShape):
-            return BoxSlot(self.shape_a, self.shape_b, self.slot)
+    def box_slot(self) -> BoxSlot | CapsuleBoxSlot | None:
+        """The contact as one of a box and another box or a capsule; None: it is of other shapes."""
+        a, b = self.shape_a, self.shape_b
+        if isinstance(a, BoxShape) and isinstance(b, BoxShape):
+            return BoxSlot(a, b, self.slot)
+        if isinstance(a, CapsuleShape) and isinstance(b, BoxShape):
+            return CapsuleBoxSlot(a, b, self.slot, capsule_first=True)
+        if isinstance(a, BoxShape) and isinstance(b, CapsuleShape):
+            return CapsuleBoxSlot(b, a, self.slot, capsule_first=False)
         return None
 
     @property
@@ -326,7 +333,8 @@ def contacts_of(geometries: Sequence[Geometry], pairs: Sequence[Pair]) -> tuple[
             raise InputError(where, pair.geometries, advice)
         listed[frozenset(pair.geometries)] = pair.name
         require_rule(where, pair, a, b)
-        touching = [(a.solid, b.solid)] * (SLOTS if a.kind == b.kind == "box" else 1)
+        slots = {("box",): BoxSlot.count, ("box", "capsule"): CapsuleBoxSlot.count}
+        touching = [(a.solid, b.solid)] * slots.get(tuple(sorted({a.kind, b.kind})), 1)
         if "plane" in {a.kind, b.kind}:
             touching = list(itertools.product(a.shapes, b.shapes))
         for number, (one, other) in enumerate(touching, 1):

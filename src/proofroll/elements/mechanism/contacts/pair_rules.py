@@ -17,8 +17,8 @@ _SOLID = frozenset({"box", "capsule", "cylinder"})
 _ROOM = 1e-9
 _RULES = (
     "only a plane with a sphere, ellipsoid, circle, box, capsule or cylinder, a sphere with a sphere, box, capsule, "
-    "cylinder or curved wall (bore, shaft, bowl, cone, torus), two capsules and two boxes have a rule; choose one of "
-    "these pairs"
+    "cylinder or curved wall (bore, shaft, bowl, cone, torus), two capsules, two boxes, and a box with a capsule have "
+    "a rule; choose one of these pairs"
 )
 
 
@@ -32,7 +32,7 @@ def require_rule(where: str, pair: Pair, a: Geometry, b: Geometry) -> None:
     elif "plane" in kinds:
         ruled = kinds != {"plane"}
     else:
-        ruled = kinds in ({"capsule"}, {"box"}) or ("sphere" in kinds and kinds <= {"sphere", *_SOLID})
+        ruled = kinds <= {"capsule", "box"} or ("sphere" in kinds and kinds <= {"sphere", *_SOLID})
     if not ruled:
         raise InputError(where, pair.geometries, _RULES)
     balls = [geometry for geometry in (a, b) if geometry.kind == "sphere"]
@@ -46,7 +46,7 @@ def require_rule(where: str, pair: Pair, a: Geometry, b: Geometry) -> None:
 def _require_one_place(pair: Pair, kinds: set[GeometryKind]) -> None:
     """Raises InputError for friction against turning at both ends of a capsule or cylinder, or between boxes."""
     long_body = next(iter(kinds & {"capsule", "cylinder"}), None) if "plane" in kinds else None
-    several = "two boxes touch at several places" if kinds == {"box"} else ""
+    several = "boxes and capsules touch at several places" if "box" in kinds <= {"capsule", "box"} else ""
     several = f"a {long_body} touches at two ends" if long_body else several
     for key in ("rolling_resistance", "spinning_friction"):
         if several and getattr(pair, key):

@@ -6,6 +6,7 @@ import numpy as np
 
 from proofroll.core.errors import NotUnique
 from proofroll.elements.mechanism.contacts.box_features import BoxSlot, Lying
+from proofroll.elements.mechanism.contacts.capsule_box import CapsuleBoxSlot
 from proofroll.elements.mechanism.contacts.features import Border, CapsuleFeatures, SolidFeatures
 from proofroll.elements.mechanism.contacts.geometry import BodyContact
 from proofroll.elements.mechanism.contacts.shapes import (
@@ -105,7 +106,9 @@ def touch(contact: BodyContact, a: Moving, b: Moving, feature: int | None = None
     """
     features = contact.features
     if contact.box_slot is not None:
-        return _touch_boxes(contact.box_slot, a, b, feature)
+        if isinstance(contact.box_slot, BoxSlot):
+            return _touch_boxes(contact.box_slot, a, b, feature)
+        return _touch_capsule(contact.box_slot, a, b, feature)
     if features is None:
         found = _touch(contact.shape_a, a, contact.shape_b, b)
         discs = ((contact.shape_a, a), (contact.shape_b, b))
@@ -139,19 +142,43 @@ def _touch_boxes(slot: BoxSlot, a: Moving, b: Moving, feature: int | None) -> To
         one, two = slot.shapes(feature)
         return _touch(one, a, two, b)._replace(feature=feature, borders=tuple(borders))
     gap = beyond if slot.of_edges else max(beyond, float(heights[slot.slot]))
-    place = lying.place_a  # as edges may be parallel: with the normal of the faces
+    found = _absent(gap, lying.normal(False, faces[1]), lying.place_a, a, b)
+    return found._replace(feature=feature, borders=tuple(borders))
+
+
+def _absent(gap: float, normal: Array, place: Array, a: Moving, b: Moving) -> Touching:
+    """Contact beyond its border, with a place of its bodies, as edges may be parallel."""
     speed, other = a.velocity(place), b.velocity(place)
     return Touching(
         gap=gap,
-        normal=lying.normal(False, faces[1]),
+        normal=normal,
         normal_rate=np.zeros(3),
         place=place,
         place_rate=speed,
         slide=speed - other,
-        feature=feature,
-        borders=tuple(borders),
         absent=True,
     )
+
+
+def _touch_capsule(slot: CapsuleBoxSlot, a: Moving, b: Moving, feature: int | None) -> Touching:
+    """One contact of a capsule and a box; see :func:`touch`."""
+    of_a, of_b = slot.centres
+    places = a.p + a.R @ of_a, b.p + b.R @ of_b
+    (capsule, box), (place, other) = ((a, b), places) if slot.capsule_first else ((b, a), places[::-1])
+    axes = box.R @ slot.box.frame
+    seen = axes.T @ (place - other), axes.T @ (capsule.R @ slot.capsule.axis)
+    feature = slot.nearest(*seen) if feature is None else feature
+    left_by = slot.left_by(feature, *seen)
+    borders = (Border(left_by, feature ^ 1),)
+    if slot.absent(feature):
+        apart = places[0] - places[1]
+        normal = apart / (float(np.linalg.norm(apart)) or 1.0)
+        return _absent(-left_by, normal, places[0], a, b)._replace(feature=feature, borders=borders)
+    one, two = slot.shapes(feature)
+    found = _touch(one, a, two, b)
+    if isinstance(one, Wall) and not isinstance(two, Wall):
+        found = _on_first(found, a, b)
+    return found._replace(feature=feature, borders=borders)
 
 
 _LYING: list[tuple[Moving, Moving, BoxShape, BoxShape, Lying]] = []  # of the last boxes, which have many contacts
