@@ -75,8 +75,8 @@ class ProjectionMechanism:
             raise Refused("contacts are followed in trees, without loops, couplings and prescribed motions")
         if any(contact.box_slot is not None for contact in mechanism.contacts):
             raise Refused(
-                "boxes, and a box and a capsule, meet at places that begin and end at borders of faces, and this solver "
-                "ends a mode where a gap closes, a force ends or a slip stops"
+                "a box meets boxes and capsules at places that begin and end at borders of faces, and this solver ends "
+                "a mode where a gap closes, a force ends or a slip stops"
             )
         if mechanism.contacts and mechanism.cells:
             raise Refused("contacts under held targets are not followed yet")

@@ -18,7 +18,7 @@ from proofroll.elements.mechanism.contacts.walls import Shaft
 from proofroll.elements.mechanism.rotations import Array
 
 ENDS = (-1.0, 1.0)
-EDGES = [(axis, *signs) for axis in range(3) for signs in itertools.product((-1.0, 1.0), repeat=2)]
+EDGES = [(axis, one, two) for axis in range(3) for one, two in itertools.product((-1.0, 1.0), repeat=2)]
 CORNERS = list(itertools.product((-1.0, 1.0), repeat=3))
 SLOTS = len(ENDS) + len(EDGES) + len(CORNERS)
 # Relative to the box: length within a border that is round-off. Sine of the angle behind a face up to which a side may
