@@ -300,7 +300,9 @@ def integrate_to_guard(
         visited.append((solver.t, solver.y.copy()))
         controlled_step(solver, None, until)
         count.took(solver.t)
-        if rise := locate_rise(solver, law.guards, law.noise, solver.t_old == time, law.near, grazes):
+        if len(law.noise) and (
+            rise := locate_rise(solver, law.guards, law.noise, solver.t_old == time, law.near, grazes)
+        ):
             return Stretch(
                 start=time,
                 end=rise.time,

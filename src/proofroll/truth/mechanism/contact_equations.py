@@ -23,6 +23,7 @@ from proofroll.elements.mechanism.contacts.touching import Moving, Touching, tou
 from proofroll.elements.mechanism.contacts.turning import TurningFriction, moments_by_pressing, turning_frictions
 from proofroll.elements.mechanism.rotations import Array, cross, frame_of_axis
 from proofroll.elements.mechanism.switches import HOLDING, STOPPED, switched_joints
+from proofroll.truth.mechanism.independent_rows import accelerated_by, independent, least_motion
 from proofroll.truth.mechanism.maximal_coordinates import RANK, NumericEquations
 from proofroll.truth.mechanism.maximal_equations import Switched
 
@@ -167,7 +168,7 @@ class ContactEquations:
             J[k] = friction.part(there.normal) @ turns
             rates[k] = friction.part_rate(there) @ relative
         mass = np.asarray(np.linalg.inv(half @ half.T), dtype=np.float64)
-        C, bias = _independent(C, bias, self.equations.rank)
+        C, bias = independent(C, bias, self.equations.rank)
         centres = np.array([view.r for view in constrained.views], dtype=float)
         residual = np.array([row.residual for row in constrained.rows], dtype=float)
         return BodiesState(
@@ -257,6 +258,22 @@ class ContactEquations:
             along.append(directions @ state.J[k])
             owner += [(k, direction) for direction in directions]
         right = right + np.einsum("kin,ki->n", state.J, force)
+        if not owner:  # no contact holds anything: the rows of joints alone, which are independent
+            x, none = accelerated_by(state.mass, right, state.C, of_joints), np.zeros((len(mode), 3, 0))
+            slide = state.J @ x + bias
+            parting = np.array([each.normal @ rate for each, rate in zip(state.touching, slide, strict=True)]) + beyond
+            return BodiesSolution(
+                mode=mode,
+                moved=x,
+                force=force,
+                slide=slide,
+                parting=parting,
+                response=1.0,
+                loose=False,
+                splits=none[:, 0],
+                spread=0.0,
+                shifts=none,
+            )
         K, D = np.concatenate(rows), np.concatenate(along)
         moments = moments_by_pressing(turning, owner, [each.normal for each in state.touching])
         for k, place, moment in moments:
@@ -371,28 +388,10 @@ class ContactEquations:
         if closed:
             normals = np.array([bodies.touching[k].normal @ bodies.J[k] for k in closed])
             gaps = np.array([bodies.touching[k].gap for k in closed])
-            back = _least_motion(bodies, normals, gaps)
+            back = least_motion(bodies.mass, bodies.C, normals, gaps)
             state[: e.nx] -= self.equations.moving(state[: e.nx], back)
             state = self.equations.normalised(state)
             bodies = self.at(state, features)
         K = forbidding_rows(mode, bodies.touching, bodies.J, presses)
-        state[e.nx : e.nx + e.nu] -= _least_motion(bodies, K, K @ bodies.u)
+        state[e.nx : e.nx + e.nu] -= least_motion(bodies.mass, bodies.C, K, K @ bodies.u)
         return state
-
-
-def _independent(C: Array, bias: Array, most: int) -> tuple[Array, Array]:
-    """Independent rows equivalent to all, at ``most`` so many; those of a planar body in its plane are round-off."""
-    if not C.size:
-        return C, bias
-    U, values, Vt = np.linalg.svd(C, full_matrices=False)
-    rank = min(most, int((values > RANK * values[0]).sum()))
-    return Vt[:rank], (U[:, :rank].T @ bias) / values[:rank]
-
-
-def _least_motion(bodies: BodiesState, K: Array, violation: Array) -> Array:
-    """Motion of least kinetic energy that produces these violations of rows K, and none of joints."""
-    rows = np.concatenate([K, bodies.C])
-    root = np.linalg.cholesky(bodies.mass)
-    into = np.linalg.solve(root, rows.T)
-    aims = np.concatenate([violation, np.zeros(len(bodies.C))])
-    return np.asarray(np.linalg.solve(root.T, np.linalg.lstsq(into.T, aims, rcond=RANK)[0]))
