@@ -44,8 +44,8 @@ class ContactTree(ContactStretches):
         turned = Rotation.from_matrix(motion.R_WB[:-1]).as_quat(scalar_first=True)
         return motion.p_WB[:-1], motion.v_WB[:-1], turned, motion.w_WB[:-1]
 
-    def _law(self, state: Array, mode: ContactMode) -> StretchLaw:
-        law = super()._law(state, mode)
+    def _law(self, state: Array, mode: ContactMode, signs: tuple[int, ...] | None = None) -> StretchLaw:
+        law = super()._law(state, mode, signs)
         return law._replace(corrected=self.dynamics.equations.watching(law.corrected))
 
     def begin(self) -> Transition[ContactMode]:

@@ -122,8 +122,10 @@ class ContactWalks(ABC):
     def _touching(self, state: Array, features: Features | None) -> Sequence[Touching]:
         """Geometry and sliding velocity of each contact at a state; ``features``: of solids that touch."""
 
-    def _law(self, state: Array, mode: ContactMode) -> StretchLaw:
-        guards, equations, signs = guards_of(self.contacts, mode), self._equations, self._clamped(state, mode)
+    def _law(self, state: Array, mode: ContactMode, signs: tuple[int, ...] | None = None) -> StretchLaw:
+        """Equations of a stretch from a state; ``signs``: of efforts at their limits there, if they are known."""
+        guards, equations = guards_of(self.contacts, mode), self._equations
+        signs = self._clamped(state, mode) if signs is None else signs
         # sign of the guard of an effort: it reaches its limit, or comes back from it
         side = np.array([1.0 if sign else -1.0 for sign in signs])
         excess = np.abs(equations.drawn(state)) - 1
@@ -195,11 +197,13 @@ class ContactWalks(ABC):
         compiled = self._by_symbols(state, mode)
         if compiled is not None:
             with suppress(Diverged):
-                stretch = compiled.walk(self._law(state, mode), mode, time, state, until)
+                stretch = compiled.walk(self._law(state, mode, self._signs), mode, time, state, until)
                 self._used.setdefault("collocation" if self._by_collocation else "Taylor series")
                 return stretch
         self._used.setdefault("DOP853")
-        stretch = integrate_to_guard(self._law(state, mode), mode, time, state, until, self._tolerance, self._span)
+        stretch = integrate_to_guard(
+            self._law(state, mode, self._signs), mode, time, state, until, self._tolerance, self._span
+        )
         self._span = stretch.end - time if stretch.end > time else None
         return stretch
 
