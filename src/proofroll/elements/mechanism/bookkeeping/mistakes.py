@@ -200,11 +200,17 @@ def _swapped(joints: tuple[str, ...], pairs: list[tuple[list[int], list[int]]]) 
     return tuple(order)
 
 
-def offsets_told(joints: tuple[str, ...], offsets: Array) -> str:
-    """Words for a default pose that is off, with the joints whose part is not round-off."""
+def offsets_told(joints: tuple[str, ...], offsets: Array, clamped: Sequence[int] = ()) -> str:
+    """Words for a default pose that is off, with the joints whose part is not round-off.
+
+    ``clamped``: indices of joints whose offset can be any beyond some size, for their efforts are at a limit.
+    """
     large = np.abs(offsets) > _TOLD * np.abs(offsets).max()
-    each = zip(joints, offsets.tolist(), large.tolist(), strict=True)
-    return "the default pose is another: " + ", ".join(f"{joint} {off:+.4g}" for joint, off, counts in each if counts)
+    parts = []
+    for k in np.flatnonzero(large).tolist():
+        known = f"{offsets[k]:+.4g}"
+        parts.append(f"{joints[k]} {('above 0' if offsets[k] > 0 else 'below 0') if k in clamped else known}")
+    return "the default pose is another: " + ", ".join(parts)
 
 
 def fitted(residual: Callable[[float], Array], start: float) -> float:

@@ -254,7 +254,7 @@ class _Trial:
                     continue
                 offsets = values[: len(law.joints)]
                 change = partial(_scaled_by, partial(_moved, law, None), offsets)
-                told = offsets_told(law.joints, offsets)
+                told = offsets_told(law.joints, offsets, self._clamped(moved, values, scheme, after))
                 item = Mistake(id="pose", words=told, layer="target", changed=change, numbers=len(offsets))
                 both = (item,) if second is None else (item, second)
                 sizes = (1.0, _size(second, values))[: len(both)]
@@ -262,6 +262,12 @@ class _Trial:
                 if self.settled(found[-1:]):
                     return found[-1:]
         return _sorted([item for item in found if all(map(_differs, item.mistakes, item.sizes))])[:1]
+
+    def _clamped(self, moved: Callable[[Array], ControlLaw], values: Array, scheme: Scheme, after: float) -> list[int]:
+        """Joints for which half of the offset explains a motion as well as all of it."""
+        halved = {k: values * (1 - 0.5 * (np.arange(len(values)) == k)) for k in range(len(self.search.law.joints))}
+        bound = max(2 * after, self.search.seen.bar)
+        return [k for k, less in halved.items() if math.isfinite(self.search.distance(moved(less), scheme, bound))]
 
 
 def _moved(law: ControlLaw, second: Mistake | None, values: Array) -> ControlLaw:
