@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
-_OF_TRUTHS = 0.6  # largest part of a budget that truths take, at first and again for a shorter time
+_OF_TRUTHS = 0.8  # largest part of a budget that truths take, at first and again for a shorter time
 _PARTS = (1, 8, 64)  # parts of the time, the first of which is tried
 _LEAST = 2  # samples of a truth with which a motion is judged: at the first one nothing has moved yet
 
