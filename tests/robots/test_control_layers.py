@@ -206,10 +206,10 @@ def test_robot_and_control_belong_together(proofroll: Proofroll, files: tuple[st
 def test_a_step_that_is_too_long_comes_first(proofroll: Proofroll, files: tuple[str, str, str]) -> None:
     """The step that explicit servos need is the first line where the rows are farther apart, and else no line."""
     record, robot, control = files
-    for kd, first in ((1.5, "every 0.001 s"), (150.0, "explicit PD needs h ≤ ")):
+    for kd, start in ((1.5, record), (150.0, "explicit PD needs h ≤ ")):
         Path(control).write_text(CONTROL.format(kd=kd))
         _, out, _ = proofroll("judge", record, "--robot", robot, "--control", control)
-        assert first in out.splitlines()[0]
+        assert out.replace("\n", "").startswith(start)
 
 
 def test_on_the_ground_accelerations_are_left_out() -> None:
