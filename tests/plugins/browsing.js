@@ -105,8 +105,9 @@ window.reading = (() => {
   }
 
   // How far the page reaches past the right edge of the screen, and what does so without lying in something that scrolls.
+  // A phone widens its layout to a page that is too wide, a moment later: the screen stays as it is.
   function wide() {
-    const edge = document.documentElement.clientWidth;
+    const edge = Math.min(document.documentElement.clientWidth, screen.width);
     const scrolls = (element) => element && (getComputedStyle(element).overflowX !== "visible" || scrolls(element.parentElement));
     const found = all().filter((element) => element.getBoundingClientRect().right > edge + 1 && !scrolls(element.parentElement));
     return [document.scrollingElement.scrollWidth - edge, found.map(named)];
