@@ -38,7 +38,7 @@ def _scene(name: str, folder: Path) -> Scene:
     assert entry is not None, f"the gallery has no {name}"
     path = locate(entry)
     if path is None:
-        pytest.skip("example-robot-data is not installed")
+        pytest.skip(f"the package of {entry.name} is not installed")
     gains, pose, start = ROBOTS[name]
     control = folder / "control.toml"
     control.write_text(f'rate = 50\n{pose}\n[[gains]]\njoints = "*"\n{gains}\n{POLICY}{start}', encoding="utf-8")
@@ -75,7 +75,7 @@ def test_targets_at_50_hz_cost_no_order(tmp_path: Path) -> None:
     entry = next(entry for entry in read_gallery() if entry.name == "solo12")
     path = locate(entry)
     if path is None:
-        pytest.skip("example-robot-data is not installed")
+        pytest.skip(f"the package of {entry.name} is not installed")
     legs = [f"{end}{side}" for end in "FH" for side in "LR"]
     signs = {leg: 1 if leg.startswith("F") else -1 for leg in legs}
     pose = ", ".join(f"{leg}_HFE = {0.7 * sign}, {leg}_KFE = {-1.4 * sign}" for leg, sign in signs.items())

@@ -164,7 +164,7 @@ def steps_in_air(
     q, v = start
     period = max(1, whole_steps(0.0, 1 / law.rate, step) + law.extra_steps)
     answer, (last, waiting) = law.answer(), law.waiting()
-    target, before = law.pose.copy(), [robot.state(law.begins, q, v)]
+    target, states = law.pose.copy(), [robot.state(law.begins, q, v)]
     efforts = np.zeros(len(law.joints))
     for k in itertools.count():
         time = law.begins + k * step
@@ -175,14 +175,14 @@ def steps_in_air(
             last = last if action is None else action
             waiting.append(law.target(action, time))
             target = waiting.pop(0)
-        servo = before[-law.lag] if law.lag and len(before) >= law.lag else state
+        servo = states[-law.lag] if law.lag and len(states) >= law.lag else state
         if not law.hold_effort or k % period == 0:
             efforts = law.effort(target, servo.q, servo.v)
         yield AirStep(q=q, v=v, efforts=efforts, target=target, action=last, observation=observation)
         q, v = _stepped(robot, law, (q, v), (efforts, target), step, scheme)
         if not np.abs(v).max() < _STOP:
             raise Diverged(f"the motion blows up at t = {time:.4g} s")
-        before = [*before[-1:], state]
+        states = [*states[-1:], state]
 
 
 def _stepped(
@@ -214,17 +214,17 @@ def _moved(
         p, turned = q[at_q][:3], Rotation.from_quat(q[at_q][3:], scalar_first=True)
         R = turned.as_matrix()
         spin = new_v[at_v][3:]
-        after = turned * Rotation.from_rotvec(h * spin)
+        attitude = turned * Rotation.from_rotvec(h * spin)
         if along_base:  # it moves on a screw
             way = h * new_v[at_v][:3]
             turn = np.cross(h * spin, way)
             way = way + turn / 2 + np.cross(h * spin, turn) / 6
-            new_q[at_q] = np.concatenate([p + R @ way, after.as_quat(scalar_first=True)])
+            new_q[at_q] = np.concatenate([p + R @ way, attitude.as_quat(scalar_first=True)])
             return new_q, new_v
         rate = acceleration[at_v][:3] + np.cross(v[at_v][3:], v[at_v][:3])
         velocity = R @ (v[at_v][:3] + h * rate)
-        new_q[at_q] = np.concatenate([p + h * velocity, after.as_quat(scalar_first=True)])
-        new_v[at_v] = np.concatenate([after.as_matrix().T @ velocity, spin])
+        new_q[at_q] = np.concatenate([p + h * velocity, attitude.as_quat(scalar_first=True)])
+        new_v[at_v] = np.concatenate([attitude.as_matrix().T @ velocity, spin])
     return new_q, new_v
 
 

@@ -187,5 +187,5 @@ class ControlLaw:
 
     def effort(self, target: Array, q: Array, v: Array) -> Array:
         """Efforts of the servos [N m or N], clamped; arrays have the joints last."""
-        wanted = self.kp * (target - q) - self.kd * v
-        return np.asarray(self.effort_factor * np.clip(wanted, -self.limit, self.limit))
+        unclamped = self.kp * (target - q) - self.kd * v
+        return np.asarray(self.effort_factor * np.clip(unclamped, -self.limit, self.limit))

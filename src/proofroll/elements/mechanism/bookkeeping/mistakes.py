@@ -208,8 +208,8 @@ def offsets_told(joints: tuple[str, ...], offsets: Array, clamped: Sequence[int]
     large = np.abs(offsets) > _TOLD * np.abs(offsets).max()
     parts = []
     for k in np.flatnonzero(large).tolist():
-        known = f"{offsets[k]:+.4g}"
-        parts.append(f"{joints[k]} {('above 0' if offsets[k] > 0 else 'below 0') if k in clamped else known}")
+        side = "above 0" if offsets[k] > 0 else "below 0"
+        parts.append(f"{joints[k]} {side if k in clamped else f'{offsets[k]:+.4g}'}")
     return "the default pose is another: " + ", ".join(parts)
 
 

@@ -88,14 +88,14 @@ class MistakeScreen:
 
     def _between(self, q: Array, v: Array) -> list[tuple[Array, Array]]:
         """States at all steps, between samples by constant accelerations."""
-        found = []
+        states = []
         for row in range(len(q) - 1):
             slope = (v[row + 1] - v[row]) / (self.stride * self.step)
             for k in range(self.stride):
                 t = k * self.step
                 moved = q[row] if k == 0 else self._robot.equations.tree.moved(q[row], t * v[row] + t * t / 2 * slope)
-                found.append((moved, v[row] + t * slope))
-        return [*found, (q[-1], v[-1])]
+                states.append((moved, v[row] + t * slope))
+        return [*states, (q[-1], v[-1])]
 
     def _acted(self, law: ControlLaw) -> list[Array]:
         """Actions at the instants of a law, which observes the motion that was seen."""
@@ -134,8 +134,11 @@ class MistakeScreen:
         lag = np.array([bool(law.lag) for law in laws])[:, None, None]
         every, h = slice(None, None, self.stride), self.step
         q, v = (np.tile(item[:-1][every], (len(laws), 1, 1)) for item in (self._q, self._v))
-        before = np.maximum(np.arange(len(self._states) - 1)[every] - 1, 0)
-        late = np.tile(self._q[before], (len(laws), 1, 1)), np.tile(self._v[before][..., self._at_v], (len(laws), 1, 1))
+        previous = np.maximum(np.arange(len(self._states) - 1)[every] - 1, 0)
+        late = (
+            np.tile(self._q[previous], (len(laws), 1, 1)),
+            np.tile(self._v[previous][..., self._at_v], (len(laws), 1, 1)),
+        )
         for k in range(self.stride):
             rows = slice(k, None, self.stride)
             now = q, v[..., self._at_v]
@@ -178,8 +181,8 @@ class MistakeScreen:
         """Coordinates and rates of the driven joints at the instant before each step, of each law."""
         steps = np.arange(len(self._states) - 1)[rows]
         periods = np.array([max(1, whole_steps(0.0, 1 / law.rate, self.step) + law.extra_steps) for law in laws])
-        at = steps // periods[:, None] * periods[:, None]
-        return self._q[at], self._v[at][..., self._at_v]
+        instants = steps // periods[:, None] * periods[:, None]
+        return self._q[instants], self._v[instants][..., self._at_v]
 
     def _inverses(self, rows: slice, armature: Array) -> Array:
         """Inverse mass matrices at steps for the armatures of laws (laws, n), (laws, steps, nv, nv)."""
@@ -264,8 +267,10 @@ class MistakeScreen:
             trials = np.array([best[0]] * (count * len(_ALONE)))
             trials[np.arange(len(trials)), np.repeat(np.arange(count), len(_ALONE))] = np.tile(_ALONE, count)
             squares = np.square(self.left([law(values) for values in trials], treatment)).mean(axis=1)
-            each = squares.reshape(count, -1)
-            several = np.where(each.min(axis=1) < best[1], np.array(_ALONE)[each.argmin(axis=1)], best[0])
+            squares_by_number = squares.reshape(count, -1)
+            several = np.where(
+                squares_by_number.min(axis=1) < best[1], np.array(_ALONE)[squares_by_number.argmin(axis=1)], best[0]
+            )
             starts = [best[0], trials[int(np.argmin(squares))], several]
             found = min((self._descended(law, start, treatment) for start in starts), key=lambda pair: pair[1])
             if found[1] > _HELPS * best[1]:
