@@ -114,7 +114,7 @@ class Forks:
 
     def _begin(self, env: Mapping[str, str]) -> None:
         self._line, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)  # which keeps requests apart
-        own = {name: value for name, value in env.items() if name != "PYTHONPATH"}
+        own = {**env, "PYTHONPATH": str(Path(process.__file__).parents[2])}  # this proofroll, installed or not
         with theirs:
             self._template = subprocess.Popen(
                 [sys.executable, str(Path(__file__)), str(theirs.fileno())],

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
+import resource
 import signal
 import sys
 import time
@@ -21,6 +23,9 @@ from proofroll.elements.ball_on_surface.mechanics import initial_response
 from proofroll.elements.ball_on_surface.model import BallCapability
 from proofroll.elements.ball_on_surface.rolling_equations import closed_form
 from proofroll.elements.ball_on_surface.sampling import BallBuilt, BallSample
+
+
+_LEAKED: list[int] = []  # descriptors that an engine keeps
 
 
 @dataclass(frozen=True)
@@ -148,6 +153,31 @@ class HangsAloud(Hangs):
         self.pipe = os.open(os.environ["HANGS_ALOUD"], os.O_WRONLY)
         os.write(self.pipe, f"{os.getpid()}\n".encode())
         super().advance(t)
+
+
+class Leaks(Oracle):
+    """Opens files until no more can be opened, and keeps them."""
+
+    name = "leaks"
+
+    def advance(self, t: float) -> None:
+        """See :class:`proofroll.core.engine.Engine`."""
+        super().advance(t)
+        resource.setrlimit(resource.RLIMIT_NOFILE, (64, resource.getrlimit(resource.RLIMIT_NOFILE)[1]))
+        with contextlib.suppress(OSError):
+            while True:
+                _LEAKED.append(os.open(os.devnull, os.O_RDONLY))
+
+
+class LimitsFiles(Oracle):
+    """Allows its process no file above 1 kB."""
+
+    name = "limits_files"
+
+    def advance(self, t: float) -> None:
+        """See :class:`proofroll.core.engine.Engine`."""
+        super().advance(t)
+        resource.setrlimit(resource.RLIMIT_FSIZE, (1024, resource.getrlimit(resource.RLIMIT_FSIZE)[1]))
 
 
 class Raises(Oracle):

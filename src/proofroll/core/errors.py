@@ -55,7 +55,16 @@ class Missing(ProofrollError):  # noqa: N818 -- a state of the machine: the engi
 
 
 class Unwritable(ProofrollError):  # noqa: N818 -- a state of the machine, as a full disk
-    """A file cannot be written; the text says which and why."""
+    """A file cannot be written; the text says which and why.
+
+    Attributes:
+        number: the system's number of the reason, as ``errno.ENOSPC``.
+        reason: the same in words.
+    """
+
+    def __init__(self, message: str, number: int, reason: str) -> None:
+        self.number, self.reason = number, reason
+        super().__init__(message)
 
 
 class Diverged(ProofrollError):  # noqa: N818 -- a finding about the engine

@@ -184,7 +184,7 @@ class Worker:
             case "missing":
                 raise Missing(answer["message"])
             case "unwritable":
-                raise Unwritable(answer["message"])
+                raise Unwritable(answer["message"], answer["errno"], answer["reason"])
             case "crashed":
                 raise WorkerDied(Status.CRASHED, answer["message"])
         return answer

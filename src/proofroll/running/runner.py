@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING
 
 from proofroll.core.errors import InputError, Missing, ProofrollError, Unwritable
 from proofroll.core.plugins import plain_name
+from proofroll.files.atomic import is_unwritable_here
 from proofroll.running.case import Case, Result, Status
 from proofroll.running.engine_questions import lent_workers
 from proofroll.running.idle_workers import Workers
@@ -280,6 +281,10 @@ def _ask(worker: Worker, case: Case, limit: float, out: Path) -> Result:
         return dataclasses.replace(result, spent=result.spent | {"process start": waited})
     except Missing as error:
         return Result(Status.MISSING, str(error))
+    except Unwritable as error:
+        if is_unwritable_here(out.parent, error):
+            raise
+        raise WorkerDied(Status.CRASHED, f"its process could not write a file any more ({error.reason})") from None
 
 
 def _counted(budget: TimeBudget | None, worker: Worker, case: Case, limit: float, out: Path) -> Result:

@@ -83,7 +83,8 @@ class Store:
                     with contextlib.suppress(OSError):  # the file system cannot lock
                         stack.enter_context(_holding(Path(incoming), fcntl.LOCK_SH))
             except OSError as error:
-                raise Unwritable(f"{self.folder} cannot be written ({error.strerror or error})") from None
+                reason = error.strerror or str(error)
+                raise Unwritable(f"{self.folder} cannot be written ({reason})", error.errno or 0, reason) from None
             yield Path(incoming) / self.trajectory(case).name
 
     def has(self, case: Case) -> bool:

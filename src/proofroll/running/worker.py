@@ -80,7 +80,7 @@ def _answer(request: dict[str, Any]) -> dict[str, Any]:
     except Missing as error:
         return {"error": "missing", "message": str(error)}
     except Unwritable as error:
-        return {"error": "unwritable", "message": str(error)}
+        return {"error": "unwritable", "message": str(error), "errno": error.number, "reason": error.reason}
     except ProofrollError as error:
         return {"error": "crashed", "message": str(error)}
     except Exception as error:

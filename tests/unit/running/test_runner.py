@@ -43,6 +43,8 @@ OUTCOMES = {
     "absent": (Status.MISSING, "absent is not installed here"),
     "misspelt": (Status.CRASHED, "NoSuchClass"),
     "judges_itself": (Status.CRASHED, "changed proofroll.core.certificate.Line.holds in its process"),
+    "leaks": (Status.CRASHED, "its process could not write a file any more (Too many open files)"),
+    "limits_files": (Status.CRASHED, "its process could not write a file any more (File too large)"),
     "moves_the_bar": (Status.CRASHED, "changed proofroll.core.certificate.EXACT in its process"),
     "signs_for_the_ball": (
         Status.CRASHED,
