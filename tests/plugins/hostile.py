@@ -24,7 +24,6 @@ from proofroll.elements.ball_on_surface.model import BallCapability
 from proofroll.elements.ball_on_surface.rolling_equations import closed_form
 from proofroll.elements.ball_on_surface.sampling import BallBuilt, BallSample
 
-
 _LEAKED: list[int] = []  # descriptors that an engine keeps
 
 

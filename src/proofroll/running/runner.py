@@ -261,7 +261,8 @@ class Runner:
                 raise WorkerDied(error.status, shown) from None
             except Unwritable as error:
                 shown = str(error).replace(str(written.absolute()), str(self.store.trajectory(case)))
-                raise Unwritable(shown.replace("another path", "another folder with --out")) from None
+                shown = shown.replace("another path", "another folder with --out")
+                raise Unwritable(shown, error.number, error.reason) from None
             return self.store.put(case, result, written)
 
     def _drop(self, worker: Worker) -> None:
