@@ -108,7 +108,7 @@ BAD = {
     "number of another kind": (["check", "arm.urdf", "--states", "1e9"], 2, ["--states = '1e9': give a whole number"]),
     "steps without number": (rk4("1e-300"), 2, ["dt = 1e-300", "steps from 0 s", "take a longer one"]),
     "numbers too large for numbers": (
-        ["run", "pendulum", "--engine", "truth", "--set", "speed=1e300", "--until", "0.1"], 2, ["its square overflows"]
+        ["run", "pendulum", "--engine", "truth", "--set", "speed=1e300", "--until", "0.1"], 2, ["its cube overflows"]
     ),
     "a version in a name": (["engines", "add", "mujoco==99"], 2, ["add mujoco --requirement mujoco==VERSION"]),
     "no version": (["engines", "add", "mujoco"], 2, ["--requirement = 'nothing'", "mujoco==VERSION"]),

@@ -5,17 +5,17 @@ from collections.abc import Sequence
 
 from proofroll.core.errors import InputError
 
-# Larger numbers have squares near the end of the range of doubles, 1.8e308.
-LARGEST = 1e150
+# Larger numbers have cubes (volumes) beyond the range of doubles, 1.8e308.
+LARGEST = 1e100
 
 # Density of osmium, the densest material, and of an aerogel, lighter than air between its solids [kg/m³].
 DENSEST, LIGHTEST = 22600.0, 0.1
 
 
 def require_usable(field: str, value: object) -> None:
-    """Raises InputError for a finite number whose square would overflow; other values pass."""
+    """Raises InputError for a finite number whose cube would overflow; other values pass."""
     if isinstance(value, (int, float)) and LARGEST < abs(value) < math.inf:
-        raise InputError(field, value, f"its size is beyond {LARGEST:g}, so its square overflows; give a smaller one")
+        raise InputError(field, value, f"its size is beyond {LARGEST:g}, so its cube overflows; give a smaller one")
 
 
 class OutOfBounds(InputError, ValueError):  # noqa: N818 -- says what is wrong, as the other errors do

@@ -8,6 +8,7 @@ from __future__ import annotations
 import contextlib
 import io
 import json
+import math
 import sys
 import weakref
 import zipfile
@@ -175,6 +176,7 @@ def read_columns(path: Path) -> Columns:
         OSError, ValueError: the file cannot be read, or has another format.
     """
     content = ordinary_content(path)
+    _require_numbers_of_headers(content, path)
     try:
         with np.load(io.BytesIO(content), allow_pickle=False) as file:
             about, attrs = map(dict, json.loads(file[_ABOUT]))
@@ -190,8 +192,25 @@ def read_arrays(path: Path) -> dict[str, npt.NDArray[Any]]:
     Raises:
         OSError, ValueError: the file cannot be read, or has another format.
     """
+    content = ordinary_content(path)
+    _require_numbers_of_headers(content, path)
     try:
-        with np.load(io.BytesIO(ordinary_content(path)), allow_pickle=False) as file:
+        with np.load(io.BytesIO(content), allow_pickle=False) as file:
             return dict(file)
     except _NO_SUCH_FILE as error:
         raise ValueError(f"{path.name} is no file of numpy's arrays") from error
+
+
+def _require_numbers_of_headers(content: bytes, path: Path) -> None:
+    """Raises OSError if an array's header promises more numbers than follow; numpy would ask for their memory."""
+    with contextlib.suppress(*_NO_SUCH_FILE), zipfile.ZipFile(io.BytesIO(content)) as archive:
+        headers = {(1, 0): np.lib.format.read_array_header_1_0}
+        for entry in [item for item in archive.infolist() if item.filename.endswith(".npy")]:
+            with archive.open(entry) as array:
+                version = np.lib.format.read_magic(array)
+                shape, _, kind = headers.get(version, np.lib.format.read_array_header_2_0)(array)
+                promised = math.prod(shape)
+                if promised * kind.itemsize > entry.file_size:
+                    name = entry.filename.removesuffix(".npy")
+                    lie = f"the header of {name} promises {promised:.3g} numbers, which do not follow"
+                    raise OSError(f"{path.name}: {lie}")

@@ -74,9 +74,10 @@ class GivenRun:
 def _require_numbers(name: str, item: xr.Variable) -> None:
     """Raises InputError unless a variable holds real numbers."""
     if item.dtype.kind not in "iuf":
-        kinds = {"c": "complex numbers", "b": "truth values", "U": "text", "S": "text"}
+        kinds = {"c": "complex numbers", "b": "truth values", "U": "text", "S": "text", "M": "dates", "m": "durations"}
         held = kinds.get(item.dtype.kind, f"values of type {item.dtype}")
-        raise InputError("run", name, f"it holds {held}; give real numbers")
+        wanted = "seconds as real numbers" if item.dtype.kind in "mM" else "real numbers"
+        raise InputError("run", name, f"it holds {held}; give {wanted}")
 
 
 def _require_unit(name: str, unit: str, expected: str) -> None:
@@ -112,8 +113,8 @@ def read_run(run: RunInput, scene: Scene, columns: Mapping[str, str] | None = No
     if "time" in units:
         _require_unit("time", units["time"], "s")
     times = dataset.variables["time"].values
-    number = np.issubdtype(times.dtype, np.number)
-    if not (times.size and number and np.all(np.isfinite(times)) and times[0] >= 0 and np.all(np.diff(times) > 0)):
+    _require_numbers("time", dataset.variables["time"])
+    if not (times.size and np.all(np.isfinite(times)) and times[0] >= 0 and np.all(np.diff(times) > 0)):
         raise InputError("run", "time", f"{_wrong_times(times)}give times in s that rise from 0 or later")
     if times[-1] > LATEST:
         raise InputError("run", f"time up to {times[-1]:.4g} s", f"no motion is followed beyond {LATEST:g} s")
@@ -209,7 +210,7 @@ def _wrong_times(times: Any) -> str:
     """The first mistake in times [s] as a clause; empty where they are no numbers at all."""
     if not times.size:
         return "there are no samples; "
-    if not np.issubdtype(times.dtype, np.number) or np.iscomplexobj(times) or times.ndim != 1:
+    if times.ndim != 1:
         return ""
     if np.any(late := ~np.isfinite(times)):
         return f"sample {int(np.argmax(late)) + 1} has no time; "
@@ -230,6 +231,8 @@ def _dataset(run: RunInput, columns: Mapping[str, str]) -> xr.Dataset:
             columns = {} if path.suffix == CSV else columns  # whose header is renamed as it is read
         except FileNotFoundError:
             raise InputError("run", Path(run), "there is no such file") from None
+        except MemoryError:
+            raise InputError("run", Path(run), "its numbers do not fit into the memory") from None
         except (OSError, ValueError, LookupError) as error:  # a truncated file may raise any of them
             how = "" if Path(run).suffix in {CSV, STORED} else _WRITE_NETCDF
             advice = f"it cannot be read ({error}){how}"

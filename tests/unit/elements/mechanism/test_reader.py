@@ -169,12 +169,12 @@ BAD = {
     "joint without its body": (SLIDER_CRANK + joint("crank", "ghost"), "joints.extra.child = 'ghost'.*no such body"),
     "kind of no kind": (SLIDER_CRANK.replace('kind = "revolute"', "kind = [[1]]", 1), r"joints.1.kind = \[\[1\]\]"),
     "moments beyond numbers": (
-        SLIDER_CRANK + ROD.replace("[1, 1, 1]", "[1, 1e149, 1]"),
+        SLIDER_CRANK + ROD.replace("[1, 1, 1]", "[1, 1e99, 1]"),
         "inertia.*triangle inequality",
     ),
-    "mass beyond numbers": (
-        SLIDER_CRANK + ROD.replace("mass = 1", "mass = 1e149\ncom = [1e149, 0, 0]") + joint("rod", "extra"),
-        "mass matrix = 'infinite': masses, moments or lengths are too large",
+    "a mass beside which others are nothing": (
+        SLIDER_CRANK + ROD.replace("mass = 1", "mass = 1e99\ncom = [1e99, 0, 0]") + joint("rod", "extra"),
+        "can move so that nothing with inertia does",
     ),
     "body without a joint": (SLIDER_CRANK + ROD, "bodies.extra.*no joint"),
     "two parents": (SLIDER_CRANK + joint("slider", "rod"), "two parents, through pin and extra"),
@@ -266,7 +266,7 @@ BAD = {
     "ragged list": (SLIDER_CRANK.replace("q0 = 0.5", "q0 = [1, [2], 3]"), r"joints.0.q0.1 = \[2\]: give a number"),
     "number beyond all bounds": (
         SLIDER_CRANK.replace("[1e-3,", f"[{10**400},"),
-        "bodies.2.inertia.0.*its square overflows",
+        "bodies.2.inertia.0.*its cube overflows",
     ),
     "nan": (SLIDER_CRANK.replace("mass = 0.6", "mass = nan"), "bodies.slider.mass.*finite"),
     "bool": (

@@ -1,5 +1,7 @@
 """Trajectories of users: what they may hold."""
 
+import io
+import zipfile
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -20,6 +22,13 @@ TIMES = np.linspace(0, 1, 11)
         ({"time": TIMES, "p_WB": np.full((11, 1, 3), "a")}, "p_WB.*it holds text; give real numbers"),
         ({"time": TIMES, "q.pivot": np.zeros(11) + 1j}, "q.pivot.*it holds complex numbers; give real numbers"),
         ({"time": TIMES, "q.pivot": np.zeros(11, dtype=bool)}, "q.pivot.*it holds truth values; give real numbers"),
+        (
+            {"time": (1e3 * TIMES).astype("m8[ms]"), "q.pivot": np.zeros(11)},
+            "time.*holds durations; give seconds as real",
+        ),
+        ({"time": TIMES.astype("m8[s]"), "q.pivot": np.zeros(11)}, "time.*holds durations; give seconds as real"),
+        ({"time": TIMES, "q.pivot": TIMES.astype("m8[s]")}, "q.pivot.*holds durations; give seconds as real"),
+        ({"time": TIMES.astype(str), "q.pivot": np.zeros(11)}, "time.*it holds text; give real numbers"),
         ({"time": 3e299 * TIMES, "q.pivot": np.zeros(11)}, "time up to 3e.299 s.*no motion is followed beyond 1e.09 s"),
     ],
 )
@@ -27,6 +36,17 @@ def test_a_hostile_trajectory_is_refused(columns: dict[str, Any], words: str) ->
     """Values that are no real numbers, and times without end, are refused in one line with the column."""
     with pytest.raises(InputError, match=words):
         proofroll.judge(columns, "pendulum")
+
+
+def test_a_header_that_promises_more_numbers_than_follow(tmp_path: Path) -> None:
+    """Numbers that a file does not hold are told by name, and no memory is asked for them."""
+    header, run = io.BytesIO(), tmp_path / "run.npz"
+    np.lib.format.write_array_header_1_0(header, {"descr": "<f8", "fortran_order": False, "shape": (10**15,)})
+    np.savez(run, time=TIMES)
+    with zipfile.ZipFile(run, "a") as archive:
+        archive.writestr("p_WB.npy", header.getvalue() + bytes(64))
+    with pytest.raises(InputError, match=r"the header of p_WB promises 1e\+15 numbers, which do not follow"):
+        proofroll.judge(run, "pendulum")
 
 
 def test_judge_has_a_limit_of_time(command_line: Callable[..., tuple[int, str, str]], tmp_path: Path) -> None:
