@@ -97,6 +97,40 @@ def test_while_the_command_is_loaded(module: str) -> None:
     assert done.stderr == "proofroll: interrupted before anything was run\n"
 
 
+BROKEN_OFF = """
+import os, signal, sys
+name, number = sys.argv.pop(1), int(sys.argv.pop(1))
+class Spoilt:
+    def find_spec(self, module, *_):
+        if module == name:
+            try:
+                os.kill(os.getpid(), number)
+            except KeyboardInterrupt:
+                raise ImportError("partially initialized module") from None
+sys.meta_path.insert(0, Spoilt())
+from proofroll.__main__ import main
+main()
+"""
+
+
+@pytest.mark.parametrize(
+    ("module", "number"),
+    [
+        ("typer", signal.SIGTERM),
+        ("proofroll.running.case", signal.SIGTERM),
+        ("proofroll.running.case", signal.SIGHUP),
+        ("proofroll.files.scene_file", signal.SIGINT),
+    ],
+)
+def test_a_signal_while_a_module_is_imported(module: str, number: int) -> None:
+    """Any signal that ends a command gives one line and 130, whatever the import that it breaks off makes of it."""
+    script = [sys.executable, "-c", BROKEN_OFF, module, str(int(number)), "run", "pendulum", "--engine", "mujoco"]
+    done = subprocess.run(script, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout) == (130, "")
+    assert done.stderr.startswith("proofroll: interrupted")
+    assert done.stderr.count("\n") == 1
+
+
 @pytest.mark.skipif(not os.path.exists("/dev/full"), reason="the system has no /dev/full")
 @pytest.mark.parametrize("arguments", [["scenes"], ["scenes", "--json"], ["--help"]])
 def test_an_output_that_is_full(arguments: list[str]) -> None:

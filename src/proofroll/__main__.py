@@ -1,4 +1,4 @@
-"""Command ``proofroll``; this module is small, so that Ctrl-C is handled while the rest is loaded."""
+"""Command ``proofroll``; this module is small, so that signals are handled while the rest is loaded."""
 
 
 def _leave(*_: object) -> None:
@@ -14,8 +14,9 @@ def main() -> None:
     try:
         import signal
 
-        if signal.getsignal(signal.SIGINT) is signal.default_int_handler:  # a shell may have set it to be ignored
-            signal.signal(signal.SIGINT, _leave)
+        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+            if signal.getsignal(number) in (signal.default_int_handler, signal.SIG_DFL):  # else a shell ignores it
+                signal.signal(number, _leave)
         from proofroll.cli import main as command_line
 
         command_line()

@@ -107,15 +107,18 @@ def _usage_message(error: typer.TyperException) -> str:
     return f"{option[1]} = {problems[0]['input']!r}: {advice(problems[0]['type'], problems[0]['msg'])}"
 
 
-def _interrupt(*_: object) -> None:
+# Signals that have interrupted this process.
+_signals: list[int] = []
+
+
+def _interrupt(number: int, _: object) -> None:
     """Signal handler: kills all workers, so that nothing waits for them, and interrupts.
 
     The next signal ends the process at once.
     """
-    if "proofroll.running.process" in sys.modules:
-        from proofroll.running.process import end_all
-
-        end_all()
+    _signals.append(number)
+    # a module that is being imported lacks it, and has no workers yet
+    getattr(sys.modules.get("proofroll.running.process"), "end_all", lambda: None)()
     for signal_name in INTERRUPTS:
         if callable(signal.getsignal(signal_name)):
             signal.signal(signal_name, end_at_once)
@@ -144,41 +147,47 @@ def _commands() -> Any:
 def main() -> None:
     """Entry point: every problem is one line on standard error and an exit code."""
     _prepare_output()
-    signal.signal(signal.SIGTERM, _interrupt)  # a time limit from outside also ends the workers
-    if signal.getsignal(signal.SIGHUP) is signal.SIG_DFL:  # so does the end of the terminal, unless nohup ignores it
-        signal.signal(signal.SIGHUP, _interrupt)
-    if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:  # a shell may have set it to be ignored
-        signal.signal(signal.SIGINT, _interrupt)
+    for number in INTERRUPTS:  # a time limit from outside and the end of the terminal also end the workers
+        if signal.getsignal(number) is not signal.SIG_IGN:  # a shell or nohup may have set it to be ignored
+            signal.signal(number, _interrupt)
     warnings.simplefilter("ignore", RuntimeWarning)  # of overflows: their consequences are reported
+    _signals.clear()
     try:
         if not all(map(str.strip, sys.argv[1:])):
             raise InputError("argument", "", "this is empty; give a value, or leave the option out")
         code = _commands()(standalone_mode=False)
         sys.stdout.flush()  # raises here if the disk is full
-    except typer.TyperException as error:
-        if error.format_message().startswith("Usage:"):  # a group of commands was called without a command
-            sys.stdout.write(f"{error.format_message()}\n")
-        else:
-            complain(_usage_message(error))
-        code = USAGE
-    except InputError as error:
-        complain(str(error))
-        code = USAGE
-    except ProofrollError as error:
-        from proofroll.core.errors import Refused
-        from proofroll.running.process import WorkerDied
-
-        complain(str(error))
-        code = ENGINE if isinstance(error, (Missing, WorkerDied, Refused)) else USAGE
-    except (KeyboardInterrupt, typer.Abort):
-        code = INTERRUPTED
-    except (OSError, SystemExit) as error:
-        code = _unwritten(error)
+    except BaseException as error:  # an import that a signal broke off raises what it likes
+        code = INTERRUPTED if _signals else _reported(error)
     for warning in broken.values():
         complain(warning)
     if code == INTERRUPTED:
         complain("interrupted; cases that were finished and stored will be reused")
     sys.exit(code or OK)
+
+
+def _reported(error: BaseException) -> Any:
+    """Exit code for an error, which is told in one line; raises it if it is no error of the user or the machine."""
+    if isinstance(error, typer.TyperException):
+        if error.format_message().startswith("Usage:"):  # a group of commands was called without a command
+            sys.stdout.write(f"{error.format_message()}\n")
+        else:
+            complain(_usage_message(error))
+        return USAGE
+    if isinstance(error, InputError):
+        complain(str(error))
+        return USAGE
+    if isinstance(error, ProofrollError):
+        from proofroll.core.errors import Refused
+        from proofroll.running.process import WorkerDied
+
+        complain(str(error))
+        return ENGINE if isinstance(error, (Missing, WorkerDied, Refused)) else USAGE
+    if isinstance(error, (KeyboardInterrupt, typer.Abort)):
+        return INTERRUPTED
+    if isinstance(error, (OSError, SystemExit)):
+        return _unwritten(error)
+    raise error
 
 
 def _unwritten(error: OSError | SystemExit) -> Any:

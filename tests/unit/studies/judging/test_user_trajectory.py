@@ -24,9 +24,9 @@ TIMES = np.linspace(0, 1, 11)
         ({"time": TIMES, "q.pivot": np.zeros(11, dtype=bool)}, "q.pivot.*it holds truth values; give real numbers"),
         (
             {"time": (1e3 * TIMES).astype("m8[ms]"), "q.pivot": np.zeros(11)},
-            "time.*holds durations; give seconds as real",
+            "time.*holds durations; give seconds",
         ),
-        ({"time": TIMES.astype("m8[s]"), "q.pivot": np.zeros(11)}, "time.*holds durations; give seconds as real"),
+        ({"time": TIMES.astype("m8[s]"), "q.pivot": np.zeros(11)}, "time.*holds durations; give seconds"),
         ({"time": TIMES, "q.pivot": TIMES.astype("m8[s]")}, "q.pivot.*holds durations; give seconds as real"),
         ({"time": TIMES.astype(str), "q.pivot": np.zeros(11)}, "time.*it holds text; give real numbers"),
         ({"time": 3e299 * TIMES, "q.pivot": np.zeros(11)}, "time up to 3e.299 s.*no motion is followed beyond 1e.09 s"),
