@@ -1,0 +1,205 @@
+"""Laws of contact: surfaces, gaps, pull, friction of what sticks and slips, moments against rolling and spin."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from proofroll.truth.laws.integrals import dot, norm
+from proofroll.truth.laws.loads import BodyLoads
+from proofroll.truth.laws.record import Array, Pieces
+from proofroll.truth.laws.residuals import ROUND, LawResiduals
+from proofroll.truth.laws.scene import LawScene, velocity_at
+from proofroll.truth.laws.surfaces import PairContact, gap, near, seen_from
+
+_KNOWN = 1e-3  # rad, error of the direction of a slip from which on its law says nothing
+_DIRECTION = 3.0  # errors of that direction that are allowed
+_LEAST = float(np.finfo(float).tiny)
+
+
+class ClosedContact(NamedTuple):
+    """A closed contact at the points of pieces: slide, its part in the surface, normal force, friction, sizes."""
+
+    number: int
+    contact: PairContact
+    slide: Array
+    slip: Array
+    normal_force: Array
+    friction: Array
+    fast: Array
+
+
+def gap_of(contact: PairContact, pieces: Pieces) -> Array:
+    """Gap of a contact from poses alone [m]; of one of several places of two solids that of the solids."""
+    A, B = ((pieces.p[..., body, :], pieces.R[..., body, :, :]) for body in (contact.a, contact.b))
+    return gap(contact.shape_a, contact.shape_b, A, B)
+
+
+def slide_of(contact: PairContact, pieces: Pieces, place: Array) -> Array:
+    """Velocity of the first body against the second at places [m/s]."""
+    return velocity_at(pieces, contact.a, place) - velocity_at(pieces, contact.b, place)
+
+
+def contact_laws(scene: LawScene, pieces: Pieces, residuals: LawResiduals, loads: BodyLoads) -> None:
+    """Checks all contacts, and adds their forces and moments to the loads."""
+    if not scene.contacts:
+        return
+    largest = norm(pieces.force).max(-1) + scene.faint
+    touches, passed = [], set[str]()
+    for k, contact in enumerate(scene.contacts):
+        if contact.alone or contact.pair.name not in passed:
+            passed.add(contact.pair.name)
+            far = scene.length + np.abs(pieces.p[..., [contact.a, contact.b], :]).max((-1, -2))
+            residuals.note("gap", contact.name, np.maximum(-gap_of(contact, pieces), 0), far, pieces.time)
+        if pieces.modes.contacts[k] == "open":
+            residuals.note("pull", contact.name, norm(pieces.force[..., k, :]), largest, pieces.time)
+            continue
+        touch = _touch(scene, pieces, k, contact)
+        force, place = pieces.force[..., k, :], pieces.place[..., k, :]
+        loads.between(contact.a, contact.b, place, force)
+        loads.works(dot(force, touch.slide), norm(force) * scene.speed)
+        _surfaces(scene, pieces, residuals, touch)
+        _slips(pieces, residuals, touch, largest)
+        touches.append(touch)
+        _turning(scene, pieces, residuals, loads, (touch, largest))
+    _presses(pieces, residuals, touches, largest)
+
+
+def _touch(scene: LawScene, pieces: Pieces, k: int, contact: PairContact) -> ClosedContact:
+    normal, force = pieces.normal[..., k, :], pieces.force[..., k, :]
+    slide, pressed = slide_of(contact, pieces, pieces.place[..., k, :]), dot(normal, force)
+    ends = contact.a, contact.b
+    fast = scene.speed + sum(norm(pieces.v[..., body, :]) for body in ends)
+    fast = fast + sum(norm(pieces.w[..., body, :]) for body in ends) * scene.length
+    return ClosedContact(
+        number=k,
+        contact=contact,
+        slide=slide,
+        slip=slide - dot(normal, slide)[..., None] * normal,
+        normal_force=pressed,
+        friction=force - pressed[..., None] * normal,
+        fast=np.asarray(fast),
+    )
+
+
+def _surfaces(scene: LawScene, pieces: Pieces, residuals: LawResiduals, touch: ClosedContact) -> None:
+    """The force acts on both surfaces, the normal is theirs, and they neither part nor approach."""
+    k, contact, time = touch.number, touch.contact, pieces.time
+    place, normal = pieces.place[..., k, :], pieces.normal[..., k, :]
+    far = scene.length + norm(place)
+    for shape, solid, body, sign in (
+        (contact.shape_a, contact.solid_a, contact.a, -1.0),
+        (contact.shape_b, contact.solid_b, contact.b, 1.0),
+    ):
+        pose = pieces.p[..., body, :], pieces.R[..., body, :, :]
+        seen = seen_from(pose, place)
+        distance, gradient = near(shape, seen)
+        residuals.note("surface", contact.name, distance, far, time)
+        if shape is not solid:
+            residuals.note("surface", contact.name, near(solid, seen)[0], far, time)
+        apart = norm(gradient - sign * seen_from((0 * place, pose[1]), normal))
+        digits = ROUND * residuals.coarse * far * shape.bend
+        residuals.note("normal", contact.name, np.where(np.isnan(apart), 0.0, apart), 1.0, time, digits)
+    residuals.note("gap rate", contact.name, dot(normal, touch.slide), touch.fast, time)
+
+
+def _slips(pieces: Pieces, residuals: LawResiduals, touch: ClosedContact, largest: Array) -> None:
+    """A contact that sticks does not slip; friction of a slip opposes it with mu N."""
+    speed, contact, time = norm(touch.slip), touch.contact, pieces.time
+    if pieces.modes.contacts[touch.number] == "stick":
+        residuals.note("stick", contact.name, speed, touch.fast, time)
+        return
+    friction = contact.pair.friction
+    if not np.isfinite(friction):
+        residuals.note("slip", contact.name, speed, touch.fast, time)
+        return
+    direction = touch.slip / np.maximum(speed, _LEAST)[..., None]
+    error = ROUND * residuals.coarse * touch.fast / np.maximum(speed, _LEAST)
+    left = norm(touch.friction + (friction * touch.normal_force)[..., None] * direction)
+    size = norm(touch.friction) - friction * touch.normal_force  # without a direction its size is left
+    residuals.note(
+        "slip",
+        contact.name,
+        np.where(error < _KNOWN, left, size),
+        largest,
+        time,
+        _DIRECTION * error * friction * largest,
+    )
+
+
+def _presses(pieces: Pieces, residuals: LawResiduals, touches: Sequence[ClosedContact], largest: Array) -> None:
+    """Contacts press, and what sticks has its friction within the bound.
+
+    How contacts of two bodies share a load is not determinate: each may be beyond its bound while another distribution
+    of the same sum is not.
+    """
+    groups: dict[tuple[int, int], list[ClosedContact]] = {}
+    for touch in touches:
+        groups.setdefault((touch.contact.a, touch.contact.b), []).append(touch)
+    for group in groups.values():
+        pulls = np.array([np.maximum(-touch.normal_force, 0) for touch in group])
+        if len(group) > 1 and (pulls > 1e-9 * largest).any():
+            pulls[:] = _least_pull(pieces, group, pulls)
+        for touch, pull in zip(group, pulls, strict=True):
+            residuals.note("pull", touch.contact.name, pull, largest, pieces.time)
+        held = [touch for touch in group if pieces.modes.contacts[touch.number] == "stick"]
+        excess = [
+            np.maximum(norm(touch.friction) - touch.contact.pair.static * np.maximum(touch.normal_force, 0), 0)
+            for touch in held
+            if np.isfinite(touch.contact.pair.static)
+        ]
+        if len(held) > 1 and len(excess) == len(held):
+            bound = sum(touch.contact.pair.static * np.maximum(touch.normal_force, 0) for touch in held)
+            whole = np.maximum(norm(np.sum([touch.friction for touch in held], 0)) - bound, 0)
+            excess = [np.minimum(each, whole) for each in excess]
+        for touch, each in zip(
+            (touch for touch in held if np.isfinite(touch.contact.pair.static)), excess, strict=True
+        ):
+            residuals.note("cone", touch.contact.name, each, largest, pieces.time)
+
+
+def _least_pull(pieces: Pieces, group: Sequence[ClosedContact], pulls: Array) -> Array:
+    """Part of the sum of normal forces and their moments that no distribution without pull gives, at each point."""
+    from scipy.optimize import nnls
+
+    left = np.zeros(pulls.shape[1:])
+    for at in zip(*np.nonzero(pulls.max(0) > 0), strict=True):
+        normals = [pieces.normal[(*at, touch.number)] for touch in group]
+        places = np.array([pieces.place[(*at, touch.number)] for touch in group])
+        reach = np.abs(places - places.mean(0)).max() or 1.0
+        arms = (places - places.mean(0)) / reach
+        rows = np.array([[*normal, *np.cross(arm, normal)] for normal, arm in zip(normals, arms, strict=True)]).T
+        left[at] = nnls(rows, rows @ np.array([touch.normal_force[at] for touch in group]))[1]
+    return left
+
+
+def _turning(
+    scene: LawScene, pieces: Pieces, residuals: LawResiduals, loads: BodyLoads, closed: tuple[ClosedContact, Array]
+) -> None:
+    """Moments against rolling and spin of a closed contact: within coefficient times N, or opposed to what turns."""
+    touch, largest = closed
+    k, contact, time = touch.number, touch.contact, pieces.time
+    a, b = contact.a, contact.b
+    normal, relative = pieces.normal[..., k, :], pieces.w[..., a, :] - pieces.w[..., b, :]
+    spin = dot(normal, relative)[..., None] * normal
+    quick = scene.rate + norm(pieces.w[..., a, :]) + norm(pieces.w[..., b, :])
+    for size, part, moments, modes in (
+        (contact.pair.rolling_resistance, relative - spin, pieces.rolling, pieces.modes.rolling),
+        (contact.pair.spinning_friction, spin, pieces.spinning, pieces.modes.spinning),
+    ):
+        if not size:
+            continue
+        moment, rate, bound = moments[..., k, :], norm(part), size * largest
+        pressed = size * np.maximum(touch.normal_force, 0)
+        loads.between(a, b, pieces.place[..., k, :], 0 * moment, moment)
+        loads.works(dot(moment, relative), norm(moment) * scene.rate)
+        if modes[k] == "stick":
+            residuals.note("turning", contact.name, np.maximum(norm(moment) - pressed, 0), bound, time)
+            residuals.note("stick", contact.name, rate, quick, time)
+            continue
+        error = ROUND * residuals.coarse * quick / np.maximum(rate, _LEAST)
+        direction = part / np.maximum(rate, _LEAST)[..., None]
+        left = np.where(error < _KNOWN, norm(moment + pressed[..., None] * direction), norm(moment) - pressed)
+        residuals.note("turning", contact.name, left, bound, time, _DIRECTION * error * bound)

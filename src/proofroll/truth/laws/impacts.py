@@ -1,0 +1,217 @@
+"""Laws of an impact: impulses explain the jump, v+ = -e v-, impulses press within their cones, no energy is won."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from proofroll.truth.laws.contacts import gap_of, slide_of
+from proofroll.truth.laws.integrals import dot, norm, turned, turned_back
+from proofroll.truth.laws.joints import Coordinates
+from proofroll.truth.laws.record import Array, Passage, Pieces
+from proofroll.truth.laws.residuals import LawResiduals
+from proofroll.truth.laws.scene import FREE, HELD_PLACES, HELD_TURNS, JointFrames, LawScene
+from proofroll.truth.laws.surfaces import PairContact
+
+_CLOSED = 1e-13  # gap in natural sizes below which a contact may take an impulse
+_RANK = 1e-11  # singular value, relative to the largest, below which impulses are not independent
+_SETTLED = 1.4e-6  # part of the fastest impact below which rebounds are summed: e^-13.5
+_SLIPS = 1e-9  # slip after an impact in natural sizes above which it has a direction
+_WITHIN = 1e-6  # part of the bound of friction below which a contact certainly sticks in an impact
+_FAINT = 1e-9  # part of the natural momentum below which an impulse counts as of that size
+
+
+class Hit(NamedTuple):
+    """A contact that may take an impulse: number, place, normal, slides before and after."""
+
+    number: int
+    contact: PairContact
+    normal: Array
+    slides: tuple[Array, Array]
+
+
+class Coordinate(NamedTuple):
+    """A joint with one coordinate: bodies' jump by a unit impulse along it, rates before and after, its armature."""
+
+    column: Array
+    rates: tuple[float, float]
+    armature: float
+
+
+class Stop(NamedTuple):
+    """A joint at a stop: its rates off the stop before and after."""
+
+    name: str
+    restitution: float
+    rates: tuple[float, float]
+
+
+def impact(
+    scene: LawScene, passage: Passage, residuals: LawResiduals, coordinates: Coordinates, fastest: dict[str, float]
+) -> None:
+    """Checks a jump of velocities; ``fastest``: largest speed of impact of each contact and stop so far."""
+    before, after, time = passage.before, passage.after, passage.before.time
+    m, fast = scene.mechanism, scene.speed + float(np.abs(before.v).max())
+    columns, moving, stops = list[Array](), dict[str, Coordinate](), list[Stop]()
+    for number, connection in enumerate(scene.connections):
+        columns += _held(scene, before, connection)
+        if number < len(m.joints) and m.joints[number].nq == 1:
+            moving[connection.name] = _coordinate(scene, passage, number)
+            reached = _reached(scene, before, coordinates, number, moving[connection.name])
+            if reached or m.joints[number].motion is not None:
+                columns.append(moving[connection.name].column)
+            stops += reached
+    for coupling in m.couplings:
+        columns.append(np.sum([factor * moving[name].column for name, factor in scene.terms(coupling)[0]], 0))
+    joints, hits = len(columns), list[Hit]()
+    for k, contact in enumerate(scene.contacts):
+        is_struck, distance = contact.name in passage.impacts, float(gap_of(contact, before)[0, 0])
+        if is_struck and contact.alone:
+            residuals.note("event", contact.name, np.array([[abs(distance) / scene.length]]), 1.0, time)
+        place = before.place[0, 0, k]
+        touches = contact.alone and abs(distance) < _CLOSED * (scene.length + float(norm(place)))
+        if is_struck or touches or before.modes.contacts[k] != "open":
+            slides = [slide_of(contact, each, before.place[..., k, :])[0, 0] for each in (before, after)]
+            hits.append(Hit(k, contact, before.normal[0, 0, k], (slides[0], slides[1])))
+            columns += [_column(scene, before, (contact.a, contact.b), place, axis, 0 * axis) for axis in np.eye(3)]
+    jump = _momentum(scene, before, after)
+    for coordinate in moving.values():
+        jump = jump + coordinate.armature * (coordinate.rates[1] - coordinate.rates[0]) * coordinate.column
+    pulses, left = _explained(columns, jump)
+    weight = np.tile(np.repeat([1.0, scene.length], 3), len(m.bodies)) * m.mass * fast
+    residuals.note("impulse", "", np.array([[(np.abs(left) / weight).max()]]), 1.0, time)
+    _newton(scene, passage, residuals, hits, stops, fastest)
+    if len(hits) == 1 and not stops and not passage.settles:
+        _coulomb(scene, passage, residuals, hits[0], pulses[joints:])
+    if not any(joint.armature or joint.motion is not None for joint in m.joints):
+        energies = [_kinetic(scene, each) for each in (before, after)]
+        size = max(energies[0], m.mass * scene.speed**2)
+        residuals.note("impact energy", "", np.array([[max(energies[1] - energies[0], 0.0)]]), size, time)
+
+
+def _column(scene: LawScene, before: Pieces, ends: tuple[int, int], place: Array, force: Array, moment: Array) -> Array:
+    """Momenta (linear, about the centre of mass) of all bodies by an impulse on the first of two, its opposite on b."""
+    centres, momenta = scene.centres(before)[0][0, 0], np.zeros((len(scene.mass), 6))
+    for body, sign in zip(ends, (1.0, -1.0), strict=True):
+        momenta[body, :3] += sign * force
+        momenta[body, 3:] += sign * (np.cross(place - centres[body], force) + moment)
+    return momenta[:-1].ravel()
+
+
+def _held(scene: LawScene, before: Pieces, connection: JointFrames) -> list[Array]:
+    """Columns of the impulses that a connection can give."""
+    placed = scene.placed(connection, before)
+    A, B, place = placed.A[0, 0], placed.B[0, 0], placed.origin_b[0, 0]
+    ends, none = (connection.b, connection.a), np.zeros(3)
+    if connection.kind == "distance":
+        apart = place - placed.origin_a[0, 0]
+        return [_column(scene, before, ends, place, apart / np.linalg.norm(apart), none)]
+    forces = [A[:, k] for k in HELD_PLACES.get(connection.kind, (0, 1, 2))]
+    moments = [np.cross(A[:, i], B[:, k]) for i, k in HELD_TURNS.get(connection.kind, ())]
+    columns = [_column(scene, before, ends, place, force, none) for force in forces]
+    return columns + [_column(scene, before, ends, place, none, moment) for moment in moments]
+
+
+def _coordinate(scene: LawScene, passage: Passage, number: int) -> Coordinate:
+    """A joint with one coordinate in an impact."""
+    connection, joint = scene.connections[number], scene.mechanism.joints[number]
+    _, axis, turns = FREE[connection.kind][0]
+    placed = [scene.placed(connection, each) for each in (passage.before, passage.after)]
+    direction, none = placed[0].A[0, 0][:, axis], np.zeros(3)
+    force, moment = (none, direction) if turns else (direction, none)
+    place, ends = placed[0].origin_b[0, 0], (connection.b, connection.a)
+    rates = [float((each.spin if turns else each.slide)[0, 0] @ direction) for each in placed]
+    column = _column(scene, passage.before, ends, place, force, moment)
+    return Coordinate(column, (rates[0], rates[1]), joint.armature)
+
+
+def _reached(
+    scene: LawScene, before: Pieces, coordinates: Coordinates, number: int, coordinate: Coordinate
+) -> list[Stop]:
+    """Stops of a joint at which it is just before the impact."""
+    joint, connection = scene.mechanism.joints[number], scene.connections[number]
+    if joint.limits is None:
+        return []
+    place = float(coordinates.at(number, 0, before, scene.placed(connection, before), connection.kind)[0, 0])
+    length = 1.0 if joint.kind == "revolute" else scene.length
+    return [
+        Stop(joint.name, joint.restitution, (sign * coordinate.rates[0], sign * coordinate.rates[1]))
+        for sign, stop in zip((1.0, -1.0), joint.limits, strict=True)
+        if abs(place - stop) < _CLOSED * (abs(stop) + length)
+    ]
+
+
+def _momentum(scene: LawScene, before: Pieces, after: Pieces) -> Array:
+    """Jump of linear momentum and of that about the centre of mass, of all bodies."""
+    velocities = [scene.centres(each)[1][0, 0] for each in (before, after)]
+    spin = turned(before.R[0, 0] @ scene.inertia @ before.R[0, 0].swapaxes(-1, -2), after.w[0, 0] - before.w[0, 0])
+    linear = scene.mass[:, None] * (velocities[1] - velocities[0])
+    return np.concatenate([linear, spin], -1)[:-1].ravel()
+
+
+def _kinetic(scene: LawScene, pieces: Pieces) -> float:
+    velocities = scene.centres(pieces)[1][0, 0]
+    local = turned_back(pieces.R[0, 0], pieces.w[0, 0])
+    return float(0.5 * (scene.mass * dot(velocities, velocities) + dot(local, turned(scene.inertia, local))).sum())
+
+
+def _explained(columns: Sequence[Array], jump: Array) -> tuple[Array, Array]:
+    """Impulses that explain a jump best, and what they leave of it."""
+    if not columns:
+        return np.zeros(0), jump
+    matrix = np.array(columns).T
+    units = np.linalg.norm(matrix, axis=0)
+    units = np.where(units > 0, units, 1.0)
+    pulses = np.linalg.lstsq(matrix / units, jump, rcond=_RANK)[0] / units
+    return pulses, matrix @ pulses - jump
+
+
+def _newton(
+    scene: LawScene,
+    passage: Passage,
+    residuals: LawResiduals,
+    hits: Sequence[Hit],
+    stops: Sequence[Stop],
+    fastest: dict[str, float],
+) -> None:
+    """No contact that was struck closes further; of one alone v+ = -e v-, or 0 where its rebounds are summed."""
+    before, time = passage.before, passage.before.time
+    fast, strikes = scene.speed + float(np.abs(before.v).max()), list[Stop]()
+    happened = passage.impacts | passage.settles
+    for hit in hits:
+        speeds = [float(hit.normal @ slide) for slide in hit.slides]
+        strikes.append(Stop(hit.contact.name, hit.contact.pair.restitution, (speeds[0], speeds[1])))
+        if before.modes.contacts[hit.number] != "open" or hit.contact.name in happened:
+            residuals.note("restitution", hit.contact.name, np.array([[max(-speeds[1], 0.0)]]), fast, time)
+    strikes += stops
+    if len(strikes) != 1:  # of several Newton's law holds for each impact of their sequence, not for the whole
+        return
+    name, restitution, (came, left) = strikes[0]
+    if not passage.settles:
+        residuals.note("restitution", name, np.array([[left + restitution * came]]), fast, time)
+        fastest[name] = max(fastest.get(name, 0.0), -came)
+        return
+    residuals.note("restitution", name, np.array([[left]]), fast, time)
+    most = _SETTLED * max(scene.speed, fastest.get(name, 0.0))
+    residuals.note("restitution", name, np.array([[max(-came - most, 0.0)]]), fast, time)
+
+
+def _coulomb(scene: LawScene, passage: Passage, residuals: LawResiduals, hit: Hit, pulse: Array) -> None:
+    """Impulse of one contact: it presses, its friction lies within the cone, and opposes the slip that is left."""
+    time, name, pair = passage.before.time, hit.contact.name, hit.contact.pair
+    fast = scene.speed + float(np.abs(passage.before.v).max())
+    pressed = float(hit.normal @ pulse)
+    friction = pulse - pressed * hit.normal
+    came, left = (slide - (hit.normal @ slide) * hit.normal for slide in hit.slides)
+    size, slip = abs(pressed) + _FAINT * scene.mechanism.mass * fast, float(norm(left))
+    bounded = np.isfinite(pair.static)
+    excess = max(float(norm(friction)) - pair.static * pressed if bounded else 0.0, -pressed, 0.0)
+    residuals.note("impact cone", name, np.array([[excess]]), size, time)
+    if not bounded or float(norm(friction)) < (1 - _WITHIN) * pair.static * pressed:
+        returned = norm(left + pair.tangential_restitution * came)
+        residuals.note("restitution", name, np.array([[returned]]), fast, time)
+    if not pair.tangential_restitution and slip > _SLIPS * fast and np.isfinite(pair.friction):
+        opposed = norm(friction + pair.friction * pressed / slip * left)
+        residuals.note("impact cone", name, np.array([[opposed]]), size, time)

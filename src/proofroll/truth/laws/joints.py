@@ -1,0 +1,196 @@
+"""Laws of joints, loops and couplings: closure at place and rate, and the forces along each free direction."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import numpy as np
+
+from proofroll.truth.laws.integrals import dot, norm
+from proofroll.truth.laws.joint_forces import forces_along
+from proofroll.truth.laws.loads import BodyLoads
+from proofroll.truth.laws.record import Array, Pieces
+from proofroll.truth.laws.residuals import ROUND, LawResiduals
+from proofroll.truth.laws.scene import FREE, HELD_PLACES, HELD_TURNS, JointFrames, LawScene, PlacedFrames, motion_of
+
+
+class FreeDirection(NamedTuple):
+    """A free direction of a joint of the tree, at the points of pieces.
+
+    Attributes:
+        joint: number of the joint.
+        direction: unit vector, world axes.
+        carrier: body that it is fixed to.
+        turns: True for an axis of rotation.
+        origin: place of the joint on its child [m].
+        speed: velocity of that place [m/s].
+        rate: along the direction [m/s, rad/s].
+        force: of all laws along it, on the child [N, N m].
+        size: sum of the sizes of these.
+        digits: effect of round-off of the coordinate by a stiff spring.
+    """
+
+    joint: int
+    direction: Array
+    carrier: int
+    turns: bool
+    origin: Array
+    speed: Array
+    rate: Array
+    force: Array
+    size: Array
+    digits: Array
+
+
+class Coordinates:
+    """Coordinates of joints with one or two of them, from poses; angles go on from those of the last point."""
+
+    def __init__(self, scene: LawScene) -> None:
+        joints = enumerate(scene.mechanism.joints)
+        self._last = {(number, k): float(q) for number, joint in joints for k, q in enumerate(joint.q0)}
+
+    def at(self, number: int, k: int, pieces: Pieces, placed: PlacedFrames, kind: str) -> Array:
+        """Coordinate k of a joint at the points of pieces [m, rad]."""
+        axes, axis, turns = FREE[kind][k]
+        if not turns:
+            return dot(placed.origin_b - placed.origin_a, placed.A[..., axis])
+        R = placed.A.swapaxes(-1, -2) @ placed.B
+        angle = np.arctan2(R[..., 2, 1], R[..., 2, 2]) if axes == "B" else np.arctan2(R[..., 1, 0], R[..., 0, 0])
+        if pieces.turns is not None:
+            turn = pieces.turns[..., number, k] - angle
+        else:
+            start = self._last[number, k]
+            path = np.unwrap(np.concatenate([[start], angle.ravel()]))[1:].reshape(angle.shape)
+            turn = path + 2 * np.pi * np.round((start - path.flat[0]) / (2 * np.pi)) - angle
+        angle = angle + 2 * np.pi * np.round(turn / (2 * np.pi))
+        self._last[number, k] = float(angle.flat[-1])
+        return np.asarray(angle)
+
+
+class Sizes(NamedTuple):
+    """Natural sizes of a connection's places, velocities and angular velocities at the points of pieces."""
+
+    place: Array
+    velocity: Array
+    spin: Array
+
+
+def joint_laws(
+    scene: LawScene, pieces: Pieces, residuals: LawResiduals, coordinates: Coordinates, loads: BodyLoads
+) -> list[FreeDirection]:
+    """Checks joints, loops and couplings, adds the forces of loops to the loads; the free directions of the tree."""
+    axes, moving, joints = list[FreeDirection](), dict[str, tuple[Array, Array]](), scene.mechanism.joints
+    for number, connection in enumerate(scene.connections):
+        placed = scene.placed(connection, pieces)
+        sizes = _sizes(scene, pieces, connection, placed)
+        _closure(pieces, residuals, connection, placed, sizes)
+        if number >= len(joints):
+            _loop_force(scene, pieces, residuals, loads, (number - len(joints), connection, placed))
+            continue
+        axes += _axes(scene, pieces, residuals, coordinates, (number, connection, placed, sizes), moving)
+    for axis in axes:
+        loads.works(axis.force * axis.rate, axis.size * (scene.rate if axis.turns else scene.speed))
+    _couplings(scene, pieces, residuals, moving)
+    return axes
+
+
+def _sizes(scene: LawScene, pieces: Pieces, connection: JointFrames, placed: PlacedFrames) -> Sizes:
+    ends = connection.a, connection.b
+    spin = sum(norm(pieces.w[..., body, :]) for body in ends)
+    velocity = scene.speed + sum(norm(pieces.v[..., body, :]) for body in ends) + spin * scene.length
+    return Sizes(scene.length + norm(placed.origin_b), np.asarray(velocity), np.asarray(scene.rate + spin))
+
+
+def _closure(
+    pieces: Pieces, residuals: LawResiduals, connection: JointFrames, placed: PlacedFrames, sizes: Sizes
+) -> None:
+    """Checks that a connection holds its bodies together, at place and rate."""
+    time, name, A, B = pieces.time, connection.name, placed.A, placed.B
+    apart = placed.origin_b - placed.origin_a
+    if connection.kind == "distance":
+        length = norm(apart)
+        residuals.note("joint place", name, length - connection.length, sizes.place, time)
+        residuals.note("joint rate", name, dot(apart / length[..., None], placed.slide), sizes.velocity, time)
+        return
+    for k in HELD_PLACES.get(connection.kind, (0, 1, 2)):
+        residuals.note("joint place", name, dot(apart, A[..., k]), sizes.place, time)
+        residuals.note("joint rate", name, dot(placed.slide, A[..., k]), sizes.velocity, time)
+    for i, k in HELD_TURNS.get(connection.kind, ()):
+        residuals.note("joint place", name, dot(A[..., i], B[..., k]), 1.0, time)
+        residuals.note("joint rate", name, dot(np.cross(B[..., k], A[..., i]), placed.spin), sizes.spin, time)
+
+
+def _loop_force(
+    scene: LawScene,
+    pieces: Pieces,
+    residuals: LawResiduals,
+    loads: BodyLoads,
+    loop: tuple[int, JointFrames, PlacedFrames],
+) -> None:
+    """Adds the stated force and moment of a loop to the loads; it has none along its free directions."""
+    number, connection, placed = loop
+    force, moment = pieces.loop[..., number, :3], pieces.loop[..., number, 3:]
+    loads.between(connection.b, connection.a, placed.origin_b, force, moment)
+    size = norm(moment) + (norm(force) + scene.faint) * scene.length
+    if connection.kind == "distance":
+        apart = placed.origin_b - placed.origin_a
+        direction = apart / norm(apart)[..., None]
+        across = norm(force - dot(force, direction)[..., None] * direction) + norm(moment) / scene.length
+        residuals.note("loop force", connection.name, across, size / scene.length, pieces.time)
+        return
+    for axes, axis, turns in FREE[connection.kind]:
+        direction = (placed.A if axes == "A" else placed.B)[..., axis]
+        part = dot(moment if turns else force, direction)
+        residuals.note("loop force", connection.name, part, size / (1.0 if turns else scene.length), pieces.time)
+
+
+def _axes(
+    scene: LawScene,
+    pieces: Pieces,
+    residuals: LawResiduals,
+    coordinates: Coordinates,
+    joint: tuple[int, JointFrames, PlacedFrames, Sizes],
+    moving: dict[str, tuple[Array, Array]],
+) -> list[FreeDirection]:
+    """Free directions of a joint of the tree; ``moving`` takes place and rate of one with one coordinate."""
+    number, connection, placed, sizes = joint
+    data, time, axes = scene.mechanism.joints[number], pieces.time, []
+    speed = pieces.v[..., connection.b, :] + np.cross(
+        pieces.w[..., connection.b, :], placed.origin_b - pieces.p[..., connection.b, :]
+    )
+    for k, (frame, axis, turns) in enumerate(FREE[connection.kind]):
+        direction = (placed.A if frame == "A" else placed.B)[..., axis]
+        rate = dot(placed.spin if turns else placed.slide, direction)
+        force, size, digits = (np.zeros(time.shape) for _ in range(3))
+        if data.nq in {1, 2}:
+            place = coordinates.at(number, k, pieces, placed, connection.kind)
+            parts = [-data.stiffness * (place - data.rest), -data.damping * rate]
+            digits = ROUND * data.stiffness * (np.abs(place) + (1.0 if turns else scene.length))
+            if data.nq == 1:
+                moving[data.name] = place, rate
+                parts += forces_along(scene, pieces, residuals, number, place, rate)
+            force, size = np.sum(parts, 0), np.sum(np.abs(parts), 0)
+        elif connection.kind == "spherical":
+            force = -data.damping * rate
+            size = np.abs(force)
+        carrier = connection.a if frame == "A" else connection.b
+        origin = placed.origin_b
+        axes.append(FreeDirection(number, direction, carrier, turns, origin, speed, rate, force, size, digits))
+    if data.motion is not None:
+        prescribed = motion_of(data.motion, time)
+        far = (sizes.place if data.kind == "prismatic" else 1.0) + np.abs(prescribed)
+        residuals.note("motion", data.name, moving[data.name][0] - prescribed, far, time)
+    return axes
+
+
+def _couplings(
+    scene: LawScene, pieces: Pieces, residuals: LawResiduals, moving: Mapping[str, tuple[Array, Array]]
+) -> None:
+    for coupling in scene.mechanism.couplings:
+        terms, total = scene.terms(coupling)
+        for law, which, least in (("coupling", 0, 1.0), ("coupling rate", 1, scene.rate)):
+            values = [factor * moving[name][which] for name, factor in terms]
+            size = sum(np.abs(value) + abs(factor) * least for value, (_, factor) in zip(values, terms, strict=True))
+            constant = 0.0 if which else total
+            residuals.note(law, coupling.name, np.sum(values, 0) - constant, np.asarray(size), pieces.time)

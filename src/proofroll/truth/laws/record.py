@@ -1,0 +1,137 @@
+"""Record of a route: poses, velocities and forces at points of pieces of its motion, and its transitions."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields, replace
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from proofroll.elements.mechanism import Mechanism
+
+Array = NDArray[np.float64]
+
+
+class Modes(NamedTuple):
+    """Modes during a stretch, each "open", "stick" or "slip".
+
+    Attributes:
+        contacts: of each contact.
+        rolling, spinning: of its rolling resistance and its friction against spin; "open" without any.
+        friction: of the dry friction of each joint; "open" without any.
+        stops: of the lower and the upper stop of each joint.
+    """
+
+    contacts: tuple[str, ...]
+    rolling: tuple[str, ...]
+    spinning: tuple[str, ...]
+    friction: tuple[str, ...]
+    stops: tuple[tuple[str, str], ...]
+
+    @classmethod
+    def smooth(cls, mechanism: Mechanism) -> Modes:
+        """Modes of a motion without contacts, stops and dry friction."""
+        joints = len(mechanism.joints)
+        return cls((), (), (), ("open",) * joints, (("open", "open"),) * joints)
+
+
+@dataclass(frozen=True)
+class Pieces:
+    """Statements of one route at the points of pieces of one stretch, SI units, world axes.
+
+    A piece is a part of a step in which all quantities are polynomials of a variable x from -1 to 1; its points are
+    Chebyshev's, :data:`.integrals.POINTS`, both ends among them. Arrays have the shape (pieces, points, …).
+    The last body is the world.
+
+    Attributes:
+        time: [s].
+        pace: rate of the time by x [s].
+        p: origin of each body's frame [m], (bodies + 1, 3).
+        R: rotation of each body, (bodies + 1, 3, 3).
+        v: velocity of each origin [m/s], (bodies + 1, 3).
+        w: angular velocity of each body [rad/s], (bodies + 1, 3).
+        effort: of each actuator along its joint [N, N m], (actuators).
+        coupling: multiplier of each coupling: force along its first joint [N, N m], (couplings).
+        drive: force that imposes the motion of each joint [N, N m], (joints); 0 where none is prescribed.
+        loop: force and moment of each loop on its second body, at its place there [N, N m], (loops, 6).
+        friction: dry friction along each joint [N, N m], (joints).
+        stops: force of each stop along its joint [N, N m], (joints, 2).
+        force: on the first body of each contact [N], (contacts, 3).
+        place: point of action [m], (contacts, 3).
+        normal: from the second body to the first, unit vector, (contacts, 3).
+        rolling, spinning: moment on the first body of each contact against rolling and spin [N m], (contacts, 3).
+        modes: during the stretch.
+        coarse: True if states inside a piece are known to fewer digits than at its ends (dense output of DOP853).
+        turns: coordinates of joints with one or two coordinates, for their whole turns, (joints, 2); None: angles
+            go on from the last point.
+        target: target of each actuator that a controller sets, NaN for the others, (actuators); None: NaN.
+    """
+
+    time: Array
+    pace: Array
+    p: Array
+    R: Array
+    v: Array
+    w: Array
+    effort: Array
+    coupling: Array
+    drive: Array
+    loop: Array
+    friction: Array
+    stops: Array
+    force: Array
+    place: Array
+    normal: Array
+    rolling: Array
+    spinning: Array
+    modes: Modes
+    coarse: bool = False
+    turns: Array | None = None
+    target: Array | None = None
+
+    def points(self, piece: int, point: int) -> Pieces:
+        """One point as pieces of one point."""
+        values = {item.name: getattr(self, item.name) for item in fields(self)}
+        part = slice(piece, piece + 1 or None), slice(point, point + 1 or None)
+        arrays: dict[str, Any] = {name: value[part] for name, value in values.items() if isinstance(value, np.ndarray)}
+        return replace(self, **arrays)
+
+
+@dataclass(frozen=True)
+class Passage:
+    """A transition between two stretches: what a route states just before and just after it.
+
+    Attributes:
+        before, after: pieces of one point each.
+        impacts: names of contacts and joints that were struck.
+        settles: names of those whose rebounds are summed.
+        decided: True if a guard ended the stretch; False for a break of a signal or a border of a surface.
+    """
+
+    before: Pieces
+    after: Pieces
+    impacts: frozenset[str] = frozenset()
+    settles: frozenset[str] = frozenset()
+    decided: bool = True
+
+
+def without_contacts(mechanism: Mechanism, time: Array, **stated: Any) -> Pieces:
+    """Pieces of a motion without contacts, stops and dry friction; what is not stated is zero.
+
+    ``stated``: fields of :class:`Pieces`.
+    """
+    shape, joints = time.shape, len(mechanism.joints)
+    sizes: dict[str, Sequence[int]] = {
+        "effort": (len(mechanism.actuators),),
+        "coupling": (len(mechanism.couplings),),
+        "drive": (joints,),
+        "loop": (len(mechanism.loops), 6),
+        "friction": (joints,),
+        "stops": (joints, 2),
+        **dict.fromkeys(("force", "place", "normal", "rolling", "spinning"), (0, 3)),
+    }
+    zeros = {name: np.zeros((*shape, *size)) for name, size in sizes.items()}
+    return Pieces(**{"time": time, "modes": Modes.smooth(mechanism), **zeros, **stated})

@@ -1,0 +1,129 @@
+"""Laws with their allowances, and the residuals of one route in parts of these."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+
+from proofroll.truth.laws.record import Array
+
+# Law -> allowance of its residual, relative to its natural size, and the law as a clause. On honest records of all
+# models the largest residual is 0.2 of its allowance, most are below 1e-3 of it.
+LAWS: dict[str, tuple[float, str]] = {
+    "place": (1e-10, "place = integral of the velocity"),
+    "turn": (1e-10, "rotation = integral of the angular velocity"),
+    "joined": (1e-10, "poses and velocities go on where they ended"),
+    "momentum": (1e-10, "momentum = integral of the forces"),
+    "spin": (1e-10, "angular momentum = integral of the moments"),
+    "energy": (1e-10, "energy = work of the forces"),
+    "joint place": (1e-10, "a joint holds its bodies together"),
+    "joint rate": (1e-10, "bodies of a joint move together"),
+    "loop force": (1e-10, "a loop bears no force along its free directions"),
+    "coupling": (1e-10, "coupled coordinates keep their sum"),
+    "coupling rate": (1e-10, "coupled rates keep their sum"),
+    "motion": (1e-10, "a driven joint follows its motion"),
+    "effort": (1e-9, "effort = law of the actuator within its limit"),
+    "dry friction": (1e-9, "dry friction opposes the rate within its bound"),
+    "stop": (1e-10, "no joint passes its stop"),
+    "stop rate": (1e-10, "a joint that a stop or dry friction holds is at rest"),
+    "gap": (1e-10, "no body passes into another"),
+    "surface": (1e-10, "a contact force acts on both surfaces"),
+    "normal": (1e-10, "the normal is that of the surfaces"),
+    "gap rate": (1e-10, "surfaces in contact neither part nor approach"),
+    "pull": (1e-9, "a contact presses and never pulls; apart, no force"),
+    "cone": (1e-9, "friction of a contact that sticks lies within its bound"),
+    "stick": (1e-10, "a contact that sticks does not slip"),
+    "slip": (1e-9, "friction of a slip opposes it with mu N"),
+    "turning": (1e-9, "the moment against rolling or spin follows its law"),
+    "event": (1e-9, "a change of mode happens at the zero of its cause"),
+    "impulse": (1e-10, "velocities jump by impulses of joints, stops and contacts"),
+    "restitution": (1e-10, "v+ = -e v- at an impact"),
+    "impact cone": (1e-9, "impulses press, within the bound of friction"),
+    "impact energy": (1e-10, "an impact wins no energy"),
+}
+COARSE = 30.0  # factor for what dense output of DOP853 says inside a step: it holds to 1.4e-12, ten times the steps
+ROUND = 1e-13  # round-off of places and angles in their natural sizes, which stiff springs turn into forces
+# What 12 points do not resolve excuses a residual up to this part of its size: more would hide a force that jumps.
+_UNRESOLVED = 1e-9
+
+
+class Violation(NamedTuple):
+    """First violation of a law by a route.
+
+    Attributes:
+        time, until: start and end of the piece in which it happens [s].
+        law: name of the law.
+        part: name of the body, joint or contact; empty: the whole mechanism.
+        size: residual relative to its natural size.
+        allowed: allowance relative to it.
+    """
+
+    time: float
+    until: float
+    law: str
+    part: str
+    size: float
+    allowed: float
+
+
+@dataclass
+class LawResiduals:
+    """LawResiduals of one route, in parts of their allowances.
+
+    Attributes:
+        largest: law -> largest residual in parts of its allowance, its time [s] and part.
+        relative: law -> largest residual relative to its natural size, without the further allowances.
+        first: first violation; None: all laws hold.
+        points: number of points at which laws were evaluated.
+        events: number of transitions.
+        coarse: factor on all allowances, now.
+    """
+
+    largest: dict[str, tuple[float, float, str]] = field(default_factory=dict)
+    relative: dict[str, float] = field(default_factory=dict)
+    first: Violation | None = None
+    points: int = 0
+    events: int = 0
+    coarse: float = 1.0
+
+    def note(
+        self,
+        law: str,
+        part: str,
+        residual: Array,
+        size: Array | float,
+        time: Array,
+        extra: Array | float = 0.0,
+        tail: Array | float = 0.0,
+    ) -> None:
+        """Takes residuals (pieces, points, …), with their natural sizes, at times (pieces, points, …) [s].
+
+        ``extra``: further allowance, absolute; ``tail``: likewise, of what the points do not resolve, bounded.
+        """
+        residual = np.abs(residual)
+        if not residual.size:
+            return
+        size, extra, tail = (np.broadcast_to(np.asarray(each, float), residual.shape) for each in (size, extra, tail))
+        with np.errstate(all="ignore"):
+            allowed = LAWS[law][0] * self.coarse * size + extra + np.minimum(tail, _UNRESOLVED * size)
+            parts = np.where(residual > 0, residual / allowed, 0.0)
+            relative = np.where(residual > 0, np.maximum(residual - extra, 0.0) / size, 0.0)
+        parts = np.where(np.isfinite(residual), parts, np.inf)
+        times = np.broadcast_to(time.reshape(time.shape + (1,) * (residual.ndim - time.ndim)), residual.shape)
+        worst = int(np.argmax(parts))
+        if parts.flat[worst] >= self.largest.get(law, (0.0,))[0]:
+            self.largest[law] = float(parts.flat[worst]), float(times.flat[worst]), part
+        self.relative[law] = max(self.relative.get(law, 0.0), float(np.nanmax(relative)))
+        if not parts.flat[worst] > 1.0:
+            return
+        violating = (parts > 1.0).reshape(len(parts), -1).any(1)
+        piece = int(violating.argmax())
+        begin, end = float(times[piece].min()), float(times[piece].max())
+        if self.first is None or begin < self.first.time:
+            number = int(np.argmax(parts[piece]))
+            with np.errstate(all="ignore"):
+                size_there = float(residual[piece].flat[number] / size[piece].flat[number])
+                bound = float(allowed[piece].flat[number] / size[piece].flat[number])
+            self.first = Violation(begin, end, law, part, size_there, bound)

@@ -1,0 +1,176 @@
+"""Numbers of a mechanism as the law check needs them: natural sizes, frames of connections, masses, the tree."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from proofroll.truth.laws.integrals import frame_of, of_angles, turned
+from proofroll.truth.laws.record import Array, Pieces
+from proofroll.truth.laws.surfaces import PairContact, contacts_of
+
+if TYPE_CHECKING:
+    from proofroll.elements.mechanism import Mechanism
+    from proofroll.elements.mechanism.drives import Coupling
+
+# Free directions of a joint, in the order of its coordinates: axes of A (on the first body) or B, number, if it turns.
+FREE: dict[str, tuple[tuple[str, int, bool], ...]] = {
+    "fixed": (),
+    "revolute": (("A", 2, True),),
+    "prismatic": (("A", 2, False),),
+    "cylindrical": (("A", 2, False), ("A", 2, True)),
+    "universal": (("A", 2, True), ("B", 0, True)),
+    "planar": (("A", 0, False), ("A", 1, False), ("A", 2, True)),
+    "spherical": tuple(("B", axis, True) for axis in range(3)),
+    "free": tuple(("B", axis, turns) for turns in (False, True) for axis in range(3)),
+}
+# Axes of A along which the points of a joint stay together (others: all three), and pairs of axes of A and B that stay
+# perpendicular (others: none).
+HELD_PLACES: dict[str, tuple[int, ...]] = {"prismatic": (0, 1), "cylindrical": (0, 1), "planar": (2,), "free": ()}
+_PARALLEL, _EQUAL = ((0, 2), (1, 2)), ((0, 1), (1, 2), (2, 0))
+HELD_TURNS: dict[str, tuple[tuple[int, int], ...]] = {
+    "fixed": _EQUAL,
+    "prismatic": _EQUAL,
+    "revolute": _PARALLEL,
+    "cylindrical": _PARALLEL,
+    "planar": _PARALLEL,
+    "universal": ((2, 0),),
+}
+_FAINT = 1e-3  # part of the natural force of a scene below which forces count as of that size
+
+
+class JointFrames(NamedTuple):
+    """A joint or loop: bodies a and b, places and frames in their axes; ``length``: of a loop that holds a distance."""
+
+    name: str
+    kind: str
+    a: int
+    b: int
+    position_a: Array
+    position_b: Array
+    frame_a: Array
+    frame_b: Array
+    length: float = 0.0
+
+
+class PlacedFrames(NamedTuple):
+    """A connection at the points of pieces: axes of A and B as columns, origins of both, and velocities of B in A."""
+
+    A: Array
+    B: Array
+    origin_a: Array
+    origin_b: Array
+    slide: Array
+    spin: Array
+
+
+class LawScene:
+    """Numbers of a mechanism in SI units.
+
+    Attributes:
+        mechanism: the data.
+        length, speed, rate, force: natural sizes [m, m/s, 1/s, N].
+        faint: force below which forces count as of that size [N].
+        connections: joints, then loops.
+        contacts: in the order of pairs.
+        mass, com, inertia: of all bodies and the world, which has none.
+        subtrees: bodies that each joint carries, (joints, bodies + 1).
+    """
+
+    def __init__(self, mechanism: Mechanism, length: float, rate: float) -> None:
+        """Takes the natural length [m] and rate [1/s]."""
+        self.mechanism, self.length, self.rate, self.speed = mechanism, length, rate, length * rate
+        self.mass = np.array([*(body.mass for body in mechanism.bodies), 0.0])
+        pull = float(np.linalg.norm(mechanism.gravity))
+        self.force = max(float(self.mass.sum()) * max(pull, length * rate**2), float(np.finfo(float).tiny))
+        self.faint = _FAINT * self.force
+        self.com = np.array([*(body.com for body in mechanism.bodies), (0.0, 0.0, 0.0)])
+        self.inertia = np.array([*(np.array(body.inertia) for body in mechanism.bodies), np.zeros((3, 3))])
+        self.index = {"world": len(mechanism.bodies)} | {body.name: k for k, body in enumerate(mechanism.bodies)}
+        self.connections = self._connections()
+        self.contacts: list[PairContact] = contacts_of(mechanism.geometries, mechanism.pairs, self.index)
+        self.subtrees = np.zeros((len(mechanism.joints), len(self.mass)), dtype=bool)
+        for number, joint in enumerate(mechanism.joints):
+            self.subtrees[number, self.index[joint.child]] = True
+            body = joint.parent
+            while body != "world":
+                above = next(k for k, upper in enumerate(mechanism.joints) if upper.child == body)
+                self.subtrees[above, self.index[joint.child]] = True
+                body = mechanism.joints[above].parent
+
+    def _connections(self) -> list[JointFrames]:
+        connections = []
+        for joint in self.mechanism.joints:
+            plain = joint.kind in {"fixed", "spherical", "free"}
+            second = None if joint.second_axis is None else np.array(joint.second_axis)
+            frame = np.eye(3) if plain else frame_of(np.array(joint.axis), second)
+            ends = self.index[joint.parent], self.index[joint.child]
+            places = np.array(joint.position), np.array(joint.child_position)
+            rotation = of_angles(np.array(joint.orientation))
+            connections.append(JointFrames(joint.name, str(joint.kind), *ends, *places, rotation @ frame, frame))
+        for loop in self.mechanism.loops:
+            kind, frame = str(loop.kind), frame_of(np.array(loop.axis_a))
+            other = frame_of(np.array(loop.axis_b))
+            if kind in {"fixed", "prismatic"}:
+                other = of_angles(np.array(loop.orientation)).T @ frame
+            elif kind == "universal":  # z of A stays perpendicular to x of B
+                other = other[:, [2, 0, 1]]
+            ends = self.index[loop.body_a], self.index[loop.body_b]
+            places = np.array(loop.position_a), np.array(loop.position_b)
+            connections.append(JointFrames(loop.name, kind, *ends, *places, frame, other, loop.length))
+        return connections
+
+    def placed(self, connection: JointFrames, pieces: Pieces) -> PlacedFrames:
+        """A connection at the points of pieces."""
+        a, b = connection.a, connection.b
+        origin_a = pieces.p[..., a, :] + turned(pieces.R[..., a, :, :], connection.position_a)
+        origin_b = pieces.p[..., b, :] + turned(pieces.R[..., b, :, :], connection.position_b)
+        return PlacedFrames(
+            A=pieces.R[..., a, :, :] @ connection.frame_a,
+            B=pieces.R[..., b, :, :] @ connection.frame_b,
+            origin_a=origin_a,
+            origin_b=origin_b,
+            # of both bodies at one place: seen from body a, the rate of their distance
+            slide=velocity_at(pieces, b, origin_b) - velocity_at(pieces, a, origin_b),
+            spin=pieces.w[..., b, :] - pieces.w[..., a, :],
+        )
+
+    @staticmethod
+    def terms(coupling: Coupling) -> tuple[list[tuple[str, float]], float]:
+        """Joints and factors of a coupling whose sum is constant, the first 1, and that sum."""
+        if coupling.joints:
+            scale = coupling.coefficients[0]
+            pairs = zip(coupling.joints, coupling.coefficients, strict=True)
+            return [(name, factor / scale) for name, factor in pairs], coupling.offset / scale
+        return [(coupling.joint_b, 1.0), (coupling.joint_a, -coupling.ratio)], coupling.offset
+
+    def centres(self, pieces: Pieces) -> tuple[Array, Array]:
+        """Centres of mass [m] and their velocities [m/s]."""
+        arm = turned(pieces.R, self.com)
+        return pieces.p + arm, pieces.v + np.cross(pieces.w, arm)
+
+
+def velocity_at(pieces: Pieces, body: int, place: Array) -> Array:
+    """Velocity of a body at places [m/s]."""
+    return np.asarray(pieces.v[..., body, :] + np.cross(pieces.w[..., body, :], place - pieces.p[..., body, :]))
+
+
+def value_of(signal: Any, time: Array) -> Array:
+    """Values of a signal at the points of pieces; a held value is that of the middle of its piece."""
+    if getattr(signal, "hold", False):
+        value = signal.at((time[:, :1] + time[:, -1:]) / 2)
+    else:
+        value = signal.at(time) if hasattr(signal, "at") else signal
+    return np.asarray(np.broadcast_to(np.asarray(value, float), time.shape))
+
+
+def motion_of(signal: Any, time: Array) -> Array:
+    """Values of a prescribed motion; a table is joined by a spline of fifth order that begins and ends at rest."""
+    if not hasattr(signal, "times"):
+        return value_of(signal, time)
+    from scipy.interpolate import make_interp_spline
+
+    at_rest = [(1, 0.0), (2, 0.0)]
+    spline = make_interp_spline(signal.times, signal.values, k=5, bc_type=(at_rest, at_rest))
+    return np.asarray(spline(np.clip(time, signal.times[0], signal.times[-1])))
