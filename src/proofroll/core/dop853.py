@@ -15,6 +15,8 @@ Accept = Callable[[float, FloatArray], FloatArray]
 
 # Smallest relative tolerance that scipy accepts; the method itself could go lower.
 TIGHTEST = 100 * float(np.finfo(float).eps)
+# Distance from a failure of the rates, relative to the time, up to which steps are halved to come nearer to it.
+_NEAREST = 1e-9
 
 
 def solver_from(
@@ -132,10 +134,10 @@ def integrate(
         first_step: length of the first attempt [s]; None: chosen from the rates.
 
     Raises:
-        Diverged: the steps become too small or too many.
+        Diverged: the steps become too small or too many, or the rates fail, at its ``time``.
     """
     solver = solver_from(rate, 0.0, start, tolerance, tolerance if least is None else least, first_step)
-    watch, count = StepWatch(), StepCount(0.0, float(times[-1]))
+    watch, count, longest = StepWatch(), StepCount(0.0, float(times[-1])), math.inf
     lost, back = np.zeros_like(start), corrected_by(corrected or (lambda y: y))
 
     def accept(t: float, _: FloatArray) -> FloatArray:
@@ -147,7 +149,15 @@ def integrate(
 
     for time in times.tolist():
         while solver.t < time:
-            controlled_step(solver, accept, time)
-            watch.took(solver.t, solver.step_size, solver.t == time)
-            count.took(solver.t)
+            begun = solver.t
+            try:
+                controlled_step(solver, accept, time, longest)
+                watch.took(solver.t, solver.step_size, solver.t == time)
+                count.took(solver.t)
+            except Diverged as stopped:
+                if solver.t > begun:  # the step itself succeeded
+                    raise Diverged(str(stopped), solver.t) from None
+                longest = min(solver.h_abs, longest, time - begun) / 2
+                if longest <= _NEAREST * begun or begun == 0.0:
+                    raise Diverged(str(stopped), begun) from None
         yield solver.y.copy()

@@ -68,7 +68,15 @@ class Unwritable(ProofrollError):  # noqa: N818 -- a state of the machine, as a 
 
 
 class Diverged(ProofrollError):  # noqa: N818 -- a finding about the engine
-    """The engine gave up or produced a state that is not finite; the text says when."""
+    """The engine gave up or produced a state that is not finite; the text says when.
+
+    Attributes:
+        time: up to which the motion is known [s]; None: the text alone says it.
+    """
+
+    def __init__(self, text: str = "", time: float | None = None) -> None:
+        super().__init__(text)
+        self.time = time
 
 
 @contextmanager

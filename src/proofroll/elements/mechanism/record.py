@@ -50,6 +50,10 @@ class Record:
             known_q=known_q,
         )
 
+    def first(self, count: int) -> "Record":
+        """The record of its first times alone."""
+        return Record(**{item.name: getattr(self, item.name)[:count] for item in fields(self)})
+
 
 def record_of(time: Array, samples: list[dict[str, Any]]) -> Record:
     """Record of samples; each is a dictionary of the record's other fields at one time."""

@@ -57,15 +57,8 @@ class MaximalTaylor:
         Raises:
             Diverged: the integration stops before the last time.
         """
-        self._begin(self._number(0), self._start if start is None else start)
-        integrator = self._integrator
-        grid = np.array([self._number(time) for time in [0.0, *times]])  # heyoka's grid starts at its present time
-        grid, begin = (grid[1:], 0) if times[0] == 0 else (grid, 1)
-        outcome, *_, states = integrator.propagate_grid(grid)
-        states = states[begin:]
-        if len(states) < len(times) or not np.isfinite(np.asarray(states, dtype=float)).all():
-            raise Diverged(f"Taylor series stopped at t = {float(integrator.time):.6g} s ({outcome})")
-        return np.asarray(states)
+        begun = self._start if start is None else start
+        return np.array(self.run_while(lambda _: True, self._number(0), begun, times.tolist())[2])
 
     def run_while(
         self, sound: Callable[[Array], bool], time: Scalar, state: Array, times: Sequence[float]
@@ -82,10 +75,11 @@ class MaximalTaylor:
         self._begin(time, state)
         states: list[Array] = []
         while len(states) < len(times):
-            left = self._number(times[-1]) - integrator.time
-            outcome, step = integrator.step(max_delta_t=left, write_tc=True)
+            begun, left = integrator.time, self._number(times[-1]) - integrator.time
+            _, step = integrator.step(max_delta_t=left, write_tc=True)
             if not np.isfinite(np.asarray(integrator.state, dtype=float)).all() or (step == 0 and left > 0):
-                raise Diverged(f"Taylor series stopped at t = {float(integrator.time):.6g} s ({outcome})")
+                text = f"Taylor series stop at t = {float(begun):.6g} s: the motion has no finite derivatives there"
+                raise Diverged(text, float(begun))
             last = step == left
             while len(states) < len(times) and (last or self._number(times[len(states)]) <= integrator.time):
                 states.append(integrator.update_d_output(self._number(times[len(states)])).copy())

@@ -140,8 +140,11 @@ class Units(NamedTuple):
         """Context that converts the times in error messages from these units to seconds."""
         try:
             yield
-        except (Refused, Diverged) as error:
+        except Refused as error:
             raise type(error)(self.text_in_seconds(str(error))) from None
+        except Diverged as error:
+            time = None if error.time is None else error.time * self.time
+            raise type(error)(self.text_in_seconds(str(error)), time) from None
 
     def text_in_seconds(self, text: str) -> str:
         """A message with its times in seconds instead of these units."""

@@ -61,7 +61,7 @@ class MechanismTruth:
             return _laws_alone(element, times, str(error))
         record = motion.record
         wrench = np.stack([record.wrench[..., :3], record.wrench[..., 3:]], axis=1)
-        pressed = np.zeros((len(times), 0, 3)) if motion.pressed is None else motion.pressed
+        pressed = np.zeros((len(record.time), 0, 3)) if motion.pressed is None else motion.pressed
         dataset = columns(
             element, record.placed(element.mechanism), wrench, pressed, record.named, motion.sums, UNDETERMINED
         ).dataset()

@@ -10,6 +10,7 @@ from proofroll.elements.mechanism.joint_coordinates import JointCoordinates
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.truth.mechanism.closed_forms import ClosedForm
 
+BRANCHING = "the rows of the loops lose rank and the motion may branch: any change of the lengths may lead elsewhere"
 _TURN = 0.02  # step between poses of a closed form, rad or m of the fastest coordinate
 _FEW, _MOST = 50, 20_000  # limits of the number of poses
 
@@ -38,8 +39,7 @@ def singular_poses_of(form: ClosedForm, equations: JointCoordinates, until: floa
 def branching(times: list[float]) -> str:
     """Clause about the times of singular poses, s; empty without any."""
     instants = ", ".join(f"{time:.4g}" for time in times[:3]) + (", …" if len(times) > 3 else "")
-    branches = "the rows of the loops lose rank and the motion may branch: any change of the lengths may lead elsewhere"
-    return f"near t = {instants} s {branches}" if times else ""
+    return f"near t = {instants} s {BRANCHING}" if times else ""
 
 
 def _passed(equations: JointCoordinates, times: Array, poses: Iterable[Array]) -> list[float]:

@@ -8,6 +8,8 @@ conservative mechanism has failed, and shows no chaos.
 """
 
 from dataclasses import replace
+from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +24,7 @@ from proofroll.elements.mechanism.record import Record, record_of
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.truth import SAFETY
 from proofroll.truth.mechanism.closed_forms import ClosedForm, closed_form
+from proofroll.truth.mechanism.early_end import EarlyEnd
 from proofroll.truth.mechanism.error_bars import (
     NUDGE,
     ROUND_OFF,
@@ -33,7 +36,7 @@ from proofroll.truth.mechanism.error_bars import (
     round_off,
 )
 from proofroll.truth.mechanism.maximal_coordinates import BESIDE, MaximalCoordinates
-from proofroll.truth.mechanism.singular_poses import branching, singular_poses, singular_poses_of
+from proofroll.truth.mechanism.singular_poses import BRANCHING, singular_poses, singular_poses_of
 from proofroll.truth.mechanism.stiff_routes import run_stiff, stiff
 
 CHAOS = 1e-9  # m, 1 (quaternions): a larger distance between motions with indistinguishable starts is chaos
@@ -42,11 +45,29 @@ ENERGY = 1e-8  # change of energy relative to its parts, a thousand times that o
 AT_LIMIT = 1e-9  # rad, m: a joint that swings exactly to its limit exceeds it by round-off, 1e-14
 
 
+class _Routes(NamedTuple):
+    """Records of all routes at the same times, the truth first, which of these are chaotic, and the routes' names."""
+
+    best: Record
+    by_tree: Record
+    by_bodies: Record
+    precise: Record
+    chaotic: NDArray[np.bool_]
+    names: tuple[str, ...]
+
+    def first(self, count: int) -> "_Routes":
+        """The same at the first times alone."""
+        best, by_tree, by_bodies, precise = (
+            record.first(count) for record in (self.best, self.by_tree, self.by_bodies, self.precise)
+        )
+        return _Routes(best, by_tree, by_bodies, precise, self.chaotic[:count], self.names)
+
+
 def find_truth(mechanism: Mechanism, times: Array, tolerance: float = 1e-15) -> TwoRouteMotion:
-    """Truth at rising times, s; the first may be 0. ``tolerance`` is DOP853's.
+    """Truth at rising times, s, up to its end; the first may be 0. ``tolerance`` is DOP853's.
 
     Raises:
-        Refused: fewer than two routes cover the mechanism; the text says why.
+        Refused: fewer than two routes cover the mechanism, or none of the times; the text says why.
     """
     if mechanism.unmodelled:
         raise Refused(f"no route of the truth has {', '.join(mechanism.unmodelled)}")
@@ -56,26 +77,12 @@ def find_truth(mechanism: Mechanism, times: Array, tolerance: float = 1e-15) -> 
     exact = _from_form(tree, form, times) if form is not None and form.motion is not None else None
     if exact is None and analysis.singular_start:
         raise Refused("the start is a singular pose, where the motion may branch, and no closed form is known")
-    try:
-        bodies = MaximalCoordinates(mechanism)
-        check_start(tree, bodies)
-        by_tree, by_bodies, precise, growth, routes = _runs(tree, bodies, times, tolerance)
-        for record, name in ((by_tree, routes[1]), (precise, routes[0])):
-            _check_energy(mechanism, record, name)
-        chaotic = growth * NUDGE > CHAOS
-        if chaotic.any():
-            chaotic &= _first_growth(tree, by_tree) * NUDGE > CHAOS
-        _check_branch(by_tree, precise, chaotic)
-        best = precise if exact is None else on_same_turns(mechanism, by_tree, exact)
-    except Diverged as stopped:
-        if exact is None:
-            poses = _singular(mechanism, float(times[-1]))
-            raise Refused(f"no truth to the end: {stopped}; end before it{poses}") from None
-        by_tree = by_bodies = precise = on_same_turns(mechanism, exact, tree.run_rk4(times))
-        best, routes, chaotic = exact, ("joint coordinates, RK4",), np.zeros(len(times), dtype=bool)
-    if exact is not None and form is not None:
-        routes = (f"closed form: {form.title}", *routes)
-    _check_limits(mechanism, best)
+    routes, early = _followed(tree, times, tolerance, exact)
+    _check_limits(mechanism, routes.best, early)
+    times = early.known(times)
+    if not len(times):
+        raise Refused(f"no truth behind t = {early.time:.6g} s: {early.reason}; ask for earlier times")
+    best, by_tree, by_bodies, precise, chaotic, names = routes.first(len(times))
     masked = replace(best, wrench=np.where(analysis.determinate, best.wrench, np.nan))
     placed, fields = masked.placed(mechanism), fields_with_bars(mechanism, masked)
     bars, differences, least = {}, {}, round_off(fields, placed)
@@ -102,36 +109,76 @@ def find_truth(mechanism: Mechanism, times: Array, tolerance: float = 1e-15) -> 
         horizon=horizon,
         branches=branches,
         determinate=analysis.determinate,
-        routes=routes,
+        routes=names if exact is None or form is None else (f"closed form: {form.title}", *names),
         checked_by=checked,
+        end=early.time,
+        ended=early.reason,
     )
 
 
+def _followed(tree: JointCoordinates, times: Array, tolerance: float, exact: Record | None) -> tuple[_Routes, EarlyEnd]:
+    """Motion by all routes, and where it ends; where they fail a motion in closed form has equal steps as its witness.
+
+    Raises:
+        Refused: there is no motion beyond the start.
+    """
+    mechanism, early = tree.mechanism, EarlyEnd()
+    bodies = MaximalCoordinates(mechanism)
+    check_start(tree, bodies)
+    try:
+        by_tree, by_bodies, precise, growth, names = _runs(tree, bodies, times, tolerance, early)
+        _check_energy(mechanism, by_tree, names[1], early)
+        _check_energy(mechanism, precise, names[0], early)
+        chaotic = growth * NUDGE > CHAOS
+        if chaotic.any():
+            nearby = early.run(partial(_first_growth, tree, by_tree), times)
+            chaotic = chaotic[: len(nearby)] & (nearby * NUDGE > CHAOS)
+        _check_branch(by_tree, precise, chaotic, early)
+    except Diverged as stopped:
+        if exact is None:
+            raise Refused(f"no truth beyond the start: {stopped}") from None
+        early.at(0.0, str(stopped))
+    if exact is not None and np.isfinite(early.time):
+        witness = on_same_turns(mechanism, exact, tree.run_rk4(times))
+        name = "joint coordinates, RK4"
+        return _Routes(exact, witness, witness, witness, np.zeros(len(times), dtype=bool), (name,)), EarlyEnd()
+    if np.isfinite(early.time):
+        early.reason = _singular(mechanism, early.time) or early.reason
+    best = precise if exact is None else on_same_turns(mechanism, by_tree, exact)
+    return _Routes(best, by_tree, by_bodies, precise, chaotic, names), early
+
+
 def _runs(
-    tree: JointCoordinates, second: MaximalCoordinates, times: Array, tolerance: float
+    tree: JointCoordinates, second: MaximalCoordinates, times: Array, tolerance: float, early: EarlyEnd
 ) -> tuple[Record, Record, Record, Array, tuple[str, ...]]:
-    """Three records, the best one last, growth of a small difference [1], and the names of the routes."""
+    """Three records, the best one last, growth of a small difference [1], and the names of the routes.
+
+    All of them end where a route fails, which ``early`` tells.
+    """
     mechanism = tree.mechanism
     refuse_switching(mechanism)
     if stiff(tree, float(times[-1])):
-        runs = run_stiff(mechanism, tree.rank, times)
+        runs = early.run(partial(run_stiff, mechanism, tree.rank), times)
         names = "maximal coordinates, implicit collocation", "joint coordinates, implicit collocation"
         best = on_same_turns(mechanism, runs.one, runs.precise)
         return runs.one, best, best, runs.growth, names
-    by_tree = tree.run(times, tolerance)
-    by_bodies, precise, name = _second(second, times, tolerance)
+    by_tree = early.run(partial(tree.run, tolerance=tolerance), times)
+    by_bodies, precise, name = early.run(partial(_second, second, tolerance=tolerance), times)
+    growth = early.run(second.growth, times)
+    by_tree, by_bodies, precise = (record.first(len(growth)) for record in (by_tree, by_bodies, precise))
     # route 1 alone counts turns; angles of the others are put on the same turns
     by_bodies, precise = on_same_turns(mechanism, by_tree, by_bodies), on_same_turns(mechanism, by_tree, precise)
-    return by_tree, by_bodies, precise, second.growth(times), (name, "joint coordinates, DOP853")
+    return by_tree, by_bodies, precise, growth, (name, "joint coordinates, DOP853")
 
 
-def _singular(mechanism: Mechanism, until: float) -> str:
-    """Clause on singular poses before ``until``, s; empty without any."""
+def _singular(mechanism: Mechanism, end: float) -> str:
+    """Clause on a singular pose at the end of a truth [s]; empty if there is none."""
+    step = min(5e-3, end / 200)
     try:
-        clause = branching(singular_poses(mechanism, until, min(5e-3, until / 200)))
-    except np.linalg.LinAlgError:  # the step is too large for the motion
-        clause = ""
-    return f" ({clause})" if clause else ""
+        poses = singular_poses(mechanism, end + 2 * step, step)
+    except (Diverged, np.linalg.LinAlgError):  # the step is too large for the motion
+        return ""
+    return BRANCHING if any(abs(time - end) <= 2 * step for time in poses) else ""
 
 
 def _apart(record: Record, second: Record) -> Array:
@@ -139,35 +186,30 @@ def _apart(record: Record, second: Record) -> Array:
     return np.maximum(largest(record.p_WB - second.p_WB), largest(record.q_WB - second.q_WB))
 
 
-def _check_branch(record: Record, precise: Record, chaotic: NDArray[np.bool_]) -> None:
-    """Checks that two routes do not part without chaos.
-
-    Raises:
-        Diverged: the difference shows that the routes have taken different branches.
-    """
-    parted = np.flatnonzero((_apart(record, precise) > BRANCH) & ~chaotic)
+def _check_branch(record: Record, precise: Record, chaotic: NDArray[np.bool_], early: EarlyEnd) -> None:
+    """Ends the truth where two routes part without chaos, for then they have taken different branches."""
+    count = len(chaotic)
+    parted = np.flatnonzero((_apart(record.first(count), precise.first(count)) > BRANCH) & ~chaotic)
     if len(parted):
-        raise Diverged(f"the two routes part before t = {record.time[parted[0]]:.6g} s, as at a singular pose")
+        early.at(float(record.time[parted[0]]), "the two routes part, as at a singular pose")
 
 
-def _check_energy(mechanism: Mechanism, record: Record, route: str) -> None:
-    """Checks that a route keeps the energy of a conservative mechanism.
-
-    Raises:
-        Diverged: the energy changes, so that the route has failed.
-    """
+def _check_energy(mechanism: Mechanism, record: Record, route: str, early: EarlyEnd) -> None:
+    """Ends the truth where a route changes the energy of a conservative mechanism, for then it has failed."""
     if not mechanism.conservative:
         return
     parts = record.placed(mechanism).energies()
     change = np.abs(parts.sum(axis=1) - parts[0].sum())
     lost = np.flatnonzero(change > ENERGY * np.abs(parts).sum(axis=1).max())
     if len(lost):
-        time = record.time[lost[0]]
-        raise Diverged(f"the route in {route} changes the energy by {change[lost[0]]:.2g} J before t = {time:.6g} s")
+        reason = f"the route in {route} changes the energy by {change[lost[0]]:.2g} J"
+        early.at(float(record.time[lost[0]]), reason)
 
 
-def _first_growth(tree: JointCoordinates, record: Record) -> Array:
+def _first_growth(tree: JointCoordinates, record: Record, times: Array) -> Array:
     """Growth of the distance to a neighbouring motion in joint coordinates, as a multiple of the initial distance.
+
+    ``times``: the first ones of the record [s].
 
     Raises:
         Diverged: the integration stops.
@@ -178,17 +220,13 @@ def _first_growth(tree: JointCoordinates, record: Record) -> Array:
     start = np.concatenate([tree.tree.moved(q, ways), v * (1.0 + ways)])
     for _ in range(3):  # Newton's method doubles the number of digits
         start = tree.eliminated(start)
-    states = integrate(tree.rate, start, record.time, BESIDE * 1e-4, tree.followed())
-    samples = [tree.sample(y[:nq], y[nq:], None, t) for t, y in zip(record.time, states, strict=True)]
-    return _apart(record_of(record.time, samples), record) / BESIDE
+    states = integrate(tree.rate, start, times, BESIDE * 1e-4, tree.followed())
+    samples = [tree.sample(y[:nq], y[nq:], None, t) for t, y in zip(times, states, strict=True)]
+    return _apart(record_of(times, samples), record.first(len(times))) / BESIDE
 
 
-def _check_limits(mechanism: Mechanism, record: Record) -> None:
-    """Checks that no joint exceeds its limits beyond round-off, as these routes do not follow stops.
-
-    Raises:
-        Refused: a joint does.
-    """
+def _check_limits(mechanism: Mechanism, record: Record, early: EarlyEnd) -> None:
+    """Ends the truth where a joint exceeds its limits beyond round-off, as these routes do not follow stops."""
     for joint, columns in zip(mechanism.joints, mechanism.q_slices, strict=True):
         if joint.limits is not None:
             low, high = joint.limits[0] - AT_LIMIT, joint.limits[1] + AT_LIMIT
@@ -196,8 +234,8 @@ def _check_limits(mechanism: Mechanism, record: Record) -> None:
                 (record.q[:, columns] < low).any(axis=1) | (record.q[:, columns] > high).any(axis=1)
             )
             if len(beyond):
-                time = record.time[beyond[0]]
-                raise Refused(f"joint {joint.name} passes its limit before t = {time:.6g} s; no route follows a stop")
+                reason = f"joint {joint.name} passes its limit, and no route follows a stop"
+                early.at(float(record.time[beyond[0]]), reason)
 
 
 def _from_form(equations: JointCoordinates, form: ClosedForm, times: Array) -> Record:

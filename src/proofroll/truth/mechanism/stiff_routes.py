@@ -116,7 +116,7 @@ def _collocated(
     while now < end:
         length = min(length, end - now)
         if now + length == now:
-            raise Diverged(f"implicit collocation stopped at t = {now:.6g} s")
+            raise Diverged(f"implicit collocation stopped at t = {now:.6g} s", now)
         scaled = replace(system, scale=np.maximum(1.0, np.abs(state)))
         step = take(scaled, now, state, length, _guess(system, last, now, state, length))
         error, alone = by_states(step, scaled.scale)
