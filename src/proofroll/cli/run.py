@@ -51,6 +51,7 @@ def run(
     as_json: options.Json = False,
 ) -> None:
     """Run one scene in one engine."""
+    import math
     import tempfile
     import threading
 
@@ -61,7 +62,9 @@ def run(
     if matrices:
         _show_matrices(scene, engine, options.assignments(settings), as_json)
         return
-    workers = Workers()  # one process resolves the settings and makes the run
+    workers = Workers(
+        patience=time_limit if time_limit > 0 else math.inf
+    )  # one process resolves the settings and makes the run
     # It imports the engine while this process imports the modules that read scenes and results.
     preparing = threading.Thread(target=prepare, args=(engine, workers), daemon=True)
     preparing.start()

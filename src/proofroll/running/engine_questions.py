@@ -11,8 +11,9 @@ from proofroll.core.engine_abilities import Term
 from proofroll.core.errors import ProofrollError, Refused
 from proofroll.core.limits import HELLO_TIME_LIMIT, PROGRAM_TIME_LIMIT
 from proofroll.core.plugins import parse_engine
-from proofroll.running.case import Case, EngineDescription, EngineFacts
+from proofroll.running.case import Case, EngineDescription, EngineFacts, Status
 from proofroll.running.idle_workers import Workers
+from proofroll.running.process import WorkerDied
 
 # Engines that have not answered yet, for displays of progress.
 waited_for: list[str] = []
@@ -27,6 +28,22 @@ def _waiting_for(engine: str) -> Iterator[None]:
         waited_for.remove(engine)
 
 
+def _ask(engine: str, request: Mapping[str, Any], workers: Workers, seconds: float) -> dict[str, Any]:
+    """Answer of an engine to one request; an engine that once did not answer in time is not asked again."""
+    if engine in workers.silent:
+        raise workers.silent[engine]
+    limit = min(seconds, workers.patience)
+    try:
+        with _waiting_for(engine), workers.lend(engine) as worker:
+            return worker.request(request, limit)
+    except WorkerDied as error:
+        if error.status is not Status.TIMEOUT:
+            raise
+        silent = WorkerDied(error.status, f"{engine} gave no answer within {limit:g} s; it was ended")
+        workers.silent[engine] = silent
+        raise silent from None
+
+
 def _answers(
     requests: Sequence[tuple[str, Mapping[str, Any]]], workers: Workers | None, seconds: float = HELLO_TIME_LIMIT
 ) -> list[dict[str, Any] | ProofrollError]:
@@ -38,8 +55,7 @@ def _answers(
             if name != engine:
                 continue
             try:
-                with _waiting_for(engine), lent.lend(engine) as worker:
-                    answers[index] = worker.request(request, seconds)
+                answers[index] = _ask(engine, request, lent, seconds)
             except ProofrollError as error:
                 answers[index] = error
 
@@ -107,11 +123,10 @@ def prepare(engine: str, workers: Workers) -> None:
     """
     with contextlib.suppress(ProofrollError):
         name = parse_engine(engine).name
-        with _waiting_for(name), workers.lend(name) as worker:
-            worker.request({"do": "resolve", "engine": name, "options": {}}, HELLO_TIME_LIMIT)
-            if name == "truth":
-                importing = {"function": "proofroll.files.trajectory_file:import_xarray", "arguments": {}}
-                worker.request({"do": "call", **importing}, HELLO_TIME_LIMIT)
+        _ask(name, {"do": "resolve", "engine": name, "options": {}}, workers, HELLO_TIME_LIMIT)
+        if name == "truth":
+            importing = {"function": "proofroll.files.trajectory_file:import_xarray", "arguments": {}}
+            _ask(name, {"do": "call", **importing}, workers, HELLO_TIME_LIMIT)
 
 
 def programs(cases: Sequence[Case], workers: Workers | None = None) -> list[tuple[str | None, str]]:

@@ -1,5 +1,6 @@
 """Pool of idle worker processes, by the engine that they have loaded, as starting one costs more than many a case."""
 
+import math
 import threading
 import weakref
 from collections.abc import Iterator
@@ -7,7 +8,7 @@ from contextlib import contextmanager
 
 from proofroll.core.errors import InputError, Missing
 from proofroll.running.interpreters import start
-from proofroll.running.process import Worker
+from proofroll.running.process import Worker, WorkerDied
 
 # Most idle workers that are kept, some hundred MB each; beyond it the longest idle one is ended.
 MOST = 8
@@ -19,10 +20,15 @@ class Workers:
     Args:
         memory: limit for each [GB]; by default :func:`proofroll.running.memory.memory_limit`.
         most: largest number of idle workers.
+        patience: wall time within which an engine has to answer a question about itself [s].
+
+    Attributes:
+        silent: engines that did not answer in time, which are not asked again.
     """
 
-    def __init__(self, memory: float | None = None, most: int = MOST) -> None:
+    def __init__(self, memory: float | None = None, most: int = MOST, patience: float = math.inf) -> None:
         self._memory, self._most = memory, most
+        self.patience, self.silent = patience, dict[str, WorkerDied]()
         self._lock = threading.Lock()
         self._idle: list[tuple[str, Worker]] = []
         self._made: weakref.WeakSet[Worker] = weakref.WeakSet()

@@ -274,8 +274,10 @@ class Worker:
         """Kills the process and all that it started, without waiting."""
         if self._process.returncode is not None:
             return  # its number may belong to another process by now
-        for process in descendants(self._process.pid):  # those that left the process group
+        for process in descendants(self._process.pid):  # those that left the process group, with theirs
             with contextlib.suppress(ProcessLookupError, PermissionError):
+                if (group := os.getpgid(process)) not in {self._process.pid, os.getpgrp()}:
+                    os.killpg(group, signal.SIGKILL)
                 os.kill(process, signal.SIGKILL)
         with contextlib.suppress(ProcessLookupError, PermissionError):
             os.killpg(self._process.pid, signal.SIGKILL)

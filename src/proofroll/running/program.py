@@ -1,9 +1,11 @@
 """Engines that are programs in any language: ``NAME@program:PATH``. See docs/worker_protocol.md."""
 
+import contextlib
 import dataclasses
 import json
 import math
 import os
+import signal
 import subprocess
 from collections.abc import Mapping
 from functools import cache
@@ -18,6 +20,7 @@ from proofroll.core.multi_element import REQUIRED
 from proofroll.core.plugins import place_of, plain_name
 from proofroll.core.scene import Scene
 from proofroll.files.json_data import plain
+from proofroll.running.process_end import bound_to_life
 
 PREFIX = "program:"
 PROTOCOL = 1
@@ -45,16 +48,26 @@ _RESOLUTIONS = ("dt", "rtol")
 
 
 class Pipe:
-    """A running program: it reads one request a line and writes one answer a line."""
+    """A running program: it reads one request a line and writes one answer a line.
+
+    It runs in a session of its own, and ends with all that it started.
+    """
 
     def __init__(self, path: Path) -> None:
         self._path = path
         try:
             self._process = subprocess.Popen(
-                [path], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, encoding="utf-8", errors="replace"
+                [path],
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                text=True,
+                encoding="utf-8",
+                errors="replace",
+                start_new_session=True,
             )
         except OSError as error:
             raise ProofrollError(f"{path} cannot be started ({error.strerror or error})") from None
+        self._bond = bound_to_life(self._process.pid)
 
     def ask(self, request: Mapping[str, Any]) -> dict[str, Any]:
         """Answer to one request.
@@ -89,9 +102,18 @@ class Pipe:
         return answer
 
     def close(self) -> None:
-        """Ends the program."""
-        self._process.kill()
-        self._process.communicate()
+        """Ends the program with all that it started; what still holds its pipe is not waited for."""
+        process = self._process
+        with contextlib.suppress(ProcessLookupError, PermissionError):
+            os.killpg(process.pid, signal.SIGKILL)
+        process.wait()
+        for pipe in (process.stdin, process.stdout):
+            if pipe is not None:
+                with contextlib.suppress(OSError):  # an unsent request
+                    pipe.close()
+        if self._bond is not None:
+            os.close(self._bond)
+            self._bond = None
 
 
 def _in_arrays(record: Mapping[str, Any]) -> dict[str, Any]:

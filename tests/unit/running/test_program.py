@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -15,6 +16,9 @@ from proofroll.core.certificate import certify, first_difference
 from proofroll.core.errors import Diverged, InputError, ProofrollError, Refused
 from proofroll.core.plugins import resolve_settings
 from proofroll.files.scene_file import load_scene
+from proofroll.running.engine_questions import describe
+from proofroll.running.idle_workers import Workers
+from proofroll.running.process import WorkerDied
 from proofroll.running.program import engine
 
 ROD = Path(__file__).resolve().parents[3] / "examples" / "workers" / "rod.pl"
@@ -129,6 +133,31 @@ def test_a_preset_that_no_run_could_take(tmp_path: Path, values: dict[str, Any],
     program = script(tmp_path / "rod", f"read -r line; echo '{described}'")
     with pytest.raises(ProofrollError, match=f"rod: preset matched of one: {says}"):
         engine(f"rod@program:{program}")
+
+
+def test_what_a_program_started_costs_nothing(tmp_path: Path) -> None:
+    """A helper that a program started, and that holds its pipe, is not waited for and ends with the program."""
+    note = tmp_path / "helper"
+    helper = f"sleep 300 & echo $! >{note}; "
+    name = answering(tmp_path, f'{helper} echo \'{{"refused": "too heavy"}}\'')
+    began = time.monotonic()
+    with pytest.raises(Refused, match="too heavy"):
+        built(name)
+    assert time.monotonic() - began < 60
+    status = Path(f"/proc/{note.read_text().strip()}/stat")
+    assert not status.exists() or status.read_text().split()[2] in "ZX"
+
+
+def test_a_program_that_does_not_answer_is_asked_once(tmp_path: Path) -> None:
+    """An engine that once gave no answer within the user's limit is not waited for again, and is told by its name."""
+    program = script(tmp_path / "rod", f"echo begun >>{tmp_path}/begun; sleep 300")
+    workers = Workers(patience=1.0)
+    for _ in range(2):
+        with pytest.raises(WorkerDied, match=r"rod@program:.* gave no answer within 1 s; it was ended"):
+            describe(f"rod@program:{program}", workers)
+    workers.close()
+    begun = tmp_path / "begun"
+    assert not begun.exists() or begun.read_text().split() == ["begun"]
 
 
 @pytest.mark.parametrize("command", ["run", "compare", "tradeoff"])
