@@ -44,6 +44,7 @@ from proofroll.truth.mechanism.contact_guards import (
     unloaded,
 )
 from proofroll.truth.mechanism.contact_walks import AHEAD, ContactWalks, SwitchedEquations
+from proofroll.truth.mechanism.impact_series import Impact, ImpactSeries, Series
 from proofroll.truth.mechanism.planar_slip import leaving_slips
 
 # Least deceleration of rebounds whose time is summed, in natural units; below it is round-off.
@@ -59,12 +60,12 @@ class ContactStretches(ContactWalks):
     def __init__(self, equations: SwitchedEquations, length: int, tolerance: float, size: float) -> None:
         """Takes the length of a state without time, the tolerance of each step, the mechanism's size."""
         super().__init__(equations, length, tolerance, size)
-        self._settles = Settling()
+        self._settles, self._series = Settling(), ImpactSeries()
 
     def early(self) -> Self:
         """The same route, which sums rebounds one before, at twice the speed at least."""
         route = copy(self)
-        route._settles, route._span = Settling(early=True), None
+        route._settles, route._series, route._span = Settling(early=True), ImpactSeries(), None
         return route
 
     @abstractmethod
@@ -203,9 +204,13 @@ class ContactStretches(ContactWalks):
         laws = [contact.restitution if k in hits else 0.0 for k, contact in enumerate(contacts)]
         sideways = [contact.tangential_restitution if k in hits else 0.0 for k, contact in enumerate(contacts)]
         speed, delay = -float(touching[hit].normal @ touching[hit].slide), 0.0
+        series = self._series.after(contacts[hit].pair, Impact(stretch.end, frozenset(hits), speed))
         rough = modes_of(closed, closed, features)
         state, stays, margin = self._struck(stretch.last, rough, laws, sideways)
-        if self._settles(hit, speed, law):
+        alternates = series is not None and (not law or len(series.contacts) > len(hits))
+        if self._settles(hit, speed, series.ratio if series is not None and alternates else law):
+            if series is not None and alternates:
+                return self._settled(stretch, state, stays, series, speed)
             modes, normal = (rebounding(contacts, stretch.mode, hit), stretch.mode), touching[hit].normal
             pull, falling = (-float(normal @ self._solved(state, mode).slide_rate[hit]) for mode in modes)
             delay = self._bouncing(self.contacts[hit].name, speed * law, pull, law, max(falling, 0.0))
@@ -215,6 +220,25 @@ class ContactStretches(ContactWalks):
         kinds = (EventKind.SETTLE if over else EventKind.IMPACT for over in settled)
         happened = tuple((kind, contacts[k].name) for kind, k in zip(kinds, hits, strict=True))
         return self._after(stretch, state, stays, happened, margin, delay)
+
+    def _settled(
+        self, stretch: Stretch[ContactMode], state: Array, stays: Sequence[bool], series: Series, speed: float
+    ) -> Transition[ContactMode]:
+        """Transition at an impact of a ``speed`` whose further ones are summed: all contacts of the series close.
+
+        Slips that are not faster have stopped by then. The error of the sum is relative to the speed.
+        """
+        touching, features = self._touching(state, features_of(stretch.mode)), features_of(stretch.mode)
+        shuts = {k for k in series.contacts if touching[k].gap <= speed * series.period}
+        closed = [
+            k in shuts or stay or bool(contact.bound)
+            for k, (stay, contact) in enumerate(zip(stays, self.contacts, strict=True))
+        ]
+        happened = tuple((EventKind.SETTLE, self.contacts[k].name) for k in sorted(shuts))
+        after = self._after(
+            stretch, state, closed, happened, delay=series.remaining, stopped=max(speed, SLIP_ENDED), features=features
+        )
+        return replace(after, blur=speed * series.remaining)
 
     def _stopped(self, stretch: Stretch[ContactMode]) -> Transition[ContactMode]:
         """Transition where a slip stops: alone, or with all others.

@@ -292,8 +292,9 @@ class CompiledMode:
         """Time before the rise of a guard [s] from which on it is within the error of a step below zero."""
         error = TOLERANCES[0] * max(1.0, float(np.abs(step.guards[:, guard]).max()))
         states = step.inside(place - (place - step.start) * _BACK)
-        near = self._called(states, pars)[guard] > -error
-        return float(states[-1, -1] - states[-1, max(int(near.argmax()) - 1, 0)])
+        clear = self._called(states, pars)[guard] <= -error
+        last = np.flatnonzero(clear).max(initial=0)  # a rebound is within it at its start, too
+        return float(states[-1, -1] - states[-1, last])
 
     def _steps(self, pars: Array, state: Array, until: float) -> Iterator[ModeStep]:
         """Steps of the integrator to a time [s].

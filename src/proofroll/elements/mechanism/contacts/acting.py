@@ -172,9 +172,12 @@ def following(own: Acting, way: Array, still: bool, least: float) -> Acting:
     return Acting("slip", None, direction_of(way / (speed or 1.0)))
 
 
-class _Named(Protocol):
+class _Contact(Protocol):
     @property
     def name(self) -> str: ...
+
+    @property
+    def friction(self) -> float: ...
 
     @property
     def bound(self) -> float: ...
@@ -184,7 +187,7 @@ class _Named(Protocol):
 
 
 def changes(
-    contacts: Sequence[_Named], before: ContactMode, after: ContactMode, stands: bool
+    contacts: Sequence[_Contact], before: ContactMode, after: ContactMode, stands: bool
 ) -> tuple[tuple[str, str], ...]:
     """Kind and contact of each event of a change of mode; ``stands``: nothing moves any more.
 
@@ -200,7 +203,7 @@ def changes(
             found.append((EventKind.SLIP, contact.name))
         elif was.kind != "open" and now.kind == "open":
             found.append((EventKind.LIFT_OFF, contact.name))
-        elif was.kind == now.kind == "slip" and _opposite(was, now):
+        elif was.kind == now.kind == "slip" and (contact.friction or contact.bound) and _opposite(was, now):
             found.append((EventKind.TURN, contact.name))
     return tuple(found)
 

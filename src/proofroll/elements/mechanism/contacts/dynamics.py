@@ -35,7 +35,7 @@ from proofroll.elements.mechanism.contacts.joint_laws import (
     off_stops,
     on_stops,
 )
-from proofroll.elements.mechanism.contacts.sequences import groups_of, ordered, refuse_spread, sequences
+from proofroll.elements.mechanism.contacts.sequences import groups_of, left_by, ordered, refuse_spread, sequences
 from proofroll.elements.mechanism.contacts.slide_rows import slide_row, turning_row
 from proofroll.elements.mechanism.contacts.start import STILL, closed_and_still, natural_scale, start_digits, touches
 from proofroll.elements.mechanism.contacts.states import ContactsNow, ContactSolution
@@ -351,8 +351,13 @@ class ContactDynamics:
                 return contact_forces(response, comes, *laws)[0].ravel()
 
             outcomes = sequences(G, J @ v, groups, strike)
-            jumps = state.W @ J.T @ np.vstack([impulse.ravel(), outcomes.impulses]).T
-            refuse_spread(jumps, outcomes, [names[k] for k in np.flatnonzero(hit)], time)
+            jumps = state.W @ J.T
+            told = [names[k] for k in np.flatnonzero(hit)]
+            once, *turns = (
+                left_by(J @ v + G @ given, STILL * scale) for given in (impulse.ravel(), *outcomes.impulses)
+            )
+            alike = all(turn == once for turn in turns)
+            refuse_spread(jumps @ outcomes.impulses.T, outcomes, told, time, jumps @ impulse.ravel(), alike=alike)
             same = True
         after = v + state.W @ J.T @ impulse.ravel()
         # The impulses are found to some digits; what holds fixes the velocities to the last one.

@@ -21,6 +21,9 @@ _ROUND_OFF = 1e-13  # speed that is round-off, in natural units
 # Difference of outcomes, relative to the largest jump of a velocity, up to which an impact has an outcome. Feet of a
 # robot that land together differ by 3e-5.
 SPREAD = 1e-3
+# Difference of impacts in turn from that of all contacts at one time, up to which it counts as an error of the model:
+# routes take one each, so that it is part of the bars.
+AT_ONCE = 1e-2
 _MOST = 4000  # impacts of one sequence at most
 _ALL = 3  # groups of which every order is tried; of more, those round the groups, both ways
 
@@ -82,7 +85,25 @@ def sequences(G: Array, slides: Array, groups: Sequence[list[int]], strike: Stri
     return Outcomes(np.array(found).reshape(-1, len(slides)), complete)
 
 
-def refuse_spread(jumps: Array, outcomes: Outcomes, names: Iterable[str], time: float) -> None:
+def left_by(slides: Array, least: float) -> list[str]:
+    """Whether each contact opens, slips or sticks behind an impact, from the slides after it, (3 contacts,).
+
+    ``least``: speed above which a contact moves.
+    """
+    parts = slides.reshape(-1, 3)
+    slips = np.where(np.linalg.norm(parts[:, 1:], axis=1) > least, "slip", "stick")
+    return list(np.where(parts[:, 0] > least, "open", slips).tolist())
+
+
+def refuse_spread(
+    jumps: Array,
+    outcomes: Outcomes,
+    names: Iterable[str],
+    time: float,
+    at_once: Array | None = None,
+    *,
+    alike: bool = True,
+) -> None:
     """Refuses an impact whose outcomes differ too much.
 
     Args:
@@ -90,18 +111,28 @@ def refuse_spread(jumps: Array, outcomes: Outcomes, names: Iterable[str], time: 
         outcomes: of all orders.
         names: of the contacts, for messages.
         time: for messages [s].
+        at_once: change of the velocities by the impact of all contacts at one time; None: not compared.
+        alike: True if that impact leaves the same contacts open, slipping and sticking.
 
     Raises:
-        NotUnique: the outcomes differ by more than ``SPREAD`` of the largest jump of a velocity.
+        NotUnique: the outcomes of the orders differ by more than ``SPREAD`` of the largest jump of a velocity, or by
+            more than ``AT_ONCE`` from the impact of all at one time, or leave other contacts closed.
     """
-    size = float(np.abs(jumps).max(initial=0.0))
-    spread = float(np.ptp(jumps, axis=1).max(initial=0.0)) / (size or 1.0)
-    if outcomes.complete and spread <= SPREAD:
+    both = jumps if at_once is None else np.column_stack([at_once, jumps])
+    size = float(np.abs(both).max(initial=0.0)) or 1.0
+    by_order, by_law = (float(np.ptp(each, axis=1).max(initial=0.0)) / size for each in (jumps, both))
+    if not outcomes.complete:
+        why = "one after the other they hit each other infinitely often"
+    elif by_order > SPREAD:
+        why = f"its outcome depends on their order, by {number(by_order, 2)} of the jump of the velocities"
+    elif by_law > AT_ONCE or not alike:
+        why = f"impacts in turn and at once differ by {number(by_law, 2)} of the jump of the velocities"
+        why += "" if alike else ", and in which contacts stick, slip or open"
+    else:
         return
-    how = f"by {number(spread, 2)} of the jump of the velocities" if outcomes.complete else "and has no end"
     raise NotUnique(
-        f"an impact at t = {time:.6g} s presses {' and '.join(names)} at once: its outcome depends on their order, "
-        f'{how}; impacts = "together" in the scene takes them at one time'
+        f"an impact at t = {time:.6g} s presses {' and '.join(names)} at once: {why}; "
+        'impacts = "together" in the scene takes them at one time'
     )
 
 
