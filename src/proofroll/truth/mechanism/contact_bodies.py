@@ -28,7 +28,7 @@ from proofroll.elements.mechanism.contacts.turning import shut_by_pressing
 from proofroll.elements.mechanism.rotations import Array, cross, frame_of_axis
 from proofroll.truth.hybrid import Transition
 from proofroll.truth.mechanism.body_impacts import ImpactLaw, impulses_in_turn
-from proofroll.truth.mechanism.contact_balance import SLACK, balanced, held_together
+from proofroll.truth.mechanism.contact_balance import SLACK, all_held
 from proofroll.truth.mechanism.contact_body_symbols import BodySymbols
 from proofroll.truth.mechanism.contact_equations import BodiesSolution, BodiesState, ContactEquations
 from proofroll.truth.mechanism.contact_guards import SLIP_ENDED, SolvedContacts, pressing, sharing
@@ -77,11 +77,11 @@ class ContactBodies(ContactStretches):
         mode, margin = self._decided(state, rough)
         return Transition(state, mode, (), margin)
 
-    def _decided(self, state: Array, rough: ContactMode, leaving: int | None = None) -> tuple[ContactMode, float]:
+    def _decided(self, state: Array, rough: ContactMode, leaving: Sequence[int] = ()) -> tuple[ContactMode, float]:
         mode, margin = self._by_trial(state, rough, leaving)
         return with_features(mode, features_of(rough)), margin
 
-    def _by_trial(self, state: Array, rough: ContactMode, leaving: int | None) -> tuple[ContactMode, float]:
+    def _by_trial(self, state: Array, rough: ContactMode, leaving: Sequence[int]) -> tuple[ContactMode, float]:
         """See :meth:`_decided`; the features of the mode are still to be set."""
         closed, still = closed_in(rough), [own.kind == "stick" for own in rough]
         if not any(closed):
@@ -96,19 +96,12 @@ class ContactBodies(ContactStretches):
             ]
             return self.equations.accelerated(bodies, tuple(directed))
 
-        if (
-            list(still) == list(closed)
-            and leaving is None
-            and not any(
-                shut and contact.pressed_by is not None for shut, contact in zip(closed, self.contacts, strict=True)
-            )
-            and (balanced(self.equations, bodies, closed) or held_together(self.equations, bodies, closed))
-        ):
-            own = zip(self._own(bodies, closed), self._rubs, strict=True)
-            return tuple(
-                each if rub or each.kind == "open" else each._replace(kind="slip") for each, rub in own
-            ), np.inf
         free = float(np.abs(bodies.J @ np.linalg.solve(bodies.mass, bodies.force)).max())
+        if list(still) == list(closed) and not leaving:
+            own = zip(self._own(bodies, closed), self._rubs, strict=True)
+            resting = tuple(each if rub or each.kind == "open" else each._replace(kind="slip") for each, rub in own)
+            if all_held(self.equations, bodies, resting, free):
+                return resting, np.inf
         best = self._tried(bodies, closed, still, trial, free, leaving)[0]
         return self._completed(bodies, closed, still, best, free)
 
@@ -190,12 +183,12 @@ class ContactBodies(ContactStretches):
         still: Sequence[bool],
         trial: Trial,
         free: float,
-        leaving: int | None = None,
+        leaving: Sequence[int] = (),
     ) -> list[tuple[float, BodiesSolution, ContactMode]]:
         """Candidate modes that violate no inequality, best first: relative margin, solution, mode.
 
         ``free``: largest slide, or rate of a slide, without forces, to which margins are relative if those with forces
-        are less; ``leaving``: contact that static friction no longer holds.
+        are less; ``leaving``: contacts that static friction no longer holds.
 
         Raises:
             Refused: there is none, or it is not found.
@@ -206,8 +199,8 @@ class ContactBodies(ContactStretches):
         choices = [
             list(self._candidates(k, own, still[k], slips[k])) for k, own in enumerate(self._own(bodies, closed))
         ]
-        if leaving is not None:
-            choices[leaving] = [option for option in choices[leaving] if option.kind != "stick"]
+        for k in leaving:
+            choices[k] = [option for option in choices[k] if option.kind != "stick"]
         exchanged = self._exchanged(bodies, choices, still, trial, free)
         if exchanged is not None and (count > _MOST or (exchanged[0] > _CLEAR and not exchanged[1].loose)):
             return [exchanged]

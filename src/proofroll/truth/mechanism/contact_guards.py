@@ -17,6 +17,7 @@ from proofroll.elements.mechanism.contacts.acting import (
     heading_of,
     slip_velocity,
 )
+from proofroll.elements.mechanism.contacts.distributions import Distribution, best_distribution, cones_of
 from proofroll.elements.mechanism.contacts.geometry import BodyContact
 from proofroll.elements.mechanism.contacts.joint_laws import JointContact, off_stops
 from proofroll.elements.mechanism.contacts.touching import FLAT, Touching
@@ -31,7 +32,9 @@ SLIP_ENDED = 1e-11  # slip speed that remains when a slip below FAINT is extrapo
 _UNLOADED = 1e-11  # normal force, in natural units, that is round-off where a contact leaves
 # Value of Painlevé's measure (1 without friction) that counts as zero.
 LEAST_RESPONSE = 1e-3
-_STRAIGHT = 1e-10  # moment of friction about the centre of pressure, relative to the load, that counts as zero
+# Speed of a contact in the motion that begins, and a difference of directions, that count as none: the distribution is
+# known to 1e-8.
+_MOVES = 1e-6
 _NO_LOAD = 1e-9  # normal force, relative to the largest, that counts as none where contacts share a load
 _FEW = 6  # contacts that share a load, up to which all groups of them are tried
 TURNED = 0.5  # cosine of the angle by which a line may turn in a stretch
@@ -41,6 +44,7 @@ _TOGETHER = 1e-13  # relative to the mechanism's size: gaps of contacts of a fac
 # Borders between features of solids that are passed at one instant at most, and length, relative to the mechanism's
 # size, by which features are left and still the nearest: round-off.
 _MOST_BORDERS, _ON_BORDER = 4, 1e-13
+NOT_SHARED = -1.0  # value of a guard that no shared load concerns
 _DIGITS = 1e-14  # relative to the mechanism's size: round-off of a gap that has just opened
 
 
@@ -55,13 +59,13 @@ class ContactGuard(NamedTuple):
         kind: ``close``: a gap closes; ``lift``: a normal force reaches zero; ``still``: a slip stops; ``break``: the
             friction of a sticking contact reaches its bound; ``turn``: its line has turned so far that its sense has
             to be taken anew; ``flat``: a disc lies flat, or capsules touch along a line; ``tear``: Painlevé's measure
-            reaches zero; ``share``: the motion begins to depend on how contacts share a load; ``pass``: the nearest
-            features of solids are left.
+            reaches zero; ``share``: the motion begins to depend on how contacts share a load; ``grip``: no distribution
+            of a shared load that sticking contacts can bear is left; ``pass``: the nearest features of solids are left.
         border: number of the border by which features are left.
     """
 
     contact: int
-    kind: Literal["close", "lift", "still", "break", "turn", "flat", "tear", "share", "pass"]
+    kind: Literal["close", "lift", "still", "break", "turn", "flat", "tear", "share", "grip", "pass"]
     border: int = 0
 
 
@@ -121,6 +125,8 @@ def guards_of(contacts: Sequence[Touchable], mode: ContactMode) -> list[ContactG
         guards.append(ContactGuard(-1, "tear"))
         if sum(own.kind != "open" for own in mode) > 1:
             guards.append(ContactGuard(-1, "share"))
+    if sum(own.kind != "open" for own in mode) > 1 and any(own.kind == "stick" for own in mode):
+        guards.append(ContactGuard(-1, "grip"))
     return guards
 
 
@@ -137,7 +143,7 @@ def guard_value(
         normals: as by :func:`pressing`.
     """
     if guard.contact < 0:
-        return LEAST_RESPONSE - solved.response if guard.kind == "tear" else _undecided(contacts, solved)
+        return _of_all(guard, contacts, solved)
     own, touch = solved.mode[guard.contact], solved.touching[guard.contact]
     if guard.kind in {"close", "flat", "pass"}:
         left = touch.borders[guard.border].left_by if guard.kind == "pass" else 0.0
@@ -149,9 +155,41 @@ def guard_value(
         return TURNED - float(np.dot(began, own.along))
     if guard.kind == "still":
         return _stopping(own, touch)
-    if guard.kind == "lift":
-        return -float(normals[guard.contact])
-    return _beyond_its_bound(guard.contact, contacts, solved)
+    if gripped(solved, guard.contact):
+        return NOT_SHARED  # together with all that share its load
+    return (
+        -float(normals[guard.contact]) if guard.kind == "lift" else _beyond_its_bound(guard.contact, contacts, solved)
+    )
+
+
+def _of_all(guard: ContactGuard, contacts: Sequence[Touchable], solved: SolvedContacts) -> float:
+    """Value of a guard that concerns all contacts."""
+    if guard.kind == "grip":
+        grip = best_grip(contacts, solved)
+        return NOT_SHARED if grip is None else -grip.margin
+    return LEAST_RESPONSE - solved.response if guard.kind == "tear" else _undecided(contacts, solved)
+
+
+def gripped(solved: SolvedContacts, k: int) -> bool:
+    """True for a contact that shares its load while a contact sticks, so that its force alone decides nothing."""
+    return any(own.kind == "stick" for own in solved.mode) and bool(np.abs(solved.shifts[k]).max(initial=0.0) > RANK)
+
+
+def best_grip(contacts: Sequence[Touchable], solved: SolvedContacts) -> Distribution | None:
+    """Distribution of a shared load that closed contacts bear best; None: they share none, or nothing sticks."""
+    if not solved.shifts.shape[2] or all(own.kind != "stick" for own in solved.mode):
+        return None
+    return best_distribution(
+        cones_of(
+            kinds=[own.kind for own in solved.mode],
+            normals=np.array([touch.normal for touch in solved.touching]),
+            friction=np.array([contact.static for contact in contacts]),
+            bounds=np.array([contact.bound for contact in contacts]),
+            pressed_by=[contact.pressed_by for contact in contacts],
+            force=solved.force,
+            shifts=solved.shifts,
+        )
+    )
 
 
 def features_beyond(
@@ -184,10 +222,7 @@ def features_beyond(
 
 
 def _beyond_its_bound(k: int, contacts: Sequence[Touchable], solved: SolvedContacts) -> float:
-    """Guard of a sticking contact: its friction beyond its bound, or that of all contacts that slip with it."""
-    whole = whole_grip(contacts, solved, k)
-    if whole is not None:
-        return float(np.linalg.norm(whole.friction)) - contacts[k].static * whole.normal
+    """Guard of a sticking contact: its friction beyond its bound."""
     force, contact, touch = solved.force[k], contacts[k], solved.touching[k]
     by = contact.pressed_by
     normal = float(touch.normal @ force) if by is None else float(solved.touching[by].normal @ solved.force[by])
@@ -196,55 +231,38 @@ def _beyond_its_bound(k: int, contacts: Sequence[Touchable], solved: SolvedConta
     return float(np.linalg.norm(force - normal * touch.normal)) - (contact.bound or contact.static * normal)
 
 
-class WholeGrip(NamedTuple):
-    """Friction of several sticking contacts of two bodies that begin to slip together, in one direction.
+class LostGrip(NamedTuple):
+    """Contacts that a shared load moves, where the last distribution that they can bear is reached.
 
     Attributes:
-        contacts: their indices.
-        friction: sum of their friction on the first body, (3).
-        normal: sum of their normal forces.
+        force: in that distribution, (contacts, 3).
+        lifting: contacts that bear nothing in it.
+        slipping: others whose friction is at its bound.
     """
 
-    contacts: list[int]
-    friction: Array
-    normal: float
+    force: Array
+    lifting: list[int]
+    slipping: list[int]
+
+    def one_way(self, touching: Sequence[Touching]) -> bool:
+        """True if all that slip do so in one direction; then no split of the normal forces matters."""
+        ways = [self.force[k] - touching[k].normal * (touching[k].normal @ self.force[k]) for k in self.slipping]
+        units = [way / (float(np.linalg.norm(way)) or 1.0) for way in ways]
+        return all(float(np.linalg.norm(way - units[0])) <= _MOVES for way in units)
 
 
-def whole_grip(contacts: Sequence[Touchable], solved: SolvedContacts, k: int) -> WholeGrip | None:
-    """Grip of all contacts that share their friction with the sticking contact ``k``.
+def lost_grip(contacts: Sequence[Touchable], solved: SolvedContacts) -> LostGrip:
+    """What a shared load moves where no distribution of it that contacts can bear is left: dual of the largest margin.
 
-    The friction of each foot of a box is not determinate. Their sum is at most μ times the sum of their normal
-    forces, and reaches that bound where each has its own bound, in one direction: of friction in proportion to the
-    normal forces, which acts at the centre of pressure. Where the sum acts there, too, the feet hold up to the bound.
-
-    None: the friction of ``k`` is determinate, or the sum is not or acts elsewhere, so that the body begins to turn.
+    Sticking contacts whose speed in that motion is zero are its pivots and hold on.
     """
-    one, ways = contacts[k], solved.shifts.shape[2]
-    if not ways or not isinstance(one, BodyContact) or solved.mode[k].kind != "stick":
-        return None
-    normal, among = solved.touching[k].normal, []
-    for number, (contact, own, touch) in enumerate(zip(contacts, solved.mode, solved.touching, strict=True)):
-        same = isinstance(contact, BodyContact) and (contact.body_a, contact.body_b) == (one.body_a, one.body_b)
-        alike = same and (contact.friction, contact.static) == (one.friction, one.static)
-        alike = alike and float(touch.normal @ normal) > 1 - RANK
-        if alike and own.kind == "stick":
-            among.append(number)
-    places = np.array([solved.touching[number].place for number in among])
-    forces, shifts = solved.force[among], solved.shifts[among]
-    moments = np.cross(places[:, :, None], shifts, axisa=1, axisb=1, axisc=1)
-    size = max(1.0, float(np.abs(places).max()))
-    pressed = forces @ normal
-    total = float(pressed.sum())
-    alone = np.abs(shifts[among.index(k)]).max() <= RANK
-    if len(among) < 2 or alone or total <= 0:
-        return None
-    if np.abs(shifts.sum(axis=0)).max() > RANK or np.abs(moments.sum(axis=0)).max() > RANK * size:
-        return None
-    friction = forces - pressed[:, None] * normal
-    turning = float(normal @ np.cross(places - pressed @ places / total, friction).sum(axis=0))
-    if abs(turning) > _STRAIGHT * total * size:
-        return None
-    return WholeGrip(among, friction.sum(axis=0), total)
+    grip = best_grip(contacts, solved)
+    assert grip is not None  # it ended the stretch
+    force = np.asarray(solved.force + solved.shifts @ grip.weights)
+    moving = np.flatnonzero(grip.speeds > _MOVES).tolist()
+    least = _MOVES * float(np.abs(force).max())
+    lifting = [k for k in moving if float(np.abs(force[k]).max()) <= least]
+    return LostGrip(force, lifting, [k for k in moving if k not in lifting and solved.mode[k].kind == "stick"])
 
 
 def _undecided(contacts: Sequence[Touchable], solved: SolvedContacts) -> float:

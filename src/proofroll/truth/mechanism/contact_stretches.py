@@ -39,6 +39,7 @@ from proofroll.truth.mechanism.contact_guards import (
     guards_of,
     leaves,
     lies_against,
+    lost_grip,
     sharing,
     striking,
     unloaded,
@@ -69,10 +70,10 @@ class ContactStretches(ContactWalks):
         return route
 
     @abstractmethod
-    def _decided(self, state: Array, rough: ContactMode, leaving: int | None = None) -> tuple[ContactMode, float]:
+    def _decided(self, state: Array, rough: ContactMode, leaving: Sequence[int] = ()) -> tuple[ContactMode, float]:
         """Mode that follows from the forces, and its relative margin from another mode.
 
-        ``rough``: what is open, moves or stands; ``leaving``: contact that static friction no longer holds.
+        ``rough``: what is open, moves or stands; ``leaving``: contacts that static friction no longer holds.
         """
 
     @abstractmethod
@@ -127,7 +128,7 @@ class ContactStretches(ContactWalks):
         if kind == "lift" or (kind == "break" and leaves(self.contacts[k], k, solved)):
             lifted = EventKind.LIFT_OFF, self.contacts[k].name
             return Transition(stretch.last, opened(self.contacts, stretch.mode, k), (lifted,))
-        if kind == "break":
+        if kind in {"break", "grip"}:
             return self._broken(stretch, k)
         return self._stopped(stretch) if kind == "still" else self._impact(stretch, k)
 
@@ -148,11 +149,27 @@ class ContactStretches(ContactWalks):
         return tuple((kinds[at], self._limited[k]) for k, at in limited.items())
 
     def _broken(self, stretch: Stretch[ContactMode], k: int) -> Transition[ContactMode]:
-        """Transition where friction no longer holds a contact; of a slip with less friction all forces jump."""
-        contacts, mode = self.contacts, list(stretch.mode)
-        if contacts[k].static > contacts[k].friction:
-            return self._after(stretch, stretch.last, [own.kind != "open" for own in mode], (), leaving=k)
-        leaving = leaving_slips(contacts, stretch.mode, self._solved(stretch.last, stretch.mode), k)
+        """Transition where friction no longer holds a contact, or contacts that share a load if ``k`` is -1.
+
+        Of a slip with less friction all forces jump.
+        """
+        contacts, solved = self.contacts, self._solved(stretch.last, stretch.mode)
+        held = {k: solved.force[k]}
+        if k < 0:
+            lost = lost_grip(contacts, solved)
+            if lost.lifting:
+                return self._unshared(stretch, unloaded(solved))
+            if not lost.one_way(solved.touching):
+                names = ", ".join(contacts[number].name for number in lost.slipping)
+                raise Refused(
+                    f"no distribution of friction over {names} holds from t = {stretch.end:.6g} s on, and they begin "
+                    "to slip in different directions: no route of the truth follows that; end before, or take more "
+                    "friction"
+                )
+            held = {number: lost.force[number] for number in lost.slipping}
+        if any(contacts[number].static > contacts[number].friction for number in held):
+            return self._after(stretch, stretch.last, closed_in(stretch.mode), (), leaving=tuple(held))
+        mode, leaving = list(stretch.mode), leaving_slips(stretch.mode, solved, held)
         for number, own in leaving.items():
             mode[number] = own
         return Transition(stretch.last, tuple(mode), tuple((EventKind.SLIP, contacts[k].name) for k in leaving))
@@ -263,7 +280,7 @@ class ContactStretches(ContactWalks):
         margin: float = np.inf,
         delay: float = 0.0,
         stopped: float = SLIP_ENDED,
-        leaving: int | None = None,
+        leaving: Sequence[int] = (),
         features: Features | None = None,
     ) -> Transition[ContactMode]:
         """Transition to the mode that follows from the forces; contacts not faster than ``stopped`` are at rest.

@@ -14,6 +14,7 @@ from proofroll.elements.mechanism.contacts.joint_laws import JointContact
 from proofroll.elements.mechanism.contacts.touching import FLAT
 from proofroll.truth.mechanism.contact_guards import (
     LEAST_RESPONSE,
+    NOT_SHARED,
     SHARED,
     TURNED,
     ContactGuard,
@@ -157,6 +158,7 @@ def guard_symbols(
             "flat": sub(FLAT, touch.tilt),
             "tear": sub(LEAST_RESPONSE, solved.response),
             "share": -SHARED,
+            "grip": NOT_SHARED,
         }
         return plain[guard.kind]
 

@@ -89,6 +89,6 @@ class ContactTree(ContactStretches):
             shifts=solution.shifts,
         )
 
-    def _decided(self, state: Array, rough: ContactMode, leaving: int | None = None) -> tuple[ContactMode, float]:
+    def _decided(self, state: Array, rough: ContactMode, leaving: Sequence[int] = ()) -> tuple[ContactMode, float]:
         q, v, time = self.dynamics.parts(state)
         return self.dynamics.decided(q, v, rough, time, leaving)

@@ -9,7 +9,7 @@ t along a unit vector t of the surface, and e normal to t in the surface, u · e
 Nodes of a polynomial in time carry the angle of t, as friction acts against t, and the states that follow from it.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -20,7 +20,7 @@ from proofroll.core.errors import Refused
 from proofroll.elements.mechanism.contacts.acting import Acting, ContactMode, slip_velocity
 from proofroll.elements.mechanism.rotations import Array, cross
 from proofroll.truth.hybrid import Stretch
-from proofroll.truth.mechanism.contact_guards import SolvedContacts, Touchable, whole_grip
+from proofroll.truth.mechanism.contact_guards import SolvedContacts
 
 # First length of the beginning, in natural units, and how often it is halved where the iteration does not settle, the
 # nodes do not resolve the motion, or another contact changes. The longer it is, the less stiff is what follows.
@@ -77,23 +77,17 @@ def leading(own: Acting, normal: Array, force: Array) -> Acting:
     return own._replace(kind="slip", heading=(x, y, z), leads=True)
 
 
-def leaving_slips(
-    contacts: Sequence[Touchable], mode: ContactMode, solved: SolvedContacts, k: int
-) -> dict[int, Acting]:
-    """Slip that starts at the bound of friction, opposite to the friction that held, of each contact that slips.
-
-    These are the contact ``k`` that friction no longer holds, and those that share its load.
-    """
-    whole, found = whole_grip(contacts, solved, k), {}
-    slipping, held = ([k], solved.force[k]) if whole is None else (whole.contacts, whole.friction)
-    for number in slipping:
-        line = solved.mode[number].along
+def leaving_slips(mode: ContactMode, solved: SolvedContacts, held: Mapping[int, Array]) -> dict[int, Acting]:
+    """Slips that start at the bound of friction, opposite to the friction that ``held`` each contact."""
+    found = {}
+    for k, force in held.items():
+        line = solved.mode[k].along
         if line is None:
-            found[number] = leading(mode[number], solved.touching[number].normal, held)
+            found[k] = leading(mode[k], solved.touching[k].normal, force)
             continue
-        sign = -1.0 if np.dot(line, held) > 0 else 1.0
+        sign = -1.0 if np.dot(line, force) > 0 else 1.0
         x, y, z = (sign * component for component in line)
-        found[number] = mode[number]._replace(kind="slip", along=(x, y, z), heading=(x, y, z))
+        found[k] = mode[k]._replace(kind="slip", along=(x, y, z), heading=(x, y, z))
     return found
 
 

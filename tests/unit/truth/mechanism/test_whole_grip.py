@@ -83,3 +83,28 @@ def test_a_box_that_drops_flat_on_a_steep_slope_slides_on_in_any_axes(seed: int)
     way = down * falls**2 / 2 + speed * left + (down - grip) * left**2 / 2
     moved = turn.inv().apply(found.record.p_WB[2, 0] - place)
     np.testing.assert_allclose(moved, [way, 0, -0.05], rtol=0, atol=1e-12)
+
+
+def _pushed_tripod(friction: tuple[float, float, float], twist: float = 0.0) -> Mechanism:
+    """A body on three feet that a growing force pushes along the floor under its middle, and a growing moment turns."""
+    feet = [(0.1, 0.0, -0.05), (-0.05, 0.0866025403784, -0.05), (-0.05, -0.0866025403784, -0.05)]
+    shapes = [Geometry(f"foot{k}", "body", "sphere", place, radius=0.0) for k, place in enumerate(feet)]
+    pairs = tuple(Pair(f"touch{k}", (f"foot{k}", "floor"), friction=mu) for k, mu in enumerate(friction))
+    free = Joint("free", "free", "world", "body", q0=(0.0, 0.0, 0.05, 1.0, 0.0, 0.0, 0.0))
+    push = Force("push", "body", "force", (Formula("10*t"), 0.0, 0.0), position=(0.0, 0.0, -0.05))
+    turn = Force("turn", "body", "moment", (0.0, 0.0, Formula(f"{twist}*t")))
+    return Mechanism(
+        (Body("body", 1.0, inertia=(0.01, 0.01, 0.02)),), (free,), gravity=(0.0, 0.0, -10.0),
+        geometries=(Geometry("floor", "world", "plane"), *shapes), pairs=pairs, forces=(push, turn),
+    )  # fmt: skip
+
+
+@pytest.mark.drill
+def test_feet_hold_as_long_as_any_distribution_of_friction_does() -> None:
+    """Nothing slips before the limit load of rigid motions, 3.0330571 N, though the shortest distribution fails at 3.
+
+    The limit is that of the least work of sliding, by a simplex search over rigid motions.
+    """
+    found = truth_of(_pushed_tripod((0.3, 0.31, 0.3)), np.array([0.0, 0.29, 0.303, 0.32]))
+    assert found.end == pytest.approx(0.3033057104, abs=1e-9)
+    assert not found.events or found.events[0].time == pytest.approx(0.3033057104, abs=1e-9)

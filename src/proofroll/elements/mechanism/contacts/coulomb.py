@@ -13,6 +13,7 @@ import numpy as np
 
 from proofroll.core.errors import Refused
 from proofroll.elements.mechanism.analysis import RANK
+from proofroll.elements.mechanism.contacts.distributions import best_distribution, cones_of
 from proofroll.elements.mechanism.contacts.lemke import lemke
 from proofroll.elements.mechanism.contacts.one_contact import AT_BOUND, ModeKind, force_of_one, rubbing
 from proofroll.elements.mechanism.rotations import Array
@@ -25,6 +26,7 @@ _SHARES = 1e-9
 # Relative change of loads and friction with which an outcome is tried on both sides; an outcome that changes is not
 # unique. Each further contact gets an extra 0.382 of it: equal changes would cancel between two walls.
 _NUDGE, _APART = 1e-6, 0.382
+_NULL = 1e-12  # response to forces, relative to the largest of unit rows, that counts as none: round-off is 1e-16
 
 
 def largest_friction(friction: Any, normal: Any) -> Any:
@@ -247,16 +249,30 @@ def _idle(
 def _all_held(
     G: Array, c: Array, friction: Array, rests: float, near: float, pressing: Sequence[int | None]
 ) -> Array | None:
-    """Least forces that let every contact stick, if they press within the cones of friction; else None."""
-    held = np.asarray(-np.linalg.pinv(G, 1e-12, hermitian=True) @ c, dtype=np.float64)
-    N, T = held[::3], np.linalg.norm(held.reshape(-1, 3)[:, 1:], axis=1)
-    N = N[[k if by is None else by for k, by in enumerate(pressing)]]
-    sticks = (
-        np.abs(c + G @ held).max() <= rests * np.abs(c).max()
-        and (N > 0).all()
-        and (largest_friction(friction, N) * (1 + near) >= T).all()
+    """Forces that let every contact stick and press within the cones of friction, in any distribution; else None."""
+    size = np.sqrt(np.diag(G))
+    scale = 1 / np.where(size > 0, size, 1.0)  # natural unit of each row: bodies of any mass may touch
+    values, vectors = np.linalg.eigh(G * np.outer(scale, scale))
+    whole = values > _NULL * values[-1]
+    held: Array = -scale * (vectors[:, whole] @ ((vectors[:, whole].T @ (scale * c)) / values[whole]))
+    if np.abs(scale * (c + G @ held)).max() > rests * np.abs(scale * c).max():
+        return None
+    count = len(friction)
+    cones = cones_of(
+        kinds=["stick"] * count,
+        normals=np.tile([1.0, 0.0, 0.0], (count, 1)),
+        friction=friction,
+        bounds=np.zeros(count),
+        pressed_by=pressing,
+        force=held.reshape(count, 3),
+        shifts=(scale[:, None] * vectors[:, ~whole]).reshape(count, 3, -1),
     )
-    return held if sticks else None
+    if cones.hold(np.zeros(len(whole) - whole.sum()), near):
+        return held
+    best = best_distribution(cones)
+    if best is None or not cones.hold(best.weights, near):
+        return None
+    return np.asarray(held + scale * (vectors[:, ~whole] @ best.weights))
 
 
 def robust_forces(

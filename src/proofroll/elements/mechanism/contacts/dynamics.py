@@ -244,7 +244,7 @@ class ContactDynamics:
         return self.decided(q, v, modes_of(closed, still, tuple(each.feature for each in touching)))
 
     def decided(
-        self, q: Array, v: Array, rough: ContactMode, time: float = 0.0, leaving: int | None = None
+        self, q: Array, v: Array, rough: ContactMode, time: float = 0.0, leaving: Sequence[int] = ()
     ) -> tuple[ContactMode, float]:
         """Mode that follows from the forces, and its margin to another one: inf, or 0 if it is not unique.
 
@@ -253,7 +253,7 @@ class ContactDynamics:
             v: velocities.
             rough: modes by the gaps and the slides: open, slip where a closed contact slides, stick where it does not.
             time: at which drives and targets are taken [s].
-            leaving: contact that static friction no longer holds.
+            leaving: contacts that static friction no longer holds.
 
         Raises:
             NotUnique: a disc lies flat, or capsules touch along a line.
@@ -275,8 +275,7 @@ class ContactDynamics:
             sliding.append(None if rough[k].kind == "stick" and k not in ways else across / np.linalg.norm(across))
         G, names = J @ state.W @ J.T, [self.contacts[k].name for k in which]
         static = self._static.copy()
-        if leaving is not None:
-            static[leaving] = self.friction[leaving]
+        static[list(leaving)] = self.friction[list(leaving)]
         force, done, same = robust_forces(
             G,
             c,
