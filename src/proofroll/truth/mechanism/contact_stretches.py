@@ -27,7 +27,7 @@ from proofroll.elements.mechanism.contacts.acting import (
     with_features,
 )
 from proofroll.elements.mechanism.contacts.joint_laws import rebounding
-from proofroll.elements.mechanism.contacts.touching import lying, torn
+from proofroll.elements.mechanism.contacts.touching import Touching, lying, torn
 from proofroll.elements.mechanism.contacts.turning import opened, shut_by_pressing
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.elements.mechanism.switches import Settling
@@ -47,6 +47,7 @@ from proofroll.truth.mechanism.contact_guards import (
 from proofroll.truth.mechanism.contact_walks import AHEAD, ContactWalks, SwitchedEquations
 from proofroll.truth.mechanism.impact_series import Impact, ImpactSeries, Series
 from proofroll.truth.mechanism.planar_slip import leaving_slips
+from proofroll.truth.mechanism.standing_ends import Face, check_faces, check_spin
 
 # Least deceleration of rebounds whose time is summed, in natural units; below it is round-off.
 _PULL = 1e-9
@@ -62,6 +63,8 @@ class ContactStretches(ContactWalks):
         """Takes the length of a state without time, the tolerance of each step, the mechanism's size."""
         super().__init__(equations, length, tolerance, size)
         self._settles, self._series = Settling(), ImpactSeries()
+        self.faces: Sequence[Face] = ()  # ends of cylinders, whose corners touch together
+        self._before: ContactMode = ()  # of the last stretch
 
     def early(self) -> Self:
         """The same route, which sums rebounds one before, at twice the speed at least."""
@@ -102,6 +105,20 @@ class ContactStretches(ContactWalks):
             )
         slower = 1.0 if falling is None else math.sqrt(falling / pull)  # impact speed over rebound speed
         return (1 + (1 / slower if slower else 0.0)) * rebound / (pull * (1 - restitution * slower))
+
+    def walk(self, time: float, state: Array, mode: ContactMode, until: float) -> Stretch[ContactMode]:
+        """See the protocol; ends of cylinders stay flat, and do not spin where they rub."""
+        if not self.faces:
+            return super().walk(time, state, mode, until)
+        check_faces(self.faces, mode if time == 0.0 else self._before, mode, time)
+        self._before, features = mode, features_of(mode)
+        self._check_spin(closed_in(mode), self._touching(state, features), time)
+        stretch = super().walk(time, state, mode, until)
+        self._check_spin(closed_in(mode), self._touching(stretch.last, features), time)
+        return stretch
+
+    def _check_spin(self, closed: Sequence[bool], touching: Sequence[Touching], time: float) -> None:
+        check_spin(self.faces, closed, touching, [contact.friction for contact in self.contacts], time)
 
     def change(self, stretch: Stretch[ContactMode]) -> Transition[ContactMode]:
         """See the protocol."""
@@ -213,6 +230,7 @@ class ContactStretches(ContactWalks):
         contacts, law, features = self.contacts, self.contacts[hit].restitution, features_of(stretch.mode)
         touching = self._touching(stretch.last, features)
         hits = striking(stretch.mode, touching, hit, stretch.end, self._size)
+        self._check_spin([k in hits for k in range(len(contacts))], touching, stretch.end)
         # dry friction of joints and of turning gives no impulse
         closed = [
             (k in hits or lies_against(own, touch, self._size)) and contact.presses

@@ -4,6 +4,7 @@ Contacts of bodies, dry friction, stops and effort limits of joints are rows wit
 """
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 
@@ -42,6 +43,7 @@ from proofroll.truth.mechanism.followed_paths import (
 from proofroll.truth.mechanism.held_route import HeldPath, HeldRoute
 from proofroll.truth.mechanism.maximal_coordinates import MaximalCoordinates
 from proofroll.truth.mechanism.natural_units import Units, natural_units
+from proofroll.truth.mechanism.standing_ends import Face, RollingLanding, standing_ends
 
 _Path = HybridPath[Stretch[ContactMode]]
 
@@ -57,12 +59,21 @@ def contact_truth(mechanism: Mechanism, times: Array) -> TwoRouteMotion:
     refuse_uncovered(mechanism)
     if mechanism.contacts and has_held(mechanism):
         raise Refused("no route of the truth follows contacts under held targets yet; it follows them in the air")
+    stands = standing_ends(mechanism)
+    if stands is not None:
+        with suppress(RollingLanding):
+            return stands.folded(_of(stands.mechanism, times, stands.faces))
+    return _of(mechanism, times)
+
+
+def _of(mechanism: Mechanism, times: Array, faces: Sequence[Face] = ()) -> TwoRouteMotion:
+    """Truth at times [s]; ``faces``: ends of cylinders whose corners are contacts."""
     units = natural_units(mechanism)
     with units.errors_in_seconds():
-        return _in_units(mechanism, units, times / units.time)
+        return _in_units(mechanism, units, times / units.time, faces)
 
 
-def _in_units(mechanism: Mechanism, units: Units, times: Array) -> TwoRouteMotion:
+def _in_units(mechanism: Mechanism, units: Units, times: Array, faces: Sequence[Face]) -> TwoRouteMotion:
     """Truth at times in natural units, by routes in these units."""
     own = units.mechanism(mechanism)
     held = tuple(HeldPath(mechanism, units, own) for _ in range(2)) if has_held(mechanism) else ()
@@ -72,6 +83,7 @@ def _in_units(mechanism: Mechanism, units: Units, times: Array) -> TwoRouteMotio
     size = _size(dynamics)
     tree, equations = ContactTree(dynamics, TOLERANCES[0], size), ContactEquations(plain[1], second.lean)
     bodies = ContactBodies(equations, TOLERANCES[1], size)
+    tree.faces = bodies.faces = faces
     until, breaking, kinds = float(times[-1]), breaks(own.signals), partial(_kinds, dynamics)
     paths, routes = _followed(tree, bodies, held, until, breaking)
     asked = times_known(paths, times)

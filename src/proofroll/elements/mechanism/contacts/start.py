@@ -156,6 +156,8 @@ def check_contacts(mechanism: Mechanism) -> None:
         if (q <= low + digits and v < -still) or (q >= high - digits and v > still):
             advice = "the joint starts on its stop and moves into it, an impact at time 0; correct v0 or start it apart"
             raise InputError(f"joints.{joint.name}.v0", v, advice)
+    round_ends = {shape.name for shape in mechanism.geometries if shape.kind == "cylinder"}
+    cylinders = {pair.name for pair in mechanism.pairs if round_ends & set(pair.geometries)}
     for contact, each in zip(mechanism.contacts, touches(mechanism, motion), strict=True):
         between = f"{contact.body_a} and {contact.body_b}"
         if each.gap < -scale.gap:
@@ -170,7 +172,7 @@ def check_contacts(mechanism: Mechanism) -> None:
                 f"they touch and slip at {slip:.3g} m/s, which friction = inf excludes; correct v0 or give a number"
             )
             raise InputError(f"pairs.{contact.name}.friction", contact.friction, advice)
-        if each.flat and each.gap <= scale.gap:
+        if each.flat and each.gap <= scale.gap and contact.pair not in cylinders:
             advice = "the disc lies flat and touches along its whole edge, not at one point; give it three spheres"
             if contact.features is not None:
                 advice = f"the capsules touch along a line: {PARALLEL}; turn one"
