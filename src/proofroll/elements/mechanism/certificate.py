@@ -202,7 +202,10 @@ def _compare_response(element: MechanismElement, built: MechanismBuilt, compare:
     except Refused:  # our equations refuse dry friction along several coordinates; an engine may have it
         return
     state = dynamics.at(*mechanism.start())
-    shut = [k for k, _ in enumerate(mechanism.contacts) if state.touching[k].gap <= TOUCHING * element.length]
+    near = TOUCHING * element.length  # a disc that lies flat has no one place, which its response depends on
+    shut = [
+        k for k, touch in enumerate(state.touching[: len(mechanism.contacts)]) if touch.gap <= near and not touch.flat
+    ]
     if not shut:
         return
     normals = [np.outer(state.touching[k].normal, state.touching[k].normal) for k in shut]

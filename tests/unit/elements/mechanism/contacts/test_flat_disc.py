@@ -20,3 +20,14 @@ def test_any_point_of_the_edge_is_the_nearest_of_a_parallel_disc(engine: str) ->
     bodies = (Body("disc", 1.0, inertia=(0.015625, 0.015625, 0.03125)),)
     scene = Scene("disc", "", (MechanismElement(Mechanism(bodies, (free,), geometries=shapes, pairs=pairs)),))
     assert simulate(scene, engine, until=0.02).attrs["status"] == "done"
+
+
+@pytest.mark.parametrize("engine", ["mujoco", "projection"])
+def test_a_cylinder_may_start_on_its_end(engine: str) -> None:
+    """What an engine computes of one place of the edge is not held against a model that has no such place."""
+    free = Joint("free", "free", "world", "can", q0=(0, 0, 0.06, 1, 0, 0, 0))
+    shapes = (Geometry("floor", "world", "plane"), Geometry("wall", "can", "cylinder", radius=0.06, length=0.12))
+    pairs = (Pair("touch", ("wall", "floor"), friction=1.0),)
+    bodies = (Body("can", 1.0, inertia=(0.003, 0.003, 0.002)),)
+    scene = Scene("can", "", (MechanismElement(Mechanism(bodies, (free,), geometries=shapes, pairs=pairs)),))
+    assert simulate(scene, engine, until=0.02).attrs["status"] == "done"
