@@ -234,8 +234,8 @@ def test_one_place_makes_cases() -> None:
 
 
 def test_modules_are_short_enough_to_be_read_at_once() -> None:
-    """No module has more than 400 lines: below, what counts is that it has one job."""
-    long = [str(file.relative_to(ROOT)) for file in ROOT.rglob("*.py") if len(file.read_text().splitlines()) > 400]
+    """No module has more than 500 lines: below, it is cut by subject, not by length."""
+    long = [str(file.relative_to(ROOT)) for file in ROOT.rglob("*.py") if len(file.read_text().splitlines()) > 500]
     assert long == []
 
 

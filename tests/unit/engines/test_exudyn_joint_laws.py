@@ -51,6 +51,15 @@ def test_a_stop_holds_what_its_joint_carries():
     assert 2 * np.arcsin(sample.q_WB[0, 2]) == pytest.approx(0.5, abs=2 * moment * 1e-6 / 11.0 + 1e-5)
 
 
+@pytest.mark.parametrize("speed", [3.0, -3.0])
+def test_friction_acts_against_the_motion_from_the_first_step(speed):
+    """Forward or backward, the mass loses speed at the rate F/m, which is linear in time and so exact."""
+    guide = Joint("guide", "prismatic", "world", "mass", v0=(speed,), friction=4.0)
+    run = runs.build("redundant", Mechanism((CUBE,), (guide,), gravity=(0.0, 0.0, 0.0)), dt=1e-3)
+    run.advance(0.1)
+    assert run.sample().v_WB[0, 2] == pytest.approx(speed - np.sign(speed) * 0.2, abs=1e-12)
+
+
 def test_friction_slows_a_mass_and_holds_it():
     """The mass loses its speed at the rate F/m, and then stands."""
     mechanism = Mechanism(

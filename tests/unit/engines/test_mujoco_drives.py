@@ -11,6 +11,7 @@ from proofroll.core.errors import Refused
 from proofroll.core.plugins import load_engine
 from proofroll.elements.mechanism import Body, Joint, Mechanism
 from proofroll.elements.mechanism.drives import Actuator, Coupling
+from proofroll.elements.mechanism.element import MechanismElement
 from proofroll.elements.mechanism.signal import Formula, Table
 from proofroll.files.scene_file import load_scene
 from proofroll.truth.mechanism.switched_truth import truth_of
@@ -136,3 +137,21 @@ def test_the_engine_says_that_it_has_all_of_it() -> None:
     ):
         assert need in provides["joints"]
         assert not any(need in provides[name] for name in ("chart", "free", "facets"))
+
+
+@pytest.mark.parametrize(("built_friction", "holds"), [(3.0, True), (6.0, False)])
+def test_dry_friction_of_a_slow_joint_is_softness_and_a_wrong_one_is_none(built_friction: float, holds: bool) -> None:
+    """At 0.5 m/s MuJoCo's soft row pushes along the motion, which is its law; twice the friction is a wrong model."""
+
+    def mass(friction: float) -> Mechanism:
+        spring = Joint(
+            "guide", "prismatic", "world", "mass", q0=(0.95,), v0=(0.5,), stiffness=100.0, friction=friction
+        )
+        return Mechanism((Body("mass", 1.0, inertia=ONES),), (spring,), gravity=(0.0, 0.0, 0.0))
+
+    element = MechanismElement(mass(3.0))
+    run = built(mass(built_friction), "default")
+    accelerations = [
+        line for line in element.certify(run.built(), run.sample()) if line.quantity == "acceleration"
+    ]
+    assert [line.holds for line in accelerations] == [holds]

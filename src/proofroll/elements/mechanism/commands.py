@@ -166,8 +166,8 @@ def placed_start(mechanism: Mechanism) -> Placed:
 
 
 def at_start(mechanism: Mechanism) -> Mechanism:
-    """Mechanism whose held signals are the numbers that they are at time 0."""
-    if not has_held(mechanism):
+    """Mechanism whose held signals are the numbers that they are at time 0; cells that :func:`drive` sets stay."""
+    if mechanism.cells or not has_held(mechanism):
         return mechanism
     return with_values(mechanism, _first(mechanism))
 

@@ -11,6 +11,12 @@ from proofroll.elements.mechanism.rotations import Array
 # Distance of the two points on the axis of a revolute loop, relative to the mechanism's size.
 _APART = 0.3
 _PARALLEL = 1e-9  # round-off of directions
+# Kinds of joints that loops of these kinds are like where all bodies move in parallel planes.
+_LIKE = {
+    str(JointKind.SPHERICAL): str(JointKind.FIXED),
+    DISTANCE: str(JointKind.FIXED),
+    str(JointKind.CYLINDRICAL): str(JointKind.REVOLUTE),
+}
 
 
 def held_points(mechanism: Mechanism, loop: Loop) -> tuple[float, ...]:
@@ -23,26 +29,32 @@ def held_points(mechanism: Mechanism, loop: Loop) -> tuple[float, ...]:
 
 
 def is_planar(mechanism: Mechanism) -> bool:
-    """True if the axes of joints and loops at the start restrict all bodies to motion in parallel planes.
+    """True if the axes of joints and loops at the start restrict all bodies to motion in parallel planes."""
+    return normal_of_plane(mechanism) is not None
 
-    Prismatic axes must lie in that plane and revolute axes be normal to it. Spherical loops and struts have no axis and
-    count as planar; every other joint or loop with more axes counts as spatial.
+
+def normal_of_plane(mechanism: Mechanism) -> Array | None:
+    """Normal of the planes in which all bodies move, world axes; None if joints or loops allow or need another motion.
+
+    Prismatic axes at the start must lie in that plane, and axes of turns be normal to it. Spherical loops and struts
+    have no axis and count as planar, cylindrical loops as revolute ones, for nothing slides along their axis; every
+    other joint or loop with more axes counts as spatial.
     """
     motion = Tree(mechanism).at(*mechanism.start())
     axes = [(str(joint.kind), A[:, 2]) for joint, A in zip(mechanism.joints, motion.R_parent, strict=True)]
     for loop in mechanism.loops:
-        R = motion.R_WB[mechanism.body_index[loop.body_a]]
-        without = loop.kind in {JointKind.SPHERICAL, DISTANCE}
-        axes.append((JointKind.FIXED if without else loop.kind, R @ loop.frame_a[:, 2]))
+        axis = motion.R_WB[mechanism.body_index[loop.body_a]] @ loop.frame_a[:, 2]
+        axes.append((_LIKE.get(str(loop.kind), str(loop.kind)), axis))
     if any(kind not in IN_PLANE for kind, _ in axes):
-        return False
+        return None
     turning = [axis for kind, axis in axes if kind in {JointKind.REVOLUTE, JointKind.PLANAR}]
     sliding = [axis for kind, axis in axes if kind == JointKind.PRISMATIC]
-    return (
+    planar = (
         bool(turning)
         and all(np.linalg.norm(np.cross(turning[0], axis)) < _PARALLEL for axis in turning)
         and all(abs(turning[0] @ axis) < _PARALLEL for axis in sliding)
     )
+    return np.asarray(turning[0]) if planar else None
 
 
 def _size(mechanism: Mechanism) -> float:

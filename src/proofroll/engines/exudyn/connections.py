@@ -12,7 +12,7 @@ from proofroll.core.errors import Refused
 from proofroll.elements.mechanism import WORLD, Force, Joint, Mechanism, Spring
 from proofroll.elements.mechanism.joint_kinds import DISTANCE, JointKind
 from proofroll.elements.mechanism.model import JointOrLoop
-from proofroll.elements.mechanism.rotations import Array, cross
+from proofroll.elements.mechanism.rotations import Array, cross, frame_of_axis
 from proofroll.elements.mechanism.signal import varies
 from proofroll.engines.exudyn.native import Output, data_node, exu, items
 
@@ -24,8 +24,9 @@ _HELD: Mapping[str, tuple[int, ...]] = {
     JointKind.UNIVERSAL: (1, 1, 1, 0, 1, 0),
     JointKind.PLANAR: (0, 0, 1, 1, 1, 0),
 }
-# The same for a revolute loop of a planar mechanism: the plane locks the rest already.
+# The same for a loop of a planar mechanism that turns: the plane locks the rest already.
 _IN_PLANE = (1, 1, 0, 0, 0, 0)
+_TURNS = frozenset({JointKind.REVOLUTE, JointKind.CYLINDRICAL, JointKind.SPHERICAL})
 # The two axes, one of each frame, that each rotational row keeps perpendicular. Components of ``TorqueLocal`` are the
 # multipliers of these rows, not a moment. Found from residuals of the rows; Exudyn's documents do not describe it.
 _THREE, _TWO = ((2, 1), (2, 0), (0, 1)), ((2, 0), (2, 1))
@@ -161,20 +162,24 @@ class Connections:
         node = data_node(self._system, joint.q0[0])  # it counts whole turns
         return self._system.AddMarker(items.MarkerBodiesRelativeRotationCoordinate(nodeNumber=node, **between))
 
-    def connect(self, between: JointOrLoop, joint: Joint | None, *, flat: bool) -> Connected:
+    def connect(self, between: JointOrLoop, joint: Joint | None, normals: Mapping[str, Array]) -> Connected:
         """Adds a joint with its own spring, damper and drive, or a loop, whose ``joint`` is None.
 
-        ``flat``: the mechanism is planar.
+        ``normals``: of a planar mechanism, body name -> normal of the plane in the body's frame; else empty.
         """
+        flat = bool(normals) and joint is None and between.kind in _TURNS
+        if flat and between.kind == JointKind.SPHERICAL:  # it has no axis of its own: in a plane it turns as a hinge
+            A, B = (frame_of_axis(normals[body]) for body in (between.a, between.b))
+            between = between._replace(kind=JointKind.REVOLUTE, frame_a=A, frame_b=B)
         kind, A, B = between.kind, between.frame_a, between.frame_b
         if kind == JointKind.UNIVERSAL:  # Exudyn's row is x of the first to z of the second, ours z to x
             A, B = A[:, [2, 0, 1]], B[:, [1, 2, 0]]
         markers = [self.marker(between.a, between.position_a, A), self.marker(between.b, between.position_b, B)]
         item, rows = None, _ROWS.get(kind, ())
-        if kind == JointKind.SPHERICAL:
-            item = items.ObjectJointSpherical(markerNumbers=markers)
-        elif kind == JointKind.REVOLUTE and flat and joint is None:
+        if flat:
             item, rows = items.ObjectJointGeneric(constrainedAxes=_IN_PLANE, markerNumbers=markers), ()
+        elif kind == JointKind.SPHERICAL:
+            item = items.ObjectJointSpherical(markerNumbers=markers)
         elif kind == JointKind.REVOLUTE:
             item = items.ObjectJointRevoluteZ(markerNumbers=markers)
         elif kind == DISTANCE:

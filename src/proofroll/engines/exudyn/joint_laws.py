@@ -52,9 +52,11 @@ class JointLaws:
         self._laws: list[JointLaw] = []
         held = any(joint.friction or joint.limits for joint in mechanism.joints)
         inertias = np.diag(matrices_of(mechanism).mass_matrix) if held else np.zeros(mechanism.nv)
+        rates = mechanism.start()[1]
         for joint, at_v in zip(mechanism.joints, mechanism.v_slices, strict=True):
             if joint.friction or joint.limits:
-                self._add(self._holding(joint, float(inertias[at_v.start])), joint.name, field="joint")
+                law = self._holding(joint, float(inertias[at_v.start]), float(rates[at_v.start]))
+                self._add(law, joint.name, field="joint")
             if varies(joint.torque):
                 self._add(self._pushing(joint.name, _drive(joint)), joint.name)
             if joint.armature:
@@ -87,8 +89,12 @@ class JointLaws:
             self._ground = self._system.AddMarker(items.MarkerNodeCoordinate(nodeNumber=node, coordinate=0))
         return [self._ground, self._coordinate(joint)]
 
-    def _holding(self, joint: Joint, inertia: float) -> Any:
-        """Adds friction and stops; ``inertia``: of all that the joint carries, along its coordinate [kg, kg m²]."""
+    def _holding(self, joint: Joint, inertia: float, rate: float) -> Any:
+        """Adds friction and stops; ``inertia``: of all that the joint carries, along its coordinate [kg, kg m²].
+
+        ``rate``: of the coordinate at the start. The first number of Exudyn's data node is the sense of the slip at
+        the start; a bristle at rest has 1.
+        """
         law = dict[str, Any]()
         if joint.friction:
             law["dynamicFrictionForce"] = joint.friction
@@ -96,12 +102,11 @@ class JointLaws:
         if joint.limits:
             law |= {"useLimitStops": True, "limitStopsLower": joint.limits[0], "limitStopsUpper": joint.limits[1]}
             law["limitStopsStiffness"], law["limitStopsDamping"] = inertia / self._dt**2, 2 * inertia / self._dt
+        sense = (-1.0 if rate < 0 else 1.0) if joint.friction else 0.0
         return self._system.AddObject(
             items.ObjectConnectorCoordinateSpringDamperExt(
                 markerNumbers=self._ends(joint.name),
-                nodeNumber=data_node(
-                    self._system, 1.0 if joint.friction else 0.0, 0.0, 0.0
-                ),  # 1: the bristle is at rest
+                nodeNumber=data_node(self._system, sense, 0.0, 0.0),
                 **law,
             )
         )

@@ -15,7 +15,7 @@ from proofroll.elements.mechanism import WORLD, Mechanism, Tree
 from proofroll.elements.mechanism.capabilities import ALL_JOINTS, ALL_LOOPS, FORCES, MechanismCapability, require
 from proofroll.elements.mechanism.commands import drive
 from proofroll.elements.mechanism.joint_kinds import WITH_AXIS, JointKind
-from proofroll.elements.mechanism.loop_points import is_planar
+from proofroll.elements.mechanism.loop_points import normal_of_plane
 from proofroll.elements.mechanism.rotations import Array, quaternion_rate, to_quaternion
 from proofroll.elements.mechanism.sampling import (
     MechanismBuilt,
@@ -78,9 +78,9 @@ class Redundant(ExudynModel):
         self._turns = _turns(mechanism)
         self._add_bodies()
         self._connections = Connections(self.system, self.bodies, self._com, self._turns)
-        flat = is_planar(mechanism)
+        normals = _normals(mechanism)
         self._joints = [
-            self._connections.connect(between, joint, flat=flat)
+            self._connections.connect(between, joint, normals)
             for between, joint in zip_longest(mechanism.connections, mechanism.joints)  # loops follow the joints
         ]
         add_springs(self.system, mechanism, self.marker)
@@ -208,6 +208,15 @@ class Redundant(ExudynModel):
             angular_acceleration=self._over_bodies(Output.AngularAcceleration),
             regularised=dict.fromkeys(("acceleration", "angular_acceleration"), _DIFFERENCED),
         )
+
+
+def _normals(mechanism: Mechanism) -> dict[str, Array]:
+    """Normal of the plane in which a mechanism moves, in the frame of each body, by name; empty if there is none."""
+    normal = normal_of_plane(mechanism)
+    if normal is None:
+        return {}
+    motion = Tree(mechanism).at(*mechanism.start())
+    return {name: motion.R_WB[number].T @ normal for name, number in mechanism.body_index.items()}
 
 
 def _turns(mechanism: Mechanism) -> dict[str, Array]:

@@ -31,13 +31,14 @@ from proofroll.engines.mujoco.applied_loads import AppliedLoads
 from proofroll.engines.mujoco.equation_matrices import equation_matrices
 from proofroll.engines.mujoco.prescribed_motions import PrescribedMotions
 from proofroll.engines.mujoco.running import SteppedModel, compiled, forget_callbacks, mass_matrix, silent
-from proofroll.engines.mujoco.settings import MujocoSettings, check
+from proofroll.engines.mujoco.settings import LARGEST_IMPEDANCE, MujocoSettings, check
 
 _CAPABILITY = MechanismCapability
 _ROW = mujoco.mjtConstraint
 _NO_SENSORS = int(mujoco.mjtDisableBit.mjDSBL_SENSOR)
 # Factor on tolerances: the response of hard loops has round-off of its own, largest where rows are dependent.
 _MARGIN = 1.1
+_BRAKE = 1e9  # 1/s: deceleration over speed that a row of hard dry friction asks for, above any that friction gives
 PROVIDES = (
     ALL_JOINTS
     | FORCES
@@ -296,7 +297,7 @@ class MujocoMechanism(SteppedModel):
             mobility=int(model.nv) - rank,
             acceleration=accelerations["acceleration"],
             angular_acceleration=accelerations["angular_acceleration"],
-            regularised=self._softened(data, rows, accelerations) if len(rows) else {},
+            regularised=self._softened(data, rows, accelerations),
         )
 
     def _axis(self, data: Any, joint: Joint) -> Array:
@@ -325,6 +326,34 @@ class MujocoMechanism(SteppedModel):
         return {"acceleration": rows[:, 3:] + self._model.opt.gravity, "angular_acceleration": rows[:, :3].copy()}
 
     def _softened(self, data: Any, rows: Array, soft: dict[str, Array]) -> dict[str, Regularised]:
+        """Tolerances for MuJoCo's soft rows: of loops, and of dry friction in joints."""
+        loops = self._softened_loops(data, rows, soft) if len(rows) else {}
+        if not any(joint.friction for joint in self._mechanism.joints):
+            return loops
+        because = "its dry friction is a soft row, which a slow motion does not saturate; a hard one would change that much"
+        tolerances = dict(loops)
+        for name, hard in self._with_hard_friction(self._evaluated()).items():
+            relative = _MARGIN * longest(hard - soft[name]) / (longest(hard) or np.finfo(float).tiny) + DEPENDENT
+            loop = loops.get(name)
+            tolerances[name] = (
+                Regularised(relative, because)
+                if loop is None
+                else Regularised(relative + loop.tolerance, f"{loop.because}; {because}")
+            )
+        return tolerances
+
+    def _with_hard_friction(self, data: Any) -> dict[str, Array]:
+        """Accelerations with dry friction against any motion however slow; keys and shapes of :meth:`_accelerations`."""
+        kept = self._model.dof_solimp.copy(), self._model.dof_solref.copy()
+        self._model.dof_solimp[:, :2], self._model.dof_solref[:] = LARGEST_IMPEDANCE, (-1.0, -_BRAKE)
+        try:
+            with self._without_steps():
+                self._forward(data)
+                return self._accelerations(data)
+        finally:
+            self._model.dof_solimp[:], self._model.dof_solref[:] = kept
+
+    def _softened_loops(self, data: Any, rows: Array, soft: dict[str, Array]) -> dict[str, Regularised]:
         """Tolerances for MuJoCo's soft loops: difference between its response and that of hard loops.
 
         The hard response uses MuJoCo's own matrices and meets its reference accelerations (``efc_aref``) exactly. So

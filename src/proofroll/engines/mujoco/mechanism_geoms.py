@@ -122,8 +122,9 @@ class MujocoGeoms(MujocoMechanism):
         The same keys and shapes as :meth:`_accelerations`.
         """
         model = self._model
-        kept = int(model.opt.cone), model.pair_solimp.copy()
-        model.opt.cone, model.pair_solimp[:, :2] = mujoco.mjtCone.mjCONE_ELLIPTIC, LARGEST_IMPEDANCE
+        kept = int(model.opt.cone), model.pair_solimp.copy(), model.dof_solimp.copy()
+        model.opt.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
+        model.pair_solimp[:, :2] = model.dof_solimp[:, :2] = LARGEST_IMPEDANCE
         try:
             mujoco.mj_forward(model, data)
             self._contacts.add_turning(data)
@@ -135,4 +136,4 @@ class MujocoGeoms(MujocoMechanism):
                 mujoco.mj_fwdConstraint(model, data)
             return self._accelerations(data)
         finally:
-            model.opt.cone, model.pair_solimp[:] = kept
+            model.opt.cone, model.pair_solimp[:], model.dof_solimp[:] = kept

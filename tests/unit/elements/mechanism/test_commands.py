@@ -18,9 +18,11 @@ from proofroll.core.plugins import load_engine, resolve_settings
 from proofroll.core.scene import Scene
 from proofroll.core.time_grid import time_grid
 from proofroll.elements.mechanism import Body, Joint, Mechanism
+from proofroll.elements.mechanism.commands import begun
 from proofroll.elements.mechanism.control import Control
 from proofroll.elements.mechanism.drives import Actuator
 from proofroll.elements.mechanism.element import MechanismElement
+from proofroll.elements.mechanism.matrices import matrices_of
 from proofroll.elements.mechanism.policy import Observation, PolicySource
 from proofroll.elements.mechanism.signal import Table, read_signal
 from proofroll.running.recording import record
@@ -317,3 +319,10 @@ def test_a_start_at_the_target_is_no_wrong_model(engine: str) -> None:
     scene = replace(scene, elements=(MechanismElement(replace(element.mechanism, joints=tuple(still))),))
     assert 0 < np.abs(scene.elements[0].first_named).max() < 1e-14  # type: ignore[attr-defined]
     assert simulate(scene, engine, until=0.02).attrs["status"] == "done"
+
+
+def test_matrices_of_an_engines_mechanism_are_those_of_the_scene() -> None:
+    """A mechanism whose held targets an engine sets has its own matrices at the start, as the scene's has."""
+    mechanism = _legs([Table(TIMES, HIPS, hold=True), Table(TIMES, KNEES, hold=True)]).elements[0].mechanism
+    expected, found = (matrices_of(each).mass_matrix for each in (mechanism, begun(mechanism)))
+    np.testing.assert_array_equal(found, expected)
