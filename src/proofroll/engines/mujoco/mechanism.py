@@ -330,7 +330,7 @@ class MujocoMechanism(SteppedModel):
         loops = self._softened_loops(data, rows, soft) if len(rows) else {}
         if not any(joint.friction for joint in self._mechanism.joints):
             return loops
-        because = "its dry friction is a soft row, which a slow motion does not saturate; a hard one would change that much"
+        because = "dry friction is a soft row, which slow motion does not saturate; a hard one would change that much"
         tolerances = dict(loops)
         for name, hard in self._with_hard_friction(self._evaluated()).items():
             relative = _MARGIN * longest(hard - soft[name]) / (longest(hard) or np.finfo(float).tiny) + DEPENDENT
@@ -343,7 +343,7 @@ class MujocoMechanism(SteppedModel):
         return tolerances
 
     def _with_hard_friction(self, data: Any) -> dict[str, Array]:
-        """Accelerations with dry friction against any motion however slow; keys and shapes of :meth:`_accelerations`."""
+        """Accelerations with dry friction against any motion, however slow; keyed as :meth:`_accelerations`."""
         kept = self._model.dof_solimp.copy(), self._model.dof_solref.copy()
         self._model.dof_solimp[:, :2], self._model.dof_solref[:] = LARGEST_IMPEDANCE, (-1.0, -_BRAKE)
         try:
