@@ -143,7 +143,7 @@ def test_the_engine_says_that_it_has_all_of_it() -> None:
 def test_dry_friction_of_a_slow_joint_is_softness_and_a_wrong_one_is_none(
     factor: float, preset: str, holds: bool
 ) -> None:
-    """At 0.5 m/s MuJoCo's default row pushes along the motion, which is its law; twice the friction is a wrong model."""
+    """MuJoCo's default row pushes along a slow motion, which is its law; twice the friction is a wrong model."""
 
     def mass(friction: float) -> Mechanism:
         law: Any = {"q0": (0.95,), "v0": (0.5,), "stiffness": 100.0, "friction": friction}
