@@ -57,6 +57,14 @@ HOSTILE = {
     "includes a link": (mjcf(extra='<include file="linked.xml"/>'), "outside its folder"),
     "includes itself": (mjcf(extra='<include file="robot.xml"/>'), "include each other"),
     "includes nothing": (mjcf(extra='<include file="absent.xml"/>'), "no such file"),
+    "a pipe for a shape": (
+        mjcf(extra='<asset><mesh name="m" file="pipe.stl"/></asset>'),
+        "<mesh file> = 'pipe.stl': .* a pipe",
+    ),
+    "a pipe of a URDF": (
+        urdf(tool='<visual><geometry><mesh filename="pipe.stl"/></geometry></visual>'),
+        "name an ordinary",
+    ),
     "plug-in": (mjcf(extra='<plugin plugin="x"/>'), "does not cover"),
     "xacro": (
         urdf(extra='<xacro:macro xmlns:xacro="http://www.ros.org/wiki/xacro" name="m"/>'),
@@ -77,6 +85,7 @@ def test_one_line(name: str, tmp_path: Path) -> None:
     folder = tmp_path / "folder"
     folder.mkdir()
     os.symlink(tmp_path / "secret.xml", folder / "linked.xml")
+    os.mkfifo(folder / "pipe.stl")
     path = folder / "robot.xml"
     if text is not None:
         path.write_text(text)

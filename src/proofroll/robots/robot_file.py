@@ -3,6 +3,7 @@
 import dataclasses
 import math
 import re
+import stat
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
@@ -142,10 +143,28 @@ _ADDRESS = "://"
 
 
 def names_files_inside(root: Element, folder: Path, inside: Path) -> bool:
-    """True if all files that are named lie in the folder ``inside`` or below, in every folder they may refer to."""
+    """True if all files that are named lie in the folder ``inside`` or below, in every folder they may refer to.
+
+    Raises:
+        InputError: one of them is a pipe or a device, which would block or never end.
+    """
     folders = {folder, *(folder / element.get(key, "") for element in root.iter("compiler") for key in _FOLDERS)}
-    names = {name for element in root.iter() for key in _FILES if (name := element.get(key)) and _ADDRESS not in name}
-    return all(file_inside(place, name, inside) is not None for place in folders for name in names)
+    named = ((name, element.tag, key) for element in root.iter() for key in _FILES if (name := element.get(key)))
+    names = {name: f"<{tag} {key}>" for name, tag, key in named if _ADDRESS not in name}
+    files = {name: [file_inside(place, name, inside) for place in folders] for name in names}
+    for name, places in files.items():
+        if any(file is not None and _is_endless(file) for file in places):
+            raise InputError(names[name], name, "it is a pipe or a device; name an ordinary file")
+    return all(file is not None for places in files.values() for file in places)
+
+
+def _is_endless(file: Path) -> bool:
+    """True if a path is that of a pipe, a socket or a device."""
+    try:
+        mode = file.stat().st_mode
+    except OSError:  # there is none, or its name is too long
+        return False
+    return not (stat.S_ISREG(mode) or stat.S_ISDIR(mode))
 
 
 def required_file(folder: Path, element: Element, inside: Path) -> Path:

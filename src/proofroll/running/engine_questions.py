@@ -39,9 +39,9 @@ def _ask(engine: str, request: Mapping[str, Any], workers: Workers, seconds: flo
     except WorkerDied as error:
         if error.status is not Status.TIMEOUT:
             raise
-        silent = WorkerDied(error.status, f"{engine} gave no answer within {limit:g} s; it was ended")
-        workers.silent[engine] = silent
-        raise silent from None
+        told = str(error) if engine in str(error) else f"{engine}: {error}"
+        workers.silent[engine] = WorkerDied(error.status, told)
+        raise workers.silent[engine] from None
 
 
 def _answers(

@@ -153,7 +153,7 @@ def test_a_program_that_does_not_answer_is_asked_once(tmp_path: Path) -> None:
     program = script(tmp_path / "rod", f"echo begun >>{tmp_path}/begun; sleep 300")
     workers = Workers(patience=1.0)
     for _ in range(2):
-        with pytest.raises(WorkerDied, match=r"rod@program:.* gave no answer within 1 s; it was ended"):
+        with pytest.raises(WorkerDied, match=r"rod@program:.*: no result within 1 s; it was ended"):
             describe(f"rod@program:{program}", workers)
     workers.close()
     begun = tmp_path / "begun"
