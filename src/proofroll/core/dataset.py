@@ -28,6 +28,7 @@ _SHARED = frozenset({"time", "xyz", "wxyz", "between"})
 BETWEEN = "between"
 # Attributes of a truth that ends early: from when on it is not known [s], and why, as a clause.
 ENDS, ENDED = "ends", "ended"
+LAWS = "laws"  # attribute of a truth: outcome of its law check, a clause
 # Attribute: widest bracket [s] of the events at the end that are left out of a comparison.
 LEFT_OUT = "widest_bracket_left_out"
 # A sample that is nearer to an impact than this part of the sampling interval lies on it.
@@ -63,7 +64,7 @@ def ended_early(dataset: xr.Dataset | Columns) -> tuple[float, str] | None:
 
 
 def truth_message(dataset: xr.Dataset | Columns) -> str:
-    """Sentence about a truth: when and why it ends early, why it is ill-posed; else the routes that agree."""
+    """Sentence about a truth: when and why it ends early, why it is ill-posed; else its routes and the law check."""
     notes, end = [str(dataset.attrs.get("ill_posed", ""))], ended_early(dataset)
     if end is not None:
         times = dataset["time"].values
@@ -71,7 +72,8 @@ def truth_message(dataset: xr.Dataset | Columns) -> str:
         notes.append(f"the truth ends at t = {end[0]:.6g} s, behind its {len(times)} samples: {end[1]}")
     if any(notes):
         return "; ".join(filter(None, notes))
-    return f"{dataset.attrs['route']}, checked by {dataset.attrs['second_route']}"
+    routes = f"{dataset.attrs['route']}, checked by {dataset.attrs['second_route']}"
+    return "; ".join(filter(None, (routes, str(dataset.attrs.get(LAWS, "")))))
 
 
 def joined(scene: Scene, parts: Mapping[str, Columns]) -> Columns:

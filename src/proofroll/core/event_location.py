@@ -209,6 +209,7 @@ def locate_rise(
     leaving: bool = False,
     near: FloatArray | float = 0.0,
     grazes: list[float] | None = None,
+    dense: Callable[[Any], Any] | None = None,
 ) -> Rise | None:
     """First rise of a guard through zero in the last step, even if it falls again in that step; None: there is none.
 
@@ -222,8 +223,10 @@ def locate_rise(
         leaving: True if guards that are positive at the start of the step count as zero there.
         near: distance from zero of each guard's maximum below which a zero is uncertain; 0: never.
         grazes: list to which the times of these crests are appended [s].
+        dense: dense output of the step; None: it is made here.
     """
-    dense, start, end = solver.dense_output(), float(solver.t_old), float(solver.t)
+    dense = solver.dense_output() if dense is None else dense
+    start, end = float(solver.t_old), float(solver.t)
     guards_at: dict[float, FloatArray] = {}
 
     def at(time: float) -> FloatArray:

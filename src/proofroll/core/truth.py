@@ -10,7 +10,7 @@ import numpy as np
 
 from proofroll.core.arrays import FloatArray, read_only
 from proofroll.core.columns import Columns
-from proofroll.core.dataset import ENDED, ENDS, ended_early, joined, off_grid_apart
+from proofroll.core.dataset import ENDED, ENDS, LAWS, ended_early, joined, off_grid_apart
 from proofroll.core.element import Element
 from proofroll.core.entry_points import loaded
 from proofroll.core.errors import InputError, Refused
@@ -36,7 +36,8 @@ class ElementTruth(Protocol):
         The attributes ``route`` and ``second_route`` name the two methods; ``ill_posed``, if present, says in a
         sentence why the motion depends on less than the accuracy of the parameters. A truth that is not known to the
         last time has the samples before its end alone, and says when and why it ends in the attributes
-        :data:`proofroll.core.dataset.ENDS` [s] and :data:`proofroll.core.dataset.ENDED`.
+        :data:`proofroll.core.dataset.ENDS` [s] and :data:`proofroll.core.dataset.ENDED`. If the routes were held to
+        the laws of mechanics, :data:`proofroll.core.dataset.LAWS` has the outcome.
 
         Args:
             element: one that it covers.
@@ -97,7 +98,7 @@ def truth(scene: Scene, asked: FloatArray, counting: FloatArray = _NONE, between
     parts = {element.name: _of_element(element, times, scene.asks) for element in scene.elements}
     columns = joined(scene, _to_common_end({name: Columns.of(part) for name, part in parts.items()}))
     whole = (columns if times is asked else off_grid_apart(scene, columns, asked, between)).dataset()
-    for name in ("route", "second_route", "ill_posed"):
+    for name in ("route", "second_route", "ill_posed", LAWS):
         texts = dict.fromkeys(str(part.attrs[name]) for part in parts.values() if part.attrs.get(name))
         if texts:
             whole.attrs[name] = "; ".join(texts)

@@ -97,6 +97,7 @@ class Stretch(Generic[ModeT]):
         visited: time [s] and state at the start of each step, if they were kept.
         grazes: times [s] of crests of guards at zero: a small change decides whether they rise above it.
         blur: uncertainty of the end by the error of a step in its guard, however slowly that reaches zero [s].
+        dense: start and end of each step [s] and its states inside, (state, times), of an integrator that has them.
     """
 
     start: float
@@ -108,6 +109,7 @@ class Stretch(Generic[ModeT]):
     visited: Sequence[tuple[float, State]] = ()
     grazes: Sequence[float] = ()
     blur: float = 0.0
+    dense: Sequence[tuple[float, float, Callable[[FloatArray], FloatArray]]] = ()
 
 
 @dataclass(frozen=True)
@@ -161,6 +163,7 @@ class HybridPath(Generic[SpanT]):
         margins: time [s] and relative distance from another outcome, of each decision.
         known: True if the last stretch reaches the end time; otherwise its continuation is unknown.
         ended: error that ended the path early, as a clause; empty: none did.
+        transitions: before each stretch, the first at time 0; one more at the end of a path without a next mode.
     """
 
     stretches: tuple[SpanT, ...]
@@ -168,6 +171,7 @@ class HybridPath(Generic[SpanT]):
     margins: tuple[tuple[float, float], ...]
     known: bool = True
     ended: str = ""
+    transitions: tuple[Transition[Any], ...] = ()
 
     def stretch_at(self, times: FloatArray) -> list[int]:
         """Index of the stretch at each time [s]; the time of a change belongs to the later stretch."""
@@ -195,24 +199,36 @@ def follow(
     short, longest, since = 0, 0.0, 0
     stretches: list[SpanT] = []
     happenings: list[Happening] = []
-    margins = []
+    margins, transitions = [], list[Transition[ModeT]]()
+
+    def path(known: bool, ended: str = "") -> HybridPath[SpanT]:
+        return HybridPath(
+            stretches=tuple(stretches),
+            happenings=tuple(happenings),
+            margins=tuple(margins),
+            known=known,
+            ended=ended,
+            transitions=tuple(transitions),
+        )
+
     while True:
+        transitions.append(change)
         over = max(over, time + change.delay)  # no change is reported before the delay of an earlier one is over
         happenings += [Happening(*what, over, change.blur) for what in change.happenings]
         margins.append((time, change.margin))
         since = since + 1 if since or change.margin < close else 0
         if change.mode is None or since > _BEYOND:
-            return HybridPath(tuple(stretches), tuple(happenings), tuple(margins), known=False)
+            return path(known=False)
         end = next((corner for corner in breaks if time < corner < until), until)
         try:
             stretch = route.walk(time, change.state, change.mode, end)
         except (Diverged, Refused) as error:
             if not stretches:
                 raise
-            return HybridPath(tuple(stretches), tuple(happenings), tuple(margins), known=False, ended=str(error))
+            return path(known=False, ended=str(error))
         stretches.append(stretch)
         if stretch.guard is None and end == until:
-            return HybridPath(tuple(stretches), tuple(happenings), tuple(margins))
+            return path(known=True)
         still = still + 1 if stretch.end <= stretch.start else 0
         length = stretch.end - stretch.start
         if length > 0.0:
@@ -233,7 +249,7 @@ def follow(
             if not undecided and stretch.end <= 0:
                 raise
             ended = "" if undecided else str(error)
-            return HybridPath(tuple(stretches), tuple(happenings), tuple(margins), known=False, ended=ended)
+            return path(known=False, ended=ended)
 
 
 def _latest(happenings: Sequence[Happening]) -> str:
@@ -294,14 +310,18 @@ def integrate_to_guard(
         return Stretch(start=time, end=time, mode=mode, first=state, last=state, guard=None)
     solver = solver_from(lambda _, y: law.rates(y), time, state, float(np.min(tolerance)), tolerance)
     back, count, visited, grazes = corrected_by(law.corrected), StepCount(time, until), [], list[float]()
+    dense = list[tuple[float, float, Callable[[FloatArray], FloatArray]]]()
     if first_step is not None:
         solver.h_abs = min(solver.h_abs, max(first_step, 16 * float(np.spacing(time))))
     while solver.t < until:
         visited.append((solver.t, solver.y.copy()))
         controlled_step(solver, None, until)
         count.took(solver.t)
+        dense.append((float(solver.t_old), float(solver.t), solver.dense_output()))
         if len(law.noise) and (
-            rise := locate_rise(solver, law.guards, law.noise, solver.t_old == time, law.near, grazes)
+            rise := locate_rise(
+                solver, law.guards, law.noise, solver.t_old == time, law.near, grazes, dense=dense[-1][2]
+            )
         ):
             return Stretch(
                 start=time,
@@ -312,6 +332,7 @@ def integrate_to_guard(
                 guard=rise.guard,
                 visited=visited,
                 grazes=grazes,
+                dense=dense,
             )
         go_on_from(solver, back(solver.t, solver.y))
     return Stretch(
@@ -323,6 +344,7 @@ def integrate_to_guard(
         guard=None,
         visited=visited,
         grazes=grazes,
+        dense=dense,
     )
 
 

@@ -12,6 +12,7 @@ from functools import cached_property
 from typing import Any
 
 import proofroll
+from proofroll.core.dataset import LAWS
 from proofroll.files.json_data import MERGED, OPTIONAL
 from proofroll.report.changes import Against
 from proofroll.report.comparison.conclusions import Conclusions, conclusions
@@ -44,7 +45,8 @@ class ErrorBar:
 class ReportedTruth:
     """Routes and error bars of the truth at a point; ``own``: facts from the kind of element.
 
-    ``route``, ``second_route`` and ``error_bars`` are None if there is no truth.
+    ``laws``: outcome of its law check, None without one; ``route``, ``second_route`` and ``error_bars`` are None if
+    there is no truth.
     """
 
     point: str
@@ -53,6 +55,7 @@ class ReportedTruth:
     wall_seconds: float | None
     route: str | None = field(default=None, metadata=OPTIONAL)
     second_route: str | None = field(default=None, metadata=OPTIONAL)
+    laws: str | None = field(default=None, metadata=OPTIONAL)
     error_bars: dict[str, ErrorBar] | None = field(default=None, metadata=OPTIONAL)
     own: Any = field(default=None, metadata=MERGED)
 
@@ -269,6 +272,7 @@ def _truths(outcome: Outcome) -> list[ReportedTruth]:
                 entry,
                 route=dataset.attrs.get("route", ""),
                 second_route=dataset.attrs.get("second_route", ""),
+                laws=dataset.attrs.get(LAWS),
                 error_bars={
                     str(key): ErrorBar(float(curve.attrs["error_bar"]), curve.attrs["units"])
                     for key, curve in dataset.data_vars.items()

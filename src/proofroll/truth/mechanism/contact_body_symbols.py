@@ -142,7 +142,18 @@ class BodySymbols:
             response=response,
             slide_rates=moved,
             within_limits=limits,
+            poses=self._poses(now.views)[:-1],
+            efforts=[efforts.get(k, self._wanted(state, k, functions)) for k in range(len(e.mechanism.actuators))],
+            drives=None if e.mechanism.prescribed or e.mechanism.loops or e.mechanism.couplings else (),
         )
+
+    def _poses(self, views: Sequence[BodyInScalars]) -> list[tuple[Vector, Sequence[Vector], Vector, Vector]]:
+        """Place of its frame, rotation by rows, velocity and angular velocity of each body, and of the world."""
+        poses = []
+        for view, body in zip(views, [*self._bodies.mechanism.bodies, None], strict=True):
+            arm = [0.0, 0.0, 0.0] if body is None else turned(view.R, floats(body.com))  # type: ignore[arg-type]
+            poses.append((minus(view.r, arm), view.R, minus(view.v, cross(view.w, arm)), view.w))
+        return poses
 
     def _wanted(self, state: Sequence[Scalar], number: int, functions: Any) -> Scalar:
         """Effort of an actuator before it is clamped."""
@@ -161,10 +172,7 @@ class BodySymbols:
         return (row.residual if index is None else state[e.nx + e.nu + index]), rate
 
     def _touching(self, views: Sequence[BodyInScalars], features: Features, functions: Any) -> list[ScalarTouch]:
-        bodies = []
-        for view, body in zip(views, [*self._bodies.mechanism.bodies, None], strict=True):
-            arm = [0.0, 0.0, 0.0] if body is None else turned(view.R, floats(body.com))  # type: ignore[arg-type]
-            bodies.append(ScalarMotion(minus(view.r, arm), view.R, minus(view.v, cross(view.w, arm)), view.w))
+        bodies = [ScalarMotion(*pose) for pose in self._poses(views)]
         pairs = zip(self._bodies.mechanism.contacts, self._equations.pairs, features, strict=False)
         root = functions["sqrt"]
         return [touch_in_scalars(contact, bodies[a], bodies[b], root, feature) for contact, (a, b), feature in pairs]

@@ -50,6 +50,9 @@ class SolvedSymbols(NamedTuple):
         response: Painlevé's measure.
         slide_rates: rate of each sliding velocity, (3,).
         within_limits: guards of efforts with a limit: they reach it, or come back from it.
+        poses: place, rotation by rows, velocity and angular velocity of each body, world axes.
+        efforts: of the actuators.
+        drives: forces that impose motions, in the order of prescribed joints; None: the route has no rule.
     """
 
     rates: Sequence[Scalar]
@@ -59,6 +62,9 @@ class SolvedSymbols(NamedTuple):
     response: Scalar
     slide_rates: Sequence[Vector]
     within_limits: Sequence[Scalar] = ()
+    poses: Sequence[tuple[Vector, Sequence[Vector], Vector, Vector]] = ()
+    efforts: Sequence[Scalar] = ()
+    drives: Sequence[Scalar] | None = ()
 
 
 class HeldRows(NamedTuple):
@@ -173,6 +179,25 @@ def slip_symbols(mode: ContactMode, contacts: Sequence[Touchable], solved: Solve
             slip = touch.across(touch.slide)
             found += [dot(slip, slip), dot(slip, rate), dot(rate, rate)]
     return found
+
+
+def stated_symbols(mode: ContactMode, contacts: Sequence[Touchable], solved: SolvedSymbols) -> list[Scalar]:
+    """Record of the law check at a state: poses, then forces of all contacts with places and normals, efforts, drives.
+
+    Empty: the route has no rule for a force.
+    """
+    if solved.drives is None:
+        return []
+    found: list[Scalar] = []
+    for p, R, v, w in solved.poses:
+        found += [*p, *(entry for row in R for entry in row), *v, *w]
+    for own, contact, touch, line, force in zip(
+        mode, contacts, solved.touching, solved.lines, solved.forces, strict=True
+    ):
+        rubs = own.kind == "slip" and contact.bound
+        rubbing = force if not rubs or line is None else scaled(-float(contact.bound), line)
+        found += [*(rubbing or _NONE), *touch.place, *touch.normal]
+    return [*found, *solved.efforts, *solved.drives]
 
 
 def turning_slip(own: Acting, contact: Touchable) -> bool:

@@ -8,11 +8,9 @@ several, dt = ds / √(Σ u⁻²). A direction of slip turns ever faster in time
 
 from __future__ import annotations
 
-from collections import OrderedDict
 from collections.abc import Callable, Iterator, Sequence
 from copy import copy
 from dataclasses import dataclass
-from threading import get_ident
 from typing import Any, NamedTuple, Protocol, Self
 
 import numpy as np
@@ -24,19 +22,22 @@ from proofroll.core.stalling import StepCount, StepWatch
 from proofroll.elements.mechanism.contacts.acting import ContactMode
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.truth.hybrid import Stretch, StretchLaw
+from proofroll.truth.mechanism.compiled_once import compiled_once, heyoka
 from proofroll.truth.mechanism.contact_guards import Touchable, guards_of
-from proofroll.truth.mechanism.contact_symbols import SolvedSymbols, Vector, guard_symbols, slip_symbols, turning_slip
+from proofroll.truth.mechanism.contact_symbols import (
+    SolvedSymbols,
+    Vector,
+    guard_symbols,
+    slip_symbols,
+    stated_symbols,
+    turning_slip,
+)
 from proofroll.truth.mechanism.followed_paths import TOLERANCES
 from proofroll.truth.mechanism.maximal_equations import FUNCTIONS
 from proofroll.truth.mechanism.run_time_constants import Constants, Symbol
 from proofroll.truth.mechanism.turning_symbols import follows
 from proofroll.truth.picard import PicardSteps
 from proofroll.truth.scalars import Scalar
-
-try:
-    import heyoka
-except ImportError:  # no wheel for this platform
-    heyoka = None
 
 _BACK = np.append(2.0 ** -np.arange(50.0), 0.0)  # places before the rise of a guard, in parts of the last step
 _CORRECTIONS = 6  # of Newton's method for the variable of integration at a time, at most
@@ -139,37 +140,6 @@ class CompiledModes:
         return self._modes[key].at_limits(clamped)
 
 
-class _Compiled(NamedTuple):
-    """Function of all values of a mode, and integrator of its rates, which are the last."""
-
-    values: Any
-    integrator: Any
-
-
-_MODES: OrderedDict[tuple[int, ...], _Compiled] = OrderedDict()
-_MOST_MODES = 128  # compiled modes that are kept
-
-
-def _compiled(expressions: Sequence[Any], state: Sequence[Any], by_collocation: bool) -> _Compiled:
-    """Compiled parts of a mode; the same for scenes that differ in numbers alone, in one thread.
-
-    They are recognised by hashes: to compare expressions takes for ever where they share parts. Optimised code takes
-    two to ten times as long to compile, which no run earns back.
-    """
-    key = (get_ident(), by_collocation, *map(hash, expressions))
-    if key not in _MODES:
-        values = heyoka.cfunc(expressions, state, compact_mode=True, opt_level=0)
-        integrator = None
-        if not by_collocation:
-            system, start = list(zip(state, expressions[-len(state) :], strict=True)), np.zeros(len(state))
-            integrator = heyoka.taylor_adaptive(system, start, compact_mode=True, opt_level=0)
-        _MODES[key] = _Compiled(values, integrator)
-        if len(_MODES) > _MOST_MODES:
-            _MODES.popitem(last=False)
-    _MODES.move_to_end(key)
-    return _MODES[key]
-
-
 class CompiledMode:
     """Integrator and guards of a mode, compiled."""
 
@@ -194,7 +164,9 @@ class CompiledMode:
         solved = symbols.solved([Symbol(each, constants) for each in state], mode, clamped, began, functions)
         slips = slip_symbols(mode, contacts, solved)
         guards = [*guard_symbols(guards_of(contacts, mode), contacts, solved, began, functions), *solved.within_limits]
-        values = [*guards, *slips, *solved.rates, 1.0]
+        stated = stated_symbols(mode, contacts, solved)
+        values = [*guards, *slips, *stated, *solved.rates, 1.0]
+        self._stated, self._first_rate = len(stated), len(guards) + len(slips) + len(stated)
         self._by_collocation = by_collocation
         self._turning = [k for k, pair in enumerate(zip(mode, contacts, strict=True)) if turning_slip(*pair)]
         self._count, self._slips, self._lined = len(guards), len(slips), lined
@@ -205,7 +177,7 @@ class CompiledMode:
             inverse = [1.0 / square for square in squares]
             pace = heyoka.sqrt(squares[0]) if len(squares) == 1 else 1.0 / heyoka.sqrt(heyoka.sum(inverse))
             expressions += [pace * rate for rate in expressions[-len(state) :]]
-        self._values, self._integrator = _compiled(expressions, state, by_collocation)
+        self._values, self._integrator = compiled_once(expressions, state, by_collocation)
 
     def at_limits(self, clamped: tuple[int, ...]) -> Self:
         """The same mode with these signs of efforts at their limits."""
@@ -232,8 +204,9 @@ class CompiledMode:
     def values(self, states: Array, mode: ContactMode) -> tuple[Array, Array, Array]:
         """Guards, numbers of slips and rates of states (times, state) of one stretch, each (times, …)."""
         pars = self._parameters(mode, float(states[0, -1]))
-        found, first = self._called(states.T, pars), self._count + self._slips
-        return found[: self._count].T, found[self._count : first].T, found[first : first + states.shape[1]].T
+        found, first = self._called(states.T, pars), self._first_rate
+        slips = found[self._count : self._count + self._slips].T
+        return found[: self._count].T, slips, found[first : first + states.shape[1]].T
 
     def _called(self, states: Array, pars: Array) -> Array:
         """Guards, numbers of slips, rates and, last, rates in the variable of integration, of states (state, times)."""
@@ -287,6 +260,26 @@ class CompiledMode:
             by=self,
             steps=steps,
         )
+
+    def steps_of(self, stretch: CompiledStretch) -> Iterator[tuple[float, float, Inside]]:
+        """Steps of a stretch up to its end: start and end of the variable of integration, states within."""
+        pars = self._parameters(stretch.mode, stretch.start)
+        for step in stretch.steps:
+            end = step.end
+            if step.last[-1] > stretch.end:
+                (end,) = self._places(pars, step.start, step.end, step.inside, np.array([stretch.end]))
+            if end > step.start:
+                yield step.start, float(end), step.inside
+
+    def record_of(self, mode: ContactMode, time: float) -> Callable[[Array], tuple[Array, Array]]:
+        """Function of states (state, places) after a time [s]: :func:`stated_symbols`, rate of time by its variable."""
+        pars, first = self._parameters(mode, time), self._first_rate
+
+        def record(states: Array) -> tuple[Array, Array]:
+            found = self._called(states, pars)
+            return found[first - self._stated : first], found[-1] if self._slips else np.ones(states.shape[1])
+
+        return record
 
     def _blur(self, pars: Array, step: ModeStep, place: float, guard: int) -> float:
         """Time before the rise of a guard [s] from which on it is within the error of a step below zero."""
@@ -363,7 +356,7 @@ class CompiledMode:
     def decay_of(self, mode: ContactMode, k: int, time: float) -> Callable[[Array], tuple[Array, Array]]:
         """Function of states (state, places) after a time [s]: slip speeds, changes until the slip would stop so."""
         pars, place = self._parameters(mode, time), self._count + 3 * self._turning.index(k)
-        first = self._count + self._slips
+        first = self._first_rate
 
         def decay(states: Array) -> tuple[Array, Array]:
             found = self._called(states, pars)

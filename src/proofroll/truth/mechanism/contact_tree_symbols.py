@@ -6,14 +6,12 @@ Velocities of bodies are in their own axes, where those of a free body are the c
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
-from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.contacts.acting import ContactMode, Features, features_of
 from proofroll.elements.mechanism.contacts.dynamics import ContactDynamics
 from proofroll.elements.mechanism.contacts.joint_laws import JointContact
 from proofroll.elements.mechanism.contacts.turning import TurningFriction
-from proofroll.elements.mechanism.joint_kinds import AXES, SLIDING, WITH_QUATERNION, JointKind
 from proofroll.elements.mechanism.prescribed import moved
 from proofroll.elements.mechanism.signal import value_at
 from proofroll.truth.mechanism.contact_scalars import ScalarMotion, ScalarTouch, floats, known_shapes, touch_in_scalars
@@ -27,9 +25,8 @@ from proofroll.truth.mechanism.contact_symbols import (
     rows_of,
     worth_compiling,
 )
-from proofroll.truth.mechanism.maximal_bodies import clean
 from proofroll.truth.mechanism.tree_loads import NONE as _NONE
-from proofroll.truth.mechanism.tree_loads import MovingBody, add_point_loads
+from proofroll.truth.mechanism.tree_loads import MovingBody, add_point_loads, bodies_of_tree
 from proofroll.truth.mechanism.turning_symbols import TurningMoments, of_turning, resisted, resisted_rate
 from proofroll.truth.scalars import (
     Scalar,
@@ -40,7 +37,6 @@ from proofroll.truth.scalars import (
     minus,
     mul,
     plus,
-    product,
     scaled,
     sub,
     turned,
@@ -48,7 +44,19 @@ from proofroll.truth.scalars import (
 )
 
 _AXES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
-_Matrix = Sequence[Vector]
+
+
+class _Inertial(NamedTuple):
+    """Mass matrix and loads along the velocities, guards of efforts with a limit, efforts.
+
+    ``driven``: velocity that a motion prescribes, with its row of the mass matrix and its load without that.
+    """
+
+    mass: list[Row]
+    load: list[Scalar]
+    limits: list[Scalar]
+    efforts: list[Scalar]
+    driven: list[tuple[int, Row, Scalar]]
 
 
 class TreeSymbols:
@@ -80,8 +88,9 @@ class TreeSymbols:
         """Rates and forces for a state that ends with the time; ``began``: line of each contact at the start."""
         m = self._mechanism
         q, v = state[: m.nq], state[m.nq : -1]
-        bodies, rates = _tree(m, q, v, functions)
-        mass, load, limits = self._inertial(bodies, q, v, state[-1], clamped, functions)
+        bodies, rates = bodies_of_tree(m, q, v, functions)
+        inertial = self._inertial(bodies, q, v, state[-1], clamped, functions)
+        mass, load, limits = inertial.mass, inertial.load, inertial.limits
         touching, slides = self._contacts(bodies, q, v, functions["sqrt"], features_of(mode))
         for k, start in enumerate(began[len(m.contacts) :], len(m.contacts)):
             bound = float(self._dynamics.contacts[k].bound)
@@ -130,6 +139,10 @@ class TreeSymbols:
             moved = plus(moved, scaled(size, each))
         turning.add_to(forces, sizes)
         slide_rates = [plus(_moved(J, moved), bias) for J, bias in slides]
+        drives = []
+        for n, row, loaded in inertial.driven:
+            pushed = [_along(slides[k][0], force).get(n, 0.0) for k, force in enumerate(forces) if force is not None]
+            drives.append(sub(_applied([row], moved)[0], add(loaded, *pushed)))
         return SolvedSymbols(
             rates=[*rates, *moved],
             touching=touching,
@@ -138,6 +151,9 @@ class TreeSymbols:
             response=response,
             slide_rates=slide_rates,
             within_limits=limits,
+            poses=[(body.p, body.R, turned(body.R, body.v), turned(body.R, body.w)) for body in bodies[:-1]],
+            efforts=inertial.efforts,
+            drives=drives,
         )
 
     def _contacts(
@@ -202,8 +218,8 @@ class TreeSymbols:
         time: Scalar,
         clamped: Sequence[Scalar],
         functions: Any,
-    ) -> tuple[list[Row], list[Scalar], list[Scalar]]:
-        """Mass matrix and loads along the velocities, and guards of efforts with a limit."""
+    ) -> _Inertial:
+        """Mass matrix and loads along the velocities, guards of efforts with a limit, efforts, and what drives move."""
         m = self._mechanism
         mass: list[Row] = [{} for _ in range(m.nv)]
         load: list[Scalar] = [0.0] * m.nv
@@ -229,125 +245,26 @@ class TreeSymbols:
                 if joint.stiffness:
                     load[n] = sub(load[n], mul(float(joint.stiffness), sub(q[at_q.start + place], float(joint.rest))))
                 load[n] = add(load[n], value_at(joint.torque, time, functions))
-        limits: list[Scalar] = []
+        limits, efforts = list[Scalar](), list[Scalar]()
         for actuator in m.actuators:
             place, n = m.place_of(actuator.joint)
             wanted = actuator.wanted(time, q[place], v[n], functions)
             if actuator.limit is not None:
                 wanted, guard = limited(wanted, float(actuator.bound), clamped[len(limits)], functions["sqrt"])
                 limits.append(guard)
+            efforts.append(wanted)
             load[n] = add(load[n], wanted)
         add_point_loads(m, bodies, load, time, functions)
+        driven = [(n, mass[n], load[n]) for _, _, n in m.prescribed]
         for joint, _, n in m.prescribed:
             assert joint.motion is not None  # as of all prescribed ones
             mass[n], load[n] = {n: 1.0}, moved(joint.motion, time, functions).acceleration
-        return mass, load, limits
+        return _Inertial(mass, load, limits, efforts, driven)
 
     def _free(self, row: Row) -> list[Scalar]:
         """Loads along the velocities; those along prescribed ones move nothing."""
         held = {n for _, _, n in self._mechanism.prescribed}
         return [0.0 if n in held else row.get(n, 0.0) for n in range(self._mechanism.nv)]
-
-
-def _tree(
-    m: Mechanism, q: Sequence[Scalar], v: Sequence[Scalar], functions: Any
-) -> tuple[list[MovingBody], list[Scalar]]:
-    """Bodies, the world last, and rates of the coordinates."""
-    ground = MovingBody(p=_NONE, R=_AXES, v=_NONE, w=_NONE, a=_NONE, turning=_NONE, move={}, turn={})
-    bodies: list[MovingBody] = [ground] * (len(m.bodies) + 1)
-    rates: list[Scalar] = []
-    index = m.body_index
-    for joint, at_q, at_v in zip(m.joints, m.q_slices, m.v_slices, strict=True):
-        parent, own = bodies[index[joint.parent]], q[at_q]
-        d, S = _pose(joint.kind, own, functions)
-        frame = [clean(row) for row in joint.parent_frame]
-        back = [clean(row) for row in joint.child_frame.T]
-        across = product(product(frame, S), back)  # child's axes in the parent's, by rows
-        to_joint = plus(clean(joint.position), turned(frame, d))
-        from_joint = scaled(-1.0, clean(joint.child_position))
-        in_child = {True: [clean(column) for column in joint.child_frame.T]}  # axes of B, then of A, in the child's
-        in_child[False] = [turned_back(back, turned_back(S, axis)) for axis in _AXES]
-        before, a = parent.at(to_joint)
-        w_parent, turning = turned_back(across, parent.w), turned_back(across, parent.turning)
-        move: dict[int, Vector] = {n: turned_back(across, way) for n, way in before.items()}
-        turn: dict[int, Vector] = {n: turned_back(across, way) for n, way in parent.turn.items()}
-        a = turned_back(across, a)
-        velocity = turned_back(across, plus(parent.v, cross(parent.w, to_joint)))
-        w, slide = list(w_parent), [0.0, 0.0, 0.0]
-        axes = []
-        for n, (of_child, axis, turns, by_child) in enumerate(AXES[joint.kind], at_v.start):
-            way = in_child[of_child][axis]
-            axes.append((n, way, turns, by_child))
-            if turns:
-                turn[n] = way
-                w = plus(w, scaled(v[n], way))
-            else:
-                move[n] = way
-                slide = plus(slide, scaled(v[n], way))
-        a = plus(a, cross(w_parent, slide))
-        for n, way, turns, by_child in axes:
-            carried = scaled(v[n], cross(w if by_child else w_parent, way))
-            if turns:
-                turning = plus(turning, carried)
-            else:
-                a = plus(a, carried)
-        velocity = plus(velocity, slide)
-        place = plus(parent.p, turned(parent.R, to_joint))
-        R = product(parent.R, across)
-        at_joint = MovingBody(p=place, R=R, v=velocity, w=w, a=a, turning=turning, move=move, turn=turn)
-        moved, a_origin = at_joint.at(from_joint)
-        bodies[index[joint.child]] = MovingBody(
-            p=plus(place, turned(R, from_joint)),
-            R=R,
-            v=plus(velocity, cross(w, from_joint)),
-            w=w,
-            a=a_origin,
-            turning=turning,
-            move=moved,
-            turn=turn,
-        )
-        rates += _coordinate_rates(joint.kind, own, v[at_v], S)
-    return bodies, rates
-
-
-def _pose(kind: str, q: Sequence[Scalar], functions: Any) -> tuple[Vector, _Matrix]:
-    """Pose of frame B in frame A: origin, and rotation by rows."""
-    if kind == JointKind.REVOLUTE:
-        return _NONE, _about_z(q[0], functions)
-    if kind in SLIDING:
-        return (0.0, 0.0, q[0]), _AXES if kind == JointKind.PRISMATIC else _about_z(q[1], functions)
-    if kind == JointKind.UNIVERSAL:
-        c, s = functions["cos"](q[1]), functions["sin"](q[1])
-        return _NONE, product(_about_z(q[0], functions), ((1.0, 0.0, 0.0), (0.0, c, -s), (0.0, s, c)))
-    if kind == JointKind.PLANAR:
-        return (q[0], q[1], 0.0), _about_z(q[2], functions)
-    if kind == JointKind.FIXED:
-        return _NONE, _AXES
-    a, b, c, d = q[-4:]
-    R = (
-        (1.0 - 2.0 * (c * c + d * d), 2.0 * (b * c - a * d), 2.0 * (b * d + a * c)),
-        (2.0 * (b * c + a * d), 1.0 - 2.0 * (b * b + d * d), 2.0 * (c * d - a * b)),
-        (2.0 * (b * d - a * c), 2.0 * (c * d + a * b), 1.0 - 2.0 * (b * b + c * c)),
-    )
-    return (q[:3] if kind == JointKind.FREE else _NONE), R
-
-
-def _about_z(angle: Scalar, functions: Any) -> _Matrix:
-    c, s = functions["cos"](angle), functions["sin"](angle)
-    return (c, -s, 0.0), (s, c, 0.0), (0.0, 0.0, 1.0)
-
-
-def _coordinate_rates(kind: str, q: Sequence[Scalar], v: Sequence[Scalar], S: _Matrix) -> list[Scalar]:
-    if kind not in WITH_QUATERNION:
-        return list(v)
-    (a, b, c, d), (x, y, z) = q[-4:], v[-3:]
-    turning = [
-        -0.5 * (b * x + c * y + d * z),
-        0.5 * (a * x + c * z - d * y),
-        0.5 * (a * y + d * x - b * z),
-        0.5 * (a * z + b * y - c * x),
-    ]
-    return [*turned(S, v[:3]), *turning] if kind == JointKind.FREE else turning
 
 
 def _slide(

@@ -41,6 +41,7 @@ from proofroll.truth.mechanism.followed_paths import (
     two_route_motion,
 )
 from proofroll.truth.mechanism.held_route import HeldPath, HeldRoute
+from proofroll.truth.mechanism.law_verdict import held_to_laws
 from proofroll.truth.mechanism.maximal_coordinates import MaximalCoordinates
 from proofroll.truth.mechanism.natural_units import Units, natural_units
 from proofroll.truth.mechanism.standing_ends import Face, RollingLanding, standing_ends
@@ -86,6 +87,7 @@ def _in_units(mechanism: Mechanism, units: Units, times: Array, faces: Sequence[
     tree.faces = bodies.faces = faces
     until, breaking, kinds = float(times[-1]), breaks(own.signals), partial(_kinds, dynamics)
     paths, routes = _followed(tree, bodies, held, until, breaking)
+    paths, laws = held_to_laws(mechanism, units, (tree, bodies), paths, second, held)
     asked = times_known(paths, times)
     times = held[1].on_instants(held[0].on_instants(asked)) if held else asked
     stretches = paths[0].stretch_at(times)
@@ -123,6 +125,7 @@ def _in_units(mechanism: Mechanism, units: Units, times: Array, faces: Sequence[
         until=until * units.time,
         cut=left,
     )
+    motion = replace(motion, laws=laws)
     if not own.contacts:
         return motion
     last = min(until, *(path.stretches[-1].end for path in paths))

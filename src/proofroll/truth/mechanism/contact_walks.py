@@ -194,7 +194,7 @@ class ContactWalks(ABC):
 
     def _walked(self, time: float, state: Array, mode: ContactMode, until: float) -> Stretch[ContactMode]:
         """Stretch by a compiled mode, or by DOP853 where there is none, and near singular poses, where it fails."""
-        compiled = self._by_symbols(state, mode)
+        compiled = self.by_symbols(state, mode)
         if compiled is not None:
             with suppress(Diverged):
                 stretch = compiled.walk(self._law(state, mode, self._signs), mode, time, state, until)
@@ -207,7 +207,7 @@ class ContactWalks(ABC):
         self._span = stretch.end - time if stretch.end > time else None
         return stretch
 
-    def _by_symbols(self, state: Array, mode: ContactMode) -> CompiledMode | None:
+    def by_symbols(self, state: Array, mode: ContactMode) -> CompiledMode | None:
         """Compiled mode, if all parts of the mechanism have a rule in symbols and no load is shared."""
         solved = self._solved(state, mode)
         if self._compiled is None or solved.splits.shape[1]:

@@ -45,6 +45,7 @@ class TwoRouteMotion:
         pressed: contact forces on the first bodies [N], (times, contacts, 3), NaN where not determinate; None: no
             contacts.
         sums: their sums over the contacts of each pair with several, (times, such pairs, 3); None: as ``pressed``.
+        laws: outcome of the law check, as a clause; empty: it ended the motion, or there was none.
     """
 
     record: Record
@@ -62,6 +63,7 @@ class TwoRouteMotion:
     ended: str = ""
     sums: Array | None = None
     bounces: Sequence[Bounce] = ()
+    laws: str = ""
 
 
 def fields_with_bars(mechanism: Mechanism, record: Record) -> dict[str, Array]:

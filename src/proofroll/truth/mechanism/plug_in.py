@@ -9,7 +9,7 @@ import numpy as np
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.bounces import with_bounces
-from proofroll.core.dataset import ENDED, ENDS
+from proofroll.core.dataset import ENDED, ENDS, LAWS
 from proofroll.core.element import Element
 from proofroll.core.errors import NotUnique
 from proofroll.core.events import with_events
@@ -107,6 +107,8 @@ class MechanismTruth:
         dataset.attrs["second_route"] = ", ".join(others)
         if motion.checked_by is not None:
             dataset.attrs["second_route"] += f", {motion.checked_by[0]}"
+        if motion.laws:
+            dataset.attrs[LAWS] = motion.laws
         notes = [branching(motion.branches)]
         if np.isfinite(motion.horizon):
             dataset.attrs["horizon"] = motion.horizon

@@ -1,0 +1,119 @@
+"""Hook of the law check: paths of both routes up to the first violation of a law."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+
+from proofroll.core.errors import Refused
+from proofroll.elements.mechanism import Mechanism
+from proofroll.elements.mechanism.contacts.acting import ContactMode
+from proofroll.truth.hybrid import HybridPath, Stretch
+from proofroll.truth.laws.check import LawCheck, LawVerdict, sentence, verdict
+from proofroll.truth.laws.record import Pieces
+from proofroll.truth.laws.residuals import LawResiduals
+from proofroll.truth.mechanism.contact_bodies import ContactBodies
+from proofroll.truth.mechanism.contact_tree import ContactTree
+from proofroll.truth.mechanism.followed_paths import CLOSE
+from proofroll.truth.mechanism.held_route import HeldPath
+from proofroll.truth.mechanism.law_records import LawRecorder
+from proofroll.truth.mechanism.law_states import by_the_bodies, by_the_tree
+from proofroll.truth.mechanism.maximal_coordinates import MaximalCoordinates
+from proofroll.truth.mechanism.natural_units import Units
+
+# Pieces of a stretch whose forces are found in numbers, at a third of the cost of its steps. Some suffice to see a
+# violation: after one a motion does not come right again.
+_MOST = 3
+
+_Path = HybridPath[Stretch[ContactMode]]
+
+
+def held_to_laws(
+    mechanism: Mechanism,
+    units: Units,
+    routes: tuple[ContactTree, ContactBodies],
+    paths: tuple[_Path, _Path],
+    second: MaximalCoordinates,
+    held: Sequence[HeldPath],
+) -> tuple[tuple[_Path, _Path], str]:
+    """Paths up to the first violation of a law by either, and the outcome of the check; empty after a violation.
+
+    Args:
+        mechanism: in SI units.
+        units: natural units of the routes and paths.
+        routes: both.
+        paths: of both.
+        second: equations of all joints of the second route.
+        held: held values of both; empty: there are none.
+
+    Raises:
+        Refused: a law is violated from the start.
+    """
+    tree, bodies = routes
+    recorders = {
+        "joint coordinates": LawRecorder(mechanism, units, tree, partial(by_the_tree, tree)),
+        "bodies": LawRecorder(mechanism, units, bodies, partial(by_the_bodies, bodies, second)),
+    }
+    # beyond an early end of one path the other may be on another branch, and is not judged
+    end = min((path.stretches[-1].end for path in paths if not path.known), default=np.inf)
+    values: Sequence[HeldPath | None] = held or (None, None)
+
+    def outcome(most: int | None) -> LawVerdict:
+        checked = {}
+        for (name, recorder), path, value in zip(recorders.items(), paths, values, strict=True):
+            check = LawCheck(mechanism, units.length, 1 / units.time)
+            checked[name] = _checked(check, recorder, path, end * (1 - CLOSE), value, most)
+        return verdict(checked)
+
+    result = outcome(_MOST)
+    if result.violation is None:
+        return paths, sentence(result, len(recorders))
+    result = outcome(None)  # the first violation may lie in a piece that was left out
+    assert result.violation is not None  # as all pieces are more than some
+    text = sentence(result, len(recorders))
+    if not result.violation.time > 0:
+        raise Refused(text)
+    cut = result.violation.time / units.time
+    return (_cut(paths[0], cut, text), _cut(paths[1], cut, text)), ""
+
+
+def _checked(
+    check: LawCheck, recorder: LawRecorder, path: _Path, end: float, held: HeldPath | None, most: int | None
+) -> LawResiduals:
+    """Remainders of the laws along one path, whose stretches are judged up to a time.
+
+    ``most``: pieces of a stretch whose forces are found in numbers; None: all.
+    """
+    before: Pieces | None = None
+    for number, stretch in enumerate(path.stretches):
+        if stretch.start >= end:
+            break
+        if held is not None:
+            held.recall(stretch.start)
+        pieces = recorder.pieces(stretch, most)
+        if before is not None:
+            check.passes(recorder.passage(path, number, before, recorder.start(stretch, pieces)))
+        for each in pieces:
+            check.take(each)
+        before = recorder.end(stretch, pieces)
+    return check.residuals
+
+
+def _cut(path: _Path, end: float, text: str) -> _Path:
+    """Path up to a time, and the reason why it ends there."""
+    kept = [stretch for stretch in path.stretches if stretch.start < end]
+    last = kept[-1]
+    if last.end > end:
+        kept[-1] = replace(last, end=end, guard=None)
+    return replace(
+        path,
+        stretches=tuple(kept),
+        happenings=tuple(item for item in path.happenings if item.time < end),
+        margins=tuple(item for item in path.margins if item[0] < end),
+        known=False,
+        ended=text,
+        transitions=path.transitions[: len(kept)],
+    )
