@@ -100,6 +100,13 @@ class Pieces:
         return replace(self, **arrays)
 
 
+def joined_pieces(parts: Sequence[Pieces]) -> Pieces:
+    """Pieces one after the other, of parts in one mode."""
+    names = [item.name for item in fields(Pieces) if isinstance(getattr(parts[0], item.name), np.ndarray)]
+    arrays: dict[str, Any] = {name: np.concatenate([getattr(part, name) for part in parts]) for name in names}
+    return replace(parts[0], **arrays)
+
+
 @dataclass(frozen=True)
 class Passage:
     """A transition between two stretches: what a route states just before and just after it.

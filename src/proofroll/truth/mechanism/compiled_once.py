@@ -14,22 +14,22 @@ try:
 except ImportError:  # no wheel for this platform
     heyoka = None
 
-__all__ = ["Compiled", "compiled_once", "heyoka"]
+__all__ = ["CompiledExpressions", "compiled_once", "heyoka"]
 
 
-class Compiled(NamedTuple):
+class CompiledExpressions(NamedTuple):
     """Function of all values of a mode, and integrator of its rates, which are the last."""
 
     values: Any
     integrator: Any
 
 
-_MODES: OrderedDict[tuple[int, ...], Compiled] = OrderedDict()
+_MODES: OrderedDict[tuple[int, ...], CompiledExpressions] = OrderedDict()
 _MOST_MODES = 128  # compiled modes that are kept
 
 
-def compiled_once(expressions: Sequence[Any], state: Sequence[Any], by_collocation: bool) -> Compiled:
-    """Compiled parts of a mode; the same for scenes that differ in numbers alone, in one thread.
+def compiled_once(expressions: Sequence[Any], state: Sequence[Any], by_collocation: bool) -> CompiledExpressions:
+    """CompiledExpressions parts of a mode; the same for scenes that differ in numbers alone, in one thread.
 
     They are recognised by hashes: to compare expressions takes for ever where they share parts. Optimised code takes
     two to ten times as long to compile, which no run earns back.
@@ -41,7 +41,7 @@ def compiled_once(expressions: Sequence[Any], state: Sequence[Any], by_collocati
         if not by_collocation:
             system, start = list(zip(state, expressions[-len(state) :], strict=True)), np.zeros(len(state))
             integrator = heyoka.taylor_adaptive(system, start, compact_mode=True, opt_level=0)
-        _MODES[key] = Compiled(values, integrator)
+        _MODES[key] = CompiledExpressions(values, integrator)
         if len(_MODES) > _MOST_MODES:
             _MODES.popitem(last=False)
     _MODES.move_to_end(key)

@@ -13,7 +13,7 @@ from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.contacts.acting import ContactMode
 from proofroll.truth.hybrid import HybridPath, Stretch
 from proofroll.truth.laws.check import LawCheck, LawVerdict, sentence, verdict
-from proofroll.truth.laws.record import Pieces
+from proofroll.truth.laws.record import Pieces, joined_pieces
 from proofroll.truth.laws.residuals import LawResiduals
 from proofroll.truth.mechanism.contact_bodies import ContactBodies
 from proofroll.truth.mechanism.contact_tree import ContactTree
@@ -88,6 +88,13 @@ def _checked(
     ``most``: pieces of a stretch whose forces are found in numbers; None: all.
     """
     before: Pieces | None = None
+    waiting = list[Pieces]()  # of stretches in one mode, which are checked together
+
+    def check_waiting() -> None:
+        if waiting:
+            check.take(joined_pieces(waiting))
+            waiting.clear()
+
     for number, stretch in enumerate(path.stretches):
         if stretch.start >= end:
             break
@@ -95,10 +102,16 @@ def _checked(
             held.recall(stretch.start)
         pieces = recorder.pieces(stretch, most)
         if before is not None:
-            check.passes(recorder.passage(path, number, before, recorder.start(stretch, pieces)))
-        for each in pieces:
-            check.take(each)
+            after = recorder.start(stretch, pieces)
+            if before.modes != after.modes:
+                check_waiting()
+            check.passes(recorder.passage(path, number, before, after))
+        for part in pieces:
+            if waiting and (waiting[-1].modes, waiting[-1].coarse) != (part.modes, part.coarse):
+                check_waiting()
+            waiting.append(part)
         before = recorder.end(stretch, pieces)
+    check_waiting()
     return check.residuals
 
 

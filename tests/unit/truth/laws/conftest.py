@@ -40,7 +40,7 @@ class HandMade:
         return replace(self, mechanism=replace(self.mechanism, **parts))
 
     def residuals(self) -> LawResiduals:
-        """What the laws leave."""
+        """Remainders of the laws."""
         check = LawCheck(self.mechanism, 1.0, 3.0)
         for number, pieces in enumerate(self.pieces):
             check.take(pieces)

@@ -50,7 +50,7 @@ def test_compiled_equations_are_those_of_the_route(scene: str) -> None:
     for route in routes(scene):
         begun = route.begin()
         assert begun.mode is not None
-        compiled = route._by_symbols(begun.state, begun.mode)
+        compiled = route.by_symbols(begun.state, begun.mode)
         assert compiled is not None
         law, guards = route._law(begun.state, begun.mode), guards_of(route.contacts, begun.mode)
         state = law.corrected(begun.state + 0.01 * law.rates(begun.state))
@@ -115,7 +115,7 @@ def test_springs_forces_motors_and_drives_are_compiled(target: Any, torque: Any)
     for route in routes_of(driven_turntable(target, torque)):
         begun = route.begin()
         assert begun.mode is not None
-        compiled, law = route._by_symbols(begun.state, begun.mode), route._law(begun.state, begun.mode)
+        compiled, law = route.by_symbols(begun.state, begun.mode), route._law(begun.state, begun.mode)
         assert compiled is not None
         state = law.corrected(begun.state + 0.01 * law.rates(begun.state))
         assert compiled.values(state[None], begun.mode)[2][0] == pytest.approx(law.rates(state), abs=1e-12)
@@ -143,7 +143,7 @@ def test_stops_and_dry_friction_of_joints_are_compiled(law: dict[str, Any]) -> N
     for route in routes_of(replace(m, joints=(replace(m.joints[0], **law), *m.joints[1:]))):
         begun = route.begin()
         assert begun.mode is not None
-        compiled, stretch = route._by_symbols(begun.state, begun.mode), route._law(begun.state, begun.mode)
+        compiled, stretch = route.by_symbols(begun.state, begun.mode), route._law(begun.state, begun.mode)
         assert compiled is not None
         state = stretch.corrected(begun.state + 0.01 * stretch.rates(begun.state))
         guards, _, rates = compiled.values(state[None], begun.mode)

@@ -1,0 +1,162 @@
+"""One-token faults in code that both routes of the truth share, planted at run time; the law check must see each."""
+
+from __future__ import annotations
+import __future__
+
+import importlib
+import inspect
+import textwrap
+import tomllib
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from proofroll.core.errors import Diverged, Refused
+from proofroll.elements.mechanism import Body, Force, Joint, Mechanism, Spring
+from proofroll.elements.mechanism.bushing import Bushing
+from proofroll.elements.mechanism.contacts.geometry import Geometry, Pair
+from proofroll.elements.mechanism.drives import Actuator, Coupling
+from proofroll.elements.mechanism.signal import Formula
+from proofroll.files.scene_file import load_scene
+from proofroll.truth.mechanism.error_bars import TwoRouteMotion
+from proofroll.truth.mechanism.switched_truth import truth_of
+
+_WIDER = 10.0  # bars by which a motion with a fault may be off
+
+
+class LawFault(NamedTuple):
+    """A fault: what is wrong, the function that has it, a token and what replaces it, and a scene that shows it."""
+
+    words: str
+    function: str
+    token: str
+    wrong: str
+    scene: str
+
+
+def bench() -> Mechanism:
+    """Joints with every law: coupled arms with stops, a motor at its limit, dry friction, a driven slide, springs."""
+    bodies = (
+        Body("arm", 1.0, com=(0.2, 0.0, 0.0), inertia=(0.01, 0.02, 0.02)),
+        Body("wheel", 0.5, com=(0.0, 0.02, 0.05), inertia=(0.01, 0.01, 0.02)),
+        Body("cart", 2.0, inertia=(0.02, 0.02, 0.02)),
+        Body("load", 0.7, com=(0.0, 0.0, -0.1), inertia=(0.004, 0.005, 0.006)),
+        Body("block", 1.5, inertia=(0.01, 0.01, 0.01)),
+    )
+    x, y = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)
+    shoulder = Joint("shoulder", "revolute", "world", "arm", axis=y, q0=(0.3,), v0=(3.0,))
+    shoulder = replace(shoulder, limits=(-0.5, 0.5), restitution=0.6, damping=0.02, stiffness=1.5, armature=0.01)
+    joints = (
+        shoulder,
+        Joint("axle", "revolute", "world", "wheel", axis=y, position=(0.0, 0.5, 0.0), q0=(0.15,), v0=(1.5,)),
+        Joint("shake", "prismatic", "world", "cart", axis=x, motion=Formula("0.05*sin(9*t)"), position=y),
+        Joint("hinge", "universal", "cart", "load", axis=y, q0=(0.4, 0.2), damping=0.01),
+        Joint("guide", "prismatic", "world", "block", axis=y, position=(0.0, 2.0, 0.0), v0=(0.8,), friction=6.0),
+    )
+    link = Spring("link", "load", "block", (0.0, 0.0, -0.2), (0.05, 0.0, 0.0), stiffness=30.0, damping=0.5, length=0.7)
+    mount = Bushing("mount", "world", "load", (0.0, 1.0, -0.3), (0.0, 0.0, -0.1), stiffness=(40, 60, 50, 2, 3, 1))
+    motor = Actuator("motor", "axle", "position", Formula("0.8*sin(20*t)"), kp=6.0, kd=0.05, gear=1.5, limit=2.0)
+    push = Force("push", "load", "force", (Formula("2*cos(5*t)"), 0.3, 1.0), position=(0.0, 0.03, 0.0), frame="body")
+    return Mechanism(
+        bodies,
+        joints,
+        springs=(link,),
+        bushings=(replace(mount, damping=(0.4,) * 6),),
+        actuators=(motor,),
+        couplings=(Coupling("gears", "shoulder", "axle", ratio=0.5),),
+        forces=(push,),
+    )
+
+
+def _ball(height: float, speed: tuple[float, ...], **pair: float) -> Mechanism:
+    """A ball, its centre of mass off its centre, at a height above a floor."""
+    body = Body("ball", 1.3, com=(0.0, 0.0, 0.01), inertia=(0.006, 0.007, 0.008))
+    joint = Joint("flight", "free", "world", "ball", q0=(0.0, 0.0, 0.1 + height, 1.0, 0.0, 0.0, 0.0), v0=speed)
+    geometries = Geometry("skin", "ball", "sphere", radius=0.1), Geometry("floor", "world", "plane")
+    law = {"friction": 0.2} | pair
+    return Mechanism((body,), (joint,), geometries=geometries, pairs=(Pair("contact", ("skin", "floor"), **law),))
+
+
+_TURNING = {"rolling_resistance": 0.004, "spinning_friction": 0.006}
+_THROWN = (0.4, 0.1, 0.0, 3.0, 1.0, 2.0)
+SCENES: dict[str, tuple[Callable[[], Mechanism], float]] = {
+    "bench": (bench, 0.25),
+    "slide": (lambda: _ball(0.0, (1.0, 0.4, 0.0, 2.0, -1.0, 6.0), **_TURNING), 0.35),
+    "roll": (lambda: _ball(0.0, (0.5, 0.0, 0.0, 0.0, 5.0, 3.0), friction=0.6, **_TURNING), 0.3),
+    "bounce": (lambda: _ball(0.1, _THROWN, restitution=0.7, tangential_restitution=0.4, friction=0.8), 0.4),
+    "grip": (lambda: _ball(0.1, _THROWN, restitution=0.7, friction=0.05), 0.4),
+    "rod": (lambda: _model("falling_rod"), 0.6),
+    "sled": (lambda: _model("sled"), 0.05),
+    "stop": (lambda: _model("stop"), 0.6),
+}
+
+
+def _model(name: str) -> Mechanism:
+    return load_scene(name).elements[0].mechanism  # type: ignore[attr-defined, no-any-return]
+
+
+def _faults() -> tuple[LawFault, ...]:
+    table = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
+    return tuple(LawFault(**fault) for fault in table["faults"])
+
+
+FAULTS = _faults()
+
+
+def _function(address: str) -> Any:
+    """Function at an address, without what wraps it."""
+    module, _, path = address.partition(":")
+    found: Any = importlib.import_module(module)
+    for name in path.split("."):
+        found = inspect.getattr_static(found, name)
+    for inner in ("fget", "func", "__func__", "__wrapped__"):
+        found = getattr(found, inner, found)
+    return found
+
+
+@contextmanager
+def planted(fault: LawFault) -> Iterator[None]:
+    """Context in which a function has the fault."""
+    function = _function(fault.function)
+    source = textwrap.dedent(inspect.getsource(function))
+    assert fault.token in source, f"{fault.words}: {fault.token!r} is not in {fault.function}"
+    lines = source.replace(fault.token, fault.wrong).splitlines()
+    start = next(number for number, line in enumerate(lines) if line.startswith("def "))
+    names = dict(function.__globals__)
+    flags = __future__.annotations.compiler_flag
+    exec(compile("\n".join(lines[start:]), "<fault>", "exec", flags=flags), names)  # the source of the suite alone
+    plain, function.__code__ = function.__code__, names[function.__name__].__code__
+    try:
+        yield
+    finally:
+        function.__code__ = plain
+
+
+@cache
+def honest(scene: str) -> TwoRouteMotion:
+    """Truth of a scene without a fault."""
+    make, until = SCENES[scene]
+    return truth_of(make(), np.linspace(0.0, until, 6))
+
+
+def outcome(fault: LawFault) -> str:
+    """Result with a fault: "refused", "within the bar" or "silent", with the words of the refusal."""
+    right = honest(fault.scene)
+    assert not right.ended, right.ended
+    make, until = SCENES[fault.scene]
+    with planted(fault):
+        try:
+            motion = truth_of(make(), np.linspace(0.0, until, 6))
+        except (Refused, Diverged, ArithmeticError) as error:
+            return f"refused: {error}"
+    if motion.ended:
+        return f"refused: {motion.ended}"
+    count = min(len(motion.record.time), len(right.record.time))
+    apart = np.abs(motion.record.p_WB[:count] - right.record.p_WB[:count]).max()
+    bar = float(motion.bars["p_WB"][-1] + right.bars["p_WB"][-1])
+    return f"{'within the bar' if apart <= _WIDER * bar else 'silent'}: off by {apart:.1e} m, bar {bar:.1e} m"

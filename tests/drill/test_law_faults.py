@@ -1,0 +1,21 @@
+"""Faults in code that both routes of the truth share are refused by the law check, or change nothing beyond the bar."""
+
+from __future__ import annotations
+
+import pytest
+
+from proofroll_drill.law_faults import FAULTS, SCENES, LawFault, honest, outcome
+
+
+@pytest.mark.drill
+@pytest.mark.parametrize("scene", SCENES)
+def test_scenes_of_faults_hold_all_laws(scene: str) -> None:
+    """Without a fault no law is violated."""
+    assert honest(scene).laws.startswith("holds ")
+
+
+@pytest.mark.drill
+@pytest.mark.parametrize("fault", FAULTS, ids=lambda fault: fault.words)
+def test_a_shared_fault_is_not_silent(fault: LawFault) -> None:
+    """Each one-token fault ends the truth with a reason, or leaves it within its bar."""
+    assert not outcome(fault).startswith("silent"), outcome(fault)
