@@ -85,7 +85,7 @@ def _ball(height: float, speed: tuple[float, ...], **pair: float) -> Mechanism:
 _TURNING = {"rolling_resistance": 0.004, "spinning_friction": 0.006}
 _THROWN = (0.4, 0.1, 0.0, 3.0, 1.0, 2.0)
 SCENES: dict[str, tuple[Callable[[], Mechanism], float]] = {
-    "bench": (bench, 0.25),
+    "bench": (bench, 0.12),
     "slide": (lambda: _ball(0.0, (1.0, 0.4, 0.0, 2.0, -1.0, 6.0), **_TURNING), 0.35),
     "roll": (lambda: _ball(0.0, (0.5, 0.0, 0.0, 0.0, 5.0, 3.0), friction=0.6, **_TURNING), 0.3),
     "bounce": (lambda: _ball(0.1, _THROWN, restitution=0.7, tangential_restitution=0.4, friction=0.8), 0.4),

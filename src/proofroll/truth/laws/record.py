@@ -124,6 +124,11 @@ class Passage:
     settles: frozenset[str] = frozenset()
     decided: bool = True
 
+    @property
+    def happens(self) -> bool:
+        """True if modes change or velocities may jump."""
+        return bool(self.impacts or self.settles) or self.before.modes != self.after.modes
+
 
 def without_contacts(mechanism: Mechanism, time: Array, **stated: Any) -> Pieces:
     """Pieces of a motion without contacts, stops and dry friction; what is not stated is zero.

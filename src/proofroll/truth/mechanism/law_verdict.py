@@ -102,10 +102,10 @@ def _checked(
             held.recall(stretch.start)
         pieces = recorder.pieces(stretch, most)
         if before is not None:
-            after = recorder.start(stretch, pieces)
-            if before.modes != after.modes:
+            passage = recorder.passage(path, number, before, recorder.start(stretch, pieces))
+            if passage.happens:
                 check_waiting()
-            check.passes(recorder.passage(path, number, before, after))
+            check.passes(passage)
         for part in pieces:
             if waiting and (waiting[-1].modes, waiting[-1].coarse) != (part.modes, part.coarse):
                 check_waiting()
