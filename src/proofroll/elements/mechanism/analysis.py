@@ -15,6 +15,9 @@ from proofroll.elements.mechanism.rotations import Array, cross
 # At a pose closed to 1e-12 a dependent row shows as a relative singular value near 1e-12 or below, an independent one
 # of the mechanisms seen so far above 1e-3; 1e-8 lies between, with room on both sides.
 RANK = 1e-8
+# Response of a coordinate or slide to forces, relative to that without loops and motions, up to which it is round-off:
+# loops and motions alone move it.
+NO_RESPONSE = 1e-13
 NEARBY = 0.05  # rad or m: far enough from a singular start to see the rank that holds in general
 # A pose counts as singular if the least singular value of its rows, relative to the usual one, is below this. It is
 # the root of 1e-9: a length changed by 1e-9 of itself makes such a pose singular, and no file is surer of a length.

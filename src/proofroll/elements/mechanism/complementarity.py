@@ -5,6 +5,7 @@ Engines decide modes with code of their own: sharing this code would make their 
 
 import itertools
 from collections.abc import Callable, Sequence
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +17,7 @@ from proofroll.elements.mechanism.rotations import Array
 from proofroll.elements.mechanism.signal import breaks
 from proofroll.elements.mechanism.switches import REDUNDANT, Mode, SwitchedJoint, held_joints
 
-_ROUND_OFF = 1e-12  # of accelerations, in parts of what they are the sum of: no pivot, or round-off alternates for ever
+ROUND_OFF = 1e-12  # of accelerations, in parts of what they are the sum of: no pivot, or round-off alternates for ever
 _MOST_TRIED = 6  # largest number of joints at rest where some share one degree of freedom
 _MOST_PIVOTS = 1000  # of the complementarity problem; usually about one for each joint
 _UNDECIDED = (
@@ -66,7 +67,7 @@ def _at_sides(
     f[held] = -np.linalg.solve(G[np.ix_(held, held)], free[held] + G[np.ix_(held, ~held)] @ f[~held])
     a = np.where(held, 0.0, free + G @ f)
     beyond = np.where(held, np.maximum(f - high, low - f) * scale**2, side * a)
-    return f, a, beyond, _ROUND_OFF * (np.abs(free) + scale * (scale @ np.abs(f)))
+    return f, a, beyond, ROUND_OFF * (np.abs(free) + scale * (scale @ np.abs(f)))
 
 
 def _turning(free: Array, G: Array, low: Array, high: Array, scale: Array) -> tuple[NDArray[np.int_], Array, Array]:
@@ -93,30 +94,55 @@ def load_of(joints: Sequence[SwitchedJoint], mode: Mode, nv: int) -> Array:
     return load
 
 
-# Function of a mode and some velocities: accelerations in this mode, (nv), and how much a unit force along each of
-# these velocities adds, (nv, forces).
-Responses = Callable[[Mode, Sequence[int]], tuple[Array, Array]]
+class RestResponse(NamedTuple):
+    """RestResponse of some velocities to forces along them.
+
+    Attributes:
+        free: their rates without these forces, (forces,).
+        by_force: how much a unit force along each adds to each, (forces, forces).
+        moved: True where no force adds anything, for loops and motions alone move the joint, (forces,).
+        least: size of each rate that is round-off, (forces,).
+    """
+
+    free: Array
+    by_force: Array
+    moved: NDArray[np.bool_]
+    least: Array
+
+
+# Function of a mode and some velocities.
+Responses = Callable[[Mode, Sequence[int]], RestResponse]
 
 
 def decided_mode(joints: Sequence[SwitchedJoint], q: Array, v: Array, responses: Responses) -> Mode:
     """Mode of the switched joints that follows from the forces.
 
     A joint at rest stays at rest if the force that this needs lies between its bounds. All joints at rest are solved
-    together, for they affect each other.
+    together, for they affect each other. A joint that only loops and motions move slides as they begin to move it, and
+    is free where they do not.
     """
     mode = [
         joint.resting(q[joint.coordinate]) if v[joint.velocity] == 0 else joint.moving(v[joint.velocity])
         for joint in joints
     ]
     still = held_joints(tuple(mode))
-    if not still:
+
+    def released() -> RestResponse:
+        """RestResponse of the joints at rest, which are free for it."""
+        of_rest: Mode = tuple("free" if number in still else own for number, own in enumerate(mode))
+        return responses(of_rest, [joints[number].velocity for number in still])
+
+    found = released() if still else None
+    if found is not None and found.moved.any():
+        for number, moved, rate, least in zip(still, found.moved, found.free, found.least, strict=True):
+            if moved:
+                mode[number] = joints[number].moving(rate) if abs(rate) > least else "free"
+        still = held_joints(tuple(mode))
+        found = released() if still else None
+    if found is None:
         return tuple(mode)
-    velocities = [joints[number].velocity for number in still]
-    free, response = responses(
-        tuple("free" if number in still else joint_mode for number, joint_mode in enumerate(mode)), velocities
-    )
     low, high = np.array([joints[number].bounds(mode[number]) for number in still]).T
-    state = complementary(free[velocities], response[velocities], low, high)[0]
+    state = complementary(found.free, found.by_force, low, high)[0]
     for number, side in zip(still, state, strict=True):
         if side:
             mode[number] = joints[number].moving(-side)

@@ -16,8 +16,14 @@ import numpy as np
 from proofroll.core.arrays import cross
 from proofroll.core.dop853 import integrate
 from proofroll.core.errors import Diverged, Refused
-from proofroll.elements.mechanism.analysis import BRANCHES, RANK, RowSign, analyse, reactions
-from proofroll.elements.mechanism.complementarity import decided_mode, load_of, refuse_switching
+from proofroll.elements.mechanism.analysis import BRANCHES, NO_RESPONSE, RANK, RowSign, analyse, reactions
+from proofroll.elements.mechanism.complementarity import (
+    ROUND_OFF,
+    RestResponse,
+    decided_mode,
+    load_of,
+    refuse_switching,
+)
 from proofroll.elements.mechanism.kinematics import BodyMotion, Rows, Tree
 from proofroll.elements.mechanism.light_joints import lacks_inertia
 from proofroll.elements.mechanism.model import Mechanism
@@ -178,11 +184,17 @@ class JointCoordinates:
         """Mode of joints, by complementarity."""
         return decided_mode(self.switched, q, v, partial(self._responses, time, q, v))
 
-    def _responses(self, time: float, q: Array, v: Array, mode: Mode, at: Sequence[int]) -> tuple[Array, Array]:
-        """Accelerations in a mode, (nv), and how much a unit force along each velocity ``at`` adds, (nv, forces)."""
-        free = self.solve(q, v, mode, time=time).acceleration
-        unit = np.eye(self.mechanism.nv)
-        return free, np.array([self.solve(q, v, mode, unit[k], time).acceleration - free for k in at]).T
+    def _responses(self, time: float, q: Array, v: Array, mode: Mode, at: Sequence[int]) -> RestResponse:
+        """Responses of the joints in a mode to unit forces along the velocities ``at``; see :data:`.Responses`."""
+        free = self.solve(q, v, mode, time=time)
+        M = self._weighted(self.inertial(free.motion)[1], np.zeros(len(v)), free.C, np.zeros(len(free.C)))[0]
+        loose: Array = np.asarray(np.linalg.inv(M), dtype=np.float64)
+        W = loose if free.split is None else loose - free.split[0] @ free.split[0].T
+        held, rates = free.C.T @ np.append(free.multipliers, free.holding), free.acceleration
+        # in the norm of kinetic energy, which has one unit for all velocities
+        strength, most = np.sqrt(rates @ M @ rates) + np.sqrt(held @ loose @ held), np.diag(loose)[list(at)]
+        moved, least = np.diag(W)[list(at)] <= NO_RESPONSE * most, ROUND_OFF * np.sqrt(most) * strength
+        return RestResponse(free=rates[list(at)], by_force=W[np.ix_(at, at)], moved=moved, least=least)
 
     def run(self, times: Array, tolerance: float = 1e-14) -> Record:
         """Record of the motion at the given times [s], by DOP853.

@@ -26,7 +26,7 @@ NEAR = 1e-13  # distance from a stop, in parts of the range between both, that i
 STOPPED = frozenset({"low", "high"})
 HOLDING = STOPPED | {"stick"}
 REDUNDANT = (
-    "friction or stops of several joints hold one degree of freedom, which loops or couplings make them share, so that "
+    "friction or stops of joints hold what loops, couplings, motions or one another hold already, so that "
     "their forces are not determinate: keep the friction or the stop of one of them; damping may stay in all"
 )
 

@@ -65,6 +65,7 @@ class DependentCoordinates:
         start: state at time 0.
         loop_rows, coupled: number of rows of loops, and of loops, couplings and motions together.
         moved: slice of the rows of prescribed motions.
+        split: of the velocities by these rows at the last solution; None: without rows.
         regularity: smallest relevant over largest singular value of these rows at the last solution; 1 without rows.
     """
 
@@ -102,6 +103,7 @@ class DependentCoordinates:
         self._bent = any(joint.kind == JointKind.UNIVERSAL for joint in mechanism.joints)
         self.gravity = np.array(mechanism.gravity)
         self.regularity = 1.0
+        self.split: RowSplit | None = None
         self._mean = np.full(self._count, 1.0 / self._count)
         self.start = self._start(mechanism)
         self._locked = _rank_of_loops(mechanism)
@@ -150,7 +152,7 @@ class DependentCoordinates:
             x: the state.
             drives: additional forces along the velocities ν, (nv,); several at once, (…, nv), give as many
                 accelerations.
-            closing: solver for the velocities of the tree; None: of free joints, or with loops and held joints.
+            closing: solver for the velocities of the tree; None: with loops and held joints, if there are any.
             held: indices of velocities that do not change.
         """
         bodies, joints = self.bodies(x), self._joints
@@ -170,7 +172,7 @@ class DependentCoordinates:
                 loads = loads._replace(drives=drives + self.tree.of_joints(bodies, *self.applied.of_joints(ends)))
         if self.applied.of_points:
             loads = loads._replace(pulls=self.applied.pulls(bodies))
-        if self._locked or held:
+        if closing is None and (self._locked or held):
             ends = self.connections.ends(bodies, self._loops_at)
             rows = self._loop_rows.at(ends)
             drift = self._loop_rows.bending(ends, rows)
@@ -208,7 +210,7 @@ class DependentCoordinates:
             C, of_given = np.vstack([C, self._geared, np.eye(self.nv)[list(held)]]), self._with_zeros(of_given, held)
         split = RowSplit(space.H, C, self._locked + len(held))
         if not held:
-            self.regularity = split.least
+            self.regularity, self.split = split.least, split
         elif split.least < DEPENDENT:
             raise Refused(REDUNDANT)
         velocities, multipliers = split(push.T, np.broadcast_to(row_rates - of_given, (*push.shape[:-1], len(C))).T)

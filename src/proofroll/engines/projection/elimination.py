@@ -155,7 +155,7 @@ class Elimination:
         matrices = _matrices(self._steps @ relative)
         needed = self.forces(bodies, bodies.inverse[:-1] @ matrices[..., :-1, :, :] @ bodies.pose[:-1] + loads.bent)
         push = loads.drives - (space.S * (self._sums @ _flat(needed - loads.pulls))).sum(-1)
-        velocities, multipliers = (closing or _without_loops)(space, matrices, push)
+        velocities, multipliers = (closing or without_rows)(space, matrices, push)
         return matrices + _matrices(self.moves @ (space.S * velocities[..., None])), velocities, multipliers
 
     def twists(self, bodies: Bodies, velocities: Array) -> Array:
@@ -199,6 +199,15 @@ class RowSplit:
         self.least = float(values[rank - 1] / values[0])
         self._locked, self._back = self._into @ Vt[:rank].T, U[:, :rank].T / values[:rank, None]
 
+    def mobility(self) -> Array:
+        """Response of each velocity to a force along it, relative to that without the rows, (nv,)."""
+        return np.asarray(1 - (self._locked**2).sum(axis=1) / (self._into**2).sum(axis=1))
+
+    def reach(self, velocities: Array) -> Array:
+        """Largest value of each velocity with the kinetic energy of these, (nv,)."""
+        energetic = float(np.linalg.norm(np.linalg.solve(self._into, velocities)))
+        return np.asarray(energetic * np.linalg.norm(self._into, axis=1))
+
     def __call__(self, push: Array, rates: Array) -> tuple[Array, Array]:
         """Solution ν, λ of H ν = push + Cᵀλ and C ν = wanted, for several right-hand sides (nv, …) and (rows, …)."""
         free = self._into @ (self._into.T @ push)
@@ -206,7 +215,8 @@ class RowSplit:
         return free + self._locked @ normal, self._back.T @ normal
 
 
-def _without_loops(space: Space, _: Array, push: Array) -> tuple[Array, Array]:
+def without_rows(space: Space, _: Array, push: Array) -> tuple[Array, Array]:
+    """Velocities without loops, couplings, motions and held joints, and no multipliers."""
     if not push.size:  # only fixed joints
         return push, np.zeros(0)
     return solved(space.H, push.T).T, np.zeros(0)

@@ -14,6 +14,7 @@ from proofroll.core.errors import NotUnique, Refused
 from proofroll.core.events import Event, EventKind
 from proofroll.core.integrators import Integrator
 from proofroll.elements.mechanism import Mechanism
+from proofroll.elements.mechanism.analysis import NO_RESPONSE
 from proofroll.elements.mechanism.contacts.start import natural_scale
 from proofroll.elements.mechanism.joint_kinds import JointKind
 from proofroll.elements.mechanism.named_forces import joint_force_shares
@@ -30,7 +31,9 @@ from proofroll.elements.mechanism.switches import (
 )
 from proofroll.engines.projection.alternating import AlternatingMotion, Excess, ends_of_efforts
 from proofroll.engines.projection.dependent import DependentCoordinates, SolvedState
+from proofroll.engines.projection.elimination import without_rows
 
+_ROUND_OFF = 1e-12  # of accelerations, relative to the largest of their kinetic energy
 _DEPENDENT = 1e-12  # Smallest over largest response below which joints hold one degree of freedom together.
 
 
@@ -138,7 +141,7 @@ class SwitchedMotion(AlternatingMotion[Mode]):
             joint.moving(rate) if rate else joint.resting(place)
             for joint, place, rate in zip(self._joints, q.tolist(), v.tolist(), strict=True)
         ]
-        still = held_joints(tuple(mode))
+        still = self._moved_on(x, mode)
         if still:
             moving = tuple("free" if k in still else joint_mode for k, joint_mode in enumerate(mode))
             velocities = [self._joints[k].velocity for k in still]
@@ -148,6 +151,30 @@ class SwitchedMotion(AlternatingMotion[Mode]):
                 if side:
                     mode[k] = self._joints[k].moving(-side)
         return (*mode, *efforts)
+
+    def _moved_on(self, x: Array, mode: list[str]) -> list[int]:
+        """Joints at rest that forces may hold; one that loops or motions alone move on slides in ``mode`` from now on.
+
+        Raises:
+            Refused: one stands because of these, so that the force of its friction is any within its bound.
+        """
+        still = held_joints(tuple(mode))
+        if not still:
+            return still
+        moving = tuple("free" if k in still else joint_mode for k, joint_mode in enumerate(mode))
+        velocities = [self._joints[k].velocity for k in still]
+        load = self._load(moving)
+        rates, split = self._equations.solve(x, load).rates, self._equations.split
+        if split is None:
+            return still
+        least = _ROUND_OFF * (split.reach(rates) + split.reach(self._equations.solve(x, load, without_rows).rates))
+        for k, at, mobility in zip(still, velocities, split.mobility()[velocities].tolist(), strict=True):
+            if mobility > NO_RESPONSE:
+                continue
+            if abs(rates[at]) <= least[at]:
+                raise Refused(REDUNDANT)
+            mode[k] = self._joints[k].moving(rates[at])
+        return held_joints(tuple(mode))
 
     def _struck(self, y: Array, q: Array, v: Array, hit: int) -> Array:
         """Change of all velocities ν by an impact of a joint on its stop, by Newton's law; updates ``v``.

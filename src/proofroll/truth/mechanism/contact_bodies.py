@@ -1,6 +1,6 @@
 """Route 2 of a mechanism that switches: separate bodies, modes of contacts and laws of joints found by trial."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 
 import numpy as np
 
@@ -14,12 +14,12 @@ from proofroll.elements.mechanism.contacts.acting import (
     closed_in,
     direction_of,
     features_of,
-    first_mode,
     following,
     modes_of,
     slip_velocity,
     with_features,
 )
+from proofroll.elements.mechanism.contacts.free_slides import FreeSlides
 from proofroll.elements.mechanism.contacts.joint_laws import off_stops
 from proofroll.elements.mechanism.contacts.sequences import groups_of
 from proofroll.elements.mechanism.contacts.start import closed_and_still, start_digits
@@ -28,13 +28,14 @@ from proofroll.elements.mechanism.contacts.turning import shut_by_pressing
 from proofroll.elements.mechanism.rotations import Array, cross, frame_of_axis
 from proofroll.truth.hybrid import Transition
 from proofroll.truth.mechanism.body_impacts import ImpactLaw, impulses_in_turn
+from proofroll.truth.mechanism.body_slides import slides_of
 from proofroll.truth.mechanism.contact_balance import SLACK, all_held
 from proofroll.truth.mechanism.contact_body_symbols import BodySymbols
 from proofroll.truth.mechanism.contact_equations import BodiesSolution, BodiesState, ContactEquations
 from proofroll.truth.mechanism.contact_guards import SLIP_ENDED, SolvedContacts, pressing, sharing
 from proofroll.truth.mechanism.contact_stretches import ContactStretches
 from proofroll.truth.mechanism.contact_taylor import ModeSymbols
-from proofroll.truth.mechanism.contact_trials import consistent, follow, next_trial
+from proofroll.truth.mechanism.contact_trials import consistent, follow, next_trial, provisional
 from proofroll.truth.mechanism.held_route import BodyStates
 
 _MOST = 6  # largest number of closed contacts of which all modes are tried: each has up to four
@@ -73,6 +74,7 @@ class ContactBodies(ContactStretches):
         closed, still = closed_and_still(touching, np.ones(len(touching)), 1.0, start_digits(self.contacts))
         features = tuple(each.feature for each in touching)
         rough = modes_of(shut_by_pressing(self.contacts, closed), still, features)
+        rough = self._moved_on(state, rough)
         state = self.equations.eliminated(state, rough)
         mode, margin = self._decided(state, rough)
         return Transition(state, mode, (), margin)
@@ -83,11 +85,12 @@ class ContactBodies(ContactStretches):
 
     def _by_trial(self, state: Array, rough: ContactMode, leaving: Sequence[int]) -> tuple[ContactMode, float]:
         """See :meth:`_decided`; the features of the mode are still to be set."""
-        closed, still = closed_in(rough), [own.kind == "stick" for own in rough]
+        closed = closed_in(rough)
         if not any(closed):
             return rough, np.inf
         bodies, ways = self.equations.at(state, features_of(rough)), off_stops(self.contacts, closed)
-        still = [rests and k not in ways for k, rests in enumerate(still)]
+        still = [own.kind == "stick" and k not in ways for k, own in enumerate(rough)]
+        ways = {k: np.array(own.heading) for k, own in enumerate(rough) if own.heading} | ways
 
         def trial(mode: ContactMode, headings: Sequence[Array | None]) -> BodiesSolution:
             directed = [
@@ -98,11 +101,15 @@ class ContactBodies(ContactStretches):
 
         free = float(np.abs(bodies.J @ np.linalg.solve(bodies.mass, bodies.force)).max())
         if list(still) == list(closed) and not leaving:
-            own = zip(self._own(bodies, closed), self._rubs, strict=True)
+            own = zip(
+                provisional(self.equations, bodies, closed),
+                self._rubs,
+                strict=True,
+            )
             resting = tuple(each if rub or each.kind == "open" else each._replace(kind="slip") for each, rub in own)
             if all_held(self.equations, bodies, resting, free):
                 return resting, np.inf
-        best = self._tried(bodies, closed, still, trial, free, leaving)[0]
+        best = self._tried(bodies, closed, still, ways, trial, free, leaving)[0]
         return self._completed(bodies, closed, still, best, free)
 
     def _completed(
@@ -126,7 +133,7 @@ class ContactBodies(ContactStretches):
         ]
         if not idle:
             return mode, kept
-        lines, whole = self._own(bodies, closed), list(mode)
+        lines, whole = provisional(self.equations, bodies, closed), list(mode)
         for k in idle:
             each = bodies.touching[k]
             way = solution.slide[k] if still[k] else each.slide
@@ -168,25 +175,19 @@ class ContactBodies(ContactStretches):
             stays[k] = bool(away <= SLIP_ENDED)
         return state, stays, np.inf
 
-    def _own(self, bodies: BodiesState, closed: Sequence[bool]) -> list[Acting]:
-        """Provisional mode of each contact: open, or stick, with its line if it can slide along a line only."""
-        modes = []
-        for each, G, shut in zip(bodies.touching, self.equations.responses(bodies), closed, strict=True):
-            frame = frame_of_axis(each.normal)[:, [2, 0, 1]]
-            modes.append(first_mode("stick", frame, np.zeros(2), frame.T @ G @ frame) if shut else OPEN)
-        return modes
-
     def _tried(
         self,
         bodies: BodiesState,
         closed: Sequence[bool],
         still: Sequence[bool],
+        ways: Mapping[int, Array],
         trial: Trial,
         free: float,
         leaving: Sequence[int] = (),
     ) -> list[tuple[float, BodiesSolution, ContactMode]]:
         """Candidate modes that violate no inequality, best first: relative margin, solution, mode.
 
+        ``ways``: directions of slips that the present slide does not tell.
         ``free``: largest slide, or rate of a slide, without forces, to which margins are relative if those with forces
         are less; ``leaving``: contacts that static friction no longer holds.
 
@@ -194,11 +195,13 @@ class ContactBodies(ContactStretches):
             Refused: there is none, or it is not found.
         """
         count = sum(closed)
-        ways = off_stops(self.contacts, closed)
         slips = [ways.get(k, slip_velocity(touch)) for k, touch in enumerate(bodies.touching)]
         choices = [
-            list(self._candidates(k, own, still[k], slips[k])) for k, own in enumerate(self._own(bodies, closed))
+            list(self._candidates(k, own, still[k], slips[k]))
+            for k, own in enumerate(provisional(self.equations, bodies, closed))
         ]
+        for k in np.flatnonzero(slides_of(bodies).moved & still).tolist():
+            choices[k] = [option for option in choices[k] if option.kind == "stick"]
         for k in leaving:
             choices[k] = [option for option in choices[k] if option.kind != "stick"]
         exchanged = self._exchanged(bodies, choices, still, trial, free)
@@ -375,6 +378,9 @@ class ContactBodies(ContactStretches):
 
     def _touching(self, state: Array, features: Features | None) -> Sequence[Touching]:
         return self.equations.at(state, features).touching
+
+    def _free_slides(self, state: Array, rough: ContactMode) -> FreeSlides:
+        return slides_of(self.equations.at(state, features_of(rough)))
 
     def _solution(self, state: Array, mode: ContactMode) -> SolvedContacts:
         bodies = self.equations.at(self.equations.equations.normalised(state), features_of(mode))

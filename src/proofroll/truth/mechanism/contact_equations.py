@@ -18,7 +18,7 @@ from proofroll.elements.mechanism.contacts.acting import (
     turned,
 )
 from proofroll.elements.mechanism.contacts.geometry import BodyContact
-from proofroll.elements.mechanism.contacts.joint_laws import JointContact, joint_contacts, mode_of_joints
+from proofroll.elements.mechanism.contacts.joint_laws import JointContact, joint_contacts, line_response, mode_of_joints
 from proofroll.elements.mechanism.contacts.touching import Moving, Touching, touch
 from proofroll.elements.mechanism.contacts.turning import TurningFriction, moments_by_pressing, turning_frictions
 from proofroll.elements.mechanism.rotations import Array, cross, frame_of_axis
@@ -188,7 +188,7 @@ class ContactEquations:
     def accelerated(self, state: BodiesState, mode: ContactMode) -> BodiesSolution:
         """Accelerations and forces while each contact keeps its mode."""
         if any(own.along for own in mode):
-            mode = tuple(map(turned, mode, state.touching, self.responses(state)))
+            mode = tuple(map(turned, mode, state.touching, map(line_response, self.contacts, self.responses(state))))
         wanted = [
             -held @ bias - (each.normal_rate @ each.slide if own.kind == "slip" else 0.0)
             for held, own, each, bias in zip(self._held(state, mode), mode, state.touching, state.bias, strict=True)

@@ -16,16 +16,19 @@ from proofroll.core.errors import Refused
 from proofroll.core.events import EventKind
 from proofroll.elements.mechanism.contacts.acting import (
     FAINT,
+    OPEN,
     ContactMode,
     Features,
     changes,
     closed_in,
+    direction_of,
     features_of,
     headed,
     modes_of,
     slip_velocity,
     with_features,
 )
+from proofroll.elements.mechanism.contacts.free_slides import FreeSlides, passing
 from proofroll.elements.mechanism.contacts.joint_laws import rebounding
 from proofroll.elements.mechanism.contacts.touching import Touching, lying, torn
 from proofroll.elements.mechanism.contacts.turning import opened, shut_by_pressing
@@ -51,6 +54,7 @@ from proofroll.truth.mechanism.standing_ends import Face, check_faces, check_spi
 
 # Least deceleration of rebounds whose time is summed, in natural units; below it is round-off.
 _PULL = 1e-9
+_SOON = 1e-3  # natural time by which a Runge-Kutta step shows a motion that begins smoothly: its error is below 1e-15
 
 
 class ContactStretches(ContactWalks):
@@ -78,6 +82,32 @@ class ContactStretches(ContactWalks):
 
         ``rough``: what is open, moves or stands; ``leaving``: contacts that static friction no longer holds.
         """
+
+    @abstractmethod
+    def _free_slides(self, state: Array, rough: ContactMode) -> FreeSlides:
+        """How the contacts slide without their forces; ``rough``: what is open, moves or stands."""
+
+    def _moved_on(self, state: Array, rough: ContactMode) -> ContactMode:
+        """Rough modes with a slip in place of each rest that loops or motions end, whatever friction does.
+
+        Where the rate vanishes, too, as of a cam that begins smoothly, the slide shortly afterwards tells the sense.
+        """
+        slides = self._free_slides(state, rough)
+        rough = passing(rough, slides)
+        rests = [k for k, own in enumerate(rough) if own.kind == "stick" and slides.moved[k]]
+        if not rests:
+            return rough
+        others = tuple(OPEN._replace(feature=own.feature) if k in rests else own for k, own in enumerate(rough))
+        mode, step, rates = self._decided(state, others)[0], [0.0, 0.5, 0.5, 1.0], list[Array]()
+        for part in step:
+            rates.append(self._equations.rate(state + part * _SOON * rates[-1] if rates else state, mode))
+        ahead = state + _SOON * np.array([1.0, 2.0, 2.0, 1.0]) / 6 @ np.array(rates)
+        touching, found = self._touching(ahead, features_of(rough)), list(rough)
+        for k in rests:
+            slip = slip_velocity(touching[k])
+            if (speed := float(np.linalg.norm(slip))) > SLIP_ENDED:
+                found[k] = rough[k]._replace(kind="slip", heading=direction_of(slip / speed))
+        return tuple(found)
 
     @abstractmethod
     def _struck(
@@ -309,7 +339,7 @@ class ContactStretches(ContactWalks):
         features = before if features is None else features
         slips = [float(np.linalg.norm(slip_velocity(each))) for each in self._touching(state, features)]
         still = [shut and slip <= stopped for shut, slip in zip(closed, slips, strict=True)]
-        rough = modes_of(closed, still, features)
+        rough = self._moved_on(state, modes_of(closed, still, features))
         state = self._equations.eliminated(state, rough)
         mode, sure = self._decided(state, rough, leaving)
         # A slip in the plane may have turned since it began: its sense is that of the last step.

@@ -7,6 +7,7 @@ from scipy.spatial.transform import Rotation
 
 from proofroll.elements.mechanism.contacts.acting import ContactMode, Features, closed_in, features_of
 from proofroll.elements.mechanism.contacts.dynamics import ContactDynamics
+from proofroll.elements.mechanism.contacts.free_slides import FreeSlides
 from proofroll.elements.mechanism.contacts.states import ContactSolution
 from proofroll.elements.mechanism.contacts.touching import Touching
 from proofroll.elements.mechanism.rotations import Array
@@ -50,7 +51,8 @@ class ContactTree(ContactStretches):
 
     def begin(self) -> Transition[ContactMode]:
         """See the protocol."""
-        mode, margin = self.dynamics.begin()
+        rough = self._moved_on(self.start, self.dynamics.rough_start())
+        mode, margin = self._decided(self.start, rough)
         state = self.dynamics.eliminated(self.start, mode)
         return Transition(state, mode, (), margin)
 
@@ -88,6 +90,10 @@ class ContactTree(ContactStretches):
             spread=solution.spread,
             shifts=solution.shifts,
         )
+
+    def _free_slides(self, state: Array, rough: ContactMode) -> FreeSlides:
+        q, v, time = self.dynamics.parts(state)
+        return self.dynamics.at(q, v, time, features_of(rough)).free_slides
 
     def _decided(self, state: Array, rough: ContactMode, leaving: Sequence[int] = ()) -> tuple[ContactMode, float]:
         q, v, time = self.dynamics.parts(state)

@@ -5,9 +5,21 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from proofroll.elements.mechanism.contacts.acting import OPEN, Acting, ContactMode
-from proofroll.elements.mechanism.rotations import Array
+from proofroll.elements.mechanism.contacts.acting import OPEN, Acting, ContactMode, first_mode
+from proofroll.elements.mechanism.contacts.joint_laws import line_response
+from proofroll.elements.mechanism.rotations import Array, frame_of_axis
+from proofroll.truth.mechanism.contact_equations import BodiesState, ContactEquations
 from proofroll.truth.mechanism.contact_guards import Touchable
+
+
+def provisional(equations: ContactEquations, bodies: BodiesState, closed: Sequence[bool]) -> list[Acting]:
+    """Provisional mode of each contact: open, or stick, with its line if it can slide along a line only."""
+    modes, responses = list[Acting](), equations.responses(bodies)
+    for contact, each, G, shut in zip(equations.contacts, bodies.touching, responses, closed, strict=True):
+        frame = frame_of_axis(each.normal)[:, [2, 0, 1]]
+        response = frame.T @ line_response(contact, G) @ frame
+        modes.append(first_mode("stick", frame, np.zeros(2), response) if shut else OPEN)
+    return modes
 
 
 def next_trial(contact: Touchable, own: Acting, options: Sequence[Acting], force: Array, normal: float) -> Acting:

@@ -143,7 +143,7 @@ def first_mode(kind: ModeKind, frame: Array, heading: Array, G: Array) -> Acting
     if kind == "open":
         return OPEN
     values, vectors = np.linalg.eigh(G[1:, 1:])
-    line = vectors[:, 1] if values[0] <= _LINE * values[1] else None
+    line = vectors[:, 1] if values[0] <= _LINE * values[1] and values[1] > 0 else None
     if line is not None and line @ heading < 0:
         line = -line
     along = None if line is None else direction_of(frame[:, 1:] @ line)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from proofroll.core.last_results import LastResults
-from proofroll.elements.mechanism.analysis import RANK
+from proofroll.elements.mechanism.analysis import NO_RESPONSE, RANK
 from proofroll.elements.mechanism.contacts.acting import (
     EXACT,
     OPEN,
@@ -22,34 +22,33 @@ from proofroll.elements.mechanism.contacts.acting import (
     forbidding_rows,
     heading_of,
     held_directions,
-    modes_of,
     turned,
     with_features,
 )
 from proofroll.elements.mechanism.contacts.coulomb import contact_forces, least_motion_for, returning, robust_forces
+from proofroll.elements.mechanism.contacts.free_slides import passing
 from proofroll.elements.mechanism.contacts.geometry import BodyContact, pair_sums
 from proofroll.elements.mechanism.contacts.joint_laws import (
     JointContact,
     joint_contacts,
+    line_response,
     mode_of_joints,
     off_stops,
     on_stops,
 )
 from proofroll.elements.mechanism.contacts.sequences import groups_of, left_by, ordered, refuse_spread, sequences
 from proofroll.elements.mechanism.contacts.slide_rows import slide_row, turning_row
-from proofroll.elements.mechanism.contacts.start import STILL, closed_and_still, natural_scale, start_digits, touches
+from proofroll.elements.mechanism.contacts.start import STILL, at_start, touches
 from proofroll.elements.mechanism.contacts.states import ContactsNow, ContactSolution
 from proofroll.elements.mechanism.contacts.touching import Touching, lying
 from proofroll.elements.mechanism.contacts.turning import (
     TurningFriction,
     moments_by_pressing,
     pressed_by,
-    shut_by_pressing,
     turning_frictions,
 )
 from proofroll.elements.mechanism.drives import MODES
 from proofroll.elements.mechanism.joint_coordinates import JointCoordinates
-from proofroll.elements.mechanism.joint_kinds import JointKind
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.named_forces import named_forces
 from proofroll.elements.mechanism.rotations import Array, cross, frame_of_axis
@@ -90,7 +89,7 @@ class ContactDynamics:
 
     def _at(self, q: Array, v: Array, time: float, features: Features | None) -> ContactsNow:
         found = self.equations.solve(q, v, (), time=time)
-        W: Array = np.asarray(np.linalg.inv(self.equations.inertial(found.motion)[1]), dtype=np.float64)
+        loose = W = np.asarray(np.linalg.inv(self.equations.inertial(found.motion)[1]), dtype=np.float64)
         if found.split is not None:
             W = W - found.split[0] @ found.split[0].T
         touching = touches(self.mechanism, found.motion, features)
@@ -107,7 +106,7 @@ class ContactDynamics:
             parts.append((part @ J, part @ rate + friction.part_rate(there) @ turning))
         J = np.array([row for row, _ in parts]).reshape(-1, 3, len(v))
         bias = np.array([rate for _, rate in parts]).reshape(-1, 3)
-        return ContactsNow(solution=found, W=W, touching=touching, J=J, bias=bias)
+        return ContactsNow(solution=found, W=W, loose=loose, touching=touching, J=J, bias=bias)
 
     def solve(self, q: Array, v: Array, mode: ContactMode, time: float = 0.0) -> ContactSolution:
         """Accelerations and forces while each contact keeps the given mode, at a time [s].
@@ -120,8 +119,8 @@ class ContactDynamics:
     def solved(self, state: ContactsNow, mode: ContactMode) -> ContactSolution:
         """Accelerations and forces at a state while each contact keeps the given mode; see :meth:`solve`."""
         mode = tuple(
-            turned(own, found, J @ state.W @ J.T) if own.along else own
-            for own, found, J in zip(mode, state.touching, state.J, strict=True)
+            turned(own, found, line_response(contact, J @ state.W @ J.T)) if own.along else own
+            for contact, own, found, J in zip(self.contacts, mode, state.touching, state.J, strict=True)
         )
         rows, bias, along, owner = [np.zeros((0, state.W.shape[0]))], [np.zeros(0)], list[Array](), list[int]()
         force, known = np.zeros((len(mode), 3)), np.ones((len(mode), 3), dtype=bool)
@@ -158,7 +157,7 @@ class ContactDynamics:
         S, wanted = K @ state.W @ D.T, -(K @ free + np.concatenate(bias))
         smooth = K @ state.W @ K.T
         values, vectors = np.linalg.eigh(smooth)
-        weak = values < RANK * values[-1]
+        weak = values < max(RANK * values[-1], NO_RESPONSE * float(np.einsum("in,nm,im->i", K, state.loose, K).max()))
         z = np.linalg.lstsq(S, wanted, rcond=RANK)[0] if weak.any() else np.linalg.solve(S, wanted)
         ways = np.linalg.svd(S)[2][len(S) - weak.sum() :].T if weak.any() else np.zeros((len(S), 0))
         shifts = np.zeros((len(mode), 3, ways.shape[1]))
@@ -233,15 +232,12 @@ class ContactDynamics:
 
     def begin(self) -> tuple[ContactMode, float]:
         """Mode at the start, and its margin to another one: inf, or 0 if it is not unique."""
-        q, v = self.mechanism.start()
-        scale = natural_scale(self.mechanism)
-        turns = [isinstance(c, JointContact) and self.mechanism.joints[c.joint.number].kind != JointKind.PRISMATIC
-                 for c in self.contacts]  # fmt: skip
-        lengths = np.where(turns, 1.0, scale.length)
-        touching = self.at(q, v).touching
-        closed, still = closed_and_still(touching, lengths, scale.rate, start_digits(self.contacts))
-        closed = shut_by_pressing(self.contacts, closed)
-        return self.decided(q, v, modes_of(closed, still, tuple(each.feature for each in touching)))
+        (q, v), rough = self.mechanism.start(), self.rough_start()
+        return self.decided(q, v, passing(rough, self.at(q, v, 0.0, features_of(rough)).free_slides))
+
+    def rough_start(self) -> ContactMode:
+        """Modes at the start by the gaps and the slides: open, slip where a closed contact slides, else stick."""
+        return at_start(self.mechanism, self.contacts, self.at(*self.mechanism.start()).touching)
 
     def decided(
         self, q: Array, v: Array, rough: ContactMode, time: float = 0.0, leaving: Sequence[int] = ()
@@ -271,9 +267,13 @@ class ContactDynamics:
             found = state.touching[k]
             if self.contacts[k].presses:
                 c[3 * place] += found.normal_rate @ found.slide
-            across = frames[k][:, 1:].T @ ways.get(k, found.slide)
+            across = frames[k][:, 1:].T @ ways.get(k, rough[k].heading or found.slide)
             sliding.append(None if rough[k].kind == "stick" and k not in ways else across / np.linalg.norm(across))
         G, names = J @ state.W @ J.T, [self.contacts[k].name for k in which]
+        moved = state.free_slides.moved[which]
+        across = np.array([[False, alone, alone] for alone in moved]).ravel()
+        G[across], G[:, across] = 0.0, 0.0  # round-off, which would pass for a response
+        c[across & np.repeat([slip is None for slip in sliding], 3)] = 0.0
         static = self._static.copy()
         static[list(leaving)] = self.friction[list(leaving)]
         force, done, same = robust_forces(
@@ -293,7 +293,8 @@ class ContactDynamics:
             slides = sliding[place]
             if slides is None:  # friction acts against the slide, and one that carries nothing has none
                 slides = -force[place, 1:] if force[place, 1:].any() else moves[place, 1:]
-            mode[k] = first_mode(done[place], frames[k], slides, G[own, own])
+            response = frames[k].T @ line_response(self.contacts[k], frames[k] @ G[own, own] @ frames[k].T) @ frames[k]
+            mode[k] = first_mode(done[place], frames[k], slides, response)
         return with_features(tuple(mode), features_of(rough)), np.inf if same else 0.0
 
     def struck(

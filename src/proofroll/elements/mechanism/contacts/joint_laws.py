@@ -91,6 +91,14 @@ def joint_contacts(joints: Sequence[SwitchedJoint]) -> tuple[JointContact, ...]:
     return tuple(found)
 
 
+def line_response(contact: object, G: Array) -> Array:
+    """Response (3, 3) by whose singularity the line of a contact is found, from that of its slide by unit forces.
+
+    A joint has one coordinate, and so one line, also where loops or motions leave no response.
+    """
+    return np.outer(contact.direction, contact.direction) if isinstance(contact, JointContact) else G
+
+
 def on_stops(closed: Sequence[object], q: Array) -> Array:
     """Coordinates with those of joints that rest on a stop, of the contacts that are closed, exactly at it."""
     q = q.copy()

@@ -9,8 +9,11 @@ from numpy.typing import ArrayLike
 from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import InputError
 from proofroll.core.last_results import kept
+from proofroll.elements.mechanism.contacts.acting import ContactMode, modes_of
+from proofroll.elements.mechanism.contacts.geometry import BodyContact
 from proofroll.elements.mechanism.contacts.joint_laws import JointContact
 from proofroll.elements.mechanism.contacts.touching import PARALLEL, Moving, Touching, touch
+from proofroll.elements.mechanism.contacts.turning import TurningFriction, shut_by_pressing
 from proofroll.elements.mechanism.joint_coordinates import JointCoordinates, Solution
 from proofroll.elements.mechanism.joint_kinds import JointKind
 from proofroll.elements.mechanism.kinematics import BodyMotion, Tree
@@ -138,6 +141,17 @@ def closed_and_still(
         for shut, each, size in zip(closed, found, least, strict=True)
     ]
     return closed, still
+
+
+def at_start(
+    mechanism: Mechanism, contacts: Sequence[JointContact | BodyContact | TurningFriction], found: Sequence[Touching]
+) -> ContactMode:
+    """Modes of all contacts, ``found`` at the start: open, slip where a closed one slides, else stick."""
+    scale, kinds = natural_scale(mechanism), [joint.kind for joint in mechanism.joints]
+    turns = [isinstance(c, JointContact) and kinds[c.joint.number] != JointKind.PRISMATIC for c in contacts]
+    lengths = np.where(turns, 1.0, scale.length)
+    closed, still = closed_and_still(found, lengths, scale.rate, start_digits(contacts))
+    return modes_of(shut_by_pressing(contacts, closed), still, tuple(each.feature for each in found))
 
 
 def check_contacts(mechanism: Mechanism) -> None:

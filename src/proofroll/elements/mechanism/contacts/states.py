@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from proofroll.elements.mechanism.contacts.acting import ContactMode
+from proofroll.elements.mechanism.contacts.free_slides import FreeSlides, free_slides
 from proofroll.elements.mechanism.contacts.touching import Touching
 from proofroll.elements.mechanism.joint_coordinates import Solution
 from proofroll.elements.mechanism.rotations import Array
@@ -19,6 +20,7 @@ class ContactsNow:
     Attributes:
         solution: of the mechanism without forces of contact.
         W: accelerations caused by unit forces along the velocities, (nv, nv).
+        loose: the same without loops, couplings and motions, (nv, nv).
         touching: geometry and rates of each contact.
         J: derivative of each slide by the velocities, (contacts, 3, nv).
         bias: rate of each slide where v̇ = 0, (contacts, 3).
@@ -26,9 +28,17 @@ class ContactsNow:
 
     solution: Solution
     W: Array
+    loose: Array
     touching: tuple[Touching, ...]
     J: Array
     bias: Array
+
+    @cached_property
+    def free_slides(self) -> FreeSlides:
+        """How the contacts slide without their forces."""
+        found = self.solution
+        held = found.C.T @ found.multipliers
+        return free_slides(self.touching, self.J, self.bias, found.acceleration, self.W, self.loose, held)
 
 
 @dataclass(frozen=True)
