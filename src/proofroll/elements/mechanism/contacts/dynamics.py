@@ -50,7 +50,6 @@ from proofroll.elements.mechanism.contacts.turning import (
 from proofroll.elements.mechanism.drives import MODES
 from proofroll.elements.mechanism.joint_coordinates import JointCoordinates
 from proofroll.elements.mechanism.model import Mechanism
-from proofroll.elements.mechanism.named_forces import named_forces
 from proofroll.elements.mechanism.rotations import Array, cross, frame_of_axis
 
 # Impulse, relative to the largest of an impact, that counts as none; a pressure nudged by 1e-6 makes such impulses.
@@ -123,8 +122,7 @@ class ContactDynamics:
             for contact, own, found, J in zip(self.contacts, mode, state.touching, state.J, strict=True)
         )
         rows, bias, along, owner = [np.zeros((0, state.W.shape[0]))], [np.zeros(0)], list[Array](), list[int]()
-        force, known = np.zeros((len(mode), 3)), np.ones((len(mode), 3), dtype=bool)
-        turning = list[tuple[int, int, Array]]()
+        force, turning = np.zeros((len(mode), 3)), list[tuple[int, int, Array]]()
         for k, (own, found) in enumerate(zip(mode, state.touching, strict=True)):
             contact = self.contacts[k]
             directions = held_directions(own, found, contact.presses)
@@ -143,12 +141,10 @@ class ContactDynamics:
         K, free = np.concatenate(rows), state.solution.acceleration
         free = free + state.W @ np.einsum("kin,ki->n", state.J, force)
         if not owner:
-            summed = np.ones((len(self.sums), 3), dtype=bool)
             none = np.zeros((len(mode), 3, 0))
             return ContactSolution(
-                state=state, mode=mode, acceleration=free, force=force, determinate=known, determinate_sums=summed,
-                response=1.0, shifts=none, spread=0.0
-            )  # fmt: skip
+                state=state, mode=mode, acceleration=free, force=force, response=1.0, shifts=none, spread=0.0
+            )
         D = np.array([direction @ state.J[k] for direction, k in zip(along, owner, strict=True)])
         owned = list(zip(owner, along, strict=True))
         moments = moments_by_pressing(turning, owned, [each.normal for each in state.touching])
@@ -164,24 +160,16 @@ class ContactDynamics:
         for k, direction, size, loose in zip(owner, along, z, ways, strict=True):
             force[k] += size * direction
             shifts[k] += np.outer(direction, loose)
-            known[k] &= np.abs(direction) * np.linalg.norm(loose) <= RANK
         for k, place, moment in moments:
             force[k] += z[place] * moment
             shifts[k] += np.outer(moment, ways[place])
-        summed = np.linalg.norm(np.einsum("pk,kiw->piw", self.sums, shifts), axis=2) <= RANK
-        for k, (own, found) in enumerate(zip(mode, state.touching, strict=True)):
-            if own.kind == "stick" and own.along is not None:  # across its line the joints hold it, too
-                alone = np.abs(cross(found.normal, np.array(own.along))) <= RANK
-                known[k] &= alone
-                summed[self.sums[:, k] > 0] &= alone
         whole = vectors[:, ~weak]  # without what the split of a shared load changes
         response = float(np.linalg.det(whole.T @ S @ whole) / np.linalg.det(whole.T @ smooth @ whole))
         spread = float(np.linalg.norm(state.W @ (D.T @ ways)))
         free = free + state.W @ D.T @ z
         return ContactSolution(
-            state=state, mode=mode, acceleration=free, force=force, determinate=known, determinate_sums=summed,
-            response=response, shifts=shifts, spread=spread
-        )  # fmt: skip
+            state=state, mode=mode, acceleration=free, force=force, response=response, shifts=shifts, spread=spread
+        )
 
     @staticmethod
     def heading(own: Acting, found: Touching) -> Array:
@@ -377,23 +365,32 @@ class ContactDynamics:
         Forces [N], (contacts, 3), and sums [N], (such pairs, 3), are NaN where they are not determinate.
         """
         found, count = self.solve(q, v, mode, time), len(self._bodies)
-        pressed = found.force[:count]
+        joints = mode_of_joints(self.equations.switched, self.contacts, mode)
+
+        def record(force: Array) -> dict[str, Any]:
+            return self.equations.sample(q, v, joints, time, *self._loads(found.state, force))
+
+        fields, pressed = record(found.force), found.force[:count]
+        for shift in np.moveaxis(found.undetermined, 2, 0):  # what another distribution changes is not determinate
+            others = record(found.force + shift)
+            for name in ("wrench", "named"):
+                fields[name] = np.where(np.abs(others[name] - fields[name]) > RANK, np.nan, fields[name])
+        moved = np.abs(np.einsum("pk,kiw->piw", self.sums, found.undetermined)).max(axis=2, initial=0.0)
+        sums = np.where(moved <= RANK, self.sums[:, :count] @ pressed, np.nan)
+        return fields, np.where(found.determinate[:count], pressed, np.nan), sums
+
+    def _loads(self, state: ContactsNow, force: Array) -> tuple[Array, Array]:
+        """Loads by contacts of bodies: along the velocities, and about the world's origin, (bodies + 1, 6)."""
+        count = len(self._bodies)
         of_bodies = [k for k, contact in enumerate(self.contacts) if not isinstance(contact, JointContact)]
-        load = np.einsum("kin,ki->n", found.state.J[of_bodies], found.force[of_bodies])
+        load = np.einsum("kin,ki->n", state.J[of_bodies], force[of_bodies])
         applied = np.zeros((len(self.mechanism.bodies) + 1, 6))
-        for (a, b), each, force in zip(self._bodies, found.state.touching, pressed, strict=False):
-            wrench = np.concatenate([force, cross(each.place, force)])
+        for (a, b), touch, push in zip(self._bodies, state.touching, force[:count], strict=False):
+            wrench = np.concatenate([push, cross(touch.place, push)])
             applied[a] += wrench
             applied[b] -= wrench
         for k, friction in enumerate(self._turning, count + len(self._of_joints)):
             a, b = self._bodies[friction.pressed_by]
-            applied[a, 3:] += found.force[k]
-            applied[b, 3:] -= found.force[k]
-        joints = mode_of_joints(self.equations.switched, self.contacts, mode)
-        record = self.equations.sample(q, v, joints, time, load, applied)
-        loose = {c.joint.number for c, own in zip(self._of_joints, found.determinate[count:], strict=False)
-                 if not own[c.direction != 0].all()}  # fmt: skip
-        named = [item.field in {"friction", "stop"} and item.number in loose for item in named_forces(self.mechanism)]
-        record["named"] = np.where(named, np.nan, record["named"])
-        sums = np.where(found.determinate_sums, self.sums[:, :count] @ pressed, np.nan)
-        return record, np.where(found.determinate[:count], pressed, np.nan), sums
+            applied[a, 3:] += force[k]
+            applied[b, 3:] -= force[k]
+        return load, applied

@@ -2,15 +2,16 @@
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from proofroll.elements.mechanism.analysis import RANK
 from proofroll.elements.mechanism.contacts.acting import ContactMode
 from proofroll.elements.mechanism.contacts.free_slides import FreeSlides, free_slides
 from proofroll.elements.mechanism.contacts.touching import Touching
 from proofroll.elements.mechanism.joint_coordinates import Solution
-from proofroll.elements.mechanism.rotations import Array
+from proofroll.elements.mechanism.rotations import Array, cross
 
 
 @dataclass(frozen=True)
@@ -50,8 +51,6 @@ class ContactSolution:
         mode: the mode, with lines of contacts as they lie now.
         acceleration: v̇, (nv).
         force: on body a of each contact [N], (contacts, 3); the smallest where they are not determinate.
-        determinate: True for each determinate component of ``force``, (contacts, 3).
-        determinate_sums: the same of the sum of forces of each pair with several contacts, (such pairs, 3).
         response: Painlevé's measure, above 0 in a possible motion: response to normal forces with friction over the
             response without.
         shifts: ways to split a load that contacts share: changes of the forces, (contacts, 3, ways).
@@ -62,8 +61,6 @@ class ContactSolution:
     mode: ContactMode
     acceleration: Array
     force: Array
-    determinate: Any
-    determinate_sums: Any
     response: float
     shifts: Array
     spread: float
@@ -72,6 +69,20 @@ class ContactSolution:
     def slide_rate(self) -> Array:
         """Rate of each slide [m/s²], (contacts, 3)."""
         return np.asarray(self.state.J @ self.acceleration + self.state.bias)
+
+    @property
+    def undetermined(self) -> Array:
+        """Changes of the forces that cause no motion, (contacts, 3, ways); across a line joints hold, too."""
+        lines = [k for k, own in enumerate(self.mode) if own.kind == "stick" and own.along is not None]
+        across = np.zeros((*self.force.shape, len(lines)))
+        for way, k in enumerate(lines):
+            across[k, :, way] = cross(self.state.touching[k].normal, np.array(self.mode[k].along))
+        return np.concatenate([self.shifts, across], axis=2)
+
+    @property
+    def determinate(self) -> NDArray[np.bool_]:
+        """True for each determinate component of ``force``, (contacts, 3)."""
+        return np.asarray(np.abs(self.undetermined).max(axis=2, initial=0.0) <= RANK)
 
     @property
     def splits(self) -> Array:
