@@ -159,6 +159,22 @@ def sliding() -> HandMade:
     return HandMade(mechanism, (pieces,))
 
 
+def guided(*, reverses: bool) -> HandMade:
+    """A ball on a rail that rubs on a floor with 4 N until it would stop at 0.05 s, and on; ``reverses``: the force."""
+    mass, normal, mu, speed = 2.0, 20.0, 0.2, 0.1
+    mechanism = floor_under("prismatic", friction=mu)
+    rail = Joint("rail", "prismatic", "world", "ball", axis=(1.0, 0.0, 0.0), position=(0.0, 0.0, 0.1))
+    mechanism = replace(mechanism, joints=(rail,))
+    time, pace = times(0.0, 0.08 if reverses else 0.04)
+    slip, none = speed - mu * normal / mass * time, 0 * time
+    p = np.stack([speed * time - mu * normal / mass / 2 * time**2, none, none + 0.1], -1)
+    v = np.stack([slip, none, none], -1)
+    force = np.stack([-mu * normal * np.sign(slip), none, none + normal], -1)
+    fields = contact(time, force, p - np.array([0.0, 0.0, 0.1])) | poses(p, v, about(2, none), 0 * p)
+    pieces = without_contacts(mechanism, time, pace=pace, **fields, modes=touching("slip"))
+    return HandMade(mechanism, (pieces,))
+
+
 def bounce(restitution: float = 0.5) -> HandMade:
     """A ball that falls by 0.2 m on a floor and rises with half its speed."""
     mechanism, drop, radius = floor_under("free", restitution=0.5), 0.2, 0.1

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tests.unit.truth.laws.conftest import HandMade, bounce, free_body, pendulum, sliding
+from tests.unit.truth.laws.conftest import HandMade, bounce, free_body, guided, pendulum, sliding
 
 from proofroll.elements.mechanism import Body
 from proofroll.elements.mechanism.contacts.geometry import Geometry, Pair
@@ -91,6 +91,14 @@ def test_a_contact_that_pulls_is_seen() -> None:
     assert "pull" in {
         law for law, (part, _, _) in sliding().changed(force=lambda f: -f).residuals().largest.items() if part > 1
     }
+
+
+def test_a_slip_that_goes_on_beyond_its_stop_is_seen() -> None:
+    """A motion that ignores the reversal of friction inside a piece breaks the law of momentum, by far."""
+    assert guided(reverses=False).broken() == ("", "")
+    record = guided(reverses=True)
+    assert record.broken()[0] in {"momentum", "energy"}
+    assert record.residuals().largest["momentum"][0] > 1e6
 
 
 def test_an_impact_before_its_time_is_seen() -> None:
