@@ -19,7 +19,7 @@ _CLOSED = 1e-13  # gap in natural sizes below which a contact may take an impuls
 _RANK = 1e-11  # singular value, relative to the largest, below which impulses are not independent
 _SETTLED = 1.4e-6  # part of the fastest impact below which rebounds are summed: e^-13.5
 _SLIPS = 1e-9  # slip after an impact in natural sizes above which it has a direction
-_WITHIN = 1e-6  # part of the bound of friction below which a contact certainly sticks in an impact
+_LEAST = float(np.finfo(float).tiny)
 _FAINT = 1e-9  # part of the natural momentum below which an impulse counts as of that size
 
 
@@ -209,9 +209,12 @@ def _coulomb(scene: LawScene, passage: Passage, residuals: LawResiduals, hit: Hi
     bounded = np.isfinite(pair.static)
     excess = max(float(norm(friction)) - pair.static * pressed if bounded else 0.0, -pressed, 0.0)
     residuals.note("impact cone", name, np.array([[excess]]), size, time)
-    if not bounded or float(norm(friction)) < (1 - _WITHIN) * pair.static * pressed:
-        returned = norm(left + pair.tangential_restitution * came)
+    # it sticks, and leaves with its part of the slip, or slips against mu N
+    returned, opposed = float(norm(left + pair.tangential_restitution * came)), np.inf
+    if np.isfinite(pair.friction) and slip > _SLIPS * fast:
+        along = left / slip if not pair.tangential_restitution else -friction / max(float(norm(friction)), _LEAST)
+        opposed = float(norm(friction + pair.friction * pressed * along))
+    if returned / fast <= opposed / size:
         residuals.note("restitution", name, np.array([[returned]]), fast, time)
-    if not pair.tangential_restitution and slip > _SLIPS * fast and np.isfinite(pair.friction):
-        opposed = norm(friction + pair.friction * pressed / slip * left)
+    else:
         residuals.note("impact cone", name, np.array([[opposed]]), size, time)

@@ -175,23 +175,24 @@ def guided(*, reverses: bool) -> HandMade:
     return HandMade(mechanism, (pieces,))
 
 
-def bounce(restitution: float = 0.5) -> HandMade:
-    """A ball that falls by 0.2 m on a floor and rises with half its speed."""
-    mechanism, drop, radius = floor_under("free", restitution=0.5), 0.2, 0.1
+def bounce(restitution: float = 0.5, speed: float = 0.0, kinetic: float = 0.2) -> HandMade:
+    """A ball that falls by 0.2 m on a floor and rises with half its speed; it may slide as it strikes."""
+    mechanism, drop, radius = floor_under("free", friction=0.2, static_friction=0.5, restitution=0.5), 0.2, 0.1
+    mass, inertia = mechanism.bodies[0].mass, mechanism.bodies[0].inertia[1][1]
     landing = np.sqrt(2 * drop / GRAVITY)
     impact = GRAVITY * landing
+    lost = kinetic * (1 + restitution) * impact if speed else 0.0  # of the speed along the floor
     pieces = []
     for start, end in ((0.0, landing), (landing, landing + 0.05)):
         time, pace = times(start, end)
-        rises = 0.0 if start == 0.0 else restitution * impact
-        level = drop if start == 0.0 else 0.0
-        height, speed = (
-            level + rises * (time - start) - GRAVITY / 2 * (time - start) ** 2,
-            rises - GRAVITY * (time - start),
-        )
-        none = np.zeros((*time.shape, 3))
-        p, v = none + (height + radius)[..., None] * [0, 0, 1], none + speed[..., None] * [0, 0, 1]
-        fields = contact(time, none, none) | poses(p, v, about(2, 0 * time), none)
+        past, none = time - start, 0 * time
+        level, rises, slides, turns = (drop, 0.0, speed, 0.0)
+        if start:
+            level, rises, slides, turns = 0.0, restitution * impact, speed - lost, radius * mass * lost / inertia
+        height, x = level + rises * past - GRAVITY / 2 * past**2 + radius, speed * start + slides * past
+        p, v = np.stack([x, none, height], -1), np.stack([none + slides, none, rises - GRAVITY * past], -1)
+        w = np.stack([none, none + turns, none], -1)
+        fields = contact(time, 0 * p, np.stack([x, none, none], -1)) | poses(p, v, about(1, turns * past), w)
         pieces.append(without_contacts(mechanism, time, pace=pace, **fields, modes=touching("open")))
     passage = Passage(pieces[0].points(-1, -1), pieces[1].points(0, 0), impacts=frozenset({"contact"}))
     return HandMade(mechanism, tuple(pieces), (passage,))

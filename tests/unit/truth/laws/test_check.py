@@ -93,6 +93,12 @@ def test_a_contact_that_pulls_is_seen() -> None:
     }
 
 
+def test_an_impact_that_slides_has_kinetic_friction() -> None:
+    """Its impulse lies within the static cone, opposes the slip that is left, and is mu P."""
+    assert bounce(speed=5.0).broken() == ("", "")
+    assert bounce(speed=5.0, kinetic=0.2 * MILLIONTH).broken() == ("impact cone", "contact")
+
+
 def test_a_slip_that_goes_on_beyond_its_stop_is_seen() -> None:
     """A motion that ignores the reversal of friction inside a piece breaks the law of momentum, by far."""
     assert guided(reverses=False).broken() == ("", "")
