@@ -365,9 +365,10 @@ def states_at(
 def states_of(
     route: HybridRoute[ModeT], path: HybridPath[Stretch[ModeT]], times: FloatArray, stretches: Sequence[int]
 ) -> FloatArray:
-    """States at rising times [s], each within the stretch of the given index or at its end, shape (times, state)."""
-    indices, ends = np.asarray(stretches), np.array([path.stretches[number].end for number in stretches])
-    within = np.minimum(times, ends)  # beyond the end of a path that is not known further, rates may be of any size
+    """States at rising times [s], each within the stretch of the given index or at an end, shape (times, state)."""
+    indices, chosen = np.asarray(stretches), [path.stretches[number] for number in stretches]
+    # beyond the end of a path that is not known further, rates may be of any size
+    within = np.clip(times, [each.start for each in chosen], [each.end for each in chosen])
     parts = [route.within(path.stretches[number], within[indices == number]) for number in sorted(set(stretches))]
     return np.concatenate(parts)
 

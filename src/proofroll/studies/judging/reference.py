@@ -23,6 +23,9 @@ from proofroll.core.verdict import TrueCurve
 if TYPE_CHECKING:
     import xarray as xr
 
+# Units of what an impact leaves as it is: places, angles, directions.
+_CONTINUOUS = frozenset({"m", "rad", "1"})
+
 
 @dataclass(frozen=True)
 class Reference:
@@ -102,7 +105,20 @@ class Reference:
 
     def true(self, name: str, values: FloatArray) -> TrueCurve:
         """True curve of an observable, of infinite error bar if there are no values; ``values`` are an engine's."""
-        return TrueCurve(*self._known(name, values), self.ill_posed_for(name))
+        curve, bar = self._known(name, values)
+        return TrueCurve(self._on_either_side(name, curve, values), bar, self.ill_posed_for(name))
+
+    def _on_either_side(self, name: str, curve: FloatArray, values: FloatArray) -> FloatArray:
+        """True curve with a run's own values at samples on an impact, where what jumps has a value on each side."""
+        item = self.scene.observables[name]
+        if item.role == Role.EVENT or item.unit in _CONTINUOUS or len(curve) != len(values):
+            return curve
+        jumps = [event for event in self.events if event.kind in JUMPS]
+        if not jumps or len(times := self.dataset.variables["time"].values[1:]) != len(curve):
+            return curve
+        low, high = (np.array([getattr(event, end) for event in jumps]) for end in ("time_low", "time_high"))
+        on = ((low <= times[:, None]) & (times[:, None] <= high)).any(axis=1)
+        return curve if on.all() else np.where(on.reshape(-1, *[1] * (curve.ndim - 1)), values, curve)
 
     def _known(self, name: str, values: FloatArray) -> tuple[FloatArray, float]:
         """True values of an observable and their error bar."""

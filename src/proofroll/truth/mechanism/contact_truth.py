@@ -37,6 +37,7 @@ from proofroll.truth.mechanism.followed_paths import (
     cut_early,
     followed,
     refuse_uncovered,
+    stretches_at,
     times_known,
     two_route_motion,
 )
@@ -90,12 +91,12 @@ def _in_units(mechanism: Mechanism, units: Units, times: Array, faces: Sequence[
     paths, laws = held_to_laws(mechanism, units, (tree, bodies), paths, second, held)
     asked = times_known(paths, times)
     times = held[1].on_instants(held[0].on_instants(asked)) if held else asked
-    stretches = paths[0].stretch_at(times)
+    stretches = stretches_at(paths, times)
     others = at_times(paths[1], counterparts(paths, stretches, kinds), times, kinds)
     states = states_of(routes[0], paths[0], times, stretches), states_of(routes[1], paths[1], times, others)
     for values in held:
         values.finish()
-    first = _by_the_tree(tree, paths[0], times, states[0])
+    first = _by_the_tree(tree, paths[0], times, states[0], stretches)
     one, cut = first.record, None if held else cut_early(tree.early(), paths[0], until, breaking, times, kinds)
     modes = [paths[1].stretches[number].mode for number in others]
     applied = [bodies.forces(state, mode) for state, mode in zip(states[1], modes, strict=True)]
@@ -108,7 +109,8 @@ def _in_units(mechanism: Mechanism, units: Units, times: Array, faces: Sequence[
     one, two = (units.record(mechanism, replace(record, time=asked)) for record in (one, two))
     left = None
     if cut is not None:
-        early = _by_the_tree(tree, cut[0], times, states_of(tree, cut[0], times, cut[0].stretch_at(times)))
+        earlier = cut[0].stretch_at(times)
+        early = _by_the_tree(tree, cut[0], times, states_of(tree, cut[0], times, earlier), earlier)
         early = early._replace(record=on_same_turns(own, first.record, early.record))
         left = _in_si(mechanism, units, early), cut[1]
     motion = two_route_motion(
@@ -180,13 +182,13 @@ def _reason(dynamics: ContactDynamics, paths: tuple[_Path, _Path]) -> str:
     return reason or "a change of the parameters within their accuracy changes which contacts stick, slide or open"
 
 
-def _by_the_tree(tree: ContactTree, path: _Path, times: Array, states: Array) -> Routed:
+def _by_the_tree(tree: ContactTree, path: _Path, times: Array, states: Array, stretches: Sequence[int]) -> Routed:
     """Motion and forces of the first route along a path with these states, in natural units."""
     dynamics = tree.dynamics
     records, forces, sums = zip(
         *(
             dynamics.sample(*dynamics.parts(state)[:2], path.stretches[number].mode, float(state[-1]))
-            for state, number in zip(states, path.stretch_at(times), strict=True)
+            for state, number in zip(states, stretches, strict=True)
         ),
         strict=True,
     )

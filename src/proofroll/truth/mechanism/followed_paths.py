@@ -228,6 +228,17 @@ def _of_a_step(mechanism: Mechanism, record: Record, units: Units) -> dict[str, 
     return {name: TOLERANCES[0] * size for name, size in sizes.items()}
 
 
+def stretches_at(paths: tuple[FollowedPath, FollowedPath], times: Array) -> list[int]:
+    """Numbers of the first route's stretches at times in natural units; within the bracket of an event, the later one.
+
+    There the routes find the event before or after the sample, and both have to give the value on the same side.
+    """
+    reached = np.array(times, dtype=float)
+    for event in _events(*paths, 1.0):
+        reached[(event.time_low <= times) & (times < event.time)] = event.time
+    return paths[0].stretch_at(reached)
+
+
 def counterparts(
     paths: tuple[HybridPath[Stretch[ModeT]], HybridPath[Stretch[ModeT]]],
     stretches: Sequence[int],
@@ -247,7 +258,8 @@ def at_times(
 ) -> list[int]:
     """Numbers of a path's stretches at times in natural units, near the given ones and of the same kinds of mode.
 
-    A route may divide what the other follows in one stretch at another time, as the beginning of a slip.
+    A route may divide what the other follows in one stretch at another time, as the beginning of a slip. No time is
+    taken across a jump of the state, as at an impact, where both routes give the value on the same side.
     """
     found = []
     for number, time in zip(stretches, times, strict=True):
@@ -255,6 +267,9 @@ def at_times(
         for step in (-1, 1):
             while 0 <= near + step < len(path.stretches) and kinds(path.stretches[near + step].mode) == kind:
                 if time > path.stretches[near].start if step < 0 else time < path.stretches[near].end:
+                    break
+                earlier = min(near, near + step)
+                if not np.array_equal(path.stretches[earlier].last, path.stretches[earlier + 1].first):
                     break
                 near += step
         found.append(near)
