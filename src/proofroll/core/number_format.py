@@ -7,10 +7,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from decimal import ROUND_CEILING, Decimal
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from proofroll.core.arrays import FloatArray
+
+# Significant digits that tell any two numbers apart.
+_ALL_DIGITS = 17
 
 
 def number(value: float | None, digits: int = 2, none: str = "–") -> str:
@@ -28,6 +32,26 @@ def number(value: float | None, digits: int = 2, none: str = "–") -> str:
 def error(value: float | None, digits: int = 2) -> str:
     """Text of an error; ∞ where it is missing or not finite."""
     return number(value, digits, none="∞")
+
+
+def with_bar(value: float, bar: float, digits: int = 2) -> tuple[str, str]:
+    """Texts of a value and its error bar, between which the whole interval lies: value - bar to value + bar.
+
+    The value is rounded at the first digit of its bar, and to 0 within it. What that changes is added to the bar, which
+    is rounded up to ``digits`` digits.
+    """
+    if not (math.isfinite(value) and math.isfinite(bar)):
+        return number(value, 12), error(bar, digits)
+    exact, half = Decimal(value), Decimal(bar)
+    text = "0"
+    if abs(exact) > half:
+        places = exact.adjusted() - half.adjusted() + 1 if half else _ALL_DIGITS
+        text = f"{value:.{places}g}" if places < _ALL_DIGITS - 1 else repr(value)  # the shortest that tells it apart
+    whole = half + abs(Decimal(text) - exact)
+    if not whole:
+        return text, "0"
+    upper = whole.quantize(Decimal(1).scaleb(whole.adjusted() - digits + 1), ROUND_CEILING)
+    return text, number(float(upper), digits + 1)
 
 
 def spaced(unit: str) -> str:

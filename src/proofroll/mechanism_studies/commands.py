@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from proofroll.cli import options
+from proofroll.core.number_format import with_bar
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -61,8 +62,9 @@ def _parts(study: Balance) -> Iterator[Table | str]:
         values.add_column(heading, justify="left" if heading in {"value", "unit"} else "right")
     largest = {item.unit: max(abs(row.value) for row in study.values if row.unit == item.unit) for item in study.values}
     for item in study.values:
-        value = 0.0 if abs(item.value) < _FAINT * largest[item.unit] else item.value
-        values.add_row(Text(item.name), f"{value:.8g}", item.unit, f"{item.error_bar:.1g}")
+        faint = abs(item.value) if abs(item.value) < _FAINT * largest[item.unit] else 0.0
+        value, bar = with_bar(item.value, max(item.error_bar, faint), 1)
+        values.add_row(Text(item.name), value, item.unit, bar)
     yield values
     if study.freedom:
         yield f"eigenvalues [1/s] ± {study.eigenvalue_error:.1g}, {'stable' if study.stable else 'unstable'}:"

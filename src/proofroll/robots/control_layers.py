@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from proofroll.core.number_format import with_bar
 from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.bookkeeping.law import VECTORS, ControlLaw, RobotState
 from proofroll.elements.mechanism.bookkeeping.mistakes import IMPLICIT, Mistake, fitted, mistakes, offsets_told
@@ -156,7 +157,8 @@ def _of_fit(evidence: _Evidence) -> Iterator[LayerCause]:
             continue
         name, value, error = fit.names[at], float(fit.values[at]), float(fit.errors[at])
         unit = " kg m²" if name == "armature" and not fit.right[at] else " of the right one"
-        yield LayerCause(name.split()[0], f"the {name} is {value:.5g} ± {error:.1g}{unit}", value, 0.0)
+        text, bar = with_bar(value, error, 1)
+        yield LayerCause(name.split()[0], f"the {name} is {text} ± {bar}{unit}", value, 0.0)
 
 
 def _best_size(mistake: Mistake, evidence: _Evidence) -> tuple[float, float]:

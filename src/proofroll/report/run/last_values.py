@@ -5,6 +5,7 @@ from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
 from proofroll.core.bounces import Bounce
+from proofroll.core.number_format import with_bar
 from proofroll.core.quantity import powers_of
 
 FORCES = ("N", "N m")
@@ -96,9 +97,10 @@ def value_table(
     for name in sorted(shown, key=lambda item: _place(units[item])):
         value, unit = values[name], units[name]
         bar = bars.get(name) if math.isfinite(value) else None
-        texts = [f"{bar:.1e}" if bar is not None else ""] if bars else []
+        size = sizes.get(_dimension(unit), 0.0)
+        text, of_bar = (value_text(value, None, size), "") if bar is None else with_bar(value, bar)
         family = ".".join(p for p in name.split(".") if not (p.isdigit() or (unit in FORCES and p in _AXES)))
-        row = (family, value_text(value, bar, sizes.get(_dimension(unit), 0.0)), unit, *texts)
+        row = (family, text, unit, *([of_bar] if bars else []))
         alike.setdefault(row, []).append(name)
     for (_, *cells), names in alike.items():
         for text in short_names(names):

@@ -14,7 +14,7 @@ from proofroll.core.dataset import ended_early
 from proofroll.core.diagnosis.scene_diagnosis import Diagnosis, diagnose_scene
 from proofroll.core.element_abilities import TellsBounces, WatchesRuns, step_bound
 from proofroll.core.events import IMPACTS, Event, events_of
-from proofroll.core.number_format import number
+from proofroll.core.number_format import number, with_bar
 from proofroll.core.scene import Scene
 from proofroll.files.json_data import OPTIONAL
 from proofroll.files.scene_file import load_scene
@@ -154,9 +154,9 @@ def _places(columns: Columns, curves: Mapping[str, Variable]) -> dict[str, Varia
 
 def _event_text(event: Event) -> str:
     """Text of an event: kind, name of its place if any, time and half width of its bracket."""
-    bar = number(0.5 * (event.time_high - event.time_low), 1)
+    time, bar = with_bar(event.time, max(event.time_high - event.time, event.time - event.time_low), 1)
     name = f" of {event.name}" if event.name else ""
-    return f"{event.kind.replace('_', '-')}{name} at {event.time:.9g} ± {bar} s"
+    return f"{event.kind.replace('_', '-')}{name} at {time} ± {bar} s"
 
 
 def _hidden_forces(content: RunContent) -> list[str]:
