@@ -272,6 +272,8 @@ class ContactStretches(ContactWalks):
         series = self._series.after(contacts[hit].pair, Impact(stretch.end, frozenset(hits), speed))
         rough = modes_of(closed, closed, features)
         state, stays, margin = self._struck(stretch.last, rough, laws, sideways)
+        if series is not None:
+            margin = np.inf  # what impacts leave repeats, however slow they are
         alternates = series is not None and (not law or len(series.contacts) > len(hits))
         if self._settles(hit, speed, series.ratio if series is not None and alternates else law):
             if series is not None and alternates:

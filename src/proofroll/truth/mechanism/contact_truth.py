@@ -11,7 +11,7 @@ from functools import partial
 import numpy as np
 
 from proofroll.core.errors import Refused
-from proofroll.core.events import EventKind
+from proofroll.core.events import JUMPS, EventKind
 from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.analysis import RANK
 from proofroll.elements.mechanism.commands import has_held
@@ -46,6 +46,9 @@ from proofroll.truth.mechanism.law_verdict import held_to_laws
 from proofroll.truth.mechanism.maximal_coordinates import MaximalCoordinates
 from proofroll.truth.mechanism.natural_units import Units, natural_units
 from proofroll.truth.mechanism.standing_ends import Face, RollingLanding, standing_ends
+
+# Impacts whose intervals become shorter and shorter, and the last of these, in natural units, where they crowd.
+_CROWD, _CROWDED = 5, 1e-3
 
 _Path = HybridPath[Stretch[ContactMode]]
 
@@ -177,9 +180,25 @@ def _reason(dynamics: ContactDynamics, paths: tuple[_Path, _Path]) -> str:
     """Reason why the motion is not unique from its horizon or its end on."""
     if not dynamics.mechanism.contacts:
         return "a change of the parameters within their accuracy changes which joints hold or hit a stop"
-    ended = first_close(paths, CLOSE)
-    reason = _shared_load(dynamics, paths[0], ended) if ended == 0 or not paths[0].known else ""
+    ended, first = first_close(paths, CLOSE), paths[0]
+    last = first.stretches[-1].start if not first.known and first.margins[-1][1] < CLOSE else ended
+    reason = _shared_load(dynamics, first, last) if ended == 0 or not first.known else ""
+    reason = reason or _crowded(first, ended)
     return reason or "a change of the parameters within their accuracy changes which contacts stick, slide or open"
+
+
+def _crowded(path: _Path, time: float) -> str:
+    """Reason why a motion is not unique from a time on where impacts crowd; empty: they do not."""
+    impacts = [happening for happening in path.happenings if happening.kind in JUMPS and happening.time <= time]
+    times = np.unique([impact.time for impact in impacts])[-_CROWD:]
+    intervals = np.diff(times)
+    if len(times) < _CROWD or time - times[-2] > _CROWDED or not np.all(np.diff(intervals) < 0):
+        return ""
+    names = sorted({impact.name for impact in impacts if impact.time >= times[0]})
+    return (
+        f"infinitely many impacts of {' and '.join(names)} follow each other faster and faster, in no series that can "
+        "be summed, and round-off decides what they leave"
+    )
 
 
 def _by_the_tree(tree: ContactTree, path: _Path, times: Array, states: Array, stretches: Sequence[int]) -> Routed:

@@ -94,13 +94,16 @@ def cut_early(
 def end_of(paths: tuple[FollowedPath, FollowedPath]) -> tuple[float, str]:
     """Time in natural units at which the first of two paths ends early, and the error that ended it.
 
-    Infinite: both reach the last time. The text is empty where a decision is too close to be known.
+    Infinite: both reach the last time. The text is of either that ends there; it is empty where a decision is too close
+    to be known.
     """
     early = [path for path in paths if not path.known]
     if not early:
         return np.inf, ""
     first = min(early, key=lambda path: path.stretches[-1].end)
-    return first.stretches[-1].end, first.ended
+    end = first.stretches[-1].end
+    together = (path.ended for path in early if path.stretches[-1].end <= end + time_accuracy(end))
+    return end, first.ended or next(filter(None, together), "")
 
 
 def times_known(paths: tuple[FollowedPath, FollowedPath], times: Array) -> Array:

@@ -94,14 +94,17 @@ def test_a_long_body_strikes_with_its_lower_end(kind: str) -> None:
     assert abs(drop["w_WB"].values[-1, 0, 0]) == pytest.approx(push * arm / ACROSS, rel=1e-12)
 
 
-def test_a_cylinder_that_stands_is_refused_with_its_reason() -> None:
-    """A face that lands on its whole rim ends the truth; all before it is kept."""
+def test_a_cylinder_lands_on_its_end_and_stands() -> None:
+    """A face that lands on its whole rim stays there, and bears the weight."""
     q0 = (0, 0, LENGTH / 2 + 0.05, np.sqrt(0.5), np.sqrt(0.5), 0, 0)
     found = followed(on_plane("cylinder", q0), np.linspace(0.0, 0.2, 5))
-    assert "lies flat" in found.attrs["ended"]
-    assert found.attrs["ends"] == pytest.approx(np.sqrt(0.1 / GRAVITY), abs=1e-12)
+    assert "ended" not in found.attrs
+    assert found["event_time"].values[0] == pytest.approx(np.sqrt(0.1 / GRAVITY), abs=1e-12)
     heights = found["p_WB"].values[:, 0, 2]
-    np.testing.assert_allclose(heights, LENGTH / 2 + 0.05 - GRAVITY / 2 * np.array([0, 0.05, 0.1]) ** 2, atol=1e-13)
+    fall = LENGTH / 2 + 0.05 - GRAVITY / 2 * np.array([0, 0.05, 0.1]) ** 2
+    np.testing.assert_allclose(heights, [*fall, LENGTH / 2, LENGTH / 2], atol=1e-13)
+    ends = [found[f"force.touch.{end}.z"].values[-1] for end in (1, 2)]
+    np.testing.assert_allclose(sorted(ends), [0, MASS * GRAVITY], atol=1e-11)
 
 
 @pytest.mark.parametrize(
