@@ -30,7 +30,7 @@ class LawCheck:
 
     def __init__(self, mechanism: Mechanism, length: float, rate: float) -> None:
         """Takes a mechanism in SI units with its natural length [m] and rate [1/s]."""
-        self._scene, self.residuals = LawScene(mechanism, length, rate), LawResiduals()
+        self._scene, self.residuals = LawScene(mechanism, length, rate), LawResiduals(rate=rate)
         self._coordinates, self._fastest = Coordinates(self._scene), dict[str, float]()
 
     def take(self, pieces: Pieces) -> None:

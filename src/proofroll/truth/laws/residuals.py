@@ -43,6 +43,10 @@ LAWS: dict[str, tuple[float, str]] = {
     "impact cone": (1e-9, "impulses press, within the bound of friction"),
     "impact energy": (1e-10, "an impact wins no energy"),
 }
+# Laws that a route keeps by their second derivatives alone: their residuals (1e-13 after 1 s of `stopped_fall`) grow
+# as a random walk of rates does. So their allowances grow with the time in natural units.
+_DRIFTING = frozenset({"joint place", "joint rate", "coupling", "coupling rate", "motion", "stop", "stop rate"})
+_DRIFTING |= {"gap", "surface", "normal", "gap rate", "stick", "event"}
 COARSE = 30.0  # factor for what dense output of DOP853 says inside a step: it holds to 1.4e-12, ten times the steps
 ROUND = 1e-13  # round-off of places and angles in their natural sizes, which stiff springs turn into forces
 # What 12 points do not resolve excuses a residual up to this part of its size: more would hide a force that jumps.
@@ -79,6 +83,7 @@ class LawResiduals:
         points: number of points at which laws were evaluated.
         events: number of transitions.
         coarse: factor on all allowances, now.
+        rate: natural rate of the scene [1/s].
     """
 
     largest: dict[str, tuple[float, float, str]] = field(default_factory=dict)
@@ -87,6 +92,7 @@ class LawResiduals:
     points: int = 0
     events: int = 0
     coarse: float = 1.0
+    rate: float = 0.0
 
     def note(
         self,
@@ -106,12 +112,13 @@ class LawResiduals:
         if not residual.size:
             return
         size, extra, tail = (np.broadcast_to(np.asarray(each, float), residual.shape) for each in (size, extra, tail))
+        times = np.broadcast_to(time.reshape(time.shape + (1,) * (residual.ndim - time.ndim)), residual.shape)
+        growth = 1.0 + self.rate * times if law in _DRIFTING else 1.0
         with np.errstate(all="ignore"):
-            allowed = LAWS[law][0] * self.coarse * size + extra + np.minimum(tail, _UNRESOLVED * size)
+            allowed = LAWS[law][0] * self.coarse * growth * size + extra + np.minimum(tail, _UNRESOLVED * size)
             parts = np.where(residual > 0, residual / allowed, 0.0)
             relative = np.where(residual > 0, np.maximum(residual - extra, 0.0) / size, 0.0)
         parts = np.where(np.isfinite(residual), parts, np.inf)
-        times = np.broadcast_to(time.reshape(time.shape + (1,) * (residual.ndim - time.ndim)), residual.shape)
         worst = int(np.argmax(parts))
         if parts.flat[worst] >= self.largest.get(law, (0.0,))[0]:
             self.largest[law] = float(parts.flat[worst]), float(times.flat[worst]), part

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 _SLOTS = {("box", "box"): 24, ("box", "capsule"): 22}
 _FACE = 1e-9  # distance from an edge, relative to the size of a box or cylinder, up to which there is no normal
 _SEARCHES = 80  # thirds by which the nearest place of a capsule's axis is enclosed: 0.67^80 is below round-off
-_PARALLEL = 1e-4  # sine of an angle between edges below which their common perpendicular separates nothing
+_PARALLEL = 1e-12  # sine of an angle between edges below which their perpendicular is round-off
 
 
 class SurfaceShape(NamedTuple):

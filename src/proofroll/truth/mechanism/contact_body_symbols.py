@@ -149,7 +149,7 @@ class BodySymbols:
 
     def _poses(self, views: Sequence[BodyInScalars]) -> list[tuple[Vector, Sequence[Vector], Vector, Vector]]:
         """Place of its frame, rotation by rows, velocity and angular velocity of each body, and of the world."""
-        poses = []
+        poses: list[tuple[Vector, Sequence[Vector], Vector, Vector]] = []
         for view, body in zip(views, [*self._bodies.mechanism.bodies, None], strict=True):
             arm = [0.0, 0.0, 0.0] if body is None else turned(view.R, floats(body.com))  # type: ignore[arg-type]
             poses.append((minus(view.r, arm), view.R, minus(view.v, cross(view.w, arm)), view.w))
