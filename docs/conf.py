@@ -12,7 +12,8 @@ import proofroll
 sys.path.insert(0, str(Path(__file__).parent))
 
 import module_map
-import vocabulary
+
+from proofroll.vocabulary import document as vocabulary
 
 project = "proofroll"
 author = "the proofroll authors"
@@ -45,6 +46,6 @@ def _links(_: Any, __: str, source: list[str]) -> None:
 
 def setup(app: Any) -> None:
     """Called by Sphinx: writes the pages that are made from the source, and names links of other pages."""
-    for page in (vocabulary, module_map):
-        page.FILE.write_text(page.document(), encoding="utf-8")
+    module_map.FILE.write_text(module_map.document(), encoding="utf-8")
+    (Path(__file__).parent / "vocabulary.md").write_text(vocabulary.document(), encoding="utf-8")
     app.connect("source-read", _links)

@@ -45,6 +45,23 @@ def test_a_scene_of_the_page_has_its_closed_form(name: str, accelerations: dict[
         assert float(coordinate.attrs["error_bar"]) < 1e-10
 
 
+def test_the_force_of_a_coupling_is_that_on_one_joint(tmp_path: Path) -> None:
+    """It acts on joint_b of a ratio and on the first of several joints, as the page about torques says."""
+    forces = {"belt": ("coupling.belt", 0.08 * 50), "tackle": ("coupling.rope", 4 * 0.8 * _G)}
+    for name, (variable, force) in forces.items():
+        (tmp_path / "scene.toml").write_text(SCENES[name], encoding="utf-8")
+        values = truth(load_scene(str(tmp_path)), np.array([0.0, 0.2]))[variable]
+        assert float(values[-1]) == pytest.approx(force, rel=1e-11)
+
+
+def test_a_parcel_slides_on_a_conveyor(tmp_path: Path) -> None:
+    """The scene of the page about conveyors starts with the acceleration mu g."""
+    page = PAGE.with_name("conveyors.md").read_text("utf-8")
+    (tmp_path / "scene.toml").write_text(page.split("```toml\n")[1].split("```")[0], encoding="utf-8")
+    dataset = truth(load_scene(str(tmp_path)), np.array([0.0, 0.05]))
+    assert float(dataset["middle.x"][-1]) == pytest.approx(0.3 * _G * 0.05**2 / 2, rel=1e-9)
+
+
 def test_the_page_has_these_scenes() -> None:
     """Every scene of the page is tested."""
     assert set(SCENES) == {"belt", "tackle", "screw", "differential"}

@@ -1,25 +1,28 @@
-"""docs/vocabulary.md says what the readers of scenes and comparisons read."""
+"""The vocabulary says what the readers of scenes and comparisons read, as a page and as a command."""
 
 from __future__ import annotations
 
-import importlib.util
+import json
 import tomllib
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
+import typer
+from typer.testing import CliRunner
 
+from proofroll.core.errors import InputError
 from proofroll.core.plugins import load_element_kinds
 from proofroll.files.toml import read_toml
+from proofroll.vocabulary import document as vocabulary
+from proofroll.vocabulary.command import all_entries, entries_about, lines_of
+from proofroll.vocabulary.command import vocabulary as command
 
 ROOT = Path(__file__).resolve().parents[1]
-_SPEC = importlib.util.spec_from_file_location("vocabulary", ROOT / "docs" / "vocabulary.py")
-assert _SPEC is not None
-assert _SPEC.loader is not None
-vocabulary = importlib.util.module_from_spec(_SPEC)
-_SPEC.loader.exec_module(vocabulary)
 TEXT = vocabulary.document()
+APP = typer.Typer()
+APP.command()(command)
 # Below these a key is the user's own: the name of a parameter, of an observable, of a tolerance.
 OWN = {"vary", "brief", "points", "over", "parameters", "tolerances", "limit", "bound", "order", "only", "where",
        "expect_for", "published", "repeat"}  # fmt: skip
@@ -67,3 +70,24 @@ def test_examples_are_valid() -> None:
     assert len(blocks) > 15
     for block in blocks:
         tomllib.loads(block.partition("```")[0])
+
+
+def test_a_word_is_answered() -> None:
+    """A key, a table or a word of a meaning is answered with type, default and unit; another word with near ones."""
+    entries = [*all_entries()]
+    (line, *_) = [line for line in lines_of(entries_about("damping", entries)) if line.startswith("    ")]
+    assert line.startswith("    damping (float; 0.0): ")
+    assert "N m s/rad" in line
+    assert {entry.table for entry in entries_about("[[Geometries]]", entries)} >= {"[[geometries]]"}
+    with pytest.raises(InputError, match=r"word = 'dampng': .* damping"):
+        entries_about("dampng", entries)
+
+
+def test_the_command_has_every_key_of_the_page() -> None:
+    """Without a word all keys are printed, and what is described in words."""
+    asked = CliRunner().invoke(APP, ["--json"])
+    printed = json.loads(asked.stdout)["keys"]
+    lines = [line for line in TEXT.splitlines() if line.startswith("| `")]
+    assert (asked.exit_code, len([entry for entry in printed if entry["key"]])) == (0, len(lines))
+    assert "[[repeat]]" in {entry["table"] for entry in printed}
+    assert "mu_static" in CliRunner().invoke(APP, []).stdout

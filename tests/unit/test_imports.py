@@ -34,6 +34,7 @@ MAY: dict[str, set[str]] = {
     "truth": {"core", "elements", "truth"},
     "ball_studies": HARNESS | {"elements", "truth", "ball_studies"},  # as a package of somebody else would be
     "mechanism_studies": HARNESS | {"elements", "truth", "ball_studies", "mechanism_studies"},
+    "vocabulary": HARNESS | {"elements", "ball_studies", "vocabulary"},
     "engines": {"core", "elements", "engines", "robots"},  # the protocol of robot readers
     "robots": {"core", "files", "running", "studies", "report", "cli", "robots", "elements"},  # a mechanism to be run
 }

@@ -167,7 +167,7 @@ def main() -> None:
 
 
 def _reported(error: BaseException) -> Any:
-    """Exit code for an error, which is told in one line; raises it if it is no error of the user or the machine."""
+    """Exit code for an error, after a line about it; raises it if neither the user nor the machine caused it."""
     if isinstance(error, typer.TyperException):
         if error.format_message().startswith("Usage:"):  # a group of commands was called without a command
             sys.stdout.write(f"{error.format_message()}\n")

@@ -9,7 +9,7 @@ from typer.core import TyperGroup
 # Title -> commands in their order. Commands of other packages that are not named here come last.
 GROUPS = {
     "Ask": ("scenes", "run", "plot", "replay", "compare", "recommend", "report"),
-    "Bring your own scene, engine or trajectory": ("new", "check", "judge", "export"),
+    "Bring your own scene, engine or trajectory": ("new", "vocabulary", "check", "judge", "export"),
     "Robots": ("robots",),
     "Study": ("tradeoff", "stability", "ladder", "balance", "onset", "regimes", "figures"),
     "Maintain": ("engines", "versions", "findings", "cite", "bench", "drill"),

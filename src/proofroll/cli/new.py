@@ -141,7 +141,7 @@ def _comparison(name: str, place: str, loaded: Scene) -> str:
         f"until = {until:g}\nevery = {every:g}\n\n"
         "# Every combination of these values is run: [vary], then parameter = [value, value].\n\n"
         "# How far an observable may be from the truth, and why.\n"
-        "# The page vocabulary of the documentation describes every key.\n"
+        "# `proofroll vocabulary WORD` describes every key.\n"
         f'[tolerances.close]\nbecause = "a first look; say here why this is close enough"\n'
         f"{''.join(lines)}\n"
         '# What is expected of each engine: expect = "agrees" unless it says another verdict, and because.\n' + rows

@@ -1,7 +1,10 @@
 """Findings about engines: files under ``findings/``, each with a program that uses only the engine."""
 
+import contextlib
 import json
+import os
 import re
+import signal
 import subprocess
 import sys
 import tempfile
@@ -150,18 +153,27 @@ def run_findings(
 
 
 def _run(command: list[str], time_limit: float, folder: str | None = None) -> tuple[int, str]:
-    """Exit code and output of a command, or standard error if it printed nothing else; it runs in ``folder``."""
+    """Exit code and output of a command, or standard error if it printed nothing else; it runs in ``folder``.
+
+    It runs in a session of its own, and ends with all that it started.
+    """
+    process = subprocess.Popen(
+        command,
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        errors="replace",
+        cwd=folder,
+        env=safe_environment(),
+        start_new_session=True,
+    )
     try:
-        done = subprocess.run(
-            command,
-            capture_output=True,
-            text=True,
-            errors="replace",
-            timeout=time_limit,
-            check=False,
-            cwd=folder,
-            env=safe_environment(),
-        )
+        printed, errors = process.communicate(timeout=time_limit)
     except subprocess.TimeoutExpired:
         return -1, f"it did not end within {time_limit:g} s"
-    return done.returncode, done.stdout.strip() or done.stderr
+    finally:
+        with contextlib.suppress(ProcessLookupError, PermissionError):
+            os.killpg(process.pid, signal.SIGKILL)
+        process.wait()
+    return process.returncode, printed.strip() or errors

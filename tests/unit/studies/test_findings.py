@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -56,6 +57,28 @@ def test_what_cannot_be_run_is_said() -> None:
     assert row.state == FindingState.NOT_INSTALLED
     with pytest.raises(Missing, match="/no/such/python is no Python interpreter"):
         list(run_findings([made("")], "/no/such/python"))
+
+
+_STARTS_A_HELPER = """
+import subprocess, sys, time
+output = {{}} if {seconds} else {{"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}}
+helper = subprocess.Popen([sys.executable, "-c", "import time; time.sleep(300)"], **output)
+open({note!r}, "w").write(str(helper.pid))
+time.sleep({seconds})
+"""
+
+
+@pytest.mark.parametrize("seconds", [0, 300])
+def test_a_program_ends_with_what_it_started(tmp_path: Path, seconds: int) -> None:
+    """A helper that holds the output of a program is not waited for, and ends with it, also at the limit of time."""
+    program = _STARTS_A_HELPER.format(note=str(tmp_path / "helper"), seconds=seconds)
+    (row,) = run_findings([made(program)], time_limit=300.0 if not seconds else 2.0)
+    assert row.state == (FindingState.BROKEN if seconds else FindingState.GONE)
+    status = Path(f"/proc/{(tmp_path / 'helper').read_text()}/stat")
+    deadline = time.monotonic() + 30
+    while (alive := status.exists() and status.read_text().split()[2] not in "ZX") and time.monotonic() < deadline:
+        time.sleep(0.05)  # the system takes a moment to end it
+    assert not alive
 
 
 def test_modules_of_the_working_folder_are_not_imported(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,4 +1,4 @@
-"""Writes docs/vocabulary.md: every key of scenes and files of studies, from the dataclasses that read them."""
+"""Every key of scenes and files of studies, from the dataclasses that read them, and the page about them."""
 
 from __future__ import annotations
 
@@ -6,9 +6,7 @@ import dataclasses
 import inspect
 import math
 import re
-import sys
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any, NamedTuple, get_args
 
 from proofroll.ball_studies import regimes as regimes_study
@@ -16,23 +14,22 @@ from proofroll.core import comparison
 from proofroll.core.gravity import Gravity
 from proofroll.elements.ball_on_surface import model as balls
 from proofroll.elements.ball_on_surface.surfaces import surface_kinds
-from proofroll.elements.mechanism import model as mechanisms
+from proofroll.elements.mechanism import Body, Force, Joint, Loop, Point, Spring
+from proofroll.elements.mechanism.bushing import Bushing
 from proofroll.elements.mechanism.composed import Cable, Gimbal, Screw, SprungJoint
 from proofroll.elements.mechanism.contacts import geometry as contacts
-from proofroll.elements.mechanism.drives import ActuatorKind
+from proofroll.elements.mechanism.drives import Actuator, ActuatorKind, Coupling
 from proofroll.elements.mechanism.joint_kinds import LOOP_FACTS, JointKind
 from proofroll.elements.mechanism.parts import Axes, ForceKind
+from proofroll.files.data_folders import data_folder
 from proofroll.files.scene_file import SceneFile
 from proofroll.files.scene_parameters import Parameter
 from proofroll.studies.stability import axes
 from proofroll.studies.stability import claims as stability_claims
 from proofroll.studies.tradeoff import claims
 
-ROOT = Path(__file__).resolve().parents[1]
-FILE = ROOT / "docs" / "vocabulary.md"
 
-
-class Table(NamedTuple):
+class KeyTable(NamedTuple):
     """A table of a file: its header as TOML writes it, what reads it, fields that are no keys."""
 
     header: str
@@ -41,55 +38,55 @@ class Table(NamedTuple):
 
 
 _OF_FILE = ("name",)
-CHAPTERS: dict[str, tuple[Table, ...]] = {
+CHAPTERS: dict[str, tuple[KeyTable, ...]] = {
     "A scene: `models/<scene>/scene.toml`": (
-        Table("", SceneFile, ("parameters", "gravity", "tables")),
-        Table("[parameters.NAME]", Parameter),
-        Table("[gravity]", Gravity),
+        KeyTable("", SceneFile, ("parameters", "gravity", "tables")),
+        KeyTable("[parameters.NAME]", Parameter),
+        KeyTable("[gravity]", Gravity),
     ),
     "A scene with balls on surfaces": (
-        Table("[[balls]]", balls.Ball),
-        *(Table("[[surfaces]]", kind) for kind in surface_kinds()),
-        Table("[[contacts]]", balls.Contact),
-        Table("[[initial]]", balls.InitialMotion),
+        KeyTable("[[balls]]", balls.Ball),
+        *(KeyTable("[[surfaces]]", kind) for kind in surface_kinds()),
+        KeyTable("[[contacts]]", balls.Contact),
+        KeyTable("[[initial]]", balls.InitialMotion),
     ),
     "A scene with a mechanism": (
-        Table("[[bodies]]", mechanisms.Body),
-        Table("[[joints]]", mechanisms.Joint),
-        Table("[[joints]]", Screw),
-        Table("[[joints]]", Gimbal),
-        Table("[[joints]]", SprungJoint),
-        Table("[[loops]]", mechanisms.Loop),
-        Table("[[loops]]", Cable),
-        Table("[[springs]]", mechanisms.Spring),
-        Table("[[bushings]]", mechanisms.Bushing),
-        Table("[[forces]]", mechanisms.Force),
-        Table("[[points]]", mechanisms.Point),
-        Table("[[geometries]]", contacts.Geometry),
-        Table("[[pairs]]", contacts.Pair),
-        Table("[[actuators]]", mechanisms.Actuator),
-        Table("[[couplings]]", mechanisms.Coupling),
+        KeyTable("[[bodies]]", Body),
+        KeyTable("[[joints]]", Joint),
+        KeyTable("[[joints]]", Screw),
+        KeyTable("[[joints]]", Gimbal),
+        KeyTable("[[joints]]", SprungJoint),
+        KeyTable("[[loops]]", Loop),
+        KeyTable("[[loops]]", Cable),
+        KeyTable("[[springs]]", Spring),
+        KeyTable("[[bushings]]", Bushing),
+        KeyTable("[[forces]]", Force),
+        KeyTable("[[points]]", Point),
+        KeyTable("[[geometries]]", contacts.Geometry),
+        KeyTable("[[pairs]]", contacts.Pair),
+        KeyTable("[[actuators]]", Actuator),
+        KeyTable("[[couplings]]", Coupling),
     ),
     "A comparison: `comparisons/*.toml` without `study`": (
-        Table("", comparison.Comparison, ("name", "vary", "brief", "bands", "rows", "left_out", "budget", "spent")),
-        Table("[[rows]]", comparison.Row, ("except_at",)),
-        Table("[[rows.except_at]]", comparison.ExceptAt),
+        KeyTable("", comparison.Comparison, ("name", "vary", "brief", "bands", "rows", "left_out", "budget", "spent")),
+        KeyTable("[[rows]]", comparison.Row, ("except_at",)),
+        KeyTable("[[rows.except_at]]", comparison.ExceptAt),
     ),
     'A trade-off: `study = "tradeoff"`': (
-        Table("", claims.TradeoffClaims, (*_OF_FILE, "over", "parameters", "cheapest", "holds", "converges")),
-        Table("[[cheapest]]", claims.Cheapest),
-        Table("[[holds]]", claims.Holds),
-        Table("[[converges]]", claims.Converges),
+        KeyTable("", claims.TradeoffClaims, (*_OF_FILE, "over", "parameters", "cheapest", "holds", "converges")),
+        KeyTable("[[cheapest]]", claims.Cheapest),
+        KeyTable("[[holds]]", claims.Holds),
+        KeyTable("[[converges]]", claims.Converges),
     ),
     'A stability map: `study = "stability"`': (
-        Table("", stability_claims.StabilityFile, (*_OF_FILE, "axes", "claims")),
-        Table("[[axes]]", axes.Axis, ("parameters",)),
-        Table("[axes.parameters.NAME]", axes.AxisTerm),
-        Table("[[claims]]", stability_claims.Claim),
+        KeyTable("", stability_claims.StabilityFile, (*_OF_FILE, "axes", "claims")),
+        KeyTable("[[axes]]", axes.Axis, ("parameters",)),
+        KeyTable("[axes.parameters.NAME]", axes.AxisTerm),
+        KeyTable("[[claims]]", stability_claims.Claim),
     ),
     'A regime map: `study = "regimes"`': (
-        Table("", regimes_study.RegimesStudy, (*_OF_FILE, "speed", "mu_static")),
-        Table("[speed], [mu_static]", regimes_study.EvenValues),
+        KeyTable("", regimes_study.RegimesStudy, (*_OF_FILE, "speed", "mu_static")),
+        KeyTable("[speed], [mu_static]", regimes_study.EvenValues),
     ),
 }
 # What is read by no dataclass of its own.
@@ -140,11 +137,12 @@ Parameter = value of the scene; parameter = values at whose every combination th
 }
 INTRODUCTION = """# The vocabulary of scenes and comparisons
 
-Written by `docs/vocabulary.py` from what reads the files; do not edit it. `proofroll check NAME` says whether a file is
-sound, and an unknown key is an error. SI units, angles in rad; nothing is converted. In a scene `"$name"` is the value
-of a parameter, and `"= mass*length^2/12"` is a formula of parameters with `+ - * / ^ ( )`, `pi`, `sin`, `cos`, `tan`,
-`asin`, `acos`, `atan`, `atan2`, `sqrt`, `hypot` and `abs`; `"30 deg"` is an angle in rad. They must have the
-unit of their place; a bare number takes the unit of what it is added to, and has none in a product.
+Written from what reads the files; `proofroll vocabulary WORD` prints a part of it. `proofroll check NAME` says
+whether a file is sound, and an unknown key is an error. SI units, angles in rad; nothing is converted. In a scene
+`"$name"` is the value of a parameter, and `"= mass*length^2/12"` is a formula of parameters with `+ - * / ^ ( )`,
+`pi`, `sin`, `cos`, `tan`, `asin`, `acos`, `atan`, `atan2`, `sqrt`, `hypot` and `abs`; `"30 deg"` is an angle in rad.
+They must have the unit of their place; a bare number takes the unit of what it is added to, and has none in a
+product.
 """
 
 
@@ -157,7 +155,7 @@ def meanings(read_by: type[Any]) -> dict[str, str]:
     return found
 
 
-def keys(table: Table) -> Iterator[tuple[str, str, str, str]]:
+def keys(table: KeyTable) -> Iterator[tuple[str, str, str, str]]:
     """Key, type, default and meaning of each line of a table."""
     said = meanings(table.read_by)
     for item in dataclasses.fields(table.read_by):
@@ -217,15 +215,21 @@ def _default(item: dataclasses.Field[Any]) -> str:
     return {True: "true", False: "false"}[value] if isinstance(value, bool) else f"{value}"
 
 
-def example(header: str, chapter: str, kind: object) -> str:
+def example(header: str, chapter: str, kind: str) -> str:
     """The first such table of our own files, up to its empty line."""
     folder, pattern = ("models", "*/scene.toml") if chapter.startswith("A scene") else ("comparisons", "*.toml")
     start = re.escape(header.partition(",")[0]).replace("NAME", r"[\w./\"]+")
-    for path in sorted((ROOT / folder).glob(pattern)):
-        only = rf'kind = "{kind}"\n' if isinstance(kind, str) else ""
+    for path in sorted(data_folder(folder).glob(pattern)):
+        only = rf'kind = "{kind}"\n' if kind else ""
         if found := re.search(rf"^{start}\n{only}(?:.+\n?)+", path.read_text(encoding="utf-8"), flags=re.MULTILINE):
-            return f"From `{path.relative_to(ROOT)}`:\n\n```toml\n{found[0].rstrip()}\n```\n"
+            return f"From `{folder}/{path.relative_to(data_folder(folder))}`:\n\n```toml\n{found[0].rstrip()}\n```\n"
     return ""
+
+
+def kind_of(table: KeyTable) -> str:
+    """Value of the key ``kind`` that a table belongs to; empty: to any."""
+    kind = getattr(table.read_by, "kind", None)
+    return kind if isinstance(kind, str) else ""
 
 
 def document() -> str:
@@ -234,8 +238,8 @@ def document() -> str:
     for chapter, tables in CHAPTERS.items():
         parts.append(f"## {chapter}\n")
         for table in tables:
-            kind = getattr(table.read_by, "kind", None)
-            named = f' with `kind = "{kind}"`' if isinstance(kind, str) else ""
+            kind = kind_of(table)
+            named = f' with `kind = "{kind}"`' if kind else ""
             parts.append(f"### {f'`{table.header}`{named}' if table.header else 'The file itself'}\n")
             lines = ["| key | type | default | meaning |", "|---|---|---|---|"]
             lines += [f"| `{key}` | {typed} | {default} | {text} |" for key, typed, default, text in keys(table)]
@@ -245,8 +249,3 @@ def document() -> str:
         if chapter in REST:
             parts.append(REST[chapter])
     return "\n".join(parts)
-
-
-if __name__ == "__main__":
-    FILE.write_text(document(), encoding="utf-8")
-    sys.stdout.write(f"{FILE.relative_to(ROOT)} is written\n")
