@@ -110,6 +110,7 @@ BAD = {
     "numbers too large for numbers": (
         ["run", "pendulum", "--engine", "truth", "--set", "speed=1e300", "--until", "0.1"], 2, ["its cube overflows"]
     ),
+    "a setting as an option": (["run", "pendulum", "--dt", "1e-3"], 2, ["--engine 'NAME[dt=…]'"]),
     "a version in a name": (["engines", "add", "mujoco==99"], 2, ["add mujoco --requirement mujoco==VERSION"]),
     "no version": (["engines", "add", "mujoco"], 2, ["--requirement = 'nothing'", "mujoco==VERSION"]),
     "a scene for a map": (["tradeoff", "/dev/null/scene.toml"], 2, ["scene.toml", "cannot be read"]),

@@ -98,6 +98,10 @@ def _usage_message(error: typer.TyperException) -> str:
         return f"{message} Choose one of {choices(names)}." if names else message
     if unknown := re.match(r"No such command '([^']+)'", message):
         return origin(unknown[1]) or message
+    context = getattr(error, "ctx", None)
+    options_here = [name for item in (context.command.params if context else ()) for name in item.opts]
+    if (unknown := re.match(r"No such option: --([\w-]+)", message)) and "--engine" in options_here:
+        return f"{message}; a setting of an engine goes into brackets: --engine 'NAME[{unknown[1]}=…]'"
     problems: list[dict[str, Any]] = getattr(error.__cause__, "errors", list)()
     option = re.search(r"'([^']+)'", message)
     if not problems or option is None:
