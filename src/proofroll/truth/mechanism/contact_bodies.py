@@ -200,8 +200,8 @@ class ContactBodies(ContactStretches):
             list(self._candidates(k, own, still[k], slips[k]))
             for k, own in enumerate(provisional(self.equations, bodies, closed))
         ]
-        for k in np.flatnonzero(slides_of(bodies).moved & still).tolist():
-            choices[k] = [option for option in choices[k] if option.kind == "stick"]
+        for k in np.flatnonzero(slides_of(bodies).moved & still & self._rubs).tolist():
+            choices[k] = [option for option in choices[k] if option.kind != "slip"]
         for k in leaving:
             choices[k] = [option for option in choices[k] if option.kind != "stick"]
         exchanged = self._exchanged(bodies, choices, still, trial, free)
