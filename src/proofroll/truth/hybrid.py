@@ -199,7 +199,7 @@ def follow(
     short, longest, since = 0, 0.0, 0
     stretches: list[SpanT] = []
     happenings: list[Happening] = []
-    margins, transitions = [], list[Transition[ModeT]]()
+    margins, transitions = list[tuple[float, float]](), list[Transition[ModeT]]()
 
     def path(known: bool, ended: str = "") -> HybridPath[SpanT]:
         return HybridPath(

@@ -39,38 +39,36 @@ class LawFault(NamedTuple):
     scene: str
 
 
-def bench() -> Mechanism:
-    """Joints with every law: coupled arms with stops, a motor at its limit, dry friction, a driven slide, springs."""
-    bodies = (
-        Body("arm", 1.0, com=(0.2, 0.0, 0.0), inertia=(0.01, 0.02, 0.02)),
-        Body("wheel", 0.5, com=(0.0, 0.02, 0.05), inertia=(0.01, 0.01, 0.02)),
-        Body("cart", 2.0, inertia=(0.02, 0.02, 0.02)),
-        Body("load", 0.7, com=(0.0, 0.0, -0.1), inertia=(0.004, 0.005, 0.006)),
-        Body("block", 1.5, inertia=(0.01, 0.01, 0.01)),
-    )
-    x, y = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)
-    shoulder = Joint("shoulder", "revolute", "world", "arm", axis=y, q0=(0.3,), v0=(3.0,))
+X, Y = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)
+
+
+def motors() -> Mechanism:
+    """Coupled arms with stops, a spring, an armature, and a motor that reaches its limit."""
+    arm = Body("arm", 1.0, com=(0.2, 0.0, 0.0), inertia=(0.01, 0.02, 0.02))
+    wheel = Body("wheel", 0.5, com=(0.0, 0.02, 0.05), inertia=(0.01, 0.01, 0.02))
+    shoulder = Joint("shoulder", "revolute", "world", "arm", axis=Y, q0=(0.3,), v0=(3.0,))
     shoulder = replace(shoulder, limits=(-0.5, 0.5), restitution=0.6, damping=0.02, stiffness=1.5, armature=0.01)
+    axle = Joint("axle", "revolute", "world", "wheel", axis=Y, position=(0.0, 0.5, 0.0), q0=(0.15,), v0=(1.5,))
+    motor = Actuator("motor", "axle", "position", Formula("0.8*sin(20*t)"), kp=6.0, kd=0.05, gear=1.5, limit=2.0)
+    gears = Coupling("gears", "shoulder", "axle", ratio=0.5)
+    return Mechanism((arm, wheel), (shoulder, axle), actuators=(motor,), couplings=(gears,))
+
+
+def links() -> Mechanism:
+    """A driven slide with a load on a universal joint, a block that rubs, a spring, a bushing and a force."""
+    cart = Body("cart", 2.0, inertia=(0.02, 0.02, 0.02))
+    load = Body("load", 0.7, com=(0.0, 0.0, -0.1), inertia=(0.004, 0.005, 0.006))
+    block = Body("block", 1.5, inertia=(0.01, 0.01, 0.01))
     joints = (
-        shoulder,
-        Joint("axle", "revolute", "world", "wheel", axis=y, position=(0.0, 0.5, 0.0), q0=(0.15,), v0=(1.5,)),
-        Joint("shake", "prismatic", "world", "cart", axis=x, motion=Formula("0.05*sin(9*t)"), position=y),
-        Joint("hinge", "universal", "cart", "load", axis=y, q0=(0.4, 0.2), damping=0.01),
-        Joint("guide", "prismatic", "world", "block", axis=y, position=(0.0, 2.0, 0.0), v0=(0.8,), friction=6.0),
+        Joint("shake", "prismatic", "world", "cart", axis=X, motion=Formula("0.05*sin(9*t)"), position=Y),
+        Joint("hinge", "universal", "cart", "load", axis=Y, q0=(0.4, 0.2), damping=0.01),
+        Joint("guide", "prismatic", "world", "block", axis=Y, position=(0.0, 2.0, 0.0), v0=(0.8,), friction=6.0),
     )
     link = Spring("link", "load", "block", (0.0, 0.0, -0.2), (0.05, 0.0, 0.0), stiffness=30.0, damping=0.5, length=0.7)
     mount = Bushing("mount", "world", "load", (0.0, 1.0, -0.3), (0.0, 0.0, -0.1), stiffness=(40, 60, 50, 2, 3, 1))
-    motor = Actuator("motor", "axle", "position", Formula("0.8*sin(20*t)"), kp=6.0, kd=0.05, gear=1.5, limit=2.0)
     push = Force("push", "load", "force", (Formula("2*cos(5*t)"), 0.3, 1.0), position=(0.0, 0.03, 0.0), frame="body")
-    return Mechanism(
-        bodies,
-        joints,
-        springs=(link,),
-        bushings=(replace(mount, damping=(0.4,) * 6),),
-        actuators=(motor,),
-        couplings=(Coupling("gears", "shoulder", "axle", ratio=0.5),),
-        forces=(push,),
-    )
+    bushings = (replace(mount, damping=(0.4,) * 6),)
+    return Mechanism((cart, load, block), joints, springs=(link,), bushings=bushings, forces=(push,))
 
 
 def _ball(height: float, speed: tuple[float, ...], **pair: float) -> Mechanism:
@@ -85,7 +83,8 @@ def _ball(height: float, speed: tuple[float, ...], **pair: float) -> Mechanism:
 _TURNING = {"rolling_resistance": 0.004, "spinning_friction": 0.006}
 _THROWN = (0.4, 0.1, 0.0, 3.0, 1.0, 2.0)
 SCENES: dict[str, tuple[Callable[[], Mechanism], float]] = {
-    "bench": (bench, 0.12),
+    "motors": (motors, 0.12),
+    "links": (links, 0.12),
     "slide": (lambda: _ball(0.0, (1.0, 0.4, 0.0, 2.0, -1.0, 6.0), **_TURNING), 0.35),
     "roll": (lambda: _ball(0.0, (0.5, 0.0, 0.0, 0.0, 5.0, 3.0), friction=0.6, **_TURNING), 0.3),
     "bounce": (lambda: _ball(0.1, _THROWN, restitution=0.7, tangential_restitution=0.4, friction=0.8), 0.4),

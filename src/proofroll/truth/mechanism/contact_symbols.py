@@ -196,7 +196,8 @@ def stated_symbols(mode: ContactMode, contacts: Sequence[Touchable], solved: Sol
     ):
         rubs = own.kind == "slip" and contact.bound
         rubbing = force if not rubs or line is None else scaled(-float(contact.bound), line)
-        found += [*(rubbing or _NONE), *touch.place, *touch.normal]
+        where = (*touch.place, *touch.normal) if contact.pressed_by is None else (*_NONE, *_NONE)
+        found += [*(rubbing or _NONE), *where]
     return [*found, *solved.efforts, *solved.drives]
 
 

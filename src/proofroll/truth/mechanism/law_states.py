@@ -14,6 +14,7 @@ from proofroll.elements.mechanism.contacts.turning import TurningFriction
 from proofroll.elements.mechanism.named_forces import named_forces
 from proofroll.elements.mechanism.rotations import Array, from_quaternion
 from proofroll.truth.mechanism.contact_bodies import ContactBodies
+from proofroll.truth.mechanism.contact_guards import Touchable
 from proofroll.truth.mechanism.contact_tree import ContactTree
 from proofroll.truth.mechanism.maximal_coordinates import MaximalCoordinates
 
@@ -56,7 +57,7 @@ def by_the_tree(route: ContactTree, state: Array, mode: ContactMode) -> Array:
         sample = dynamics.equations.sample(q, v, joints, time, load, applied)
         named, loops = stated_named(m, sample["named"]), sample["wrench"][len(m.joints) :].ravel()
     poses = motion.p_WB[:-1], motion.R_WB[:-1], motion.v_WB[:-1], motion.w_WB[:-1]
-    return _vector(poses, solution.state.touching, solution.force, named, loops)
+    return _vector(poses, contacts, solution.state.touching, solution.force, named, loops)
 
 
 def by_the_bodies(route: ContactBodies, second: MaximalCoordinates, state: Array, mode: ContactMode) -> Array:
@@ -72,7 +73,7 @@ def by_the_bodies(route: ContactBodies, second: MaximalCoordinates, state: Array
         named, loops = stated_named(m, record.named[0]), record.wrench[0, len(m.joints) :].ravel()
     p, v, quaternions, w = equations.equations.poses(state[:-1])
     rotations = np.array([from_quaternion(quaternion) for quaternion in quaternions])
-    return _vector((p, rotations, v, w), bodies.touching, force, named, loops)
+    return _vector((p, rotations, v, w), equations.contacts, bodies.touching, force, named, loops)
 
 
 def _has_named(m: Mechanism) -> bool:
@@ -87,6 +88,7 @@ def stated_named(m: Mechanism, named: Array) -> Array:
 
 def _vector(
     poses: tuple[Array, Array, Array, Array],
+    contacts: Sequence[Touchable],
     touching: Sequence[Touching],
     forces: Array,
     named: Array,
@@ -95,6 +97,8 @@ def _vector(
     """Record at one state, flat."""
     of_bodies = np.concatenate([part.reshape(len(poses[0]), -1) for part in poses], 1)
     of_contacts = np.zeros((len(touching), 9))
-    for row, touch, force in zip(of_contacts, touching, forces, strict=True):
-        row[:] = *force, *touch.place, *touch.normal
+    for row, contact, touch, force in zip(of_contacts, contacts, touching, forces, strict=True):
+        row[:3] = force
+        if contact.pressed_by is None:
+            row[3:] = *touch.place, *touch.normal
     return np.concatenate([of_bodies.ravel(), of_contacts.ravel(), named, loops])
