@@ -351,8 +351,8 @@ def _most_even(normals: Array, splits: Array) -> float:
 
 
 def _stopping(own: Acting, touch: Touching) -> float:
-    """Guard of the end of a slip [m/s]: minus the speed along a known line; in the plane, FAINT minus the speed."""
-    if own.along is None:
+    """Guard of the end of a slip [m/s]: minus the speed along a known way; in the plane, FAINT minus the speed."""
+    if own.along is None and not own.leads:
         return FAINT - float(np.linalg.norm(slip_velocity(touch)))
     return -float(heading_of(own, touch) @ touch.slide)
 

@@ -49,8 +49,9 @@ from proofroll.truth.mechanism.contact_guards import (
 )
 from proofroll.truth.mechanism.contact_walks import AHEAD, ContactWalks, SwitchedEquations
 from proofroll.truth.mechanism.impact_series import Impact, ImpactSeries, Series
-from proofroll.truth.mechanism.planar_slip import leaving_slips
+from proofroll.truth.mechanism.planar_slip import BegunSlip, leaving_slips
 from proofroll.truth.mechanism.standing_ends import Face, check_faces, check_spin
+from proofroll.truth.mechanism.stopping_slip import StoppingSlip
 
 # Least deceleration of rebounds whose time is summed, in natural units; below it is round-off.
 _PULL = 1e-9
@@ -156,6 +157,9 @@ class ContactStretches(ContactWalks):
         return replace(changed, blur=max(changed.blur, stretch.blur))
 
     def _changed(self, stretch: Stretch[ContactMode]) -> Transition[ContactMode]:
+        if isinstance(stretch, BegunSlip):
+            mode = tuple(own._replace(leads=False) for own in stretch.mode_at(stretch.end))
+            stretch = replace(stretch, mode=mode)
         guards = guards_of(self.contacts, stretch.mode)
         if stretch.guard is None or not 0 <= stretch.guard < len(guards):  # a break, a slip begun, an effort
             k = -1 if stretch.guard is None else stretch.guard - len(guards)
@@ -177,7 +181,7 @@ class ContactStretches(ContactWalks):
             return Transition(stretch.last, opened(self.contacts, stretch.mode, k), (lifted,))
         if kind in {"break", "grip"}:
             return self._broken(stretch, k)
-        return self._stopped(stretch) if kind == "still" else self._impact(stretch, k)
+        return self._stopped(stretch, k) if kind == "still" else self._impact(stretch, k)
 
     def jumped(self, stretch: Stretch[ContactMode]) -> Transition[ContactMode]:
         """Transition at the end of a stretch where forces jump: the mode is decided anew."""
@@ -307,11 +311,14 @@ class ContactStretches(ContactWalks):
         )
         return replace(after, blur=speed * series.remaining)
 
-    def _stopped(self, stretch: Stretch[ContactMode]) -> Transition[ContactMode]:
-        """Transition where a slip stops: alone, or with all others.
+    def _stopped(self, stretch: Stretch[ContactMode], k: int) -> Transition[ContactMode]:
+        """Transition where a slip stops: alone, or with all others; in the plane first to its last instants.
 
         Bodies that turn while they slide stop all their slips at once: then all slips below FAINT count as stopped.
         """
+        if stretch.mode[k].along is None and not isinstance(stretch, BegunSlip | StoppingSlip):
+            ending = stretch.mode[k]._replace(stops=True)
+            return Transition(stretch.last, (*stretch.mode[:k], ending, *stretch.mode[k + 1 :]), ())
         closed, solved = closed_in(stretch.mode), self._solved(stretch.last, stretch.mode)
         slides = [k for k, own in enumerate(stretch.mode) if own.kind == "slip"]
         slips = np.linalg.norm([slip_velocity(solved.touching[k]) for k in slides], axis=1)

@@ -361,7 +361,9 @@ class CompiledMode:
         def decay(states: Array) -> tuple[Array, Array]:
             found = self._called(states, pars)
             square, along, rate = found[place : place + 3]
-            return np.sqrt(square), np.maximum(0.0, -along / rate) * found[first : first + len(states)]
+            change = np.maximum(0.0, -along / rate) * found[first : first + len(states)]
+            # a slip that round-off has stopped has no direction, and changes nothing
+            return np.sqrt(square), np.where(square, change, 0.0)
 
         return decay
 

@@ -101,7 +101,7 @@ def _in_units(mechanism: Mechanism, units: Units, times: Array, faces: Sequence[
         values.finish()
     first = _by_the_tree(tree, paths[0], times, states[0], stretches)
     one, cut = first.record, None if held else cut_early(tree.early(), paths[0], until, breaking, times, kinds)
-    modes = [paths[1].stretches[number].mode for number in others]
+    modes = [bodies.acting(paths[1].stretches[number], state) for number, state in zip(others, states[1], strict=True)]
     applied = [bodies.forces(state, mode) for state, mode in zip(states[1], modes, strict=True)]
     switched = [equations.switched(state, mode) for state, mode in zip(states[1], modes, strict=True)]
     wrenches = [wrench for _, wrench in applied]
@@ -206,7 +206,7 @@ def _by_the_tree(tree: ContactTree, path: _Path, times: Array, states: Array, st
     dynamics = tree.dynamics
     records, forces, sums = zip(
         *(
-            dynamics.sample(*dynamics.parts(state)[:2], path.stretches[number].mode, float(state[-1]))
+            dynamics.sample(*dynamics.parts(state)[:2], tree.acting(path.stretches[number], state), float(state[-1]))
             for state, number in zip(states, stretches, strict=True)
         ),
         strict=True,

@@ -13,6 +13,7 @@ import numpy as np
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Diverged, Refused
+from proofroll.core.event_location import locate_rise_within
 from proofroll.core.last_results import LastResults
 from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.contacts.acting import (
@@ -42,8 +43,8 @@ from proofroll.truth.mechanism.contact_guards import (
 )
 from proofroll.truth.mechanism.contact_taylor import CompiledMode, CompiledModes, CompiledStretch, ModeSymbols
 from proofroll.truth.mechanism.followed_paths import CLOSE, TOLERANCES
-from proofroll.truth.mechanism.planar_slip import BegunSlip, begun_slip
-from proofroll.truth.picard import PicardSteps
+from proofroll.truth.mechanism.planar_slip import SHORTEST, BegunSlip, begun_slip, held_or_stopped
+from proofroll.truth.mechanism.stopping_slip import NOTHING, StoppingSlip, stopping_slip
 
 _KEPT = 4  # solutions that are kept
 AHEAD = 1e-9  # time step, relative to the natural time, after which an effort is compared with its limit
@@ -51,9 +52,6 @@ _CLAMPED = 1e-9  # difference of an effort from its limit, relative to the limit
 # Difference of compiled accelerations from others, relative to the largest, up to which they are the same: the
 # direction of a slip of 2e-8 is known to 1e-8.
 _SAME_RATES = 1e-6
-# Integration of a slip to rest: decrease of its logarithm in a step, and slip speed at the end.
-_DECAY, _NOTHING = 2.0, 1e-14
-
 
 # Guard of the first instants of a slip, which goes on.
 _GOES_ON = -1
@@ -126,8 +124,7 @@ class ContactWalks(ABC):
         """Equations of a stretch from a state; ``signs``: of efforts at their limits there, if they are known."""
         guards, equations = guards_of(self.contacts, mode), self._equations
         signs = self._clamped(state, mode) if signs is None else signs
-        # sign of the guard of an effort: it reaches its limit, or comes back from it
-        side = np.array([1.0 if sign else -1.0 for sign in signs])
+        side = self._side(signs)
         excess = np.abs(equations.drawn(state)) - 1
         noise = np.where(np.abs(excess) < _CLAMPED, 2 * np.abs(excess), 0.0)
 
@@ -140,7 +137,7 @@ class ContactWalks(ABC):
 
         return StretchLaw(
             rates=rates,
-            guards=lambda y: np.append(self._guards(y, mode, guards), -side * (np.abs(equations.drawn(y)) - 1)),
+            guards=lambda y: self._guards_and_limits(y, mode, guards, side),
             corrected=lambda y: equations.eliminated(y, mode),
             noise=np.append(noise_of(guards, self._size), noise),
             near=np.append([CLOSE * (guard.kind == "close") for guard in guards], np.zeros_like(noise)),
@@ -153,6 +150,17 @@ class ContactWalks(ABC):
         normals = pressing(solved.mode, solved.touching, solved.force, solved.splits)
         return np.array([guard_value(guard, mode, contacts, solved, normals) for guard in guards])
 
+    @staticmethod
+    def _side(signs: Sequence[int]) -> Array:
+        """Sign of the guard of each effort with a limit: it reaches its limit, or comes back from it."""
+        return np.array([1.0 if sign else -1.0 for sign in signs])
+
+    def _guards_and_limits(
+        self, state: Array, mode: ContactMode, guards: Sequence[ContactGuard], side: Array
+    ) -> FloatArray:
+        """Values of guards, and of those of efforts with a limit, by the side from which these come."""
+        return np.append(self._guards(state, mode, guards), -side * (np.abs(self._equations.drawn(state)) - 1))
+
     def walk(self, time: float, state: Array, mode: ContactMode, until: float) -> Stretch[ContactMode]:
         """See the protocol."""
         state = np.append(state[:-1], time)
@@ -163,34 +171,41 @@ class ContactWalks(ABC):
             return Stretch(start=time, end=until, mode=mode, first=state, last=state, guard=None)
         if any(own.leads for own in mode):
             return self._begun(time, state, mode, until)
+        stopping = next((k for k, own in enumerate(mode) if own.stops), None)
+        if stopping is not None:
+            return self._stopping(time, state, mode, stopping)
         guards = guards_of(self.contacts, mode)
         share = next((number for number, guard in enumerate(guards) if guard.kind == "share"), None)
         if share is not None and self._guards(state, mode, [guards[share]])[0] > 0:
             return Stretch(start=time, end=time, mode=mode, first=state, last=state, guard=share)
         start, begun = self._kicked(time, state, mode)
-        stretch = self._walked(begun, start, mode, until)
-        end, last, blur = stretch.end, stretch.last, stretch.blur
-        if stretch.guard is not None and stretch.guard < len(guards):
-            k, kind, _ = guards[stretch.guard]
-            if kind == "still" and mode[k].along is None:
-                last, blur = self._spent(last, mode, k, stretch)
-                end += float(last[-1] - stretch.last[-1])
-        return replace(stretch, start=time, first=state, end=end, last=last, blur=blur)
+        return replace(self._walked(begun, start, mode, until), start=time, first=state)
 
     def _begun(self, time: float, state: Array, mode: ContactMode, until: float) -> Stretch[ContactMode]:
         """First instants of a slip from rest in the plane, which end before another contact changes."""
         name = next(contact.name for contact, own in zip(self.contacts, mode, strict=True) if own.leads)
-        guards = guards_of(self.contacts, mode)
-        others = [guard for guard in guards if guard.kind != "still" or not mode[guard.contact].leads]
+        begun = begun_slip(time, state, mode, until, self._equations.rate, self._solved, self._begins_by, name)
+        law, guards, side = self._law(state, mode, self._signs), guards_of(self.contacts, mode), self._side(self._signs)
 
-        def clear(y: Array, now: ContactMode) -> bool:
-            return bool(np.all(self._guards(y, now, others) <= noise_of(others, self._size)))
+        def values(times: FloatArray) -> FloatArray:
+            pairs = zip(times.tolist(), begun.at(times), strict=True)
+            return np.array([self._guards_and_limits(y, begun.mode_at(t), guards, side) for t, y in pairs])
 
-        rate, solve, count = self._equations.rate, self._solved, self._begins_by
-        begun = begun_slip(time, state, mode, until, rate, solve, clear, count, name)
-        last = self._equations.eliminated(begun.last, begun.mode)
-        goes_on = None if begun.end >= until else _GOES_ON
-        return replace(begun, last=last, guard=goes_on)
+        grazes = list[float]()
+        rise = locate_rise_within(values, time, begun.end, law.noise, True, law.near, grazes)
+        guard = _GOES_ON if begun.end < until else None
+        if rise is not None:
+            end, guard = rise
+            k, kind = (guards[guard].contact, guards[guard].kind) if guard < len(guards) else (-1, "")
+            stops = kind == "still" and mode[k].leads
+            if not stops and end <= time + SHORTEST:
+                raise held_or_stopped(name, time)
+            begun = replace(begun, end=end, last=begun.at(np.array([end]))[0])
+            if stops:  # the error of the speed, as a time
+                slows = self._solved(begun.last, begun.mode_at(end)).slide_rate[k]
+                begun = replace(begun, blur=TOLERANCES[1] / float(np.linalg.norm(slows)))
+        last = self._equations.eliminated(begun.last, mode)
+        return replace(begun, last=last, guard=guard, grazes=grazes)
 
     def _walked(self, time: float, state: Array, mode: ContactMode, until: float) -> Stretch[ContactMode]:
         """Stretch by a compiled mode, or by DOP853 where there is none, and near singular poses, where it fails."""
@@ -231,7 +246,7 @@ class ContactWalks(ABC):
 
     def within(self, stretch: Stretch[ContactMode], times: Array) -> Array:
         """See the protocol."""
-        if isinstance(stretch, BegunSlip):
+        if isinstance(stretch, BegunSlip | StoppingSlip):
             return np.array([self._equations.eliminated(state, stretch.mode) for state in stretch.at(times)])
         if isinstance(stretch, CompiledStretch) and stretch.by is not None:
             return stretch.by.within(self._law(stretch.first, stretch.mode), stretch, times)
@@ -239,34 +254,41 @@ class ContactWalks(ABC):
             return np.array([stretch.first for _ in times])
         return states_at(self._law(stretch.first, stretch.mode), stretch.visited, times, self._tolerance)
 
-    def _spent(self, state: Array, mode: ContactMode, k: int, stretch: Stretch[ContactMode]) -> tuple[Array, float]:
-        """State at the end of a slip below FAINT, by collocation in the logarithm of the slip speed.
+    def acting(self, stretch: Stretch[ContactMode], state: Array) -> ContactMode:
+        """Mode at a state within a stretch, with the directions of slips that its integration took."""
+        time, mode = float(state[-1]), stretch.mode
+        if isinstance(stretch, BegunSlip):
+            return stretch.mode_at(time)
+        if isinstance(stretch, CompiledStretch) and stretch.visited and time > stretch.visited[0][0]:
+            return self._as_it_goes(state, mode)
+        return mode
 
-        The slower a slip, the faster it turns: its equations are stiff in time, and smooth in that logarithm. Its last
-        part is a straight line, whose duration, with that of the error of the speed, is the uncertainty of the end.
+    def _as_it_goes(self, state: Array, mode: ContactMode) -> ContactMode:
+        """Mode with the present directions of slips in the plane, however slow."""
+        touching = self._touching(state, features_of(mode))
+        return tuple(headed(own, each) for own, each in zip(mode, touching, strict=True))
+
+    def _stopping(self, time: float, state: Array, mode: ContactMode, k: int) -> StoppingSlip:
+        """Last instants of a slip below FAINT.
+
+        The duration of its straight line, with that of the error of the speed, is the uncertainty of the end.
         """
 
         def one(y: Array) -> tuple[float, Array]:
-            touching = self._touching(y, features_of(mode))
-            now = tuple(headed(own, each) for own, each in zip(mode, touching, strict=True))
-            change = faint_time(touching[k], self._solved(y, now).slide_rate[k]) * self._equations.rate(y, now)
-            return float(np.linalg.norm(slip_velocity(touching[k]))), change
+            now, touch = self._as_it_goes(y, mode), self._touching(y, features_of(mode))[k]
+            change = faint_time(touch, self._solved(y, now).slide_rate[k]) * self._equations.rate(y, now)
+            return float(np.linalg.norm(slip_velocity(touch))), change
 
-        def decay(states: Array) -> tuple[Array, Array]:
-            """Slip speeds, and changes of states (state, places) until the slip would stop at its present rate."""
+        def by_states(states: Array) -> tuple[Array, Array]:
             speeds, changes = zip(*map(one, states.T), strict=True)
             return np.array(speeds), np.array(changes).T
 
-        compiled = stretch.by if isinstance(stretch, CompiledStretch) else None
-        function = decay if compiled is None else compiled.decay_of(mode, k, stretch.start)
-        steps, place = PicardSteps(lambda states: function(states)[1]), 0.0
-        last = float(np.log(np.maximum(function(state[:, None])[0], _NOTHING) / _NOTHING)[0])
-        while place < last:
-            place, state, _ = steps.step(place, state, min(last, place + _DECAY))
-        change = np.asarray(function(state[:, None])[1][:, 0])
-        headings = zip(mode, self._touching(state, features_of(mode)), strict=True)
-        slows = self._solved(state, tuple(headed(own, each) for own, each in headings)).slide_rate[k]
-        return state + change, (_NOTHING + TOLERANCES[1]) / float(np.linalg.norm(slows))
+        compiled = self._by_symbols(state, mode)
+        decay = by_states if compiled is None else compiled.decay_of(mode, k, time)
+        guard = guards_of(self.contacts, mode).index(ContactGuard(k, "still"))
+        slip = stopping_slip(time, state, mode, guard, decay)
+        slows = self._solved(slip.line, self._as_it_goes(slip.line, mode)).slide_rate[k]
+        return replace(slip, blur=(NOTHING + TOLERANCES[1]) / float(np.linalg.norm(slows)))
 
     def _kicked(self, time: float, state: Array, mode: ContactMode) -> tuple[Array, float]:
         """State and time shortly after a slip in the plane starts from rest, when it has a direction."""

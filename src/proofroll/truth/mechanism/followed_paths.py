@@ -284,14 +284,17 @@ def _alike(
 ) -> tuple[list[tuple[int, int]], list[Stretch[Any]]]:
     """Numbers of stretches of both routes that are in the same mode in turn, and the stretches from where they part.
 
-    Changes at the same instant may come in either order; if that order matters, the margin of a decision is small.
+    Changes at the same instant may come in either order; if that order matters, the margin of a decision is small. A
+    route may divide what the other follows in one stretch.
     """
     pairs, left = list[tuple[int, int]](), [list(path.stretches) for path in (one, two)]
+    last: Any = None
     while all(left):
         if kinds(left[0][0].mode) == kinds(left[1][0].mode):
             pairs.append((len(one.stretches) - len(left[0]), len(two.stretches) - len(left[1])))
+            last = kinds(left[0][0].mode)
             del left[0][0], left[1][0]
-        elif passing := next((stretches for stretches in left if _instant(stretches[0])), None):
+        elif passing := next((ones for ones in left if _instant(ones[0]) or kinds(ones[0].mode) == last), None):
             del passing[0]
         else:
             break

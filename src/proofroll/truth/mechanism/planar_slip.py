@@ -22,9 +22,10 @@ from proofroll.elements.mechanism.rotations import Array, cross
 from proofroll.truth.hybrid import Stretch
 from proofroll.truth.mechanism.contact_guards import SolvedContacts
 
-# First length of the beginning, in natural units, and how often it is halved where the iteration does not settle, the
-# nodes do not resolve the motion, or another contact changes. The longer it is, the less stiff is what follows.
+# First length of the beginning, in natural units, and how often it is halved where the iteration does not settle or the
+# nodes do not resolve the motion. The longer it is, the less stiff is what follows.
 _FIRST, _HALVINGS = 2.0, 20
+SHORTEST = _FIRST * 2.0**-_HALVINGS  # of beginnings
 _RESOLVED = 1e-14  # last coefficients of the states' series, relative to their sizes, that count as zero
 _SLOWEST = 0.7  # change of a round over that of the round before, above which the iteration does not settle
 _ROUNDS = 40  # of the iteration at most
@@ -34,21 +35,34 @@ _TURN = 1e-4  # rad: by which the response to the direction of friction is measu
 _FREE = 1e-6  # response to that direction, relative to the friction's own, below which other contacts fix the direction
 
 Rate = Callable[[Array, ContactMode], Array]
-Clear = Callable[[Array, ContactMode], bool]
 Solve = Callable[[Array, ContactMode], SolvedContacts]
 
 
 @dataclass(frozen=True)
 class BegunSlip(Stretch[ContactMode]):
-    """The first instants of a slip from rest; ``nodes``: coefficients of its states by Chebyshev polynomials."""
+    """The first instants of a slip from rest, by Chebyshev polynomials; an event may end it before these do.
 
+    Attributes:
+        length: of the polynomials [s].
+        nodes: coefficients of states.
+        ways: coefficients of the direction against which friction acts.
+    """
+
+    length: float = 0.0
     nodes: Any = None
+    ways: Any = None
+
+    def _of(self, series: Any, times: Array) -> Array:
+        return np.asarray(chebyshev.chebval(2 * (times - self.start) / self.length - 1, series).T)
 
     def at(self, times: Array) -> Array:
         """States at times [s] within it, shape (times, state)."""
-        length = self.end - self.start
-        place = 2 * (times - self.start) / length - 1 if length else 0 * times
-        return np.asarray(chebyshev.chebval(place, self.nodes).T)
+        return self._of(self.nodes, times)
+
+    def mode_at(self, time: float) -> ContactMode:
+        """Mode with the direction against which friction acts at a time [s]."""
+        x, y, z = self._of(self.ways, np.array(time)).tolist()
+        return tuple(own._replace(heading=(x, y, z)) if own.leads else own for own in self.mode)
 
 
 class _Nodes:
@@ -92,19 +106,12 @@ def leaving_slips(mode: ContactMode, solved: SolvedContacts, held: Mapping[int, 
 
 
 def begun_slip(
-    time: float,
-    state: Array,
-    mode: ContactMode,
-    until: float,
-    rate: Rate,
-    solve: Solve,
-    clear: Clear,
-    count: int,
-    name: str,
+    time: float, state: Array, mode: ContactMode, until: float, rate: Rate, solve: Solve, count: int, name: str
 ) -> BegunSlip:
     """First instants of the slip that leads in a mode, from a time [s] on, at most to ``until`` [s].
 
-    Contacts of one face that lead together slip in one direction.
+    Contacts of one face that lead together slip in one direction. Neither an end of this slip nor a change of another
+    contact is asked for.
 
     Args:
         time: of the start.
@@ -113,7 +120,6 @@ def begun_slip(
         until: at most.
         rate: of a state in a mode.
         solve: motion and forces of a state in a mode.
-        clear: True if no contact changes, at a state in a mode.
         count: of nodes.
         name: of the contact, for messages.
 
@@ -122,22 +128,28 @@ def begun_slip(
     """
     k = next(number for number, own in enumerate(mode) if own.leads)
     length, nodes = min(_FIRST, until - time), _Nodes(count)
-    plain = tuple(own._replace(leads=False) for own in mode)
     for _ in range(_HALVINGS):
-        states = _settled(state, mode, k, length, nodes, rate, solve)
-        if states is not None and all(clear(y, plain) for y in states[1:]):
-            end = until if length == until - time else time + length
+        settled = _settled(state, mode, k, length, nodes, rate, solve)
+        if settled is not None:
+            states, ways = settled
             return BegunSlip(
                 start=time,
-                end=end,
-                mode=plain,
+                end=until if length == until - time else time + length,
+                mode=mode,
                 first=state,
                 last=states[-1],
                 guard=None,
+                length=length,
                 nodes=nodes.to_series @ states,
+                ways=nodes.to_series @ ways,
             )
         length /= 2
-    raise Refused(
+    raise held_or_stopped(name, time)
+
+
+def held_or_stopped(name: str, time: float) -> Refused:
+    """Error that others hold or stop a slip at the time at which it begins [s]."""
+    return Refused(
         f"{name} begins to slip from rest at t = {time:.6g} s as others hold or stop it: no route of the truth follows "
         "that; end before, or take more friction"
     )
@@ -145,8 +157,11 @@ def begun_slip(
 
 def _settled(
     state: Array, mode: ContactMode, k: int, length: float, nodes: _Nodes, rate: Rate, solve: Solve
-) -> Array | None:
-    """States at the nodes of a beginning of a ``length``; None: the iteration does not settle, or nothing slips."""
+) -> tuple[Array, Array] | None:
+    """States and directions at the nodes of a beginning of a ``length``.
+
+    None: the iteration does not settle, or nothing slips.
+    """
     count = len(nodes.places)
     start = np.array(mode[k].heading)
 
@@ -188,6 +203,7 @@ def _settled(
             return None
         if change <= _SETTLED or (change <= _STALLED and change >= before / 2):
             tail = np.abs((nodes.to_series @ states)[-2:]).max()
-            return states if tail <= _RESOLVED * max(1.0, float(np.abs(states).max())) else None
+            resolved = tail <= _RESOLVED * max(1.0, float(np.abs(states).max()))
+            return (states, np.array([point[1] for point in points])) if resolved else None
         before = change
     return None

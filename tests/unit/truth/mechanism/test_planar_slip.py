@@ -8,7 +8,7 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 from proofroll.elements.ball_on_surface.element import rolling_ball
-from proofroll.elements.mechanism import Body, Joint, Mechanism
+from proofroll.elements.mechanism import Body, Force, Joint, Mechanism
 from proofroll.elements.mechanism.contacts.geometry import Geometry, Pair
 from proofroll.elements.mechanism.drives import Actuator
 from proofroll.elements.mechanism.signal import Formula
@@ -117,3 +117,87 @@ def test_a_bead_slips_against_friction_that_turns_with_its_pull() -> None:
     assert found.bars["v"][-1] < 1e-11
     right = reference(np.array([1.75, 1.25]), hold, until)
     assert found.record.v[1, :2] == pytest.approx(right, abs=1e-6)
+
+
+def bead(push: str = "", speed: float = 0.0, shake: str = "") -> Mechanism:
+    """A bead of 1 kg on a floor with friction 0.5, pushed along x; the floor may be shaken along x."""
+    start = (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
+    joints = [Joint("free", "free", "world", "bead", q0=start, v0=(speed, 0.0, 0.0, 0.0, 0.0, 0.0))]
+    bodies = [Body("bead", 1.0, inertia=(0.1,) * 3)]
+    if shake:
+        joints.append(Joint("shake", "prismatic", "world", "plate", axis=(1, 0, 0), motion=Formula(shake)))
+        bodies.append(Body("plate", 1.0, inertia=(0.1,) * 3))
+    shapes = (Geometry("floor", "plate" if shake else "world", "plane"), Geometry("tip", "bead", "sphere", radius=0.0))
+    return Mechanism(
+        tuple(bodies),
+        tuple(joints),
+        forces=(Force("push", "bead", "force", value=(Formula(push), 0.0, 0.0)),) if push else (),
+        geometries=shapes,
+        pairs=(Pair("touch", ("tip", "floor"), 0.5),),
+    )
+
+
+def slip_under_a_push(push: float, rate: float, hold: float) -> tuple[float, float, float]:
+    """Begin [s], end [s] and length [m] of a slip under ``push`` sin(``rate`` t) against friction, by its integral."""
+    begin = float(np.arcsin(hold / push)) / rate
+
+    def speed(t: float) -> float:
+        return float(push / rate * (np.cos(rate * begin) - np.cos(rate * t)) - hold * (t - begin))
+
+    end = brentq(speed, begin + 1e-2, 2 * np.pi / rate, xtol=1e-15)
+    way = push / rate * (np.cos(rate * begin) * (end - begin) - (np.sin(rate * end) - np.sin(rate * begin)) / rate)
+    return begin, end, float(way - hold * (end - begin) ** 2 / 2)
+
+
+PUSHED, SLIP = bead("5.2*sin(10*t)"), slip_under_a_push(5.2, 10.0, 0.5 * 9.81)
+
+
+@pytest.mark.parametrize("until", np.linspace(0.13, 0.4, 20).tolist())
+def test_a_slip_that_stops_in_its_first_instants_ends_there(until: float) -> None:
+    """A bead under a swelling push sticks when its speed is zero, whatever the end of the run is."""
+    found = truth_of(PUSHED, np.array([0.0, until]))
+    begin, end, way = SLIP
+    right = [("slip", begin), ("stick", end)][: 1 + (until > end)]
+    assert [event.kind for event in found.events] == [kind for kind, _ in right]
+    for event, (_, time) in zip(found.events, right, strict=True):
+        assert event.time_low <= time <= event.time_high
+    if until > end:
+        assert found.record.q[-1, 0] == pytest.approx(way, abs=1e-14)
+        assert found.record.v[-1, 0] == pytest.approx(0.0, abs=1e-14)
+
+
+@pytest.mark.drill
+@pytest.mark.parametrize("until", [0.19, 0.21, 0.25, 0.4])
+def test_a_slip_on_a_shaken_floor_ends_when_the_floor_has_its_speed(until: float) -> None:
+    """A bead that holds to a shaken floor slips and holds again at one time, whatever the end of the run is."""
+    found = truth_of(bead(speed=0.5, shake="0.05*sin(10*t)"), np.array([0.0, until]))
+    begin = float(np.arcsin(0.5 * 9.81 / 5.0)) / 10  # s: the floor's deceleration reaches the bound
+    assert 0.1 < begin < 0.19
+    end = brentq(
+        lambda t: 0.5 * np.cos(10 * begin) - 0.5 * 9.81 * (t - begin) - 0.5 * np.cos(10 * t), 0.15, 0.22, xtol=1e-15
+    )
+    kinds = [event.kind for event in found.events]
+    assert kinds == ["slip", "stick"][: 1 + (until > end)]
+    for event, right in zip(found.events, (begin, end), strict=False):
+        assert event.time_low <= right <= event.time_high
+
+
+@pytest.mark.parametrize("way", [(1.0, 0.0), (0.0, 1.0), (0.6, 0.8)])
+def test_a_ball_of_unequal_moments_slides_along_an_axis_until_it_rolls(way: tuple[float, float]) -> None:
+    """A slip that keeps its direction stops without a division by zero: at 2/7 of v/(μ g) for moments alike."""
+    right = {(1.0, 0.0): 0.03, (0.0, 1.0): 0.018}.get(way)
+    start = (0.0, 0.0, 0.2, 1.0, 0.0, 0.0, 0.0)
+    free = Joint("free", "free", "world", "ball", q0=start, v0=(-2.0 * way[0], -2.0 * way[1], 0.0, 0.0, 0.0, 0.0))
+    shapes = (Geometry("floor", "world", "plane"), Geometry("skin", "ball", "sphere", radius=0.2))
+    ball = Mechanism(
+        (Body("ball", 1.0, inertia=(0.018, 0.03, 0.028)),), (free,), geometries=shapes,
+        pairs=(Pair("c", ("skin", "floor"), 0.3),), gravity=(0.0, 0.0, -10.0),
+    )  # fmt: skip
+    found = truth_of(ball, np.array([0.0, 0.4]))
+    (event,) = found.events
+    assert event.kind == "stick"
+    if right is not None:
+        end = 2.0 / (0.3 * 10.0 * (1 + 0.2**2 / right))
+        assert event.time_low <= end <= event.time_high
+        place = -2.0 * end + 1.5 * end**2 - (2.0 - 3.0 * end) * (0.4 - end)
+        assert found.record.p_WB[-1, 0] @ np.array([*way, 0.0]) == pytest.approx(place, abs=1e-14)

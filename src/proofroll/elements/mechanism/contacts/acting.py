@@ -28,6 +28,7 @@ class Acting(NamedTuple):
             its sense too.
         heading: initial direction of a slip that begins from rest.
         leads: True if friction acts against ``heading`` whatever the slip is, which has just begun.
+        stops: True for a slip in the plane below FAINT that is about to stop.
         feature: number of the features that are nearest; 0 of shapes that have one only.
     """
 
@@ -35,6 +36,7 @@ class Acting(NamedTuple):
     along: Direction | None = None
     heading: Direction | None = None
     leads: bool = False
+    stops: bool = False
     feature: int = 0
 
 

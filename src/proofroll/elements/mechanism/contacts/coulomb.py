@@ -294,9 +294,10 @@ def robust_forces(
     bounds = np.zeros(len(friction)) if bounds is None else bounds
     static = friction if static is None else static
     force, done = contact_forces(G, c, friction, sliding, names, bounds, time, static=static, pressed_by=pressed_by)
-    own = np.diag(G)[::3]
-    # as a force at each contact, which the holds of the other contacts balance
-    lift = np.where(own > 0, (1 + _APART * np.arange(len(own))) / np.where(own > 0, own, 1), 0.0)
+    # as a force at each contact that presses, which the holds of the other contacts balance
+    along, pressing = np.diag(G)[::3], [None] * len(friction) if pressed_by is None else pressed_by
+    presses = (along > 0) & (bounds == 0) & np.array([by is None for by in pressing])
+    lift = np.where(presses, (1 + _APART * np.arange(len(along))) / np.where(presses, along, 1), 0.0)
     nudge = _NUDGE * float(np.abs(c).max()) * G[:, ::3] @ lift
 
     def outcome(force: Array, done: Sequence[ModeKind]) -> list[ModeKind]:

@@ -1,0 +1,109 @@
+"""The truth of bodies that touch is that of the same bodies in a turned world: events, reasons and error bars."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any
+
+import numpy as np
+import pytest
+from turned_scenes import turned_mechanism
+
+from proofroll.core.errors import InputError, Refused
+from proofroll.elements.mechanism import Body, Joint, Mechanism
+from proofroll.elements.mechanism.contacts.geometry import Geometry, Pair
+from proofroll.elements.mechanism.element import the_mechanism
+from proofroll.elements.mechanism.rotations import from_rpy
+from proofroll.files.scene_file import load_scene
+from proofroll.truth.mechanism.switched_truth import truth_of
+from proofroll_drill.referee.random_contacts import random_contacts
+
+NIGHTLY = (pytest.mark.drill, pytest.mark.nightly)
+ROLLING, SPINNING = 2e-3, 3e-3  # m
+APART = 3.0  # factor between bars, whose round-off depends on the axes
+LEAST = 1e-12  # bars of SI units below which they are round-off alone
+SCENES = {
+    "sled": 0.65, "eccentric_sphere": 0.6, "rolling_coin": 0.2, "rattleback": 0.1, "free_turntable": 0.3,
+    "spinning_bounce": 0.5, "two_spheres": 0.3, "ladder": 0.3, "falling_rod": 0.6, "slide_to_roll": 0.4,
+    "sled_on_slope": 0.3, "tilted_disc": 0.2, "rocking_block": 0.3,
+}  # fmt: skip
+
+
+def with_resistance(mechanism: Mechanism) -> Mechanism:
+    """The mechanism with resistance against rolling and spinning in each pair that may have it."""
+    pairs = list(mechanism.pairs)
+    for k, pair in enumerate(mechanism.pairs):
+        try:
+            resisted = dataclasses.replace(pair, rolling_resistance=ROLLING, spinning_friction=SPINNING)
+            dataclasses.replace(mechanism, pairs=(*pairs[:k], resisted, *pairs[k + 1 :]))
+        except InputError:
+            continue
+        pairs[k] = resisted
+    return dataclasses.replace(mechanism, pairs=tuple(pairs))
+
+
+def ball(slides: float, spins: float) -> Mechanism:
+    """A ball that slides and spins on a plane, against friction of each kind."""
+    v0 = (0.9 + slides, -0.5, 0.0, 5.0, 9.0, spins)
+    free = Joint("free", "free", "world", "ball", q0=(0.0, 0.0, 0.1, 1.0, 0.0, 0.0, 0.0), v0=v0)
+    shapes = (Geometry("s", "ball", "sphere", radius=0.1), Geometry("floor", "world", "plane"))
+    pair = Pair("touch", ("s", "floor"), 0.3, rolling_resistance=ROLLING, spinning_friction=SPINNING)
+    return Mechanism((Body("ball", 1.0, inertia=(0.004,) * 3),), (free,), geometries=shapes, pairs=(pair,))
+
+
+def assert_the_same_elsewhere(mechanism: Mechanism, until: float, seed: int) -> None:
+    """The truth of a mechanism is its truth in a world turned at random."""
+    rpy = tuple(np.random.default_rng(seed).uniform(-3, 3, 3))
+    times, R = np.linspace(0.0, until, 4), from_rpy(rpy)
+    try:
+        here = truth_of(mechanism, times)
+    except Refused as error:
+        with pytest.raises(Refused, match=str(error)[:20]):
+            truth_of(turned_mechanism(mechanism, rpy, (0.0, 0.0, 0.0)), times)
+        return
+    there = truth_of(turned_mechanism(mechanism, rpy, (0.0, 0.0, 0.0)), times)
+    assert (here.horizon, here.end) == pytest.approx((there.horizon, there.end), rel=1e-6)
+    assert here.ended.split(" at t =")[0] == there.ended.split(" at t =")[0]
+    assert [(event.kind, event.name) for event in here.events] == [(event.kind, event.name) for event in there.events]
+    for one, other in zip(here.events, there.events, strict=True):
+        wide = (one.time_high - one.time_low + other.time_high - other.time_low) / 2
+        assert one.time == pytest.approx(other.time, abs=wide)
+    for name in ("p_WB", "v_WB", "w_WB"):
+        bars = here.bars[name][-1] + there.bars[name][-1]
+        turned = getattr(here.record, name) @ R.T
+        assert np.nanmax(np.abs(turned - getattr(there.record, name))) <= bars
+    for name, bar in here.bars.items():
+        known = sorted([max(float(bar[-1]), LEAST), max(float(there.bars[name][-1]), LEAST)])
+        assert known[1] <= APART * known[0], name
+
+
+def _cases() -> list[Any]:
+    drilled = {"eccentric_sphere", "rolling_coin"}
+    return [
+        pytest.param(name, resisted, marks=pytest.mark.drill if name in drilled and resisted else NIGHTLY)
+        for name in SCENES
+        for resisted in (False, True)
+    ]
+
+
+@pytest.mark.arithmetic
+@pytest.mark.parametrize(("slides", "spins", "seed"), [(0.0, 0.0, 1), (0.0, 7.0, 2), (1.5, -4.0, 3)])
+def test_a_ball_with_resistance_rolls_alike_in_a_turned_world(slides: float, spins: float, seed: int) -> None:
+    """A ball that rolls, spins or slides against resistance has the same truth whatever the axes are."""
+    assert_the_same_elsewhere(ball(slides, spins), 0.3, seed)
+
+
+@pytest.mark.arithmetic
+@pytest.mark.parametrize(("name", "resisted"), _cases())
+def test_a_scene_with_contacts_has_the_same_truth_in_a_turned_world(name: str, resisted: bool) -> None:
+    """A scene with contacts, with and without resistance, has the same truth whatever the axes are."""
+    mechanism = the_mechanism(load_scene(name)).mechanism
+    assert_the_same_elsewhere(with_resistance(mechanism) if resisted else mechanism, SCENES[name], len(name))
+
+
+@pytest.mark.arithmetic
+@pytest.mark.parametrize("seed", [pytest.param(seed, marks=NIGHTLY) for seed in range(60)])
+def test_random_contacts_with_resistance_have_the_same_truth_in_a_turned_world(seed: int) -> None:
+    """The same of random bodies that touch."""
+    _, mechanism, until = random_contacts(seed)
+    assert_the_same_elsewhere(with_resistance(mechanism), until, seed)
