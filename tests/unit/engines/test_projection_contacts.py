@@ -12,6 +12,7 @@ from scipy.integrate import solve_ivp
 from proofroll.core.errors import Refused
 from proofroll.core.first_steps import first_steps
 from proofroll.core.plugins import load_engine
+from proofroll.core.scene import Scene
 from proofroll.elements.mechanism import Body, Joint, Mechanism
 from proofroll.elements.mechanism.contacts.acting import Acting
 from proofroll.elements.mechanism.contacts.geometry import Geometry, Pair
@@ -344,7 +345,7 @@ def test_a_fixed_step_that_ends_a_slip_keeps_its_direction(angle: float) -> None
     """A point that friction stops against a weaker drive passes zero along its slip, at every angle between them."""
     step, drive = 0.01, 0.82 * np.array([np.cos(angle), np.sin(angle), 0.0])
     mode = (Acting("slip", None, (1.0, 0.0, 0.0)),)
-    directions, u = SlipDirections(step), np.array([0.2, 0.0, 0.0])
+    directions, u = SlipDirections(step, np.zeros(1)), np.array([0.2, 0.0, 0.0])
     directions.begin(mode)
 
     def rate(slip: Array) -> Array:
@@ -405,3 +406,19 @@ def test_a_contact_that_opens_does_not_hit_at_once() -> None:
     run = PROJECTION.build(load_scene("flick"), replace(DEFAULT, dt=2e-3))
     run.advance(0.1)
     assert [(event.kind, event.name) for event in run.events()] == [("slip", "push"), ("lift_off", "push")]
+
+
+def test_a_ball_that_rolls_across_a_slope_begins_to_slip_down_it() -> None:
+    """Friction acts against the slip that begins, however round-off directs the slip at the start."""
+    lean, speed, radius, friction = 0.35, 0.2, 0.025, 0.05
+    normal = (float(np.sin(lean)), 0.0, float(np.cos(lean)))
+    roll = [speed * part / radius for part in (normal[2], 0.0, -normal[0])]
+    start = (*(radius * part for part in normal), 1.0, 0.0, 0.0, 0.0)
+    free = Joint("free", "free", "world", "ball", q0=start, v0=(0.0, -speed, 0.0, *roll))
+    shapes = (Geometry("s", "ball", "sphere", radius=radius), Geometry("wall", "world", "plane", normal=normal))
+    pair = Pair("contact", ("s", "wall"), friction)
+    ball = Mechanism((Body("ball", 0.5, inertia=(1.25e-4,) * 3),), (free,), geometries=shapes, pairs=(pair,))
+    run = PROJECTION.build(Scene("ball", "", (MechanismElement(ball),)), DEFAULT)
+    run.advance(0.1)
+    pull = 9.81 * (np.sin(lean) - friction * np.cos(lean))
+    assert run.sample().v_WB[0] == pytest.approx([0.1 * pull * normal[2], -speed, -0.1 * pull * normal[0]], abs=1e-9)

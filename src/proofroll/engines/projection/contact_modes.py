@@ -89,7 +89,7 @@ class ContactMotion(AlternatingMotion[ContactMode]):
         turns = [mechanism.joints[each.joint.number].kind != JointKind.PRISMATIC for each in self._joints]
         # length of each contact's motion by 1 m, or by 1 rad
         self._arms = np.array([1.0] * len(self._bodies) + [scale.length if turn else 1.0 for turn in turns])
-        self._slipping = SlipDirections(step)
+        self._slipping = SlipDirections(step, self._still / self._arms)
         self._timed = any(map(varies, mechanism.signals))
         self._faint = max(self._still, _REST * step * float(np.linalg.norm(mechanism.gravity)))
         self._limited = {k: item for k, item in enumerate(mechanism.actuators) if item.limit is not None}

@@ -16,9 +16,9 @@ class SlipDirections:
     circle about zero for good. A slip that a fixed step ends, by the rate of the step before, keeps its direction.
     """
 
-    def __init__(self, step: float) -> None:
-        """Takes the size of a fixed step [s]; 0: the step adapts."""
-        self._step = step
+    def __init__(self, step: float, still: Array) -> None:
+        """Takes the size of a fixed step [s], 0 if it adapts, and speeds of each contact that count as rest [m/s]."""
+        self._step, self._still = step, still
         self._toward: list[Array] = []
         self._speeds: list[float] = []
         self._time = 0.0
@@ -46,9 +46,9 @@ class SlipDirections:
         return -float(slip_velocity(there) @ self._toward[k])
 
     def heading(self, k: int, there: Touching) -> Array:
-        """Direction of a slip; after the end of the slip within a step, the direction before."""
+        """Direction of a slip; of one that counts as rest, and after its end within a step, the direction before."""
         slip, toward = slip_velocity(there), self._toward[k]
         speed = float(np.linalg.norm(slip))
-        if self._last_step[k] or speed <= np.finfo(float).tiny:
+        if self._last_step[k] or speed <= self._still[k]:
             return toward
         return np.asarray(slip / speed if slip @ toward >= 0 else -slip / speed)

@@ -283,7 +283,7 @@ class ContactWalks(ABC):
             speeds, changes = zip(*map(one, states.T), strict=True)
             return np.array(speeds), np.array(changes).T
 
-        compiled = self._by_symbols(state, mode)
+        compiled = self.by_symbols(state, mode)
         decay = by_states if compiled is None else compiled.decay_of(mode, k, time)
         guard = guards_of(self.contacts, mode).index(ContactGuard(k, "still"))
         slip = stopping_slip(time, state, mode, guard, decay)

@@ -24,6 +24,7 @@ from proofroll.truth.mechanism.contact_tree import ContactTree
 from proofroll.truth.mechanism.law_states import stated_named
 from proofroll.truth.mechanism.natural_units import Units
 from proofroll.truth.mechanism.planar_slip import BegunSlip
+from proofroll.truth.mechanism.stopping_slip import StoppingSlip
 
 _RESOLVED = 1e-13  # last coefficients of states on a piece, relative to their sizes, that are round-off
 _TURN = 1.0  # rad, by which bodies turn in a piece at most: more is not resolved by its points
@@ -77,7 +78,7 @@ class LawRecorder:
             pieces = [piece for piece in cut if piece.coarse is coarse]
             if pieces:
                 records = [
-                    np.array([self._state_of(y, stretch.mode) for y in piece.states])
+                    np.array([self._state_of(y, self._route.acting(stretch, y)) for y in piece.states])
                     if piece.record is None
                     else piece.record
                     for piece in pieces
@@ -90,13 +91,13 @@ class LawRecorder:
         """First point of a stretch with these pieces, as exact as its steps."""
         if pieces and self._reaches(pieces[0], 0, stretch.start):
             return pieces[0].points(0, 0)
-        return self._at(stretch.start, stretch.first, stretch.mode)
+        return self._at(stretch.start, stretch.first, self._route.acting(stretch, stretch.first))
 
     def end(self, stretch: Stretch[ContactMode], pieces: Sequence[Pieces]) -> Pieces:
         """Last point of a stretch with these pieces, as exact as its steps."""
         if pieces and self._reaches(pieces[-1], -1, stretch.end):
             return pieces[-1].points(-1, -1)
-        return self._at(stretch.end, stretch.last, stretch.mode)
+        return self._at(stretch.end, stretch.last, self._route.acting(stretch, stretch.last))
 
     def _reaches(self, pieces: Pieces, point: int, time: float) -> bool:
         """True if exact pieces begin or end at a time, but for its last digits: not where a slip fades away behind."""
@@ -198,7 +199,10 @@ class LawRecorder:
             compiled = self._route.by_symbols(stretch.last, stretch.mode)
             recorded = None if compiled is None else compiled.record_of(stretch.mode, stretch.start)
             for k, (start, end) in enumerate(pairwise(edges)):  # at rest a slip has no direction in compiled modes
-                yield from self._parts(start, end, lambda x: stretch.at(x).T, recorded if k else None)
+                yield from self._parts(start, end, lambda x: stretch.at(x).T, recorded if 0 < k < _PARTS - 1 else None)
+        elif isinstance(stretch, StoppingSlip):
+            if stretch.end > stretch.start:
+                yield from self._parts(stretch.start, stretch.end, lambda x: stretch.at(x).T, None, depth=_HALVINGS)
         elif isinstance(stretch, CompiledStretch) and stretch.by is not None:
             recorded = stretch.by.record_of(stretch.mode, stretch.start)
             for start, end, inside_step in stretch.by.steps_of(stretch):
