@@ -269,11 +269,13 @@ def _undecided(contacts: Sequence[Touchable], solved: SolvedContacts) -> float:
     """Guard of a motion that hangs on how contacts share a load.
 
     Each split of it has its own friction where slips are not parallel. The slower these are, the less time it has to
-    act: the spread of the accelerations counts by their speed.
+    act: the spread of the accelerations counts by their speed. It is that of a split of the whole load, which is small
+    on a light body.
     """
+    load = float(np.abs(solved.force[sharing(solved.splits)]).max(initial=0.0))
     rubbing = zip(solved.mode, contacts, solved.touching, strict=True)
     speeds = (slip_velocity(each) for own, contact, each in rubbing if own.kind == "slip" and contact.friction)
-    return solved.spread * max(float(np.linalg.norm(speed)) for speed in speeds) - SHARED
+    return load * solved.spread * max(float(np.linalg.norm(speed)) for speed in speeds) - SHARED
 
 
 def leaves(contact: Touchable, k: int, solved: SolvedContacts) -> bool:

@@ -26,6 +26,7 @@ _SHARES = 1e-9
 # Relative change of loads and friction with which an outcome is tried on both sides; an outcome that changes is not
 # unique. Each further contact gets an extra 0.382 of it: equal changes would cancel between two walls.
 _NUDGE, _APART = 1e-6, 0.382
+_ROUND_OFF = 1e-14  # of motions, in parts of what they are the sum of: a light body between heavy ones has 2e-16
 _NULL = 1e-12  # response to forces, relative to the largest of unit rows, that counts as none: round-off is 1e-16
 
 
@@ -35,6 +36,12 @@ def largest_friction(friction: Any, normal: Any) -> Any:
     return np.where(
         unbounded, np.where(np.greater(normal, 0), np.inf, 0.0), np.where(unbounded, 0.0, friction) * normal
     )
+
+
+def natural_rows(G: Array) -> Array:
+    """Natural unit of each row of responses, the root of the force that it needs: bodies of any mass may touch."""
+    own = np.diag(G)
+    return np.asarray(1 / np.sqrt(np.where(own > 0, own, 1.0)))
 
 
 def returning(slides: Array, restitution: Array, sideways: Array) -> Array:
@@ -250,12 +257,12 @@ def _all_held(
     G: Array, c: Array, friction: Array, rests: float, near: float, pressing: Sequence[int | None]
 ) -> Array | None:
     """Forces that let every contact stick and press within the cones of friction, in any distribution; else None."""
-    size = np.sqrt(np.diag(G))
-    scale = 1 / np.where(size > 0, size, 1.0)  # natural unit of each row: bodies of any mass may touch
+    scale = natural_rows(G)
     values, vectors = np.linalg.eigh(G * np.outer(scale, scale))
     whole = values > _NULL * values[-1]
     held: Array = -scale * (vectors[:, whole] @ ((vectors[:, whole].T @ (scale * c)) / values[whole]))
-    if np.abs(scale * (c + G @ held)).max() > rests * np.abs(scale * c).max():
+    rounded = _ROUND_OFF * float((scale * (np.abs(G) @ np.abs(held))).max())
+    if np.abs(scale * (c + G @ held)).max() > max(rests * float(np.abs(scale * c).max()), rounded):
         return None
     count = len(friction)
     cones = cones_of(

@@ -25,7 +25,13 @@ from proofroll.elements.mechanism.contacts.acting import (
     turned,
     with_features,
 )
-from proofroll.elements.mechanism.contacts.coulomb import contact_forces, least_motion_for, returning, robust_forces
+from proofroll.elements.mechanism.contacts.coulomb import (
+    contact_forces,
+    least_motion_for,
+    natural_rows,
+    returning,
+    robust_forces,
+)
 from proofroll.elements.mechanism.contacts.free_slides import passing
 from proofroll.elements.mechanism.contacts.geometry import BodyContact, pair_sums
 from proofroll.elements.mechanism.contacts.joint_laws import (
@@ -142,9 +148,7 @@ class ContactDynamics:
         free = free + state.W @ np.einsum("kin,ki->n", state.J, force)
         if not owner:
             none = np.zeros((len(mode), 3, 0))
-            return ContactSolution(
-                state=state, mode=mode, acceleration=free, force=force, response=1.0, shifts=none, spread=0.0
-            )
+            return ContactSolution(state, mode, acceleration=free, force=force, response=1.0, shifts=none, spread=0.0)
         D = np.array([direction @ state.J[k] for direction, k in zip(along, owner, strict=True)])
         owned = list(zip(owner, along, strict=True))
         moments = moments_by_pressing(turning, owned, [each.normal for each in state.touching])
@@ -152,10 +156,12 @@ class ContactDynamics:
             D[place] += moment @ state.J[k]
         S, wanted = K @ state.W @ D.T, -(K @ free + np.concatenate(bias))
         smooth = K @ state.W @ K.T
-        values, vectors = np.linalg.eigh(smooth)
-        weak = values < max(RANK * values[-1], NO_RESPONSE * float(np.einsum("in,nm,im->i", K, state.loose, K).max()))
-        z = np.linalg.lstsq(S, wanted, rcond=RANK)[0] if weak.any() else np.linalg.solve(S, wanted)
-        ways = np.linalg.svd(S)[2][len(S) - weak.sum() :].T if weak.any() else np.zeros((len(S), 0))
+        units = natural_rows(K @ state.loose @ K.T)
+        values, vectors = np.linalg.eigh(smooth * np.outer(units, units))
+        weak, even = values < max(RANK * values[-1], NO_RESPONSE), S * np.outer(units, units)
+        z = units * np.linalg.lstsq(even, units * wanted, rcond=RANK)[0] if weak.any() else np.linalg.solve(S, wanted)
+        ways = units[:, None] * np.linalg.svd(even)[2][len(S) - weak.sum() :].T if weak.any() else np.zeros((len(S), 0))
+        ways /= np.linalg.norm(ways, axis=0)
         shifts = np.zeros((len(mode), 3, ways.shape[1]))
         for k, direction, size, loose in zip(owner, along, z, ways, strict=True):
             force[k] += size * direction
@@ -163,13 +169,11 @@ class ContactDynamics:
         for k, place, moment in moments:
             force[k] += z[place] * moment
             shifts[k] += np.outer(moment, ways[place])
-        whole = vectors[:, ~weak]  # without what the split of a shared load changes
+        whole = units[:, None] * vectors[:, ~weak]  # without what the split of a shared load changes
         response = float(np.linalg.det(whole.T @ S @ whole) / np.linalg.det(whole.T @ smooth @ whole))
         spread = float(np.linalg.norm(state.W @ (D.T @ ways)))
         free = free + state.W @ D.T @ z
-        return ContactSolution(
-            state=state, mode=mode, acceleration=free, force=force, response=response, shifts=shifts, spread=spread
-        )
+        return ContactSolution(state, mode, free, force, response=response, shifts=shifts, spread=spread)
 
     @staticmethod
     def heading(own: Acting, found: Touching) -> Array:
