@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from proofroll.core.errors import Diverged, Refused
+from proofroll.core.errors import Diverged, InputError, Refused
 from proofroll.elements.mechanism import Body, Force, Joint, Mechanism, Spring
 from proofroll.elements.mechanism.bushing import Bushing
 from proofroll.elements.mechanism.contacts.geometry import Geometry, Pair
@@ -151,7 +151,7 @@ def outcome(fault: LawFault) -> str:
     with planted(fault):
         try:
             motion = truth_of(make(), np.linspace(0.0, until, 6))
-        except (Refused, Diverged, ArithmeticError) as error:
+        except (Refused, Diverged, InputError, ArithmeticError) as error:
             return f"refused: {error}"
     if motion.ended:
         return f"refused: {motion.ended}"

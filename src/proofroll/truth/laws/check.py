@@ -18,9 +18,6 @@ if TYPE_CHECKING:
     from proofroll.elements.mechanism import Mechanism
 
 
-_SAME = 1e-9  # relative difference of times up to which violations of two routes are one
-
-
 class LawCheck:
     """Laws of a mechanism, to which the record of one route is held.
 
@@ -62,7 +59,7 @@ class LawVerdict(NamedTuple):
         events: number of transitions.
         largest: largest residual in parts of its allowance, its law, time [s] and part.
         violation: first violation; None: all hold.
-        routes: names of the routes that break that law.
+        routes: names of the routes that break a law; if both do, the cause is in code that they share.
     """
 
     laws: int
@@ -78,16 +75,13 @@ def verdict(checked: Mapping[str, LawResiduals]) -> LawVerdict:
     largest = [(part, law, time, name) for each in checked.values() for law, (part, time, name) in each.largest.items()]
     broken = {route: each.first for route, each in checked.items() if each.first is not None}
     violation = min(broken.values(), key=lambda item: item.time, default=None)
-    # a route breaks it as well if its own first violation begins within the same piece, but for digits of an event
-    last = 0.0 if violation is None else violation.until * (1 + _SAME)
-    routes = tuple(name for name, item in broken.items() if item.time <= last)
     return LawVerdict(
         laws=len({law for each in checked.values() for law in each.largest}),
         points=max((each.points for each in checked.values()), default=0),
         events=max((each.events for each in checked.values()), default=0),
         largest=max(largest, default=(0.0, "", 0.0, "")),
         violation=violation,
-        routes=routes,
+        routes=tuple(broken),
     )
 
 

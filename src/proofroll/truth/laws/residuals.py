@@ -57,7 +57,7 @@ class Violation(NamedTuple):
     """First violation of a law by a route.
 
     Attributes:
-        time, until: start and end of the piece in which it happens [s].
+        time: start of the piece in which it happens [s].
         law: name of the law.
         part: name of the body, joint or contact; empty: the whole mechanism.
         size: residual relative to its natural size.
@@ -65,7 +65,6 @@ class Violation(NamedTuple):
     """
 
     time: float
-    until: float
     law: str
     part: str
     size: float
@@ -127,10 +126,10 @@ class LawResiduals:
             return
         violating = (parts > 1.0).reshape(len(parts), -1).any(1)
         piece = int(violating.argmax())
-        begin, end = float(times[piece].min()), float(times[piece].max())
+        begin = float(times[piece].min())
         if self.first is None or begin < self.first.time:
             number = int(np.argmax(parts[piece]))
             with np.errstate(all="ignore"):
                 size_there = float(residual[piece].flat[number] / size[piece].flat[number])
                 bound = float(allowed[piece].flat[number] / size[piece].flat[number])
-            self.first = Violation(begin, end, law, part, size_there, bound)
+            self.first = Violation(begin, law, part, size_there, bound)
