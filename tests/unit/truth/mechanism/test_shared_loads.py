@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from proofroll.elements.mechanism import Body, Joint, Mechanism
 from proofroll.elements.mechanism.contacts.geometry import Geometry, Pair
@@ -36,3 +37,27 @@ def test_forces_of_joints_and_drives_that_hang_on_a_split_are_not_given() -> Non
     assert np.isnan(wrench[:, 1:, 2]).all()
     assert np.isfinite(wrench[:, 0]).all()
     assert max(float(found.bars[name][-1]) for name in ("wrench", "named", "p_WB", "v_WB")) < 1e-9
+
+
+@pytest.mark.drill
+def test_a_light_body_on_a_heavy_one_slides_until_both_move_alike() -> None:
+    """A box of 2 kg on a belt of 1e6 kg sticks where momentum says, as on a light belt."""
+    belt, box, speed, mu, g = 1e6, 2.0, 0.8, 0.3, 9.81
+    bodies = Body("belt", belt), Body("box", box, inertia=(0.02,) * 3)
+    joints = (
+        Joint("run", "prismatic", "world", "belt", axis=(1.0, 0.0, 0.0), v0=(speed,)),
+        Joint("float", "free", "world", "box", q0=(0.0, 0.0, 0.1, 1.0, 0.0, 0.0, 0.0)),
+    )
+    feet = [
+        Geometry(f"foot{k}", "box", "sphere", (x, y, -0.1), radius=0.0)
+        for k, (x, y) in enumerate([(0.15, 0.15), (0.15, -0.15), (-0.15, 0.15), (-0.15, -0.15)])
+    ]
+    pairs = tuple(Pair(f"touch{k}", (f"foot{k}", "top"), friction=mu) for k in range(4))
+    shapes = (Geometry("top", "belt", "plane"), *feet)
+    mechanism = Mechanism(bodies, joints, gravity=(0.0, 0.0, -g), geometries=shapes, pairs=pairs)
+    found = truth_of(mechanism, np.array([0.0, 0.4]))
+    sticks = speed / (mu * g * (1 + box / belt))
+    common = speed * belt / (belt + box)
+    assert found.ended == ""
+    assert all(event.time_low <= sticks <= event.time_high for event in found.events)
+    assert found.record.p_WB[1, 1, 0] == pytest.approx(mu * g * sticks**2 / 2 + common * (0.4 - sticks), abs=1e-9)
