@@ -1,4 +1,7 @@
-"""Laws of an impact: impulses explain the jump, v+ = -e v-, impulses press within their cones, no energy is won."""
+"""Laws of an impact: impulses explain the jump, v+ = -e v-, impulses press within their cones.
+
+Newton's and Coulomb's laws together may win energy (Kane's paradox), so that energy is no law here.
+"""
 
 from __future__ import annotations
 
@@ -8,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from proofroll.truth.laws.contacts import gap_of, slide_of
-from proofroll.truth.laws.integrals import dot, norm, turned, turned_back
+from proofroll.truth.laws.integrals import norm, turned
 from proofroll.truth.laws.joints import Coordinates
 from proofroll.truth.laws.record import Array, Passage, Pieces
 from proofroll.truth.laws.residuals import LawResiduals
@@ -85,10 +88,6 @@ def impact(
     _newton(scene, passage, residuals, hits, stops, fastest)
     if len(hits) == 1 and not stops and not passage.settles:
         _coulomb(scene, passage, residuals, hits[0], pulses[joints:])
-    if not any(joint.armature or joint.motion is not None for joint in m.joints):
-        energies = [_kinetic(scene, each) for each in (before, after)]
-        size = max(energies[0], m.mass * scene.speed**2)
-        residuals.note("impact energy", "", np.array([[max(energies[1] - energies[0], 0.0)]]), size, time)
 
 
 def _column(scene: LawScene, before: Pieces, ends: tuple[int, int], place: Array, force: Array, moment: Array) -> Array:
@@ -149,12 +148,6 @@ def _momentum(scene: LawScene, before: Pieces, after: Pieces) -> Array:
     spin = turned(before.R[0, 0] @ scene.inertia @ before.R[0, 0].swapaxes(-1, -2), after.w[0, 0] - before.w[0, 0])
     linear = scene.mass[:, None] * (velocities[1] - velocities[0])
     return np.concatenate([linear, spin], -1)[:-1].ravel()
-
-
-def _kinetic(scene: LawScene, pieces: Pieces) -> float:
-    velocities = scene.centres(pieces)[1][0, 0]
-    local = turned_back(pieces.R[0, 0], pieces.w[0, 0])
-    return float(0.5 * (scene.mass * dot(velocities, velocities) + dot(local, turned(scene.inertia, local))).sum())
 
 
 def _explained(columns: Sequence[Array], jump: Array) -> tuple[Array, Array]:

@@ -41,7 +41,6 @@ LAWS: dict[str, tuple[float, str]] = {
     "impulse": (1e-10, "velocities jump by impulses of joints, stops and contacts"),
     "restitution": (1e-10, "v+ = -e v- at an impact"),
     "impact cone": (1e-9, "impulses press, within the bound of friction"),
-    "impact energy": (1e-10, "an impact wins no energy"),
 }
 # Laws that a route keeps by their second derivatives alone: their residuals (1e-13 after 1 s of `stopped_fall`) grow
 # as a random walk of rates does. So their allowances grow with the time in natural units.

@@ -40,6 +40,6 @@ def test_a_truth_says_that_it_holds_all_laws() -> None:
     """The motion and the line of a run have the outcome."""
     ball, until = SCENES["grip"]
     laws = truth_of(ball(), np.linspace(0.0, until / 2, 3)).laws
-    assert laws.startswith("holds 13 laws at ")
+    assert laws.startswith("holds 12 laws at ")
     line = truth_message(Columns({}, {"route": "one", "second_route": "two", LAWS: laws}))
     assert line == f"one, checked by two; {laws}"
