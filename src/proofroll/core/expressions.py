@@ -52,7 +52,7 @@ def evaluated(
         names: the parameters, with their units.
         unit: required unit of the result, as scene files write it, or several joined by OR; "": not checked. A formula
             of plain numbers is accepted for any unit, as a plain number is.
-        functions: functions of a dimensionless number that the expression may call; None: :data:`FUNCTIONS`.
+        functions: further functions of a dimensionless number that the expression may call, beside :data:`FUNCTIONS`.
 
     Raises:
         InputError: the expression cannot be read, has an unknown name or function, divides by zero, overflows, adds
@@ -61,7 +61,8 @@ def evaluated(
     if len(text) > LONGEST:
         raise InputError(field, text, f"an expression may have at most {LONGEST} characters")
     constants = {**CONSTANTS, **names}
-    called = FUNCTIONS if functions is None else {name: _of_ratio(name, item) for name, item in functions.items()}
+    further = {name: _of_ratio(name, item) for name, item in (functions or {}).items() if name not in FUNCTIONS}
+    called = {**FUNCTIONS, **further}
     try:
         source = text.replace("^", "**").strip()
         value = evaluator(constants, called, _power).eval(source, ast.parse(source, mode="eval").body)
@@ -119,6 +120,24 @@ def _size(argument: Quantity | float) -> Quantity:
     return Quantity(abs(quantity.value), quantity.powers)
 
 
+def _sign(argument: Quantity | float) -> Quantity:
+    value = _plain(argument)
+    return Quantity(math.copysign(1.0, value) if value else 0.0)
+
+
+def _chosen(name: str, choose: Callable[..., float]) -> Callable[..., Quantity]:
+    """Largest or smallest of quantities in one unit."""
+
+    def called(*arguments: Quantity | float) -> Quantity:
+        total = Quantity(0.0)
+        for argument in arguments:
+            total = total + argument  # raises if their units differ
+        return Quantity(choose(map(_plain, arguments)), total.powers)
+
+    called.__name__ = name
+    return called
+
+
 def _plain(argument: Quantity | float) -> float:
     return float((Quantity(0.0) + argument).value)
 
@@ -130,6 +149,9 @@ FUNCTIONS: Mapping[str, Callable[..., Quantity]] = {
     "sqrt": _root,
     "hypot": _hypotenuse,
     "abs": _size,
+    "sign": _sign,
+    "max": _chosen("max", max),
+    "min": _chosen("min", min),
 }
 
 

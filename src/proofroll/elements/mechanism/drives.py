@@ -99,11 +99,13 @@ class Actuator:
         effort = (n * self.kd) * (target - n * v) if self.kind == "velocity" else (n * self.kp) * (target - n * q)
         return effort - (n * n * self.kd) * v if self.kind == "position" and self.kd else effort
 
-    def effort(self, time: float, q: float, v: float, mode: str | None = None) -> float:
+    def effort(
+        self, time: float, q: float, v: float, mode: str | None = None, functions: Mapping[str, Any] | None = None
+    ) -> float:
         """Effort at the joint in a mode of :data:`MODES` [N m, N]; None: clamped to the limit."""
         if mode in {"least", "greatest"}:
             return -self.bound if mode == "least" else self.bound
-        free = float(self.wanted(time, q, v))
+        free = float(self.wanted(time, q, v, functions))
         return free if mode == "linear" else min(max(free, -self.bound), self.bound)
 
     def mode(self, time: float, q: float, v: float) -> str:

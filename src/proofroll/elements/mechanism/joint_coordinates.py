@@ -25,13 +25,14 @@ from proofroll.elements.mechanism.complementarity import (
     refuse_switching,
 )
 from proofroll.elements.mechanism.kinematics import BodyMotion, Rows, Tree
+from proofroll.elements.mechanism.kinks import Functions
 from proofroll.elements.mechanism.light_joints import lacks_inertia
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.named_forces import joint_force_shares, lengths, pick_named
 from proofroll.elements.mechanism.point_loads import point_loads
 from proofroll.elements.mechanism.record import Record, record_of
 from proofroll.elements.mechanism.rotations import Array, skews, to_quaternion
-from proofroll.elements.mechanism.signal import value_at, varies
+from proofroll.elements.mechanism.signal import FUNCTIONS, value_at, varies
 from proofroll.elements.mechanism.switches import REDUNDANT, STOPPED, Mode, held_joints, switched_joints
 
 _NEAR = 1e-7  # displacement of coordinates for finite differences of accelerations [m, 1]
@@ -84,6 +85,7 @@ class JointCoordinates:
         self.limited = [place for place in self.actuators if place[0].limit is not None]
         self._clamped = [actuator.limit is not None for actuator in mechanism.actuators]
         self.sides: Mode = ()  # modes of limited efforts that are kept; empty: they follow from the state
+        self.functions: Functions = FUNCTIONS  # of formulas, which may hold the sides of their kinks
         self.switches = bool(self.switched or self.limited)
         self._light = self.rank > 0 and lacks_inertia(mechanism)
         self._armature = np.diag([joint.armature for joint in by_velocity])
@@ -109,22 +111,22 @@ class JointCoordinates:
         b = self._torque - self._damping * v - loads.ravel() @ J.reshape(-1, len(v))
         for stiffness, rest, at_q, at_v in self._springs:
             b[at_v] -= stiffness * (q[at_q] - rest)
-        for i, arm, force, moment in point_loads(self.mechanism, motion, time):
+        for i, arm, force, moment in point_loads(self.mechanism, motion, time, self.functions):
             b += np.concatenate([force, moment + cross(arm, force)]) @ motion.J[i]
         if self.switched:
             b += load_of(self.switched, mode, len(v))
         if load is not None:
             b += load
         for signal, at in self._driven:
-            b[at] += value_at(signal, time)
+            b[at] += value_at(signal, time, self.functions)
         if self.actuators:
             for (_, _, at), effort in zip(self.actuators, self.efforts(time, q, v, mode), strict=True):
                 b[at] += effort
-        rows = self.tree.loop_rows(motion, time)
+        rows = self.tree.loop_rows(motion, time, self.functions)
         C, bias, rank = rows.C, rows.bias, self.rank
         if held := [self.switched[number].velocity for number in held_joints(mode)]:
             C, bias, rank = np.vstack([C, np.eye(len(v))[held]]), np.append(bias, np.zeros(len(held))), rank + len(held)
-        M, b = self._weighted(M, b, C, bias)
+        M, b = self.weighted(M, b, C, bias)
         try:
             into = np.linalg.inv(np.linalg.cholesky(M)).T  # M⁻¹ = into intoᵀ
         except np.linalg.LinAlgError:
@@ -158,7 +160,7 @@ class JointCoordinates:
             holding=multipliers[loops:],
         )
 
-    def _weighted(self, M: Array, b: Array, C: Array, bias: Array) -> tuple[Array, Array]:
+    def weighted(self, M: Array, b: Array, C: Array, bias: Array) -> tuple[Array, Array]:
         """Mass matrix and forces with a weight on the rows, if the mass matrix is singular without them.
 
         Accelerations meet C v̇ = −bias, so the weight changes neither them nor the multipliers.
@@ -176,7 +178,9 @@ class JointCoordinates:
         """Effort of each actuator at its joint [N m, N], by its mode if ``mode`` has one, else clamped to its limit."""
         modes = iter(mode[len(self.switched) :] or self.sides)
         return [
-            actuator.effort(time, float(q[at_q]), float(v[at_v]), next(modes, None) if clamped else "linear")
+            actuator.effort(
+                time, float(q[at_q]), float(v[at_v]), next(modes, None) if clamped else "linear", self.functions
+            )
             for (actuator, at_q, at_v), clamped in zip(self.actuators, self._clamped, strict=True)
         ]
 

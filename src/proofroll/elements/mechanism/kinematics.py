@@ -9,10 +9,12 @@ from numpy.typing import NDArray
 from proofroll.elements.mechanism.drives import Coupling
 from proofroll.elements.mechanism.joint import Joint, child_in_parent, coordinate_rate
 from proofroll.elements.mechanism.joint_kinds import AXES, DISTANCE, FACTS, WITH_QUATERNION
+from proofroll.elements.mechanism.kinks import Functions
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.parts import Loop
 from proofroll.elements.mechanism.prescribed import moved
 from proofroll.elements.mechanism.rotations import Array, cross
+from proofroll.elements.mechanism.signal import FUNCTIONS
 
 _O, _UNIT = np.zeros(3), np.eye(3)
 
@@ -172,11 +174,14 @@ class Tree:
             motion.bias[i, :3] + cross(motion.bias[i, 3:], arm) + cross(w, cross(w, arm)),
         )
 
-    def loop_rows(self, motion: BodyMotion, time: float = 0.0) -> Rows:
-        """Residuals and rows of all loops, then of all couplings, then of all prescribed motions at a time [s]."""
+    def loop_rows(self, motion: BodyMotion, time: float = 0.0, functions: Functions = FUNCTIONS) -> Rows:
+        """Residuals and rows of all loops, then of all couplings, then of all prescribed motions at a time [s].
+
+        ``functions``: of their formulas.
+        """
         parts = [self._rows_of(motion, loop) for loop in self.mechanism.loops]
         parts += [self._coupled(motion, coupling) for coupling in self.mechanism.couplings]
-        parts += [self._moved(joint, at_v, time) for joint, _, at_v in self.mechanism.prescribed]
+        parts += [self._moved(joint, at_v, time, functions) for joint, _, at_v in self.mechanism.prescribed]
         if not parts:
             none, nv = np.zeros(0), self.mechanism.nv
             return Rows(
@@ -208,9 +213,11 @@ class Tree:
             apart += factor * motion.q[at_q]
         return np.array([apart]), C, np.zeros(1), np.zeros((1, 3)), np.zeros((1, 3))
 
-    def _moved(self, joint: Joint, at_v: int, time: float) -> tuple[Array, Array, Array, Array, Array]:
+    def _moved(
+        self, joint: Joint, at_v: int, time: float, functions: Functions
+    ) -> tuple[Array, Array, Array, Array, Array]:
         assert joint.motion is not None  # as of all prescribed ones
-        acceleration = float(moved(joint.motion, time).acceleration)
+        acceleration = float(moved(joint.motion, time, functions).acceleration)
         return (
             np.zeros(1),
             np.eye(self.mechanism.nv)[[at_v]],

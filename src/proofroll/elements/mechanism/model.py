@@ -6,7 +6,7 @@ body ``world``. Each object checks itself and raises :class:`~proofroll.core.err
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Collection, Hashable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -25,7 +25,7 @@ from proofroll.elements.mechanism.joint import Joint
 from proofroll.elements.mechanism.joint_kinds import JointKind
 from proofroll.elements.mechanism.parts import Body, Force, Loop, Point, Spring
 from proofroll.elements.mechanism.rotations import Array
-from proofroll.elements.mechanism.signal import Held, Signal, Table
+from proofroll.elements.mechanism.signal import Formula, Held, Signal, Table
 
 # Laws of impacts of several contacts at once, see Mechanism.impacts.
 IN_ANY_ORDER, TOGETHER = "any order", "together"
@@ -267,6 +267,15 @@ class Mechanism:
         of_joints = *(joint.torque for joint in self.joints), *(item.target for item in self.actuators)
         of_forces = (part for force in self.forces for part in force.value)
         return (*of_joints, *of_forces, *(joint.motion for joint, _, _ in self.prescribed if joint.motion is not None))
+
+    @cached_property
+    def kinks(self) -> dict[Hashable, list[str]]:
+        """Laws with kinks, springs by their names and formulas of time themselves, and the functions of the kinks."""
+        laws: dict[Hashable, list[str]] = {
+            spring.name: spring.force.kinks for spring in self.springs if spring.force is not None
+        }
+        laws |= {signal: signal.kinks for signal in self.signals if isinstance(signal, Formula)}
+        return {law: names for law, names in laws.items() if names}
 
     def place_of(self, joint: str) -> tuple[int, int]:
         """Indices in q and v of a joint with one coordinate."""

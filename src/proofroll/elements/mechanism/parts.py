@@ -144,10 +144,10 @@ class Spring:
         """Stiffness along its line [N/m]."""
         return self.stiffness
 
-    def pull(self, length: Any, rate: Any) -> Any:
+    def pull(self, length: Any, rate: Any, functions: Mapping[str, Callable[..., Any]] = FUNCTIONS) -> Any:
         """Pull on both ends for a length [m] and its rate [m/s], N; numbers or arrays."""
         pull = self.stiffness * (length - self.length) + self.damping * rate
-        return pull if self.force is None else pull + self.force.pull(length, rate)
+        return pull if self.force is None else pull + self.force.pull(length, rate, functions, self.name)
 
 
 @dataclass(frozen=True)

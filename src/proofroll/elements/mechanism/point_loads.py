@@ -9,8 +9,10 @@ from proofroll.core.arrays import cross
 from proofroll.core.errors import Diverged
 from proofroll.elements.mechanism.bushing import LARGEST
 from proofroll.elements.mechanism.kinematics import BodyMotion
+from proofroll.elements.mechanism.kinks import Functions, Sides
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.rotations import Array
+from proofroll.elements.mechanism.signal import FUNCTIONS, value_at
 
 
 class PointLoad(NamedTuple):
@@ -29,8 +31,12 @@ class PointLoad(NamedTuple):
     moment: Array
 
 
-def point_loads(mechanism: Mechanism, motion: BodyMotion, time: float) -> Iterator[PointLoad]:
+def point_loads(
+    mechanism: Mechanism, motion: BodyMotion, time: float, functions: Functions = FUNCTIONS
+) -> Iterator[PointLoad]:
     """Loads of springs, bushings and applied forces at a time [s], for the motion of bodies and world.
+
+    ``functions``: of their formulas.
 
     Raises:
         Diverged: a bushing turns too far.
@@ -43,7 +49,7 @@ def point_loads(mechanism: Mechanism, motion: BodyMotion, time: float) -> Iterat
         slide = motion.v_WB[b] + cross(motion.w_WB[b], arm_b) - motion.v_WB[a] - cross(motion.w_WB[a], arm_a)
         length = float(np.linalg.norm(d))
         direction = d / length
-        pull = spring.pull(length, float(direction @ slide))
+        pull = spring.pull(length, float(direction @ slide), functions)
         yield PointLoad(a, arm_a, pull * direction, none)
         yield PointLoad(b, arm_b, -pull * direction, none)
     for bushing in mechanism.bushings:
@@ -53,12 +59,23 @@ def point_loads(mechanism: Mechanism, motion: BodyMotion, time: float) -> Iterat
     yield from bushing_loads(mechanism, motion)
     for applied in mechanism.forces:
         acting, reacting = index[applied.body], index[applied.reaction]
-        size = np.array(applied.at(time), dtype=float)
+        size = np.array(applied.at(time, functions), dtype=float)
         load = motion.R_WB[acting] @ size if applied.frame == "body" else size
         force, moment = (load, none) if applied.kind == "force" else (none, load)
         arm = motion.R_WB[acting] @ applied.position
         yield PointLoad(acting, arm, force, moment)
         yield PointLoad(reacting, motion.p_WB[acting] + arm - motion.p_WB[reacting], -force, -moment)
+
+
+def kink_arguments(mechanism: Mechanism, motion: BodyMotion, time: float) -> Array:
+    """Arguments of the kinks of all laws at a time [s], in the order of the mechanism's kinks; zero at a kink."""
+    sides = Sides(mechanism.kinks)
+    functions = sides.functions(FUNCTIONS)
+    for _ in point_loads(mechanism, motion, time, functions):
+        pass
+    for signal in mechanism.signals:
+        value_at(signal, time, functions)
+    return np.array(sides.arguments, dtype=float)
 
 
 def bushing_loads(mechanism: Mechanism, motion: BodyMotion) -> Iterator[PointLoad]:

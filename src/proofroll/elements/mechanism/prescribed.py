@@ -10,6 +10,7 @@ import numpy as np
 
 from proofroll.core.errors import InputError
 from proofroll.elements.mechanism.contacts.walls.formula import Jet
+from proofroll.elements.mechanism.kinks import KINKS, side_of, with_sides
 from proofroll.elements.mechanism.signal import FUNCTIONS, Formula, Signal, Table
 
 if TYPE_CHECKING:
@@ -62,7 +63,7 @@ _DERIVATIVES: Mapping[str, Callable[[Any, Any, Mapping[str, Callable[[Any], Any]
 }
 
 
-def of_jets(functions: Mapping[str, Callable[[Any], Any]]) -> dict[str, Callable[[Any], Any]]:
+def of_jets(functions: Mapping[str, Callable[..., Any]]) -> dict[str, Callable[..., Any]]:
     """Functions of jets, by the chain rule from those of their parts."""
 
     def lifted(name: str) -> Callable[[Any], Any]:
@@ -74,7 +75,8 @@ def of_jets(functions: Mapping[str, Callable[[Any], Any]]) -> dict[str, Callable
 
         return called
 
-    return {name: lifted(name) for name in functions}
+    of_sides = {KINKS: functions[KINKS]} if KINKS in functions else {}
+    return {**with_sides({name: lifted(name) for name in _DERIVATIVES}, side_of), **of_sides}
 
 
 def moved(signal: Signal, time: Any, functions: Mapping[str, Callable[[Any], Any]] = FUNCTIONS) -> Moved:

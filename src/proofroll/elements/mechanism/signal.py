@@ -1,4 +1,4 @@
-"""Signals of time: a number, a smooth formula of the time t, a table, or a value held from one instant to the next."""
+"""Signals of time: a number, a formula of the time t, a table, or a value held from one instant to the next."""
 
 import ast
 import math
@@ -16,14 +16,17 @@ from proofroll.core.expressions import FUNCTIONS as OF_PARAMETERS
 from proofroll.core.parameters import Parameters, in_radians
 from proofroll.core.quantity import Quantity
 from proofroll.elements.mechanism import checks
+from proofroll.elements.mechanism.kinks import KINKED, functions_of, kinks_in
 
 TIME = "t"
 PIECE = "piece of a signal"  # key of a function of a table or held value and a symbol of time
 # Smooth functions that a formula may call; other modules map their names to functions of symbols or of compiled code.
-FUNCTIONS: Mapping[str, Callable[[Any], Any]] = {
+SMOOTH: Mapping[str, Callable[..., Any]] = {
     name: getattr(np, {"asin": "arcsin", "atan": "arctan"}.get(name, name))
     for name in ("sin", "cos", "tan", "asin", "atan", "exp", "log", "sqrt", "tanh")
 }
+FUNCTIONS: Mapping[str, Callable[..., Any]] = {**SMOOTH, **KINKED}
+_MOST_FACTORS = 16  # powers of symbols up to it are products, which have derivatives where the base is zero
 
 
 # What evaluates to no number; KeyError: an operator that is not known, such as a comparison.
@@ -33,6 +36,9 @@ NO_NUMBER += (ValueError, RecursionError, MemoryError)
 
 def _power(functions: Mapping[str, Callable[[Any], Any]], base: Any, power: Any) -> Any:
     base = float(base) if isinstance(base, int) else base  # integers would grow for hours
+    if not isinstance(base, float | np.ndarray | np.number) and power in range(2, _MOST_FACTORS + 1):
+        half = _power(functions, base, power // 2) if power > 3 else base
+        return half * half * base if power % 2 else half * half
     if isinstance(power, int | float | np.ndarray | np.number):
         return base**power
     return functions["exp"](power * (math.log(base) if isinstance(base, float) else functions["log"](base)))
@@ -53,7 +59,7 @@ def formula_value(parsed: Any, names: Mapping[str, Any], functions: Mapping[str,
 
 @dataclass(frozen=True)
 class Formula:
-    """A smooth formula of the time ``t`` [s]: numbers, parameters, + - * / ^ ( ), ``pi`` and :data:`FUNCTIONS`.
+    """A formula of the time ``t`` [s]: numbers, parameters, + - * / ^ ( ), ``pi`` and :data:`FUNCTIONS`.
 
     Attributes:
         text: the formula, without the sign that opens it in a file.
@@ -74,7 +80,12 @@ class Formula:
 
     def at(self, time: Any, functions: Mapping[str, Callable[[Any], Any]] = FUNCTIONS) -> Any:
         """Value at a time [s], which may be an array or a symbol; ``functions`` evaluates the calls for that type."""
-        return formula_value(self._parsed, {**dict(self.numbers), TIME: time}, functions)
+        return formula_value(self._parsed, {**dict(self.numbers), TIME: time}, functions_of(self, functions))
+
+    @cached_property
+    def kinks(self) -> list[str]:
+        """Functions of its kinks, see :func:`.kinks_in`."""
+        return kinks_in(self._parsed)
 
     @cached_property
     def _parsed(self) -> Any:

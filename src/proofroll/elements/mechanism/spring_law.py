@@ -10,6 +10,7 @@ from typing import Any
 from proofroll.core.errors import InputError, require_known
 from proofroll.core.expressions import LONGEST
 from proofroll.core.parameters import Parameters
+from proofroll.elements.mechanism.kinks import functions_of, kinks_in
 from proofroll.elements.mechanism.signal import FUNCTIONS, NO_NUMBER, formula_value, names_in, parsed_formula
 
 LENGTH, RATE = "L", "dL"
@@ -20,7 +21,7 @@ _ANYWHERE = 0.7390851332151607  # m, m/s: where no formula of round numbers is s
 
 @dataclass(frozen=True)
 class SpringLaw:
-    """A smooth formula of the length ``L`` [m] of a spring and its rate ``dL`` [m/s]; positive values pull [N].
+    """A formula of the length ``L`` [m] of a spring and its rate ``dL`` [m/s]; positive values pull [N].
 
     Attributes:
         text: the formula, without the sign that opens it in a file.
@@ -41,17 +42,27 @@ class SpringLaw:
         if len(self.text) > LONGEST:
             raise InputError("force", f"= {self.text}", f"a formula may have at most {LONGEST} characters")
 
-    def pull(self, length: Any, rate: Any, functions: Mapping[str, Callable[[Any], Any]] = FUNCTIONS) -> Any:
-        """Pull for a length [m] and a rate [m/s]: numbers, arrays, or symbols that ``functions`` take."""
+    def pull(
+        self, length: Any, rate: Any, functions: Mapping[str, Callable[..., Any]] = FUNCTIONS, spring: str = ""
+    ) -> Any:
+        """Pull for a length [m] and a rate [m/s]: numbers, arrays, or symbols that ``functions`` take.
+
+        ``spring``: name of the spring, whose kinks have sides of their own.
+        """
         metre, speed, newton = self.units
         names = {**dict(self.numbers), LENGTH: metre * length, RATE: speed * rate}
-        value = formula_value(self._parsed, names, functions)
+        value = formula_value(self._parsed, names, functions_of(spring, functions))
         return value if newton == 1.0 else value * (1.0 / newton)
 
     def scaled(self, length: float, speed: float, force: float) -> SpringLaw:
         """The same law in units of these sizes in the present ones."""
         metre, second, newton = self.units
         return replace(self, units=(metre * length, second * speed, newton * force))
+
+    @cached_property
+    def kinks(self) -> list[str]:
+        """Functions of its kinks, see :func:`.kinks_in`."""
+        return kinks_in(self._parsed)
 
     @cached_property
     def _parsed(self) -> Any:

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 from proofroll.elements.mechanism.contacts.acting import ContactMode, Features, features_of
 from proofroll.elements.mechanism.contacts.joint_laws import JointContact
 from proofroll.elements.mechanism.contacts.turning import TurningFriction
+from proofroll.elements.mechanism.kinks import Sides
 from proofroll.truth.mechanism.constraint_rows import ConstraintRow
 from proofroll.truth.mechanism.contact_equations import ContactEquations
 from proofroll.truth.mechanism.contact_scalars import ScalarMotion, ScalarTouch, floats, known_shapes, touch_in_scalars
@@ -16,6 +17,7 @@ from proofroll.truth.mechanism.contact_symbols import (
     SolvedSymbols,
     Vector,
     eliminated,
+    kink_guards,
     limited,
     of_joint,
     rows_of,
@@ -67,6 +69,9 @@ class BodySymbols:
     ) -> SolvedSymbols:
         """Rates and forces for a state that ends with the time; ``began``: line of each contact at the start."""
         e = self._bodies
+        sides = clamped[len(self._equations.limited) :]
+        kinks = Sides(e.mechanism.kinks, sides)
+        functions = kinks.functions(functions)
         numbers_of_limits = [k for k, actuator in enumerate(e.mechanism.actuators) if actuator.limit is not None]
         limited_ones = [
             (
@@ -75,11 +80,11 @@ class BodySymbols:
                     self._wanted(state, k, functions), float(e.mechanism.actuators[k].bound), sign, functions["sqrt"]
                 ),
             )
-            for k, sign in zip(numbers_of_limits, clamped, strict=True)
+            for k, sign in zip(numbers_of_limits, clamped, strict=False)
         ]
         efforts = {k: effort for k, (effort, _) in limited_ones}
         now = e.at(state[:-1], functions, Switched(clamped=efforts), time=state[-1])
-        limits = [guard for _, (_, guard) in limited_ones]
+        limits = [*(guard for _, (_, guard) in limited_ones), *kink_guards(sides, kinks.arguments)]
         numbers = [law.joint.number for law in self._laws]
         at = _Now(now.views, e.rate_rows(state[:-1], numbers, functions))
         touching = [*self._touching(now.views, features_of(mode), functions), *self._of_joints(state, at)]

@@ -21,11 +21,13 @@ from proofroll.elements.mechanism.contacts.geometry import BodyContact
 from proofroll.elements.mechanism.contacts.joint_laws import JointContact, joint_contacts, line_response, mode_of_joints
 from proofroll.elements.mechanism.contacts.touching import Moving, Touching, touch
 from proofroll.elements.mechanism.contacts.turning import TurningFriction, moments_by_pressing, turning_frictions
+from proofroll.elements.mechanism.kinks import Sides, held_sides
 from proofroll.elements.mechanism.rotations import Array, cross, frame_of_axis
+from proofroll.elements.mechanism.signal import value_at
 from proofroll.elements.mechanism.switches import HOLDING, STOPPED, switched_joints
 from proofroll.truth.mechanism.independent_rows import accelerated_by, independent, least_motion
 from proofroll.truth.mechanism.maximal_coordinates import RANK, NumericEquations
-from proofroll.truth.mechanism.maximal_equations import Switched
+from proofroll.truth.mechanism.maximal_equations import FUNCTIONS, Switched
 
 _AXES = np.eye(3)
 _KEPT = 4  # states whose rows and loads are kept
@@ -109,10 +111,10 @@ class ContactEquations:
         index = mechanism.body_index
         self.pairs = [(index[contact.body_a], index[contact.body_b]) for contact in mechanism.contacts]
         self._com = [np.array(body.com) for body in mechanism.bodies] + [np.zeros(3)]
-        self._limited = {k: actuator for k, actuator in enumerate(mechanism.actuators) if actuator.limit is not None}
+        self.limited = {k: actuator for k, actuator in enumerate(mechanism.actuators) if actuator.limit is not None}
         self._sides: tuple[int, ...] = ()
         self._last = LastResults[tuple[bytes, tuple[float, ...], Features | None], BodiesState](_KEPT)
-        self._driven = [mechanism.joint_index[actuator.joint] for actuator in self._limited.values()]
+        self._driven = [mechanism.joint_index[actuator.joint] for actuator in self.limited.values()]
 
     def at(self, state: Array, features: Features | None = None) -> BodiesState:
         """Rows and loads of the bodies at a state: coordinates, velocities, angles, and last the time [s].
@@ -342,20 +344,31 @@ class ContactEquations:
 
     def drawn(self, state: Array) -> Array:
         """Efforts with a limit before they are clamped, in parts of their limits."""
-        if not self._limited:
+        if not self.limited:
             return np.zeros(0)
         along = self.equations.along(self.equations.normalised(state[:-1]), self._driven)
-        motors = zip(self._limited.values(), *along, strict=True)
+        motors = zip(self.limited.values(), *along, strict=True)
         return np.array([motor.wanted(state[-1], q, v) / motor.bound for motor, q, v in motors])
 
-    def hold_efforts(self, signs: Sequence[int]) -> None:
-        """See :meth:`ContactDynamics.hold_efforts`."""
+    def kinks(self, state: Array) -> Array:
+        """See :meth:`ContactDynamics.kinks`."""
+        sides = Sides(self.mechanism.kinks)
+        functions = sides.functions(FUNCTIONS)
+        self.equations.equations.at(self.equations.normalised(state[:-1]).tolist(), functions, time=float(state[-1]))
+        for signal in self.mechanism.signals:
+            value_at(signal, float(state[-1]), functions)
+        return np.array(sides.arguments, dtype=float)
+
+    def hold(self, signs: Sequence[int]) -> None:
+        """See :meth:`ContactDynamics.hold`."""
         self._sides = tuple(signs)
+        self.equations.functions = held_sides(self.mechanism.kinks, signs[len(self.limited) :], FUNCTIONS)
 
     def clamped(self, state: Array) -> Switched:
         """Switched state with the efforts that are clamped at their limits."""
-        sides = self._sides or [np.clip(part, -1, 1) if abs(part) > 1 else 0 for part in self.drawn(state)]
-        pairs = zip(self._limited.items(), sides, strict=True)
+        sides: Sequence[float] = self._sides[: len(self.limited)]
+        sides = sides or [np.clip(part, -1, 1) if abs(part) > 1 else 0 for part in self.drawn(state)]
+        pairs = zip(self.limited.items(), sides, strict=True)
         return Switched(clamped={k: float(side * m.bound) for (k, m), side in pairs if side})
 
     def switched(self, state: Array, mode: ContactMode) -> Switched:

@@ -161,9 +161,11 @@ class ContactStretches(ContactWalks):
             mode = tuple(own._replace(leads=False) for own in stretch.mode_at(stretch.end))
             stretch = replace(stretch, mode=mode)
         guards = guards_of(self.contacts, stretch.mode)
-        if stretch.guard is None or not 0 <= stretch.guard < len(guards):  # a break, a slip begun, an effort
+        if stretch.guard is None or not 0 <= stretch.guard < len(guards):  # a break, a slip begun, an effort, a kink
             k = -1 if stretch.guard is None else stretch.guard - len(guards)
-            return Transition(stretch.last, stretch.mode, self._of_efforts({k: not self._signs[k]} if k >= 0 else {}))
+            turned = {k: not self._signs[k]} if k >= 0 else {}
+            plain = Transition(stretch.last, stretch.mode, self._of_efforts(turned))
+            return self.jumped(stretch) if k >= len(self._limited) and self._jumping else plain
         k, kind, border = guards[stretch.guard]
         if kind == "tear":
             slipping = zip(self.contacts, stretch.mode, strict=True)
@@ -197,7 +199,7 @@ class ContactStretches(ContactWalks):
         if self._equations.mechanism.contacts:
             return ()  # beside contacts of bodies no engine reports them
         kinds = {True: EventKind.SATURATE, False: EventKind.RELEASE}
-        return tuple((kinds[at], self._limited[k]) for k, at in limited.items())
+        return tuple((kinds[at], self._limited[k]) for k, at in limited.items() if k < len(self._limited))
 
     def _broken(self, stretch: Stretch[ContactMode], k: int) -> Transition[ContactMode]:
         """Transition where friction no longer holds a contact, or contacts that share a load if ``k`` is -1.

@@ -49,7 +49,7 @@ class SolvedSymbols(NamedTuple):
         forces: on body a of each contact, (3,); None: open.
         response: Painlevé's measure.
         slide_rates: rate of each sliding velocity, (3,).
-        within_limits: guards of efforts with a limit: they reach it, or come back from it.
+        within_limits: guards of efforts with a limit: they reach it, or come back from it; then those of kinks.
         poses: place, rotation by rows, velocity and angular velocity of each body, world axes.
         efforts: of the actuators.
         drives: forces that impose motions, in the order of prescribed joints; None: the route has no rule.
@@ -108,6 +108,11 @@ def limited(wanted: Scalar, bound: float, sign: Scalar, root: Callable[[Scalar],
     within = sub(1.0, mul(sign, sign))
     excess = sub(root(mul(wanted, wanted)) / bound, 1.0)
     return add(mul(within, wanted), mul(sign, bound)), mul(sub(mul(2.0, within), 1.0), excess)
+
+
+def kink_guards(sides: Sequence[Scalar], arguments: Sequence[Scalar]) -> list[Scalar]:
+    """Guards of kinks of laws, by their sides and arguments."""
+    return [sub(0.0, mul(side, argument)) for side, argument in zip(sides, arguments, strict=True)]
 
 
 def rows_of(

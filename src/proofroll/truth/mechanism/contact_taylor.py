@@ -21,6 +21,7 @@ from proofroll.core.event_location import locate_rise_within, points_within
 from proofroll.core.stalling import StepCount, StepWatch
 from proofroll.elements.mechanism.contacts.acting import ContactMode
 from proofroll.elements.mechanism.rotations import Array
+from proofroll.elements.mechanism.signal import SMOOTH
 from proofroll.truth.hybrid import Stretch, StretchLaw
 from proofroll.truth.mechanism.compiled_once import compiled_once, heyoka
 from proofroll.truth.mechanism.contact_guards import Touchable, guards_of
@@ -33,7 +34,6 @@ from proofroll.truth.mechanism.contact_symbols import (
     turning_slip,
 )
 from proofroll.truth.mechanism.followed_paths import TOLERANCES
-from proofroll.truth.mechanism.maximal_equations import FUNCTIONS
 from proofroll.truth.mechanism.run_time_constants import Constants, Symbol
 from proofroll.truth.mechanism.turning_symbols import follows
 from proofroll.truth.picard import PicardSteps
@@ -157,7 +157,7 @@ class CompiledMode:
         clamped = [Symbol(heyoka.par[3 * len(lined) + number], constants) for number in range(limits)]
         self._clamped: tuple[int, ...] = (0,) * limits
         state = [heyoka.make_vars(f"s{index}") for index in range(length)]
-        functions = constants.functions({name: getattr(heyoka, name) for name in FUNCTIONS})
+        functions = constants.functions({name: getattr(heyoka, name) for name in SMOOTH})
         began: list[Vector | None] = [None] * len(mode)
         for place, k in enumerate(lined):
             began[k] = [Symbol(heyoka.par[3 * place + axis], constants) for axis in range(3)]

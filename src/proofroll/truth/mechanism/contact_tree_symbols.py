@@ -12,6 +12,7 @@ from proofroll.elements.mechanism.contacts.acting import ContactMode, Features, 
 from proofroll.elements.mechanism.contacts.dynamics import ContactDynamics
 from proofroll.elements.mechanism.contacts.joint_laws import JointContact
 from proofroll.elements.mechanism.contacts.turning import TurningFriction
+from proofroll.elements.mechanism.kinks import Sides
 from proofroll.elements.mechanism.prescribed import moved
 from proofroll.elements.mechanism.signal import value_at
 from proofroll.truth.mechanism.contact_scalars import ScalarMotion, ScalarTouch, floats, known_shapes, touch_in_scalars
@@ -20,6 +21,7 @@ from proofroll.truth.mechanism.contact_symbols import (
     SolvedSymbols,
     Vector,
     eliminated,
+    kink_guards,
     limited,
     of_joint,
     rows_of,
@@ -87,10 +89,14 @@ class TreeSymbols:
     ) -> SolvedSymbols:
         """Rates and forces for a state that ends with the time; ``began``: line of each contact at the start."""
         m = self._mechanism
+        sides = clamped[len(self._dynamics.equations.limited) :]
+        kinks = Sides(m.kinks, sides)
+        functions = kinks.functions(functions)
         q, v = state[: m.nq], state[m.nq : -1]
         bodies, rates = bodies_of_tree(m, q, v, functions)
         inertial = self._inertial(bodies, q, v, state[-1], clamped, functions)
         mass, load, limits = inertial.mass, inertial.load, inertial.limits
+        limits = [*limits, *kink_guards(sides, kinks.arguments)]
         touching, slides = self._contacts(bodies, q, v, functions["sqrt"], features_of(mode))
         for k, start in enumerate(began[len(m.contacts) :], len(m.contacts)):
             bound = float(self._dynamics.contacts[k].bound)

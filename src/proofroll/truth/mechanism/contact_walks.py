@@ -4,10 +4,10 @@ Each route adds its own equations and its own decisions on the next mode.
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import replace
-from typing import Protocol
+from typing import Protocol, TypeVar
 
 import numpy as np
 
@@ -25,6 +25,7 @@ from proofroll.elements.mechanism.contacts.acting import (
     slip_velocity,
 )
 from proofroll.elements.mechanism.contacts.touching import Touching
+from proofroll.elements.mechanism.kinks import JUMP
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.elements.mechanism.signal import varies
 from proofroll.elements.mechanism.switches import REDUNDANT
@@ -43,9 +44,12 @@ from proofroll.truth.mechanism.contact_guards import (
 )
 from proofroll.truth.mechanism.contact_taylor import CompiledMode, CompiledModes, CompiledStretch, ModeSymbols
 from proofroll.truth.mechanism.followed_paths import CLOSE, TOLERANCES
+from proofroll.truth.mechanism.held_route import BodyStates
+from proofroll.truth.mechanism.kink_sides import noise_at_start, refuse_jolts, sides_ahead
 from proofroll.truth.mechanism.planar_slip import SHORTEST, BegunSlip, begun_slip, held_or_stopped
 from proofroll.truth.mechanism.stopping_slip import NOTHING, StoppingSlip, stopping_slip
 
+_T = TypeVar("_T")
 _KEPT = 4  # solutions that are kept
 AHEAD = 1e-9  # time step, relative to the natural time, after which an effort is compared with its limit
 _CLAMPED = 1e-9  # difference of an effort from its limit, relative to the limit, up to which it starts at the limit
@@ -72,8 +76,14 @@ class SwitchedEquations(Protocol):
     def drawn(self, state: Array, /) -> Array:
         """Efforts with a limit before they are clamped, in parts of their limits."""
 
-    def hold_efforts(self, signs: Sequence[int], /) -> None:
-        """Keeps efforts with a limit at it, by their sign, or within it (0); without signs they follow the state."""
+    def kinks(self, state: Array, /) -> Array:
+        """Arguments of the kinks of laws, which are at a kink where theirs is zero."""
+
+    def hold(self, signs: Sequence[int], /) -> None:
+        """Keeps efforts with a limit at it, by their sign, or within it (0), and then the sides of kinks.
+
+        Without signs all follow the state.
+        """
 
 
 class ContactWalks(ABC):
@@ -91,7 +101,9 @@ class ContactWalks(ABC):
         self._timed = any(map(varies, equations.mechanism.signals))
         self._last = LastResults[tuple[bytes, tuple[float, ...], ContactMode], SolvedContacts](_KEPT)
         self._limited = [item.name for item in equations.mechanism.actuators if item.limit is not None]
-        self._signs: tuple[int, ...] = ()  # of efforts at their limits, in the present stretch
+        # of efforts at their limits, and sides of the kinks of laws, in the present stretch
+        self._signs: tuple[int, ...] = ()
+        self._jumping = any(JUMP in names for names in equations.mechanism.kinks.values())
         self._used: dict[str, None] = {}
         symbols = self._symbols()
         self._compiled = (
@@ -124,24 +136,33 @@ class ContactWalks(ABC):
         """Equations of a stretch from a state; ``signs``: of efforts at their limits there, if they are known."""
         guards, equations = guards_of(self.contacts, mode), self._equations
         signs = self._clamped(state, mode) if signs is None else signs
-        side = self._side(signs)
         excess = np.abs(equations.drawn(state)) - 1
         noise = np.where(np.abs(excess) < _CLAMPED, 2 * np.abs(excess), 0.0)
-
-        def rates(y: Array) -> Array:
-            equations.hold_efforts(signs)
-            try:
-                return equations.rate(y, mode)
-            finally:
-                equations.hold_efforts(())
-
+        if len(sides := np.array(signs[len(self._limited) :], dtype=float)):
+            noise = np.append(noise, noise_at_start(state, sides, equations.kinks, self._extent(state)))
         return StretchLaw(
-            rates=rates,
-            guards=lambda y: self._guards_and_limits(y, mode, guards, side),
+            rates=lambda y: self._held(signs, lambda: equations.rate(y, mode)),
+            guards=lambda y: self._guards_and_limits(y, mode, guards, signs),
             corrected=lambda y: equations.eliminated(y, mode),
             noise=np.append(noise_of(guards, self._size), noise),
             near=np.append([CLOSE * (guard.kind == "close") for guard in guards], np.zeros_like(noise)),
         )
+
+    @abstractmethod
+    def bodies(self, state: Array) -> BodyStates:
+        """Places, velocities, quaternions and angular velocities of all bodies, world axes."""
+
+    def _extent(self, state: Array) -> float:
+        """Largest distance of a body from the origin, at least the natural length, which is 1."""
+        return max(1.0, float(np.abs(self.bodies(state)[0]).max(initial=0.0)))
+
+    def _held(self, signs: Sequence[int], value: Callable[[], _T]) -> _T:
+        """A value while efforts at their limits and kinks keep their sides."""
+        self._equations.hold(signs)
+        try:
+            return value()
+        finally:
+            self._equations.hold(())
 
     def _guards(self, state: Array, mode: ContactMode, guards: Sequence[ContactGuard]) -> FloatArray:
         if not guards:
@@ -150,21 +171,23 @@ class ContactWalks(ABC):
         normals = pressing(solved.mode, solved.touching, solved.force, solved.splits)
         return np.array([guard_value(guard, mode, contacts, solved, normals) for guard in guards])
 
-    @staticmethod
-    def _side(signs: Sequence[int]) -> Array:
-        """Sign of the guard of each effort with a limit: it reaches its limit, or comes back from it."""
-        return np.array([1.0 if sign else -1.0 for sign in signs])
-
     def _guards_and_limits(
-        self, state: Array, mode: ContactMode, guards: Sequence[ContactGuard], side: Array
+        self, state: Array, mode: ContactMode, guards: Sequence[ContactGuard], signs: Sequence[int]
     ) -> FloatArray:
-        """Values of guards, and of those of efforts with a limit, by the side from which these come."""
-        return np.append(self._guards(state, mode, guards), -side * (np.abs(self._equations.drawn(state)) - 1))
+        """Values of guards, of those of efforts with a limit by the side from which these come, and of those of kinks."""
+        count, equations = len(self._limited), self._equations
+        side = np.array([1.0 if sign else -1.0 for sign in signs[:count]])
+        sides = np.array(signs[count:], dtype=float)
+        of_kinks = -sides * equations.kinks(state) if len(sides) else sides
+        return np.concatenate([self._guards(state, mode, guards), -side * (np.abs(equations.drawn(state)) - 1), of_kinks])
 
     def walk(self, time: float, state: Array, mode: ContactMode, until: float) -> Stretch[ContactMode]:
         """See the protocol."""
-        state = np.append(state[:-1], time)
+        state, before = np.append(state[:-1], time), self._signs
         self._signs = self._clamped(state, mode)
+        if time > 0.0 and before[len(self._limited) :] != self._signs[len(self._limited) :]:
+            count, mechanism = len(self._limited), self._equations.mechanism
+            refuse_jolts(mechanism, time, before[count:], self._signs[count:])
         if not self._equations.mechanism.contacts and self._solved(state, mode).shifts.any():
             raise Refused(REDUNDANT)
         if self._stands(state, mode):
@@ -185,11 +208,11 @@ class ContactWalks(ABC):
         """First instants of a slip from rest in the plane, which end before another contact changes."""
         name = next(contact.name for contact, own in zip(self.contacts, mode, strict=True) if own.leads)
         begun = begun_slip(time, state, mode, until, self._equations.rate, self._solved, self._begins_by, name)
-        law, guards, side = self._law(state, mode, self._signs), guards_of(self.contacts, mode), self._side(self._signs)
+        law, guards, signs = self._law(state, mode, self._signs), guards_of(self.contacts, mode), self._signs
 
         def values(times: FloatArray) -> FloatArray:
             pairs = zip(times.tolist(), begun.at(times), strict=True)
-            return np.array([self._guards_and_limits(y, begun.mode_at(t), guards, side) for t, y in pairs])
+            return np.array([self._guards_and_limits(y, begun.mode_at(t), guards, signs) for t, y in pairs])
 
         grazes = list[float]()
         rise = locate_rise_within(values, time, begun.end, law.noise, True, law.near, grazes)
@@ -224,7 +247,7 @@ class ContactWalks(ABC):
 
     def by_symbols(self, state: Array, mode: ContactMode) -> CompiledMode | None:
         """Compiled mode, if all parts of the mechanism have a rule in symbols and no load is shared."""
-        solved = self._solved(state, mode)
+        solved = self._held(self._signs, lambda: self._solution(state, mode))
         if self._compiled is None or solved.splits.shape[1]:
             return None
         compiled = self._compiled.of(mode, self._signs)
@@ -237,12 +260,21 @@ class ContactWalks(ABC):
         return compiled if agrees else None
 
     def _clamped(self, state: Array, mode: ContactMode) -> tuple[int, ...]:
-        """Sign of each effort that is at its limit in a stretch from a state, 0 of others, of those with a limit."""
-        equations = self._equations
-        if not self._limited:
-            return ()
-        ahead = equations.drawn(state + AHEAD * equations.rate(state, mode))
-        return tuple(int(np.sign(part)) if abs(part) > 1 else 0 for part in ahead.tolist())
+        """Sign of each effort that is at its limit in a stretch from a state, 0 of others, of those with a limit.
+
+        After these the sides of the kinks of laws.
+        """
+        equations, signs = self._equations, list[int]()
+        if self._limited:
+            ahead = equations.drawn(state + AHEAD * equations.rate(state, mode))
+            signs = [int(np.sign(part)) if abs(part) > 1 else 0 for part in ahead.tolist()]
+        if not equations.mechanism.kinks:
+            return tuple(signs)
+
+        def rates(y: Array, sides: tuple[int, ...]) -> Array:
+            return self._held((*signs, *sides), lambda: equations.rate(y, mode))
+
+        return (*signs, *sides_ahead(state, equations.kinks, rates))
 
     def within(self, stretch: Stretch[ContactMode], times: Array) -> Array:
         """See the protocol."""

@@ -20,12 +20,13 @@ from proofroll.core.dop853 import integrate
 from proofroll.core.errors import Missing
 from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.complementarity import refuse_switching
+from proofroll.elements.mechanism.kinks import Functions
 from proofroll.elements.mechanism.named_forces import joint_force_shares, lengths, pick_named
 from proofroll.elements.mechanism.record import Record, record_of
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.truth.mechanism.constraint_rows import ConstraintRow
 from proofroll.truth.mechanism.maximal_bodies import BodyInScalars
-from proofroll.truth.mechanism.maximal_equations import ConstrainedEquations, MaximalEquations, Switched
+from proofroll.truth.mechanism.maximal_equations import FUNCTIONS, ConstrainedEquations, MaximalEquations, Switched
 from proofroll.truth.mechanism.maximal_taylor import MaximalTaylor
 
 # Initial displacement for growth, m, rad and relative to velocities: far above round-off, small if grown by 1e7.
@@ -64,6 +65,7 @@ class NumericEquations:
     def __init__(self, equations: MaximalEquations) -> None:
         self.equations = equations
         self._switched: Switched | None = None
+        self.functions: Functions = FUNCTIONS  # of formulas, which may hold the sides of their kinks
         mass = equations.mass_matrix.copy()
         mass[equations.light, equations.light] += max(equations.usual)  # only the scale of the rows depends on it
         self._inverse_root = np.linalg.inv(np.linalg.cholesky(mass)).T
@@ -110,7 +112,7 @@ class NumericEquations:
 
         ``applied``: further forces and moments about the centres of mass, world axes, (bodies, 6).
         """
-        constrained = self.equations.at(state.tolist(), switched=self._switched, time=time)
+        constrained = self.equations.at(state.tolist(), self.functions, switched=self._switched, time=time)
         C, (half, force) = self._matrix(constrained.rows), self._driven(constrained)
         if applied is not None:
             force = force + self.equations.projected(constrained.views, applied)
@@ -132,7 +134,7 @@ class NumericEquations:
         self, state: Array, time: float = 0.0, switched: Switched | None = None
     ) -> tuple[ConstrainedEquations, Array, Array, Array, Array]:
         """Equations at a state and a time [s], their rows C and biases, H with M⁻¹ = H Hᵀ, and the loads."""
-        constrained = self.equations.at(state.tolist(), switched=switched, time=time)
+        constrained = self.equations.at(state.tolist(), self.functions, switched=switched, time=time)
         bias = np.array([row.bias for row in constrained.rows], dtype=float)
         return constrained, self._matrix(constrained.rows), bias, *self._driven(constrained)
 

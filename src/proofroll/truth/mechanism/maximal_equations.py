@@ -16,10 +16,10 @@ from proofroll.core.arrays import slices
 from proofroll.elements.mechanism import WORLD, Joint, Mechanism
 from proofroll.elements.mechanism.drives import Coupling
 from proofroll.elements.mechanism.joint_kinds import JointKind
+from proofroll.elements.mechanism.kinks import KINKED
 from proofroll.elements.mechanism.prescribed import moved
 from proofroll.elements.mechanism.rotations import Array
-from proofroll.elements.mechanism.signal import FUNCTIONS as SMOOTH
-from proofroll.elements.mechanism.signal import value_at
+from proofroll.elements.mechanism.signal import SMOOTH, value_at
 from proofroll.truth.mechanism.bushing_scalars import bushing_load
 from proofroll.truth.mechanism.constraint_rows import NONE, Connection, ConstraintRow, ConstraintRows, columns, speed_at
 from proofroll.truth.mechanism.maximal_bodies import GROUND, BodyInScalars, clean, made_bodies, placed_bodies
@@ -27,7 +27,7 @@ from proofroll.truth.scalars import Scalar, add, cross, dot, is_zero, minus, mul
 
 # Kinds whose coordinates are angles that may exceed a turn; the first route has a list of its own.
 _COUNTED = frozenset({JointKind.REVOLUTE, JointKind.UNIVERSAL})
-FUNCTIONS: Mapping[str, Callable[[Any], Any]] = {name: getattr(math, name) for name in SMOOTH}
+FUNCTIONS: Mapping[str, Callable[..., Any]] = {**{name: getattr(math, name) for name in SMOOTH}, **KINKED}
 
 
 class Drive(NamedTuple):
@@ -324,7 +324,8 @@ class MaximalEquations:
                 stretch = add(stretch, mul(spring.damping, dot(slide, d) / (length * length)))
             if spring.force is not None:
                 slide = minus(speed_at(views[b], arm_b), speed_at(views[a], arm_a))
-                stretch = add(stretch, spring.force.pull(length, dot(slide, d) / length, functions) / length)
+                pull = spring.force.pull(length, dot(slide, d) / length, functions, spring.name)
+                stretch = add(stretch, pull / length)
             self._apply(force, views, a, scaled(stretch, d), arm_a)
             self._apply(force, views, b, scaled(-1.0, scaled(stretch, d)), arm_b)
         for bushing, (a, place_a, b, place_b) in zip(self.mechanism.bushings, self._bushed, strict=True):

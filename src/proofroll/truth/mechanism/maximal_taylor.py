@@ -11,8 +11,9 @@ import numpy as np
 
 from proofroll.core.errors import Diverged, Missing
 from proofroll.elements.mechanism.rotations import Array
+from proofroll.elements.mechanism.signal import SMOOTH
 from proofroll.truth.mechanism.constraint_rows import ConstraintRow
-from proofroll.truth.mechanism.maximal_equations import FUNCTIONS, ConstrainedEquations, MaximalEquations
+from proofroll.truth.mechanism.maximal_equations import ConstrainedEquations, MaximalEquations
 from proofroll.truth.scalars import Scalar, add, is_zero, mul, sub
 
 try:
@@ -109,7 +110,7 @@ def compiled_rates(equations: MaximalEquations, rows: Sequence[int]) -> Callable
 def _in_symbols(equations: MaximalEquations, rows: Sequence[int], time: Any) -> tuple[list[Any], list[Scalar]]:
     """Variables of a state, and its rates as expressions in them."""
     state = [heyoka.make_vars(f"s{index}") for index in range(len(equations.start()))]
-    at_state = equations.at(state, {name: getattr(heyoka, name) for name in FUNCTIONS}, time=time)
+    at_state = equations.at(state, {name: getattr(heyoka, name) for name in SMOOTH}, time=time)
     u_rate = accelerations(equations, at_state, [at_state.rows[k] for k in rows])
     return state, [*at_state.rate, *u_rate, *at_state.angle_rate]
 

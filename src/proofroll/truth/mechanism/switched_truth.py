@@ -54,9 +54,11 @@ def _without_contacts(mechanism: Mechanism, times: Array) -> TwoRouteMotion:
     """Truth of a mechanism without contacts, by the simplest method that covers its switching."""
     equations, kinks = JointCoordinates(mechanism), breaks(mechanism.signals)
     kinks = kinks or ([0.0] if has_held(mechanism) else [])
-    if not (equations.switches or kinks) or mechanism.unmodelled:
+    bent = bool(kinks or mechanism.kinks)
+    if not (equations.switches or bent) or mechanism.unmodelled:
         return find_truth(mechanism, times)
-    if not kinks and not any(joint.friction for joint in equations.switched) and _reaches_none(mechanism, times):
+    rubs = any(joint.friction for joint in equations.switched)
+    if not bent and not rubs and _reaches_none(mechanism, times):
         return find_truth(_unlimited(mechanism), times)
     return contact_truth(mechanism, times)
 

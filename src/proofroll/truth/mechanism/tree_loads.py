@@ -64,7 +64,8 @@ def add_point_loads(
         if spring.damping:
             pull = add(pull, mul(float(spring.damping), dot(minus(fast, slow), d) / (length * length)))
         if spring.force is not None:
-            pull = add(pull, spring.force.pull(length, dot(minus(fast, slow), d) / length, functions) / length)
+            rate = dot(minus(fast, slow), d) / length
+            pull = add(pull, spring.force.pull(length, rate, functions, spring.name) / length)
         for (body, arm, _, _), sign in zip(ends, (1.0, -1.0), strict=True):
             force = turned_back(body.R, scaled(sign, scaled(pull, d)))
             _add(load, body.at(arm)[0], force)

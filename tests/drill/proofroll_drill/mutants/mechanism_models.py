@@ -12,6 +12,7 @@ from proofroll.elements.mechanism import BodyMotion, Mechanism
 from proofroll.elements.mechanism.element import MechanismElement
 from proofroll.elements.mechanism.joint_coordinates import JointCoordinates
 from proofroll.elements.mechanism.kinematics import Rows
+from proofroll.elements.mechanism.kinks import Functions
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.elements.mechanism.sampling import MechanismSample
 from proofroll_drill.mutants.base import STEP, Mutant
@@ -225,8 +226,8 @@ class LoopWithoutRow(JointsMutant):
         found = JointCoordinates(mechanism, rank=1)
         whole = found.tree.loop_rows
 
-        def rows(motion: BodyMotion, time: float = 0.0) -> Rows:
-            every = whole(motion, time)
+        def rows(motion: BodyMotion, time: float = 0.0, *functions: Functions) -> Rows:
+            every = whole(motion, time, *functions)
             less: dict[str, Any] = {
                 name: np.delete(part, 1, axis=0) for name, part in every._asdict().items() if name != "moved"
             }

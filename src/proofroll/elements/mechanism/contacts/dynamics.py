@@ -55,8 +55,11 @@ from proofroll.elements.mechanism.contacts.turning import (
 )
 from proofroll.elements.mechanism.drives import MODES
 from proofroll.elements.mechanism.joint_coordinates import JointCoordinates
+from proofroll.elements.mechanism.kinks import held_sides
 from proofroll.elements.mechanism.model import Mechanism
+from proofroll.elements.mechanism.point_loads import kink_arguments
 from proofroll.elements.mechanism.rotations import Array, cross, frame_of_axis
+from proofroll.elements.mechanism.signal import FUNCTIONS
 
 # Impulse, relative to the largest of an impact, that counts as none; a pressure nudged by 1e-6 makes such impulses.
 _NO_IMPULSE = 1e-4
@@ -82,6 +85,7 @@ class ContactDynamics:
         self.sums = np.pad(pair_sums(mechanism.contacts), ((0, 0), (0, others)))
         index = mechanism.body_index
         self._bodies = [(index[contact.body_a], index[contact.body_b]) for contact in mechanism.contacts]
+        self._held: tuple[int, ...] = ()
         self._last = LastResults[tuple[bytes, bytes, float, tuple[object, ...], Features | None], ContactsNow](4)
 
     def at(self, q: Array, v: Array, time: float = 0.0, features: Features | None = None) -> ContactsNow:
@@ -89,12 +93,14 @@ class ContactDynamics:
 
         ``features``: of solids that touch; None: the nearest.
         """
-        key = q.tobytes(), v.tobytes(), time, (*self.mechanism.held, *self.equations.sides), features
+        key = q.tobytes(), v.tobytes(), time, (*self.mechanism.held, *self._held), features
         return self._last.of(key, lambda: self._at(q.copy(), v.copy(), time, features))
 
     def _at(self, q: Array, v: Array, time: float, features: Features | None) -> ContactsNow:
         found = self.equations.solve(q, v, (), time=time)
-        loose = W = np.asarray(np.linalg.inv(self.equations.inertial(found.motion)[1]), dtype=np.float64)
+        mass, C = self.equations.inertial(found.motion)[1], found.C
+        mass = self.equations.weighted(mass, np.zeros(len(v)), C, np.zeros(len(C)))[0]
+        loose = W = np.asarray(np.linalg.inv(mass), dtype=np.float64)
         if found.split is not None:
             W = W - found.split[0] @ found.split[0].T
         touching = touches(self.mechanism, found.motion, features)
@@ -195,9 +201,20 @@ class ContactDynamics:
         q, v, time = self.parts(y)
         return np.array([m.wanted(time, q[at_q], v[at_v]) / m.bound for m, at_q, at_v in self.equations.limited])
 
-    def hold_efforts(self, signs: Sequence[int]) -> None:
-        """Keeps efforts with a limit at it, by their sign, or within it (0); without signs they follow the state."""
-        self.equations.sides = tuple(MODES[sign + 1] for sign in signs)
+    def kinks(self, y: Array) -> Array:
+        """Arguments of the kinks of all laws, see :class:`~proofroll.elements.mechanism.kinks.Sides`."""
+        q, v, time = self.parts(y)
+        return kink_arguments(self.mechanism, self.equations.tree.at(q, v), time)
+
+    def hold(self, signs: Sequence[int]) -> None:
+        """Keeps efforts with a limit at it, by their sign, or within it (0), and then the sides of kinks.
+
+        Without signs all follow the state.
+        """
+        count = len(self.equations.limited)
+        self.equations.sides = tuple(MODES[sign + 1] for sign in signs[:count])
+        self.equations.functions = held_sides(self.mechanism.kinks, signs[count:], FUNCTIONS)
+        self._held = tuple(signs)
 
     def eliminated(self, y: Array, mode: ContactMode) -> Array:
         """The state with violations of loops, closed contacts and unit quaternions removed."""

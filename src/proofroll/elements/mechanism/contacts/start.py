@@ -39,10 +39,12 @@ def touches(mechanism: Mechanism, motion: BodyMotion, features: Sequence[int] | 
 
 
 def extent(mechanism: Mechanism, motion: BodyMotion) -> float:
-    """Largest distance between joints, centres of mass, tracked points and contacts at one instant [m]."""
+    """Largest distance between joints, loops, springs, centres of mass, tracked points and contacts at one instant [m]."""
     own = [(joint.child, joint.child_position) for joint in mechanism.joints]
     own += [(body.name, body.com) for body in mechanism.bodies]
     own += [(point.body, point.position) for point in mechanism.points]
+    for part in (*mechanism.loops, *mechanism.links):
+        own += [(part.body_a, part.position_a), (part.body_b, part.position_b)]
     index = mechanism.body_index
     places = [motion.p_WB[index[body]] + motion.R_WB[index[body]] @ np.array(at) for body, at in own]
     places += [each.place for each in touches(mechanism, motion)]
