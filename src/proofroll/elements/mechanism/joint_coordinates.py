@@ -6,7 +6,7 @@ each step the violations of Φ and C v are eliminated along the locked direction
 spherical and free joints are states in the child's axes, which keeps digits when a body spins fast.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -170,6 +170,10 @@ class JointCoordinates:
         weight = float(M.max()) / float(np.abs(C.T @ C).max())
         return M + weight * C.T @ C, b - weight * bias @ C
 
+    def spin(self, y: Array) -> float:
+        """Largest angular velocity of a body at a state (q, v) [rad/s]."""
+        return float(np.abs(self.tree.at(y[: self.mechanism.nq], y[self.mechanism.nq :]).w_WB).max())
+
     def rows(self, q: Array) -> Rows:
         """Constraints of loops and couplings for coordinates (nq), at rest."""
         return self.tree.loop_rows(self.tree.at(q, np.zeros(self.mechanism.nv)))
@@ -200,16 +204,23 @@ class JointCoordinates:
         moved, least = np.diag(W)[list(at)] <= NO_RESPONSE * most, ROUND_OFF * np.sqrt(most) * strength
         return RestResponse(free=rates[list(at)], by_force=W[np.ix_(at, at)], moved=moved, least=least)
 
-    def run(self, times: Array, tolerance: float = 1e-14) -> Record:
-        """Record of the motion at the given times [s], by DOP853.
+    def run(self, times: Array, tolerance: float = 1e-14, visited: list[tuple[float, Array]] | None = None) -> Record:
+        """Record of the motion at the given times [s], by DOP853; ``visited`` takes times and states before steps.
 
         Raises:
             Refused: a law switches, see :func:`~proofroll.elements.mechanism.complementarity.refuse_switching`.
             Diverged: the integration stops, e.g. at a singular pose, or stepped over one.
         """
         refuse_switching(self.mechanism)
-        nq, start = self.mechanism.nq, np.concatenate(self.mechanism.start())
-        states = integrate(self.rate, start, times, tolerance, self.followed(), least=self._least(tolerance))
+        start = np.concatenate(self.mechanism.start())
+        least = self._least(tolerance)
+        return self.recorded(
+            times, integrate(self.rate, start, times, tolerance, self.followed(), least, None, visited)
+        )
+
+    def recorded(self, times: Array, states: Iterable[Array]) -> Record:
+        """Record of states (q, v) at times [s]."""
+        nq = self.mechanism.nq
         return record_of(times, [self.sample(y[:nq], y[nq:], None, t) for t, y in zip(times, states, strict=True)])
 
     def followed(self, mode: Mode | None = None) -> Callable[[Array], Array]:
@@ -285,9 +296,7 @@ class JointCoordinates:
 
         Fixed steps pass singular poses, where adaptive steps would shrink to zero.
         """
-        nq = self.mechanism.nq
-        states = zip(times, self.rk4_states(times, _EQUAL_STEP), strict=True)
-        return record_of(times, [self.sample(y[:nq], y[nq:], None, t) for t, y in states])
+        return self.recorded(times, self.rk4_states(times, _EQUAL_STEP))
 
     def rk4_states(self, times: Array, step: float) -> Iterator[Array]:
         """States (q, v) at the given times [s], by Runge-Kutta 4 in equal steps of at most ``step`` [s]."""

@@ -10,6 +10,7 @@ from proofroll.elements.mechanism.kinks import held_sides
 from proofroll.elements.mechanism.prescribed import moved
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.elements.mechanism.signal import FUNCTIONS, Formula
+from proofroll.truth.mechanism.followed_paths import TOLERANCES
 
 # Steps [natural time] in which the way away from a kink is looked for: the shortest that is no round-off decides.
 _AHEAD = (1e-9, 1e-7, 1e-5, 1e-4, 1e-3, 1e-2)
@@ -18,7 +19,7 @@ _AHEAD = (1e-9, 1e-7, 1e-5, 1e-4, 1e-3, 1e-2)
 _LEAST, _MOST, _ALIKE = 1.5, 80.0, 2.0
 _TRIALS = 8
 _JOLT = 1e-9  # jump of a prescribed rate that is no round-off of the time of its kink, in natural units
-_DIGITS = 16 * float(np.finfo(float).eps)  # relative change of a state by its round-off
+_DIGITS = 10 * TOLERANCES[1]  # change of a state by the error of a step, relative to the size of the mechanism
 
 
 def sides_ahead(
@@ -98,10 +99,22 @@ def _grows(one: float, two: float, four: float) -> bool:
     return growths[0] >= _LEAST and growths[1] <= min(_MOST, _ALIKE * growths[0])
 
 
-def round_off(state: Array, kinks: Callable[[Array], Array], size: float) -> Array:
-    """Round-off of the arguments of kinks at a state; ``size``: largest distance of a body from the origin."""
-    ways = np.random.default_rng(0).choice([-1.0, 1.0], (3, len(state))) * np.maximum(np.abs(state), size)
-    return np.asarray(np.abs([kinks(state + _DIGITS * way) - kinks(state) for way in ways]).max(axis=0))
+def noise_at_start(state: Array, sides: Array, kinks: Callable[[Array], Array], size: float) -> Array:
+    """Noise of the guards of kinks in a stretch from a state: of those that it leaves the error of a step, else none.
+
+    Args:
+        state: at the start, where a kink has a side by what follows, whatever its own last digits are.
+        sides: of the kinks.
+        kinks: state -> arguments of the kinks.
+        size: largest distance of a body from the origin, in natural units.
+    """
+    signs = np.random.default_rng(0).choice([-1.0, 1.0], (3, len(state)))
+    # sizes that differ by the golden ratio do not cancel each other
+    uneven = 1.0 + np.modf(np.arange(1, len(state) + 1) * 0.6180339887498949)[0]
+    ways = signs * uneven * np.maximum(np.abs(state), size)
+    start = kinks(state)
+    noise = np.abs([kinks(state + _DIGITS * way) - start for way in ways]).max(axis=0)
+    return np.asarray(np.where(np.abs(start) <= noise, noise, 0.0) + 2 * np.maximum(-sides * start, 0.0))
 
 
 def _stepped(

@@ -27,7 +27,7 @@ from proofroll.elements.mechanism.rotations import Array
 from proofroll.truth.mechanism.constraint_rows import ConstraintRow
 from proofroll.truth.mechanism.maximal_bodies import BodyInScalars
 from proofroll.truth.mechanism.maximal_equations import FUNCTIONS, ConstrainedEquations, MaximalEquations, Switched
-from proofroll.truth.mechanism.maximal_taylor import MaximalTaylor
+from proofroll.truth.mechanism.maximal_taylor import MaximalTaylor, Visited
 
 # Initial displacement for growth, m, rad and relative to velocities: far above round-off, small if grown by 1e7.
 BESIDE = 1e-9
@@ -242,7 +242,9 @@ class MaximalCoordinates:
             self._compiled[key] = MaximalTaylor(self.lean.equations, key[1], long_double)
         return self._compiled[key]
 
-    def taylor_states(self, times: Array, long_double: bool = False, start: Array | None = None) -> Array:
+    def taylor_states(
+        self, times: Array, long_double: bool = False, start: Array | None = None, visited: Visited | None = None
+    ) -> Array:
         """States at the given times, s, (times, state), by Taylor series, from the mechanism's own start or another.
 
         Of redundant rows others are chosen where the present ones come near to dependence.
@@ -253,14 +255,14 @@ class MaximalCoordinates:
         """
         taylor = self.taylor(long_double)
         if not self.lean.redundant:
-            return taylor.run(times, start)
+            return taylor.run(times, start, visited)
         time, states = 0.0, list[Array]()
         state = taylor.start() if start is None else start
         rows = self.lean.independent_rows()
         while len(states) < len(times):
             sound = partial(self._sound, rows)
             left = times[len(states) :].tolist()
-            time, state, passed = self.taylor(long_double, rows).run_while(sound, time, state, left)
+            time, state, passed = self.taylor(long_double, rows).run_while(sound, time, state, left, visited)
             states += passed
             rows = self.lean.independent_rows(np.asarray(state, dtype=float))
         return np.array(states)
@@ -268,7 +270,7 @@ class MaximalCoordinates:
     def _sound(self, rows: Sequence[int], state: Array) -> bool:
         return self.lean.independence(rows, state) > WEAKEST
 
-    def run_taylor(self, times: Array, long_double: bool = False) -> Record:
+    def run_taylor(self, times: Array, long_double: bool = False, visited: Visited | None = None) -> Record:
         """Motion at the given times, s, by Taylor series.
 
         Raises:
@@ -277,9 +279,11 @@ class MaximalCoordinates:
             Diverged: the integration stops.
         """
         refuse_switching(self.mechanism)
-        return self.recorded(times, np.asarray(self.taylor_states(times, long_double), dtype=float))
+        return self.recorded(times, np.asarray(self.taylor_states(times, long_double, None, visited), float))
 
-    def run_dop853(self, times: Array, tolerance: float = 1e-14) -> Record:
+    def run_dop853(
+        self, times: Array, tolerance: float = 1e-14, visited: list[tuple[float, Array]] | None = None
+    ) -> Record:
         """Motion at the given times, s, by DOP853 with projection.
 
         Raises:
@@ -287,7 +291,7 @@ class MaximalCoordinates:
             Diverged: the integration stops.
         """
         refuse_switching(self.mechanism)
-        return self.recorded(times, self._dop853(self.lean.equations.start(), times, tolerance))
+        return self.recorded(times, self._dop853(self.lean.equations.start(), times, tolerance, visited))
 
     def growth(self, times: Array) -> Array:
         """Growth of the distance to a neighbouring motion at the given times, s: multiple of the initial distance.
@@ -306,8 +310,15 @@ class MaximalCoordinates:
         apart: Array = np.abs(other - one)[:, : lean.equations.nx].max(axis=1) / BESIDE
         return apart
 
-    def _dop853(self, start: Array, times: Array, tolerance: float) -> Array:
-        return np.array(list(integrate(self.lean.rate, start, times, tolerance, self.lean.eliminated)))
+    def _dop853(
+        self, start: Array, times: Array, tolerance: float, visited: list[tuple[float, Array]] | None = None
+    ) -> Array:
+        lean = self.lean
+        return np.array(list(integrate(lean.rate, start, times, tolerance, lean.eliminated, visited=visited)))
+
+    def spin(self, state: Array) -> float:
+        """Largest angular velocity of a body at a state [rad/s]."""
+        return float(np.abs(self.lean.poses(np.asarray(state, dtype=float))[3]).max())
 
     def at_start(self) -> Record:
         """Poses of this route at time 0."""

@@ -22,6 +22,10 @@ except ImportError:  # no wheel for this platform
     heyoka = None
 
 
+# Integrator, time [s] and state before each step.
+Visited = list[tuple["MaximalTaylor", Scalar, Array]]
+
+
 class MaximalTaylor:
     """Compiled integrator of a mechanism; every run starts anew.
 
@@ -37,13 +41,13 @@ class MaximalTaylor:
     def __init__(self, equations: MaximalEquations, rows: Sequence[int], long_double: bool = False) -> None:
         if heyoka is None:
             raise Missing("Taylor series need heyoka: pip install 'proofroll[fast]'")
-        self._number = np.longdouble if long_double else float
+        self.number = np.longdouble if long_double else float
         state, rates = _in_symbols(equations, rows, heyoka.time)
-        self._start = np.array([self._number(value) for value in equations.start()])
+        self._start = np.array([self.number(value) for value in equations.start()])
         self._integrator = heyoka.taylor_adaptive(
-            [(name, _expression(value, self._number)) for name, value in zip(state, rates, strict=True)],
+            [(name, _expression(value, self.number)) for name, value in zip(state, rates, strict=True)],
             self._start,
-            fp_type=self._number,
+            fp_type=self.number,
             compact_mode=True,
             opt_level=0,  # optimised code takes two to ten times as long to compile, which no run earns back
         )
@@ -52,19 +56,28 @@ class MaximalTaylor:
         """State at the start, in this integrator's numbers."""
         return self._start.copy()
 
-    def run(self, times: Array, start: Array | None = None) -> Array:
+    def run(self, times: Array, start: Array | None = None, visited: Visited | None = None) -> Array:
         """States at the given times, s, (times, state), from the mechanism's own start or another.
+
+        ``visited``: see :meth:`run_while`.
 
         Raises:
             Diverged: the integration stops before the last time.
         """
         begun = self._start if start is None else start
-        return np.array(self.run_while(lambda _: True, self._number(0), begun, times.tolist())[2])
+        return np.array(self.run_while(lambda _: True, self.number(0), begun, times.tolist(), visited)[2])
 
     def run_while(
-        self, sound: Callable[[Array], bool], time: Scalar, state: Array, times: Sequence[float]
+        self,
+        sound: Callable[[Array], bool],
+        time: Scalar,
+        state: Array,
+        times: Sequence[float],
+        visited: Visited | None = None,
     ) -> tuple[Scalar, Array, list[Array]]:
         """Steps from a time [s] and a state to the last of ``times``, or to the end of the first unsound step.
+
+        ``visited`` takes this integrator, and time [s] and state before each step; None: they are not kept.
 
         Returns:
             Time and state at the end, and states at those of ``times`` that are not after it.
@@ -76,21 +89,29 @@ class MaximalTaylor:
         self._begin(time, state)
         states: list[Array] = []
         while len(states) < len(times):
-            begun, left = integrator.time, self._number(times[-1]) - integrator.time
+            begun, left = integrator.time, self.number(times[-1]) - integrator.time
+            if visited is not None:
+                visited.append((self, begun, integrator.state.copy()))
             _, step = integrator.step(max_delta_t=left, write_tc=True)
             if not np.isfinite(np.asarray(integrator.state, dtype=float)).all() or (step == 0 and left > 0):
                 text = f"Taylor series stop at t = {float(begun):.6g} s: the motion has no finite derivatives there"
                 raise Diverged(text, float(begun))
             last = step == left
-            while len(states) < len(times) and (last or self._number(times[len(states)]) <= integrator.time):
-                states.append(integrator.update_d_output(self._number(times[len(states)])).copy())
+            while len(states) < len(times) and (last or self.number(times[len(states)]) <= integrator.time):
+                states.append(integrator.update_d_output(self.number(times[len(states)])).copy())
             if not last and not sound(np.asarray(integrator.state, dtype=float)):
                 break
         return integrator.time, integrator.state.copy(), states
 
+    def inside(self, time: Scalar, state: Array, end: Scalar, times: Array) -> Array:
+        """States at times [s] within the step from a time and state to ``end`` [s], which is taken again."""
+        self._begin(time, state)
+        self._integrator.step(max_delta_t=end - time, write_tc=True)
+        return np.array([self._integrator.update_d_output(self.number(t)).copy() for t in times], dtype=float)
+
     def _begin(self, time: Scalar, state: Array) -> None:
         self._integrator.state[:] = state
-        self._integrator.time = self._number(time)
+        self._integrator.time = self.number(time)
 
 
 def compiled_rates(equations: MaximalEquations, rows: Sequence[int]) -> Callable[[Array], Array]:

@@ -19,10 +19,12 @@ from proofroll.core.errors import Diverged, Missing, Refused
 from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.analysis import analyse
 from proofroll.elements.mechanism.complementarity import refuse_switching
+from proofroll.elements.mechanism.contacts.start import natural_scale
 from proofroll.elements.mechanism.joint_coordinates import JointCoordinates
 from proofroll.elements.mechanism.record import Record, record_of
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.truth import SAFETY
+from proofroll.truth.laws.check import sentence
 from proofroll.truth.mechanism.closed_forms import ClosedForm, closed_form
 from proofroll.truth.mechanism.early_end import EarlyEnd
 from proofroll.truth.mechanism.error_bars import (
@@ -36,7 +38,9 @@ from proofroll.truth.mechanism.error_bars import (
     round_off,
 )
 from proofroll.truth.mechanism.maximal_coordinates import BESIDE, MaximalCoordinates
+from proofroll.truth.mechanism.maximal_taylor import Visited
 from proofroll.truth.mechanism.singular_poses import BRANCHING, singular_poses, singular_poses_of
+from proofroll.truth.mechanism.smooth_laws import KeptRoute, KeptStep, dense_steps, law_check
 from proofroll.truth.mechanism.stiff_routes import run_stiff, stiff
 
 CHAOS = 1e-9  # m, 1 (quaternions): a larger distance between motions with indistinguishable starts is chaos
@@ -54,13 +58,14 @@ class _Routes(NamedTuple):
     precise: Record
     chaotic: NDArray[np.bool_]
     names: tuple[str, ...]
+    laws: str = ""
 
     def first(self, count: int) -> "_Routes":
         """The same at the first times alone."""
         best, by_tree, by_bodies, precise = (
             record.first(count) for record in (self.best, self.by_tree, self.by_bodies, self.precise)
         )
-        return _Routes(best, by_tree, by_bodies, precise, self.chaotic[:count], self.names)
+        return _Routes(best, by_tree, by_bodies, precise, self.chaotic[:count], self.names, self.laws)
 
 
 def find_truth(mechanism: Mechanism, times: Array, tolerance: float = 1e-15) -> TwoRouteMotion:
@@ -82,7 +87,7 @@ def find_truth(mechanism: Mechanism, times: Array, tolerance: float = 1e-15) -> 
     times = early.known(times)
     if not len(times):
         raise Refused(f"no truth behind t = {early.time:.6g} s: {early.reason}; ask for earlier times")
-    best, by_tree, by_bodies, precise, chaotic, names = routes.first(len(times))
+    best, by_tree, by_bodies, precise, chaotic, names, _ = routes.first(len(times))
     masked = replace(best, wrench=np.where(analysis.determinate, best.wrench, np.nan))
     placed, fields = masked.placed(mechanism), fields_with_bars(mechanism, masked)
     bars, differences, least = {}, {}, round_off(fields, placed)
@@ -113,6 +118,7 @@ def find_truth(mechanism: Mechanism, times: Array, tolerance: float = 1e-15) -> 
         checked_by=checked,
         end=early.time,
         ended=early.reason,
+        laws=routes.laws,
     )
 
 
@@ -126,7 +132,7 @@ def _followed(tree: JointCoordinates, times: Array, tolerance: float, exact: Rec
     bodies = MaximalCoordinates(mechanism)
     check_start(tree, bodies)
     try:
-        by_tree, by_bodies, precise, growth, names = _runs(tree, bodies, times, tolerance, early)
+        by_tree, by_bodies, precise, growth, names, kept = _runs(tree, bodies, times, tolerance, early)
         _check_energy(mechanism, by_tree, names[1], early)
         _check_energy(mechanism, precise, names[0], early)
         chaotic = growth * NUDGE > CHAOS
@@ -134,6 +140,11 @@ def _followed(tree: JointCoordinates, times: Array, tolerance: float, exact: Rec
             nearby = early.run(partial(_first_growth, tree, by_tree), times)
             chaotic = chaotic[: len(nearby)] & (nearby * NUDGE > CHAOS)
         _check_branch(by_tree, precise, chaotic, early)
+        checked = law_check(mechanism, dict(zip(names, kept, strict=True)))
+        laws = sentence(checked, len(names))
+        if checked.violation is not None:
+            early.at(checked.violation.time, laws)
+            laws = ""
     except Diverged as stopped:
         if exact is None:
             raise Refused(f"no truth beyond the start: {stopped}") from None
@@ -145,13 +156,13 @@ def _followed(tree: JointCoordinates, times: Array, tolerance: float, exact: Rec
     if np.isfinite(early.time):
         early.reason = _singular(mechanism, early.time) or early.reason
     best = precise if exact is None else on_same_turns(mechanism, by_tree, exact)
-    return _Routes(best, by_tree, by_bodies, precise, chaotic, names), early
+    return _Routes(best, by_tree, by_bodies, precise, chaotic, names, laws), early
 
 
 def _runs(
     tree: JointCoordinates, second: MaximalCoordinates, times: Array, tolerance: float, early: EarlyEnd
-) -> tuple[Record, Record, Record, Array, tuple[str, ...]]:
-    """Three records, the best one last, growth of a small difference [1], and the names of the routes.
+) -> tuple[Record, Record, Record, Array, tuple[str, ...], tuple[KeptRoute, ...]]:
+    """Three records, the best one last, growth of a small difference [1], names and steps of the routes.
 
     All of them end where a route fails, which ``early`` tells.
     """
@@ -161,14 +172,21 @@ def _runs(
         runs = early.run(partial(run_stiff, mechanism, tree.rank), times)
         names = "maximal coordinates, implicit collocation", "joint coordinates, implicit collocation"
         best = on_same_turns(mechanism, runs.one, runs.precise)
-        return runs.one, best, best, runs.growth, names
-    by_tree = early.run(partial(tree.run, tolerance=tolerance), times)
-    by_bodies, precise, name = early.run(partial(_second, second, tolerance=tolerance), times)
+        return runs.one, best, best, runs.growth, names, runs.kept[::-1]
+    by_tree, kept = early.run(partial(_by_tree, tree, tolerance=tolerance), times)
+    by_bodies, precise, name, other = early.run(partial(_second, second, tolerance=tolerance), times)
     growth = early.run(second.growth, times)
     by_tree, by_bodies, precise = (record.first(len(growth)) for record in (by_tree, by_bodies, precise))
     # route 1 alone counts turns; angles of the others are put on the same turns
     by_bodies, precise = on_same_turns(mechanism, by_tree, by_bodies), on_same_turns(mechanism, by_tree, precise)
-    return by_tree, by_bodies, precise, growth, (name, "joint coordinates, DOP853")
+    return by_tree, by_bodies, precise, growth, (name, "joint coordinates, DOP853"), (other, kept)
+
+
+def _by_tree(tree: JointCoordinates, times: Array, tolerance: float) -> tuple[Record, KeptRoute]:
+    """Route 1 and its steps."""
+    visited: list[tuple[float, Array]] = []
+    record = tree.run(times, tolerance, visited)
+    return record, KeptRoute(dense_steps(tree.rate, visited, float(times[-1])), tree.recorded, tree.spin, coarse=True)
 
 
 def _singular(mechanism: Mechanism, end: float) -> str:
@@ -198,9 +216,10 @@ def _check_energy(mechanism: Mechanism, record: Record, route: str, early: Early
     """Ends the truth where a route changes the energy of a conservative mechanism, for then it has failed."""
     if not mechanism.conservative:
         return
-    parts = record.placed(mechanism).energies()
+    parts, scale = record.placed(mechanism).energies(), natural_scale(mechanism)
     change = np.abs(parts.sum(axis=1) - parts[0].sum())
-    lost = np.flatnonzero(change > ENERGY * np.abs(parts).sum(axis=1).max())
+    natural = mechanism.mass * (scale.length * scale.rate) ** 2  # a mechanism in balance may have no energy
+    lost = np.flatnonzero(change > ENERGY * max(natural, float(np.abs(parts).sum(axis=1).max())))
     if len(lost):
         reason = f"the route in {route} changes the energy by {change[lost[0]]:.2g} J"
         early.at(float(record.time[lost[0]]), reason)
@@ -248,11 +267,21 @@ def _from_form(equations: JointCoordinates, form: ClosedForm, times: Array) -> R
     return record_of(times, [equations.sample(q, v) for q, v in zip(*moves, strict=True)])
 
 
-def _second(route: MaximalCoordinates, times: Array, tolerance: float) -> tuple[Record, Record, str]:
-    """Route 2 in two precisions, the better one last, and its name."""
+def _second(route: MaximalCoordinates, times: Array, tolerance: float) -> tuple[Record, Record, str, KeptRoute]:
+    """Route 2 in two precisions, the better one last, its name, and the steps of the better one."""
+    series: Visited = []
     try:
-        double, long = route.run_taylor(times), route.run_taylor(times, long_double=True)
+        double, long = route.run_taylor(times), route.run_taylor(times, long_double=True, visited=series)
     except Missing:
+        visited: list[tuple[float, Array]] = []
         coarse = route.run_dop853(times, 10 * tolerance)
-        return coarse, route.run_dop853(times, tolerance), "maximal coordinates, DOP853"
-    return double, long, "maximal coordinates, Taylor series in long doubles"
+        record, steps = route.run_dop853(times, tolerance, visited), dense_steps(route.lean.rate, visited, times[-1])
+        kept = KeptRoute(steps, route.recorded, route.spin, coarse=True)
+        return coarse, record, "maximal coordinates, DOP853", kept
+    ends = [*(float(time) for _, time, _ in series[1:]), float(times[-1])]
+    taken = [
+        KeptStep(float(time), end, partial(taylor.inside, time, state, taylor.number(end)))
+        for (taylor, time, state), end in zip(series, ends, strict=True)
+    ]
+    name = "maximal coordinates, Taylor series in long doubles"
+    return double, long, name, KeptRoute(taken, route.recorded, route.spin)

@@ -7,6 +7,7 @@ differ too.
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -14,12 +15,13 @@ import numpy as np
 from proofroll.core.errors import Diverged, Missing
 from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.joint_coordinates import JointCoordinates
-from proofroll.elements.mechanism.record import Record, record_of
+from proofroll.elements.mechanism.record import Record
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.truth.collocation import Step, System, by_states, next_length, nodes, take
 from proofroll.truth.mechanism.maximal_coordinates import BESIDE, MaximalCoordinates, NumericEquations
 from proofroll.truth.mechanism.maximal_taylor import compiled_rates
-from proofroll.truth.mechanism.natural_units import natural_units
+from proofroll.truth.mechanism.natural_units import Units, natural_units
+from proofroll.truth.mechanism.smooth_laws import KeptRoute, KeptStep
 
 # Time constants of a damper per run above which it may be stiff. DOP853 is stable up to six of them per step, so it
 # makes at least a hundred steps for stability alone, and more due to the noise of accelerations.
@@ -36,11 +38,13 @@ class StiffRuns(NamedTuple):
     Attributes:
         one, precise: records.
         growth: growth of the distance to a neighbouring motion at each time [1].
+        kept: steps of both, route 1 first.
     """
 
     one: Record
     precise: Record
     growth: Array
+    kept: tuple[KeptRoute, KeptRoute]
 
 
 def stiff(equations: JointCoordinates, until: float) -> bool:
@@ -72,16 +76,37 @@ def run_stiff(mechanism: Mechanism, rank: int, times: Array) -> StiffRuns:
     def joints(y: Array) -> Array:
         return np.array([tree.rate(each[-1], each[:-1]) for each in y])
 
+    steps: tuple[list[Step], list[Step]] = [], []
     with units.errors_in_seconds():
         joined, beside = (
-            _collocated(joints, each, moments, _TOLERANCES[0], tree.followed())
-            for each in (start, tree.eliminated(near))
+            _collocated(joints, each, moments, _TOLERANCES[0], tree.followed(), kept)
+            for each, kept in ((start, steps[0]), (tree.eliminated(near), None))
         )
-        alone = _collocated(_rates(lean), lean.equations.start(), moments, _TOLERANCES[1], lean.eliminated)
-    one = record_of(moments, [tree.sample(y[:nq], y[nq:], None, t) for t, y in zip(moments, joined, strict=True)])
+        lone = lean.equations.start()
+        alone = _collocated(_rates(lean), lone, moments, _TOLERANCES[1], lean.eliminated, steps[1])
+    one = tree.recorded(moments, joined)
     growth = np.abs(beside - joined)[:, :nq].max(axis=1) / BESIDE
     one, precise = (units.record(mechanism, each) for each in (one, bodies.recorded(moments, alone)))
-    return StiffRuns(one, precise, growth)
+    kept = (
+        _kept(steps[0], units, lambda t, y: units.record(mechanism, tree.recorded(t, y)), tree.spin),
+        _kept(steps[1], units, lambda t, y: units.record(mechanism, bodies.recorded(t, y)), bodies.spin),
+    )
+    return StiffRuns(one, precise, growth, kept)
+
+
+def _kept(
+    steps: list[Step], units: Units, recorded: Callable[[Array, Array], Record], spin: Callable[[Array], float]
+) -> KeptRoute:
+    """Steps in seconds, from those in natural units."""
+
+    def inside(step: Step, times: Array) -> Array:
+        return step(times / units.time)[:, :-1]
+
+    kept = [
+        KeptStep(step.time * units.time, (step.time + step.length) * units.time, partial(inside, step))
+        for step in steps
+    ]
+    return KeptRoute(kept, lambda times, states: recorded(times / units.time, states), lambda y: spin(y) / units.time)
 
 
 def _rates(lean: NumericEquations) -> Callable[[Array], Array]:
@@ -101,7 +126,12 @@ def _jacobian(rates: Callable[[Array], Array], states: Array) -> Array:
 
 
 def _collocated(
-    rates: Callable[[Array], Array], start: Array, times: Array, tolerance: float, corrected: Callable[[Array], Array]
+    rates: Callable[[Array], Array],
+    start: Array,
+    times: Array,
+    tolerance: float,
+    corrected: Callable[[Array], Array],
+    kept: list[Step] | None = None,
 ) -> Array:
     """States at rising times from a state at time 0; ``rates`` takes states with the time as last column."""
 
@@ -126,6 +156,8 @@ def _collocated(
             continue
         reached = end if length == end - now else now + length
         parts.append(step(times[(times > now) & (times <= reached)])[:, :-1])
+        if kept is not None:
+            kept.append(step)
         now, last, length = reached, step, next_step
         state = np.append(corrected(step.last[:-1]), now)
     return np.concatenate(parts)

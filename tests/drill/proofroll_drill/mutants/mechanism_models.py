@@ -233,7 +233,7 @@ class LoopWithoutRow(JointsMutant):
             }
             return every._replace(**less)
 
-        found.tree.loop_rows = rows  # type: ignore[method-assign]  # that is the fault
+        found.tree.loop_rows = rows  # type: ignore[method-assign, assignment]  # that is the fault
         return found
 
 

@@ -39,7 +39,7 @@ def touches(mechanism: Mechanism, motion: BodyMotion, features: Sequence[int] | 
 
 
 def extent(mechanism: Mechanism, motion: BodyMotion) -> float:
-    """Largest distance between joints, loops, springs, centres of mass, tracked points and contacts at one instant [m]."""
+    """Largest distance between joints, loops, springs, centres of mass, points and contacts at one instant [m]."""
     own = [(joint.child, joint.child_position) for joint in mechanism.joints]
     own += [(body.name, body.com) for body in mechanism.bodies]
     own += [(point.body, point.position) for point in mechanism.points]
