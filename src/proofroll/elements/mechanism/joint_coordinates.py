@@ -195,7 +195,7 @@ class JointCoordinates:
     def _responses(self, time: float, q: Array, v: Array, mode: Mode, at: Sequence[int]) -> RestResponse:
         """Responses of the joints in a mode to unit forces along the velocities ``at``; see :data:`.Responses`."""
         free = self.solve(q, v, mode, time=time)
-        M = self._weighted(self.inertial(free.motion)[1], np.zeros(len(v)), free.C, np.zeros(len(free.C)))[0]
+        M = self.weighted(self.inertial(free.motion)[1], np.zeros(len(v)), free.C, np.zeros(len(free.C)))[0]
         loose: Array = np.asarray(np.linalg.inv(M), dtype=np.float64)
         W = loose if free.split is None else loose - free.split[0] @ free.split[0].T
         held, rates = free.C.T @ np.append(free.multipliers, free.holding), free.acceleration

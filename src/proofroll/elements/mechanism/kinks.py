@@ -47,12 +47,13 @@ class Sides:
         held: side of each kink, numbers or symbols; None: they follow from the arguments.
 
     Attributes:
+        held: the given sides.
         arguments: of the kinks, in the order of the laws; 1 of one that was not evaluated.
     """
 
     def __init__(self, laws: Mapping[Hashable, Sequence[str]], held: Sequence[Any] | None = None) -> None:
         ends = np.cumsum([0, *map(len, laws.values())]).tolist()
-        self._first, self._held = dict(zip(laws, ends, strict=False)), held
+        self._first, self.held = dict(zip(laws, ends, strict=False)), held
         self.arguments: list[Any] = [1.0] * ends[-1]
 
     def functions(self, functions: Functions) -> Functions:
@@ -60,14 +61,14 @@ class Sides:
         return {**functions, KINKS: self._of}
 
     def _of(self, law: Hashable, functions: Functions) -> Functions:
-        if law not in self._first:  # it has no kinks
+        if law not in self._first and "" not in self._first:  # it has no kinks
             return functions
-        numbers = count(self._first[law])
+        numbers = count(self._first.get(law, 0))
 
         def side(argument: Any) -> Any:
             number = next(numbers)
             self.arguments[number] = getattr(argument, "value", argument)  # of a jet the value decides
-            return side_of(argument) if self._held is None else self._held[number]
+            return side_of(argument) if self.held is None else self.held[number]
 
         return with_sides(functions, side)
 
@@ -97,3 +98,18 @@ def with_sides(functions: Functions, side: Callable[[Any], Any]) -> Functions:
         "max": lambda *values: reduce(larger, values),
         "min": lambda *values: reduce(lambda a, b: larger(a, b, -0.5), values),
     }
+
+
+def beside(kinks: Sequence[str], value: Callable[[Functions, bool], Any], functions: Functions) -> Any:
+    """Value of a law whose kinks keep the sides that they have in the middle of a piece of a motion.
+
+    Args:
+        kinks: of the law.
+        value: functions, and True for the middle -> value of the law at all points, or in the middle.
+        functions: of formulas.
+    """
+    laws = {"": kinks}
+    middle = Sides(laws)
+    value(middle.functions(functions), True)
+    held = Sides(laws, [np.sign(argument) for argument in middle.arguments])
+    return value(held.functions(functions), False)

@@ -80,7 +80,7 @@ class BodyLoads:
             rate = dot(direction, velocity_at(pieces, b, ends[1]) - velocity_at(pieces, a, ends[0]))
             pull = spring.stiffness * (length - spring.length) + spring.damping * rate
             if spring.force is not None:
-                pull = pull + spring.force.pull(length, rate)
+                pull = pull + spring.force.in_piece(length, rate)
             for body, end, sign in ((a, ends[0], 1.0), (b, ends[1], -1.0)):
                 self.add(body, end, (sign * pull)[..., None] * direction)
                 self._stiff(body, spring.stiffness, length + norm(end))

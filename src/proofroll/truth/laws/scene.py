@@ -162,6 +162,7 @@ def value_of(signal: Any, time: Array) -> Array:
         value = signal.at((time[:, :1] + time[:, -1:]) / 2)
     else:
         value = signal.at(time) if hasattr(signal, "at") else signal
+        value = signal.in_piece(time) if getattr(signal, "kinks", None) else value
     return np.asarray(np.broadcast_to(np.asarray(value, float), time.shape))
 
 

@@ -69,8 +69,7 @@ class BodySymbols:
     ) -> SolvedSymbols:
         """Rates and forces for a state that ends with the time; ``began``: line of each contact at the start."""
         e = self._bodies
-        sides = clamped[len(self._equations.limited) :]
-        kinks = Sides(e.mechanism.kinks, sides)
+        kinks = Sides(e.mechanism.kinks, clamped[len(self._equations.limited) :])
         functions = kinks.functions(functions)
         numbers_of_limits = [k for k, actuator in enumerate(e.mechanism.actuators) if actuator.limit is not None]
         limited_ones = [
@@ -84,7 +83,7 @@ class BodySymbols:
         ]
         efforts = {k: effort for k, (effort, _) in limited_ones}
         now = e.at(state[:-1], functions, Switched(clamped=efforts), time=state[-1])
-        limits = [*(guard for _, (_, guard) in limited_ones), *kink_guards(sides, kinks.arguments)]
+        limits = [*(guard for _, (_, guard) in limited_ones), *kink_guards(kinks)]
         numbers = [law.joint.number for law in self._laws]
         at = _Now(now.views, e.rate_rows(state[:-1], numbers, functions))
         touching = [*self._touching(now.views, features_of(mode), functions), *self._of_joints(state, at)]

@@ -12,6 +12,7 @@ from proofroll.elements.mechanism import WORLD, Mechanism
 from proofroll.elements.mechanism.contacts.acting import FAINT, Acting, ContactMode
 from proofroll.elements.mechanism.contacts.joint_laws import JointContact
 from proofroll.elements.mechanism.contacts.touching import FLAT
+from proofroll.elements.mechanism.kinks import Sides
 from proofroll.truth.mechanism.contact_guards import (
     LEAST_RESPONSE,
     NOT_SHARED,
@@ -110,9 +111,9 @@ def limited(wanted: Scalar, bound: float, sign: Scalar, root: Callable[[Scalar],
     return add(mul(within, wanted), mul(sign, bound)), mul(sub(mul(2.0, within), 1.0), excess)
 
 
-def kink_guards(sides: Sequence[Scalar], arguments: Sequence[Scalar]) -> list[Scalar]:
-    """Guards of kinks of laws, by their sides and arguments."""
-    return [sub(0.0, mul(side, argument)) for side, argument in zip(sides, arguments, strict=True)]
+def kink_guards(kinks: Sides) -> list[Scalar]:
+    """Guards of kinks of laws, after the evaluation of these with held sides."""
+    return [sub(0.0, mul(side, argument)) for side, argument in zip(kinks.held or (), kinks.arguments, strict=True)]
 
 
 def rows_of(

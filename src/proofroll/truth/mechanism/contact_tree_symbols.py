@@ -89,14 +89,12 @@ class TreeSymbols:
     ) -> SolvedSymbols:
         """Rates and forces for a state that ends with the time; ``began``: line of each contact at the start."""
         m = self._mechanism
-        sides = clamped[len(self._dynamics.equations.limited) :]
-        kinks = Sides(m.kinks, sides)
+        kinks = Sides(m.kinks, clamped[len(self._dynamics.equations.limited) :])
         functions = kinks.functions(functions)
         q, v = state[: m.nq], state[m.nq : -1]
         bodies, rates = bodies_of_tree(m, q, v, functions)
         inertial = self._inertial(bodies, q, v, state[-1], clamped, functions)
         mass, load, limits = inertial.mass, inertial.load, inertial.limits
-        limits = [*limits, *kink_guards(sides, kinks.arguments)]
         touching, slides = self._contacts(bodies, q, v, functions["sqrt"], features_of(mode))
         for k, start in enumerate(began[len(m.contacts) :], len(m.contacts)):
             bound = float(self._dynamics.contacts[k].bound)
@@ -156,7 +154,7 @@ class TreeSymbols:
             forces=forces,
             response=response,
             slide_rates=slide_rates,
-            within_limits=limits,
+            within_limits=[*limits, *kink_guards(kinks)],
             poses=[(body.p, body.R, turned(body.R, body.v), turned(body.R, body.w)) for body in bodies[:-1]],
             efforts=inertial.efforts,
             drives=drives,

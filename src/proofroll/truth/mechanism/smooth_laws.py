@@ -24,7 +24,7 @@ from proofroll.truth.laws.record import Pieces, without_contacts
 
 _PIECES = 2  # of a route: they cost a tenth of a truth of few samples
 _RESOLVED = 1e-13  # last coefficients of states, relative to the largest, that are round-off
-_HALVINGS = 8
+_HALVINGS = 20
 _LOOSE = 1e-3  # tolerance of a step that is taken again: it was accepted
 _TURN = 1.0  # rad, in which rotations are polynomials of eleven degrees to the last digit
 
@@ -99,12 +99,15 @@ def _pieces(mechanism: Mechanism, route: KeptRoute) -> Pieces | None:
 def _window(step: KeptStep, spin: Callable[[Array], float]) -> tuple[Array, Array]:
     """Times of the points of a piece at the start of a step [s], short enough that these resolve it, and states."""
     start, length = step.start, step.end - step.start
-    length = min(length, _TURN / max(spin(step.inside(np.array([start]))[0]), _TURN / length))
     for _ in range(_HALVINGS):
         times = start + length * (POINTS + 1) / 2
         states = step.inside(times)
         series = np.abs(TO_SERIES @ states)
-        if (series[-2:] <= _RESOLVED * np.maximum(series.max(axis=0), series.max() * _RESOLVED)).all():
+        turned = length * max(spin(states[0]), spin(states[-1]))
+        if (
+            turned <= _TURN
+            and (series[-2:] <= _RESOLVED * np.maximum(series.max(axis=0), series.max() * _RESOLVED)).all()
+        ):
             break
         length /= 2
     return times, states

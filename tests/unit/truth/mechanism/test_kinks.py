@@ -40,6 +40,7 @@ def test_a_spring_with_two_stiffnesses_swings_through_its_kink(compiled, monkeyp
     assert not found.events
 
 
+@pytest.mark.drill
 def test_laws_with_one_meaning_give_one_motion():
     """abs, max, min and sign write one law in four ways."""
     laws = ("2.5*(L-1) + 1.5*abs(L-1)", "max(4*(L-1), L-1)", "-min(-4*(L-1), 1-L)", "(2.5 + 1.5*sign(L-1))*(L-1)")
@@ -59,7 +60,8 @@ def test_a_start_at_a_kink_takes_the_side_of_its_motion(at, v0):
 
 
 @pytest.mark.parametrize("text", ["max(0, sin(3*t))", "abs(cos(3*t))", "sign(sin(3*t))", "min(t, 1 - t)"])
-@pytest.mark.parametrize("part", ["force", "torque", pytest.param("target", marks=pytest.mark.drill)])
+@pytest.mark.drill
+@pytest.mark.parametrize("part", ["force", "torque", "target"])
 def test_kinks_of_drives_are_located(text, part):
     """The velocity of a free body is the integral of its drive, to round-off."""
     signal = Formula(text)

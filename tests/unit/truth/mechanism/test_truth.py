@@ -89,8 +89,8 @@ def test_a_route_that_loses_energy_shows_no_chaos(scene, monkeypatch):
     """A truth ends where a route changes the energy, however fast small differences grow, and keeps what is before."""
     run = MaximalCoordinates.run_taylor
 
-    def braked(route, times, long_double=False):
-        record = run(route, times, long_double)
+    def braked(route, times, long_double=False, visited=None):
+        record = run(route, times, long_double, visited)
         return replace(record, v_WB=record.v_WB * np.exp(-1e-3 * (times > 0.15))[:, None, None])
 
     pytest.importorskip("heyoka")
@@ -125,8 +125,8 @@ def test_the_horizon_hangs_on_no_round_off(scene, monkeypatch):
     pytest.importorskip("heyoka")
     run = MaximalCoordinates.run_taylor
 
-    def noisy(self, times, long_double=False):
-        record = run(self, times, long_double)
+    def noisy(self, times, long_double=False, visited=None):
+        record = run(self, times, long_double, visited)
         return record if long_double else replace(record, p_WB=record.p_WB + 2 * CHAOS)
 
     monkeypatch.setattr(MaximalCoordinates, "run_taylor", noisy)
@@ -219,8 +219,8 @@ def test_routes_on_different_branches_are_no_truth(scene, monkeypatch):
     pytest.importorskip("heyoka")
     run = JointCoordinates.run
 
-    def flipped(self, times, tolerance):
-        record = run(self, times, tolerance)
+    def flipped(self, times, tolerance, visited=None):
+        record = run(self, times, tolerance, visited)
         return replace(record, p_WB=record.p_WB + np.array([1e-2, 0, 0]) * (times > 0.06)[:, None, None])
 
     monkeypatch.setattr(JointCoordinates, "run", flipped)
