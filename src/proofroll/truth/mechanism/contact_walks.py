@@ -174,12 +174,14 @@ class ContactWalks(ABC):
     def _guards_and_limits(
         self, state: Array, mode: ContactMode, guards: Sequence[ContactGuard], signs: Sequence[int]
     ) -> FloatArray:
-        """Values of guards, of those of efforts with a limit by the side from which these come, and of those of kinks."""
+        """Values of guards, of efforts with a limit by the side from which these come, and of kinks."""
         count, equations = len(self._limited), self._equations
         side = np.array([1.0 if sign else -1.0 for sign in signs[:count]])
         sides = np.array(signs[count:], dtype=float)
         of_kinks = -sides * equations.kinks(state) if len(sides) else sides
-        return np.concatenate([self._guards(state, mode, guards), -side * (np.abs(equations.drawn(state)) - 1), of_kinks])
+        return np.concatenate(
+            [self._guards(state, mode, guards), -side * (np.abs(equations.drawn(state)) - 1), of_kinks]
+        )
 
     def walk(self, time: float, state: Array, mode: ContactMode, until: float) -> Stretch[ContactMode]:
         """See the protocol."""
