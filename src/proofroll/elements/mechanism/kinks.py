@@ -108,7 +108,7 @@ def beside(kinks: Sequence[str], value: Callable[[Functions, bool], Any], functi
         value: functions, and True for the middle -> value of the law at all points, or in the middle.
         functions: of formulas.
     """
-    laws = {"": kinks}
+    laws: dict[Hashable, Sequence[str]] = {"": kinks}
     middle = Sides(laws)
     value(middle.functions(functions), True)
     held = Sides(laws, [np.sign(argument) for argument in middle.arguments])
