@@ -147,7 +147,7 @@ product.
 
 
 def meanings(read_by: type[Any]) -> dict[str, str]:
-    """What each field means: its line under ``Attributes:`` in the docstring of the class."""
+    """Meaning of each field: its line under ``Attributes:`` in the docstring of the class."""
     found: dict[str, str] = {}
     section = (inspect.getdoc(read_by) or "").partition("Attributes:\n")[2].split("\n\n")[0]
     for names, text in re.findall(r"^    ([\w, ]+): (.*(?:\n        .*)*)", section, flags=re.MULTILINE):

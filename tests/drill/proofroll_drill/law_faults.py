@@ -21,6 +21,7 @@ from proofroll.elements.mechanism import Body, Force, Joint, Mechanism, Spring
 from proofroll.elements.mechanism.bushing import Bushing
 from proofroll.elements.mechanism.contacts.geometry import Geometry, Pair
 from proofroll.elements.mechanism.drives import Actuator, Coupling
+from proofroll.elements.mechanism.joint_kinds import JointKind
 from proofroll.elements.mechanism.signal import Formula
 from proofroll.files.scene_file import load_scene
 from proofroll.truth.mechanism.error_bars import TwoRouteMotion
@@ -39,16 +40,22 @@ class LawFault(NamedTuple):
     scene: str
 
 
+Inertia = tuple[tuple[float, float, float], tuple[float, float, float], tuple[float, float, float]]
 X, Y = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)
+
+
+def _inertia(xx: float, yy: float, zz: float) -> Inertia:
+    """Inertia about axes of the body [kg m²]."""
+    return (xx, 0.0, 0.0), (0.0, yy, 0.0), (0.0, 0.0, zz)
 
 
 def motors() -> Mechanism:
     """Coupled arms with stops, a spring, an armature, and a motor that reaches its limit."""
-    arm = Body("arm", 1.0, com=(0.2, 0.0, 0.0), inertia=(0.01, 0.02, 0.02))
-    wheel = Body("wheel", 0.5, com=(0.0, 0.02, 0.05), inertia=(0.01, 0.01, 0.02))
-    shoulder = Joint("shoulder", "revolute", "world", "arm", axis=Y, q0=(0.3,), v0=(3.0,))
+    arm = Body("arm", 1.0, com=(0.2, 0.0, 0.0), inertia=_inertia(0.01, 0.02, 0.02))
+    wheel = Body("wheel", 0.5, com=(0.0, 0.02, 0.05), inertia=_inertia(0.01, 0.01, 0.02))
+    shoulder = Joint("shoulder", JointKind.REVOLUTE, "world", "arm", axis=Y, q0=(0.3,), v0=(3.0,))
     shoulder = replace(shoulder, limits=(-0.5, 0.5), restitution=0.6, damping=0.02, stiffness=1.5, armature=0.01)
-    axle = Joint("axle", "revolute", "world", "wheel", axis=Y, position=(0.0, 0.5, 0.0), q0=(0.15,), v0=(1.5,))
+    axle = Joint("axle", JointKind.REVOLUTE, "world", "wheel", axis=Y, position=(0.0, 0.5, 0.0), q0=(0.15,), v0=(1.5,))
     motor = Actuator("motor", "axle", "position", Formula("0.8*sin(20*t)"), kp=6.0, kd=0.05, gear=1.5, limit=2.0)
     gears = Coupling("gears", "shoulder", "axle", ratio=0.5)
     return Mechanism((arm, wheel), (shoulder, axle), actuators=(motor,), couplings=(gears,))
@@ -56,13 +63,15 @@ def motors() -> Mechanism:
 
 def links() -> Mechanism:
     """A driven slide with a load on a universal joint, a block that rubs, a spring, a bushing and a force."""
-    cart = Body("cart", 2.0, inertia=(0.02, 0.02, 0.02))
-    load = Body("load", 0.7, com=(0.0, 0.0, -0.1), inertia=(0.004, 0.005, 0.006))
-    block = Body("block", 1.5, inertia=(0.01, 0.01, 0.01))
+    cart = Body("cart", 2.0, inertia=_inertia(0.02, 0.02, 0.02))
+    load = Body("load", 0.7, com=(0.0, 0.0, -0.1), inertia=_inertia(0.004, 0.005, 0.006))
+    block = Body("block", 1.5, inertia=_inertia(0.01, 0.01, 0.01))
     joints = (
-        Joint("shake", "prismatic", "world", "cart", axis=X, motion=Formula("0.05*sin(9*t)"), position=Y),
-        Joint("hinge", "universal", "cart", "load", axis=Y, q0=(0.4, 0.2), damping=0.01),
-        Joint("guide", "prismatic", "world", "block", axis=Y, position=(0.0, 2.0, 0.0), v0=(0.8,), friction=6.0),
+        Joint("shake", JointKind.PRISMATIC, "world", "cart", axis=X, motion=Formula("0.05*sin(9*t)"), position=Y),
+        Joint("hinge", JointKind.UNIVERSAL, "cart", "load", axis=Y, q0=(0.4, 0.2), damping=0.01),
+        Joint(
+            "guide", JointKind.PRISMATIC, "world", "block", axis=Y, position=(0.0, 2.0, 0.0), v0=(0.8,), friction=6.0
+        ),
     )
     link = Spring("link", "load", "block", (0.0, 0.0, -0.2), (0.05, 0.0, 0.0), stiffness=30.0, damping=0.5, length=0.7)
     mount = Bushing("mount", "world", "load", (0.0, 1.0, -0.3), (0.0, 0.0, -0.1), stiffness=(40, 60, 50, 2, 3, 1))
@@ -73,8 +82,8 @@ def links() -> Mechanism:
 
 def _ball(height: float, speed: tuple[float, ...], **pair: float) -> Mechanism:
     """A ball, its centre of mass off its centre, at a height above a floor."""
-    body = Body("ball", 1.3, com=(0.0, 0.0, 0.01), inertia=(0.006, 0.007, 0.008))
-    joint = Joint("flight", "free", "world", "ball", q0=(0.0, 0.0, 0.1 + height, 1.0, 0.0, 0.0, 0.0), v0=speed)
+    body = Body("ball", 1.3, com=(0.0, 0.0, 0.01), inertia=_inertia(0.006, 0.007, 0.008))
+    joint = Joint("flight", JointKind.FREE, "world", "ball", q0=(0.0, 0.0, 0.1 + height, 1.0, 0.0, 0.0, 0.0), v0=speed)
     geometries = Geometry("skin", "ball", "sphere", radius=0.1), Geometry("floor", "world", "plane")
     law = {"friction": 0.2} | pair
     return Mechanism((body,), (joint,), geometries=geometries, pairs=(Pair("contact", ("skin", "floor"), **law),))

@@ -99,7 +99,7 @@ class RestResponse(NamedTuple):
 
     Attributes:
         free: their rates without these forces, (forces,).
-        by_force: how much a unit force along each adds to each, (forces, forces).
+        by_force: response of each to a unit force along each, (forces, forces).
         moved: True where no force adds anything, for loops and motions alone move the joint, (forces,).
         least: size of each rate that is round-off, (forces,).
     """

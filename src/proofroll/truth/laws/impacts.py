@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from proofroll.elements.mechanism.joint_kinds import DISTANCE, JointKind
 from proofroll.truth.laws.contacts import gap_of, slide_of
 from proofroll.truth.laws.integrals import norm, turned
 from proofroll.truth.laws.joints import Coordinates
@@ -104,7 +105,7 @@ def _held(scene: LawScene, before: Pieces, connection: JointFrames) -> list[Arra
     placed = scene.placed(connection, before)
     A, B, place = placed.A[0, 0], placed.B[0, 0], placed.origin_b[0, 0]
     ends, none = (connection.b, connection.a), np.zeros(3)
-    if connection.kind == "distance":
+    if connection.kind == DISTANCE:
         apart = place - placed.origin_a[0, 0]
         return [_column(scene, before, ends, place, apart / np.linalg.norm(apart), none)]
     forces = [A[:, k] for k in HELD_PLACES.get(connection.kind, (0, 1, 2))]
@@ -134,7 +135,7 @@ def _reached(
     if joint.limits is None:
         return []
     place = float(coordinates.at(number, 0, before, scene.placed(connection, before), connection.kind)[0, 0])
-    length = 1.0 if joint.kind == "revolute" else scene.length
+    length = 1.0 if joint.kind == JointKind.REVOLUTE else scene.length
     return [
         Stop(joint.name, joint.restitution, (sign * coordinate.rates[0], sign * coordinate.rates[1]))
         for sign, stop in zip((1.0, -1.0), joint.limits, strict=True)

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from proofroll.elements.mechanism.joint_kinds import JointKind
 from proofroll.truth.laws.record import Array, Pieces
 from proofroll.truth.laws.residuals import LAWS, LawResiduals
 from proofroll.truth.laws.scene import LawScene, value_of
@@ -51,7 +52,7 @@ def forces_along(
 
 def _sizes(scene: LawScene, number: int) -> tuple[float, float, float]:
     """Natural place, rate and force along a coordinate."""
-    turns = scene.mechanism.joints[number].kind == "revolute"
+    turns = scene.mechanism.joints[number].kind == JointKind.REVOLUTE
     length = 1.0 if turns else scene.length
     return length, scene.rate * length, scene.force * (scene.length if turns else 1.0)
 

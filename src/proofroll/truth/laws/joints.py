@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from proofroll.elements.mechanism.joint_kinds import DISTANCE, JointKind
 from proofroll.truth.laws.integrals import dot, norm
 from proofroll.truth.laws.joint_forces import forces_along
 from proofroll.truth.laws.loads import BodyLoads
@@ -108,7 +109,7 @@ def _closure(
     """Checks that a connection holds its bodies together, at place and rate."""
     time, name, A, B = pieces.time, connection.name, placed.A, placed.B
     apart = placed.origin_b - placed.origin_a
-    if connection.kind == "distance":
+    if connection.kind == DISTANCE:
         length = norm(apart)
         residuals.note("joint place", name, length - connection.length, sizes.place, time)
         residuals.note("joint rate", name, dot(apart / length[..., None], placed.slide), sizes.velocity, time)
@@ -133,7 +134,7 @@ def _loop_force(
     force, moment = pieces.loop[..., number, :3], pieces.loop[..., number, 3:]
     loads.between(connection.b, connection.a, placed.origin_b, force, moment)
     size = norm(moment) + (norm(force) + scene.faint) * scene.length
-    if connection.kind == "distance":
+    if connection.kind == DISTANCE:
         apart = placed.origin_b - placed.origin_a
         direction = apart / norm(apart)[..., None]
         across = norm(force - dot(force, direction)[..., None] * direction) + norm(moment) / scene.length
@@ -171,7 +172,7 @@ def _axes(
                 moving[data.name] = place, rate
                 parts += forces_along(scene, pieces, residuals, number, place, rate)
             force, size = np.sum(parts, 0), np.sum(np.abs(parts), 0)
-        elif connection.kind == "spherical":
+        elif connection.kind == JointKind.SPHERICAL:
             force = -data.damping * rate
             size = np.abs(force)
         carrier = connection.a if frame == "A" else connection.b
@@ -179,7 +180,7 @@ def _axes(
         axes.append(FreeDirection(number, direction, carrier, turns, origin, speed, rate, force, size, digits))
     if data.motion is not None:
         prescribed = motion_of(data.motion, time)
-        far = (sizes.place if data.kind == "prismatic" else 1.0) + np.abs(prescribed)
+        far = (sizes.place if data.kind == JointKind.PRISMATIC else 1.0) + np.abs(prescribed)
         residuals.note("motion", data.name, moving[data.name][0] - prescribed, far, time)
     return axes
 

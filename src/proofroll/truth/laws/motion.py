@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from proofroll.elements.mechanism.joint_kinds import JointKind
 from proofroll.truth.laws.integrals import dot, integral, norm, since_start, tail, turned
 from proofroll.truth.laws.joints import FreeDirection
 from proofroll.truth.laws.loads import BodyLoads
@@ -90,7 +91,7 @@ def momenta(
         size = size + joint.armature * ((scene.rate if axis.turns else scene.speed) + np.abs(axis.rate))
         residuals.note(
             "spin" if axis.turns else "momentum",
-            joint.child if joint.kind == "free" else joint.name,
+            joint.child if joint.kind == JointKind.FREE else joint.name,
             since_start(value) - integral(rate, pace),
             size + span * (loaded + axis.size),
             time,

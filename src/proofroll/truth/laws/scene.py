@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from proofroll.elements.mechanism.joint_kinds import JointKind
 from proofroll.truth.laws.integrals import frame_of, of_angles, turned
 from proofroll.truth.laws.record import Array, Pieces
 from proofroll.truth.laws.surfaces import PairContact, contacts_of
@@ -16,26 +17,31 @@ if TYPE_CHECKING:
 
 # Free directions of a joint, in the order of its coordinates: axes of A (on the first body) or B, number, if it turns.
 FREE: dict[str, tuple[tuple[str, int, bool], ...]] = {
-    "fixed": (),
-    "revolute": (("A", 2, True),),
-    "prismatic": (("A", 2, False),),
-    "cylindrical": (("A", 2, False), ("A", 2, True)),
-    "universal": (("A", 2, True), ("B", 0, True)),
-    "planar": (("A", 0, False), ("A", 1, False), ("A", 2, True)),
-    "spherical": tuple(("B", axis, True) for axis in range(3)),
-    "free": tuple(("B", axis, turns) for turns in (False, True) for axis in range(3)),
+    JointKind.FIXED: (),
+    JointKind.REVOLUTE: (("A", 2, True),),
+    JointKind.PRISMATIC: (("A", 2, False),),
+    JointKind.CYLINDRICAL: (("A", 2, False), ("A", 2, True)),
+    JointKind.UNIVERSAL: (("A", 2, True), ("B", 0, True)),
+    JointKind.PLANAR: (("A", 0, False), ("A", 1, False), ("A", 2, True)),
+    JointKind.SPHERICAL: tuple(("B", axis, True) for axis in range(3)),
+    JointKind.FREE: tuple(("B", axis, turns) for turns in (False, True) for axis in range(3)),
 }
 # Axes of A along which the points of a joint stay together (others: all three), and pairs of axes of A and B that stay
 # perpendicular (others: none).
-HELD_PLACES: dict[str, tuple[int, ...]] = {"prismatic": (0, 1), "cylindrical": (0, 1), "planar": (2,), "free": ()}
+HELD_PLACES: dict[str, tuple[int, ...]] = {
+    JointKind.PRISMATIC: (0, 1),
+    JointKind.CYLINDRICAL: (0, 1),
+    JointKind.PLANAR: (2,),
+    JointKind.FREE: (),
+}
 _PARALLEL, _EQUAL = ((0, 2), (1, 2)), ((0, 1), (1, 2), (2, 0))
 HELD_TURNS: dict[str, tuple[tuple[int, int], ...]] = {
-    "fixed": _EQUAL,
-    "prismatic": _EQUAL,
-    "revolute": _PARALLEL,
-    "cylindrical": _PARALLEL,
-    "planar": _PARALLEL,
-    "universal": ((2, 0),),
+    JointKind.FIXED: _EQUAL,
+    JointKind.PRISMATIC: _EQUAL,
+    JointKind.REVOLUTE: _PARALLEL,
+    JointKind.CYLINDRICAL: _PARALLEL,
+    JointKind.PLANAR: _PARALLEL,
+    JointKind.UNIVERSAL: ((2, 0),),
 }
 _FAINT = 1e-3  # part of the natural force of a scene below which forces count as of that size
 
@@ -102,7 +108,7 @@ class LawScene:
     def _connections(self) -> list[JointFrames]:
         connections = []
         for joint in self.mechanism.joints:
-            plain = joint.kind in {"fixed", "spherical", "free"}
+            plain = joint.kind in {JointKind.FIXED, JointKind.SPHERICAL, JointKind.FREE}
             second = None if joint.second_axis is None else np.array(joint.second_axis)
             frame = np.eye(3) if plain else frame_of(np.array(joint.axis), second)
             ends = self.index[joint.parent], self.index[joint.child]
@@ -112,9 +118,9 @@ class LawScene:
         for loop in self.mechanism.loops:
             kind, frame = str(loop.kind), frame_of(np.array(loop.axis_a))
             other = frame_of(np.array(loop.axis_b))
-            if kind in {"fixed", "prismatic"}:
+            if kind in {JointKind.FIXED, JointKind.PRISMATIC}:
                 other = of_angles(np.array(loop.orientation)).T @ frame
-            elif kind == "universal":  # z of A stays perpendicular to x of B
+            elif kind == JointKind.UNIVERSAL:  # z of A stays perpendicular to x of B
                 other = other[:, [2, 0, 1]]
             ends = self.index[loop.body_a], self.index[loop.body_b]
             places = np.array(loop.position_a), np.array(loop.position_b)

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from proofroll.elements.mechanism.joint_kinds import JointKind
 from proofroll.truth.laws.contacts import gap_of, slide_of
 from proofroll.truth.laws.impacts import impact
 from proofroll.truth.laws.integrals import dot, norm
@@ -94,7 +95,7 @@ def _beyond_bound(scene: LawScene, before: Pieces, k: int) -> float:
 def _of_joints(scene: LawScene, before: Pieces, after: Pieces) -> Iterator[tuple[str, float]]:
     """Causes of changes of stops and dry friction."""
     for number, joint in enumerate(scene.mechanism.joints):
-        turns = joint.kind == "revolute"
+        turns = joint.kind == JointKind.REVOLUTE
         natural = scene.force * (scene.length if turns else 1.0)
         for k, (mode, later) in enumerate(zip(before.modes.stops[number], after.modes.stops[number], strict=True)):
             if mode != later and later == "open":
@@ -115,5 +116,5 @@ def _of_joints(scene: LawScene, before: Pieces, after: Pieces) -> Iterator[tuple
 def _rate(scene: LawScene, pieces: Pieces, number: int) -> float:
     """Rate of a joint with one coordinate."""
     placed = scene.placed(scene.connections[number], pieces)
-    turns = scene.mechanism.joints[number].kind == "revolute"
+    turns = scene.mechanism.joints[number].kind == JointKind.REVOLUTE
     return float(dot(placed.spin if turns else placed.slide, placed.A[..., 2])[0, 0])

@@ -9,7 +9,7 @@ from proofroll.truth.mechanism.independent_rows import accelerated_by
 
 
 def slides_of(bodies: BodiesState) -> FreeSlides:
-    """How the contacts of bodies slide without forces of contacts."""
+    """Slides of the contacts of bodies without forces of contacts."""
     free = accelerated_by(bodies.mass, bodies.force, bodies.C, -bodies.of_joints)
     loose: Array = np.asarray(np.linalg.inv(bodies.mass), dtype=np.float64)
     root = np.linalg.cholesky(bodies.mass)

@@ -252,7 +252,7 @@ class LostGrip(NamedTuple):
 
 
 def lost_grip(contacts: Sequence[Touchable], solved: SolvedContacts) -> LostGrip:
-    """What a shared load moves where no distribution of it that contacts can bear is left: dual of the largest margin.
+    """Motion by a shared load where no distribution of it that contacts can bear is left: dual of the largest margin.
 
     Sticking contacts whose speed in that motion is zero are its pivots and hold on.
     """

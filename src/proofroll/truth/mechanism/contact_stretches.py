@@ -48,7 +48,7 @@ from proofroll.truth.mechanism.contact_guards import (
     unloaded,
 )
 from proofroll.truth.mechanism.contact_walks import AHEAD, ContactWalks, SwitchedEquations
-from proofroll.truth.mechanism.impact_series import Impact, ImpactSeries, Series
+from proofroll.truth.mechanism.impact_series import GeometricSeries, Impact, ImpactSeries
 from proofroll.truth.mechanism.planar_slip import BegunSlip, leaving_slips
 from proofroll.truth.mechanism.standing_ends import Face, check_faces, check_spin
 from proofroll.truth.mechanism.stopping_slip import StoppingSlip
@@ -86,7 +86,7 @@ class ContactStretches(ContactWalks):
 
     @abstractmethod
     def _free_slides(self, state: Array, rough: ContactMode) -> FreeSlides:
-        """How the contacts slide without their forces; ``rough``: what is open, moves or stands."""
+        """Slides of the contacts without their forces; ``rough``: what is open, moves or stands."""
 
     def _moved_on(self, state: Array, rough: ContactMode) -> ContactMode:
         """Rough modes with a slip in place of each rest that loops or motions end, whatever friction does.
@@ -295,7 +295,7 @@ class ContactStretches(ContactWalks):
         return self._after(stretch, state, stays, happened, margin, delay)
 
     def _settled(
-        self, stretch: Stretch[ContactMode], state: Array, stays: Sequence[bool], series: Series, speed: float
+        self, stretch: Stretch[ContactMode], state: Array, stays: Sequence[bool], series: GeometricSeries, speed: float
     ) -> Transition[ContactMode]:
         """Transition at an impact of a ``speed`` whose further ones are summed: all contacts of the series close.
 

@@ -30,14 +30,14 @@ class EarlyEnd:
             self.time, self.reason = time, _TIME.sub("", reason)
 
     def known(self, times: Array) -> Array:
-        """Those of rising times [s] that lie before the end."""
+        """Times of rising ones [s] that lie before the end."""
         return np.asarray(times[times < self.time])
 
     def run(self, route: Callable[[Array], _T], times: Array) -> _T:
         """Result of a route at the known ones of some times [s]; where it fails is an end.
 
         Raises:
-            Diverged: it fails at the first of these times, or at a time that it does not tell.
+            Diverged: the route fails at the first of these times, or at a time that it does not tell.
         """
         while True:
             try:

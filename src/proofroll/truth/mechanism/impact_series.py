@@ -16,7 +16,7 @@ class Impact(NamedTuple):
     speed: float
 
 
-class Series(NamedTuple):
+class GeometricSeries(NamedTuple):
     """Infinitely many impacts still to come.
 
     Attributes:
@@ -41,7 +41,7 @@ class ImpactSeries:
     def __init__(self) -> None:
         self._all, self._of_pairs = list[Impact](), dict[str, list[Impact]]()
 
-    def after(self, pair: str, impact: Impact) -> Series | None:
+    def after(self, pair: str, impact: Impact) -> GeometricSeries | None:
         """Series that an impact on a pair belongs to; None: it belongs to none. The impact is kept."""
         self._all.append(impact)
         impacts = self._of_pairs.setdefault(pair, [])
@@ -55,5 +55,5 @@ class ImpactSeries:
             ratio = last.speed / middle.speed
             if ratio < 1 and period < before and abs(period / before - ratio) <= _ALIKE:
                 hit = (each.contacts for each in self._all if each.time > middle.time)
-                return Series(ratio, period * ratio / (1 - ratio), period, frozenset().union(*hit))
+                return GeometricSeries(ratio, period * ratio / (1 - ratio), period, frozenset().union(*hit))
         return None

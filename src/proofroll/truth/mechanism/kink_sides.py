@@ -52,7 +52,7 @@ def refuse_jolts(mechanism: Mechanism, time: float, before: Sequence[int], after
     """Refuses a motion whose prescribed rate jumps at a time [s], where kinks change their sides.
 
     Raises:
-        Refused: it does, by more than round-off.
+        Refused: the rate jumps by more than round-off.
     """
     for joint, _, _ in mechanism.prescribed:
         if isinstance(joint.motion, Formula) and joint.motion.kinks:

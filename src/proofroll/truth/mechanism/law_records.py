@@ -13,6 +13,7 @@ from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.contacts.acting import ContactMode, features_of
 from proofroll.elements.mechanism.contacts.joint_laws import JointContact
 from proofroll.elements.mechanism.contacts.turning import TurningFriction
+from proofroll.elements.mechanism.joint_kinds import JointKind
 from proofroll.elements.mechanism.named_forces import named_forces
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.truth.hybrid import HybridPath, Stretch
@@ -144,7 +145,11 @@ class LawRecorder:
                 continue
             assert isinstance(contact, JointContact)  # the only other kind
             number = contact.joint.number
-            push = forces[..., k, :] @ contact.direction * (force if m.joints[number].kind == "prismatic" else moment)
+            push = (
+                forces[..., k, :]
+                @ contact.direction
+                * (force if m.joints[number].kind == JointKind.PRISMATIC else moment)
+            )
             if contact.side:
                 stops[..., number, 0 if contact.side > 0 else 1] = push
             else:

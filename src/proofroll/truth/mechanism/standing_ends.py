@@ -12,12 +12,11 @@ from typing import Any
 import numpy as np
 
 from proofroll.core.errors import NotUnique
-from proofroll.elements.mechanism import Mechanism
+from proofroll.elements.mechanism import Mechanism, Tree
 from proofroll.elements.mechanism.contacts.acting import ContactMode, closed_in, slip_velocity
 from proofroll.elements.mechanism.contacts.geometry import Geometry, Pair, shared_pairs
 from proofroll.elements.mechanism.contacts.start import STILL, natural_scale, touches
 from proofroll.elements.mechanism.contacts.touching import Touching
-from proofroll.elements.mechanism.kinematics import Tree
 from proofroll.elements.mechanism.rotations import Array, cross, to_rpy
 from proofroll.truth.mechanism.error_bars import TwoRouteMotion
 
@@ -158,8 +157,8 @@ def check_faces(faces: Sequence[Face], before: ContactMode, after: ContactMode, 
     """Refuses what an end of a cylinder does when only some of its corners are closed; ``before``: the last mode.
 
     Raises:
-        NotUnique: it begins to tip.
-        RollingLanding: it lands on its rim.
+        NotUnique: the cylinder begins to tip.
+        RollingLanding: the cylinder lands on its rim.
     """
     was, closed = closed_in(before), closed_in(after)
     for face in faces:

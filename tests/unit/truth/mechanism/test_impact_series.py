@@ -14,7 +14,7 @@ from proofroll.elements.mechanism.contacts.geometry import Geometry, Pair
 from proofroll.elements.mechanism.contacts.sequences import Outcomes, refuse_spread
 from proofroll.files.scene_file import load_scene
 from proofroll.truth.laws import impacts
-from proofroll.truth.mechanism.impact_series import Impact, ImpactSeries, Series
+from proofroll.truth.mechanism.impact_series import GeometricSeries, Impact, ImpactSeries
 from proofroll.truth.mechanism.switched_truth import truth_of
 
 GRAVITY = 9.81
@@ -128,7 +128,7 @@ def test_impacts_in_turn_and_at_once_are_compared() -> None:
         refuse_spread(jumps + np.diag([0.02, 0.0]), outcomes, ["a", "b"], 0.5)
 
 
-def series_of(ratio: float, growth: float) -> tuple[Series | None, float]:
+def series_of(ratio: float, growth: float) -> tuple[GeometricSeries | None, float]:
     """Series after eight impacts of two sets of contacts in turn, and the time of the last."""
     impacts, time, found = ImpactSeries(), 0.0, None
     for k in range(8):

@@ -15,7 +15,7 @@ _RESTS = 1e-10  # rate of a slide, relative to the parts that it is the sum of, 
 
 
 class FreeSlides(NamedTuple):
-    """How contacts slide along their surfaces without forces of contacts.
+    """Slides of contacts along their surfaces without forces of contacts.
 
     Attributes:
         rates: of the slides, (contacts, 3).

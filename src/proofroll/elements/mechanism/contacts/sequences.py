@@ -86,7 +86,7 @@ def sequences(G: Array, slides: Array, groups: Sequence[list[int]], strike: Stri
 
 
 def left_by(slides: Array, least: float) -> list[str]:
-    """Whether each contact opens, slips or sticks behind an impact, from the slides after it, (3 contacts,).
+    """Mode of each contact behind an impact (open, slip or stick), from the slides after it, (3 contacts,).
 
     ``least``: speed above which a contact moves.
     """

@@ -36,7 +36,7 @@ class ContactsNow:
 
     @cached_property
     def free_slides(self) -> FreeSlides:
-        """How the contacts slide without their forces."""
+        """Slides of the contacts without their forces."""
         found = self.solution
         held = found.C.T @ found.multipliers
         return free_slides(self.touching, self.J, self.bias, found.acceleration, self.W, self.loose, held)
