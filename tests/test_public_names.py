@@ -11,7 +11,7 @@ import pytest
 
 from proofroll.core import engine_abilities
 from proofroll.elements.ball_on_surface.model import BallCapability
-from proofroll.elements.mechanism.capabilities import MechanismCapability
+from proofroll.elements.mechanism.run.capabilities import MechanismCapability
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGE = (ROOT / "docs" / "write_an_engine.md").read_text(encoding="utf-8")

@@ -11,8 +11,8 @@ from single_precision import Single
 
 from proofroll.conformance import checks
 from proofroll.core.scene import Scene
-from proofroll.elements.mechanism.capabilities import MechanismCapability
-from proofroll.elements.mechanism.element import MechanismElement
+from proofroll.elements.mechanism.run.capabilities import MechanismCapability
+from proofroll.elements.mechanism.run.element import MechanismElement
 from proofroll.engines.mujoco import Mujoco
 
 LAWS = frozenset(

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from proofroll.files.scene_file import load_scene, read_scene_file
-from proofroll.truth.mechanism.switched_truth import truth_of
+from proofroll.truth.switched_truth import truth_of
 
 # m, s, N and the like: what two routes may leave of a scene; 1e-11 is seen.
 KNOWN = 1e-9

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from proofroll.core.errors import InputError
-from proofroll.elements.mechanism.published import read_published
+from proofroll.elements.mechanism.scene.published import read_published
 from proofroll_drill import published
 
 NUMBERS = """

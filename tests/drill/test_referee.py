@@ -12,16 +12,16 @@ from proofroll.cli import app
 from proofroll.core.truth import truth
 from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.elements.mechanism import Mechanism
-from proofroll.elements.mechanism.analysis import analyse
-from proofroll.elements.mechanism.assembly import check_start
-from proofroll.elements.mechanism.contacts.start import check_contacts
-from proofroll.elements.mechanism.joint_coordinates import JointCoordinates
-from proofroll.elements.mechanism.joint_kinds import FACTS
-from proofroll.elements.mechanism.record import Record, record_of
-from proofroll.truth.mechanism import maximal_taylor
-from proofroll.truth.mechanism.maximal_bodies import Planar, made_bodies
-from proofroll.truth.mechanism.maximal_coordinates import MaximalCoordinates
-from proofroll.truth.mechanism.switched_truth import truth_of
+from proofroll.elements.mechanism.contact.start import check_contacts
+from proofroll.elements.mechanism.dynamics.analysis import analyse
+from proofroll.elements.mechanism.dynamics.joint_coordinates import JointCoordinates
+from proofroll.elements.mechanism.dynamics.record import Record, record_of
+from proofroll.elements.mechanism.run.assembly import check_start
+from proofroll.elements.mechanism.scene.joint_kinds import FACTS
+from proofroll.truth.bodies import maximal_taylor
+from proofroll.truth.bodies.maximal_bodies import Planar, made_bodies
+from proofroll.truth.bodies.maximal_coordinates import MaximalCoordinates
+from proofroll.truth.switched_truth import truth_of
 from proofroll_drill.referee import holding
 from proofroll_drill.referee.balls import BallReferee
 from proofroll_drill.referee.holding import errors, hold, hold_ball, hold_contacts

@@ -14,10 +14,10 @@ from tiny import Tiny
 from proofroll.core.arrays import FloatArray
 from proofroll.core.engine import whole_steps
 from proofroll.core.scene import Scene
-from proofroll.elements.mechanism.capabilities import MechanismCapability
-from proofroll.elements.mechanism.contacts.dynamics import ContactDynamics
-from proofroll.elements.mechanism.joint_coordinates import JointCoordinates
-from proofroll.elements.mechanism.sampling import MechanismBuilt, MechanismSample
+from proofroll.elements.mechanism.contact.dynamics import ContactDynamics
+from proofroll.elements.mechanism.dynamics.joint_coordinates import JointCoordinates
+from proofroll.elements.mechanism.run.capabilities import MechanismCapability
+from proofroll.elements.mechanism.run.sampling import MechanismBuilt, MechanismSample
 from proofroll.engines.projection import Projection
 
 # Order -> Runge-Kutta tableau: weights of earlier stages for each stage, and weights of all stages.

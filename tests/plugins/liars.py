@@ -16,7 +16,7 @@ from scipy.spatial.transform import Rotation
 from proofroll.conformance.subject import truth_scenes
 from proofroll.core.events import Event
 from proofroll.core.scene import Scene
-from proofroll.elements.mechanism.element import MechanismElement
+from proofroll.elements.mechanism.run.element import MechanismElement
 from proofroll.engines.projection import Projection
 from proofroll.engines.projection.settings import ProjectionSettings
 from proofroll.files.scene_file import load_scene

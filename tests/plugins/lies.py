@@ -14,7 +14,7 @@ from proofroll.core.events import Event
 from proofroll.core.gravity import Gravity
 from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.element import scene_with
-from proofroll.elements.mechanism.element import MechanismElement
+from proofroll.elements.mechanism.run.element import MechanismElement
 
 
 def gravity(magnitude: float) -> Callable[[Scene], Scene]:

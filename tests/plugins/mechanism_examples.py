@@ -1,7 +1,7 @@
 """Mechanisms that several tests share."""
 
 from proofroll.elements.mechanism import Body, Force, Joint, Loop, Mechanism, Point, Spring
-from proofroll.elements.mechanism.bushing import Bushing
+from proofroll.elements.mechanism.scene.bushing import Bushing
 
 SOLID = {"mass": 1.3, "com": (0.1, -0.2, 0.05), "inertia": ((0.5, 0.02, 0.01), (0.02, 0.6, -0.03), (0.01, -0.03, 0.7))}
 BUSHING = Bushing(

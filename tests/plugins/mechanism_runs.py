@@ -7,9 +7,9 @@ import numpy as np
 
 from proofroll.core.plugins import load_engine
 from proofroll.elements.mechanism import Tree
-from proofroll.elements.mechanism.analysis import analyse
-from proofroll.elements.mechanism.joint_coordinates import JointCoordinates
-from proofroll.elements.mechanism.rotations import from_quaternion
+from proofroll.elements.mechanism.dynamics.analysis import analyse
+from proofroll.elements.mechanism.dynamics.joint_coordinates import JointCoordinates
+from proofroll.elements.mechanism.scene.rotations import from_quaternion
 from proofroll.files.scene_file import load_scene
 
 # Formulation for mechanisms -> its engine, and the preset for which tests have tight bounds.

@@ -5,7 +5,7 @@ from collections.abc import Callable
 import pytest
 
 from proofroll.elements.mechanism import Mechanism
-from proofroll.elements.mechanism.element import MechanismElement
+from proofroll.elements.mechanism.run.element import MechanismElement
 from proofroll.files.scene_file import load_scene
 
 

@@ -6,7 +6,7 @@ import pytest
 
 from proofroll.core.errors import InputError
 from proofroll.elements.mechanism import Mechanism
-from proofroll.elements.mechanism.element import the_mechanism
+from proofroll.elements.mechanism.run.element import the_mechanism
 from proofroll.files.scene_file import load_scene
 
 _TEXT = """

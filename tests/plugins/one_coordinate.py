@@ -7,7 +7,7 @@ from functools import cache
 from scipy.integrate import solve_ivp
 
 from proofroll.elements.mechanism import Mechanism
-from proofroll.elements.mechanism.signal import value_at
+from proofroll.elements.mechanism.scene.signal import value_at
 
 
 @cache

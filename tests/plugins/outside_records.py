@@ -80,7 +80,7 @@ class Loop:
 
     def record(self, program: Callable[[Loop], Simulator]) -> dict[str, np.ndarray]:
         """Columns over time of a run, each named as in the documentation."""
-        from proofroll.elements.mechanism.policy import Observation
+        from proofroll.elements.mechanism.scene.policy import Observation
         from proofroll.robots.probe import make
 
         sim, act, rows = program(self), make(JOINTS), []

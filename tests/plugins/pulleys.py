@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from proofroll.elements.mechanism import Body, Joint, Mechanism
-from proofroll.elements.mechanism.drives import Coupling
+from proofroll.elements.mechanism.scene.drives import Coupling
 
 MASSES = (4.0, 1.0, 2.0)
 _MOMENTS = (0.01, 0.01, 0.01)

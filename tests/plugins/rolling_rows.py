@@ -19,11 +19,11 @@ import numpy as np
 from proofroll.elements.ball_on_surface.surfaces import Cylinder, Declared, Plane, Surface
 from proofroll.elements.ball_on_surface.surfaces.formula import Jet, sqrt, variables
 from proofroll.elements.mechanism import WORLD, Mechanism
-from proofroll.elements.mechanism.checks import Vector
-from proofroll.truth.mechanism.constraint_rows import AXES, NONE, ConstraintRow, ConstraintRows
-from proofroll.truth.mechanism.maximal_bodies import BodyInScalars
-from proofroll.truth.mechanism.maximal_equations import MaximalEquations
-from proofroll.truth.scalars import Scalar, cross, dot, scaled
+from proofroll.elements.mechanism.scene.checks import Vector
+from proofroll.truth.bodies.constraint_rows import AXES, NONE, ConstraintRow, ConstraintRows
+from proofroll.truth.bodies.maximal_bodies import BodyInScalars
+from proofroll.truth.bodies.maximal_equations import MaximalEquations
+from proofroll.truth.numerics.scalars import Scalar, cross, dot, scaled
 
 
 @dataclass(frozen=True)

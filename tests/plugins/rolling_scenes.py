@@ -12,8 +12,8 @@ from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.element import BallOnSurface
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.mechanism import WORLD, Body, Joint, Mechanism
-from proofroll.elements.mechanism.checks import Vector
-from proofroll.elements.mechanism.element import MechanismElement
+from proofroll.elements.mechanism.run.element import MechanismElement
+from proofroll.elements.mechanism.scene.checks import Vector
 
 
 def rolling_scene(scene: Scene) -> tuple[Mechanism, tuple[RollingContact, ...]]:

@@ -9,7 +9,7 @@ import pytest
 
 from proofroll.core.parameters import Parameters
 from proofroll.elements.mechanism import Mechanism
-from proofroll.elements.mechanism.reader import made_mechanism
+from proofroll.elements.mechanism.run.reader import made_mechanism
 from proofroll.robots.gallery import locate, read_gallery
 from proofroll.robots.scene import RobotScenes
 

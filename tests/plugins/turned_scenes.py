@@ -12,10 +12,10 @@ import numpy as np
 from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.element import BallOnSurface
 from proofroll.elements.mechanism import WORLD, Mechanism
-from proofroll.elements.mechanism.bushing import Bushing
-from proofroll.elements.mechanism.element import MechanismElement
-from proofroll.elements.mechanism.rotations import from_rpy, to_rpy
-from proofroll.elements.mechanism.signal import Formula, Table, value_at, varies
+from proofroll.elements.mechanism.run.element import MechanismElement
+from proofroll.elements.mechanism.scene.bushing import Bushing
+from proofroll.elements.mechanism.scene.rotations import from_rpy, to_rpy
+from proofroll.elements.mechanism.scene.signal import Formula, Table, value_at, varies
 
 # Lists of a mechanism whose order is that of its file.
 LISTS = (

@@ -11,11 +11,11 @@ from turned_scenes import turned_mechanism
 
 from proofroll.core.errors import InputError, Refused
 from proofroll.elements.mechanism import Body, Joint, Mechanism
-from proofroll.elements.mechanism.contacts.geometry import Geometry, Pair
-from proofroll.elements.mechanism.element import the_mechanism
-from proofroll.elements.mechanism.rotations import from_rpy
+from proofroll.elements.mechanism.run.element import the_mechanism
+from proofroll.elements.mechanism.scene.rotations import from_rpy
+from proofroll.elements.mechanism.scene.shapes.geometry import Geometry, Pair
 from proofroll.files.scene_file import load_scene
-from proofroll.truth.mechanism.switched_truth import truth_of
+from proofroll.truth.switched_truth import truth_of
 from proofroll_drill.referee.random_contacts import random_contacts
 
 NIGHTLY = (pytest.mark.drill, pytest.mark.nightly)

@@ -11,7 +11,7 @@ from turned_scenes import turned_scene
 
 from proofroll.core.certificate import certify, first_difference
 from proofroll.core.errors import Diverged, Refused
-from proofroll.elements.mechanism.element import MechanismElement
+from proofroll.elements.mechanism.run.element import MechanismElement
 from proofroll.files.data_folders import data_folder
 from proofroll.files.scene_file import load_scene
 from proofroll.running.simulation import build

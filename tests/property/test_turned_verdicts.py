@@ -15,8 +15,8 @@ from scene_answers import answers, differences
 from turned_scenes import shuffled, turned_ball, turned_scene
 
 from proofroll.core.scene import Scene
-from proofroll.elements.mechanism.element import MechanismElement, the_mechanism
-from proofroll.elements.mechanism.rotations import from_rpy
+from proofroll.elements.mechanism.run.element import MechanismElement, the_mechanism
+from proofroll.elements.mechanism.scene.rotations import from_rpy
 from proofroll.files.scene_file import load_scene
 from proofroll_drill.referee.random_balls import random_ball
 from proofroll_drill.referee.random_contacts import random_contacts

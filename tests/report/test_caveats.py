@@ -15,7 +15,7 @@ from proofroll.core.first_steps import certificate
 from proofroll.core.plugins import engine_names, load_engine
 from proofroll.core.verdict import Verdict
 from proofroll.elements.ball_on_surface.model import BallCapability
-from proofroll.elements.mechanism.capabilities import MechanismCapability
+from proofroll.elements.mechanism.run.capabilities import MechanismCapability
 from proofroll.files.scene_file import load_scene
 from proofroll.report.comparison.closing import closing_notes
 from proofroll.report.labels import family_and_caveat, with_caveat

@@ -17,10 +17,10 @@ from proofroll.core.errors import Refused
 from proofroll.core.scene import Scene
 from proofroll.core.truth import truth
 from proofroll.elements.mechanism import Body, Joint, Mechanism
-from proofroll.elements.mechanism.contacts.geometry import Geometry, GeometryKind, Pair
-from proofroll.elements.mechanism.element import MechanismElement
 from proofroll.elements.mechanism.report.drawing import mechanism_drawing
 from proofroll.elements.mechanism.report.replay import _orientations, draw_mechanism
+from proofroll.elements.mechanism.run.element import MechanismElement
+from proofroll.elements.mechanism.scene.shapes.geometry import Geometry, GeometryKind, Pair
 from proofroll.files.comparison_file import load_comparison
 from proofroll.files.scene_file import load_scene
 from proofroll.report.comparison.plots import point_curves

@@ -7,7 +7,7 @@ from robot_templates import mjcf
 from proofroll import simulate
 from proofroll.core.errors import Refused
 from proofroll.core.truth import truth
-from proofroll.elements.mechanism.joint_coordinates import JointCoordinates
+from proofroll.elements.mechanism.dynamics.joint_coordinates import JointCoordinates
 from proofroll.files.scene_file import load_scene
 
 mujoco = pytest.importorskip("mujoco")

@@ -15,7 +15,7 @@ from proofroll import load_scene, simulate
 from proofroll.cli import app
 from proofroll.core.errors import InputError
 from proofroll.elements.mechanism import Mechanism
-from proofroll.elements.mechanism.policy import Observation
+from proofroll.elements.mechanism.scene.policy import Observation
 from proofroll.files.scene_sources import with_control
 from proofroll.robots.probe import make
 from proofroll.studies.comparison.default_comparison import default_comparison

@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 
 from proofroll.core.errors import InputError
-from proofroll.elements.mechanism.signal import Formula, Table
+from proofroll.elements.mechanism.scene.signal import Formula, Table
 from proofroll.robots.controller import GroundContact, read_controller
 
 FULL = """

@@ -18,14 +18,14 @@ from proofroll.core.errors import InputError, Refused
 from proofroll.core.events import events_of
 from proofroll.core.limits import TIME_LIMIT
 from proofroll.core.truth import truth
-from proofroll.elements.mechanism.joint_coordinates import JointCoordinates
+from proofroll.elements.mechanism.dynamics.joint_coordinates import JointCoordinates
 from proofroll.robots.gallery import locate, read_gallery
 from proofroll.robots.meaning import meaning
 from proofroll.robots.opening import open_robot
 from proofroll.robots.reading import write
 from proofroll.robots.states import random_states
 from proofroll.robots.two_formulations import world_jacobians
-from proofroll.truth.mechanism import maximal_taylor
+from proofroll.truth.bodies import maximal_taylor
 
 EVERY_KIND = """<mujoco model="mobile"><worldbody>
 <body name="lone" pos="2 0 0" euler="0 30 0"><joint name="k0" type="ball" pos="0.1 0 0"/>

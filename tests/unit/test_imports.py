@@ -127,7 +127,7 @@ def test_imports_lead_one_way(folder: str) -> None:
         ("core/a.py", "from ..truth import onset\n", 1),
         ("core/a.py", "from proofroll import simulate\n", 1),
         ("running/a.py", "import proofroll.testing\n", 1),
-        ("report/a.py", 'x = 1\nimport_module("proofroll.elements.mechanism.kind")\n', 2),
+        ("report/a.py", 'x = 1\nimport_module("proofroll.elements.mechanism.run.kind")\n', 2),
         ("running/a.py", 'import_module(f"proofroll.engines.{name}")\n', 1),
         ("cli/a.py", 'TEXT = "import x\\nfrom proofroll.truth.ball_on_surface.onset import onset"\n', 1),
         ("cli/templates/a.txt", "\nfrom proofroll.elements.mechanism import model\n", 2),
@@ -164,8 +164,8 @@ def test_engines_know_no_scene_and_no_surface_by_name() -> None:
 
 # Engines that share a part with the truth, and for what.
 SHARED_WITH_TRUTH = {
-    "engines/exudyn/spheres.py imports proofroll.elements.mechanism.contacts.dynamics",  # the load at the start alone
-    "engines/projection/contact_modes.py imports proofroll.elements.mechanism.contacts.coulomb",  # Coulomb's law alone
+    "engines/exudyn/contact/spheres.py imports proofroll.elements.mechanism.contact.dynamics",  # the start's load
+    "engines/projection/contact/contact_modes.py imports proofroll.elements.mechanism.contact.coulomb",  # its law alone
 }
 
 

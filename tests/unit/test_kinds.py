@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from proofroll.core.events import EventKind
-from proofroll.elements.mechanism.joint_kinds import FACTS, JointKind
+from proofroll.elements.mechanism.scene.joint_kinds import FACTS, JointKind
 
 SRC = Path(__file__).resolve().parents[2] / "src"
 # Modes of contacts and their guards have the names of some events.

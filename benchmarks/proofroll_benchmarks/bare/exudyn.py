@@ -17,13 +17,13 @@ from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Diverged, Refused
 from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.model import RollingBall
-from proofroll.elements.mechanism.sampling import mechanism_of
-from proofroll.engines.exudyn.carrier import Carrier
-from proofroll.engines.exudyn.contact import PenaltyContact
+from proofroll.elements.mechanism.run.sampling import mechanism_of
+from proofroll.engines.exudyn.ball.carrier import Carrier
+from proofroll.engines.exudyn.ball.contact import PenaltyContact
+from proofroll.engines.exudyn.ball.rolling_disc import RollingDisc
 from proofroll.engines.exudyn.integration import new_system, simulation_settings
 from proofroll.engines.exudyn.native import Output, exu, items
-from proofroll.engines.exudyn.redundant import Redundant
-from proofroll.engines.exudyn.rolling_disc import RollingDisc
+from proofroll.engines.exudyn.smooth.redundant import Redundant
 from proofroll_benchmarks.bare import Bare, in_vertical_cylinder, is_mechanism
 
 Start = tuple[FloatArray, FloatArray]

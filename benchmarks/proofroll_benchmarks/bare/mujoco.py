@@ -17,7 +17,7 @@ from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Diverged, Refused
 from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.model import RollingBall
-from proofroll.elements.mechanism.sampling import mechanism_of
+from proofroll.elements.mechanism.run.sampling import mechanism_of
 from proofroll.engines.mujoco import Mujoco
 from proofroll.engines.mujoco.reproducer import stepped
 from proofroll_benchmarks.bare import Bare, in_vertical_cylinder, is_mechanism

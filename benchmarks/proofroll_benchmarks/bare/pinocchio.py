@@ -19,12 +19,12 @@ from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Diverged, Refused
 from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.model import BallCapability, RollingBall
-from proofroll.elements.mechanism.joint_kinds import FACTS
-from proofroll.elements.mechanism.sampling import mechanism_of
-from proofroll.engines.pinocchio.constraint_dynamics import ConstraintDynamics
-from proofroll.engines.pinocchio.contact import LARGEST_FRICTION
-from proofroll.engines.pinocchio.mechanism_run import MechanismRun
-from proofroll.engines.pinocchio.plane_contact import PlaneContact
+from proofroll.elements.mechanism.run.sampling import mechanism_of
+from proofroll.elements.mechanism.scene.joint_kinds import FACTS
+from proofroll.engines.pinocchio.ball.contact import LARGEST_FRICTION
+from proofroll.engines.pinocchio.ball.plane_contact import PlaneContact
+from proofroll.engines.pinocchio.smooth.constraint_dynamics import ConstraintDynamics
+from proofroll.engines.pinocchio.smooth.mechanism_run import MechanismRun
 from proofroll_benchmarks.bare import Bare, in_vertical_cylinder, is_mechanism
 from proofroll_benchmarks.bare.mechanism_loop import MechanismLoop
 from proofroll_benchmarks.bare.steps import dop853

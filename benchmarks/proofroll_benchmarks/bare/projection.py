@@ -17,11 +17,11 @@ from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Diverged, Refused
 from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.model import RollingBall
-from proofroll.elements.mechanism.sampling import mechanism_of
-from proofroll.engines.projection.dependent import DependentCoordinates
-from proofroll.engines.projection.geometry import geometry_of
-from proofroll.engines.projection.method import ProjectedBall, start_and_scales
-from proofroll.engines.projection.orientation import EulerAngles, Orientation, RotatingFrame
+from proofroll.elements.mechanism.run.sampling import mechanism_of
+from proofroll.engines.projection.ball.geometry import geometry_of
+from proofroll.engines.projection.ball.method import ProjectedBall, start_and_scales
+from proofroll.engines.projection.ball.orientation import EulerAngles, Orientation, RotatingFrame
+from proofroll.engines.projection.smooth.dependent import DependentCoordinates
 from proofroll_benchmarks.bare import Bare, in_vertical_cylinder, is_mechanism
 from proofroll_benchmarks.bare.steps import dop853, rk4
 

@@ -12,20 +12,20 @@ from numpy.typing import NDArray
 from proofroll.core.errors import InputError, ProofrollError, Refused, require_known
 from proofroll.core.scene import Scene
 from proofroll.elements.mechanism import Joint, Mechanism, Tree
-from proofroll.elements.mechanism.analysis import analyse
-from proofroll.elements.mechanism.commands import at_start
-from proofroll.elements.mechanism.dataset import along, reactions
-from proofroll.elements.mechanism.element import MechanismElement
-from proofroll.elements.mechanism.joint_coordinates import JointCoordinates
-from proofroll.elements.mechanism.joint_kinds import JointKind
-from proofroll.elements.mechanism.named_forces import lengths, named_forces, pick_named
-from proofroll.elements.mechanism.prescribed import moved
-from proofroll.elements.mechanism.rotations import Array
+from proofroll.elements.mechanism.dynamics.analysis import analyse
+from proofroll.elements.mechanism.dynamics.commands import at_start
+from proofroll.elements.mechanism.dynamics.joint_coordinates import JointCoordinates
+from proofroll.elements.mechanism.dynamics.named_forces import lengths, named_forces, pick_named
+from proofroll.elements.mechanism.run.dataset import along, reactions
+from proofroll.elements.mechanism.run.element import MechanismElement
+from proofroll.elements.mechanism.scene.joint_kinds import JointKind
+from proofroll.elements.mechanism.scene.prescribed import moved
+from proofroll.elements.mechanism.scene.rotations import Array
 from proofroll.files.scene_file import load_scene
 from proofroll.mechanism_studies.linearised import Apart, InTree, Spectrum, apart, at_rest, spectrum
 from proofroll.running.simulation import build
 from proofroll.studies.comparison.default_comparison import able
-from proofroll.truth.mechanism.maximal_coordinates import MaximalCoordinates
+from proofroll.truth.bodies.maximal_coordinates import MaximalCoordinates
 
 # Displacement for an engine's accelerations: of doubles with softened rows and own differences of 1e-10.
 _STEP = 1e-2

@@ -11,10 +11,10 @@ from scipy.optimize import linear_sum_assignment
 
 from proofroll.core.errors import Refused
 from proofroll.elements.mechanism import Mechanism
-from proofroll.elements.mechanism.analysis import RANK
-from proofroll.elements.mechanism.joint_coordinates import JointCoordinates
-from proofroll.elements.mechanism.rotations import Array
-from proofroll.truth.mechanism.maximal_coordinates import MaximalCoordinates
+from proofroll.elements.mechanism.dynamics.analysis import RANK
+from proofroll.elements.mechanism.dynamics.joint_coordinates import JointCoordinates
+from proofroll.elements.mechanism.scene.rotations import Array
+from proofroll.truth.bodies.maximal_coordinates import MaximalCoordinates
 
 # Displacement for derivatives by central differences, rad or m and per s: with Richardson's extrapolation from half of
 # it the error is that power of four, 1e-12, and round-off of accelerations as large.

@@ -5,7 +5,7 @@ M comes column by column. Source: Featherstone, Rigid Body Dynamics Algorithms, 
 
 import numpy as np
 
-from proofroll.elements.mechanism.joint_kinds import JointKind
+from proofroll.elements.mechanism.scene.joint_kinds import JointKind
 from proofroll.robots.model import NO_BODY, Array, Robot, RobotBody, RobotJoint
 from proofroll.robots.states import RobotStates
 from proofroll.robots.two_formulations import Dynamics, armature, skew, turned_armature, within

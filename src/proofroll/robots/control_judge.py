@@ -12,8 +12,8 @@ from proofroll.core.number_format import counted, error
 from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.bookkeeping.law import ControlLaw
 from proofroll.elements.mechanism.bookkeeping.mistakes import LAYERS
-from proofroll.elements.mechanism.joint_coordinates import JointCoordinates
-from proofroll.elements.mechanism.step_limits import servo_steps
+from proofroll.elements.mechanism.dynamics.joint_coordinates import JointCoordinates
+from proofroll.elements.mechanism.run.step_limits import servo_steps
 from proofroll.robots.control_layers import record_layers
 from proofroll.robots.control_record import ControlRecord, read_record
 from proofroll.robots.controlled import ControlledScenes

@@ -14,7 +14,7 @@ from proofroll.core.number_format import with_bar
 from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.bookkeeping.law import VECTORS, ControlLaw, RobotState
 from proofroll.elements.mechanism.bookkeeping.mistakes import IMPLICIT, Mistake, fitted, mistakes, offsets_told
-from proofroll.elements.mechanism.policy import Observation
+from proofroll.elements.mechanism.scene.policy import Observation
 from proofroll.robots.air_fit import acceleration_fit
 from proofroll.robots.control_motion import motion_layer
 from proofroll.robots.control_record import BASE, OBSERVED, ControlRecord

@@ -14,10 +14,10 @@ from scipy.spatial.transform import Rotation
 from proofroll.core.errors import InputError, error_location
 from proofroll.core.parameters import Parameters
 from proofroll.elements.mechanism import Mechanism
-from proofroll.elements.mechanism.control import TARGET, Control
-from proofroll.elements.mechanism.joint_kinds import JointKind
-from proofroll.elements.mechanism.policy import PolicySource
-from proofroll.elements.mechanism.reader import made_mechanism
+from proofroll.elements.mechanism.run.reader import made_mechanism
+from proofroll.elements.mechanism.scene.control import TARGET, Control
+from proofroll.elements.mechanism.scene.joint_kinds import JointKind
+from proofroll.elements.mechanism.scene.policy import PolicySource
 from proofroll.robots.actuators import scene_actuators
 from proofroll.robots.controller import Controller, Gains, read_controller
 from proofroll.robots.model import Robot

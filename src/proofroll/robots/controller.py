@@ -13,7 +13,7 @@ import numpy as np
 from proofroll.core.errors import InputError, choices, error_location, require_known
 from proofroll.core.parameters import Parameters, Unit
 from proofroll.core.validation import strict, units_of, validated
-from proofroll.elements.mechanism.signal import Signal, Table, checked, read_signal
+from proofroll.elements.mechanism.scene.signal import Signal, Table, checked, read_signal
 from proofroll.files.csv_table import read_csv
 from proofroll.files.toml import read_toml
 from proofroll.robots.model import Array

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from proofroll.core.arrays import FloatArray, slices
-from proofroll.elements.mechanism.joint_kinds import FACTS, ONE_COORDINATE, JointKind
+from proofroll.elements.mechanism.scene.joint_kinds import FACTS, ONE_COORDINATE, JointKind
 
 Array = FloatArray  # its short name, for signatures of robots
 # Parent of joints in the world. It is no name of a body or joint: many root links are called ``world``.

@@ -6,8 +6,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from proofroll.core.bounds import DENSEST
-from proofroll.elements.mechanism.joint_kinds import JointKind
-from proofroll.elements.mechanism.plausibility import FAR, LARGE, TIMES
+from proofroll.elements.mechanism.run.plausibility import FAR, LARGE, TIMES
+from proofroll.elements.mechanism.scene.joint_kinds import JointKind
 from proofroll.robots.mjcf.defaults import with_classes
 from proofroll.robots.model import Robot, RobotBody
 from proofroll.robots.robot_file import RobotFile, floats

@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
-from proofroll.elements.mechanism.policy import Observation
+from proofroll.elements.mechanism.scene.policy import Observation
 
 _SEED, _WIDTH = 49, 64
 # Scales that bring rates and velocities to the size of angles.

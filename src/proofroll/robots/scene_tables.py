@@ -14,8 +14,8 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from proofroll.core.errors import InputError
-from proofroll.elements.mechanism.joint_kinds import LAWS, JointKind
-from proofroll.elements.mechanism.rotations import to_rpy
+from proofroll.elements.mechanism.scene.joint_kinds import LAWS, JointKind
+from proofroll.elements.mechanism.scene.rotations import to_rpy
 from proofroll.robots.meaning import opened, robot_of_text
 from proofroll.robots.model import NO_BODY, Array, Mimic, Robot, RobotJoint, RobotLoop, Tie
 from proofroll.robots.robot_file import RobotFile

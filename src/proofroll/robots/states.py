@@ -12,7 +12,7 @@ import dataclasses
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from proofroll.elements.mechanism.joint_kinds import ONE_COORDINATE, JointKind
+from proofroll.elements.mechanism.scene.joint_kinds import ONE_COORDINATE, JointKind
 from proofroll.robots.model import Array, Robot
 
 # Least speed of a joint: slower ones might stick where an engine smooths Coulomb friction [rad/s or m/s].

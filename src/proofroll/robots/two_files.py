@@ -13,7 +13,7 @@ import numpy as np
 
 from proofroll.core.errors import InputError, require_known
 from proofroll.core.plugins import EngineSpec
-from proofroll.elements.mechanism.joint_kinds import JointKind
+from proofroll.elements.mechanism.scene.joint_kinds import JointKind
 from proofroll.robots import reading
 from proofroll.robots.body_recursion import body_recursion
 from proofroll.robots.check import bar_of, robot_drawing

@@ -11,7 +11,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from proofroll.core.arrays import cross
-from proofroll.elements.mechanism.joint_kinds import JointKind
+from proofroll.elements.mechanism.scene.joint_kinds import JointKind
 from proofroll.robots.model import NO_BODY, Array, Robot, RobotJoint
 from proofroll.robots.states import RobotStates
 

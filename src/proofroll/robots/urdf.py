@@ -10,7 +10,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from proofroll.core.errors import InputError, choices, error_location
-from proofroll.elements.mechanism.joint_kinds import ONE_COORDINATE, JointKind
+from proofroll.elements.mechanism.scene.joint_kinds import ONE_COORDINATE, JointKind
 from proofroll.robots.model import DOFS, NO_BODY, Array, Mimic, Robot, RobotBody, RobotJoint
 from proofroll.robots.robot_file import LintRemark, RobotFile, numbers
 

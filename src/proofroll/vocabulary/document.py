@@ -15,12 +15,12 @@ from proofroll.core.gravity import Gravity
 from proofroll.elements.ball_on_surface import model as balls
 from proofroll.elements.ball_on_surface.surfaces import surface_kinds
 from proofroll.elements.mechanism import Body, Force, Joint, Loop, Point, Spring
-from proofroll.elements.mechanism.bushing import Bushing
-from proofroll.elements.mechanism.composed import Cable, Gimbal, Screw, SprungJoint
-from proofroll.elements.mechanism.contacts import geometry as contacts
-from proofroll.elements.mechanism.drives import Actuator, ActuatorKind, Coupling
-from proofroll.elements.mechanism.joint_kinds import LOOP_FACTS, JointKind
-from proofroll.elements.mechanism.parts import Axes, ForceKind
+from proofroll.elements.mechanism.scene.bushing import Bushing
+from proofroll.elements.mechanism.scene.composed import Cable, Gimbal, Screw, SprungJoint
+from proofroll.elements.mechanism.scene.drives import Actuator, ActuatorKind, Coupling
+from proofroll.elements.mechanism.scene.joint_kinds import LOOP_FACTS, JointKind
+from proofroll.elements.mechanism.scene.parts import Axes, ForceKind
+from proofroll.elements.mechanism.scene.shapes import geometry as contacts
 from proofroll.files.data_folders import data_folder
 from proofroll.files.scene_file import SceneFile
 from proofroll.files.scene_parameters import Parameter

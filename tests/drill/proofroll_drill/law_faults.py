@@ -18,14 +18,14 @@ import numpy as np
 
 from proofroll.core.errors import Diverged, InputError, Refused
 from proofroll.elements.mechanism import Body, Force, Joint, Mechanism, Spring
-from proofroll.elements.mechanism.bushing import Bushing
-from proofroll.elements.mechanism.contacts.geometry import Geometry, Pair
-from proofroll.elements.mechanism.drives import Actuator, Coupling
-from proofroll.elements.mechanism.joint_kinds import JointKind
-from proofroll.elements.mechanism.signal import Formula
+from proofroll.elements.mechanism.scene.bushing import Bushing
+from proofroll.elements.mechanism.scene.drives import Actuator, Coupling
+from proofroll.elements.mechanism.scene.joint_kinds import JointKind
+from proofroll.elements.mechanism.scene.shapes.geometry import Geometry, Pair
+from proofroll.elements.mechanism.scene.signal import Formula
 from proofroll.files.scene_file import load_scene
-from proofroll.truth.mechanism.error_bars import TwoRouteMotion
-from proofroll.truth.mechanism.switched_truth import truth_of
+from proofroll.truth.error_bars import TwoRouteMotion
+from proofroll.truth.switched_truth import truth_of
 
 _WIDER = 10.0  # bars by which a motion with a fault may be off
 

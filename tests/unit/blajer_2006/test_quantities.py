@@ -10,7 +10,7 @@ import pytest
 from blajer_2006.quantities import euler_angles, known, quantity
 from proofroll.core.truth import truth
 from proofroll.elements.ball_on_surface.element import rolling_ball
-from proofroll.engines.projection.orientation import EulerAngles
+from proofroll.engines.projection.ball.orientation import EulerAngles
 from proofroll.files.scene_file import load_scene
 
 

@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from proofroll.elements.mechanism.element import the_mechanism
 from proofroll.elements.mechanism.report.drawing import mechanism_drawing
+from proofroll.elements.mechanism.run.element import the_mechanism
 from proofroll.files.data_folders import data_folder
 from proofroll.files.scene_file import load_scene, scene_names
 from proofroll.report.pen import Polyline

@@ -14,9 +14,9 @@ from proofroll.core.events import Event
 from proofroll.core.scene import Scene
 from proofroll.core.truth import truth
 from proofroll.elements.mechanism import Body, Joint, Mechanism
-from proofroll.elements.mechanism.contacts.events import ContactWatch
-from proofroll.elements.mechanism.contacts.geometry import Geometry, Pair
-from proofroll.elements.mechanism.element import MechanismElement
+from proofroll.elements.mechanism.run.contacts.events import ContactWatch
+from proofroll.elements.mechanism.run.element import MechanismElement
+from proofroll.elements.mechanism.scene.shapes.geometry import Geometry, Pair
 from proofroll.files.scene_file import load_scene
 from proofroll.running.simulation import simulate
 

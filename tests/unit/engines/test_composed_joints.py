@@ -6,8 +6,8 @@ import pytest
 
 from proofroll.core.errors import Refused
 from proofroll.elements.mechanism import Body, Joint, Mechanism
-from proofroll.elements.mechanism.capabilities import required
-from proofroll.elements.mechanism.drives import Coupling
+from proofroll.elements.mechanism.run.capabilities import required
+from proofroll.elements.mechanism.scene.drives import Coupling
 
 SOLID = ((0.1, 0, 0), (0, 0.2, 0), (0, 0, 0.25))
 ROTOR = Body("rotor", 2.0, (0.1, 0.05, 0.2), SOLID)

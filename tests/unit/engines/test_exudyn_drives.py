@@ -9,15 +9,15 @@ from one_coordinate import moved
 
 from proofroll.core.errors import Refused
 from proofroll.elements.mechanism import Body, Joint, Mechanism
-from proofroll.elements.mechanism.drives import Actuator, Coupling
-from proofroll.elements.mechanism.signal import Formula
-from proofroll.truth.mechanism.switched_truth import truth_of
+from proofroll.elements.mechanism.scene.drives import Actuator, Coupling
+from proofroll.elements.mechanism.scene.signal import Formula
+from proofroll.truth.switched_truth import truth_of
 
 pytest.importorskip("exudyn")
 
-from proofroll.engines.exudyn.redundant import Redundant
 from proofroll.engines.exudyn.settings import PRESETS
-from proofroll.engines.exudyn.tree import KinematicTree
+from proofroll.engines.exudyn.smooth.redundant import Redundant
+from proofroll.engines.exudyn.smooth.tree import KinematicTree
 
 ONES = ((1.0, 0, 0), (0, 1.0, 0), (0, 0, 1.0))
 MODELS = {"redundant": Redundant, "tree": KinematicTree}

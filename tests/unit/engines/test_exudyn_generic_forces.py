@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from proofroll.elements.ball_on_surface.element import rolling_ball
-from proofroll.engines.exudyn.friction import resistance_moment, slow
-from proofroll.engines.exudyn.generic_forces import base, force_function, quadratic_terms, weight_function
-from proofroll.engines.exudyn.local_frame import local_geometry
+from proofroll.engines.exudyn.ball.friction import resistance_moment, slow
+from proofroll.engines.exudyn.ball.generic_forces import base, force_function, quadratic_terms, weight_function
+from proofroll.engines.exudyn.ball.local_frame import local_geometry
 from proofroll.files.scene_file import load_scene
 
 pytest.importorskip("exudyn")

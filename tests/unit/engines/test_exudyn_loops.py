@@ -8,7 +8,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from proofroll.elements.mechanism import Body, Joint, Loop, Mechanism
-from proofroll.elements.mechanism.rotations import Array
+from proofroll.elements.mechanism.scene.rotations import Array
 
 pytest.importorskip("exudyn")
 

@@ -8,8 +8,8 @@ import pytest
 from proofroll.core.errors import InputError, Refused
 from proofroll.core.plugins import load_engine
 from proofroll.elements.mechanism import Body, Joint, Mechanism
-from proofroll.elements.mechanism.contacts.geometry import Geometry, Pair
-from proofroll.elements.mechanism.element import MechanismElement
+from proofroll.elements.mechanism.run.element import MechanismElement
+from proofroll.elements.mechanism.scene.shapes.geometry import Geometry, Pair
 from proofroll_drill.published import true_values
 
 pytest.importorskip("exudyn")

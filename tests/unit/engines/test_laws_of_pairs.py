@@ -11,8 +11,8 @@ import proofroll
 from proofroll.core.errors import InputError, Refused
 from proofroll.core.scene import Scene
 from proofroll.elements.mechanism import Body, Joint, Mechanism
-from proofroll.elements.mechanism.contacts.geometry import Geometry, Pair
-from proofroll.elements.mechanism.element import MechanismElement
+from proofroll.elements.mechanism.run.element import MechanismElement
+from proofroll.elements.mechanism.scene.shapes.geometry import Geometry, Pair
 from proofroll.files.scene_file import load_scene
 
 FILE = """

@@ -9,8 +9,8 @@ from typer.testing import CliRunner
 
 from proofroll.cli import app
 from proofroll.elements.mechanism import Body, Joint, Mechanism
-from proofroll.elements.mechanism.joint_coordinates import JointCoordinates
-from proofroll.elements.mechanism.matrices import matrices_of, velocity_names
+from proofroll.elements.mechanism.dynamics.joint_coordinates import JointCoordinates
+from proofroll.elements.mechanism.dynamics.matrices import matrices_of, velocity_names
 from proofroll.files.scene_file import load_scene
 from proofroll.running.simulation import build
 

@@ -11,11 +11,11 @@ import pytest
 
 from proofroll.core.errors import Refused
 from proofroll.elements.mechanism import Body, Force, Joint, Mechanism, Spring
-from proofroll.elements.mechanism.analysis import analyse
-from proofroll.elements.mechanism.capabilities import required
-from proofroll.elements.mechanism.joint_kinds import WITH_AXIS
-from proofroll.elements.mechanism.rotations import from_quaternion
-from proofroll.elements.mechanism.spring_law import SpringLaw
+from proofroll.elements.mechanism.dynamics.analysis import analyse
+from proofroll.elements.mechanism.run.capabilities import required
+from proofroll.elements.mechanism.scene.joint_kinds import WITH_AXIS
+from proofroll.elements.mechanism.scene.rotations import from_quaternion
+from proofroll.elements.mechanism.scene.spring_law import SpringLaw
 from proofroll.files.scene_file import load_scene
 from proofroll.running.simulation import simulate
 

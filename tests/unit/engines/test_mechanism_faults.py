@@ -12,12 +12,12 @@ from proofroll.core.certificate import certify, first_difference
 from proofroll.core.errors import Diverged, InputError, Refused
 from proofroll.core.plugins import load_engine, resolve_settings
 from proofroll.elements.mechanism import Body, Joint, Loop, Mechanism
-from proofroll.elements.mechanism.analysis import analyse
-from proofroll.elements.mechanism.loop_points import held_points, is_planar
-from proofroll.engines.pinocchio.joint_tree import JointTree
-from proofroll.engines.pinocchio.null_space import LoopRows
+from proofroll.elements.mechanism.dynamics.analysis import analyse
+from proofroll.elements.mechanism.dynamics.loop_points import held_points, is_planar
 from proofroll.engines.pinocchio.settings import PROXIMAL
-from proofroll.engines.projection.dependent import DependentCoordinates
+from proofroll.engines.pinocchio.smooth.joint_tree import JointTree
+from proofroll.engines.pinocchio.smooth.null_space import LoopRows
+from proofroll.engines.projection.smooth.dependent import DependentCoordinates
 from proofroll.files.scene_file import load_scene
 
 

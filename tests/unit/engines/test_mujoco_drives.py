@@ -10,16 +10,16 @@ from one_coordinate import moved
 from proofroll.core.errors import Refused
 from proofroll.core.plugins import load_engine
 from proofroll.elements.mechanism import Body, Joint, Mechanism
-from proofroll.elements.mechanism.drives import Actuator, Coupling
-from proofroll.elements.mechanism.element import MechanismElement
-from proofroll.elements.mechanism.signal import Formula, Table
+from proofroll.elements.mechanism.run.element import MechanismElement
+from proofroll.elements.mechanism.scene.drives import Actuator, Coupling
+from proofroll.elements.mechanism.scene.signal import Formula, Table
 from proofroll.files.scene_file import load_scene
-from proofroll.truth.mechanism.switched_truth import truth_of
+from proofroll.truth.switched_truth import truth_of
 
 pytest.importorskip("mujoco")
 
-from proofroll.engines.mujoco.mechanism import MujocoMechanism
 from proofroll.engines.mujoco.settings import PRESETS
+from proofroll.engines.mujoco.smooth.mechanism import MujocoMechanism
 
 ONES = ((1.0, 0, 0), (0, 1.0, 0), (0, 0, 1.0))
 

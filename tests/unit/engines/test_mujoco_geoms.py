@@ -9,10 +9,10 @@ from proofroll.core.engine import EPSILON
 from proofroll.core.errors import InputError, Refused
 from proofroll.core.plugins import load_engine
 from proofroll.elements.mechanism import Body, Joint, Loop, Mechanism, Tree
-from proofroll.elements.mechanism.contacts.geometry import Geometry, Pair
-from proofroll.elements.mechanism.contacts.start import touches
-from proofroll.elements.mechanism.drives import Actuator
-from proofroll.elements.mechanism.element import MechanismElement
+from proofroll.elements.mechanism.contact.start import touches
+from proofroll.elements.mechanism.run.element import MechanismElement
+from proofroll.elements.mechanism.scene.drives import Actuator
+from proofroll.elements.mechanism.scene.shapes.geometry import Geometry, Pair
 from proofroll.files.scene_file import load_scene
 from proofroll_drill.published import true_values
 

@@ -9,9 +9,9 @@ from one_coordinate import moved
 from proofroll.core.errors import Refused
 from proofroll.core.plugins import load_engine
 from proofroll.elements.mechanism import Body, Joint, Mechanism
-from proofroll.elements.mechanism.drives import Actuator, Coupling
-from proofroll.elements.mechanism.signal import Formula, Table
-from proofroll.truth.mechanism.switched_truth import truth_of
+from proofroll.elements.mechanism.scene.drives import Actuator, Coupling
+from proofroll.elements.mechanism.scene.signal import Formula, Table
+from proofroll.truth.switched_truth import truth_of
 
 pytest.importorskip("pinocchio")
 

@@ -11,11 +11,11 @@ import pytest
 from proofroll.core.errors import Diverged, InputError, Refused
 from proofroll.core.plugins import load_engine
 from proofroll.elements.mechanism import Body, Joint, Mechanism
-from proofroll.elements.mechanism.contacts.geometry import Geometry, Pair
-from proofroll.elements.mechanism.element import MechanismElement
-from proofroll.elements.mechanism.sampling import mechanism_of
+from proofroll.elements.mechanism.run.element import MechanismElement
+from proofroll.elements.mechanism.run.sampling import mechanism_of
+from proofroll.elements.mechanism.scene.shapes.geometry import Geometry, Pair
 from proofroll.files.scene_file import load_scene
-from proofroll.truth.mechanism.natural_units import Units
+from proofroll.truth.natural_units import Units
 from proofroll_drill.published import true_values
 
 pytest.importorskip("pinocchio")

@@ -64,7 +64,7 @@ def test_orientation_makes_no_difference() -> None:
 
 def test_start_of_slip_does_not_matter(true: xr.Dataset, monkeypatch: pytest.MonkeyPatch) -> None:
     """The size of slip up to which the direction is slaved, a thousandfold, moves events by next to nothing."""
-    from proofroll.engines.pinocchio import stick_slip
+    from proofroll.engines.pinocchio.ball import stick_slip
 
     before = happened(true)
     monkeypatch.setattr(stick_slip, "_HANDOVER", 1000 * stick_slip._HANDOVER)

@@ -12,8 +12,8 @@ from proofroll.core.plugins import resolve_settings
 from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.elements.ball_on_surface.model import BallCapability
 from proofroll.engines.projection import Projection
-from proofroll.engines.projection.ball_switching import Switching
-from proofroll.engines.projection.orientation import EulerAngles
+from proofroll.engines.projection.ball.ball_switching import Switching
+from proofroll.engines.projection.ball.orientation import EulerAngles
 from proofroll.running.simulation import build, simulate
 
 CYLINDER = {"name": "sphere_in_cylinder"}

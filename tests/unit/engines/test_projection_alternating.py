@@ -11,9 +11,9 @@ import pytest
 from proofroll.core.dop853 import TIGHTEST
 from proofroll.core.errors import Diverged
 from proofroll.core.integrators import INTEGRATORS
-from proofroll.engines.projection.alternating import AlternatingMotion, Excess
-from proofroll.engines.projection.contact_modes import ContactMotion
-from proofroll.engines.projection.joint_modes import SwitchedMotion
+from proofroll.engines.projection.contact.alternating import AlternatingMotion, Excess
+from proofroll.engines.projection.contact.contact_modes import ContactMotion
+from proofroll.engines.projection.contact.joint_modes import SwitchedMotion
 
 
 class Bouncing(AlternatingMotion[str]):

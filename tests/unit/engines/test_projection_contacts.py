@@ -14,17 +14,17 @@ from proofroll.core.first_steps import first_steps
 from proofroll.core.plugins import load_engine
 from proofroll.core.scene import Scene
 from proofroll.elements.mechanism import Body, Joint, Mechanism
-from proofroll.elements.mechanism.contacts.acting import Acting
-from proofroll.elements.mechanism.contacts.geometry import Geometry, Pair
-from proofroll.elements.mechanism.contacts.touching import Touching
-from proofroll.elements.mechanism.drives import Actuator, Coupling
-from proofroll.elements.mechanism.element import MechanismElement
-from proofroll.elements.mechanism.rotations import Array
-from proofroll.elements.mechanism.sampling import mechanism_of
-from proofroll.elements.mechanism.signal import Formula
-from proofroll.engines.projection.slip_directions import SlipDirections
+from proofroll.elements.mechanism.contact.acting import Acting
+from proofroll.elements.mechanism.contact.touching import Touching
+from proofroll.elements.mechanism.run.element import MechanismElement
+from proofroll.elements.mechanism.run.sampling import mechanism_of
+from proofroll.elements.mechanism.scene.drives import Actuator, Coupling
+from proofroll.elements.mechanism.scene.rotations import Array
+from proofroll.elements.mechanism.scene.shapes.geometry import Geometry, Pair
+from proofroll.elements.mechanism.scene.signal import Formula
+from proofroll.engines.projection.contact.slip_directions import SlipDirections
 from proofroll.files.scene_file import load_scene
-from proofroll.truth.mechanism.switched_truth import truth_of
+from proofroll.truth.switched_truth import truth_of
 from proofroll_drill.published import true_values
 
 PROJECTION = load_engine("projection")

@@ -8,10 +8,10 @@ from one_coordinate import moved
 
 from proofroll.core.errors import Refused
 from proofroll.elements.mechanism import Body, Joint, Mechanism
-from proofroll.elements.mechanism.drives import Actuator
-from proofroll.elements.mechanism.signal import Formula, Table
-from proofroll.engines.projection.mechanism import ProjectionMechanism
+from proofroll.elements.mechanism.scene.drives import Actuator
+from proofroll.elements.mechanism.scene.signal import Formula, Table
 from proofroll.engines.projection.settings import PRESETS
+from proofroll.engines.projection.smooth.mechanism import ProjectionMechanism
 
 ONES = ((1.0, 0, 0), (0, 1.0, 0), (0, 0, 1.0))
 

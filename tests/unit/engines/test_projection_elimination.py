@@ -12,11 +12,11 @@ from proofroll.core.errors import Refused
 from proofroll.core.plugins import load_engine
 from proofroll.elements.ball_on_surface.compiled.library import available
 from proofroll.elements.mechanism import Body, Joint, Mechanism
-from proofroll.elements.mechanism.drives import Actuator
-from proofroll.elements.mechanism.sampling import row_rank
-from proofroll.engines.projection.connections import Bodies
-from proofroll.engines.projection.dependent import DependentCoordinates
-from proofroll.engines.projection.recursion import Recursion
+from proofroll.elements.mechanism.run.sampling import row_rank
+from proofroll.elements.mechanism.scene.drives import Actuator
+from proofroll.engines.projection.smooth.connections import Bodies
+from proofroll.engines.projection.smooth.dependent import DependentCoordinates
+from proofroll.engines.projection.smooth.recursion import Recursion
 
 ROUND_OFF = 1e-12
 

@@ -8,9 +8,9 @@ import pytest
 
 from proofroll.core.errors import Refused
 from proofroll.elements.mechanism import Body, Joint, Mechanism
-from proofroll.elements.mechanism.drives import Actuator, Coupling
-from proofroll.elements.mechanism.signal import Formula, Table
-from proofroll.truth.mechanism.switched_truth import truth_of
+from proofroll.elements.mechanism.scene.drives import Actuator, Coupling
+from proofroll.elements.mechanism.scene.signal import Formula, Table
+from proofroll.truth.switched_truth import truth_of
 from proofroll_drill.published import true_values
 
 CUBE = Body("mass", 1.0, inertia=(0.1, 0.1, 0.1))

@@ -11,9 +11,9 @@ import proofroll
 from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.elements.ball_on_surface.rolling_equations import reduced_rates
 from proofroll.elements.ball_on_surface.surfaces import Cylinder, Plane
-from proofroll.engines.projection.geometry import GeneralSurface, Uniform, geometry_of, matrix
-from proofroll.engines.projection.method import ProjectedBall
-from proofroll.engines.projection.orientation import EulerAngles, RotatingFrame
+from proofroll.engines.projection.ball.geometry import GeneralSurface, Uniform, geometry_of, matrix
+from proofroll.engines.projection.ball.method import ProjectedBall
+from proofroll.engines.projection.ball.orientation import EulerAngles, RotatingFrame
 
 BODY = rolling_ball(proofroll.load_scene("sphere_in_cylinder", rolling_resistance=5e-4))
 A, C, M, J = BODY.ball.radius, BODY.surface.radius, BODY.ball.mass, BODY.ball.inertia

@@ -11,11 +11,11 @@ from proofroll.core.events import events_of
 from proofroll.elements.ball_on_surface.element import rolling_ball, scene_with
 from proofroll.elements.ball_on_surface.mechanics import slip_velocity
 from proofroll.elements.ball_on_surface.surfaces import Cylinder
-from proofroll.engines.projection import ball_modes
-from proofroll.engines.projection.friction import Friction
-from proofroll.engines.projection.geometry import geometry_of
-from proofroll.engines.projection.method import ProjectedBall
-from proofroll.engines.projection.orientation import EulerAngles, RotatingFrame
+from proofroll.engines.projection.ball import ball_modes
+from proofroll.engines.projection.ball.friction import Friction
+from proofroll.engines.projection.ball.geometry import geometry_of
+from proofroll.engines.projection.ball.method import ProjectedBall
+from proofroll.engines.projection.ball.orientation import EulerAngles, RotatingFrame
 from proofroll.running.recording import record
 from proofroll.running.simulation import build, simulate
 

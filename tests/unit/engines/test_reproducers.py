@@ -16,7 +16,7 @@ from proofroll.core.errors import Refused
 from proofroll.core.plugins import load_engine, resolve_settings
 from proofroll.core.program_text import imported_packages
 from proofroll.elements.ball_on_surface.element import rolling_ball, scene_with
-from proofroll.elements.mechanism.sampling import mechanism_of
+from proofroll.elements.mechanism.run.sampling import mechanism_of
 from proofroll.files.scene_file import load_scene
 
 CYLINDER, PLANE = "sphere_in_cylinder", "inclined_plane"

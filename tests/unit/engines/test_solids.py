@@ -11,8 +11,8 @@ import proofroll
 from proofroll.core.errors import Refused
 from proofroll.core.scene import Scene
 from proofroll.elements.mechanism import Body, Joint, Mechanism
-from proofroll.elements.mechanism.contacts.geometry import Geometry, Pair
-from proofroll.elements.mechanism.element import MechanismElement
+from proofroll.elements.mechanism.run.element import MechanismElement
+from proofroll.elements.mechanism.scene.shapes.geometry import Geometry, Pair
 
 TURN = Rotation.from_rotvec([0.4, 0.2, -0.9])
 RADIUS, UP = 0.1, TURN.as_matrix()[:, 2]

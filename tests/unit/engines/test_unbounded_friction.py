@@ -12,11 +12,11 @@ from proofroll.core.errors import InputError, NotUnique, Refused
 from proofroll.core.scene import Scene
 from proofroll.core.truth import truth
 from proofroll.elements.mechanism import Body, Joint, Mechanism
-from proofroll.elements.mechanism.contacts.coulomb import contact_forces
-from proofroll.elements.mechanism.contacts.geometry import Geometry, Pair
-from proofroll.elements.mechanism.contacts.start import check_contacts
-from proofroll.elements.mechanism.element import MechanismElement
-from proofroll.truth.mechanism.body_impacts import impulse_of_a_contact
+from proofroll.elements.mechanism.contact.coulomb import contact_forces
+from proofroll.elements.mechanism.contact.start import check_contacts
+from proofroll.elements.mechanism.run.element import MechanismElement
+from proofroll.elements.mechanism.scene.shapes.geometry import Geometry, Pair
+from proofroll.truth.bodies.body_impacts import impulse_of_a_contact
 
 
 def on_plane(

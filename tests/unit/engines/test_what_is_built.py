@@ -12,7 +12,7 @@ from proofroll.core.errors import InputError, Refused
 from proofroll.core.plugins import load_engine
 from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.model import BallCapability
-from proofroll.engines.projection.ball_modes import Exit
+from proofroll.engines.projection.ball.ball_modes import Exit
 from proofroll.files.scene_file import load_scene
 from proofroll.running.simulation import build, simulate
 

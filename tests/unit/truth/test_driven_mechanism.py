@@ -7,11 +7,11 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from proofroll.elements.mechanism import Body, Joint, Mechanism
-from proofroll.elements.mechanism.drives import Actuator, Coupling
-from proofroll.elements.mechanism.joint_coordinates import JointCoordinates
-from proofroll.elements.mechanism.signal import Formula, Table
+from proofroll.elements.mechanism.dynamics.joint_coordinates import JointCoordinates
+from proofroll.elements.mechanism.scene.drives import Actuator, Coupling
+from proofroll.elements.mechanism.scene.signal import Formula, Table
 from proofroll.files.scene_file import load_scene
-from proofroll.truth.mechanism.switched_truth import truth_of
+from proofroll.truth.switched_truth import truth_of
 from proofroll_drill.published import true_values
 
 TIGHT = 1e-12  # of what two routes at 1e-14 leave, with room

@@ -8,19 +8,19 @@ import pytest
 
 from proofroll.core.errors import InputError, Refused
 from proofroll.elements.mechanism import Body, Joint, Mechanism
-from proofroll.elements.mechanism.complementarity import complementary
-from proofroll.elements.mechanism.contacts.dynamics import ContactDynamics
-from proofroll.elements.mechanism.drives import Coupling
+from proofroll.elements.mechanism.contact.dynamics import ContactDynamics
+from proofroll.elements.mechanism.dynamics.complementarity import complementary
+from proofroll.elements.mechanism.scene.drives import Coupling
 from proofroll.files.scene_file import load_scene
-from proofroll.truth.hybrid import HybridPath, Stretch, first_close, follow
-from proofroll.truth.mechanism import followed_paths
-from proofroll.truth.mechanism.contact_bodies import ContactBodies
-from proofroll.truth.mechanism.contact_equations import ContactEquations
-from proofroll.truth.mechanism.contact_tree import ContactTree
-from proofroll.truth.mechanism.followed_paths import CLOSE, TOLERANCES
-from proofroll.truth.mechanism.maximal_coordinates import MaximalCoordinates
-from proofroll.truth.mechanism.natural_units import natural_units
-from proofroll.truth.mechanism.switched_truth import truth_of
+from proofroll.truth import followed_paths
+from proofroll.truth.bodies.contact_bodies import ContactBodies
+from proofroll.truth.bodies.contact_equations import ContactEquations
+from proofroll.truth.bodies.maximal_coordinates import MaximalCoordinates
+from proofroll.truth.followed_paths import CLOSE, TOLERANCES
+from proofroll.truth.natural_units import natural_units
+from proofroll.truth.numerics.hybrid import HybridPath, Stretch, first_close, follow
+from proofroll.truth.switched_truth import truth_of
+from proofroll.truth.tree.contact_tree import ContactTree
 from proofroll_drill.published import true_values
 
 TIGHT = 1e-11  # of what two routes at 1e-14 leave after some ten switches, with room

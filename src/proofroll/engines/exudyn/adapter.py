@@ -18,22 +18,23 @@ from proofroll.core.errors import Refused
 from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.elements.ball_on_surface.model import ALL_OF_A_BALL, ROLLS, BallCapability, RollingBall
-from proofroll.elements.mechanism.capabilities import MechanismCapability
-from proofroll.elements.mechanism.sampling import mechanism_of
-from proofroll.engines.exudyn import discs, redundant, spheres, tree
-from proofroll.engines.exudyn.carrier import Carrier
-from proofroll.engines.exudyn.contact import PenaltyContact
-from proofroll.engines.exudyn.discs import Discs
-from proofroll.engines.exudyn.generic import Generic
+from proofroll.elements.mechanism.run.capabilities import MechanismCapability
+from proofroll.elements.mechanism.run.sampling import mechanism_of
+from proofroll.engines.exudyn.ball.carrier import Carrier
+from proofroll.engines.exudyn.ball.contact import PenaltyContact
+from proofroll.engines.exudyn.ball.generic import Generic
+from proofroll.engines.exudyn.ball.local_frame import slides
+from proofroll.engines.exudyn.ball.rolling_disc import RollingDisc
+from proofroll.engines.exudyn.ball.world_coordinates import WorldCoordinates
+from proofroll.engines.exudyn.contact import discs, spheres
+from proofroll.engines.exudyn.contact.discs import Discs
+from proofroll.engines.exudyn.contact.spheres import Spheres
 from proofroll.engines.exudyn.integration import ExudynModel
-from proofroll.engines.exudyn.local_frame import slides
 from proofroll.engines.exudyn.native import exu
-from proofroll.engines.exudyn.redundant import Redundant
-from proofroll.engines.exudyn.rolling_disc import RollingDisc
 from proofroll.engines.exudyn.settings import PRESETS, ExudynSettings
-from proofroll.engines.exudyn.spheres import Spheres
-from proofroll.engines.exudyn.tree import KinematicTree
-from proofroll.engines.exudyn.world_coordinates import WorldCoordinates
+from proofroll.engines.exudyn.smooth import redundant, tree
+from proofroll.engines.exudyn.smooth.redundant import Redundant
+from proofroll.engines.exudyn.smooth.tree import KinematicTree
 
 OF_BALLS: Mapping[str, Callable[[RollingBall, ExudynSettings], ExudynModel]] = {
     "generic": lambda body, settings: (Generic if slides(body) else WorldCoordinates)(body, settings),

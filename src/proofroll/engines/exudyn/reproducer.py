@@ -10,7 +10,7 @@ from proofroll.core.errors import Refused
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.reproducer_source import cut_program
 from proofroll.elements.mechanism import Mechanism
-from proofroll.engines.exudyn.generic import Generic
+from proofroll.engines.exudyn.ball.generic import Generic
 from proofroll.engines.exudyn.integration import Integration
 from proofroll.engines.exudyn.native import exu
 from proofroll.engines.exudyn.settings import ExudynSettings

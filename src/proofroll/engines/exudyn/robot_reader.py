@@ -8,7 +8,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from proofroll.core.errors import Refused
-from proofroll.elements.mechanism.joint_kinds import JointKind
+from proofroll.elements.mechanism.scene.joint_kinds import JointKind
 from proofroll.engines.exudyn.integration import new_system
 from proofroll.engines.exudyn.native import Output, add_kinematic_tree, exu, items, new_settings
 from proofroll.robots.model import NO_BODY, Array, RobotJoint

@@ -15,21 +15,22 @@ from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.elements.ball_on_surface.mechanics import natural_acceleration
 from proofroll.elements.ball_on_surface.model import ALL_OF_A_BALL, BallCapability, RollingBall
 from proofroll.elements.ball_on_surface.sampling import BallBuilt, BallSample, terms_held
-from proofroll.elements.mechanism.capabilities import MechanismCapability
-from proofroll.elements.mechanism.sampling import mechanism_of
-from proofroll.engines.mujoco import mechanism, mechanism_geoms
-from proofroll.engines.mujoco.certificate_bounds import softness
-from proofroll.engines.mujoco.chart import Chart
-from proofroll.engines.mujoco.contact import contact_coefficient, contact_force
-from proofroll.engines.mujoco.formulation import Formulation
-from proofroll.engines.mujoco.free import Facets, Free
-from proofroll.engines.mujoco.friction import BoundedFriction, check_coefficients
-from proofroll.engines.mujoco.mechanism import MujocoMechanism
-from proofroll.engines.mujoco.mechanism_geoms import MujocoGeoms
-from proofroll.engines.mujoco.model import read_spec, write_physics
+from proofroll.elements.mechanism.run.capabilities import MechanismCapability
+from proofroll.elements.mechanism.run.sampling import mechanism_of
+from proofroll.engines.mujoco.ball.certificate_bounds import softness
+from proofroll.engines.mujoco.ball.chart import Chart
+from proofroll.engines.mujoco.ball.contact import contact_coefficient, contact_force
+from proofroll.engines.mujoco.ball.formulation import Formulation
+from proofroll.engines.mujoco.ball.free import Facets, Free
+from proofroll.engines.mujoco.ball.friction import BoundedFriction, check_coefficients
+from proofroll.engines.mujoco.ball.model import read_spec, write_physics
+from proofroll.engines.mujoco.ball.start import EVALUATIONS, accelerations, start
+from proofroll.engines.mujoco.contact import mechanism_geoms
+from proofroll.engines.mujoco.contact.mechanism_geoms import MujocoGeoms
 from proofroll.engines.mujoco.running import SteppedModel, compiled, forget_callbacks, silent, written
 from proofroll.engines.mujoco.settings import PRESETS, ROLLS, TERMS, MujocoSettings, check, check_restitution, lowered
-from proofroll.engines.mujoco.start import EVALUATIONS, accelerations, start
+from proofroll.engines.mujoco.smooth import mechanism
+from proofroll.engines.mujoco.smooth.mechanism import MujocoMechanism
 
 _FORMULATIONS: Mapping[str, type[Formulation]] = {"free": Free, "chart": Chart, "facets": Facets}
 _MECHANISMS: Mapping[str, type[MujocoMechanism]] = {"joints": MujocoMechanism, "geoms": MujocoGeoms}

@@ -15,12 +15,12 @@ from proofroll.core.program_text import assignment
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.reproducer_source import cut_program
 from proofroll.elements.mechanism import Mechanism
-from proofroll.engines.mujoco.chart import Chart
-from proofroll.engines.mujoco.free import Facets, Free
-from proofroll.engines.mujoco.friction import BoundedFriction
+from proofroll.engines.mujoco.ball.chart import Chart
+from proofroll.engines.mujoco.ball.free import Facets, Free
+from proofroll.engines.mujoco.ball.friction import BoundedFriction
+from proofroll.engines.mujoco.ball.start import EVALUATIONS
 from proofroll.engines.mujoco.running import raise_if_fatal
 from proofroll.engines.mujoco.settings import MujocoSettings
-from proofroll.engines.mujoco.start import EVALUATIONS
 
 _RUN = '''
 

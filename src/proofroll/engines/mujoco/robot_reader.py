@@ -10,7 +10,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from proofroll.core.errors import Refused
-from proofroll.elements.mechanism.joint_kinds import ONE_COORDINATE, JointKind
+from proofroll.elements.mechanism.scene.joint_kinds import ONE_COORDINATE, JointKind
 from proofroll.engines.mujoco.running import mass_matrix, written
 from proofroll.robots.model import NO_BODY, Array, Mimic, Robot, RobotBody, RobotJoint, RobotLoop, Tie, composed
 from proofroll.robots.protocol import AtState, Reading, Request, Whole, evaluate

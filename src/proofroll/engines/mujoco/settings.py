@@ -13,7 +13,7 @@ from proofroll.core.engine_abilities import Term
 from proofroll.core.errors import InputError, Refused, refuse_first
 from proofroll.core.plugins import release
 from proofroll.elements.ball_on_surface.model import BallCapability
-from proofroll.elements.mechanism.capabilities import ALL_LOOPS, MechanismCapability
+from proofroll.elements.mechanism.run.capabilities import ALL_LOOPS, MechanismCapability
 
 # MuJoCo's defaults: step [s], friction, solref [s], solimp (dmin, dmax).
 DEFAULT_STEP = 2e-3

@@ -12,14 +12,15 @@ from proofroll.core.plugins import release
 from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.elements.ball_on_surface.model import ALL_OF_A_BALL, BallCapability
-from proofroll.elements.mechanism.capabilities import MechanismCapability, require
-from proofroll.elements.mechanism.sampling import mechanism_of
-from proofroll.engines.pinocchio import constraint_dynamics, impulses, joint_tree
-from proofroll.engines.pinocchio.contact import ContactRun
-from proofroll.engines.pinocchio.impulse_run import ImpulseRun
-from proofroll.engines.pinocchio.mechanism_run import MechanismRun
-from proofroll.engines.pinocchio.rows_run import RowsRun
+from proofroll.elements.mechanism.run.capabilities import MechanismCapability, require
+from proofroll.elements.mechanism.run.sampling import mechanism_of
+from proofroll.engines.pinocchio.ball.contact import ContactRun
+from proofroll.engines.pinocchio.ball.rows_run import RowsRun
+from proofroll.engines.pinocchio.contact import impulses
+from proofroll.engines.pinocchio.contact.impulse_run import ImpulseRun
 from proofroll.engines.pinocchio.settings import OF_MECHANISMS, PRESETS, PinocchioSettings, lowered
+from proofroll.engines.pinocchio.smooth import constraint_dynamics, joint_tree
+from proofroll.engines.pinocchio.smooth.mechanism_run import MechanismRun
 
 # Before 4.0 the constraints had other signatures and other results.
 _OF_PINOCCHIO_4 = {"contact", "constraint_dynamics", "impulses"}

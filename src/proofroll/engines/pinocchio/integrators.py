@@ -12,7 +12,7 @@ from proofroll.core.dop853 import controlled_step, solver_from
 from proofroll.core.engine import whole_steps
 from proofroll.core.errors import Diverged, Refused
 from proofroll.core.events import Event, EventKind
-from proofroll.engines.pinocchio.ball_with_rows import BallWithRows, left_the_wall
+from proofroll.engines.pinocchio.ball.ball_with_rows import BallWithRows, left_the_wall
 from proofroll.engines.pinocchio.settings import PinocchioSettings
 
 

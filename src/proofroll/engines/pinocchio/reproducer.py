@@ -10,12 +10,12 @@ from proofroll.core.program_text import assignment
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.reproducer_source import cut_program
 from proofroll.elements.mechanism import Force
-from proofroll.elements.mechanism.drives import Actuator
-from proofroll.elements.mechanism.loop_points import held_points
-from proofroll.engines.pinocchio.contact import ContactSteps
-from proofroll.engines.pinocchio.mechanism_run import MechanismMotion, MechanismRun
-from proofroll.engines.pinocchio.rows_run import RowsRun
+from proofroll.elements.mechanism.dynamics.loop_points import held_points
+from proofroll.elements.mechanism.scene.drives import Actuator
+from proofroll.engines.pinocchio.ball.contact import ContactSteps
+from proofroll.engines.pinocchio.ball.rows_run import RowsRun
 from proofroll.engines.pinocchio.settings import PinocchioSettings
+from proofroll.engines.pinocchio.smooth.mechanism_run import MechanismMotion, MechanismRun
 
 _SEEN = '''
 

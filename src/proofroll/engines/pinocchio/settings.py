@@ -10,7 +10,7 @@ from proofroll.core.dop853 import TIGHTEST
 from proofroll.core.engine import Scheme
 from proofroll.core.errors import refuse_first
 from proofroll.elements.ball_on_surface.model import BallCapability
-from proofroll.elements.mechanism.capabilities import MechanismCapability
+from proofroll.elements.mechanism.run.capabilities import MechanismCapability
 
 _ORDERS = {"semi_implicit_euler": 1, "midpoint": 1, "leapfrog": 2, "rk4": 2, "rk4_dexpinv": 4}
 _SCHEMES = {

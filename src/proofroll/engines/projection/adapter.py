@@ -17,15 +17,15 @@ from proofroll.elements.ball_on_surface.compiled.library import with_heyoka
 from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.elements.ball_on_surface.model import ALL_OF_A_BALL, BallCapability, RollingBall
 from proofroll.elements.ball_on_surface.sampling import BallBuilt, BallSample, terms_held
-from proofroll.elements.mechanism.contacts.family import Family, of_contact
-from proofroll.engines.projection import mechanism
-from proofroll.engines.projection.ball_switching import Switching
-from proofroll.engines.projection.geometry import geometry_of, matrix
-from proofroll.engines.projection.mechanism import ProjectionMechanism
-from proofroll.engines.projection.method import ProjectedBall, start_and_scales
-from proofroll.engines.projection.orientation import EulerAngles, FollowedFrame, Orientation, RotatingFrame
+from proofroll.elements.mechanism.run.contacts.family import Family, of_contact
+from proofroll.engines.projection.ball.ball_switching import Switching
+from proofroll.engines.projection.ball.geometry import geometry_of, matrix
+from proofroll.engines.projection.ball.method import ProjectedBall, start_and_scales
+from proofroll.engines.projection.ball.orientation import EulerAngles, FollowedFrame, Orientation, RotatingFrame
+from proofroll.engines.projection.ball.taylor import TaylorSeries
 from proofroll.engines.projection.settings import PRESETS, ProjectionSettings
-from proofroll.engines.projection.taylor import TaylorSeries
+from proofroll.engines.projection.smooth import mechanism
+from proofroll.engines.projection.smooth.mechanism import ProjectionMechanism
 
 # Components of the state without the ball's orientation: two coordinates and five velocities.
 _WITHOUT_ORIENTATION = 7

@@ -5,7 +5,7 @@ import dataclasses
 from typing import Any
 from xml.etree.ElementTree import SubElement
 
-from proofroll.elements.mechanism.joint_kinds import JointKind
+from proofroll.elements.mechanism.scene.joint_kinds import JointKind
 from proofroll.robots.hypotheses import RobotEvidence, hypothesis
 from proofroll.robots.model import Robot
 

@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from proofroll.core.arrays import FloatArray, cross
 from proofroll.elements.ball_on_surface.model import RollingBall
-from proofroll.truth.collocation import System
+from proofroll.truth.numerics.collocation import System
 
 AnyArray = npt.NDArray[Any]  # real or complex
 _PLUS_MINUS = np.concatenate([np.eye(3), -np.eye(3)])

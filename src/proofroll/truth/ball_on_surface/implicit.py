@@ -19,7 +19,7 @@ from proofroll.truth.ball_on_surface import unreduced_taylor
 from proofroll.truth.ball_on_surface.contact import ContactRates
 from proofroll.truth.ball_on_surface.impact import by_equations
 from proofroll.truth.ball_on_surface.route import BallStretch, End, Route, World, about_to_stop, join_motions
-from proofroll.truth.collocation import Step, System, next_length, nodes, take
+from proofroll.truth.numerics.collocation import Step, System, next_length, nodes, take
 
 _TOLERANCE = 1e-13  # of a step, relative to the scale of each variable
 _APPROACH = 0.5  # fraction of the time left until standstill that one step may take, far from it,

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterable
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
-from proofroll.truth import collocation
+from proofroll.truth.numerics import collocation
 
 # Rotation of the ball per step [rad], so small that the error of the spin dominates that of the step.
 _TURN = 2.0
@@ -66,7 +66,7 @@ def _quaternions(h: FloatArray, spin: FloatArray) -> FloatArray:
 
 
 def _matrices(h: FloatArray, spin: FloatArray) -> FloatArray:
-    """Rotation of each step by collocation of its matrix, :mod:`proofroll.truth.collocation`: order 25."""
+    """Rotation of each step by collocation of its matrix, :mod:`proofroll.truth.numerics.collocation`: order 25."""
     from scipy.spatial.transform import Rotation  # slow to load, and few truths need it
 
     x, y, z = np.moveaxis(spin * h[:, None, None], -1, 0)

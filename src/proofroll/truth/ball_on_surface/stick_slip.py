@@ -25,7 +25,7 @@ from proofroll.truth.ball_on_surface.orientation import MATRICES, QUATERNIONS, Q
 from proofroll.truth.ball_on_surface.polar import Polar
 from proofroll.truth.ball_on_surface.route import Path, Route
 from proofroll.truth.ball_on_surface.switching import follow
-from proofroll.truth.conditioning import MOVE, Story, in_common, well_posed_events
+from proofroll.truth.numerics.conditioning import MOVE, Story, in_common, well_posed_events
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -53,7 +53,8 @@ def stick_slip(scene: Scene, times: FloatArray) -> tuple[xr.Dataset, list[Event]
         ``sticking`` (bool per sample; a sample at an event belongs to the later stretch), with its events if friction
         is bounded or there are some, and energies and heights of bounces; events up to the last sample,
         each with a bracket that contains both routes. If relative changes of the parameters by
-        :data:`proofroll.truth.conditioning.MOVE` (:func:`with_changes`) change the events, the attribute ``ill_posed``
+        :data:`proofroll.truth.numerics.conditioning.MOVE` (:func:`with_changes`) change the events, the
+        attribute ``ill_posed``
         says from which time on; only earlier events are returned, and error bars cover the difference of the routes.
         Where the motion is not known to the last time, the dataset has the samples before its end, and says when and
         why it ends (:data:`proofroll.core.dataset.ENDS`).
@@ -152,7 +153,7 @@ def with_changes(body: RollingBall, part: float) -> RollingBall:
 
 
 def _unmoved(body: RollingBall, path_now: Path, pace: float, until: float) -> tuple[int, bool]:
-    """See :func:`~proofroll.truth.conditioning.well_posed_events`; the second route takes few steps near an edge."""
+    """See :func:`~proofroll.truth.numerics.conditioning.well_posed_events`; few steps of route 2 near an edge."""
     contact = body.contact
     if always_pressed(body) and not (body.gap0 or contact.rolling_resistance or np.isfinite(contact.mu_static)):
         return len(path_now.events), True  # nothing can switch

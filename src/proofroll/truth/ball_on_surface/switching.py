@@ -1,7 +1,7 @@
 """Sequence of rolling, slipping, flight and rest of a ball, for any route.
 
 A :class:`Route` integrates one stretch at a time and reports why it ended; this module decides what comes next.
-:func:`proofroll.truth.hybrid.follow` chains the stretches.
+:func:`proofroll.truth.numerics.hybrid.follow` chains the stretches.
 """
 
 import math
@@ -21,10 +21,10 @@ from proofroll.elements.ball_on_surface.mechanics import (
 )
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.motion import BallMotion
-from proofroll.truth import hybrid
 from proofroll.truth.ball_on_surface.flight import Rebound, fly, landing_outcome, normal_force_per_mass
 from proofroll.truth.ball_on_surface.route import BallStretch, End, Path, Route, World
-from proofroll.truth.hybrid import Transition
+from proofroll.truth.numerics import hybrid
+from proofroll.truth.numerics.hybrid import Transition
 
 # Relative distance from the friction cone below which round-off (1e-15) decides on which side a state is.
 _ON_CONE = 1e-12
@@ -74,7 +74,7 @@ def follow(body: RollingBall, route: Route, until: float) -> Path:
 
 
 class SwitchedBall:
-    """Stretches of a ball by one route; implements :class:`proofroll.truth.hybrid.SwitchingRoute`."""
+    """Stretches of a ball by one route; implements :class:`proofroll.truth.numerics.hybrid.SwitchingRoute`."""
 
     def __init__(self, body: RollingBall, route: Route) -> None:
         self.body, self.route = body, route

@@ -27,7 +27,7 @@ from proofroll.elements.ball_on_surface.mechanics import newton_euler
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.motion import BallMotion
 from proofroll.elements.ball_on_surface.surfaces import Cylinder, Declared, Plane, Surface
-from proofroll.truth.scalars import cross, dot, minus, plus, scaled
+from proofroll.truth.numerics.scalars import cross, dot, minus, plus, scaled
 
 _local = threading.local()
 # Optimisation level of the compiler: with the default 3 the series of a torus compile in 2.9 s of processor time, with

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from proofroll.elements.mechanism.joint_kinds import DISTANCE, JointKind
+from proofroll.elements.mechanism.scene.joint_kinds import DISTANCE, JointKind
 from proofroll.truth.laws.contacts import gap_of, slide_of
 from proofroll.truth.laws.integrals import norm, turned
 from proofroll.truth.laws.joints import Coordinates

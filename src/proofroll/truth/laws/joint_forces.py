@@ -6,13 +6,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from proofroll.elements.mechanism.joint_kinds import JointKind
+from proofroll.elements.mechanism.scene.joint_kinds import JointKind
 from proofroll.truth.laws.record import Array, Pieces
 from proofroll.truth.laws.residuals import LAWS, LawResiduals
 from proofroll.truth.laws.scene import LawScene, value_of
 
 if TYPE_CHECKING:
-    from proofroll.elements.mechanism.drives import Actuator
+    from proofroll.elements.mechanism.scene.drives import Actuator
 
 _CERTAIN = 10.0  # allowances of a rate from which on its sign is certain
 _PART = 1e-6  # part of a scene's natural force that counts in the size of an effort

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from proofroll.elements.mechanism.joint_kinds import DISTANCE, JointKind
+from proofroll.elements.mechanism.scene.joint_kinds import DISTANCE, JointKind
 from proofroll.truth.laws.integrals import dot, norm
 from proofroll.truth.laws.joint_forces import forces_along
 from proofroll.truth.laws.loads import BodyLoads

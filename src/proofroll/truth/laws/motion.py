@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from proofroll.elements.mechanism.joint_kinds import JointKind
+from proofroll.elements.mechanism.scene.joint_kinds import JointKind
 from proofroll.truth.laws.integrals import dot, integral, norm, since_start, tail, turned
 from proofroll.truth.laws.joints import FreeDirection
 from proofroll.truth.laws.loads import BodyLoads

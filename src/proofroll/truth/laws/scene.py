@@ -6,14 +6,14 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from proofroll.elements.mechanism.joint_kinds import JointKind
+from proofroll.elements.mechanism.scene.joint_kinds import JointKind
 from proofroll.truth.laws.integrals import frame_of, of_angles, turned
 from proofroll.truth.laws.record import Array, Pieces
 from proofroll.truth.laws.surfaces import PairContact, contacts_of
 
 if TYPE_CHECKING:
     from proofroll.elements.mechanism import Mechanism
-    from proofroll.elements.mechanism.drives import Coupling
+    from proofroll.elements.mechanism.scene.drives import Coupling
 
 # Free directions of a joint, in the order of its coordinates: axes of A (on the first body) or B, number, if it turns.
 FREE: dict[str, tuple[tuple[str, int, bool], ...]] = {

@@ -15,7 +15,7 @@ from proofroll.truth.laws.integrals import dot, norm, of_angles, turned, turned_
 from proofroll.truth.laws.record import Array
 
 if TYPE_CHECKING:
-    from proofroll.elements.mechanism.contacts.geometry import Geometry, Pair
+    from proofroll.elements.mechanism.scene.shapes.geometry import Geometry, Pair
 
 # Contacts of two geometries that are neither a plane nor one contact.
 _SLOTS = {("box", "box"): 24, ("box", "capsule"): 22}

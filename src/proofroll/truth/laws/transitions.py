@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from proofroll.elements.mechanism.joint_kinds import JointKind
+from proofroll.elements.mechanism.scene.joint_kinds import JointKind
 from proofroll.truth.laws.contacts import gap_of, slide_of
 from proofroll.truth.laws.impacts import impact
 from proofroll.truth.laws.integrals import dot, norm

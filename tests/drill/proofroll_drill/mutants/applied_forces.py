@@ -6,7 +6,7 @@ import dataclasses
 from typing import Any, ClassVar
 
 from proofroll.elements.mechanism import Force, Mechanism
-from proofroll.elements.mechanism.signal import Formula, delayed
+from proofroll.elements.mechanism.scene.signal import Formula, delayed
 from proofroll_drill.mutants.base import STEP
 from proofroll_drill.mutants.mechanism_models import MechanismMutant
 

@@ -6,7 +6,7 @@ import dataclasses
 from typing import Any, ClassVar
 
 from proofroll.elements.mechanism import Mechanism
-from proofroll.elements.mechanism.bushing import Bushing
+from proofroll.elements.mechanism.scene.bushing import Bushing
 from proofroll_drill.mutants.mechanism_models import MechanismMutant
 
 

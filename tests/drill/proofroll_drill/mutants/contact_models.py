@@ -11,15 +11,15 @@ import numpy as np
 from proofroll.core.events import Event
 from proofroll.core.scene import Scene
 from proofroll.elements.mechanism import Mechanism
-from proofroll.elements.mechanism.contacts.acting import Acting, heading_of
-from proofroll.elements.mechanism.contacts.dynamics import ContactDynamics
-from proofroll.elements.mechanism.contacts.geometry import coefficients_of
-from proofroll.elements.mechanism.contacts.start import touches
-from proofroll.elements.mechanism.contacts.touching import Touching
-from proofroll.elements.mechanism.rotations import Array
-from proofroll.elements.mechanism.sampling import MechanismBuilt, MechanismSample, mechanism_of
-from proofroll.truth.hybrid import follow, states_of
-from proofroll.truth.mechanism.contact_tree import ContactTree
+from proofroll.elements.mechanism.contact.acting import Acting, heading_of
+from proofroll.elements.mechanism.contact.dynamics import ContactDynamics
+from proofroll.elements.mechanism.contact.start import touches
+from proofroll.elements.mechanism.contact.touching import Touching
+from proofroll.elements.mechanism.run.sampling import MechanismBuilt, MechanismSample, mechanism_of
+from proofroll.elements.mechanism.scene.rotations import Array
+from proofroll.elements.mechanism.scene.shapes.geometry import coefficients_of
+from proofroll.truth.numerics.hybrid import follow, states_of
+from proofroll.truth.tree.contact_tree import ContactTree
 from proofroll_drill.mutants.base import STEP
 from proofroll_drill.mutants.mechanism_models import MechanismMutant
 

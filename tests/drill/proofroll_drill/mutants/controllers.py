@@ -9,8 +9,8 @@ from typing import Any, ClassVar
 from proofroll.core.controlled_engine import commanded
 from proofroll.core.engine import fixed_step
 from proofroll.elements.mechanism import Mechanism
-from proofroll.elements.mechanism.control import Control
-from proofroll.elements.mechanism.policy import Observation, PolicySource
+from proofroll.elements.mechanism.scene.control import Control
+from proofroll.elements.mechanism.scene.policy import Observation, PolicySource
 from proofroll.robots.probe import make
 from proofroll_drill.mutants.mechanism_models import MechanismMutant
 

@@ -9,12 +9,12 @@ import numpy as np
 
 from proofroll.core.scene import Scene
 from proofroll.elements.mechanism import BodyMotion, Mechanism
-from proofroll.elements.mechanism.element import MechanismElement
-from proofroll.elements.mechanism.joint_coordinates import JointCoordinates
-from proofroll.elements.mechanism.kinematics import Rows
-from proofroll.elements.mechanism.kinks import Functions
-from proofroll.elements.mechanism.rotations import Array
-from proofroll.elements.mechanism.sampling import MechanismSample
+from proofroll.elements.mechanism.dynamics.joint_coordinates import JointCoordinates
+from proofroll.elements.mechanism.dynamics.kinematics import Rows
+from proofroll.elements.mechanism.run.element import MechanismElement
+from proofroll.elements.mechanism.run.sampling import MechanismSample
+from proofroll.elements.mechanism.scene.kinks import Functions
+from proofroll.elements.mechanism.scene.rotations import Array
 from proofroll_drill.mutants.base import STEP, Mutant
 
 PENDULUM: Any = ("double_pendulum", {})

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from proofroll.core.scene import Scene
-from proofroll.elements.mechanism.sampling import MechanismSample
+from proofroll.elements.mechanism.run.sampling import MechanismSample
 from proofroll_drill.mutants.base import STEP, Mutant, OneStepBehind
 from proofroll_drill.mutants.mechanism_models import CRANK, PENDULUM, TOP, MechanismMutant
 

@@ -8,8 +8,8 @@ from typing import Any, ClassVar
 import numpy as np
 
 from proofroll.elements.mechanism import BodyMotion, Mechanism
-from proofroll.elements.mechanism.joint_coordinates import JointCoordinates
-from proofroll.elements.mechanism.rotations import Array
+from proofroll.elements.mechanism.dynamics.joint_coordinates import JointCoordinates
+from proofroll.elements.mechanism.scene.rotations import Array
 from proofroll_drill.mutants.mechanism_models import (
     CRANK,
     PENDULUM,

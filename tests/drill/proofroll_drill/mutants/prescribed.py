@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any, ClassVar
 
 from proofroll.core.scene import Scene
-from proofroll.elements.mechanism.signal import Formula, Signal, delayed
+from proofroll.elements.mechanism.scene.signal import Formula, Signal, delayed
 from proofroll_drill.mutants.base import STEP
 from proofroll_drill.mutants.mechanism_models import MechanismMutant
 

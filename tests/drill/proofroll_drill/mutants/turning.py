@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 from proofroll.elements.mechanism import Mechanism
-from proofroll.elements.mechanism.capabilities import MechanismCapability
+from proofroll.elements.mechanism.run.capabilities import MechanismCapability
 from proofroll_drill.mutants.contact_models import ContactMutant, of_pairs
 
 

@@ -20,7 +20,7 @@ from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import ProofrollError, require_known
 from proofroll.core.events import events_of
 from proofroll.core.truth import truth
-from proofroll.elements.mechanism.published import Published, read_published
+from proofroll.elements.mechanism.scene.published import Published, read_published
 from proofroll.files.scene_file import load_scene, read_scene_file, scene_names
 from proofroll.running.simulation import simulate
 

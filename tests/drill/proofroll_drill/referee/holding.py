@@ -12,13 +12,13 @@ from proofroll.core.errors import ProofrollError
 from proofroll.core.events import events_of
 from proofroll.core.truth import truth
 from proofroll.elements.mechanism import Mechanism
-from proofroll.elements.mechanism.assembly import check_start
-from proofroll.elements.mechanism.contacts.start import check_contacts
-from proofroll.elements.mechanism.record import Record
-from proofroll.elements.mechanism.rotations import Array
-from proofroll.truth.mechanism.error_bars import TwoRouteMotion
-from proofroll.truth.mechanism.smooth_truth import find_truth
-from proofroll.truth.mechanism.switched_truth import truth_of
+from proofroll.elements.mechanism.contact.start import check_contacts
+from proofroll.elements.mechanism.dynamics.record import Record
+from proofroll.elements.mechanism.run.assembly import check_start
+from proofroll.elements.mechanism.scene.rotations import Array
+from proofroll.truth.error_bars import TwoRouteMotion
+from proofroll.truth.smooth_truth import find_truth
+from proofroll.truth.switched_truth import truth_of
 
 from .balls import BallReferee
 from .contacts import ContactReferee, Told

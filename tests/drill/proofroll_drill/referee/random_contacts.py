@@ -10,10 +10,10 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from proofroll.elements.mechanism import Body, Joint, Mechanism
-from proofroll.elements.mechanism.contacts.geometry import Geometry, Pair
-from proofroll.elements.mechanism.drives import Actuator
-from proofroll.elements.mechanism.joint_kinds import JointKind
-from proofroll.elements.mechanism.signal import Formula
+from proofroll.elements.mechanism.scene.drives import Actuator
+from proofroll.elements.mechanism.scene.joint_kinds import JointKind
+from proofroll.elements.mechanism.scene.shapes.geometry import Geometry, Pair
+from proofroll.elements.mechanism.scene.signal import Formula
 
 _G = (0.0, 0.0, -9.81)  # m/s²
 _APART = 0.005  # m between the tip of an arm and its floor at the start, at least

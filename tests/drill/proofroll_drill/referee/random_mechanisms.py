@@ -9,7 +9,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from proofroll.elements.mechanism import Body, Joint, Loop, Mechanism, Point, Spring, Tree
-from proofroll.elements.mechanism.joint_kinds import FACTS, LAWS, WITH_AXIS, JointKind
+from proofroll.elements.mechanism.scene.joint_kinds import FACTS, LAWS, WITH_AXIS, JointKind
 
 KINDS: tuple[JointKind, ...] = (
     JointKind.FIXED,

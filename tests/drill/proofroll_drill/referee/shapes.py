@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from proofroll.elements.mechanism.contacts.geometry import Geometry
+from proofroll.elements.mechanism.scene.shapes.geometry import Geometry
 
 from .extrapolation import Long
 from .linear_algebra import cross, long, of_rpy

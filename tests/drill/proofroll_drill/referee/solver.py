@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from proofroll.elements.mechanism import Joint, Mechanism
-from proofroll.elements.mechanism.drives import Actuator
-from proofroll.elements.mechanism.signal import Formula
+from proofroll.elements.mechanism.scene.drives import Actuator
+from proofroll.elements.mechanism.scene.signal import Formula
 
 from .extrapolation import Long, extrapolated
 from .linear_algebra import cross, inverse, long, of_quaternion, of_rpy, quaternion, semidefinite_solve, turn

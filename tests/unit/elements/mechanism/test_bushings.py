@@ -11,14 +11,14 @@ from scipy.spatial.transform import Rotation
 
 from proofroll.core.errors import Diverged
 from proofroll.elements.mechanism import Body, Joint, Mechanism, Tree
-from proofroll.elements.mechanism.bushing import Bushing
-from proofroll.elements.mechanism.element import MechanismElement
-from proofroll.elements.mechanism.placed import Placed
-from proofroll.elements.mechanism.point_loads import point_loads
-from proofroll.elements.mechanism.rotations import Array
-from proofroll.truth.mechanism.bushing_scalars import bushing_load
-from proofroll.truth.mechanism.maximal_equations import FUNCTIONS
-from proofroll.truth.mechanism.plug_in import MechanismTruth
+from proofroll.elements.mechanism.dynamics.placed import Placed
+from proofroll.elements.mechanism.dynamics.point_loads import point_loads
+from proofroll.elements.mechanism.run.element import MechanismElement
+from proofroll.elements.mechanism.scene.bushing import Bushing
+from proofroll.elements.mechanism.scene.rotations import Array
+from proofroll.truth.bodies.bushing_scalars import bushing_load
+from proofroll.truth.bodies.maximal_equations import FUNCTIONS
+from proofroll.truth.plug_in import MechanismTruth
 
 ROUND = ((0.1, 0, 0), (0, 0.2, 0), (0, 0, 0.25))
 TIMES = np.linspace(0.0, 1.0, 6)

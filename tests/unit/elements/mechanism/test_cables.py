@@ -10,11 +10,11 @@ from scipy.integrate import solve_ivp
 
 from proofroll.core.events import events_of
 from proofroll.elements.mechanism import Body, Joint, Mechanism
-from proofroll.elements.mechanism.composed import Cable
-from proofroll.elements.mechanism.element import MechanismElement
+from proofroll.elements.mechanism.run.element import MechanismElement
+from proofroll.elements.mechanism.scene.composed import Cable
 from proofroll.files.scene_file import load_scene
 from proofroll.running.simulation import simulate
-from proofroll.truth.mechanism.plug_in import MechanismTruth
+from proofroll.truth.plug_in import MechanismTruth
 
 CABLE = '[[loops]]\nname = "k"\nkind = "distance"\nbody_a = "world"\nbody_b = "b"\n'
 FALL = '[[forces]]\nname = "w"\nbody = "b"\nkind = "force"\nvalue = [0, 0, -9.81]\n'

@@ -11,13 +11,13 @@ from scipy.spatial.transform import Rotation
 
 from proofroll.core.events import events_of
 from proofroll.elements.mechanism import Body, Force, Joint, Mechanism
-from proofroll.elements.mechanism.contacts.geometry import Geometry, Pair
-from proofroll.elements.mechanism.element import MechanismElement
-from proofroll.elements.mechanism.placed import Placed
-from proofroll.elements.mechanism.rotations import Array
-from proofroll.elements.mechanism.signal import Formula
+from proofroll.elements.mechanism.dynamics.placed import Placed
+from proofroll.elements.mechanism.run.element import MechanismElement
+from proofroll.elements.mechanism.scene.rotations import Array
+from proofroll.elements.mechanism.scene.shapes.geometry import Geometry, Pair
+from proofroll.elements.mechanism.scene.signal import Formula
 from proofroll.files.scene_file import load_scene
-from proofroll.truth.mechanism.plug_in import MechanismTruth
+from proofroll.truth.plug_in import MechanismTruth
 
 ROUND = ((0.1, 0, 0), (0, 0.1, 0), (0, 0, 0.1))
 TIMES = np.linspace(0.0, 1.0, 11)

@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 from proofroll.elements.mechanism import Tree
-from proofroll.elements.mechanism.analysis import analyse
-from proofroll.elements.mechanism.reader import KINDS
+from proofroll.elements.mechanism.dynamics.analysis import analyse
+from proofroll.elements.mechanism.run.reader import KINDS
 
 MODELS = Path(__file__).parents[4] / "models"
 
@@ -56,7 +56,7 @@ def test_scene_says_what_it_is_for(name):
 
 def test_reactions_at_rest_carry_the_weight(scene):
     """The ground's joints together carry the weight of a mechanism at rest in its lowest position."""
-    from proofroll.elements.mechanism.joint_coordinates import JointCoordinates
+    from proofroll.elements.mechanism.dynamics.joint_coordinates import JointCoordinates
 
     equations = JointCoordinates(scene("chain", angle=0.0, links=4, mass=2.0))
     wrench = equations.sample(*equations.mechanism.start())["wrench"]
@@ -65,7 +65,7 @@ def test_reactions_at_rest_carry_the_weight(scene):
 
 def test_andrews_initial_accelerations_and_multipliers(scene):
     """β̈ and Θ̈ at the start are the literature's, so all parameters are."""
-    from proofroll.elements.mechanism.joint_coordinates import JointCoordinates
+    from proofroll.elements.mechanism.dynamics.joint_coordinates import JointCoordinates
 
     mechanism = scene("andrews_squeezer")
     acceleration = JointCoordinates(mechanism).solve(*mechanism.start()).acceleration

@@ -12,9 +12,9 @@ import proofroll
 from proofroll.core.plugins import load_engine
 from proofroll.core.scene import Scene
 from proofroll.elements.mechanism import Mechanism
-from proofroll.elements.mechanism.element import MechanismElement
-from proofroll.engines.mujoco.mechanism_model import write
-from proofroll.truth.mechanism.plug_in import MechanismTruth
+from proofroll.elements.mechanism.run.element import MechanismElement
+from proofroll.engines.mujoco.smooth.mechanism_model import write
+from proofroll.truth.plug_in import MechanismTruth
 
 TIMES = np.linspace(0.0, 2.0, 9)
 STIFFNESS, DAMPING, SPIN = 3.0, 0.4, 0.8

@@ -11,9 +11,9 @@ from scipy.integrate import solve_ivp
 
 from proofroll.core.errors import Refused
 from proofroll.elements.mechanism import Body, Joint, Loop, Mechanism, Tree
-from proofroll.elements.mechanism.capabilities import required
-from proofroll.elements.mechanism.element import MechanismElement
-from proofroll.truth.mechanism.plug_in import MechanismTruth
+from proofroll.elements.mechanism.run.capabilities import required
+from proofroll.elements.mechanism.run.element import MechanismElement
+from proofroll.truth.plug_in import MechanismTruth
 
 ROUND = ((0.1, 0, 0), (0, 0.2, 0), (0, 0, 0.25))
 STRUT = '[[loops]]\nname = "strut"\nkind = "distance"\nbody_a = "world"\nbody_b = "b"\nposition_a = [0, 0, 2]\n'

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from proofroll.elements.mechanism import Body, Joint, Mechanism
-from proofroll.elements.mechanism.contacts.geometry import Geometry, Pair
+from proofroll.elements.mechanism.scene.shapes.geometry import Geometry, Pair
 from proofroll.truth.laws.check import LawCheck
 from proofroll.truth.laws.integrals import POINTS
 from proofroll.truth.laws.record import Array, Modes, Passage, Pieces, without_contacts
@@ -96,8 +96,8 @@ def free_body() -> HandMade:
 
 def pendulum() -> HandMade:
     """A body on a revolute joint about y, driven by an actuator that cancels gravity: it turns at a constant rate."""
-    from proofroll.elements.mechanism.drives import Actuator
-    from proofroll.elements.mechanism.signal import Formula
+    from proofroll.elements.mechanism.scene.drives import Actuator
+    from proofroll.elements.mechanism.scene.signal import Formula
 
     rate, mass, arm = 2.0, 1.5, 0.4
     body = Body("bob", mass, com=(0.0, 0.0, -arm), inertia=(0.02, 0.02, 0.01))

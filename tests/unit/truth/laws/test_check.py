@@ -10,7 +10,7 @@ import pytest
 from tests.unit.truth.laws.conftest import HandMade, bounce, free_body, guided, pendulum, sliding
 
 from proofroll.elements.mechanism import Body
-from proofroll.elements.mechanism.contacts.geometry import Geometry, Pair
+from proofroll.elements.mechanism.scene.shapes.geometry import Geometry, Pair
 from proofroll.truth.laws.check import sentence, verdict
 
 MILLIONTH = 1 + 1e-6
@@ -146,5 +146,5 @@ def test_laws_take_no_code_of_the_routes() -> None:
                 and id(node) not in typed
                 and (node.module or "").startswith("proofroll")
             ):
-                allowed = ("proofroll.truth.laws", "proofroll.elements.mechanism.joint_kinds")
+                allowed = ("proofroll.truth.laws", "proofroll.elements.mechanism.scene.joint_kinds")
                 assert (node.module or "").startswith(allowed), f"{file.name} imports {node.module}"

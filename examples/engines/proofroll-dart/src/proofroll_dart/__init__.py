@@ -17,9 +17,9 @@ from proofroll.core.engine import Scheme, whole_steps
 from proofroll.core.errors import Diverged, InputError
 from proofroll.core.scene import Scene
 from proofroll.elements.mechanism import WORLD, Joint, Mechanism
-from proofroll.elements.mechanism.capabilities import MechanismCapability
-from proofroll.elements.mechanism.sampling import MechanismBuilt, MechanismSample, mechanism_of
-from proofroll.elements.mechanism.signal import value_at
+from proofroll.elements.mechanism.run.capabilities import MechanismCapability
+from proofroll.elements.mechanism.run.sampling import MechanismBuilt, MechanismSample, mechanism_of
+from proofroll.elements.mechanism.scene.signal import value_at
 
 _KINDS = {"fixed": "Weld", "revolute": "Revolute", "prismatic": "Prismatic", "universal": "Universal"}
 _DRIVES = {MechanismCapability[name] for name in ("JOINT_SPRINGS", "ACTUATORS", "SATURATION", "SIGNALS")}

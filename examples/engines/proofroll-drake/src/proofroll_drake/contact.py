@@ -21,9 +21,9 @@ from pydrake.multibody.plant import CoulombFriction, DiscreteContactApproximatio
 
 from proofroll.core.errors import Refused
 from proofroll.elements.mechanism import Mechanism
-from proofroll.elements.mechanism.contacts.dynamics import ContactDynamics
-from proofroll.elements.mechanism.contacts.family import Family, of_contact
-from proofroll.elements.mechanism.sampling import MechanismBuilt
+from proofroll.elements.mechanism.contact.dynamics import ContactDynamics
+from proofroll.elements.mechanism.run.contacts.family import Family, of_contact
+from proofroll.elements.mechanism.run.sampling import MechanismBuilt
 from proofroll_drake.settings import DrakeSettings
 
 APPROXIMATIONS: Mapping[str, DiscreteContactApproximation] = {

@@ -22,11 +22,11 @@ from proofroll.core.engine import Regularised, whole_steps
 from proofroll.core.errors import Diverged, Refused
 from proofroll.core.scene import Scene
 from proofroll.elements.mechanism import WORLD, Joint, Mechanism
-from proofroll.elements.mechanism.capabilities import ALL_JOINTS, FORCES, MechanismCapability
-from proofroll.elements.mechanism.joint_kinds import WITH_AXIS
-from proofroll.elements.mechanism.loop_points import held_points
-from proofroll.elements.mechanism.sampling import MechanismBuilt, MechanismSample, mechanism_of
-from proofroll.elements.mechanism.signal import value_at
+from proofroll.elements.mechanism.dynamics.loop_points import held_points
+from proofroll.elements.mechanism.run.capabilities import ALL_JOINTS, FORCES, MechanismCapability
+from proofroll.elements.mechanism.run.sampling import MechanismBuilt, MechanismSample, mechanism_of
+from proofroll.elements.mechanism.scene.joint_kinds import WITH_AXIS
+from proofroll.elements.mechanism.scene.signal import value_at
 from proofroll_drake.contact import DrakeContacts
 from proofroll_drake.joints import connect, start
 from proofroll_drake.settings import DrakeSettings

@@ -7,8 +7,8 @@ from collections.abc import Mapping
 from typing import Any, ClassVar
 
 from proofroll.core.scene import Scene
-from proofroll.elements.mechanism.capabilities import MechanismCapability
-from proofroll.elements.mechanism.contacts.family import Family, of_contact
+from proofroll.elements.mechanism.run.capabilities import MechanismCapability
+from proofroll.elements.mechanism.run.contacts.family import Family, of_contact
 from proofroll_pybullet import ball, mechanism, spheres
 from proofroll_pybullet.ball import PybulletBall
 from proofroll_pybullet.mechanism import PybulletMechanism

@@ -15,11 +15,11 @@ from proofroll.core.engine import Regularised, Scheme, whole_steps
 from proofroll.core.errors import Diverged, Refused
 from proofroll.core.scene import Scene
 from proofroll.elements.mechanism import WORLD, Body, Joint, Mechanism
-from proofroll.elements.mechanism.capabilities import MechanismCapability
-from proofroll.elements.mechanism.contacts.family import Family, of_contact
-from proofroll.elements.mechanism.contacts.shapes import HalfSpace, SphereShape
-from proofroll.elements.mechanism.rotations import frame_of_axis, from_quaternion, to_quaternion
-from proofroll.elements.mechanism.sampling import MechanismBuilt, MechanismSample, mechanism_of
+from proofroll.elements.mechanism.run.capabilities import MechanismCapability
+from proofroll.elements.mechanism.run.contacts.family import Family, of_contact
+from proofroll.elements.mechanism.run.sampling import MechanismBuilt, MechanismSample, mechanism_of
+from proofroll.elements.mechanism.scene.rotations import frame_of_axis, from_quaternion, to_quaternion
+from proofroll.elements.mechanism.scene.shapes.shapes import HalfSpace, SphereShape
 
 with warnings.catch_warnings():  # SAPIEN says which library of Vulkan it takes; nothing is drawn here
     warnings.simplefilter("ignore")

@@ -14,7 +14,7 @@ from proofroll.core.arrays import FloatArray
 from proofroll.core.bounds import require_bounds
 from proofroll.core.errors import InputError
 from proofroll.elements.ball_on_surface.surfaces.declared import Declared
-from proofroll.elements.mechanism.contacts.walls.of_revolution import bowl_distance
+from proofroll.elements.mechanism.scene.shapes.walls.of_revolution import bowl_distance
 
 
 @dataclass(frozen=True)

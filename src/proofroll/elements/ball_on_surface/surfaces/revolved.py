@@ -16,7 +16,7 @@ from proofroll.core.bounds import OutOfBounds, require_bounds
 from proofroll.core.errors import InputError
 from proofroll.elements.ball_on_surface.surfaces.declared import Declared
 from proofroll.elements.ball_on_surface.surfaces.formula import Jet, cos, sin, sqrt, variables
-from proofroll.elements.mechanism.contacts.walls.of_revolution import cone_distance, ring_distance
+from proofroll.elements.mechanism.scene.shapes.walls.of_revolution import cone_distance, ring_distance
 
 # Number of start points along a curve for the search of the nearest point, of Newton steps, and relative tolerance.
 _PLACES, _NEWTON, _ROUND_OFF = 65, 30, 1e-15

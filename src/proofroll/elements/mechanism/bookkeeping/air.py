@@ -13,11 +13,11 @@ from scipy.spatial.transform import Rotation
 from proofroll.core.engine import whole_steps
 from proofroll.core.errors import Diverged
 from proofroll.elements.mechanism.bookkeeping.law import ControlLaw, RobotState
-from proofroll.elements.mechanism.joint_coordinates import JointCoordinates
-from proofroll.elements.mechanism.joint_kinds import JointKind
-from proofroll.elements.mechanism.model import Mechanism
-from proofroll.elements.mechanism.policy import Observation
-from proofroll.elements.mechanism.rotations import Array
+from proofroll.elements.mechanism.dynamics.joint_coordinates import JointCoordinates
+from proofroll.elements.mechanism.scene.joint_kinds import JointKind
+from proofroll.elements.mechanism.scene.model import Mechanism
+from proofroll.elements.mechanism.scene.policy import Observation
+from proofroll.elements.mechanism.scene.rotations import Array
 
 Scheme = Literal["explicit", "implicit", "explicit_base", "implicit_base", "rk4"]
 SCHEMES: Mapping[Scheme, str] = {

@@ -12,11 +12,11 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from proofroll.core.errors import InputError
-from proofroll.elements.mechanism.control import EFFORT
-from proofroll.elements.mechanism.model import Mechanism
-from proofroll.elements.mechanism.policy import Observation, PolicySource
-from proofroll.elements.mechanism.rotations import Array
-from proofroll.elements.mechanism.signal import Signal, value_at
+from proofroll.elements.mechanism.scene.control import EFFORT
+from proofroll.elements.mechanism.scene.model import Mechanism
+from proofroll.elements.mechanism.scene.policy import Observation, PolicySource
+from proofroll.elements.mechanism.scene.rotations import Array
+from proofroll.elements.mechanism.scene.signal import Signal, value_at
 
 VECTORS = ("p_WB", "v_WB_W", "w_WB_B", "gravity_B")  # of an observation, shape (3,) each
 

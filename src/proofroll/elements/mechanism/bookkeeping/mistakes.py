@@ -10,7 +10,7 @@ import numpy as np
 
 from proofroll.core.diagnosis.fitting import least_squares_parameter
 from proofroll.elements.mechanism.bookkeeping.law import ControlLaw
-from proofroll.elements.mechanism.rotations import Array
+from proofroll.elements.mechanism.scene.rotations import Array
 
 # Layers of a record, each computed from the ones before; a record shows a mistake at one of them.
 LAYERS = {

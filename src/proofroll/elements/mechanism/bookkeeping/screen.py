@@ -19,8 +19,8 @@ from proofroll.core.engine import whole_steps
 from proofroll.elements.mechanism.bookkeeping.air import AirRobot
 from proofroll.elements.mechanism.bookkeeping.law import ControlLaw
 from proofroll.elements.mechanism.bookkeeping.mistakes import Mistake, changed
-from proofroll.elements.mechanism.model import Mechanism
-from proofroll.elements.mechanism.rotations import Array
+from proofroll.elements.mechanism.scene.model import Mechanism
+from proofroll.elements.mechanism.scene.rotations import Array
 
 _FACTORS = (0.0, 0.3, 0.6, 0.85, 0.95, 1.0, 1.05, 1.2, 1.6, 2.5)  # sizes that are tried, 1 being right
 _ARMATURES = (1e-4, 1e-3, 1e-2, 0.1)  # kg m², where the right one is 0

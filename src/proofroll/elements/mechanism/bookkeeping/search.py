@@ -20,8 +20,8 @@ from proofroll.elements.mechanism.bookkeeping.law import ControlLaw
 from proofroll.elements.mechanism.bookkeeping.mistakes import Mistake, changed, fitted, mistakes, offsets_told
 from proofroll.elements.mechanism.bookkeeping.screen import TREATMENTS, MistakeScreen, Screened, Treatment
 from proofroll.elements.mechanism.bookkeeping.seen import LawMotions, SeenMotion
-from proofroll.elements.mechanism.model import Mechanism
-from proofroll.elements.mechanism.rotations import Array
+from proofroll.elements.mechanism.scene.model import Mechanism
+from proofroll.elements.mechanism.scene.rotations import Array
 
 # Most that is tried, where nothing simpler explains a motion.
 Depth = Literal["a mistake", "a pair", "a pair with a pose"]

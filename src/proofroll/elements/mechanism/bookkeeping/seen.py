@@ -14,9 +14,9 @@ from proofroll.core.errors import Diverged, Refused
 from proofroll.elements.mechanism.bookkeeping.air import SCHEMES, AirRobot, Scheme, steps_in_air
 from proofroll.elements.mechanism.bookkeeping.law import ControlLaw
 from proofroll.elements.mechanism.bookkeeping.mistakes import Mistake, changed
-from proofroll.elements.mechanism.joint_kinds import WITH_QUATERNION, JointKind
-from proofroll.elements.mechanism.model import Mechanism
-from proofroll.elements.mechanism.rotations import Array
+from proofroll.elements.mechanism.scene.joint_kinds import WITH_QUATERNION, JointKind
+from proofroll.elements.mechanism.scene.model import Mechanism
+from proofroll.elements.mechanism.scene.rotations import Array
 
 SHOWN = 0.1  # s: a mistake of bookkeeping shows in the air within it
 WHOLE = 1e-6  # part of a step by which an interval may miss a whole number of steps

@@ -7,13 +7,13 @@ import numpy as np
 
 from proofroll.core.diagnosis import Cause, Evidence, hypothesis
 from proofroll.core.diagnosis.fitting import Residuals, change_by, factor_text, possible
-from proofroll.elements.mechanism.checks import WORLD, ZERO
 from proofroll.elements.mechanism.diagnosis.equations import Change
 from proofroll.elements.mechanism.diagnosis.residuals import best, residuals_of
-from proofroll.elements.mechanism.model import Mechanism
-from proofroll.elements.mechanism.parts import Axes, Force
-from proofroll.elements.mechanism.rotations import Array
-from proofroll.elements.mechanism.signal import delayed, varies
+from proofroll.elements.mechanism.scene.checks import WORLD, ZERO
+from proofroll.elements.mechanism.scene.model import Mechanism
+from proofroll.elements.mechanism.scene.parts import Axes, Force
+from proofroll.elements.mechanism.scene.rotations import Array
+from proofroll.elements.mechanism.scene.signal import delayed, varies
 
 
 @hypothesis(

@@ -20,7 +20,7 @@ from proofroll.elements.mechanism.bookkeeping.search import (
 from proofroll.elements.mechanism.bookkeeping.seen import SHOWN, WHOLE, SeenMotion
 from proofroll.elements.mechanism.diagnosis.equations import is_motion, of_start, placed_of
 from proofroll.elements.mechanism.diagnosis.residuals import COVERED
-from proofroll.elements.mechanism.model import Mechanism
+from proofroll.elements.mechanism.scene.model import Mechanism
 
 # Names of hypotheses that look at the same number by other means.
 _SAME: Mapping[str, str] = {

@@ -4,11 +4,11 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 from proofroll.core.diagnosis import Cause, Evidence, hypothesis
-from proofroll.elements.mechanism.bushing import Bushing, Six
-from proofroll.elements.mechanism.checks import ZERO
 from proofroll.elements.mechanism.diagnosis.equations import Change
 from proofroll.elements.mechanism.diagnosis.residuals import residuals_of
-from proofroll.elements.mechanism.rotations import to_rpy
+from proofroll.elements.mechanism.scene.bushing import Bushing, Six
+from proofroll.elements.mechanism.scene.checks import ZERO
+from proofroll.elements.mechanism.scene.rotations import to_rpy
 
 # Axes in another order: words, numbers of the axes whose values they take.
 _ORDERS = (

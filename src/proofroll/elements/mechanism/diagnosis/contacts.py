@@ -12,10 +12,16 @@ from proofroll.core.diagnosis import Cause, Evidence, hypothesis
 from proofroll.core.diagnosis.fitting import cached_on_evidence, change_by, factor_text
 from proofroll.core.diagnosis.samples import run_and_truth
 from proofroll.core.diagnosis.vectors import ReportedVector
-from proofroll.elements.mechanism.contacts.observables import PRESSES, SLIDES, Followed, follow_contacts, normal_forces
 from proofroll.elements.mechanism.diagnosis.equations import is_motion, placed_of
-from proofroll.elements.mechanism.model import Mechanism
-from proofroll.elements.mechanism.placed import Placed
+from proofroll.elements.mechanism.dynamics.placed import Placed
+from proofroll.elements.mechanism.run.contacts.observables import (
+    PRESSES,
+    SLIDES,
+    Followed,
+    follow_contacts,
+    normal_forces,
+)
+from proofroll.elements.mechanism.scene.model import Mechanism
 
 # Least difference of forces and least overlap that point to another law, relative to the mechanism's force and size.
 FORCE, _SUNK = 1e-4, 1e-3

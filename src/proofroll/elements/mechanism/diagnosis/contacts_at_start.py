@@ -17,13 +17,13 @@ from proofroll.core.diagnosis.fitting import (
 )
 from proofroll.core.errors import Refused
 from proofroll.core.first_steps import OF_FIRST_STEPS
-from proofroll.elements.mechanism.checks import WORLD
-from proofroll.elements.mechanism.contacts.geometry import Geometry
-from proofroll.elements.mechanism.contacts.observables import follow_contacts
-from proofroll.elements.mechanism.contacts.start import TOUCHING
+from proofroll.elements.mechanism.contact.start import TOUCHING
 from proofroll.elements.mechanism.diagnosis.contacts import FORCE, contact_cause
 from proofroll.elements.mechanism.diagnosis.equations import of_start
-from proofroll.elements.mechanism.rotations import frame_of_axis
+from proofroll.elements.mechanism.run.contacts.observables import follow_contacts
+from proofroll.elements.mechanism.scene.checks import WORLD
+from proofroll.elements.mechanism.scene.rotations import frame_of_axis
+from proofroll.elements.mechanism.scene.shapes.geometry import Geometry
 
 _PLACED = 1e-3  # part of the difference that a wrong place may leave: of three numbers two are fitted
 _OWN = "give each pair its own coefficient"

@@ -19,15 +19,15 @@ from scipy.interpolate import make_interp_spline
 from proofroll.core.arrays import FloatArray, cross
 from proofroll.core.diagnosis import Evidence
 from proofroll.core.first_steps import OF_FIRST_STEPS
-from proofroll.elements.mechanism.drives import Actuator
-from proofroll.elements.mechanism.joint_kinds import WITH_QUATERNION
-from proofroll.elements.mechanism.kinematics import BodyMotion, Tree
-from proofroll.elements.mechanism.model import Mechanism
-from proofroll.elements.mechanism.placed import Placed
-from proofroll.elements.mechanism.point_loads import bushing_loads
-from proofroll.elements.mechanism.rotations import skews
-from proofroll.elements.mechanism.signal import breaks, value_at
-from proofroll.elements.mechanism.switches import switched_joints
+from proofroll.elements.mechanism.dynamics.kinematics import BodyMotion, Tree
+from proofroll.elements.mechanism.dynamics.placed import Placed
+from proofroll.elements.mechanism.dynamics.point_loads import bushing_loads
+from proofroll.elements.mechanism.dynamics.switches import switched_joints
+from proofroll.elements.mechanism.scene.drives import Actuator
+from proofroll.elements.mechanism.scene.joint_kinds import WITH_QUATERNION
+from proofroll.elements.mechanism.scene.model import Mechanism
+from proofroll.elements.mechanism.scene.rotations import skews
+from proofroll.elements.mechanism.scene.signal import breaks, value_at
 
 _FITS = ((7, 5), (5, 3))
 _SAMPLES = 16

@@ -20,13 +20,13 @@ from proofroll.core.diagnosis.fitting import (
     least_squares_parameters,
 )
 from proofroll.core.errors import InputError, NotUnique
-from proofroll.elements.mechanism.contacts.dynamics import ContactDynamics
-from proofroll.elements.mechanism.contacts.geometry import Geometry
-from proofroll.elements.mechanism.contacts.observables import PRESSES, Followed, normal_forces
+from proofroll.elements.mechanism.contact.dynamics import ContactDynamics
 from proofroll.elements.mechanism.diagnosis.contacts import COVERS, contact_cause, touch_of
 from proofroll.elements.mechanism.diagnosis.equations import is_one_motion, placed_of
-from proofroll.elements.mechanism.model import Mechanism
-from proofroll.elements.mechanism.placed import Placed
+from proofroll.elements.mechanism.dynamics.placed import Placed
+from proofroll.elements.mechanism.run.contacts.observables import PRESSES, Followed, normal_forces
+from proofroll.elements.mechanism.scene.model import Mechanism
+from proofroll.elements.mechanism.scene.shapes.geometry import Geometry
 
 _DELAY, _RATIO = 0.05, 1e-3  # largest delay, in steps, and error of restitution that count as none
 _JUMP = 1e-4  # least velocity that counts as missed, relative to the mechanism's speed

@@ -12,11 +12,11 @@ from proofroll.core.diagnosis.samples import run_and_truth
 from proofroll.core.errors import Diverged, Refused
 from proofroll.elements.mechanism.diagnosis.equations import Change, is_motion, is_one_motion, of_start, placed_of
 from proofroll.elements.mechanism.diagnosis.residuals import COVERED, best, residuals_of
-from proofroll.elements.mechanism.drives import Actuator
-from proofroll.elements.mechanism.joint_coordinates import JointCoordinates
-from proofroll.elements.mechanism.joint_kinds import WITH_QUATERNION, JointKind
-from proofroll.elements.mechanism.model import Mechanism
-from proofroll.elements.mechanism.signal import value_at
+from proofroll.elements.mechanism.dynamics.joint_coordinates import JointCoordinates
+from proofroll.elements.mechanism.scene.drives import Actuator
+from proofroll.elements.mechanism.scene.joint_kinds import WITH_QUATERNION, JointKind
+from proofroll.elements.mechanism.scene.model import Mechanism
+from proofroll.elements.mechanism.scene.signal import value_at
 
 Effort = Callable[[Actuator, float, float, float], float]
 _COVERS = ("motion", *COVERED, "effort")

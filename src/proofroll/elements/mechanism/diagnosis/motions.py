@@ -9,10 +9,10 @@ from proofroll.core.diagnosis import Cause, Evidence, above_round_off, hypothesi
 from proofroll.core.diagnosis.samples import run_and_truth
 from proofroll.elements.mechanism.diagnosis.equations import is_motion, of_start, placed_of
 from proofroll.elements.mechanism.diagnosis.residuals import COVERED
-from proofroll.elements.mechanism.joint import Joint
-from proofroll.elements.mechanism.joint_kinds import JointKind
-from proofroll.elements.mechanism.prescribed import moved
-from proofroll.elements.mechanism.signal import delayed, varies
+from proofroll.elements.mechanism.scene.joint import Joint
+from proofroll.elements.mechanism.scene.joint_kinds import JointKind
+from proofroll.elements.mechanism.scene.prescribed import moved
+from proofroll.elements.mechanism.scene.signal import delayed, varies
 
 _COVERS = ("motion", *COVERED, "drive")
 _DEGREE = np.pi / 180

@@ -11,8 +11,8 @@ from proofroll.core.diagnosis import Cause, Evidence, Hypothesis, hypothesis
 from proofroll.core.diagnosis.fitting import Residuals, change_by, factor_text, possible
 from proofroll.elements.mechanism.diagnosis.equations import Change
 from proofroll.elements.mechanism.diagnosis.residuals import best, residuals_of
-from proofroll.elements.mechanism.joint_coordinates import JointCoordinates
-from proofroll.elements.mechanism.model import Mechanism
+from proofroll.elements.mechanism.dynamics.joint_coordinates import JointCoordinates
+from proofroll.elements.mechanism.scene.model import Mechanism
 
 # Damping by a scheme of first order at a step h and a stiffness k, in parts of k h: 0.5, and what a fit of it leaves.
 _FIRST_ORDER = 0.6

@@ -17,12 +17,12 @@ from proofroll.core.diagnosis.vectors import ReportedVector, product
 from proofroll.core.errors import Diverged
 from proofroll.elements.mechanism.diagnosis.equations import is_motion, placed_of
 from proofroll.elements.mechanism.diagnosis.reporting_errors import BODY
-from proofroll.elements.mechanism.joint_coordinates import JointCoordinates
-from proofroll.elements.mechanism.model import Mechanism
-from proofroll.elements.mechanism.placed import Placed
-from proofroll.elements.mechanism.rotations import skews
-from proofroll.elements.mechanism.signal import Formula, Table
-from proofroll.elements.mechanism.switches import switched_joints
+from proofroll.elements.mechanism.dynamics.joint_coordinates import JointCoordinates
+from proofroll.elements.mechanism.dynamics.placed import Placed
+from proofroll.elements.mechanism.dynamics.switches import switched_joints
+from proofroll.elements.mechanism.scene.model import Mechanism
+from proofroll.elements.mechanism.scene.rotations import skews
+from proofroll.elements.mechanism.scene.signal import Formula, Table
 
 # Distance of joints without any comparable components, in sizes of the forces: they are matched last.
 _FAR = 1e3

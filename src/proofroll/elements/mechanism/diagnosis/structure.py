@@ -15,9 +15,9 @@ from proofroll.core.errors import InputError
 from proofroll.core.first_steps import OF_FIRST_STEPS
 from proofroll.elements.mechanism.diagnosis.equations import Change, is_motion, of_run, placed_of, stretch
 from proofroll.elements.mechanism.diagnosis.residuals import COVERED, residuals_of
-from proofroll.elements.mechanism.joint_kinds import JointKind
-from proofroll.elements.mechanism.model import Mechanism
-from proofroll.elements.mechanism.placed import Placed
+from proofroll.elements.mechanism.dynamics.placed import Placed
+from proofroll.elements.mechanism.scene.joint_kinds import JointKind
+from proofroll.elements.mechanism.scene.model import Mechanism
 
 _REMEDY = "an axis is given in the frame of the parent body; look at whose frame the engine takes"
 # Lines of the certificate that follow from the joints' axes.

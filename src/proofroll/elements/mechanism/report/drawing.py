@@ -7,14 +7,14 @@ from scipy.spatial import ConvexHull
 from scipy.spatial.transform import Rotation
 
 from proofroll.core.arrays import FloatArray
-from proofroll.elements.mechanism.checks import WORLD
-from proofroll.elements.mechanism.contacts.shapes import HalfSpace, Shape, SphereShape, Wall
-from proofroll.elements.mechanism.contacts.start import TOUCHING, touches
-from proofroll.elements.mechanism.contacts.walls import BowlWall, CurvedWall
-from proofroll.elements.mechanism.element import MechanismElement
-from proofroll.elements.mechanism.joint_kinds import DISTANCE, SLIDING, JointKind
-from proofroll.elements.mechanism.kinematics import Tree
-from proofroll.elements.mechanism.rotations import frame_of_axis
+from proofroll.elements.mechanism.contact.start import TOUCHING, touches
+from proofroll.elements.mechanism.dynamics.kinematics import Tree
+from proofroll.elements.mechanism.run.element import MechanismElement
+from proofroll.elements.mechanism.scene.checks import WORLD
+from proofroll.elements.mechanism.scene.joint_kinds import DISTANCE, SLIDING, JointKind
+from proofroll.elements.mechanism.scene.rotations import frame_of_axis
+from proofroll.elements.mechanism.scene.shapes.shapes import HalfSpace, Shape, SphereShape, Wall
+from proofroll.elements.mechanism.scene.shapes.walls import BowlWall, CurvedWall
 from proofroll.report.pen import Drawing, View, across, circle, unit
 
 _SIZE = 240.0  # size of the mechanism in the picture [px]

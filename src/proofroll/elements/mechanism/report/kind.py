@@ -9,9 +9,9 @@ import numpy as np
 
 from proofroll.core.observable import Observable, Role
 from proofroll.core.scene import Scene
-from proofroll.elements.mechanism.capabilities import ALL_LOOPS, FORCES, MechanismCapability
-from proofroll.elements.mechanism.element import MechanismElement, the_mechanism
-from proofroll.elements.mechanism.matrices import Matrices, matrices_of, velocity_names
+from proofroll.elements.mechanism.dynamics.matrices import Matrices, matrices_of, velocity_names
+from proofroll.elements.mechanism.run.capabilities import ALL_LOOPS, FORCES, MechanismCapability
+from proofroll.elements.mechanism.run.element import MechanismElement, the_mechanism
 from proofroll.report.kinds import EquationMatrices, ReportKind
 
 if TYPE_CHECKING:

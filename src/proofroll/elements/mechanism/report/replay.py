@@ -13,14 +13,14 @@ from scipy.spatial.transform import Rotation
 from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Refused
 from proofroll.core.scene import Scene
-from proofroll.elements.mechanism.checks import WORLD, ZERO, Vector
-from proofroll.elements.mechanism.contacts.geometry import BodyContact, Geometry
-from proofroll.elements.mechanism.contacts.observables import SLIDES
-from proofroll.elements.mechanism.contacts.shapes import SphereShape, Wall
-from proofroll.elements.mechanism.element import MechanismElement, the_mechanism
-from proofroll.elements.mechanism.joint_kinds import SLIDING, JointKind
-from proofroll.elements.mechanism.placed import Placed
+from proofroll.elements.mechanism.dynamics.placed import Placed
 from proofroll.elements.mechanism.report.drawing import direction
+from proofroll.elements.mechanism.run.contacts.observables import SLIDES
+from proofroll.elements.mechanism.run.element import MechanismElement, the_mechanism
+from proofroll.elements.mechanism.scene.checks import WORLD, ZERO, Vector
+from proofroll.elements.mechanism.scene.joint_kinds import SLIDING, JointKind
+from proofroll.elements.mechanism.scene.shapes.geometry import BodyContact, Geometry
+from proofroll.elements.mechanism.scene.shapes.shapes import SphereShape, Wall
 from proofroll.files.json_data import plain
 from proofroll.report.labels import symbol, unit
 from proofroll.report.replay.records import SPEEDS, PackedNumbers, Replayed, present

@@ -11,8 +11,8 @@ import pytest
 from proofroll.core.diagnosis import Evidence, diagnose, hypotheses_of
 from proofroll.core.truth import truth
 from proofroll.elements.mechanism import Mechanism
-from proofroll.elements.mechanism.control import Control
-from proofroll.elements.mechanism.element import MechanismElement
+from proofroll.elements.mechanism.run.element import MechanismElement
+from proofroll.elements.mechanism.scene.control import Control
 from proofroll.files.scene_file import load_scene
 from proofroll.running.simulation import simulate
 

@@ -20,8 +20,8 @@ from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.diagnosis.contacts_at_start import _FirstAccelerations, _other_friction
 from proofroll.elements.mechanism.diagnosis.equations import Change, MechanismStates
 from proofroll.elements.mechanism.diagnosis.joint_laws import _effort
-from proofroll.elements.mechanism.drives import Actuator
-from proofroll.elements.mechanism.element import MechanismElement
+from proofroll.elements.mechanism.run.element import MechanismElement
+from proofroll.elements.mechanism.scene.drives import Actuator
 from proofroll.files.scene_file import load_scene
 from proofroll.running.simulation import simulate
 

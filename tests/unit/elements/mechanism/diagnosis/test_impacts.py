@@ -14,8 +14,8 @@ from proofroll.core.diagnosis import Evidence, diagnose, hypotheses_of
 from proofroll.core.scene import Scene
 from proofroll.core.truth import truth
 from proofroll.elements.mechanism import Body, Joint, Mechanism
-from proofroll.elements.mechanism.contacts.geometry import Geometry, Pair
-from proofroll.elements.mechanism.element import MechanismElement
+from proofroll.elements.mechanism.run.element import MechanismElement
+from proofroll.elements.mechanism.scene.shapes.geometry import Geometry, Pair
 from proofroll.files.scene_file import load_scene
 from proofroll.running.simulation import simulate
 

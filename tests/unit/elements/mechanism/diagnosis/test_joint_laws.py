@@ -11,7 +11,7 @@ from proofroll.core.certificate import certify
 from proofroll.core.diagnosis import Cause, Evidence
 from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.diagnosis.joint_laws import soft_couplings
-from proofroll.elements.mechanism.element import MechanismElement
+from proofroll.elements.mechanism.run.element import MechanismElement
 from proofroll.files.scene_file import load_scene
 from proofroll.running.simulation import build
 

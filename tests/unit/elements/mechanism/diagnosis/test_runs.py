@@ -20,8 +20,8 @@ from proofroll.core.truth import truth
 from proofroll.core.verdict import Judgement, Verdict
 from proofroll.elements.mechanism.diagnosis.equations import Change, MechanismStates, placed_of
 from proofroll.elements.mechanism.diagnosis.residuals import contradicts_first_steps
-from proofroll.elements.mechanism.element import MechanismElement
-from proofroll.elements.mechanism.signal import Table
+from proofroll.elements.mechanism.run.element import MechanismElement
+from proofroll.elements.mechanism.scene.signal import Table
 from proofroll.files.scene_file import load_scene
 
 ROUGH_ARM = Path(__file__).parents[4] / "drill/proofroll_drill/mutants/rough_arm"

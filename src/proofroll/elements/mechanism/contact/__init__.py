@@ -1,0 +1,1 @@
+"""Modes of contacts (sticking, slipping, open) and impacts."""

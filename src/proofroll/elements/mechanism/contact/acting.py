@@ -1,0 +1,237 @@
+"""Mode of a contact between two events: open, slip or stick."""
+
+from collections.abc import Sequence
+from typing import NamedTuple, Protocol
+
+import numpy as np
+
+from proofroll.core.events import EventKind
+from proofroll.elements.mechanism.contact.one_contact import ModeKind
+from proofroll.elements.mechanism.contact.touching import Touching
+from proofroll.elements.mechanism.scene.rotations import Array, frame_of_axis
+
+Direction = tuple[float, float, float]
+# Slip speed in the plane below which the direction of slip is not well known; the rest of the slip is followed as a
+# straight line [m/s; in the truth in natural units].
+FAINT = 1e-8
+_LINE = 1e-9  # response across over response along, below which a contact can slide along a line only
+EXACT = 1e-16  # violation of what holds, in natural units, that is only round-off
+_TURNED = 0.5  # least length of the first direction of a slip after projection on a surface that has turned since
+
+
+class Acting(NamedTuple):
+    """Mode of one contact.
+
+    Attributes:
+        kind: ``open``, ``slip`` or ``stick``.
+        along: direction of the only line along which it can slide, if there is one, where the mode began; in a slip,
+            its sense too.
+        heading: initial direction of a slip that begins from rest.
+        leads: True if friction acts against ``heading`` whatever the slip is, which has just begun.
+        stops: True for a slip in the plane below FAINT that is about to stop.
+        feature: number of the features that are nearest; 0 of shapes that have one only.
+    """
+
+    kind: ModeKind
+    along: Direction | None = None
+    heading: Direction | None = None
+    leads: bool = False
+    stops: bool = False
+    feature: int = 0
+
+
+ContactMode = tuple[Acting, ...]
+Features = tuple[int, ...]
+OPEN = Acting("open")
+
+
+def kinds(mode: ContactMode) -> tuple[tuple[str, int], ...]:
+    """Kind and nearest features of each contact's mode, without directions."""
+    return tuple((own.kind, own.feature) for own in mode)
+
+
+def features_of(mode: ContactMode) -> Features:
+    """Number of the nearest features of each contact."""
+    return tuple(own.feature for own in mode)
+
+
+def closed_in(mode: ContactMode) -> list[bool]:
+    """True for each contact that is not open."""
+    return [own.kind != "open" for own in mode]
+
+
+def with_features(mode: ContactMode, features: Features) -> ContactMode:
+    """The mode with other nearest features."""
+    return tuple(own._replace(feature=feature) for own, feature in zip(mode, features, strict=True))
+
+
+def slip_velocity(found: Touching) -> Array:
+    """Slip velocity of a contact, tangential to its surfaces [m/s], shape (3,)."""
+    return np.asarray(found.slide - found.normal * (found.normal @ found.slide))
+
+
+def forbidding_rows(mode: ContactMode, touching: Sequence[Touching], J: Array, presses: Sequence[bool]) -> Array:
+    """Rows by which closed contacts forbid velocities, (rows, velocities), from the derivatives of the slides by these.
+
+    One that sticks forbids all three components of its slide; one that ``presses`` and slips, that along its normal.
+    """
+    rows = [np.zeros((0, J.shape[-1]))]
+    for own, found, of_slide, pressing in zip(mode, touching, J, presses, strict=True):
+        if own.kind == "stick" or (own.kind == "slip" and pressing):
+            rows.append(of_slide if own.kind == "stick" else found.normal[None] @ of_slide)
+    return np.concatenate(rows)
+
+
+def heading_of(own: Acting, found: Touching) -> Array:
+    """Unit direction of a slip, shape (3,); friction acts against it.
+
+    Of a slip in the plane below FAINT it is the first one, unless the surface has turned since.
+    """
+    slip = slip_velocity(found)
+    speed = float(np.linalg.norm(slip))
+    if own.along is None and not own.leads and speed > FAINT / 2:
+        return np.asarray(slip / speed)
+    given = np.array(own.heading if own.along is None else own.along)
+    given = given - found.normal * (found.normal @ given)
+    length = float(np.linalg.norm(given))
+    if own.along is None and length < _TURNED and speed:
+        return np.asarray(slip / speed)
+    return np.asarray(given / (length or 1.0))
+
+
+def turned(own: Acting, found: Touching, G: Array) -> Acting:
+    """Mode of a contact with its line as it lies now; ``G``: rates of its slide by unit forces, (3, 3).
+
+    A tip on a turning arm, and a ball in a pipe that rolls in a plane, carry their lines with them.
+    """
+    if own.along is None:
+        return own
+    across = np.eye(3) - np.outer(found.normal, found.normal)
+    values, vectors = np.linalg.eigh(across @ G @ across)
+    if values[-1] <= _LINE * np.trace(G):  # it slides along no line at all
+        return own
+    line = direction_of(vectors[:, -1] if vectors[:, -1] @ own.along >= 0 else -vectors[:, -1])
+    return own._replace(along=line, heading=own.heading and line)
+
+
+def held_directions(own: Acting, found: Touching, presses: bool) -> Array:
+    """Directions in which a contact permits no motion, (directions, 3).
+
+    A slip holds its normal, if it ``presses`` (dry friction of a joint and of turning do not). A sticking contact holds
+    all directions, those of its surface if it does not press, or its normal and its line if it can slide along one line
+    only.
+    """
+    if own.kind == "open":
+        return np.zeros((0, 3))
+    normal = found.normal[None] if presses else np.zeros((0, 3))
+    if own.kind == "slip":
+        return normal
+    if own.along is None:
+        return np.eye(3) if presses else frame_of_axis(found.normal)[:, :2].T
+    line = np.array(own.along) - found.normal * (found.normal @ np.array(own.along))
+    return np.vstack([normal, line / np.linalg.norm(line)])
+
+
+def first_mode(kind: ModeKind, frame: Array, heading: Array, G: Array) -> Acting:
+    """Mode in which a contact begins.
+
+    Args:
+        kind: see :class:`Acting`.
+        frame: its normal and two directions along the surface, as columns.
+        heading: direction of its slip in the two surface directions, of any length.
+        G: accelerations along the columns by unit forces along them, (3, 3); a singular tangential part means that the
+            contact can slide along one line only.
+    """
+    if kind == "open":
+        return OPEN
+    values, vectors = np.linalg.eigh(G[1:, 1:])
+    line = vectors[:, 1] if values[0] <= _LINE * values[1] and values[1] > 0 else None
+    if line is not None and line @ heading < 0:
+        line = -line
+    along = None if line is None else direction_of(frame[:, 1:] @ line)
+    if kind == "stick":
+        return Acting("stick", along)
+    size = float(np.linalg.norm(heading)) or 1.0
+    return Acting("slip", along, direction_of(frame[:, 1:] @ (heading / size)))
+
+
+def following(own: Acting, way: Array, still: bool, least: float) -> Acting:
+    """Mode of a closed contact whose body moves it along its surface.
+
+    Args:
+        own: mode at rest, with its line.
+        way: slide, or its rate where the contact is ``still``, along the surface.
+        still: True for a contact at rest.
+        least: size of a rate that counts as none.
+    """
+    speed = float(np.linalg.norm(way))
+    if still and speed <= least:
+        return own
+    if own.along is not None:
+        line = np.array(own.along)
+        heading = direction_of(line if way @ line >= 0 else -line)
+        return Acting("slip", heading, heading)
+    return Acting("slip", None, direction_of(way / (speed or 1.0)))
+
+
+class _Contact(Protocol):
+    @property
+    def name(self) -> str: ...
+
+    @property
+    def friction(self) -> float: ...
+
+    @property
+    def bound(self) -> float: ...
+
+    @property
+    def pressed_by(self) -> int | None: ...
+
+
+def changes(
+    contacts: Sequence[_Contact], before: ContactMode, after: ContactMode, stands: bool
+) -> tuple[tuple[str, str], ...]:
+    """Kind and contact of each event of a change of mode; ``stands``: nothing moves any more.
+
+    Friction against turning changes without events.
+    """
+    found: list[tuple[str, str]] = []
+    for contact, was, now in zip(contacts, before, after, strict=True):
+        if contact.pressed_by is not None:
+            continue
+        if now.kind == "stick" and was.kind != "stick":
+            found.append((EventKind.REST if stands and not contact.bound else EventKind.STICK, contact.name))
+        elif was.kind == "stick" and now.kind == "slip":
+            found.append((EventKind.SLIP, contact.name))
+        elif was.kind != "open" and now.kind == "open":
+            found.append((EventKind.LIFT_OFF, contact.name))
+        elif was.kind == now.kind == "slip" and (contact.friction or contact.bound) and _opposite(was, now):
+            found.append((EventKind.TURN, contact.name))
+    return tuple(found)
+
+
+def _opposite(was: Acting, now: Acting) -> bool:
+    return was.along is not None and now.heading is not None and float(np.dot(was.along, now.heading)) < 0
+
+
+def direction_of(vector: Array) -> Direction:
+    """A vector as plain floats."""
+    x, y, z = vector.tolist()
+    return x, y, z
+
+
+def headed(own: Acting, touch: Touching) -> Acting:
+    """Mode of a contact with the present direction of its slip in the plane, however slow."""
+    slip = slip_velocity(touch)
+    if own.kind != "slip" or own.along is not None or not slip.any():
+        return own
+    x, y, z = (slip / np.linalg.norm(slip)).tolist()
+    return own._replace(heading=(x, y, z))
+
+
+def modes_of(closed: Sequence[bool], still: Sequence[bool], features: Features) -> ContactMode:
+    """Modes of contacts: stick if closed and still, slip if only closed, else open."""
+    return tuple(
+        Acting("open" if not shut else "stick" if stands else "slip", feature=feature)
+        for shut, stands, feature in zip(closed, still, features, strict=True)
+    )

@@ -1,0 +1,338 @@
+"""Coulomb's law at several contacts at once: forces f with w = G f + c, by Gauss-Seidel over the contacts.
+
+The components of a contact are one normal and two tangential ones. N ≥ 0, w_n ≥ 0 and N w_n = 0; friction is at most
+μN, and is μN against w_t where w_t is not zero. For accelerations, c is the acceleration without contact forces; for
+an impact, the velocity before it plus what restitution returns. Dry friction of a joint has no normal force but a
+bound of its own; it acts along the coordinate alone.
+"""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from proofroll.core.errors import Refused
+from proofroll.elements.mechanism.contact.distributions import best_distribution, cones_of
+from proofroll.elements.mechanism.contact.lemke import lemke
+from proofroll.elements.mechanism.contact.one_contact import AT_BOUND, ModeKind, force_of_one, rubbing
+from proofroll.elements.mechanism.dynamics.analysis import RANK
+from proofroll.elements.mechanism.scene.rotations import Array
+
+_SWEEPS = 1000
+_SETTLED = 1e-12  # largest change in the last sweep, relative to the largest force
+_RESTS = 1e-10  # motion of a contact that counts as none, relative to the loads
+# Singular value of normal responses, and motion by a split of a load, relative to the largest, that count as zero.
+_SHARES = 1e-9
+# Relative change of loads and friction with which an outcome is tried on both sides; an outcome that changes is not
+# unique. Each further contact gets an extra 0.382 of it: equal changes would cancel between two walls.
+_NUDGE, _APART = 1e-6, 0.382
+_ROUND_OFF = 1e-14  # of motions, in parts of what they are the sum of: a light body between heavy ones has 2e-16
+_NULL = 1e-12  # response to forces, relative to the largest of unit rows, that counts as none: round-off is 1e-16
+
+
+def largest_friction(friction: Any, normal: Any) -> Any:
+    """Largest friction by coefficients, which may be infinite, and normal forces; 0 without a normal force."""
+    unbounded = np.isinf(friction)
+    return np.where(
+        unbounded, np.where(np.greater(normal, 0), np.inf, 0.0), np.where(unbounded, 0.0, friction) * normal
+    )
+
+
+def natural_rows(G: Array) -> Array:
+    """Natural unit of each row of responses, the root of the force that it needs: bodies of any mass may touch."""
+    own = np.diag(G)
+    return np.asarray(1 / np.sqrt(np.where(own > 0, own, 1.0)))
+
+
+def returning(slides: Array, restitution: Array, sideways: Array) -> Array:
+    """Slides before an impact plus what restitution returns of them, (3 contacts,), where a contact closes.
+
+    Args:
+        slides: first components along the normals, (3 contacts,).
+        restitution: of the normal speeds.
+        sideways: of the slips.
+    """
+    parts = slides.reshape(-1, 3).copy()
+    closes = parts[:, 0] < 0
+    parts[closes, 0] *= 1 + restitution[closes]
+    parts[closes, 1:] *= 1 + sideways[closes, None]
+    return np.asarray(parts.ravel())
+
+
+def contact_forces(
+    G: Array,
+    c: Array,
+    friction: Array,
+    sliding: Sequence[Array | None],
+    names: Sequence[str],
+    bounds: Array | None = None,
+    time: float = 0.0,
+    near: float = 0.0,
+    static: Array | None = None,
+    guess: Sequence[ModeKind] | None = None,
+    pressed_by: Sequence[int | None] | None = None,
+) -> tuple[Array, list[ModeKind]]:
+    """Forces of all contacts, shape (contacts, 3), and outcome of each contact.
+
+    Args:
+        G: (3 contacts, 3 contacts).
+        c: (3 contacts).
+        friction: coefficient of each while it slips.
+        sliding: unit vector of slip along the surface, shape (2,), or None for a contact that does not slide yet;
+            friction acts against it.
+        names: for messages.
+        bounds: largest friction of each contact without a normal force; 0, or None: a contact with one.
+        time: for messages [s].
+        near: part of the loads and of friction's bound that is round-off where all contacts stick.
+        static: coefficient of each while it sticks; None: as while it slips.
+        guess: outcomes whose forces the sweeps start from; None: all press that can.
+        pressed_by: place of the contact whose normal force bounds the moment of a friction against turning; None: an
+            own normal force, or a bound.
+
+    Raises:
+        NotUnique: the force of a contact is not unique.
+        Refused: no answer is found.
+    """
+    done = list[ModeKind](["open"] * len(friction))
+    bounds = np.zeros(len(friction)) if bounds is None else bounds
+    pressing = [None] * len(friction) if pressed_by is None else pressed_by
+    turns = any(by is not None for by in pressing)
+    f = np.zeros(len(c)) if turns else _guessed(G, c, friction, sliding, bounds, guess)
+    static = friction if static is None else static
+    least = _RESTS * float(np.abs(c).max())
+    if len(friction) > 1 and friction.all() and not bounds.any() and all(slip is None for slip in sliding):
+        held = _all_held(G, c, static, max(near, _RESTS), max(near, AT_BOUND), pressing)
+        if held is not None:
+            return held.reshape(-1, 3), ["stick"] * len(friction)
+    for _ in range(_SWEEPS):
+        before = f.copy()
+        for k, mu in enumerate(friction):
+            own = slice(3 * k, 3 * k + 3)
+            free = c[own] + G[own] @ f - G[own, own] @ f[own]
+            by = pressing[k]
+            bound = bounds[k] if by is None else mu * max(float(f[3 * by]), 0.0)
+            if by is not None and not bound:
+                f[own], done[k] = 0.0, "open"
+            elif bound:
+                f[own], done[k] = rubbing(G[own, own], free, bound, sliding[k])
+            else:
+                f[own], done[k] = force_of_one(G[own, own], free, (mu, static[k]), sliding[k], (names[k], time), least)
+        if len(friction) == 1 or np.abs(f - before).max() <= _SETTLED * np.abs(f).max():
+            w = (c + G @ f).reshape(-1, 3)
+            for k in [] if turns else _idle(G, w, friction, sliding, done, least):
+                done[k] = "slip"
+            for k, along in enumerate(sliding):
+                rubs = friction[k] or bounds[k]
+                if done[k] == "slip" and along is None and rubs and np.linalg.norm(w[k, 1:]) <= least:
+                    done[k] = "stick"  # one of several holding contacts may reach its bound while nothing moves
+            return f.reshape(-1, 3), done
+    together = None if bounds.any() or turns else _together(G, c, friction, sliding, least)
+    if together is not None:
+        return together
+    raise Refused(f"forces of the contacts {', '.join(names)} at t = {time:.6g} s are not found in {_SWEEPS} sweeps")
+
+
+def _guessed(
+    G: Array,
+    c: Array,
+    friction: Array,
+    sliding: Sequence[Array | None],
+    bounds: Array,
+    guess: Sequence[ModeKind] | None,
+) -> Array:
+    """Forces for a guess of outcomes, from which sweeps start; zero where a direction of slip is not known."""
+    rows, along, f = list[int](), list[Array](), np.zeros(len(c))
+    for k, slip in enumerate(sliding):
+        own = "stick" if slip is None else "slip"
+        if guess is not None:
+            own = guess[k]
+        if own == "open":
+            continue
+        if own == "stick" and slip is None and (friction[k] or bounds[k]):
+            ways = [1, 2] if bounds[k] else [0, 1, 2]
+            rows += [3 * k + way for way in ways]
+            along += [np.eye(len(c))[3 * k + way] for way in ways]
+        elif slip is None and (friction[k] or bounds[k]):
+            return np.zeros(len(c))
+        elif bounds[k]:
+            assert slip is not None
+            f[3 * k + 1 : 3 * k + 3] = -bounds[k] * slip
+        else:
+            push = np.zeros(len(c))
+            push[3 * k : 3 * k + 3] = [1.0, *(-friction[k] * (np.zeros(2) if slip is None else slip))]
+            rows.append(3 * k)
+            along.append(push)
+    if not rows:
+        return f
+    D = np.array(along).T
+    found = f + D @ np.linalg.lstsq((G @ D)[rows], -(c + G @ f)[rows], rcond=_SHARES)[0]
+    return np.asarray(found) if (found[::3] >= 0).all() else np.zeros(len(c))
+
+
+def _all_sliding(G: Array, c: Array, friction: Array, ways: Sequence[Array]) -> Array | None:
+    """Forces of contacts that all slide, (contacts, 3), by complementarity of their normals; None: there are none.
+
+    Sweeps converge slowly, or not at all, where many contacts share a load.
+    """
+    along = np.array([[1.0, *(-mu * way)] for mu, way in zip(friction, ways, strict=True)])
+    pushes = np.zeros((len(c), len(along)))
+    for k, push in enumerate(along):
+        pushes[3 * k : 3 * k + 3, k] = push
+    normals = lemke((G @ pushes)[::3], c[::3])
+    return None if normals is None else normals[:, None] * along
+
+
+def _together(
+    G: Array, c: Array, friction: Array, sliding: Sequence[Array | None], least: float
+) -> tuple[Array, list[ModeKind]] | None:
+    """Forces and outcomes of contacts that all slide already, or set off in one direction; None: neither."""
+    if all(along is not None or not mu for along, mu in zip(sliding, friction, strict=True)):
+        ways = [np.zeros(2) if along is None else along for along in sliding]
+        pressed = _all_sliding(G, c, friction, ways)
+        if pressed is None:
+            return None
+        leaving = (c + G @ pressed.ravel())[::3] > least  # one that shares a load may carry none of it, and stay
+        return pressed, ["open" if leaves else "slip" for leaves in leaving]
+    if np.isfinite(friction).all() and all(along is None for along in sliding):
+        pressed = _all_setting_off(G, c, friction, least)
+        return None if pressed is None else (pressed, ["slip"] * len(friction))
+    return None
+
+
+def _all_setting_off(G: Array, c: Array, friction: Array, least: float) -> Array | None:
+    """Forces of contacts at rest that all set off in the direction that they would have without friction; None: not so.
+
+    Sweeps converge slowly, or not at all, where feet of one body share friction at its bound.
+    """
+    free = c.reshape(-1, 3)[:, 1:]
+    speeds = np.linalg.norm(free, axis=1)
+    if speeds.min() <= least:
+        return None
+    ways = free / speeds[:, None]
+    pressed = _all_sliding(G, c, friction, list(ways))
+    if pressed is None:
+        return None
+    moves = (c + G @ pressed.ravel()).reshape(-1, 3)
+    ahead = np.einsum("ki,ki->k", moves[:, 1:], ways)
+    aside = moves[:, 1:] - ahead[:, None] * ways
+    sets_off = ahead.min() > 0 and np.abs(aside).max() <= least and np.abs(moves[:, 0]).max() <= least
+    return pressed if sets_off else None
+
+
+def _idle(
+    G: Array, w: Array, friction: Array, sliding: Sequence[Array | None], done: Sequence[ModeKind], least: float
+) -> list[int]:
+    """Open contacts that do not part, if no split of the load that they share with others changes the motion.
+
+    Of the corners of a face that slides without turning, one may carry nothing of the load, and stays closed.
+
+    Args:
+        G: as of :func:`contact_forces`.
+        w: motion, (contacts, 3).
+        friction: coefficients.
+        sliding: as of :func:`contact_forces`.
+        done: outcomes so far.
+        least: motion that counts as none.
+    """
+    idle = [k for k, own in enumerate(done) if own == "open" and w[k, 0] <= least]
+    if not (idle and least):
+        return []
+    closed = [k for k, own in enumerate(done) if own != "open" or k in idle]
+    pushes = np.zeros((len(G), len(closed)))  # unit normal forces with their friction
+    for place, k in enumerate(closed):
+        speed = float(np.linalg.norm(w[k, 1:]))
+        way = w[k, 1:] / speed if speed > least else np.zeros(2)
+        along = sliding[k]
+        mu = friction[k] if np.isfinite(friction[k]) else 0.0  # what never slips has no friction of a slip
+        pushes[3 * k : 3 * k + 3, place] = [1.0, *(-mu * (way if along is None else along))]
+    normals = [3 * k for k in closed]
+    _, sizes, ways = np.linalg.svd(G[np.ix_(normals, normals)])
+    splits = ways[(sizes > _SHARES * sizes[0]).sum() :]
+    spread = np.abs(G @ pushes @ splits.T).max(initial=0.0)
+    share = np.linalg.norm(splits, axis=0) > _SHARES
+    return [k for k in idle if share[closed.index(k)]] if spread <= _SHARES * np.abs(G).max() else []
+
+
+def _all_held(
+    G: Array, c: Array, friction: Array, rests: float, near: float, pressing: Sequence[int | None]
+) -> Array | None:
+    """Forces that let every contact stick and press within the cones of friction, in any distribution; else None."""
+    scale = natural_rows(G)
+    values, vectors = np.linalg.eigh(G * np.outer(scale, scale))
+    whole = values > _NULL * values[-1]
+    held: Array = -scale * (vectors[:, whole] @ ((vectors[:, whole].T @ (scale * c)) / values[whole]))
+    rounded = _ROUND_OFF * float((scale * (np.abs(G) @ np.abs(held))).max())
+    if np.abs(scale * (c + G @ held)).max() > max(rests * float(np.abs(scale * c).max()), rounded):
+        return None
+    count = len(friction)
+    cones = cones_of(
+        kinds=["stick"] * count,
+        normals=np.tile([1.0, 0.0, 0.0], (count, 1)),
+        friction=friction,
+        bounds=np.zeros(count),
+        pressed_by=pressing,
+        force=held.reshape(count, 3),
+        shifts=(scale[:, None] * vectors[:, ~whole]).reshape(count, 3, -1),
+    )
+    if cones.hold(np.zeros(len(whole) - whole.sum()), near):
+        return held
+    best = best_distribution(cones)
+    if best is None or not cones.hold(best.weights, near):
+        return None
+    return np.asarray(held + scale * (vectors[:, ~whole] @ best.weights))
+
+
+def robust_forces(
+    G: Array,
+    c: Array,
+    friction: Array,
+    sliding: Sequence[Array | None],
+    names: Sequence[str],
+    bounds: Array | None = None,
+    time: float = 0.0,
+    least: float = 0.0,
+    static: Array | None = None,
+    pressed_by: Sequence[int | None] | None = None,
+) -> tuple[Array, list[ModeKind], bool]:
+    """Solution as of :func:`contact_forces`, and True if slightly changed pressure and friction give the same outcomes.
+
+    A contact whose force is at most a ``least`` part of the largest force counts as open.
+    """
+    bounds = np.zeros(len(friction)) if bounds is None else bounds
+    static = friction if static is None else static
+    force, done = contact_forces(G, c, friction, sliding, names, bounds, time, static=static, pressed_by=pressed_by)
+    # as a force at each contact that presses, which the holds of the other contacts balance
+    along, pressing = np.diag(G)[::3], [None] * len(friction) if pressed_by is None else pressed_by
+    presses = (along > 0) & (bounds == 0) & np.array([by is None for by in pressing])
+    lift = np.where(presses, (1 + _APART * np.arange(len(along))) / np.where(presses, along, 1), 0.0)
+    nudge = _NUDGE * float(np.abs(c).max()) * G[:, ::3] @ lift
+
+    def outcome(force: Array, done: Sequence[ModeKind]) -> list[ModeKind]:
+        little = least * float(np.abs(force).max())
+        return ["open" if each[0] <= little and least else own for each, own in zip(force, done, strict=True)]
+
+    nominal = outcome(force, done)
+    same = all(
+        outcome(
+            *contact_forces(
+                G,
+                c + side * nudge,
+                friction * part,
+                sliding,
+                names,
+                bounds * part,
+                time,
+                static=static * part,
+                guess=done,
+                pressed_by=pressed_by,
+            )
+        )
+        == nominal
+        for side, part in ((1.0, 1 - _NUDGE), (-1.0, 1 + _NUDGE))
+    )
+    return force, done, same
+
+
+def least_motion_for(W: Array, K: Array, violation: Array) -> Array:
+    """Motion of least kinetic energy that makes these violations of rows K, (nv)."""
+    return np.asarray(W @ K.T @ (np.linalg.pinv(K @ W @ K.T, RANK, hermitian=True) @ violation))

@@ -1,0 +1,417 @@
+"""Equations of motion of a mechanism whose bodies touch, in the coordinates of its tree.
+
+Between events each contact is ``open``, ``slip``s (one row, friction against the slip), or ``stick``s (three rows).
+"""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from proofroll.core.last_results import LastResults
+from proofroll.elements.mechanism.contact.acting import (
+    EXACT,
+    OPEN,
+    Acting,
+    ContactMode,
+    Features,
+    closed_in,
+    features_of,
+    first_mode,
+    forbidding_rows,
+    heading_of,
+    held_directions,
+    turned,
+    with_features,
+)
+from proofroll.elements.mechanism.contact.coulomb import (
+    contact_forces,
+    least_motion_for,
+    natural_rows,
+    returning,
+    robust_forces,
+)
+from proofroll.elements.mechanism.contact.free_slides import passing
+from proofroll.elements.mechanism.contact.joint_laws import (
+    JointContact,
+    joint_contacts,
+    line_response,
+    mode_of_joints,
+    off_stops,
+    on_stops,
+)
+from proofroll.elements.mechanism.contact.sequences import groups_of, left_by, ordered, refuse_spread, sequences
+from proofroll.elements.mechanism.contact.slide_rows import slide_row, turning_row
+from proofroll.elements.mechanism.contact.start import STILL, at_start, touches
+from proofroll.elements.mechanism.contact.states import ContactsNow, ContactSolution
+from proofroll.elements.mechanism.contact.touching import Touching, lying
+from proofroll.elements.mechanism.contact.turning import (
+    TurningFriction,
+    moments_by_pressing,
+    pressed_by,
+    turning_frictions,
+)
+from proofroll.elements.mechanism.dynamics.analysis import NO_RESPONSE, RANK
+from proofroll.elements.mechanism.dynamics.joint_coordinates import JointCoordinates
+from proofroll.elements.mechanism.dynamics.point_loads import kink_arguments
+from proofroll.elements.mechanism.scene.drives import MODES
+from proofroll.elements.mechanism.scene.kinks import held_sides
+from proofroll.elements.mechanism.scene.model import Mechanism
+from proofroll.elements.mechanism.scene.rotations import Array, cross, frame_of_axis
+from proofroll.elements.mechanism.scene.shapes.geometry import BodyContact, pair_sums
+from proofroll.elements.mechanism.scene.signal import FUNCTIONS
+
+# Impulse, relative to the largest of an impact, that counts as none; a pressure nudged by 1e-6 makes such impulses.
+_NO_IMPULSE = 1e-4
+_ROUND_OFF = 1e-13  # of slides in a sequence of impacts, relative to the largest
+
+
+class ContactDynamics:
+    """A mechanism in the coordinates of its tree with its contacts: of bodies, laws of joints, friction of turning."""
+
+    def __init__(self, mechanism: Mechanism) -> None:
+        self.mechanism, self.equations = mechanism, JointCoordinates(mechanism)
+        self._of_joints = joint_contacts(self.equations.switched)
+        self._turning = turning_frictions(mechanism.contacts)
+        self.contacts: tuple[BodyContact | JointContact | TurningFriction, ...] = (
+            *mechanism.contacts,
+            *self._of_joints,
+            *self._turning,
+        )
+        self.friction = np.array([contact.friction for contact in self.contacts])
+        self._static = np.array([contact.static for contact in self.contacts])
+        self._bounds = np.array([contact.bound for contact in self.contacts])
+        others = len(self.contacts) - len(mechanism.contacts)
+        self.sums = np.pad(pair_sums(mechanism.contacts), ((0, 0), (0, others)))
+        index = mechanism.body_index
+        self._bodies = [(index[contact.body_a], index[contact.body_b]) for contact in mechanism.contacts]
+        self._held: tuple[int, ...] = ()
+        self._last = LastResults[tuple[bytes, bytes, float, tuple[object, ...], Features | None], ContactsNow](4)
+
+    def at(self, q: Array, v: Array, time: float = 0.0, features: Features | None = None) -> ContactsNow:
+        """Kinematics and free accelerations for coordinates (nq) and velocities (nv) at a time [s].
+
+        ``features``: of solids that touch; None: the nearest.
+        """
+        key = q.tobytes(), v.tobytes(), time, (*self.mechanism.held, *self._held), features
+        return self._last.of(key, lambda: self._at(q.copy(), v.copy(), time, features))
+
+    def _at(self, q: Array, v: Array, time: float, features: Features | None) -> ContactsNow:
+        found = self.equations.solve(q, v, (), time=time)
+        mass, C = self.equations.inertial(found.motion)[1], found.C
+        mass = self.equations.weighted(mass, np.zeros(len(v)), C, np.zeros(len(C)))[0]
+        loose = W = np.asarray(np.linalg.inv(mass), dtype=np.float64)
+        if found.split is not None:
+            W = W - found.split[0] @ found.split[0].T
+        touching = touches(self.mechanism, found.motion, features)
+        parts = [slide_row(found.motion, self._bodies[k], each) for k, each in enumerate(touching)]
+        for contact in self._of_joints:
+            at = contact.joint.velocity
+            touching += (contact.touching(float(q[contact.joint.coordinate]), float(v[at])),)
+            parts.append((np.outer(contact.direction, np.eye(len(v))[at]), np.zeros(3)))
+        for friction in self._turning:
+            there = touching[friction.pressed_by]
+            turning, J, rate = turning_row(found.motion, self._bodies[friction.pressed_by])
+            touching += (friction.touching(there, turning),)
+            part = friction.part(there.normal)
+            parts.append((part @ J, part @ rate + friction.part_rate(there) @ turning))
+        J = np.array([row for row, _ in parts]).reshape(-1, 3, len(v))
+        bias = np.array([rate for _, rate in parts]).reshape(-1, 3)
+        return ContactsNow(solution=found, W=W, loose=loose, touching=touching, J=J, bias=bias)
+
+    def solve(self, q: Array, v: Array, mode: ContactMode, time: float = 0.0) -> ContactSolution:
+        """Accelerations and forces while each contact keeps the given mode, at a time [s].
+
+        Raises:
+            Diverged: a velocity moves nothing with inertia in this pose.
+        """
+        return self.solved(self.at(q, v, time, features_of(mode)), mode)
+
+    def solved(self, state: ContactsNow, mode: ContactMode) -> ContactSolution:
+        """Accelerations and forces at a state while each contact keeps the given mode; see :meth:`solve`."""
+        mode = tuple(
+            turned(own, found, line_response(contact, J @ state.W @ J.T)) if own.along else own
+            for contact, own, found, J in zip(self.contacts, mode, state.touching, state.J, strict=True)
+        )
+        rows, bias, along, owner = [np.zeros((0, state.W.shape[0]))], [np.zeros(0)], list[Array](), list[int]()
+        force, turning = np.zeros((len(mode), 3)), list[tuple[int, int, Array]]()
+        for k, (own, found) in enumerate(zip(mode, state.touching, strict=True)):
+            contact = self.contacts[k]
+            directions = held_directions(own, found, contact.presses)
+            rows.append(directions @ state.J[k])
+            bias.append(directions @ state.bias[k])
+            owner += [k] * len(directions)
+            if own.kind == "slip":
+                bias[-1] = bias[-1] + found.normal_rate @ found.slide
+                heading = self.heading(own, found) if self.friction[k] or self._bounds[k] else np.zeros(3)
+                force[k] = -self._bounds[k] * heading
+                if contact.pressed_by is None:
+                    directions = directions - self.friction[k] * heading
+                else:
+                    turning.append((k, contact.pressed_by, -self.friction[k] * heading))
+            along += list(directions)
+        K, free = np.concatenate(rows), state.solution.acceleration
+        free = free + state.W @ np.einsum("kin,ki->n", state.J, force)
+        if not owner:
+            none = np.zeros((len(mode), 3, 0))
+            return ContactSolution(state, mode, acceleration=free, force=force, response=1.0, shifts=none, spread=0.0)
+        D = np.array([direction @ state.J[k] for direction, k in zip(along, owner, strict=True)])
+        owned = list(zip(owner, along, strict=True))
+        moments = moments_by_pressing(turning, owned, [each.normal for each in state.touching])
+        for k, place, moment in moments:
+            D[place] += moment @ state.J[k]
+        S, wanted = K @ state.W @ D.T, -(K @ free + np.concatenate(bias))
+        smooth = K @ state.W @ K.T
+        units = natural_rows(K @ state.loose @ K.T)
+        values, vectors = np.linalg.eigh(smooth * np.outer(units, units))
+        weak, even = values < max(RANK * values[-1], NO_RESPONSE), S * np.outer(units, units)
+        z = units * np.linalg.lstsq(even, units * wanted, rcond=RANK)[0] if weak.any() else np.linalg.solve(S, wanted)
+        ways = units[:, None] * np.linalg.svd(even)[2][len(S) - weak.sum() :].T if weak.any() else np.zeros((len(S), 0))
+        ways /= np.linalg.norm(ways, axis=0)
+        shifts = np.zeros((len(mode), 3, ways.shape[1]))
+        for k, direction, size, loose in zip(owner, along, z, ways, strict=True):
+            force[k] += size * direction
+            shifts[k] += np.outer(direction, loose)
+        for k, place, moment in moments:
+            force[k] += z[place] * moment
+            shifts[k] += np.outer(moment, ways[place])
+        whole = units[:, None] * vectors[:, ~weak]  # without what the split of a shared load changes
+        response = float(np.linalg.det(whole.T @ S @ whole) / np.linalg.det(whole.T @ smooth @ whole))
+        spread = float(np.linalg.norm(state.W @ (D.T @ ways)))
+        free = free + state.W @ D.T @ z
+        return ContactSolution(state, mode, free, force, response=response, shifts=shifts, spread=spread)
+
+    @staticmethod
+    def heading(own: Acting, found: Touching) -> Array:
+        """Unit direction in which a contact slips; its friction acts against it."""
+        return heading_of(own, found)
+
+    def rate(self, y: Array, mode: ContactMode) -> Array:
+        """Right-hand side for the state (q, v, time)."""
+        q, v, time = self.parts(y)
+        return np.concatenate([self.equations.tree.rate(q, v), self.solve(q, v, mode, time).acceleration, [1.0]])
+
+    def parts(self, y: Array) -> tuple[Array, Array, float]:
+        """Coordinates, velocities and time [s] of a state."""
+        nq = self.mechanism.nq
+        return y[:nq], y[nq:-1], float(y[-1])
+
+    def drawn(self, y: Array) -> Array:
+        """Efforts with a limit before they are clamped, in parts of their limits."""
+        q, v, time = self.parts(y)
+        return np.array([m.wanted(time, q[at_q], v[at_v]) / m.bound for m, at_q, at_v in self.equations.limited])
+
+    def kinks(self, y: Array) -> Array:
+        """Arguments of the kinks of all laws, see :class:`~proofroll.elements.mechanism.scene.kinks.Sides`."""
+        q, v, time = self.parts(y)
+        return kink_arguments(self.mechanism, self.equations.tree.at(q, v), time)
+
+    def hold(self, signs: Sequence[int]) -> None:
+        """Keeps efforts with a limit at it, by their sign, or within it (0), and then the sides of kinks.
+
+        Without signs all follow the state.
+        """
+        count = len(self.equations.limited)
+        self.equations.sides = tuple(MODES[sign + 1] for sign in signs[:count])
+        self.equations.functions = held_sides(self.mechanism.kinks, signs[count:], FUNCTIONS)
+        self._held = tuple(signs)
+
+    def eliminated(self, y: Array, mode: ContactMode) -> Array:
+        """The state with violations of loops, closed contacts and unit quaternions removed."""
+        (q, v, time), presses = self.parts(y), [contact.presses for contact in self.contacts]
+        closed = [k for k, own in enumerate(mode) if own.kind != "open" and presses[k]]
+        unit = self.equations.tree.normalised(q)
+        q = on_stops([self.contacts[k] for k in closed], unit if np.abs(unit - q).max(initial=0.0) > EXACT else q)
+        state = self.at(q, v, time, features := features_of(mode))
+        gaps = np.array([state.touching[k].gap for k in closed])
+        found, K = state.solution, forbidding_rows(mode, state.touching, state.J, presses)
+        left = [found.rows.residual, found.C @ v, gaps, K @ v]
+        if np.abs(np.concatenate(left)).max(initial=0.0) > EXACT:
+            y = np.append(self.equations.eliminated(y[:-1], ()), time)
+            if not len(K):
+                return y
+            (q, v, _), state = self.parts(y), self.at(*self.parts(y), features)
+            normals = np.array([state.touching[k].normal @ state.J[k] for k in closed]).reshape(-1, len(v))
+            gaps = np.array([state.touching[k].gap for k in closed])
+            q = self.equations.tree.moved(q, -least_motion_for(state.W, normals, gaps)) if closed else q
+            state = self.at(q, v, time, features)
+            K = forbidding_rows(mode, state.touching, state.J, presses)
+            v = v - least_motion_for(state.W, K, K @ v)
+        return np.concatenate([q, v, [time]])
+
+    def begin(self) -> tuple[ContactMode, float]:
+        """Mode at the start, and its margin to another one: inf, or 0 if it is not unique."""
+        (q, v), rough = self.mechanism.start(), self.rough_start()
+        return self.decided(q, v, passing(rough, self.at(q, v, 0.0, features_of(rough)).free_slides))
+
+    def rough_start(self) -> ContactMode:
+        """Modes at the start by the gaps and the slides: open, slip where a closed contact slides, else stick."""
+        return at_start(self.mechanism, self.contacts, self.at(*self.mechanism.start()).touching)
+
+    def decided(
+        self, q: Array, v: Array, rough: ContactMode, time: float = 0.0, leaving: Sequence[int] = ()
+    ) -> tuple[ContactMode, float]:
+        """Mode that follows from the forces, and its margin to another one: inf, or 0 if it is not unique.
+
+        Args:
+            q: coordinates.
+            v: velocities.
+            rough: modes by the gaps and the slides: open, slip where a closed contact slides, stick where it does not.
+            time: at which drives and targets are taken [s].
+            leaving: contacts that static friction no longer holds.
+
+        Raises:
+            NotUnique: a disc lies flat, or capsules touch along a line.
+        """
+        state, closed = self.at(q, v, time, features_of(rough)), closed_in(rough)
+        which = [k for k, shut in enumerate(closed) if shut]
+        self._refuse_flat(state, which, time)
+        if not which:
+            return rough, np.inf
+        frames = {k: frame_of_axis(state.touching[k].normal)[:, [2, 0, 1]] for k in which}
+        J = np.concatenate([frames[k].T @ state.J[k] for k in which])
+        c = J @ state.solution.acceleration + np.concatenate([frames[k].T @ state.bias[k] for k in which])
+        sliding, ways = list[Array | None](), off_stops(self.contacts, closed)
+        for place, k in enumerate(which):
+            found = state.touching[k]
+            if self.contacts[k].presses:
+                c[3 * place] += found.normal_rate @ found.slide
+            across = frames[k][:, 1:].T @ ways.get(k, rough[k].heading or found.slide)
+            sliding.append(None if rough[k].kind == "stick" and k not in ways else across / np.linalg.norm(across))
+        G, names = J @ state.W @ J.T, [self.contacts[k].name for k in which]
+        moved = state.free_slides.moved[which]
+        across = np.array([[False, alone, alone] for alone in moved]).ravel()
+        G[across], G[:, across] = 0.0, 0.0  # round-off, which would pass for a response
+        c[across & np.repeat([slip is None for slip in sliding], 3)] = 0.0
+        static = self._static.copy()
+        static[list(leaving)] = self.friction[list(leaving)]
+        force, done, same = robust_forces(
+            G,
+            c,
+            self.friction[which],
+            sliding,
+            names,
+            self._bounds[which],
+            time,
+            static=static[which],
+            pressed_by=pressed_by(self.contacts, which),
+        )
+        mode, moves = [OPEN for _ in closed], (c + G @ force.ravel()).reshape(-1, 3)
+        for place, k in enumerate(which):
+            own = slice(3 * place, 3 * place + 3)
+            slides = sliding[place]
+            if slides is None:  # friction acts against the slide, and one that carries nothing has none
+                slides = -force[place, 1:] if force[place, 1:].any() else moves[place, 1:]
+            response = frames[k].T @ line_response(self.contacts[k], frames[k] @ G[own, own] @ frames[k].T) @ frames[k]
+            mode[k] = first_mode(done[place], frames[k], slides, response)
+        return with_features(tuple(mode), features_of(rough)), np.inf if same else 0.0
+
+    def struck(
+        self,
+        q: Array,
+        v: Array,
+        closed: Sequence[int],
+        restitution: Array,
+        time: float = 0.0,
+        sideways: Array | None = None,
+        features: Features | None = None,
+    ) -> tuple[Array, Array, float]:
+        """Velocities after an impact, by Newton's law of restitution and Coulomb's law with the slip after the impact.
+
+        Args:
+            q: coordinates.
+            v: velocities before it.
+            closed: contacts whose gaps are closed.
+            restitution: of each of them.
+            time: of the impact, for messages [s].
+            sideways: tangential restitution of each of them; None: none has any.
+            features: of solids that touch; None: the nearest.
+
+        Returns:
+            The velocities, the impulses (closed, 3), and the margin to another outcome: inf, or 0 if it is not unique.
+
+        Raises:
+            NotUnique: several contacts press each other, so that their order counts; or one is along a line.
+        """
+        state = self.at(q, v, time, features)
+        self._refuse_flat(state, closed, time)
+        frames = [frame_of_axis(state.touching[k].normal)[:, [2, 0, 1]] for k in closed]
+        J = np.concatenate([frame.T @ state.J[k] for frame, k in zip(frames, closed, strict=True)])
+        sideways = np.zeros(len(closed)) if sideways is None else sideways
+        c = returning(J @ v, restitution, sideways)
+        G, names = J @ state.W @ J.T, [self.contacts[k].name for k in closed]
+        sliding = [None] * len(closed)
+        impulse, done, same = robust_forces(
+            G, c, self.friction[list(closed)], sliding, names, None, time, _NO_IMPULSE, self._static[list(closed)]
+        )
+        speeds, scale = (J @ v)[::3], float(np.abs(J @ v).max())
+        hit = (speeds < -STILL * scale) | (impulse[:, 0] > STILL * impulse[:, 0].max())
+        lossy = np.array([bool(self.contacts[k].friction or self.contacts[k].restitution) for k in closed])
+        if not self.mechanism.together and ordered(G, lossy, hit):
+            groups = groups_of([self.contacts[k].pair for k in closed], J @ v, together=False)
+
+            def strike(response: Array, slides: Array, group: list[int]) -> Array:
+                of = np.array([closed[k] for k in group])
+                comes = returning(slides, restitution[group], sideways[group])
+                told = [names[k] for k in group]
+                near = _ROUND_OFF * scale / float(np.abs(comes).max())
+                none = [None] * len(of)
+                laws = self.friction[of], none, told, None, time, near, self._static[of]
+                return contact_forces(response, comes, *laws)[0].ravel()
+
+            outcomes = sequences(G, J @ v, groups, strike)
+            jumps = state.W @ J.T
+            told = [names[k] for k in np.flatnonzero(hit)]
+            once, *turns = (
+                left_by(J @ v + G @ given, STILL * scale) for given in (impulse.ravel(), *outcomes.impulses)
+            )
+            alike = all(turn == once for turn in turns)
+            refuse_spread(jumps @ outcomes.impulses.T, outcomes, told, time, jumps @ impulse.ravel(), alike=alike)
+            same = True
+        after = v + state.W @ J.T @ impulse.ravel()
+        # The impulses are found to some digits; what holds fixes the velocities to the last one.
+        held = np.array([[way != "open", *[way == "stick"] * 2] for way in done]).ravel()
+        after -= least_motion_for(state.W, J[held], (J @ (after - v) + c)[held])
+        return after, impulse, np.inf if same else 0.0
+
+    def _refuse_flat(self, state: ContactsNow, closed: Sequence[int], time: float) -> None:
+        """Raises NotUnique if one of these contacts is along an edge or a line at a time [s]."""
+        for k in closed:
+            if state.touching[k].flat:
+                raise lying(self.mechanism.contacts[k], time)
+
+    def sample(self, q: Array, v: Array, mode: ContactMode, time: float = 0.0) -> tuple[dict[str, Any], Array, Array]:
+        """Fields of a record at one time [s], contact forces between bodies, and sums of pairs with several contacts.
+
+        Forces [N], (contacts, 3), and sums [N], (such pairs, 3), are NaN where they are not determinate.
+        """
+        found, count = self.solve(q, v, mode, time), len(self._bodies)
+        joints = mode_of_joints(self.equations.switched, self.contacts, mode)
+
+        def record(force: Array) -> dict[str, Any]:
+            return self.equations.sample(q, v, joints, time, *self._loads(found.state, force))
+
+        fields, pressed = record(found.force), found.force[:count]
+        for shift in np.moveaxis(found.undetermined, 2, 0):  # what another distribution changes is not determinate
+            others = record(found.force + shift)
+            for name in ("wrench", "named"):
+                fields[name] = np.where(np.abs(others[name] - fields[name]) > RANK, np.nan, fields[name])
+        moved = np.abs(np.einsum("pk,kiw->piw", self.sums, found.undetermined)).max(axis=2, initial=0.0)
+        sums = np.where(moved <= RANK, self.sums[:, :count] @ pressed, np.nan)
+        return fields, np.where(found.determinate[:count], pressed, np.nan), sums
+
+    def _loads(self, state: ContactsNow, force: Array) -> tuple[Array, Array]:
+        """Loads by contacts of bodies: along the velocities, and about the world's origin, (bodies + 1, 6)."""
+        count = len(self._bodies)
+        of_bodies = [k for k, contact in enumerate(self.contacts) if not isinstance(contact, JointContact)]
+        load = np.einsum("kin,ki->n", state.J[of_bodies], force[of_bodies])
+        applied = np.zeros((len(self.mechanism.bodies) + 1, 6))
+        for (a, b), touch, push in zip(self._bodies, state.touching, force[:count], strict=False):
+            wrench = np.concatenate([push, cross(touch.place, push)])
+            applied[a] += wrench
+            applied[b] -= wrench
+        for k, friction in enumerate(self._turning, count + len(self._of_joints)):
+            a, b = self._bodies[friction.pressed_by]
+            applied[a, 3:] += force[k]
+            applied[b, 3:] -= force[k]
+        return load, applied

@@ -1,0 +1,64 @@
+"""Slides of contacts without forces of contacts, and contacts that loops or motions alone move."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from proofroll.elements.mechanism.contact.acting import ContactMode, direction_of
+from proofroll.elements.mechanism.contact.touching import Touching
+from proofroll.elements.mechanism.dynamics.analysis import NO_RESPONSE
+from proofroll.elements.mechanism.scene.rotations import Array
+
+_RESTS = 1e-10  # rate of a slide, relative to the parts that it is the sum of, that counts as none
+
+
+class FreeSlides(NamedTuple):
+    """Slides of contacts along their surfaces without forces of contacts.
+
+    Attributes:
+        rates: of the slides, (contacts, 3).
+        least: size of each that is round-off, (contacts,).
+        moved: True where no force changes the rate, for loops and motions alone move the contact, (contacts,).
+    """
+
+    rates: Array
+    least: Array
+    moved: NDArray[np.bool_]
+
+
+def free_slides(
+    touching: Sequence[Touching], J: Array, bias: Array, acceleration: Array, W: Array, loose: Array, held: Array
+) -> FreeSlides:
+    """See :class:`FreeSlides`.
+
+    Args:
+        touching: the contacts.
+        J: derivative of each slide by the velocities, (contacts, 3, velocities).
+        bias: rate of each slide without accelerations, (contacts, 3).
+        acceleration: without forces of contacts, (velocities,).
+        W: accelerations by unit forces along the velocities, (velocities, velocities).
+        loose: the same without loops, couplings and motions.
+        held: forces of these along the velocities, (velocities,).
+    """
+    across = np.array([np.eye(3) - np.outer(each.normal, each.normal) for each in touching]).reshape(-1, 3, 3)
+    J, bias = across @ J, np.einsum("kij,kj->ki", across, bias)
+    response, most = (np.einsum("kin,nm,kim->k", J, each, J) for each in (W, loose))
+    # in the norm of kinetic energy, which has one unit for all velocities
+    strength = np.sqrt(acceleration @ np.linalg.solve(loose, acceleration)) + np.sqrt(held @ loose @ held)
+    sizes = np.sqrt(most) * strength + np.linalg.norm(bias, axis=1)
+    return FreeSlides(J @ acceleration + bias, _RESTS * sizes, response <= NO_RESPONSE * most)
+
+
+def passing(rough: ContactMode, slides: FreeSlides) -> ContactMode:
+    """Rough modes with a slip in place of each rest that loops or motions end at once, whatever friction does.
+
+    A slider passes its dead centre so: its rate vanishes for an instant, and friction reverses.
+    """
+    sizes = np.linalg.norm(slides.rates, axis=1)
+    goes = slides.moved & (sizes > slides.least)
+    return tuple(
+        own._replace(kind="slip", heading=direction_of(rate / size)) if on and own.kind == "stick" else own
+        for own, on, rate, size in zip(rough, goes, slides.rates, sizes, strict=True)
+    )

@@ -1,0 +1,201 @@
+"""Start of contacts: which are closed, which slide, natural scales, and the check of a scene's start."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from proofroll.core.arrays import FloatArray
+from proofroll.core.errors import InputError
+from proofroll.core.last_results import kept
+from proofroll.elements.mechanism.contact.acting import ContactMode, modes_of
+from proofroll.elements.mechanism.contact.joint_laws import JointContact
+from proofroll.elements.mechanism.contact.touching import PARALLEL, Moving, Touching, touch
+from proofroll.elements.mechanism.contact.turning import TurningFriction, shut_by_pressing
+from proofroll.elements.mechanism.dynamics.joint_coordinates import JointCoordinates, Solution
+from proofroll.elements.mechanism.dynamics.kinematics import BodyMotion, Tree
+from proofroll.elements.mechanism.dynamics.switches import NEAR
+from proofroll.elements.mechanism.scene.joint_kinds import JointKind
+from proofroll.elements.mechanism.scene.model import Mechanism
+from proofroll.elements.mechanism.scene.rotations import skew
+from proofroll.elements.mechanism.scene.shapes.geometry import BodyContact
+
+# Gap or overlap of shapes that counts as touching, relative to a natural length, or in rad: digits of a file.
+TOUCHING = 1e-9
+# Speed that counts as none between touching shapes, relative to a natural speed: digits of a file.
+STILL = 1e-9
+# Speed of a followed place per unit of a joint's, relative to the length, up to which it stands: round-off is 1e-16.
+_STANDS = 1e-12
+
+
+def touches(mechanism: Mechanism, motion: BodyMotion, features: Sequence[int] | None = None) -> tuple[Touching, ...]:
+    """Gap, normal and slide of all contacts at one instant; ``features``: that touch; None: the nearest."""
+    index = mechanism.body_index
+    bodies = [Moving(*each) for each in zip(motion.p_WB, motion.R_WB, motion.v_WB, motion.w_WB, strict=True)]
+    given = [None] * len(mechanism.contacts) if features is None else features[: len(mechanism.contacts)]
+    pairs = zip(mechanism.contacts, given, strict=True)
+    return tuple(touch(c, bodies[index[c.body_a]], bodies[index[c.body_b]], feature) for c, feature in pairs)
+
+
+def extent(mechanism: Mechanism, motion: BodyMotion) -> float:
+    """Largest distance between joints, loops, springs, centres of mass, points and contacts at one instant [m]."""
+    own = [(joint.child, joint.child_position) for joint in mechanism.joints]
+    own += [(body.name, body.com) for body in mechanism.bodies]
+    own += [(point.body, point.position) for point in mechanism.points]
+    for part in (*mechanism.loops, *mechanism.links):
+        own += [(part.body_a, part.position_a), (part.body_b, part.position_b)]
+    index = mechanism.body_index
+    places = [motion.p_WB[index[body]] + motion.R_WB[index[body]] @ np.array(at) for body, at in own]
+    places += [each.place for each in touches(mechanism, motion)]
+    return float(np.max(np.linalg.norm(np.array(places)[:, None] - np.array(places)[None], axis=-1)))
+
+
+def followed_moves(mechanism: Mechanism, motion: BodyMotion, length: float) -> bool:
+    """True if joints can move a followed place at once, in a mechanism of a ``length`` [m]; a wheel moves none."""
+    for body, position in mechanism.followed:
+        k = mechanism.body_index[body]
+        by_joints = motion.J[k, :3] - skew(motion.R_WB[k] @ np.array(position)) @ motion.J[k, 3:]
+        if np.any(np.abs(by_joints) > _STANDS * length):
+            return True
+    return False
+
+
+class Scale(NamedTuple):
+    """Natural length [m] and rate [1/s] of a mechanism at its start."""
+
+    length: float
+    rate: float
+
+    @property
+    def gap(self) -> float:
+        """Largest gap that counts as touching [m]."""
+        return TOUCHING * self.length
+
+    @property
+    def speed(self) -> float:
+        """Largest speed that counts as rest [m/s]."""
+        return STILL * self.length * self.rate
+
+
+def natural_length(mechanism: Mechanism, found: Solution) -> float:
+    """Largest of extent, prismatic travel and radii of gyration at one instant [m]; 0: it has none.
+
+    That of a point at its place is the way to its nearest stop, or how far its speed carries it against its
+    acceleration.
+    """
+    motion = found.motion
+    slides = [joint for joint in mechanism.joints if joint.kind == JointKind.PRISMATIC]
+    ways = [abs(way) for joint in slides for way in (*joint.q0, joint.rest)]
+    radii = [np.sqrt(np.trace(body.inertia) / body.mass) for body in mechanism.bodies if body.mass]
+    length, pull = max([extent(mechanism, motion), *ways, *radii]), _largest(_rates(found)[:, :3])
+    stops = [abs(at - j.q0[0]) for j in slides for at in j.limits or () if abs(at - j.q0[0]) > j.stop_digits]
+    nearest = min(stops, default=0.0)
+    return float(length or nearest or (pull and _largest(motion.v_WB) ** 2 / pull))
+
+
+@kept
+def natural_scale(mechanism: Mechanism) -> Scale:
+    """Natural length, and the faster of the rates of gravity and of the first motion.
+
+    Both are powers of two, so that a change of units causes no round-off.
+    """
+    found = JointCoordinates(mechanism).solve(*mechanism.start())
+    motion, rates, length = found.motion, _rates(found), natural_length(mechanism, found) or 1.0
+    pulls = _largest(mechanism.gravity) / length, _largest(rates[:, :3]) / length, _largest(rates[:, 3:])
+    rate = max(np.sqrt(max(pulls)), _largest(motion.v_WB) / length, _largest(motion.w_WB)) or 1.0
+    return Scale(*(2.0 ** round(np.log2(size)) for size in (length, rate)))
+
+
+def _rates(found: Solution) -> FloatArray:
+    """Accelerations and angular accelerations of the bodies, shape (body, 6)."""
+    return found.motion.J @ found.acceleration + found.motion.bias
+
+
+def _largest(values: ArrayLike) -> float:
+    return float(np.max(np.abs(values), initial=0.0))
+
+
+def start_digits(contacts: Sequence[object]) -> FloatArray:
+    """Gap and speed of each contact that count as none: digits of a file, and of laws of joints rounding alone."""
+    return np.array([NEAR if isinstance(contact, JointContact) else TOUCHING for contact in contacts])
+
+
+def closed_and_still(
+    found: Sequence[Touching], lengths: FloatArray, rate: float, digits: FloatArray | float = TOUCHING
+) -> tuple[list[bool], list[bool]]:
+    """Two lists over the contacts: True if closed at the start and not opening, True if also at rest.
+
+    Args:
+        found: the contacts.
+        lengths: natural length along each, 1 for an angle.
+        rate: natural rate [1/s].
+        digits: gap and speed of each that count as none, relative to its natural ones.
+    """
+    rate = max([rate, *(float(np.linalg.norm(each.slide)) / size for each, size in zip(found, lengths, strict=True))])
+    least = lengths * digits
+    closed = [
+        not each.absent and each.gap <= size and abs(float(each.normal @ each.slide)) <= size * rate
+        for each, size in zip(found, least, strict=True)
+    ]
+    still = [
+        shut and bool(np.linalg.norm(each.slide) <= size * rate)
+        for shut, each, size in zip(closed, found, least, strict=True)
+    ]
+    return closed, still
+
+
+def at_start(
+    mechanism: Mechanism, contacts: Sequence[JointContact | BodyContact | TurningFriction], found: Sequence[Touching]
+) -> ContactMode:
+    """Modes of all contacts, ``found`` at the start: open, slip where a closed one slides, else stick."""
+    scale, kinds = natural_scale(mechanism), [joint.kind for joint in mechanism.joints]
+    turns = [isinstance(c, JointContact) and kinds[c.joint.number] != JointKind.PRISMATIC for c in contacts]
+    lengths = np.where(turns, 1.0, scale.length)
+    closed, still = closed_and_still(found, lengths, scale.rate, start_digits(contacts))
+    return modes_of(shut_by_pressing(contacts, closed), still, tuple(each.feature for each in found))
+
+
+def check_contacts(mechanism: Mechanism) -> None:
+    """Raises InputError if two bodies overlap or strike at the start, a disc lies flat, or a joint strikes its stop."""
+    stopped = [joint for joint in mechanism.joints if joint.limits]
+    if not (mechanism.contacts or stopped):
+        return
+    motion = Tree(mechanism).at(*mechanism.start())
+    if not np.isfinite(extent(mechanism, motion)):
+        raise InputError("geometries", "infinite", "places or sizes are too large to be computed with")
+    scale = natural_scale(mechanism)
+    for joint in stopped:
+        assert joint.limits is not None
+        (low, high), (q,), (v,) = joint.limits, joint.q0, joint.v0
+        digits, still = joint.stop_digits, scale.speed if joint.kind == JointKind.PRISMATIC else STILL * scale.rate
+        if (q <= low + digits and v < -still) or (q >= high - digits and v > still):
+            advice = "the joint starts on its stop and moves into it, an impact at time 0; correct v0 or start it apart"
+            raise InputError(f"joints.{joint.name}.v0", v, advice)
+    round_ends = {shape.name for shape in mechanism.geometries if shape.kind == "cylinder"}
+    cylinders = {pair.name for pair in mechanism.pairs if round_ends & set(pair.geometries)}
+    for contact, each in zip(mechanism.contacts, touches(mechanism, motion), strict=True):
+        between = f"{contact.body_a} and {contact.body_b}"
+        if each.gap < -scale.gap:
+            advice = f"they overlap by {-each.gap:.3g} m at the start; move one"
+            raise InputError(f"pairs.{contact.name}", between, advice)
+        if each.gap <= scale.gap and not each.normal.any():
+            advice = "they touch at several points at once, without one normal; move one"
+            raise InputError(f"pairs.{contact.name}", between, advice)
+        slip = float(np.linalg.norm(each.slide - each.normal * (each.normal @ each.slide)))
+        if each.gap <= scale.gap and slip > scale.speed and np.isinf(contact.friction):
+            advice = (
+                f"they touch and slip at {slip:.3g} m/s, which friction = inf excludes; correct v0 or give a number"
+            )
+            raise InputError(f"pairs.{contact.name}.friction", contact.friction, advice)
+        if each.flat and each.gap <= scale.gap and contact.pair not in cylinders:
+            advice = "the disc lies flat and touches along its whole edge, not at one point; give it three spheres"
+            if contact.features is not None:
+                advice = f"the capsules touch along a line: {PARALLEL}; turn one"
+            raise InputError(f"pairs.{contact.name}", between, advice)
+        closing = -float(each.normal @ each.slide)
+        if each.gap <= scale.gap and closing > scale.speed:
+            advice = (
+                f"they touch and approach at {closing:.3g} m/s, an impact at time 0; correct v0 or start them apart"
+            )
+            raise InputError(f"pairs.{contact.name}", between, advice)

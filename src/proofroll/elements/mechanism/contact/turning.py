@@ -1,0 +1,123 @@
+"""Friction of a contact against turning: rolling resistance, and friction against spin about the normal.
+
+Each is a contact beside its pair's own. Its slide is the part of the bodies' relative angular velocity that it resists,
+its force is a moment, and its bound is a coefficient [m] times the normal force of the contact that it belongs to.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import ClassVar, Protocol
+
+import numpy as np
+
+from proofroll.elements.mechanism.contact.acting import OPEN, ContactMode
+from proofroll.elements.mechanism.contact.touching import Touching
+from proofroll.elements.mechanism.scene.rotations import Array, frame_of_axis
+from proofroll.elements.mechanism.scene.shapes.geometry import BodyContact
+
+
+@dataclass(frozen=True)
+class TurningFriction:
+    """Friction of a contact against turning.
+
+    Attributes:
+        name: of the contact that presses.
+        pressed_by: index of that contact; its normal force bounds the moment.
+        spins: True: friction against spin about the normal; False: rolling resistance.
+        friction: coefficient, the largest moment over the normal force [m].
+        pair: text that no other contact has.
+    """
+
+    bound: ClassVar[float] = 0.0
+    presses: ClassVar[bool] = False
+    restitution: ClassVar[float] = 0.0
+    tangential_restitution: ClassVar[float] = 0.0
+    name: str
+    pressed_by: int
+    spins: bool
+    friction: float
+    pair: str
+
+    @property
+    def static(self) -> float:
+        """Coefficient of what does not turn: the same."""
+        return self.friction
+
+    def touching(self, touch: Touching, turning: Array) -> Touching:
+        """The friction as a contact, at an angular velocity of a relative to b [rad/s]; ``touch``: what presses.
+
+        The normal of a spin is one across it, so that the spin is a slide along a line.
+        """
+        slide = self.part(touch.normal) @ turning
+        if not self.spins:
+            return touch._replace(slide=slide, tilt=1.0, feature=0, borders=())
+        across = frame_of_axis(touch.normal)[:, 0]
+        touch = touch._replace(normal=across, normal_rate=np.zeros(3), tilt=1.0)
+        return touch._replace(slide=slide, feature=0, borders=())
+
+    def part(self, normal: Array) -> Array:
+        """Matrix that leaves the resisted part of an angular velocity."""
+        along = np.outer(normal, normal)
+        return along if self.spins else np.eye(3) - along
+
+    def part_rate(self, touch: Touching) -> Array:
+        """Rate of that matrix as the normal turns [1/s]."""
+        turning = np.outer(touch.normal_rate, touch.normal)
+        turning = turning + turning.T
+        return turning if self.spins else -turning
+
+
+def turning_frictions(contacts: Sequence[BodyContact]) -> tuple[TurningFriction, ...]:
+    """Friction against turning of each contact that has some."""
+    found = []
+    for k, contact in enumerate(contacts):
+        for spins, size in ((False, contact.rolling_resistance), (True, contact.spinning_friction)):
+            if size:
+                text = f"{contact.name} {'spin' if spins else 'roll'}"
+                found.append(TurningFriction(name=contact.name, pressed_by=k, spins=spins, friction=size, pair=text))
+    return tuple(found)
+
+
+def moments_by_pressing(
+    turning: Sequence[tuple[int, int, Array]], owner: Sequence[tuple[int, Array]], normals: Sequence[Array]
+) -> list[tuple[int, int, Array]]:
+    """Moments by a unit of each unknown force: index of the friction, place of the unknown, moment.
+
+    Args:
+        turning: index of each friction that acts, index of the contact that presses, moment by a unit normal force.
+        owner: contact and direction of each unknown force.
+        normals: of all contacts.
+    """
+    return [
+        (k, place, float(direction @ normals[by]) * moment)
+        for k, by, moment in turning
+        for place, (of, direction) in enumerate(owner)
+        if of == by
+    ]
+
+
+class _Pressed(Protocol):
+    @property
+    def pressed_by(self) -> int | None: ...
+
+
+def opened(contacts: Sequence[_Pressed], mode: ContactMode, k: int) -> ContactMode:
+    """Mode in which a contact opens, and friction against turning with it."""
+    pairs = zip(contacts, mode, strict=True)
+    return tuple(
+        OPEN._replace(feature=own.feature) if k in {number, contact.pressed_by} else own
+        for number, (contact, own) in enumerate(pairs)
+    )
+
+
+def shut_by_pressing(contacts: Sequence[_Pressed], closed: Sequence[bool]) -> list[bool]:
+    """True for closed contacts; friction against turning is closed with the contact that presses."""
+    return [
+        closed[contact.pressed_by] if contact.pressed_by is not None else shut
+        for contact, shut in zip(contacts, closed, strict=True)
+    ]
+
+
+def pressed_by(contacts: Sequence[_Pressed], which: Sequence[int]) -> list[int | None]:
+    """Place among some contacts of that whose normal force bounds each; None: its own."""
+    return [None if (k := contacts[own].pressed_by) is None else list(which).index(k) for own in which]

@@ -1,0 +1,1 @@
+"""Motion of a tree: poses, velocities, loads, smooth motion in joint coordinates."""

@@ -1,0 +1,411 @@
+"""Route 1 of the truth: the tree in joint coordinates, its loops by projection on the null space of their rows.
+
+With M v̇ = b and C v̇ = −γ, the singular values of C L⁻ᵀ (M = L Lᵀ) split the velocities into directions that the loops
+allow and those they lock. The rank is fixed at the start, so that redundant rows cost nothing and never flicker. After
+each step the violations of Φ and C v are eliminated along the locked directions (Blajer 2002). Angular velocities of
+spherical and free joints are states in the child's axes, which keeps digits when a body spins fast.
+"""
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from proofroll.core.arrays import cross
+from proofroll.core.dop853 import integrate
+from proofroll.core.errors import Diverged, Refused
+from proofroll.elements.mechanism.dynamics.analysis import BRANCHES, NO_RESPONSE, RANK, RowSign, analyse, reactions
+from proofroll.elements.mechanism.dynamics.complementarity import (
+    ROUND_OFF,
+    RestResponse,
+    decided_mode,
+    load_of,
+    refuse_switching,
+)
+from proofroll.elements.mechanism.dynamics.kinematics import BodyMotion, Rows, Tree
+from proofroll.elements.mechanism.dynamics.light_joints import lacks_inertia
+from proofroll.elements.mechanism.dynamics.named_forces import joint_force_shares, lengths, pick_named
+from proofroll.elements.mechanism.dynamics.point_loads import point_loads
+from proofroll.elements.mechanism.dynamics.record import Record, record_of
+from proofroll.elements.mechanism.dynamics.switches import REDUNDANT, STOPPED, Mode, held_joints, switched_joints
+from proofroll.elements.mechanism.scene.kinks import Functions
+from proofroll.elements.mechanism.scene.model import Mechanism
+from proofroll.elements.mechanism.scene.rotations import Array, skews, to_quaternion
+from proofroll.elements.mechanism.scene.signal import FUNCTIONS, value_at, varies
+
+_NEAR = 1e-7  # displacement of coordinates for finite differences of accelerations [m, 1]
+_EQUAL_STEP = 2e-3  # s
+_STEP = 0.05  # of DOP853, in times in which the fastest mode turns by 1 rad; chains of 5 to 80 links need no less
+
+
+@dataclass(frozen=True)
+class Solution:
+    """Accelerations at one instant, with intermediate results.
+
+    Attributes:
+        acceleration: v̇, (nv).
+        multipliers: of the rows of loops and couplings, the smallest in norm where they are redundant.
+        motion: of the bodies.
+        rows: constraints of loops and couplings.
+        split: (A, B) = (L⁻ᵀV, Uᵀ/S) of the locked directions: −A B r is the correction that removes a residual r.
+        C: rows of the loops, then of switched joints that are held, (rows, nv).
+        holding: forces that hold switched joints, along their coordinates, in the order of ``held_joints``.
+    """
+
+    acceleration: Array
+    multipliers: Array
+    motion: BodyMotion
+    rows: Rows
+    split: tuple[Array, Array] | None
+    C: Array
+    holding: Array
+
+
+class JointCoordinates:
+    """Equations of motion of a mechanism in the coordinates of its tree.
+
+    ``rank`` is that of the loops' rows; None: their rank at a general pose.
+    """
+
+    def __init__(self, mechanism: Mechanism, rank: int | None = None) -> None:
+        self.mechanism, self.tree, self.switched = mechanism, Tree(mechanism), switched_joints(mechanism)
+        self.rank = analyse(mechanism).rank if rank is None else rank
+        self._mass = np.array([body.mass for body in mechanism.bodies])
+        self._com = np.array([body.com for body in mechanism.bodies])
+        self._inertia = np.array([body.inertia for body in mechanism.bodies])
+        self._gravity = np.array(mechanism.gravity)
+        by_velocity = [joint for joint in mechanism.joints for _ in range(joint.nv)]
+        self._damping = np.array([joint.damping for joint in by_velocity])
+        self._torque = np.array([joint.constant_drive for joint in by_velocity])
+        joints = zip(mechanism.joints, mechanism.v_slices, strict=True)
+        self._driven = [(joint.torque, at.start) for joint, at in joints if varies(joint.torque)]
+        self.actuators = [(actuator, *mechanism.place_of(actuator.joint)) for actuator in mechanism.actuators]
+        self.limited = [place for place in self.actuators if place[0].limit is not None]
+        self._clamped = [actuator.limit is not None for actuator in mechanism.actuators]
+        self.sides: Mode = ()  # modes of limited efforts that are kept; empty: they follow from the state
+        self.functions: Functions = FUNCTIONS  # of formulas, which may hold the sides of their kinks
+        self.switches = bool(self.switched or self.limited)
+        self._light = self.rank > 0 and lacks_inertia(mechanism)
+        self._armature = np.diag([joint.armature for joint in by_velocity])
+        laws = zip(mechanism.joints, mechanism.q_slices, mechanism.v_slices, strict=True)
+        self._springs = [(joint.stiffness, joint.rest, at_q, at_v) for joint, at_q, at_v in laws if joint.stiffness]
+
+    def solve(
+        self, q: Array, v: Array, mode: Mode | None = None, load: Array | None = None, time: float = 0.0
+    ) -> Solution:
+        """Accelerations and multipliers for coordinates (nq) and velocities (nv), with drives at ``time`` [s].
+
+        ``mode``: of switched joints and limited efforts; None: it follows from the forces, see :meth:`decided_mode`.
+        ``load``: additional force along the velocities, (nv).
+
+        Raises:
+            Diverged: a velocity moves nothing with inertia in this pose.
+            Refused: joints that are held and loops lock the same direction, so that their forces are not determinate.
+        """
+        if mode is None:
+            mode = self.decided(q, v, time) if self.switched else ()
+        motion = self.tree.at(q, v)
+        J, M, loads = self.inertial(motion)
+        b = self._torque - self._damping * v - loads.ravel() @ J.reshape(-1, len(v))
+        for stiffness, rest, at_q, at_v in self._springs:
+            b[at_v] -= stiffness * (q[at_q] - rest)
+        for i, arm, force, moment in point_loads(self.mechanism, motion, time, self.functions):
+            b += np.concatenate([force, moment + cross(arm, force)]) @ motion.J[i]
+        if self.switched:
+            b += load_of(self.switched, mode, len(v))
+        if load is not None:
+            b += load
+        for signal, at in self._driven:
+            b[at] += value_at(signal, time, self.functions)
+        if self.actuators:
+            for (_, _, at), effort in zip(self.actuators, self.efforts(time, q, v, mode), strict=True):
+                b[at] += effort
+        rows = self.tree.loop_rows(motion, time, self.functions)
+        C, bias, rank = rows.C, rows.bias, self.rank
+        if held := [self.switched[number].velocity for number in held_joints(mode)]:
+            C, bias, rank = np.vstack([C, np.eye(len(v))[held]]), np.append(bias, np.zeros(len(held))), rank + len(held)
+        M, b = self.weighted(M, b, C, bias)
+        try:
+            into = np.linalg.inv(np.linalg.cholesky(M)).T  # M⁻¹ = into intoᵀ
+        except np.linalg.LinAlgError:
+            raise Diverged("the mass matrix is singular, as where joints of massless bodies line up") from None
+        free = into.T @ b
+        if not rank:
+            return Solution(
+                acceleration=into @ free,
+                multipliers=np.zeros(0),
+                motion=motion,
+                rows=rows,
+                split=None,
+                C=C,
+                holding=np.zeros(0),
+            )
+        U, S, Vt = np.linalg.svd(C @ into, full_matrices=False)
+        if held and (rank > len(S) or S[rank - 1] < RANK * S[0]):
+            raise Refused(REDUNDANT)
+        locked, back = Vt[:rank], U[:, :rank].T / S[:rank, None]
+        normal = -back @ bias - locked @ free
+        locked_into = into @ locked.T
+        multipliers = back.T @ normal
+        loops = len(rows.residual)
+        return Solution(
+            acceleration=into @ free + locked_into @ normal,
+            multipliers=multipliers[:loops],
+            motion=motion,
+            rows=rows,
+            split=(locked_into, back),
+            C=C,
+            holding=multipliers[loops:],
+        )
+
+    def weighted(self, M: Array, b: Array, C: Array, bias: Array) -> tuple[Array, Array]:
+        """Mass matrix and forces with a weight on the rows, if the mass matrix is singular without them.
+
+        Accelerations meet C v̇ = −bias, so the weight changes neither them nor the multipliers.
+        """
+        if not self._light:
+            return M, b
+        weight = float(M.max()) / float(np.abs(C.T @ C).max())
+        return M + weight * C.T @ C, b - weight * bias @ C
+
+    def spin(self, y: Array) -> float:
+        """Largest angular velocity of a body at a state (q, v) [rad/s]."""
+        return float(np.abs(self.tree.at(y[: self.mechanism.nq], y[self.mechanism.nq :]).w_WB).max())
+
+    def rows(self, q: Array) -> Rows:
+        """Constraints of loops and couplings for coordinates (nq), at rest."""
+        return self.tree.loop_rows(self.tree.at(q, np.zeros(self.mechanism.nv)))
+
+    def efforts(self, time: float, q: Array, v: Array, mode: Mode = ()) -> list[float]:
+        """Effort of each actuator at its joint [N m, N], by its mode if ``mode`` has one, else clamped to its limit."""
+        modes = iter(mode[len(self.switched) :] or self.sides)
+        return [
+            actuator.effort(
+                time, float(q[at_q]), float(v[at_v]), next(modes, None) if clamped else "linear", self.functions
+            )
+            for (actuator, at_q, at_v), clamped in zip(self.actuators, self._clamped, strict=True)
+        ]
+
+    def decided(self, q: Array, v: Array, time: float = 0.0) -> Mode:
+        """Mode of joints, by complementarity."""
+        return decided_mode(self.switched, q, v, partial(self._responses, time, q, v))
+
+    def _responses(self, time: float, q: Array, v: Array, mode: Mode, at: Sequence[int]) -> RestResponse:
+        """Responses of the joints in a mode to unit forces along the velocities ``at``; see :data:`.Responses`."""
+        free = self.solve(q, v, mode, time=time)
+        M = self.weighted(self.inertial(free.motion)[1], np.zeros(len(v)), free.C, np.zeros(len(free.C)))[0]
+        loose: Array = np.asarray(np.linalg.inv(M), dtype=np.float64)
+        W = loose if free.split is None else loose - free.split[0] @ free.split[0].T
+        held, rates = free.C.T @ np.append(free.multipliers, free.holding), free.acceleration
+        # in the norm of kinetic energy, which has one unit for all velocities
+        strength, most = np.sqrt(rates @ M @ rates) + np.sqrt(held @ loose @ held), np.diag(loose)[list(at)]
+        moved, least = np.diag(W)[list(at)] <= NO_RESPONSE * most, ROUND_OFF * np.sqrt(most) * strength
+        return RestResponse(free=rates[list(at)], by_force=W[np.ix_(at, at)], moved=moved, least=least)
+
+    def run(self, times: Array, tolerance: float = 1e-14, visited: list[tuple[float, Array]] | None = None) -> Record:
+        """Record of the motion at the given times [s], by DOP853; ``visited`` takes times and states before steps.
+
+        Raises:
+            Refused: a law switches, see
+                :func:`~proofroll.elements.mechanism.dynamics.complementarity.refuse_switching`.
+            Diverged: the integration stops, e.g. at a singular pose, or stepped over one.
+        """
+        refuse_switching(self.mechanism)
+        start = np.concatenate(self.mechanism.start())
+        least = self._least(tolerance)
+        return self.recorded(
+            times, integrate(self.rate, start, times, tolerance, self.followed(), least, None, visited)
+        )
+
+    def recorded(self, times: Array, states: Iterable[Array]) -> Record:
+        """Record of states (q, v) at times [s]."""
+        nq = self.mechanism.nq
+        return record_of(times, [self.sample(y[:nq], y[nq:], None, t) for t, y in zip(times, states, strict=True)])
+
+    def followed(self, mode: Mode | None = None) -> Callable[[Array], Array]:
+        """Correction of the state after each step of one motion, by elimination of violations.
+
+        It raises Diverged where a step passes a singular pose of the loops, or comes too near to one to tell.
+        """
+        return self.watching(lambda y: self.eliminated(y, mode))
+
+    def watching(self, eliminated: Callable[[Array], Array]) -> Callable[[Array], Array]:
+        """A correction of the state that raises Diverged as :meth:`followed` does."""
+        sign = RowSign(self.rank)
+
+        def corrected(y: Array) -> Array:
+            y = eliminated(y)
+            if self.rank and (sign.changes(self.rows(y[: self.mechanism.nq]).C) or sign.least < BRANCHES):
+                raise Diverged("a step passes a singular pose of the loops, or one as near as lengths are known")
+            return y
+
+        return corrected
+
+    def sensitivity(self) -> tuple[float, float]:
+        """Sensitivity of the accelerations to the state at the start.
+
+        Returns:
+            Rate of the fastest mode [rad/s], at least 1; and the change of accelerations if the state moves by its
+            round-off.
+        """
+        q, v = self.mechanism.start()
+        acceleration = self.solve(q, v).acceleration
+        ways = np.random.default_rng(0).choice([-1.0, 1.0], (3, self.mechanism.nv))
+        moved = [self.solve(self.tree.moved(q, _NEAR * way), v).acceleration for way in ways]
+        nudged = [self.solve(self.tree.moved(q, np.spacing(1.0) * way), v + np.spacing(v) * way) for way in ways]
+        slope = float(np.abs(np.array(moved) - acceleration).max(initial=0.0)) / _NEAR
+        noise = max(float(np.abs(each.acceleration - acceleration).max(initial=0.0)) for each in nudged)
+        return max(1.0, float(np.sqrt(slope))), noise
+
+    def joint_gains(self) -> tuple[Array, Array]:
+        """Damping and stiffness of the joints' own laws along the velocities, (nv) each."""
+        stiffness = np.zeros(self.mechanism.nv)
+        for of_joint, _, _, at_v in self._springs:
+            stiffness[at_v] += of_joint
+        return self._damping.copy(), stiffness
+
+    def servo_gains(self) -> tuple[Array, Array]:
+        """Gains kd and kp of actuators at their joints, along the velocities, (nv) each."""
+        gains = np.zeros((2, self.mechanism.nv))
+        for actuator, _, at in self.actuators:
+            gains[:, at] += actuator.gear**2 * np.array([actuator.kd, actuator.kp])
+        return gains[0], gains[1]
+
+    def _least(self, tolerance: float) -> Array:
+        """Error tolerances of coordinates and velocities, (nq + nv): the level of the noise of accelerations.
+
+        Noise enters the velocities in proportion to the step, not to its ninth power as the error of the method does.
+        """
+        fastest, noise = self.sensitivity()
+        unavoidable = _STEP * noise / fastest
+        return np.concatenate(
+            [
+                np.full(self.mechanism.nq, max(tolerance, _STEP * unavoidable / fastest)),
+                np.full(self.mechanism.nv, max(tolerance, unavoidable)),
+            ]
+        )
+
+    def rate(self, time: float, y: Array, mode: Mode | None = None) -> Array:
+        """Right-hand side for the state (q, v), (nq + nv)."""
+        q, v = y[: self.mechanism.nq], y[self.mechanism.nq :]
+        return np.concatenate([self.tree.rate(q, v), self.solve(q, v, mode, time=time).acceleration])
+
+    def run_rk4(self, times: Array) -> Record:
+        """Record of the motion at the given times [s], by Runge-Kutta 4 in equal steps of at most 2 ms.
+
+        Fixed steps pass singular poses, where adaptive steps would shrink to zero.
+        """
+        return self.recorded(times, self.rk4_states(times, _EQUAL_STEP))
+
+    def rk4_states(self, times: Array, step: float) -> Iterator[Array]:
+        """States (q, v) at the given times [s], by Runge-Kutta 4 in equal steps of at most ``step`` [s]."""
+        y, now = np.concatenate(self.mechanism.start()), 0.0
+        for time in times:
+            steps = int(np.ceil((time - now) / step - 1e-9))
+            h = (time - now) / max(steps, 1)
+            for t in (now + h * number for number in range(steps)):
+                k1 = self.rate(t, y)
+                k2 = self.rate(t + h / 2, y + h / 2 * k1)
+                k3 = self.rate(t + h / 2, y + h / 2 * k2)
+                y = self.eliminated(y + h / 6 * (k1 + 2 * k2 + 2 * k3 + self.rate(t + h, y + h * k3)))
+            now = time
+            yield y
+
+    def eliminated(self, y: Array, mode: Mode | None = None) -> Array:
+        """The state with violations of loops, of held joints and of unit quaternions removed."""
+        nq = self.mechanism.nq
+        q, v = self.tree.normalised(y[:nq]), y[nq:]
+        if self.rank or self.switched:
+            found = self.solve(q, v, mode)
+            if found.split is not None:
+                into, back = found.split
+                opening = np.append(found.rows.opening(v), found.C[len(found.rows.residual) :] @ v)
+                v = v - into @ (back @ opening)
+                residual = np.append(found.rows.residual, np.zeros(len(found.C) - len(found.rows.residual)))
+                q = self.tree.moved(q, -into @ (back @ residual))
+        return np.concatenate([q, v])
+
+    def sample(
+        self,
+        q: Array,
+        v: Array,
+        mode: Mode | None = None,
+        time: float = 0.0,
+        load: Array | None = None,
+        applied: Array | None = None,
+    ) -> dict[str, Any]:
+        """Fields of a :class:`~proofroll.elements.mechanism.dynamics.record.Record` at one time.
+
+        ``load``: additional forces along the velocities, (nv). ``applied``: the wrenches on bodies and world that
+        ``load`` comes from, about the world's origin, (bodies + 1, 6).
+        """
+        if mode is None and self.switched:
+            mode = self.decided(q, v, time)
+        found = self.solve(q, v, mode, load, time)
+        motion, rows, mechanism = found.motion, found.rows, self.mechanism
+        n = len(mechanism.bodies)
+        needed = self._needed(found, time) - (0.0 if applied is None else applied)
+        wrench = np.concatenate(reactions(self.tree, motion, rows, found.multipliers, needed))
+        largest = [np.abs(rows.residual).max(initial=0.0), np.abs(rows.opening(v)).max(initial=0.0)]
+        return {
+            "p_WB": motion.p_WB[:n],
+            "v_WB": motion.v_WB[:n],
+            "q_WB": np.array([to_quaternion(R) for R in motion.R_WB[:n]]),
+            "w_WB": motion.w_WB[:n],
+            "q": q,
+            "v": v,
+            "wrench": wrench,
+            "named": self._named(found, q, v, mode or (), time),
+            "residual": np.array(largest),
+        }
+
+    def _named(self, found: Solution, q: Array, v: Array, mode: Mode, time: float) -> Array:
+        fields = {name: np.zeros(count) for name, count in lengths(self.mechanism).items()}
+        fields["effort"][:] = self.efforts(time, q, v, mode)
+        moved = len(found.multipliers) - found.rows.moved
+        fields["coupling"][:] = found.multipliers[moved - len(fields["coupling"]) : moved]
+        driven = [self.mechanism.joint_index[joint.name] for joint, _, _ in self.mechanism.prescribed]
+        fields["drive"][driven] = found.multipliers[moved:]
+        holding = dict(zip(held_joints(mode), found.holding, strict=True))
+        for number, (joint, own) in enumerate(zip(self.switched, mode, strict=False)):
+            force = holding.get(number, joint.push(own))
+            on = joint_force_shares(own in STOPPED, joint.friction, force)
+            fields["friction"][joint.number], fields["stop"][joint.number] = on
+        return pick_named(self.mechanism, fields)
+
+    def inertial(self, motion: BodyMotion) -> tuple[Array, Array, Array]:
+        """Jacobians at the centres of mass, (bodies, 6, nv), mass matrix, inertial minus gravity wrenches at v̇ = 0."""
+        n = len(self._mass)
+        R, w = motion.R_WB[:n], motion.w_WB[:n]
+        arm = (R @ self._com[:, :, None])[..., 0]
+        inertia = R @ self._inertia @ R.transpose(0, 2, 1)
+        J = motion.J[:n].copy()
+        J[:, :3] -= skews(arm) @ J[:, 3:]
+        weighted = np.concatenate([self._mass[:, None, None] * J[:, :3], inertia @ J[:, 3:]], axis=1)
+        nv = self.mechanism.nv
+        M = J.reshape(-1, nv).T @ weighted.reshape(-1, nv) + self._armature
+        return J, M, self._wrenches(motion.bias[:n], arm, inertia, w)
+
+    def _wrenches(self, acceleration: Array, arm: Array, inertia: Array, w: Array) -> Array:
+        """Force and moment about the centre of mass that accelerate each body so, beyond gravity, (bodies, 6)."""
+        alpha, turn = acceleration[:, 3:, None], skews(w)
+        at_com = acceleration[:, :3] + (turn @ (turn @ arm[:, :, None]) - skews(arm) @ alpha)[..., 0]
+        moment = inertia @ alpha + turn @ (inertia @ w[:, :, None])
+        return np.concatenate([self._mass[:, None] * (at_com - self._gravity), moment[..., 0]], axis=1)
+
+    def _needed(self, found: Solution, time: float) -> Array:
+        """Wrenches about the world's origin that joints and loops bring to the bodies; the last is the world's."""
+        motion, n = found.motion, len(self._mass)
+        R = motion.R_WB[:n]
+        arm = (R @ self._com[:, :, None])[..., 0]
+        acceleration = motion.J[:n] @ found.acceleration + motion.bias[:n]
+        inertia = R @ self._inertia @ R.transpose(0, 2, 1)
+        wrenches = self._wrenches(acceleration, arm, inertia, motion.w_WB[:n])
+        needed = np.zeros((n + 1, 6))
+        needed[:n] = wrenches
+        needed[:n, 3:] += cross(motion.p_WB[:n] + arm, wrenches[:, :3])
+        for i, arm, force, moment in point_loads(self.mechanism, motion, time):
+            needed[i] -= np.concatenate([force, moment + cross(motion.p_WB[i] + arm, force)])
+        return needed

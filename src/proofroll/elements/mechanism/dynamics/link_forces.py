@@ -1,0 +1,133 @@
+"""Forces of springs and bushings along a motion, and work of drives: results that follow from the state of the bodies.
+
+The harness evaluates them for truth and engines alike, at the motion that each of them has.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import fields, replace
+from typing import Any
+
+import numpy as np
+
+from proofroll.core.arrays import FloatArray
+from proofroll.core.observable import Observable, Role
+from proofroll.elements.mechanism.dynamics.named_forces import NamedForce, named_forces
+from proofroll.elements.mechanism.dynamics.placed import Placed
+from proofroll.elements.mechanism.scene.bushing import Bushing
+from proofroll.elements.mechanism.scene.model import Mechanism
+from proofroll.elements.mechanism.scene.parts import Spring
+
+WORKING = ("effort", "drive")  # fields of named forces whose work is a result
+_BUSHINGS = (("bushing_forces", "N", "forces"), ("bushing_torques", "N m", "moments"))
+
+
+def pull_of(placed: Placed, spring: Spring) -> FloatArray:
+    """Pull of a spring by its law, positive if it draws its ends together [N], shape (time,)."""
+    apart = placed.point(spring.body_b, spring.position_b) - placed.point(spring.body_a, spring.position_a)
+    slide = placed.velocity(spring.body_b, spring.position_b) - placed.velocity(spring.body_a, spring.position_a)
+    length = np.linalg.norm(apart, axis=-1)
+    return np.asarray(spring.pull(length, np.sum(apart * slide, axis=-1) / length) + np.zeros(len(length)))
+
+
+def load_of(placed: Placed, bushing: Bushing) -> FloatArray:
+    """Force [N] and moment [N m] of a bushing on body_b, at the origin of B, world axes, shape (time, 6)."""
+    a, b = (placed.mechanism.body_index[name] for name in (bushing.body_a, bushing.body_b))
+    apart = placed.point(bushing.body_b, bushing.position_b) - placed.point(bushing.body_a, bushing.position_a)
+    slide = placed.velocity(bushing.body_b, bushing.position_b) - placed.velocity(bushing.body_a, bushing.position_a)
+    states = (
+        placed.R_WB[:, a],
+        placed.R_WB[:, b],
+        apart,
+        slide,
+        placed.spin(bushing.body_a),
+        placed.spin(bushing.body_b),
+    )
+    return np.array([np.concatenate(bushing.load(*state)) for state in zip(*states, strict=True)])
+
+
+def link_values(placed: Placed) -> FloatArray:
+    """Pulls of all springs, then loads of all bushings [N, N m], shape (time, springs + 6 bushings)."""
+    pulls = [pull_of(placed, spring)[:, None] for spring in placed.mechanism.springs]
+    loads = [load_of(placed, bushing) for bushing in placed.mechanism.bushings]
+    return np.concatenate([np.zeros((len(placed.time), 0)), *pulls, *loads], axis=1)
+
+
+def working(mechanism: Mechanism) -> list[tuple[int, NamedForce]]:
+    """Named forces whose work is a result, with their indices."""
+    return [(number, item) for number, item in enumerate(named_forces(mechanism)) if item.field in WORKING]
+
+
+def works(placed: Placed, named: FloatArray) -> FloatArray:
+    """Work of each of :func:`working` since the first time [J], shape (time, drives).
+
+    Simpson's rule over the samples, for truth and engines alike; ``named``: all named forces, shape (time, forces).
+    """
+    drives, rates = working(placed.mechanism), placed.coordinates()
+    if not drives:
+        return np.zeros((len(placed.time), 0))
+    joints = {f"effort.{item.name}": item.joint for item in placed.mechanism.actuators}
+    names = [joints.get(item.name, item.name.removeprefix("drive.")) for _, item in drives]
+    powers = [named[:, number] * rates[name][1] for (number, _), name in zip(drives, names, strict=True)]
+    return np.stack([_integral(placed.time, power) for power in powers], axis=1)
+
+
+def coarseness(placed: Placed, named: FloatArray) -> FloatArray:
+    """Change of :func:`works` where every other sample is left out, largest so far [J], shape (time,).
+
+    It bounds the error of the quadrature, which falls by sixteen where samples are twice as dense and nothing jumps.
+    """
+    every, count = works(placed, named), len(placed.time)
+    change = np.zeros(count)
+    if every.shape[1] and count > 2:
+        names = [item.name for item in fields(placed) if item.name != "mechanism"]
+        parts = {name: getattr(placed, name) for name in names}
+        thinned: dict[str, Any] = {name: None if part is None else part[::2] for name, part in parts.items()}
+        sparse = replace(placed, **thinned)
+        gap = np.abs(works(sparse, named[::2]) - every[::2])
+        change[::2] = np.where(np.isnan(gap), 0.0, gap).max(axis=1)
+    return np.maximum.accumulate(change)
+
+
+def _integral(time: FloatArray, values: FloatArray) -> FloatArray:
+    if len(time) < 2:
+        return np.zeros(len(time))
+    from scipy.integrate import cumulative_simpson
+
+    return np.asarray(cumulative_simpson(values, x=time, initial=0.0))
+
+
+def put_links(placed: Placed, named: FloatArray, put: Callable[..., None], unsaid: str) -> None:
+    """Puts forces of springs and bushings, and work of drives, among the variables of a run.
+
+    Args:
+        placed: motion of the bodies.
+        named: named forces, shape (time, forces).
+        put: takes a variable's name, values, unit, meaning and dimensions.
+        unsaid: reason of work that has no value.
+    """
+    mechanism, values = placed.mechanism, link_values(placed)
+    count = len(mechanism.springs)
+    for spring, pull in zip(mechanism.springs, values.T, strict=False):
+        put(f"force.{spring.name}", pull, "N", f"pull of {spring.name} by its law, at this motion")
+    loads = values[:, count:].reshape(len(placed.time), -1, 2, 3)
+    for number, bushing in enumerate(mechanism.bushings):
+        for part, (kind, unit) in enumerate((("force", "N"), ("torque", "N m"))):
+            for axis, letter in enumerate("xyz"):
+                meaning = f"{kind} of {bushing.name} on {bushing.body_b} by its law, at this motion"
+                put(f"{kind}.{bushing.name}.{letter}", loads[:, number, part, axis], unit, meaning)
+    for part, (name, unit, what) in enumerate(_BUSHINGS if mechanism.bushings else ()):
+        put(name, loads[:, :, part], unit, f"{what} of bushings by their laws", "bushing", "xyz")
+    for work, (_, item) in zip(works(placed, named).T, working(mechanism), strict=True):
+        put(f"work.{item.name}", work, "J", f"work of {item.name}", absent=unsaid if np.all(np.isnan(work[1:])) else "")
+
+
+def link_observables(mechanism: Mechanism, floors: dict[str, float]) -> Iterator[Observable]:
+    """Observables of forces of springs and bushings and of work of drives; ``floors``: of an observable, by unit."""
+    for spring in mechanism.springs:
+        yield Observable(f"force.{spring.name}", "N", f"pull of {spring.name}", Role.REACTION, floor=floors["N"])
+    for name, unit, what in _BUSHINGS if mechanism.bushings else ():
+        yield Observable(name, unit, f"{what} of bushings on their bodies b", Role.REACTION, floor=floors[unit])
+    for _, item in working(mechanism):
+        yield Observable(f"work.{item.name}", "J", f"work of {item.name}", Role.REACTION, floor=floors["J"])

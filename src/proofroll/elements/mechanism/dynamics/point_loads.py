@@ -1,0 +1,92 @@
+"""Loads of springs between points, bushings and applied forces on the bodies of a mechanism, at one state."""
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+
+from proofroll.core.arrays import cross
+from proofroll.core.errors import Diverged
+from proofroll.elements.mechanism.dynamics.kinematics import BodyMotion
+from proofroll.elements.mechanism.scene.bushing import LARGEST
+from proofroll.elements.mechanism.scene.kinks import Functions, Sides
+from proofroll.elements.mechanism.scene.model import Mechanism
+from proofroll.elements.mechanism.scene.rotations import Array
+from proofroll.elements.mechanism.scene.signal import FUNCTIONS, value_at
+
+
+class PointLoad(NamedTuple):
+    """Load on a body, in world axes.
+
+    Attributes:
+        body: index of the body; -1: the world.
+        arm: from the origin of the body's frame to the place of the force [m].
+        force: [N].
+        moment: beside that of the force at its arm [N m].
+    """
+
+    body: int
+    arm: Array
+    force: Array
+    moment: Array
+
+
+def point_loads(
+    mechanism: Mechanism, motion: BodyMotion, time: float, functions: Functions = FUNCTIONS
+) -> Iterator[PointLoad]:
+    """Loads of springs, bushings and applied forces at a time [s], for the motion of bodies and world.
+
+    ``functions``: of their formulas.
+
+    Raises:
+        Diverged: a bushing turns too far.
+    """
+    none, index = np.zeros(3), mechanism.body_index
+    for spring in mechanism.springs:
+        a, b = index[spring.body_a], index[spring.body_b]
+        arm_a, arm_b = motion.R_WB[a] @ spring.position_a, motion.R_WB[b] @ spring.position_b
+        d = motion.p_WB[b] + arm_b - motion.p_WB[a] - arm_a
+        slide = motion.v_WB[b] + cross(motion.w_WB[b], arm_b) - motion.v_WB[a] - cross(motion.w_WB[a], arm_a)
+        length = float(np.linalg.norm(d))
+        direction = d / length
+        pull = spring.pull(length, float(direction @ slide), functions)
+        yield PointLoad(a, arm_a, pull * direction, none)
+        yield PointLoad(b, arm_b, -pull * direction, none)
+    for bushing in mechanism.bushings:
+        if bushing.turned(motion.R_WB[index[bushing.body_a]], motion.R_WB[index[bushing.body_b]]) > LARGEST:
+            advice = "at half a turn its rotation vector is not unique; give a joint the spring"
+            raise Diverged(f"the bushing {bushing.name} turns by more than {LARGEST:g} rad: {advice}")
+    yield from bushing_loads(mechanism, motion)
+    for applied in mechanism.forces:
+        acting, reacting = index[applied.body], index[applied.reaction]
+        size = np.array(applied.at(time, functions), dtype=float)
+        load = motion.R_WB[acting] @ size if applied.frame == "body" else size
+        force, moment = (load, none) if applied.kind == "force" else (none, load)
+        arm = motion.R_WB[acting] @ applied.position
+        yield PointLoad(acting, arm, force, moment)
+        yield PointLoad(reacting, motion.p_WB[acting] + arm - motion.p_WB[reacting], -force, -moment)
+
+
+def kink_arguments(mechanism: Mechanism, motion: BodyMotion, time: float) -> Array:
+    """Arguments of the kinks of all laws at a time [s], in the order of the mechanism's kinks; zero at a kink."""
+    sides = Sides(mechanism.kinks)
+    functions = sides.functions(FUNCTIONS)
+    for _ in point_loads(mechanism, motion, time, functions):
+        pass
+    for signal in mechanism.signals:
+        value_at(signal, time, functions)
+    return np.array(sides.arguments, dtype=float)
+
+
+def bushing_loads(mechanism: Mechanism, motion: BodyMotion) -> Iterator[PointLoad]:
+    """Loads of bushings alone, however far they turn."""
+    index = mechanism.body_index
+    for bushing in mechanism.bushings:
+        a, b = index[bushing.body_a], index[bushing.body_b]
+        arm_a, arm_b = motion.R_WB[a] @ bushing.position_a, motion.R_WB[b] @ bushing.position_b
+        apart = motion.p_WB[b] + arm_b - motion.p_WB[a] - arm_a
+        w_a, w_b = motion.w_WB[a], motion.w_WB[b]
+        slide = motion.v_WB[b] + cross(w_b, arm_b) - motion.v_WB[a] - cross(w_a, arm_a)
+        force, moment = bushing.load(motion.R_WB[a], motion.R_WB[b], apart, slide, w_a, w_b)
+        yield PointLoad(b, arm_b, force, moment)
+        yield PointLoad(a, arm_a + apart, -force, -moment)

@@ -1,0 +1,1 @@
+"""Answers to what the harness asks of a mechanism."""

@@ -1,0 +1,1 @@
+"""Events and observables of contacts, and families of formulations."""

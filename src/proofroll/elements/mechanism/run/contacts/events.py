@@ -1,0 +1,214 @@
+"""Events of contacts, found between the samples of a run from its forces, gaps and slip."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from proofroll.core.arrays import FloatArray
+from proofroll.core.bounces import Bounce
+from proofroll.core.columns import Columns
+from proofroll.core.element_abilities import SeenInRun
+from proofroll.core.events import Event, EventKind
+from proofroll.elements.mechanism.run.contacts.bounces import sampled_bounces
+from proofroll.elements.mechanism.run.contacts.observables import (
+    PRESSES,
+    Followed,
+    follow_contacts,
+    given_forces,
+    normal_forces,
+)
+from proofroll.elements.mechanism.run.dataset import placed_from
+
+if TYPE_CHECKING:
+    from proofroll.elements.mechanism.run.element import MechanismElement
+    from proofroll.elements.mechanism.run.sampling import MechanismSample
+
+_States = NDArray[np.bool_]
+# Slip speed of a contact that counts as sticking, relative to the mechanism's speed: softened contacts creep.
+_CREEPS = 1e-3
+# Gap at the start that counts as closed, relative to the mechanism's size.
+_CLOSED = 1e-6
+# Room of a time in which a gap closes, relative: digits of its samples.
+_ROUNDED = 1.01
+# Cosine between the slips of two samples below which one line of slip has turned: the line may turn with its bodies.
+_REVERSED = -0.9
+# Kinds of events that samples cannot distinguish from others: a resting contact may still begin to move, and a settling
+# one may go on rebounding.
+_ALIKE: Mapping[str, str] = {EventKind.REST: EventKind.STICK, EventKind.SETTLE: EventKind.IMPACT}
+
+
+class ContactWatch:
+    """Events of all contacts of a run. See :class:`proofroll.core.element_abilities.RunWatch`.
+
+    A state that lasts for one sample only does not count: a contact that presses at a single sample between two open
+    ones rebounds, and one that does not slip at a single sample changes its direction of slip. Two impacts between
+    samples count as one. A contact whose gap stays closed has not lifted off, though another may bear its load, and one
+    whose gap cannot close between two samples has no impact there, though its speed changes sign.
+    """
+
+    def __init__(self, element: MechanismElement) -> None:
+        self._element = element
+
+    def over(self, sample: MechanismSample) -> bool:  # noqa: ARG002 -- the protocol's
+        """False: bodies may leave each other."""
+        return False
+
+    def conclude(
+        self, times: FloatArray, samples: Sequence[MechanismSample], located: Sequence[Event] | None
+    ) -> SeenInRun:
+        """Events of the contacts; None for the events if forces of contact are not known at all times.
+
+        Without contacts they are those of joints and efforts that the engine itself locates.
+        """
+        count, mechanism = len(samples), self._element.mechanism
+        if not mechanism.contacts:
+            return SeenInRun(count, located if mechanism.has_events else None, None)
+        if any(sample.q_WB is None for sample in samples):
+            return SeenInRun(count, None, None)
+        pressed = given_forces(mechanism, samples)
+        if count < 3 or np.isnan(pressed[1:]).any():
+            return SeenInRun(count, None, None)
+        placed = placed_from(self._element, times[:count], samples)
+        turning = np.abs(placed.w_WB).max(axis=(1, 2)) * self._element.length
+        speeds = np.maximum(np.abs(placed.v_WB).max(axis=(1, 2)), turning)
+        seen = self._events(times[:count], follow_contacts(placed), pressed, speeds)
+        return SeenInRun(count, self._reconciled(located or (), seen), None)
+
+    def bounces(self, columns: Columns) -> Sequence[Bounce]:
+        """See :class:`proofroll.core.element_abilities.TellsBounces`."""
+        return sampled_bounces(self._element.mechanism, columns)
+
+    def _reconciled(self, located: Sequence[Event], seen: Sequence[Event]) -> Sequence[Event]:
+        """The engine's own events of contacts, unless its samples show one that is not among them."""
+        names = {contact.name for contact in self._element.mechanism.contacts}
+        own = [event for event in located if event.name in names]
+        left = list(own)
+        for event in seen:
+            match = next((one for one in left if _alike(one, event)), None)
+            if match is None:
+                return seen
+            left.remove(match)
+        return own
+
+    def _events(self, times: FloatArray, found: Followed, pressed: FloatArray, speeds: FloatArray) -> list[Event]:
+        presses = normal_forces(found, pressed) > PRESSES * self._element.force
+        # Several engines have forces only after a first step, and a slip from rest is slow at first
+        presses[0] |= presses[1] & (found.gap[0] <= _CLOSED * self._element.length)
+        forces, presses = presses, _without_lone(presses)
+        u_n = np.sum(found.normal * found.slide, axis=-1)
+        for c in range(presses.shape[1]):
+            room, moves = _CLOSED * self._element.length, _CREEPS * self._element.speed
+            presses[:, c] |= _stays_closed(presses[:, c], found.gap[:, c], u_n[:, c], room, moves)
+        slips = presses & (found.slip > _CREEPS * self._element.speed)
+        slips[0] |= presses[0] & slips[1]
+        slips = presses & _without_lone(slips)
+        stands = (speeds <= _CREEPS * self._element.speed) & ~slips.any(axis=1)
+        events = []
+        for c, contact in enumerate(self._element.mechanism.contacts):
+            states = forces[:, c], presses[:, c], slips[:, c]
+            for k in range(len(times) - 1):
+                kind, at = _change(times, found, u_n[:, c], states, k, c)
+                if kind == EventKind.STICK and stands[k + 1]:
+                    kind = EventKind.REST
+                if kind:
+                    low, high = float(times[k]), float(times[k + 1])
+                    events.append(
+                        Event(kind=kind, time=min(max(at, low), high), time_low=low, time_high=high, name=contact.name)
+                    )
+        return sorted(events, key=lambda event: event.time)
+
+
+def _alike(one: Event, seen: Event) -> bool:
+    """True if an event may be the one seen in the samples: same contact and kind, at most one interval off."""
+    wide = seen.time_high - seen.time_low
+    near = seen.time_low - wide <= one.time <= seen.time_high + wide
+    return near and one.name == seen.name and _ALIKE.get(one.kind, one.kind) == _ALIKE.get(seen.kind, seen.kind)
+
+
+def _without_lone(states: _States) -> _States:
+    """States along time without runs of one sample, which take the value of their neighbours."""
+    lone = (states[:-2] == states[2:]) & (states[1:-1] != states[2:])
+    return np.concatenate([states[:1], np.where(lone, states[2:], states[1:-1]), states[-1:]])
+
+
+def _stays_closed(presses: _States, gap: FloatArray, u_n: FloatArray, room: float, moves: float) -> _States:
+    """Samples without force at which one contact is closed nevertheless, shape (time,).
+
+    These are whole stretches without force in which the gap does not open, and at the end of the run is not opening.
+
+    Args:
+        presses: True where the contact has a force, shape (time,).
+        gap: distance [m], shape (time,).
+        u_n: rate of the gap [m/s], shape (time,).
+        room: gap that counts as closed [m].
+        moves: speed that does not count as rest [m/s].
+    """
+    closed = np.zeros_like(presses)
+    edges = np.flatnonzero(np.diff(presses)) + 1
+    for low, high in zip([0, *edges.tolist()], [*edges.tolist(), len(presses)], strict=True):
+        opens = high == len(presses) and u_n[-1] > moves
+        closed[low:high] = not presses[low] and bool(np.any(presses)) and not opens and gap[low:high].max() <= room
+    return closed
+
+
+def _strikes(times: FloatArray, gap: FloatArray, u_n: FloatArray, pressed: _States, k: int) -> bool:
+    """True if an open contact touches between samples k and k + 1, where its gap begins to grow.
+
+    It does if it presses at one of them. Otherwise its gap must be able to close within the interval and to open again
+    to what it is afterwards. Nor does its speed change as it does in the intervals beside it, as that of a body which
+    swings past without a touch.
+    """
+    if pressed[k] or pressed[k + 1]:
+        return True
+    h = float(times[k + 1] - times[k])
+    beside = [j for j in (k - 1, k + 1) if 0 <= j < len(times) - 1]
+    rates = [float((u_n[j + 1] - u_n[j]) / (times[j + 1] - times[j])) for j in beside]
+    falls = max([-rate for rate in rates if rate < 0], default=0.0)
+    there, back = (
+        _fall_time(max(float(g), 0.0), abs(float(u)), falls) for g, u in ((gap[k], u_n[k]), (gap[k + 1], u_n[k + 1]))
+    )
+    smooth = len(rates) == 2 and min(rates) > 0 and float(u_n[k + 1] - u_n[k]) <= sum(rates) * h
+    return there <= _ROUNDED * h and there + back <= 2 * h and not smooth
+
+
+def _fall_time(gap: float, speed: float, acceleration: float) -> float:
+    """Time [s] in which a gap [m] closes at a speed [m/s] that grows [m/s²]."""
+    return 2 * gap / (speed + float(np.sqrt(speed**2 + 2 * acceleration * gap))) if gap else 0.0
+
+
+def _change(
+    times: FloatArray, found: Followed, u_n: FloatArray, states: tuple[_States, _States, _States], k: int, c: int
+) -> tuple[str, float]:
+    """Kind and time [s] of the event of contact c between samples k and k + 1; the kind is empty without an event.
+
+    Args:
+        times: of the samples [s].
+        found: the contacts along the motion.
+        u_n: rate of its gap [m/s], shape (time,).
+        states: truth values (pressed, touching, slipping) at each sample, each of shape (time,).
+        k: number of the sample before.
+        c: number of the contact.
+    """
+    pressed, presses, slips = states
+    start, middle = float(times[k]), float(times[k] + times[k + 1]) / 2
+    if not presses[k]:
+        closing = float(u_n[k])
+        if presses[k + 1] or (closing < 0 < u_n[k + 1] and _strikes(times, found.gap[:, c], u_n, pressed, k)):
+            return EventKind.IMPACT, start + float(found.gap[k, c]) / -closing if closing < 0 else middle
+        return "", start
+    if not presses[k + 1]:
+        return EventKind.LIFT_OFF, middle
+    if slips[k] and not slips[k + 1]:
+        before = float(found.slip[k - 1, c]) if k and slips[k - 1] else np.inf
+        slip, lost = float(found.slip[k, c]), before - float(found.slip[k, c])
+        whole = start + slip / lost * float(times[k] - times[k - 1]) if 0 < lost < np.inf else middle
+        return EventKind.STICK, whole
+    if slips[k + 1] and not slips[k]:
+        return EventKind.SLIP, middle
+    along = float(found.slide[k, c] @ found.slide[k + 1, c])
+    turned = slips[k] and along < _REVERSED * float(found.slip[k, c] * found.slip[k + 1, c])
+    return (EventKind.TURN, middle) if turned else ("", start)

@@ -1,0 +1,223 @@
+"""Gaps, slips, forces and residuals of contacts, as variables of a run and as observables."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from proofroll.core.arrays import FloatArray
+from proofroll.core.errors import Diverged
+from proofroll.core.events import EVENT_ORDER
+from proofroll.core.observable import Observable, Role
+from proofroll.elements.mechanism.contact.coulomb import largest_friction
+from proofroll.elements.mechanism.contact.touching import Moving, touch
+from proofroll.elements.mechanism.scene.joint_kinds import JointKind
+from proofroll.elements.mechanism.scene.shapes.geometry import shared_pairs
+from proofroll.elements.mechanism.scene.signal import varies
+
+if TYPE_CHECKING:
+    from proofroll.elements.mechanism.dynamics.placed import Placed
+    from proofroll.elements.mechanism.run.sampling import MechanismSample
+    from proofroll.elements.mechanism.scene.model import Mechanism
+
+
+# Residuals of Coulomb's law for the forces that a run reports: zero where they obey it.
+RESIDUALS = (
+    ("penetration", "m", "depth to which shapes overlap"),
+    ("contact_pull", "N", "normal forces that pull"),
+    ("cone_excess", "N", "friction beyond its coefficient times the normal force"),
+    ("friction_direction", "1", "1 + T·u/(μN|u|): friction that is less than its bound or not against the slip u"),
+    ("hop_speed", "m/s", "speed along the normal of pressing contacts"),
+    ("natural_map", "N", "distance of forces from where Coulomb's law projects them with the slip"),
+)
+# Conservation laws that hold through impacts: energy, if nothing drives the bodies; momentum, if nothing else acts on
+# them.
+LAWS = (
+    ("energy_gain", "J", "energy beyond that at the start"),
+    ("momentum_error", "N s", "momentum now minus that at the start"),
+    ("angular_momentum_error", "N m s", "moment of momentum about the origin now minus that at the start"),
+)
+# Least force of a pressing contact and least speed of a sliding one, relative to the mechanism's weight and speed.
+PRESSES, SLIDES = 1e-6, 1e-2
+# Error of contact forces, in parts of the largest, that no first look lets pass. Measured: at most 0.09 where contacts
+# are hard or damped, 0.9 to 1.1 where softened ones chatter, 1.2 for friction of thrice its size that drives.
+_WRONG = 1.0
+_AXIS = 1e-12  # largest component of a unit normal that counts as zero
+
+
+class Followed(NamedTuple):
+    """Geometry and motion of all contacts along a run.
+
+    Attributes:
+        gap: [m], shape (time, contacts).
+        slip: speed along the surfaces [m/s], shape (time, contacts).
+        normal: unit vectors from b to a, shape (time, contacts, 3).
+        slide: velocity of a relative to b at the contact [m/s], shape (time, contacts, 3).
+    """
+
+    gap: FloatArray
+    slip: FloatArray
+    normal: FloatArray
+    slide: FloatArray
+
+
+def follow_contacts(placed: Placed) -> Followed:
+    """Gaps, slip speeds, normals and sliding velocities of all contacts at all times."""
+    mechanism = placed.mechanism
+    shape = (len(placed.time), len(mechanism.contacts))
+    gap, slip, normal, slide = np.zeros(shape), np.zeros(shape), np.zeros((*shape, 3)), np.zeros((*shape, 3))
+    still = np.zeros((len(placed.time), 3))
+
+    def moving(body: str, k: int) -> Moving:
+        i = mechanism.body_index[body]
+        p, v, w = (still if i < 0 else values[:, i] for values in (placed.p_WB, placed.v_WB, placed.w_WB))
+        return Moving(p[k], placed.R_WB[k, i], v[k], w[k])
+
+    for c, contact in enumerate(mechanism.contacts):
+        for k in range(shape[0]):
+            found = touch(contact, moving(contact.body_a, k), moving(contact.body_b, k))
+            across = found.slide - found.normal * (found.normal @ found.slide)
+            gap[k, c], slip[k, c], normal[k, c] = found.gap, np.linalg.norm(across), found.normal
+            slide[k, c] = found.slide
+    return Followed(gap, slip, normal, slide)
+
+
+def kept_laws(mechanism: Mechanism) -> frozenset[str]:
+    """Names of the ``LAWS`` that hold for a mechanism with contacts, through any impact."""
+    if not mechanism.contacts or mechanism.actuators or any(joint.torque for joint in mechanism.joints):
+        return frozenset()
+    if mechanism.forces or any(varies(signal) for signal in mechanism.signals):
+        return frozenset()
+    ends = {name for contact in mechanism.contacts for name in (contact.body_a, contact.body_b)}
+    ends |= {name for spring in mechanism.links for name in (spring.body_a, spring.body_b)}
+    ends |= {name for loop in mechanism.loops for name in (loop.body_a, loop.body_b)}
+    held = any(joint.kind != JointKind.FREE and "world" in {joint.parent, joint.child} for joint in mechanism.joints)
+    held = held or "world" in ends or bool(np.any(mechanism.gravity))
+    return frozenset(name for name, _, _ in (LAWS[:1] if held else LAWS))
+
+
+def event_observables(mechanism: Mechanism) -> Iterator[Observable]:
+    """Observables of the events of contacts, joints and efforts."""
+    if mechanism.has_events:
+        meaning = "times of all events of contacts, joints and efforts"
+        yield Observable("event_times", "s", meaning, Role.EVENT, asked_for=False)
+        meaning = "events of another kind than the truth's"
+        yield Observable(EVENT_ORDER, "events", meaning, Role.EVENT, asked_for=False)
+
+
+def contact_observables(mechanism: Mechanism, sizes: Mapping[str, float], least: float) -> Iterator[Observable]:
+    """Observables of a mechanism with contacts.
+
+    Args:
+        mechanism: the mechanism.
+        sizes: natural size of a quantity, by its unit.
+        least: floor of an observable, relative to its natural size.
+    """
+    if not mechanism.contacts:
+        return
+    length, speed, force = (least * sizes[unit] for unit in ("m", "m/s", "N"))
+    yield Observable("gaps", "m", "distances between what may touch", Role.MOTION, floor=length)
+    yield Observable("slips", "m/s", "slip speeds of the contacts", Role.MOTION, floor=speed, asked_for=False)
+    meaning = "normal forces between what may touch"
+    yield Observable("normal_forces", "N", meaning, Role.REACTION, floor=force, headline=True, column=True)
+    meaning = "contact forces, where they are determinate"
+    told: dict[str, Any] = {"asked_for": False, "at_impacts": False}
+    yield Observable("contact_forces", "N", meaning, Role.REACTION, floor=force, always=_WRONG, **told)
+    if shared_pairs(mechanism.contacts):
+        meaning = "sums of the forces of each pair that touches at several places, where they are determinate"
+        yield Observable("pair_forces", "N", meaning, Role.REACTION, floor=force, **told)
+    meaning = "share of the samples so far without a normal force"
+    yield Observable("unpressed", "1", meaning, Role.REACTION, floor=1.0, asked_for=False)
+    laws = [law for law in LAWS if law[0] in kept_laws(mechanism)]
+    for name, unit, meaning in (*RESIDUALS, *laws):
+        difference = "energy" if unit == "J" else ""
+        yield Observable(
+            name, unit, meaning, Role.RESIDUAL, floor=1.0 if unit == "1" else least * sizes[unit],
+            asked_for=False, hangs_on_events=False, difference_of=difference,
+        )  # fmt: skip
+
+
+def residuals(
+    found: Followed,
+    pressed: FloatArray,
+    friction: FloatArray,
+    weight: float,
+    speed: float,
+    static: FloatArray | None = None,
+) -> dict[str, FloatArray]:
+    """Residuals of the contact laws and ``unpressed``, by name, shape (time, contacts).
+
+    ``penetration`` always has values; the others are NaN where no component of the force is known.
+
+    Args:
+        found: the contacts along the motion.
+        pressed: forces on their first bodies [N], shape (time, contacts, 3); NaN where not determinate.
+        friction: their coefficients while they slip, shape (contacts,).
+        weight: of the mechanism [N].
+        speed: natural speed, which scales slip against weight in the natural map [m/s].
+        static: coefficients while they stick; None: the same.
+    """
+    friction = np.where(found.slip > SLIDES * speed, friction, friction if static is None else static)
+    n, u_n = found.normal, np.sum(found.normal * found.slide, axis=-1)
+    complete, given = np.all(np.isfinite(pressed), axis=-1), np.any(np.isfinite(pressed), axis=-1)
+    N = normal_forces(found, pressed)
+    u = found.slide - n * u_n[..., None]
+    T = np.where(complete[..., None], pressed - N[..., None] * n, 0.0)
+    presses = np.asarray(PRESSES * weight < N)
+    t = np.linalg.norm(T, axis=-1)
+    bound = largest_friction(friction, np.where(presses, N, 0.0))
+    slides = np.asarray(presses & complete & (found.slip > SLIDES * speed) & (friction > 0))
+    against = np.sum(T * u, axis=-1) / (np.where(slides, bound, 1.0) * np.where(slides, found.slip, 1.0))
+    # De Saxcé's correction makes the law a projection onto the cone: λ = P(λ − r (u + μ|u_t| n))
+    r = weight / speed
+    slipping = np.where(np.isinf(friction), 0.0, friction)  # of what never slips the cone is a half space
+    pushed, pulled = N - r * (u_n + slipping * found.slip), T - r * u
+    length = np.linalg.norm(pulled, axis=-1)
+    kept, holds = _onto_cone(pushed, length, friction)
+    across = pulled * (holds / np.where(length > 0, length, 1.0))[..., None] - T
+    off = np.maximum(np.abs(kept - N), np.linalg.norm(across, axis=-1))
+    values = {
+        "penetration": np.maximum(-found.gap, 0.0),
+        "contact_pull": np.maximum(-N, 0.0),
+        "cone_excess": np.maximum(t - bound, 0.0),
+        "friction_direction": np.where(slides, 1.0 + against, 0.0),
+        "hop_speed": np.where(presses, np.abs(u_n), 0.0),
+        "natural_map": np.where(presses, np.where(complete, off, 0.0), t),
+    }
+    after = np.arange(len(N))[:, None]
+    values["unpressed"] = np.cumsum(np.where(after > 0, np.logical_not(presses), 0), axis=0) / np.maximum(after, 1)
+    own = {"penetration"}
+    return {name: value if name in own else np.where(given, value, np.nan) for name, value in values.items()}
+
+
+def normal_forces(found: Followed, pressed: FloatArray) -> FloatArray:
+    """Normal force of each contact [N], shape (time, contacts); known from the normal component alone, others NaN."""
+    along = np.abs(found.normal) > _AXIS
+    return np.asarray(np.sum(np.where(along, pressed, 0.0) * found.normal, axis=-1))
+
+
+def _onto_cone(N: FloatArray, T: FloatArray, friction: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Nearest point of the cone T ≤ μN to given normal forces and sizes of friction [N]: (normal force, friction)."""
+    finite = np.where(np.isinf(friction), 0.0, friction)
+    within = largest_friction(friction, N) >= T
+    beyond = np.where(np.isinf(friction), N <= 0, -finite * T >= N)
+    pressed = (N + finite * T) / (1 + finite**2)
+    kept = np.where(within, N, np.where(beyond, 0.0, pressed))
+    return kept, np.where(within, T, np.where(beyond, 0.0, finite * pressed))
+
+
+def given_forces(mechanism: Mechanism, samples: Sequence[MechanismSample]) -> FloatArray:
+    """Forces on body a of each contact [N], shape (time, contacts, 3); NaN where the engine does not know them.
+
+    Raises:
+        Diverged: the forces have another shape.
+    """
+    count = len(mechanism.contacts)
+    empty = np.full((count, 3), np.nan)
+    found = [empty if sample.contact_force is None else np.asarray(sample.contact_force) for sample in samples]
+    for given in found:
+        if given.size != 3 * count:
+            raise Diverged(f"the engine gave contact_force with shape {given.shape} instead of {(count, 3)}")
+    return np.array([given.reshape(count, 3) for given in found], dtype=np.float64)

@@ -1,0 +1,1 @@
+"""Mechanisms as scene files describe them, checked."""

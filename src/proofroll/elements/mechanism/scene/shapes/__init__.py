@@ -1,0 +1,1 @@
+"""Shapes of bodies, walls, and pairs of them that may touch."""

@@ -1,0 +1,1 @@
+"""Contacts of mechanisms in Exudyn."""

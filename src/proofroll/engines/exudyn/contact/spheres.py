@@ -1,0 +1,195 @@
+"""Formulation ``spheres``: bodies of :mod:`redundant` with Exudyn's penalty contacts of spheres.
+
+A sphere meets a plane as ``ObjectContactSphereTriangle``, with a triangle so wide that its edges are out of reach, and
+another sphere as ``ObjectContactSphereSphere``. Friction is proportional to the slip up to ``friction_zone`` and
+Coulomb's beyond, in the direction of the slip: a contact that should stick creeps.
+"""
+
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any, ClassVar, NamedTuple
+
+import numpy as np
+from typing_extensions import override
+
+from proofroll.core.engine import Regularised
+from proofroll.core.errors import NotUnique, Refused
+from proofroll.elements.mechanism import Mechanism
+from proofroll.elements.mechanism.contact.acting import OPEN
+from proofroll.elements.mechanism.contact.dynamics import ContactDynamics
+from proofroll.elements.mechanism.run.capabilities import MechanismCapability
+from proofroll.elements.mechanism.run.contacts.family import Family, of_contact
+from proofroll.elements.mechanism.run.sampling import MechanismBuilt, MechanismSample
+from proofroll.elements.mechanism.scene.rotations import Array, frame_of_axis
+from proofroll.elements.mechanism.scene.shapes.geometry import BodyContact
+from proofroll.elements.mechanism.scene.shapes.shapes import HalfSpace, SphereShape
+from proofroll.engines.exudyn.native import Output, exu, items
+from proofroll.engines.exudyn.settings import ExudynSettings
+from proofroll.engines.exudyn.smooth import redundant
+from proofroll.engines.exudyn.smooth.redundant import Redundant
+
+_CAPABILITY = MechanismCapability
+PROVIDES = (redundant.PROVIDES | {_CAPABILITY.CONTACT, _CAPABILITY.CONTACT_FRICTION}) - {_CAPABILITY.MOTIONS}
+LACKING: Mapping[str, str] = {
+    **redundant.LACKING,
+    _CAPABILITY.UNBOUNDED_FRICTION: "this model gives a contact a coefficient, and creeps by friction_zone with any",
+    _CAPABILITY.STATIC_FRICTION: "this formulation gives a contact one coefficient",
+    _CAPABILITY.SLIP_REBOUNDS: "this formulation has no rebounds",
+    _CAPABILITY.MOTIONS: "this formulation reads the force of a drive without that of contacts",
+    _CAPABILITY.TURNING_FRICTION: "this formulation gives a contact no moment",
+    _CAPABILITY.CONTACT_REBOUNDS: "its restitution is a damping that comes near it with ever shorter steps alone",
+}
+# m: distance from the centre of the triangle that stands for a plane to its sides.
+_WIDE = 1e3
+# Missing friction at the start, in units of the largest contact force: less than the first counts as none; the
+# tolerance of accelerations is at most the second, as for soft loops.
+_LITTLE, _LARGEST = 1e-6, 0.5
+# Relative error of accelerations at the start that Exudyn differentiates numerically.
+_DIFFERENCED = 1e-5
+_CORNERS = ((-1.0, -1.0, 0.0), (2.0, -1.0, 0.0), (-1.0, 2.0, 0.0))
+
+
+def family(settings: ExudynSettings) -> Mapping[str, str]:
+    """See :class:`proofroll.core.engine_abilities.TellsFamily`; the same for balls and for bodies of mechanisms."""
+    if settings.formulation not in {"spheres", "contact"}:
+        return of_contact(Family.HARD)
+    return of_contact(Family.SOFTENED, stiffness=settings.stiffness, zone=settings.friction_zone)
+
+
+class _Made(NamedTuple):
+    """One contact in Exudyn: its object, the sign of its force on body a, and how deep it starts [m]."""
+
+    item: Any
+    sign: float
+    sunk: float
+
+
+class Spheres(Redundant):
+    """Run with contacts of spheres; see :class:`proofroll.core.engine.Engine` for the methods."""
+
+    provides: ClassVar[frozenset[str]] = PROVIDES
+    lacking: ClassVar[Mapping[str, str]] = LACKING
+
+    def _add_contacts(self, mechanism: Mechanism, settings: ExudynSettings) -> None:
+        """Adds contacts at the depth of their load at the start, with spheres enlarged by that depth."""
+        self._contacts: list[_Made] = []
+        self._softness, self._larger, self._builds_up = 0.0, 0.0, False
+        if not mechanism.contacts:
+            return
+        for contact in mechanism.contacts:
+            _check(contact)
+        dynamics = ContactDynamics(mechanism)
+        try:
+            start = dynamics.solve(*mechanism.start(), dynamics.begin()[0])
+        except NotUnique:  # the contact forces are not determined
+            start = dynamics.solve(*mechanism.start(), (OPEN,) * len(dynamics.contacts))
+        lacking = 0.0
+        for number, contact in enumerate(mechanism.contacts):
+            each = start.state.touching[number]
+            slip = each.slide - each.normal * (each.normal @ each.slide)
+            pressed, speed = max(float(start.force[number] @ each.normal), 0.0), float(np.linalg.norm(slip))
+            self._contacts.append(self._add_contact(contact, each.gap, pressed, speed, settings))
+            if speed < settings.penalty[1]:
+                lacking += float(np.linalg.norm(start.force[number] - pressed * each.normal))
+        load = float(np.abs(start.force[: len(mechanism.contacts)]).max(initial=0.0))
+        self._builds_up = lacking > _LITTLE * load
+        if self._builds_up:
+            self._softness = min(_LARGEST, 2 * lacking / load)
+
+    def _add_contact(
+        self, contact: BodyContact, gap: float, pressed: float, slip: float, settings: ExudynSettings
+    ) -> _Made:
+        """Adds a contact with the normal force ``pressed`` [N], ``gap`` [m] and ``slip`` [m/s] at the start."""
+        stiffness, zone = settings.penalty[:2]
+        sunk = pressed / stiffness
+        sides = [(contact.body_a, contact.shape_a), (contact.body_b, contact.shape_b)]
+        sign = 1.0
+        if isinstance(contact.shape_a, HalfSpace):
+            sides, sign = sides[::-1], -1.0
+        (body, shape), (other, second) = sides
+        assert isinstance(shape, SphereShape)
+        self._larger = max(self._larger, sunk / shape.radius)
+        law: dict[str, Any] = {
+            "nodeNumber": self.system.AddNode(
+                items.NodeGenericData(initialCoordinates=[gap - sunk, slip, 0.0, 0.0], numberOfDataCoordinates=4)
+            ),
+            "dynamicFriction": contact.friction,
+            "frictionProportionalZone": zone,
+            "contactStiffness": stiffness,
+            "contactDamping": 2 * math.sqrt(stiffness * self._moved(body, other)),
+        }
+        if isinstance(second, HalfSpace):
+            frame = frame_of_axis(second.normal)
+            made = items.ObjectContactSphereTriangle(
+                markerNumbers=[self.marker(body, shape.centre), self.marker(other, second.point)],
+                sphereRadius=shape.radius + sunk,
+                trianglePoints=exu.Vector3DList([_WIDE * frame @ np.array(corner) for corner in _CORNERS]),
+                includeEdges=0,
+                **law,
+            )
+        else:
+            assert isinstance(second, SphereShape)
+            made = items.ObjectContactSphereSphere(
+                markerNumbers=[self.marker(body, shape.centre), self.marker(other, second.centre)],
+                spheresRadii=[shape.radius + sunk, second.radius],
+                **law,
+            )
+        return _Made(self.system.AddObject(made), sign, sunk)
+
+    def _moved(self, *bodies: str) -> float:
+        """Reduced mass of two bodies [kg]; the world counts as infinite."""
+        masses = {body.name: body.mass for body in self._mechanism.bodies}
+        return 1 / sum(1 / masses[body] for body in bodies if body in masses)
+
+    @override
+    def sample(self) -> MechanismSample:
+        force = [made.sign * np.array(self.system.GetObjectOutput(made.item, Output.Force)) for made in self._contacts]
+        return replace(super().sample(), contact_force=np.reshape(force, (len(force), 3)))
+
+    @override
+    def built(self) -> MechanismBuilt:
+        model = super().built()
+        if not self._contacts:
+            return model
+        gaps, normals, places = zip(*(self._lying(made) for made in self._contacts), strict=True)
+        model = replace(
+            model,
+            contact_gap=np.array(gaps),
+            contact_normal=np.array(normals),
+            contact_place=np.array(places),
+            contact_friction=np.array([self.system.GetObject(made.item)["dynamicFriction"] for made in self._contacts]),
+            contact_restitution=np.zeros(len(self._contacts)),
+        )
+        larger = Regularised(_DIFFERENCED + self._larger, "a sphere is larger by its indentation")
+        if self._builds_up:  # then the first accelerations lack friction and prove nothing
+            larger = Regularised(self._softness, "friction of a sticking contact builds up with the creep")
+            model = replace(model, acceleration=None, angular_acceleration=None)
+        return replace(model, regularised=dict.fromkeys(("acceleration", "angular_acceleration"), larger))
+
+    def _lying(self, made: _Made) -> tuple[float, Array, Array]:
+        """Gap [m], normal from b to a, and place [m] of a contact, read from Exudyn's object."""
+        item = self.system.GetObject(made.item)
+        now = exu.ConfigurationType.Current
+        one, two = (np.array(self.system.GetMarkerOutput(k, Output.Position, now)) for k in item["markerNumbers"])
+        if "spheresRadii" in item:
+            n = (one - two) / np.linalg.norm(one - two)
+            radius = item["spheresRadii"][0] - made.sunk
+            return float(n @ (one - two)) - radius - item["spheresRadii"][1], n, one - radius * n
+        R = np.reshape(self.system.GetMarkerOutput(item["markerNumbers"][1], Output.RotationMatrix, now), (3, 3))
+        corners = np.array([item["trianglePoints"][k] for k in range(3)]) @ R.T  # iterated over, it never ends
+        n = np.cross(corners[1] - corners[0], corners[2] - corners[0])
+        n /= np.linalg.norm(n)
+        radius = item["sphereRadius"] - made.sunk
+        return float(n @ (one - two - corners[0])) - radius, made.sign * n, one - radius * n
+
+
+def _check(contact: BodyContact) -> None:
+    """Raises Refused for shapes that Exudyn's contacts do not have."""
+    for shape in (contact.shape_a, contact.shape_b):
+        if isinstance(shape, SphereShape) and not shape.radius:
+            raise Refused(f"a corner touches in {contact.name}; Exudyn's contacts are of spheres with a radius")
+        if not isinstance(shape, SphereShape | HalfSpace):
+            raise Refused(
+                f"{contact.name} has a shape that is neither sphere nor plane; this formulation has no contact for it"
+            )

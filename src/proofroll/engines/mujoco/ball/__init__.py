@@ -1,0 +1,1 @@
+"""A ball on a surface in MuJoCo."""

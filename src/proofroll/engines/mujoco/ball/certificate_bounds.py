@@ -1,0 +1,146 @@
+"""Certificate tolerances for MuJoCo's soft contact: bounds of its errors at time 0."""
+
+import math
+from collections.abc import Iterator, Mapping
+
+import numpy as np
+
+from proofroll.core.engine import Regularised
+from proofroll.elements.ball_on_surface.mechanics import initial_response, natural_acceleration, newton_euler
+from proofroll.elements.ball_on_surface.model import RollingBall
+from proofroll.engines.mujoco.ball.friction import corrects
+from proofroll.engines.mujoco.settings import PRELOAD, MujocoSettings
+
+_FORCES = ("acceleration", "N", "F2", "F3")
+_MORE = "friction against turning or rolling, which the scene does not ask for, turns the ball otherwise"
+# The bounds below are asymptotic in depth/a, and MuJoCo's Newton solver stops at a relative 1e-8.
+_MARGIN = 1.1
+_SOLVER = 1e-8
+_ROUND_OFF = 1e-12
+# Part of a lift that the solver's tolerance leaves: 3e-5 at most was seen.
+_OF_LIFT = 1e-4
+# Error left where a state at time 0 is found by iteration.
+_SEQUENCE = 1e-6
+
+
+def softness(body: RollingBall, settings: MujocoSettings) -> Mapping[str, Regularised]:
+    """Certificate quantity -> its tolerance with the reason."""
+    a, r = body.ball.radius, body.ball.inertia_ratio
+    e1 = body.surface.normal(body.p0)
+    e1_rate = body.surface.normal_gradient(body.p0) @ body.v0
+    bend = abs(float(e1_rate @ body.v0))
+    gravity = float(np.linalg.norm(body.gravity))
+    load = bend + gravity
+    least, most = settings.impedances
+    scale = natural_acceleration(body)
+    lacks = settings.formulation != "chart" and not settings.curvature
+    # Normal acceleration missing at depth zero: the share 1 - d of the load, which the impedance does not carry, the
+    # normal acceleration of the path (``bend``) if J̇v is missing, and its change over ``normal_lead``. Along the wall
+    # a ω × ė1 is missing, divided between motion and friction.
+    ahead = 2 * settings.normal_lead * abs(float(e1_rate @ initial_response(body)[0]))
+    pressed = PRELOAD if corrects(body.contact, settings) else 0.0
+    missing = (1 - least + pressed) * load + ahead + (bend if lacks else 0.0)
+    turning = np.cross(e1, np.cross(body.w0, e1_rate))  # its part along the wall, turned
+    creep = a * float(np.linalg.norm(turning)) * r / (1 + r) if lacks else 0.0
+    why = "the impedance of a soft contact is below 1" + (" and its rows lack J̇v" if lacks else "")
+    result = dict(_computed(body, settings))
+    if settings.start == "touching":
+        # Friction is bounded by the little normal force of a contact at depth zero.
+        supplied = least * max(float(body.gravity @ e1) + (0.0 if lacks else bend), 0.0)
+        lost = _law_of_friction(body, settings, supplied * body.ball.mass) + _lift_of_slip(body, settings)
+        why += "; the ball starts at depth zero, where no depth makes up for it"
+        if lost:
+            why += " and the normal force that remains does not hold the friction"
+        soft = _MARGIN * (missing + creep + lost) / scale + _SOLVER
+        if soft >= 1 and not np.any(body.slip0):
+            why += ": accelerations and forces at time 0 are not checked"
+        return result | _dynamics(body, settings, soft, why)
+    # At the depth of a settled start, the reference acceleration k depth, k = d / (dmax tc)², of which the impedance
+    # turns the part d into acceleration, supplies what is missing.
+    depth = _MARGIN * missing * (most * settings.contact_time / least) ** 2 / a
+    sunk = f"a soft contact carries the load only at a depth, {depth:.1e} of the radius at most"
+    rolls = "MuJoCo's contact point, at which it rolls, lies midway in that depth"
+    # A ball that starts slipping may turn faster than it would roll.
+    speed = float(np.linalg.norm(body.v0)) or math.sqrt(a * gravity) or 1.0
+    turns = max(1.0, a * float(np.linalg.norm(body.w0)) / speed)
+    # The depth shortens the lever of friction, which balances gravity along the wall.
+    law = _MARGIN * (_law_of_friction(body, settings, None) + _lift_of_slip(body, settings))
+    if law:
+        why += "; as the ball slips from the start, MuJoCo's cone of friction lifts it or turns its friction"
+    soft = (2 * (1 - least) * load + depth * gravity + _MARGIN * creep + law) / scale + _SOLVER
+    return result | {
+        "position": Regularised(depth, sunk),
+        "gap": Regularised(depth, sunk),
+        "gap in the engine": Regularised(depth, sunk),
+        "spin": Regularised(depth / 2 + _SOLVER, rolls),
+        "slip": Regularised(turns * depth / 2, rolls),
+        **_dynamics(body, settings, soft, why),
+    }
+
+
+def _dynamics(body: RollingBall, settings: MujocoSettings, soft: float, why: str) -> dict[str, Regularised]:
+    """Tolerances of accelerations and forces; ``soft`` is that of the centre, relative to the natural acceleration.
+
+    An error F of friction changes the acceleration by F/m, and a times the angular acceleration by a² F/J: m a²/J times
+    as much. Rolling resistance adds f to the lever a. A contact's own friction against turning and rolling adds moments
+    of at most N times the coefficient.
+    """
+    a = body.ball.radius
+    turning = soft * (1 + body.contact.rolling_resistance / a) / body.ball.inertia_ratio
+    _, about_normal, rolling = settings.friction_coefficients(1.0)
+    if about_normal or rolling:
+        # Relative to the natural force, which N does not exceed by more than gravity.
+        why += "; " + _MORE
+        soft += 2 * rolling / a
+        turning += 2 * (about_normal + rolling) / a / body.ball.inertia_ratio
+    return dict.fromkeys(_FORCES, Regularised(soft, why)) | {"angular acceleration": Regularised(turning, why)}
+
+
+def _computed(body: RollingBall, settings: MujocoSettings) -> Iterator[tuple[str, Regularised]]:
+    """Tolerances of the coefficient that stands for unbounded friction, of rolling resistance and of the velocity."""
+    if math.isinf(body.contact.mu_static):
+        stands = f"MuJoCo has no unbounded friction: a coefficient of {settings.friction:g} stands for it"
+        for name in ("1 / static friction", "1 / kinetic friction"):
+            yield name, Regularised((1 + _ROUND_OFF) / settings.friction, stands)
+    if body.contact.rolling_resistance:
+        yield "rolling resistance", Regularised(_SOLVER, "its torque uses the normal force of the evaluation before")
+    if settings.velocity_lag:
+        # With the correction of a slip, that acceleration is found by iteration.
+        share = _SEQUENCE if corrects(body.contact, settings) else _SOLVER
+        yield "velocity", Regularised(share, "it is MuJoCo's of half a step before plus half a step's acceleration")
+
+
+def _lift_of_slip(body: RollingBall, settings: MujocoSettings) -> float:
+    """Normal acceleration from MuJoCo's cone on a ball that starts slipping: μ b times the slip, b its damping [m/s²].
+
+    The correction of the cone removes it up to the solver's tolerance, a part of so large a number.
+    """
+    damping = 2 / (settings.impedances[1] * settings.contact_time)
+    left = _OF_LIFT if corrects(body.contact, settings) else 1.0
+    slip = float(np.linalg.norm(body.slip0))
+    return left * (damping * slip * body.contact.mu_kinetic if slip else 0.0)
+
+
+def _law_of_friction(body: RollingBall, settings: MujocoSettings, unloaded: float | None) -> float:
+    """Bound of the error of the acceleration at time 0 from MuJoCo's law of friction [m/s²]; 0 if the ball sticks.
+
+    ``unloaded`` is the normal force of a contact at depth zero, which has not its full load yet [N].
+    """
+    ball, contact = body.ball, body.contact
+    bounded = math.isfinite(contact.mu_static)
+    static, kinetic = (contact.mu_static, contact.mu_kinetic) if bounded else (settings.friction, settings.friction)
+    e1 = body.surface.normal(body.p0)
+    force = newton_euler(body, body.p0, body.v0, body.w0)[2]
+    loaded = -float(force @ e1)
+    needed = float(np.linalg.norm(force + loaded * e1))
+    if not bounded and (unloaded is None or needed > static * loaded):
+        return 0.0  # a ball that slips under its full load shows a coefficient that is too small, not softness
+    N = loaded if unloaded is None else unloaded
+    pyramidal = settings.cone == "pyramidal"
+    if needed * (math.sqrt(2) if pyramidal else 1.0) <= static * N:
+        return 0.0
+    slip_rate = max(needed - kinetic * N, 0.0) * (1 / ball.mass + ball.radius**2 / ball.inertia)
+    lift = 0.0 if corrects(contact, settings) else kinetic * slip_rate
+    # Friction of the unloaded contact is wrong altogether; that of a loaded pyramid has a wrong direction.
+    wrong = (min(needed, static * loaded) if unloaded is not None else 0.0) + (kinetic * N if pyramidal else 0.0)
+    return lift + wrong / ball.mass

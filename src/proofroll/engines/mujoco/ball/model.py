@@ -1,0 +1,178 @@
+"""MuJoCo model of a ball's scene: structure from the scene's MJCF file, all physical numbers from the scene.
+
+A scene without a file gets the structure that is written here.
+"""
+
+import math
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from proofroll.core.arrays import FloatArray
+from proofroll.core.errors import Refused
+from proofroll.core.scene import Scene
+from proofroll.elements.ball_on_surface.model import RollingBall
+from proofroll.engines.mujoco.ball.contact import MEMORY
+from proofroll.engines.mujoco.ball.friction import SLIP_MEMORY, condim, corrects
+from proofroll.engines.mujoco.settings import MujocoSettings
+
+# How much of the wall's tangent plane is drawn, in radii of the ball; for MuJoCo it has no end.
+_SEEN = 4.0
+
+_FREE = """
+<mujoco model="{name}, free">
+  <worldbody>
+    <light pos="0 0 1"/>
+    <body name="wall" mocap="true">
+      <geom name="wall" type="plane" size="{seen} {seen} 0.01"/>
+    </body>
+    <body name="ball">
+      <freejoint name="spin"/>
+      <geom name="ball" type="sphere" size="{radius}"/>
+    </body>
+  </worldbody>
+</mujoco>
+"""
+# The masses of carriage and slider are the least that MuJoCo accepts, and do not count.
+_CHART = """
+<mujoco model="{name}, chart">
+  <worldbody>
+    <light pos="0 0 1"/>
+    <geom name="wall" type="plane" size="{seen} {seen} 0.01"/>
+    <body name="chart">
+      <body name="carriage">
+        <inertial pos="0 0 0" mass="1e-13" diaginertia="1e-14 1e-14 1e-14"/>
+        <joint name="u1" type="{first}"/>
+        <joint name="u2" type="{second}"/>
+        <site name="touch" zaxis="-1 0 0" size="0.003"/>
+        <body name="slider">
+          <inertial pos="0 0 0" mass="1e-13" diaginertia="1e-14 1e-14 1e-14"/>
+          <joint name="normal" type="slide" axis="1 0 0"/>
+          <body name="ball">
+            <joint name="spin" type="ball"/>
+            <geom name="ball" type="sphere" size="{radius}"/>
+          </body>
+        </body>
+      </body>
+    </body>
+  </worldbody>
+</mujoco>
+"""
+_JOINTS = {"rotation": "hinge", "translation": "slide"}
+
+
+def read_spec(scene: Scene, body: RollingBall, formulation: str) -> Any:
+    """MjSpec of the scene's MJCF file for this formulation; without a file, a model of the same structure.
+
+    Raises:
+        Refused: the scene does not name the file, MuJoCo cannot read it, or the formulation needs one and has none.
+    """
+    path = scene.folder / f"mujoco_{formulation}.xml"
+    if scene.folder == Path() or not path.is_file():
+        return mujoco.MjSpec.from_string(_written(body, scene.name, formulation))
+    if path.name not in scene.files:
+        raise Refused(f'the scene does not name the model beside it; write files = ["{path.name}"] into scene.toml')
+    try:
+        return mujoco.MjSpec.from_file(str(path))
+    except ValueError as error:
+        raise Refused(f"MuJoCo cannot read {path.name}: {' '.join(str(error).split())}") from None
+
+
+def _written(body: RollingBall, name: str, formulation: str) -> str:
+    """MJCF of a model without a file.
+
+    Raises:
+        Refused: the formulation needs a file, or two motions that slide the surface along itself, and there are none.
+    """
+    names = {"name": name, "radius": body.ball.radius, "seen": _SEEN * body.ball.radius}
+    if formulation == "free":
+        return _FREE.format(**names)
+    if formulation != "chart":
+        raise Refused(f"{formulation} needs a wall made of MuJoCo's shapes, mujoco_{formulation}.xml beside the scene")
+    if body.surface.generators is None:
+        raise Refused(
+            "chart moves the ball by two joints in a row that slide its wall along itself, as those of planes and "
+            "cylinders do: on a sphere they are singular at the bottom, elsewhere they would not follow the wall's "
+            "curvature, and the J̇v that MuJoCo leaves out would remain; use free"
+        )
+    joint_1, joint_2 = (_JOINTS[generator.kind] for generator in body.surface.generators)
+    return _CHART.format(**names, first=joint_1, second=joint_2)
+
+
+def write_physics(spec: Any, body: RollingBall, settings: MujocoSettings) -> None:
+    """Sets the numbers that all formulations share: ball, gravity, contact and solver."""
+    ball = spec.body("ball")
+    ball.explicitinertial = True
+    ball.mass = body.ball.mass
+    ball.inertia = np.full(3, body.ball.inertia)
+    ball.ipos = np.zeros(3)
+    spec.geom("ball").size = [body.ball.radius, 0.0, 0.0]
+    option = spec.option
+    option.gravity = body.gravity
+    option.timestep = settings.dt
+    option.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{settings.integrator.upper()}")
+    option.cone = getattr(mujoco.mjtCone, f"mjCONE_{settings.cone.upper()}")
+    spec.nuserdata = MEMORY if body.contact.rolling_resistance else 0
+    spec.nuserdata += SLIP_MEMORY if corrects(body.contact, settings) else 0
+    # A diverging run must be seen: by default MuJoCo resets the model to its initial state and goes on.
+    option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
+    mu = body.contact.mu_static if math.isfinite(body.contact.mu_static) else settings.friction
+    for geom in spec.geoms:
+        geom.condim = condim(mu, settings)
+        geom.friction = settings.friction_coefficients(mu)
+        # MuJoCo's defaults are written too: the file may hold others.
+        geom.solref = [settings.contact_time, 1.0]
+        geom.solimp = settings.solimp
+    if settings.friction_damping is not None:
+        _write_pair(spec, settings, mu, settings.friction_damping)
+    if body.contact.restitution is not None:
+        _write_restitution(spec, body, settings, mu)
+
+
+def _write_restitution(spec: Any, body: RollingBall, settings: MujocoSettings, mu: float) -> None:
+    """Writes an impact as one step of damping, (1 + e)/dt in solref's direct format: it takes 1 + e times the velocity.
+
+    The stiffness, without which the format is not valid, is too small to matter.
+    """
+    for geom in spec.geoms:
+        geom.solref = [-1.0, -(1 + (body.contact.restitution or 0.0)) / settings.dt]
+    if settings.cone == "elliptic":
+        _write_pair(spec, settings, mu, 1 + body.contact.tangential_restitution)
+
+
+def _write_pair(spec: Any, settings: MujocoSettings, mu: float, damping: float) -> None:
+    """Declares the contact as a pair of geoms, for only a pair has ``solreffriction``; it replaces MuJoCo's own."""
+    pair = spec.add_pair(geomname1="wall", geomname2="ball", condim=condim(mu, settings))
+    sliding, turning, rolling = settings.friction_coefficients(mu)
+    pair.friction = [sliding, sliding, turning, rolling, rolling]
+    pair.solref, pair.solimp = spec.geom("ball").solref, spec.geom("ball").solimp
+    # Stiffness and damping with the sign that marks the direct format; a slip has no position to be stiff about.
+    pair.solreffriction = [-1.0, -damping / settings.dt]
+
+
+def pose(element: Any, position: FloatArray, quaternion: FloatArray) -> None:
+    """Puts an element of a spec at ``position`` [m] with ``quaternion``.
+
+    An orientation that the file gives in another form (``zaxis``, ``xyaxes``, ``euler``) would silently win over the
+    quaternion when the spec is compiled, so it is taken away.
+    """
+    element.alt.type = mujoco.mjtOrientation.mjORIENTATION_QUAT
+    element.pos = position
+    element.quat = quaternion
+
+
+def tangent_plane(body: RollingBall) -> tuple[FloatArray, FloatArray]:
+    """Point [m] and quaternion of the plane that touches the ball at its start; its z axis points to the ball."""
+    e1 = body.surface.normal(body.p0)
+    quaternion = np.zeros(4)
+    mujoco.mju_quatZ2Vec(quaternion, -e1)
+    return body.p0 + body.ball.radius * e1, quaternion
+
+
+def quaternion_of(axes: FloatArray) -> FloatArray:
+    """MuJoCo's quaternion of a frame whose axes are the columns of ``axes``, shape (4,)."""
+    quaternion = np.zeros(4)
+    mujoco.mju_mat2Quat(quaternion, np.ascontiguousarray(axes).ravel())
+    return quaternion

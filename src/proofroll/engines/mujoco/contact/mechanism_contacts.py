@@ -1,0 +1,327 @@
+"""Contacts of a mechanism: geoms and pairs of an MjSpec, and the contacts that MuJoCo finds, read back.
+
+A vertex is a sphere of almost no radius, a circle a cylinder of almost no height, and a plane on a moving body, which
+MuJoCo refuses, the top of a wide box.
+"""
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import mujoco
+import numpy as np
+
+from proofroll.core.errors import Refused
+from proofroll.elements.mechanism import WORLD, Mechanism, Tree
+from proofroll.elements.mechanism.contact.start import touches
+from proofroll.elements.mechanism.contact.touching import Moving, touch
+from proofroll.elements.mechanism.run.sampling import DEPENDENT
+from proofroll.elements.mechanism.scene.rotations import Array, cross, frame_of_axis, to_quaternion
+from proofroll.elements.mechanism.scene.shapes.box_features import CORNERS, BoxSlot
+from proofroll.elements.mechanism.scene.shapes.geometry import BodyContact
+from proofroll.elements.mechanism.scene.shapes.shapes import (
+    BoxShape,
+    CapsuleShape,
+    CircleShape,
+    CylinderShape,
+    EllipsoidShape,
+    HalfSpace,
+    Shape,
+    SphereShape,
+)
+from proofroll.elements.mechanism.scene.shapes.walls import CurvedWall
+from proofroll.engines.mujoco.ball.friction import NEAR_CONE, check_coefficients
+from proofroll.engines.mujoco.settings import UNBOUNDED_FRICTION, MujocoSettings
+
+# m; MuJoCo has no sphere of radius 0.
+_VERTEX = 1e-12
+# Half the height of a circle's cylinder, as a part of its radius.
+_FLAT = 1e-10
+# m: half the width and half the depth of the box whose top stands for a plane on a moving body. A sphere that goes
+# deeper than it is wide would be pushed out at its side.
+_WIDE, _DEEP = 1e3, 1.0
+# m: gap below which MuJoCo has a contact in its equations. At 0, round-off would decide what touches at the start.
+_MARGIN = 1e-9
+# m: margin within which contacts are searched to be read back, so large that every one is found.
+_FAR = 1e6
+# Factor on rates of the step before, so that their errors open no contact. With twice the rate, contacts that stick
+# beside others that slide would swing with a period of two steps.
+_LEAD = 1.1
+
+
+def check_contacts(mechanism: Mechanism, settings: MujocoSettings) -> None:
+    """Refuses the first contact that MuJoCo would silently change or cannot represent."""
+    moving = _moving(mechanism)
+    for contact in mechanism.contacts:
+        check_coefficients([_coefficient(contact)], settings, "a contact")
+        sides = ((contact.body_a, contact.shape_a), (contact.body_b, contact.shape_b))
+        for (body, shape), (_, partner) in (sides, sides[::-1]):
+            if isinstance(shape, CurvedWall):
+                raise Refused(
+                    f"{contact.name} has the wall {shape.kind}; this adapter builds convex geoms alone, as facets are "
+                    "another surface"
+                )
+            if isinstance(shape, HalfSpace) and body in moving and not isinstance(partner, SphereShape):
+                raise Refused(
+                    f"the plane of {contact.name} moves with {body}; MuJoCo's planes stand, and a box in its place "
+                    "meets spheres alone exactly"
+                )
+
+
+def write_contacts(spec: Any, bodies: dict[str, Any], mechanism: Mechanism, settings: MujocoSettings) -> None:
+    """Adds geoms ``contact<k>a`` and ``contact<k>b`` and a pair for each contact k; no other geoms meet."""
+    spec.option.cone = getattr(mujoco.mjtCone, f"mjCONE_{settings.cone.upper()}")
+    moving = _moving(mechanism)
+    for number, contact in enumerate(mechanism.contacts):
+        if contact.box_slot is not None and contact.slot:
+            continue  # the first contact of two boxes stands for all
+        names = [f"contact{number}{end}" for end in "ab"]
+        ends = ((contact.body_a, contact.shape_a), (contact.body_b, contact.shape_b))
+        for name, (body, shape) in zip(names, ends, strict=True):
+            geom = bodies[body].add_geom(name=name, mass=0.0, contype=0, conaffinity=0)
+            _set_shape(geom, shape, body in moving)
+        pair = spec.add_pair(name=f"contact{number}", geomname1=names[0], geomname2=names[1], margin=_MARGIN)
+        _set_pair_law(pair, contact, settings)
+
+
+def _set_pair_law(pair: Any, contact: BodyContact, settings: MujocoSettings) -> None:
+    """Sets friction, softness and restitution.
+
+    Restitution is one step of damping in solref's direct format: (1 + e)/dt takes away 1 + e times the normal velocity.
+    Friction has its own ``solreffriction``, or the slip would be reversed too.
+    """
+    pair.condim = 3 if contact.friction else 1
+    pair.friction = (_coefficient(contact), _coefficient(contact), 0.0, 0.0, 0.0)
+    settings.soften(pair)
+    if contact.restitution:
+        pair.solref = (-1.0, -(1 + contact.restitution) / settings.dt)
+        pair.solreffriction = (-1e-9, -1 / settings.dt)
+
+
+def _coefficient(contact: BodyContact) -> float:
+    """Coefficient of a contact in MuJoCo, which has no unbounded friction."""
+    return min(contact.friction, UNBOUNDED_FRICTION)
+
+
+def _set_shape(geom: Any, shape: Shape, moves: bool) -> None:
+    if isinstance(shape, HalfSpace):
+        frame = frame_of_axis(shape.normal)
+        geom.quat = to_quaternion(frame)
+        if moves:
+            geom.type, geom.size = mujoco.mjtGeom.mjGEOM_BOX, (_WIDE, _WIDE, _DEEP)
+            geom.pos = shape.point - _DEEP * frame[:, 2]
+        else:
+            geom.type, geom.size, geom.pos = mujoco.mjtGeom.mjGEOM_PLANE, (0.0, 0.0, 1.0), shape.point
+        return
+    assert not isinstance(shape, CurvedWall)  # refused
+    geom.pos = shape.centre
+    if isinstance(shape, SphereShape):
+        geom.type, geom.size = mujoco.mjtGeom.mjGEOM_SPHERE, (max(shape.radius, _VERTEX), 0.0, 0.0)
+    elif isinstance(shape, EllipsoidShape):
+        geom.type, geom.size, geom.quat = mujoco.mjtGeom.mjGEOM_ELLIPSOID, shape.axes, to_quaternion(shape.frame)
+    elif isinstance(shape, BoxShape):
+        geom.type, geom.size, geom.quat = mujoco.mjtGeom.mjGEOM_BOX, shape.half, to_quaternion(shape.frame)
+    elif isinstance(shape, CapsuleShape | CylinderShape):
+        kind = "CAPSULE" if isinstance(shape, CapsuleShape) else "CYLINDER"
+        geom.type, geom.size = getattr(mujoco.mjtGeom, f"mjGEOM_{kind}"), (shape.radius, shape.half, 0.0)
+        geom.quat = to_quaternion(frame_of_axis(shape.axis))
+    else:
+        assert isinstance(shape, CircleShape)
+        geom.type, geom.size = mujoco.mjtGeom.mjGEOM_CYLINDER, (shape.radius, _FLAT * shape.radius, 0.0)
+        geom.quat = to_quaternion(frame_of_axis(shape.normal))
+
+
+def _moving(mechanism: Mechanism) -> frozenset[str]:
+    """Names of the bodies that are not fixed to the world."""
+    still = {WORLD}
+    for joint in mechanism.joints:  # sorted: the parent comes first
+        if not joint.nv and joint.parent in still:
+            still.add(joint.child)
+    return frozenset({body.name for body in mechanism.bodies} - still)
+
+
+class ContactsRead(NamedTuple):
+    """Contacts as MuJoCo finds them.
+
+    Gaps [m], normals from b to a, places [m], coefficients, and the Delassus matrix [1/kg].
+    """
+
+    gap: Array
+    normal: Array
+    place: Array
+    friction: Array
+    restitution: Array
+    response: Array
+
+
+class Contacts:
+    """The contacts of a compiled model."""
+
+    def __init__(self, model: Any, mechanism: Mechanism) -> None:
+        self._model, self._mechanism = model, mechanism
+        firsts = [k - contact.slot if contact.box_slot else k for k, contact in enumerate(mechanism.contacts)]
+        self._geoms = [[model.geom(f"contact{k}{end}").id for end in "ab"] for k in firsts]
+        self._boxes = {k for k, contact in enumerate(mechanism.contacts) if contact.box_slot and not contact.slot}
+        # Geom -> number of its contact, and 1 if the geom is body a's or -1 if it is body b's.
+        self._of_geom = {a: (k, 1.0) for k, (a, _) in zip(firsts, self._geoms, strict=True)}
+        self._of_geom |= {b: (k, -1.0) for k, (_, b) in zip(firsts, self._geoms, strict=True)}
+        self._normal_rows: dict[int, list[Array]] = {}
+
+    def forces(self, data: Any) -> Array:
+        """Forces on body a of each contact in the world [N], shape (contacts, 3)."""
+        total, wrench = np.zeros((len(self._geoms), 3)), np.zeros(6)
+        for index in range(data.ncon):
+            contact = data.contact[index]
+            mujoco.mj_contactForce(self._model, data, index, wrench)
+            number, sign = self._contact(data, contact)
+            # The frame's first axis points from geom[0] to geom[1], and the force is the one on geom[1].
+            total[number] += sign * (contact.frame.reshape(3, 3).T @ wrench[:3])
+        return total
+
+    def correct(self, data: Any, rows: Array) -> None:
+        """Subtracts from the normal rows what lifts contacts in MuJoCo and not in mechanics; the cone must be elliptic.
+
+        Friction in MuJoCo is the dual of a convex cone: friction rows that miss their reference accelerations by r add
+        mu r to the normal acceleration, and the contact hops. With the damping b of the slip s, r = b s + ds/dt; ds/dt
+        is that of the evaluation before. Where r would be negative, friction ends the slip, and nothing is lifted. The
+        second lift is the turning of the normal row (J̇v), which MuJoCo leaves out; it follows from the row of the step
+        before (:meth:`remember`). Rates that press a contact instead are left to it.
+
+        Args:
+            data: MuJoCo's data after its reference accelerations and before its forces.
+            rows: Jacobian of all rows, shape (nefc, nv).
+        """
+        dt, rates = self._model.opt.timestep, rows @ data.qacc
+        for index in range(data.ncon):
+            contact = data.contact[index]
+            row, mu = int(contact.efc_address), float(contact.friction[0])
+            if row < 0:
+                continue
+            turns = [rows[row] - previous for previous in self._normal_rows.get(self._number(contact), ())]
+            if turns:  # a pair that meets in several points: the nearest row
+                turning = float(min(turns, key=np.linalg.norm) @ data.qvel) / dt
+                data.efc_aref[row] -= _LEAD * max(turning, 0.0)
+            friction = slice(row + 1, row + contact.dim)
+            slip = float(np.linalg.norm(data.efc_vel[friction]))
+            if contact.dim == 1:
+                continue
+            # from rest a slip starts along its acceleration
+            slip_rates = rates[friction] if slip == 0 else data.efc_vel[friction]
+            size = float(np.linalg.norm(slip_rates))
+            rate = float(slip_rates @ rates[friction]) / size if size else 0.0
+            damped = float(data.efc_KBIP[row + 1, 1]) * slip
+            if damped + rate > 0:
+                data.efc_aref[row] -= mu * (damped + _LEAD * max(rate, 0.0))
+
+    def remember(self, data: Any, rows: Array) -> None:
+        """Keeps the normal rows of a step for :meth:`correct` in the next one; the same arguments."""
+        self._normal_rows = {}
+        for index in range(data.ncon):
+            contact = data.contact[index]
+            if contact.efc_address >= 0:
+                self._normal_rows.setdefault(self._number(contact), []).append(rows[int(contact.efc_address)])
+
+    def _number(self, contact: Any) -> int:
+        """Number of the mechanism's contact to which MuJoCo's contact belongs."""
+        return self._of_geom[int(contact.geom[1])][0]
+
+    def _contact(self, data: Any, contact: Any) -> tuple[int, float]:
+        """Number of the mechanism's contact that MuJoCo's contact is, and 1 or -1: its force acts on body a or b.
+
+        Of two boxes it is the nearest of their corners and crossings.
+        """
+        number, sign = self._of_geom[int(contact.geom[1])]
+        if number not in self._boxes:
+            return number, sign
+        contacts, none = self._mechanism.contacts, np.zeros(3)
+        slot = contacts[number].box_slot
+        assert slot is not None  # as of all of these
+        bodies = [self._model.body(name).id for name in (contacts[number].body_a, contacts[number].body_b)]
+        a, b = (Moving(data.xpos[body], data.xmat[body].reshape(3, 3), none, none) for body in bodies)
+        found = [touch(contacts[k], a, b) for k in range(number, number + slot.count)]
+        away = [np.inf if each.absent else float(np.linalg.norm(each.place - contact.pos)) for each in found]
+        return number + int(np.argmin(away)), sign
+
+    def add_turning(self, data: Any) -> None:
+        """Adds J̇v, which MuJoCo leaves out of the rows of contacts, to the reference accelerations at the start."""
+        mechanism = self._mechanism
+        motion = Tree(mechanism).at(*mechanism.start())
+        touching, rate = touches(mechanism, motion), np.zeros((3, self._model.nv))
+        for index in range(data.ncon):
+            contact = data.contact[index]
+            row = int(contact.efc_address)
+            number, sign = self._contact(data, contact)
+            contact_of_scene, touch = mechanism.contacts[number], touching[number]
+            missing = np.zeros(3)
+            for body, side in ((contact_of_scene.body_a, 1.0), (contact_of_scene.body_b, -1.0)):
+                k = mechanism.body_index[body]
+                mujoco.mj_jacDot(self._model, data, rate, None, touch.place, self._model.body(body).id)
+                moving = Moving(motion.p_WB[k], motion.R_WB[k], motion.v_WB[k], motion.w_WB[k])
+                along_body = touch.place_rate - moving.velocity(touch.place)
+                missing += side * (rate @ data.qvel + cross(moving.w, along_body))
+            shift = sign * contact.frame.reshape(3, 3) @ missing
+            shift[0] += float(touch.normal_rate @ touch.slide)
+            if row >= 0:
+                data.efc_aref[row : row + contact.dim] -= shift[: contact.dim]
+
+    def take_lift(self, data: Any, rates: Array) -> None:
+        """Subtracts the lift of each contact whose force is on the cone, from the residual of its friction rows.
+
+        :meth:`correct` knows the damping alone; this has the whole residual: acceleration of the row less reference.
+
+        Args:
+            data: MuJoCo's data after its forces, whose reference accelerations are edited.
+            rates: accelerations of all rows, J q̈, shape (nefc,).
+        """
+        missed = rates - data.efc_aref
+        for index in range(data.ncon):
+            contact = data.contact[index]
+            row, mu = int(contact.efc_address), float(contact.friction[0])
+            if row < 0 or contact.dim == 1:
+                continue
+            N, T1, T2 = data.efc_force[row : row + 3].tolist()
+            if np.hypot(T1, T2) >= NEAR_CONE * mu * N:
+                data.efc_aref[row] -= mu * np.hypot(*missed[row + 1 : row + 3])
+
+    def read(self, data: Any, rows_of: Callable[[Any, int], Array]) -> ContactsRead:
+        """All contacts, by MuJoCo's own search with a margin so wide that it finds every one; overwrites ``data``.
+
+        Coefficients are those that MuJoCo combined. ``rows_of(data, n)`` is the Jacobian of the first n rows.
+        """
+        model, count = self._model, len(self._geoms)
+        gap, friction, restitution = np.full((3, count), np.nan)
+        normal, place = np.full((2, count, 3), np.nan)
+        rows = np.full((count, 3, model.nv), np.nan)
+        kept = int(model.opt.cone), model.pair_margin.copy()
+        model.opt.cone, model.pair_margin[:] = mujoco.mjtCone.mjCONE_ELLIPTIC, _FAR  # rows of slips, not of edges
+        try:
+            mujoco.mj_fwdPosition(model, data)
+        finally:
+            model.opt.cone, model.pair_margin[:] = kept
+        all_rows = rows_of(data, data.nefc)
+        for index in range(data.ncon):
+            contact = data.contact[index]
+            number, sign = self._contact(data, contact)
+            if not contact.dist >= gap[number]:  # a cylinder has several contact points: the nearest is taken
+                gap[number], normal[number] = contact.dist, sign * contact.frame[:3]
+                place[number] = contact.pos + self._to_surface(number) * contact.dist * normal[number]
+                row, dim, damping = int(contact.efc_address), int(contact.dim), float(contact.solref[1])
+                friction[number] = contact.friction[0] if dim > 1 else 0.0
+                restitution[number] = -damping * model.opt.timestep - 1.0 if damping < 0 else 0.0
+                rows[number] = contact.frame.reshape(3, 3)[:dim].T @ all_rows[row : row + dim]
+        held = all_rows[: data.ne]
+        whole_rows = np.concatenate([rows.reshape(-1, model.nv), held])
+        to_joints = np.zeros_like(whole_rows)
+        mujoco.mj_solveM(model, data, to_joints, whole_rows)
+        whole = whole_rows @ to_joints.T
+        of, by = slice(0, 3 * count), slice(3 * count, None)
+        through_loops = np.linalg.pinv(whole[by, by], DEPENDENT, hermitian=True) @ whole[by, of]
+        response = (whole[of, of] - whole[of, by] @ through_loops).reshape(count, 3, count, 3)
+        return ContactsRead(
+            gap=gap, normal=normal, place=place, friction=friction, restitution=restitution, response=response
+        )
+
+    def _to_surface(self, number: int) -> float:
+        """Signed half: times the gap, the step along the normal from MuJoCo's contact point to the curved shape."""
+        contact = self._mechanism.contacts[number]
+        of_second = isinstance(contact.box_slot, BoxSlot) and CORNERS <= contact.slot < 2 * CORNERS  # a corner of it
+        return -0.5 if isinstance(contact.shape_a, HalfSpace) or of_second else 0.5

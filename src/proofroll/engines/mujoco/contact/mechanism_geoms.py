@@ -1,0 +1,139 @@
+"""Formulation ``geoms``: a mechanism of :mod:`~proofroll.engines.mujoco.smooth.mechanism` whose bodies may touch."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any, ClassVar
+
+import mujoco
+import numpy as np
+from typing_extensions import override
+
+from proofroll.core.arrays import longest
+from proofroll.core.engine import Regularised
+from proofroll.core.errors import Refused
+from proofroll.elements.mechanism.run.capabilities import MechanismCapability
+from proofroll.elements.mechanism.run.contacts.family import Family, of_contact
+from proofroll.elements.mechanism.run.sampling import DEPENDENT, MechanismBuilt, MechanismSample, mechanism_of
+from proofroll.elements.mechanism.scene.rotations import Array
+from proofroll.engines.mujoco.contact.mechanism_contacts import Contacts, check_contacts
+from proofroll.engines.mujoco.settings import LARGEST_IMPEDANCE, MujocoSettings, check_restitution
+from proofroll.engines.mujoco.smooth import mechanism
+from proofroll.engines.mujoco.smooth.mechanism import MujocoMechanism
+
+_CAPABILITY = MechanismCapability
+# Rounds for the lift of slip; each at least halves its error.
+_ROUNDS = 40
+_MARGIN = 1.1
+# Factor on the share of the load that the impedance does not carry, for it acts on the bodies with lever arms.
+_OF_LOAD = 10.0
+_SOFT = (
+    "contacts are soft, start without load, lift what slips and lack the turning of their normals (J̇v); hard ones "
+    "would change that much"
+)
+PROVIDES = mechanism.PROVIDES | {_CAPABILITY.CONTACT, _CAPABILITY.CONTACT_FRICTION, _CAPABILITY.CONTACT_REBOUNDS}
+PROVIDES = (PROVIDES | {_CAPABILITY.UNBOUNDED_FRICTION}) - {_CAPABILITY.MOTIONS}
+LACKING: Mapping[str, str] = {
+    **mechanism.LACKING,
+    _CAPABILITY.STATIC_FRICTION: "this formulation gives a contact one coefficient",
+    _CAPABILITY.MOTIONS: "this formulation reads the force of a drive without that of contacts",
+    _CAPABILITY.TURNING_FRICTION: "this formulation builds contacts that slide (condim 3), not such that turn",
+    _CAPABILITY.SLIP_REBOUNDS: "this formulation sets restitution along the normal alone",
+}
+
+
+def family(settings: MujocoSettings) -> Mapping[str, str]:
+    """See :class:`proofroll.core.engine_abilities.TellsFamily`; the same for balls and for bodies of mechanisms."""
+    elliptic = Family.HARD if settings.cone_correction else Family.CONVEX
+    kind = Family.PYRAMID if settings.cone == "pyramidal" else elliptic
+    return of_contact(kind, time=settings.contact_time if settings.time_constant is None else None)
+
+
+class MujocoGeoms(MujocoMechanism):
+    """Run of a mechanism with contacts; see :class:`proofroll.core.engine.Engine` for the methods."""
+
+    provides: ClassVar[frozenset[str]] = PROVIDES
+    lacking: ClassVar[Mapping[str, str]] = LACKING
+
+    def __init__(self, scene: Any, settings: MujocoSettings) -> None:
+        mechanism = mechanism_of(scene)
+        check_contacts(mechanism, settings)
+        if any(pair.restitution for pair in mechanism.pairs):
+            check_restitution(settings)
+        super().__init__(mechanism, settings)
+        self._contacts = Contacts(self._model, mechanism)
+
+    def spec(self) -> Any:
+        """MjSpec, whose keyframe ``start`` is time 0. Raises Refused if each step edits the contacts."""
+        if self._settings.cone_correction:
+            raise Refused("the correction of the cone is made in every step, and in no MJCF; set cone_correction=false")
+        return super().spec()
+
+    def _run(self, steps: int) -> None:
+        if not self._settings.cone_correction:
+            super()._run(steps)
+            return
+        for _ in range(steps):
+            mujoco.mj_step1(self._model, self._data)
+            self._drive(self._model, self._data)
+            rows = self._rows(self._data, self._data.nefc)
+            self._contacts.correct(self._data, rows)
+            self._contacts.remember(self._data, rows)
+            mujoco.mj_step2(self._model, self._data)
+
+    def _forward(self, data: Any) -> None:
+        if not self._settings.cone_correction:
+            super()._forward(data)
+            return
+        mujoco.mj_fwdPosition(self._model, data)
+        mujoco.mj_fwdVelocity(self._model, data)
+        self._contacts.correct(data, self._rows(data, data.nefc))
+        mujoco.mj_fwdActuation(self._model, data)
+        mujoco.mj_fwdAcceleration(self._model, data)
+        mujoco.mj_fwdConstraint(self._model, data)
+        mujoco.mj_sensorAcc(self._model, data)
+
+    @override
+    def sample(self) -> MechanismSample:
+        sample = super().sample()
+        return replace(sample, contact_force=self._contacts.forces(self._scratch))
+
+    @override
+    def built(self) -> MechanismBuilt:
+        plain = super().built()
+        with self._without_steps():
+            read = self._contacts.read(self._evaluated(), self._rows)
+        contacts = {f"contact_{name}": value for name, value in read._asdict().items()}
+        if not self._evaluated().ncon:
+            return replace(plain, **contacts)
+        softened = dict(plain.regularised)
+        with self._without_steps():
+            hard = self._hard(self._evaluated())
+        load = (1 - LARGEST_IMPEDANCE) * _OF_LOAD * float(np.linalg.norm(self._mechanism.gravity))
+        for name, expected in hard.items():
+            size = longest(expected) or np.finfo(float).tiny
+            rest = load / (longest(hard["acceleration"]) or np.finfo(float).tiny)
+            difference = longest(expected - getattr(plain, name)) / size
+            softened[name] = Regularised(_MARGIN * difference + rest + DEPENDENT, _SOFT)
+        return replace(plain, **contacts, regularised=softened)
+
+    def _hard(self, data: Any) -> dict[str, Array]:
+        """Accelerations from MuJoCo's own equations with the largest impedance, with J̇v and without the cone's lift.
+
+        The same keys and shapes as :meth:`_accelerations`.
+        """
+        model = self._model
+        kept = int(model.opt.cone), model.pair_solimp.copy(), model.dof_solimp.copy()
+        model.opt.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
+        model.pair_solimp[:, :2] = model.dof_solimp[:, :2] = LARGEST_IMPEDANCE
+        try:
+            mujoco.mj_forward(model, data)
+            self._contacts.add_turning(data)
+            reference = data.efc_aref.copy()
+            for _ in range(_ROUNDS):
+                rates = self._rows(data, data.nefc) @ data.qacc
+                data.efc_aref[:] = reference
+                self._contacts.take_lift(data, rates)
+                mujoco.mj_fwdConstraint(model, data)
+            return self._accelerations(data)
+        finally:
+            model.opt.cone, model.pair_solimp[:], model.dof_solimp[:] = kept

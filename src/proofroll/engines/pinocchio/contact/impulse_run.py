@@ -1,0 +1,124 @@
+"""Formulation ``impulses``: run of a mechanism with contacts, dry friction and stops, and its samples."""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+from typing_extensions import override
+
+from proofroll.core.arrays import longest
+from proofroll.core.engine import Regularised, whole_steps
+from proofroll.core.errors import Diverged
+from proofroll.elements.mechanism import WORLD, Mechanism
+from proofroll.elements.mechanism.run.sampling import MechanismBuilt, MechanismSample
+from proofroll.elements.mechanism.scene.rotations import Array
+from proofroll.engines.pinocchio.contact.impulses import Impulses, ImpulseSteps
+from proofroll.engines.pinocchio.settings import PinocchioSettings
+from proofroll.engines.pinocchio.smooth.joint_tree import JointTree
+from proofroll.engines.pinocchio.smooth.mechanism_run import MechanismRun
+from proofroll.engines.pinocchio.smooth.null_space import LoopRows, NullSpace
+
+# Fraction of a step over which the initial accelerations are evaluated, and factor on their errors.
+_PART, _MARGIN = 1 / 16, 4.0
+_PARTS = "in the convex problem a slipping contact separates"
+_FOUND = (
+    "an impulse opposes the slip at its end, which turns, is found to solver_tolerance, and follows the turning of its "
+    "contact (J̇v) one step later"
+)
+
+
+class ImpulseRun(MechanismRun):
+    """Run of formulation ``impulses``; see :class:`proofroll.core.engine.Engine` for the methods."""
+
+    def __init__(self, mechanism: Mechanism, settings: PinocchioSettings) -> None:
+        self._mechanism, self._settings = mechanism, settings
+        self.tree = JointTree(mechanism, apart=True)
+        self._model, self._data = self.tree.model, self.tree.model.createData()
+        self.dynamics = NullSpace(self.tree, LoopRows(self.tree))
+        self.steps, self._dt = ImpulseSteps(self.tree, settings), float(settings.dt or 0.0)
+
+    @override
+    def advance(self, t: float) -> None:
+        start, steps = self.steps.t, self.steps
+        for number in range(whole_steps(start, t, self._dt)):
+            steps.t = start + number * self._dt
+            steps.step()
+            if not np.isfinite(steps.v.sum()):
+                raise Diverged(f"the state is not finite at t = {steps.t:.6g} s")
+        steps.t = t
+
+    def _renew(self) -> None:
+        """Keeps the stepper, which evaluates all forces anew in each step."""
+
+    def _kick(self) -> tuple[Array, Array, Array]:
+        """Joint accelerations v̇, forces on body a of each contact [N], and forces of joint rows, in the next step.
+
+        At time 0 they belong to a fraction of that step, and include effects that later steps see one step late.
+        """
+        steps = self.steps
+        if steps.t:
+            kick, span = steps.kick(steps.q, steps.v), self._dt
+        else:
+            span = _PART * self._dt
+            kick = steps.beginning(span, convex=self._settings.convex)
+        return (kick.v - steps.v) / span, kick.impulse / span, kick.along / span
+
+    def _evaluated(self) -> tuple[Any, Array, Array, Array, Any, Array]:
+        """Data of the present state, q, v, accelerations, joint forces in the next step, and empty loop forces."""
+        q, v, (acceleration, pressing, _) = self.steps.q, self.steps.v, self._kick()
+        touching = self.steps.terms(q, v, self._dt)[-1]
+        self.tree.now = self.steps.t
+        data = self._placed(acceleration)
+        forces = self.tree.pulls(data)
+        for contact, touch, force in zip(self.steps.contacts, touching, pressing, strict=True):
+            for body, sign in ((contact.body_a, 1.0), (contact.body_b, -1.0)):
+                if body != WORLD:
+                    frame = self.tree.body[self._mechanism.body_index[body]]
+                    self.tree.put(forces, data, frame, touch.place, sign * force)
+        return data, q, v, acceleration, forces, np.zeros((2, 0, 3))
+
+    def _placed(self, acceleration: Array) -> Any:
+        """Data of the present state with an acceleration."""
+        data = self._model.createData()
+        pin.forwardKinematics(self._model, data, self.steps.q, self.steps.v, acceleration)
+        pin.updateFramePlacements(self._model, data)
+        return data
+
+    def sample(self) -> MechanismSample:
+        """See :class:`proofroll.core.engine.Engine`; the forces are those of the next step."""
+        _, pressing, joint_forces = self._kick()
+        forces = self.steps.joints.along_joints(self.steps.q, joint_forces) if joint_forces.size else {}
+        return replace(super().sample(), contact_force=pressing if self.steps.contacts else None, **forces)
+
+    @override
+    def built(self) -> MechanismBuilt:
+        plain, span = super().built(), _PART * self._dt
+        hard, twice = (
+            self._accelerations(self.steps.beginning(length, convex=False), length) for length in (span, 2 * span)
+        )
+        step = self._accelerations(self.steps.kick(self.steps.q, self.steps.v), self._dt)
+        softened = dict[str, Regularised]()
+        now = Impulses(self.steps.v, np.zeros(0), np.zeros(0))
+        still, errors = self._accelerations(now, span), self.steps.unsure(span)
+        off = [self._accelerations(now._replace(v=now.v + error), span) for error in errors]
+        for name, value in hard.items():
+            size = longest(value) or 1.0  # 1 if all accelerations are zero
+            others = twice[name], step[name], getattr(plain, name)
+            apart = sum(longest(value - rival) for rival in others)
+            unsure = max((longest(shifted[name] - still[name]) for shifted in off), default=0.0)
+            tolerance = _MARGIN * (unsure + apart) / size
+            softened[name] = Regularised(tolerance, _PARTS if self._settings.convex else _FOUND)
+        return replace(plain, **self.steps.read() if self.steps.contacts else {}, regularised=softened)
+
+    def _accelerations(self, kick: Impulses, span: float) -> dict[str, Array]:
+        """Accelerations of all bodies during a kick of length ``span`` [s]."""
+        data = self._placed((kick.v - self.steps.v) / span)
+        accelerations = [
+            pin.getFrameClassicalAcceleration(self._model, data, frame, pin.LOCAL_WORLD_ALIGNED)
+            for frame in self.tree.body
+        ]
+        return {
+            "acceleration": np.array([item.linear for item in accelerations]),
+            "angular_acceleration": np.array([item.angular for item in accelerations]),
+        }

@@ -1,0 +1,362 @@
+"""Steps of a mechanism with contacts, dry friction and stops, by Pinocchio's terms and its contact solver.
+
+Contacts are points in Pinocchio, posed in each step where the shapes are nearest. Its solver finds the impulses of a
+step within the friction cones: by Coulomb's law, or by the convex problem without De Saxcé's term, where slipping
+contacts separate.
+"""
+
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+import pinocchio as pin
+
+from proofroll.core.errors import Diverged, Refused
+from proofroll.elements.mechanism.contact.start import natural_scale
+from proofroll.elements.mechanism.contact.touching import Moving, Touching, touch
+from proofroll.elements.mechanism.run.capabilities import ALL_JOINTS, ALL_LOOPS, FORCES, MechanismCapability
+from proofroll.elements.mechanism.run.contacts.family import Family, of_contact
+from proofroll.elements.mechanism.scene.rotations import Array, frame_of_axis
+from proofroll.engines.pinocchio.ball.contact import LARGEST_FRICTION
+from proofroll.engines.pinocchio.ball.plane_contact import solver_of
+from proofroll.engines.pinocchio.contact.joint_rows import JointRows
+from proofroll.engines.pinocchio.settings import PinocchioSettings
+from proofroll.engines.pinocchio.smooth.joint_tree import JointTree
+
+_CAPABILITY = MechanismCapability
+PROVIDES: frozenset[str] = (
+    ALL_JOINTS
+    | FORCES
+    | {_CAPABILITY.ARMATURE, _CAPABILITY.CONTACT, _CAPABILITY.CONTACT_FRICTION, _CAPABILITY.CONTACT_REBOUNDS}
+    | {_CAPABILITY.UNBOUNDED_FRICTION, _CAPABILITY.SLIP_REBOUNDS}
+    | {_CAPABILITY.ACTUATORS, _CAPABILITY.SATURATION, _CAPABILITY.SIGNALS, _CAPABILITY.HELD}
+    | {_CAPABILITY.JOINT_FRICTION, _CAPABILITY.STOPS, _CAPABILITY.REBOUNDS}
+)
+_OF_A_TREE = "its steps are those of a tree with contacts"
+LACKING: Mapping[str, str] = {
+    **dict.fromkeys(
+        ALL_LOOPS | {_CAPABILITY.COUPLINGS, _CAPABILITY.COUPLINGS_OF_MANY, _CAPABILITY.MASSLESS}, _OF_A_TREE
+    ),
+    _CAPABILITY.STATIC_FRICTION: "this formulation gives a contact one coefficient",
+    _CAPABILITY.TURNING_FRICTION: "this formulation gives a contact no moment",
+}
+# Approach speed, in steps of gravity, below which nothing rebounds.
+_SOFT = 5.0
+# Fraction c of a gap that a step h by the midpoint rule closes; closing all of it would eject what has penetrated. The
+# turning of a contact's rows (J̇v) leaves gaps of h² J̇v / 2c.
+_CLOSED = 0.5
+# Largest gap that counts as closed, in falls by gravity of one step: contacts may turn that many times faster than
+# gravity pulls before steps leave them open.
+_NEAR = 2.0
+# Part of the largest speed of a row that a speed along a normal has to be, to count.
+_SMALL = 1e-9
+# Ratio of the contact's mobility in two directions of the surface above which PGS returns a wrong impulse.
+_UNEQUAL = 2.0
+
+
+def family(settings: PinocchioSettings) -> Mapping[str, str]:
+    """See :class:`proofroll.core.engine_abilities.TellsFamily`; the same for balls and mechanisms."""
+    return of_contact(Family.CONVEX if settings.convex else Family.HARD)
+
+
+class Impulses(NamedTuple):
+    """Impulses of a step.
+
+    Attributes:
+        v: velocity after it, shape (nv,).
+        impulse: on body a of each contact, world axes [N s], shape (contacts, 3).
+        along: impulses of joint rows [N s, N m s], shape (rows,).
+    """
+
+    v: Array
+    impulse: Array
+    along: Array
+
+
+class _Solver(NamedTuple):
+    """Pinocchio's objects for a subset of contacts and joint rows: constraints, solver, its options and result."""
+
+    points: list[Any]
+    point_datas: list[Any]
+    models: Any
+    datas: Any
+    solve: Any
+    options: Any
+    result: Any
+
+
+class ImpulseSteps:
+    """Steps of a tree with contacts, dry friction and stops of joints.
+
+    Attributes:
+        q, v, t: configuration, velocity, time [s].
+        restitution: of each contact [1].
+        joints: joint rows, numbered after the contacts.
+    """
+
+    def __init__(self, tree: JointTree, settings: PinocchioSettings) -> None:
+        """Starts at time 0.
+
+        Raises:
+            Refused: Pinocchio's solver returns wrong impulses for such contacts.
+        """
+        self._tree, self._model, self._data = tree, tree.model, tree.model.createData()
+        self._settings, self._dt = settings, float(settings.dt or 0.0)
+        self._midpoint = settings.integrator == "midpoint"
+        mechanism = tree.mechanism
+        self.contacts = mechanism.contacts
+        self.q, self.v, self.t = tree.q0, tree.v0, 0.0
+        self._gravity = float(np.linalg.norm(mechanism.gravity))
+        self._touching = natural_scale(mechanism).gap
+        self._index = mechanism.body_index
+        self.restitution = np.array([contact.restitution for contact in self.contacts])
+        self.joints = JointRows(tree)
+        stops = [item.joint.restitution for item in self.joints.stops]
+        self._returned = np.concatenate([self.restitution, np.zeros(len(self.joints.friction)), stops])
+        self._solvers: dict[tuple[int, ...], _Solver] = {}
+        try:
+            J, _, inverse, _ = self.terms(self.q, self.v, self._dt)
+            for k in range(len(self.contacts)):
+                self._check(k, J[k] @ inverse @ J[k].T)
+        except Diverged as error:
+            raise Refused(str(error)) from None
+
+    def _check(self, k: int, G: Array) -> None:
+        """Checks that PGS returns right impulses for contact ``k`` with the mobility ``G``, shape (3, 3).
+
+        Raises:
+            Diverged: PGS returns wrong ones.
+        """
+        G_1, G_2 = float(G[0, 0]), float(G[1, 1])
+        if self._settings.solver == "pgs" and self.contacts[k].friction and max(G_1, G_2) > _UNEQUAL * min(G_1, G_2):
+            raise Diverged(
+                f"Pinocchio's PGS returns a wrong impulse where a contact gives way {_UNEQUAL:g} times as much in one "
+                f"direction as across it, as {self.contacts[k].name} does at {self.t:g} s; set solver=admm"
+            )
+
+    def step(self) -> None:
+        """Makes one step from the present state.
+
+        Raises:
+            Diverged: Pinocchio's solver does not find the impulses.
+        """
+        kick = self.kick(self.q, self.v)
+        if self._midpoint:
+            middle = pin.integrate(self._model, self.q, 0.5 * self._dt * self.v)
+            self.q = pin.integrate(self._model, middle, 0.5 * self._dt * kick.v)
+        else:
+            self.q = pin.integrate(self._model, self.q, self._dt * kick.v)
+        self.v = kick.v
+
+    def kick(self, q: Array, v: Array) -> Impulses:
+        """Impulses of the step from a state; changes nothing but scratch data."""
+        if self._midpoint:
+            q = pin.integrate(self._model, q, 0.5 * self._dt * v)
+        J, free, inverse, touching = self.terms(q, v, self._dt)
+        shifts = self._shifts(J, q, v, touching)
+        return self._solved(J, free, inverse, touching, shifts, self._dt, convex=self._settings.convex)
+
+    def beginning(self, span: float, *, convex: bool) -> Impulses:
+        """Impulses of a short time from now on, with the turning of the contacts (J̇v), which steps see one step late.
+
+        Open gaps stay open.
+        """
+        J, free, inverse, touching = self.terms(self.q, self.v, span)
+        ahead = self.terms(pin.integrate(self._model, self.q, span * self.v), self.v, span)[0]
+        shifts = np.zeros((len(self._returned), 3))
+        shifts[: len(touching)] = (ahead - J) @ self.v
+        apart = [touch.absent or touch.gap > self._touching for touch in touching] + [False] * len(self.joints.friction)
+        shifts[apart + [not item.closed(self.q) for item in self.joints.stops], 2] = np.inf
+        return self._solved(J, free, inverse, touching, shifts, span, convex=convex)
+
+    def read(self) -> dict[str, Any]:
+        """Normals, positions and friction of contact points in Pinocchio, with gaps of the shapes at its poses."""
+        J, _, inverse, touching = self.terms(self.q, self.v, self._dt)
+        world = np.array([frame_of_axis(touch.normal) for touch in touching]) @ J
+        solver, data = self._solver(tuple(range(len(self.contacts)))), self._data
+        normal, place = np.zeros((2, len(touching), 3))
+        for k, point in enumerate(solver.points):
+            normal[k] = (data.oMi[point.joint1_id] * point.joint1_placement).rotation[:, 2]
+            place[k] = (data.oMi[point.joint2_id] * point.joint2_placement).translation
+        return {
+            "contact_gap": np.array([touch.gap for touch in touching]),
+            "contact_normal": normal,
+            "contact_place": place,
+            "contact_friction": np.array([point.getFriction() for point in solver.points]),
+            "contact_restitution": self.restitution.copy(),
+            "contact_tangential": np.array([contact.tangential_restitution for contact in self.contacts]),
+            "contact_response": np.einsum("kin,nm,ljm->kilj", world, inverse, world),
+        }
+
+    def terms(self, q: Array, v: Array, span: float) -> tuple[Array, Array, Array, list[Touching]]:
+        """Contact rows (contacts, 3, nv), velocity without impulses, inverse mass matrix, and geometry of the contacts.
+
+        The rows are slip velocities along the normal's :func:`frame_of_axis`, the normal last.
+        """
+        tree, model, data = self._tree, self._model, self._data
+        pin.forwardKinematics(model, data, q, v)
+        pin.updateFramePlacements(model, data)
+        tree.now = self.t + 0.5 * span * self._midpoint
+        pulls = tree.pulls(data) if tree.pushed else None
+        tau = tree.drives(q, v)
+        touching = [
+            touch(contact, self._moving(contact.body_a), self._moving(contact.body_b)) for contact in self.contacts
+        ]
+        rate = pin.aba(model, data, q, v, tau, pulls) if pulls else pin.aba(model, data, q, v, tau)
+        free = v + span * rate
+        inverse = np.triu(pin.computeMinverse(model, data, q))
+        inverse = inverse + np.triu(inverse, 1).T
+        pin.computeJointJacobians(model, data, q)
+        J = np.zeros((len(touching), 3, model.nv))
+        all_of = self._solver(tuple(range(len(touching))))
+        for k, contact_touch in enumerate(touching):
+            J[k] = self._posed(all_of, k, contact_touch)
+        return J, free, inverse, touching
+
+    def unsure(self, span: float) -> Array:
+        """Velocities by which errors of each row within the tolerance change those after a ``span`` [s], (rows, nv)."""
+        J, free, inverse, _ = self.terms(self.q, self.v, span)
+        rows = np.concatenate([J.reshape(-1, len(free)), self.joints.J])
+        speed = float(np.abs(rows @ free).max(initial=0.0)) * float(self._settings.solver_tolerance or 0.0)
+        ways = rows @ inverse
+        ease = np.einsum("ri,ri->r", rows, ways)
+        changes: Array = speed * ways[ease > 0] / ease[ease > 0, None]
+        return changes
+
+    def _moving(self, body: str) -> Moving:
+        k, data = self._index[body], self._data
+        if k < 0:
+            return Moving(np.zeros(3), np.eye(3), np.zeros(3), np.zeros(3))
+        frame = self._tree.body[k]
+        velocity, pose = self._tree.velocity(data, frame), data.oMf[frame]
+        return Moving(pose.translation.copy(), pose.rotation.copy(), velocity.linear, velocity.angular)
+
+    def _posed(self, solver: _Solver, number: int, there: Touching) -> Array:
+        """Poses the ``number``-th point of a solver and returns its rows, shape (3, nv)."""
+        point, data = solver.points[number], self._data
+        place = pin.SE3(frame_of_axis(there.normal), there.place)
+        point.joint1_placement = data.oMi[point.joint1_id].actInv(place)
+        point.joint2_placement = data.oMi[point.joint2_id].actInv(place)
+        point.calc(self._model, data, solver.point_datas[number])
+        rows = point.jacobian(self._model, data, solver.point_datas[number])
+        return np.reshape(np.array(rows), (3, self._model.nv))
+
+    def _solver(self, which: tuple[int, ...]) -> _Solver:
+        if which not in self._solvers:
+            models, datas = pin.StdVec_ConstraintModel(), pin.StdVec_ConstraintData()
+            rows, count = (*self.joints.friction, *self.joints.stops), len(self.contacts)
+            for k in which:
+                if k < count:
+                    contact = self.contacts[k]
+                    b, a = (self._joint(body) for body in (contact.body_b, contact.body_a))
+                    point = pin.PointContactConstraintModel(self._model, b, pin.SE3.Identity(), a, pin.SE3.Identity())
+                    point.setFriction(min(contact.friction, LARGEST_FRICTION[self._settings.solver or "admm"]))
+                    models.append(pin.ConstraintModel(point))
+                else:
+                    models.append(rows[k - count].model)
+                datas.append(models[len(models) - 1].createData())
+            points = [models[i].extract() for i in range(len(which))]
+            settings, size = self._settings, sum(3 if k < count else 1 for k in which)
+            solve, options, result = solver_of(settings.solver or "admm", float(settings.solver_tolerance or 0.0), size)
+            made = [datas[i].extract() for i in range(len(which))]
+            self._solvers[which] = _Solver(
+                points=points, point_datas=made, models=models, datas=datas, solve=solve, options=options, result=result
+            )
+        return self._solvers[which]
+
+    def _joint(self, body: str) -> int:
+        k = self._index[body]
+        return 0 if k < 0 else int(self._model.frames[self._tree.body[k]].parentJoint)
+
+    def _shifts(self, J: Array, q: Array, v: Array, touching: Sequence[Touching]) -> Array:
+        """Terms added to slip and gap velocities [m/s], shape (contacts + joint rows, 3); inf: the gap cannot close."""
+        begin, dt = len(touching) + len(self.joints.friction), self._dt
+        shifts = np.zeros((len(self._returned), 3))
+        gaps = [(k, touch.gap, float(J[k, 2] @ v)) for k, touch in enumerate(touching) if not touch.absent]
+        shifts[[k for k, touch in enumerate(touching) if touch.absent], 2] = np.inf
+        speeds = self.joints.J[len(self.joints.friction) :] @ v
+        gaps += [(k, item.gap(q), float(speeds[k - begin])) for k, item in enumerate(self.joints.stops, begin)]
+        for k, gap, approach in gaps:
+            e = float(self._returned[k])
+            hits = e and -e * approach > _SOFT * self._gravity * dt
+            shifts[k, 2] = np.inf
+            if self._midpoint:
+                if gap <= max(self._touching, _NEAR * self._gravity * dt**2):
+                    back = max(_CLOSED * gap / dt, -_SOFT * self._gravity * dt) if k >= begin else _CLOSED * gap / dt
+                    shifts[k, 2] = e * approach if hits else back
+            else:
+                hits = hits and gap + dt * (approach - dt * self._gravity) <= 0
+                shifts[k, 2] = e * approach if hits else gap / dt
+            if hits and k < len(touching) and self.contacts[k].tangential_restitution:
+                shifts[k, :2] = self.contacts[k].tangential_restitution * (J[k, :2] @ v)
+        return shifts
+
+    def _solved(
+        self,
+        J: Array,
+        free: Array,
+        inverse: Array,
+        touching: Sequence[Touching],
+        shifts: Array,
+        span: float,
+        *,
+        convex: bool,
+    ) -> Impulses:
+        """Impulses of dry friction and of all contacts and stops that would close, also due to other impulses."""
+        count, v = len(touching), free
+        blocks = [*J, *self.joints.J[:, None]]
+        of_blocks = [*shifts[:count], *shifts[count:, 2:]]
+        rubs = count + len(self.joints.friction)
+        gaps = [k for k in (*range(count), *range(rubs, len(blocks))) if np.isfinite(shifts[k, 2])]
+        impulse, along_rows, which = np.zeros((count, 3)), np.zeros(len(blocks) - count), tuple(range(count, rubs))
+        changed = bool(which)
+        while True:
+            closing = {k for k in gaps if blocks[k][-1] @ v + shifts[k, 2] < 0}
+            if closing <= set(which) and not changed:
+                return Impulses(v, impulse, along_rows)
+            which, changed = tuple(sorted({*which, *closing})), False
+            solver = self._solver(which)
+            rows = np.concatenate([blocks[k] for k in which])
+            to_joints = inverse @ rows.T
+            G = rows @ to_joints
+            ends = np.cumsum([len(blocks[k]) for k in which])
+            for end, k in zip(ends, which, strict=True):
+                if k < count:
+                    self._check(k, G[end - 3 : end, end - 3 : end])
+            g = rows @ free + np.concatenate([of_blocks[k] for k in which])
+            # Pinocchio's tolerances and regularisations are numbers without scale: 1e-8, below which its ADMM adapts
+            # its penalty the wrong way, would be a large part of the impulses of short steps or light bodies. In these
+            # units of speed and impulse the problem is the same for all masses, steps and lengths.
+            speed = max(float(np.abs(g[ends - 1]).max()), _SMALL * float(np.abs(g).max())) or 1.0
+            unit = speed / float(np.diag(G).max())
+            for row, k in enumerate(which):
+                if k < count:
+                    self._posed(solver, row, touching[k])
+                elif k < rubs:
+                    solver.points[row].setTimeStep(span / unit)  # bounds are forces; the default step would be 1 s
+                    solver.points[row].calc(self._model, self._data, solver.point_datas[row])
+            solver.result.reset()
+            solver.options.solve_ncp = not convex
+            tolerance = float(self._settings.solver_tolerance or 0.0)
+            # a product of impulses and velocities, which both have the tolerance; velocities are 1 along normals
+            solver.options.absolute_complementarity_tol = tolerance * max(1.0, float(np.abs(g).max()) / speed)
+            if not solver.solve.solve(
+                pin.DelassusOperatorDense(G * (unit / speed)),
+                g / speed,
+                solver.models,
+                solver.datas,
+                solver.options,
+                solver.result,
+            ):
+                raise Diverged(
+                    f"Pinocchio's {self._settings.solver} solver did not reach "
+                    f"solver_tolerance={self._settings.solver_tolerance:g} at {self.t:g} s; a larger one may do"
+                )
+            got = unit * np.array(solver.result.retrieveConstraintImpulses())
+            v = free + to_joints @ got
+            impulse[:], along_rows[:] = 0.0, 0.0
+            for end, k in zip(ends, which, strict=True):
+                if k < count:
+                    impulse[k] = frame_of_axis(touching[k].normal) @ got[end - 3 : end]
+                else:
+                    along_rows[k - count] = got[end - 1]

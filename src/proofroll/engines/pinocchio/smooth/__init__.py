@@ -1,0 +1,1 @@
+"""Mechanisms without contacts in Pinocchio."""

@@ -1,0 +1,396 @@
+"""Contacts of bodies, and laws of joints beside them: open, slipping or sticking, ends of these modes, transitions.
+
+Contact forces act along the velocities ν of the tree, whose mass matrix the projection provides. Between two
+transitions the equations are smooth; a transition is located within a step by shorter steps of the same method. The
+next mode follows from Coulomb's law at all contacts at once, by the same solver as in the truth's first route: so equal
+decisions confirm nothing, but equal motions between them do.
+"""
+
+import math
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from proofroll.core.arrays import cross
+from proofroll.core.dop853 import Accept
+from proofroll.core.errors import Diverged, Refused
+from proofroll.core.events import EventKind
+from proofroll.core.integrators import Integrator
+from proofroll.elements.mechanism import Mechanism
+from proofroll.elements.mechanism.contact.acting import (
+    OPEN,
+    Acting,
+    ContactMode,
+    changes,
+    first_mode,
+    held_directions,
+    slip_velocity,
+)
+from proofroll.elements.mechanism.contact.coulomb import contact_forces, largest_friction
+from proofroll.elements.mechanism.contact.joint_laws import JointContact, joint_contacts, refuse_rubbing_stops
+from proofroll.elements.mechanism.contact.start import closed_and_still, natural_scale, start_digits
+from proofroll.elements.mechanism.contact.touching import Moving, Touching, torn, touch
+from proofroll.elements.mechanism.dynamics.switches import switched_joints
+from proofroll.elements.mechanism.scene.joint_kinds import JointKind
+from proofroll.elements.mechanism.scene.rotations import Array, frame_of_axis
+from proofroll.elements.mechanism.scene.shapes.geometry import BodyContact, coefficients_of
+from proofroll.elements.mechanism.scene.signal import breaks, varies
+from proofroll.engines.projection.contact.alternating import AlternatingMotion, Excess, ends_of_efforts
+from proofroll.engines.projection.contact.slip_directions import SlipDirections
+from proofroll.engines.projection.smooth.dependent import DependentCoordinates, SolvedState
+from proofroll.engines.projection.smooth.elimination import Space
+from proofroll.engines.projection.smooth.elimination import solved as divided
+
+_RANK = 1e-10  # smallest singular value of independent contact rows, relative to the largest
+_OVERLAP = 1e-14  # overlap that is round-off, relative to the natural length
+_STANDS = 1e-6  # acceleration, relative to the natural one, too small to start a motion
+_REST = 1e-2  # slip speed, relative to gravity times a fixed step, below which slips end together with another one
+
+
+class ContactsThere(NamedTuple):
+    """Contacts at a state, without their forces.
+
+    Attributes:
+        touching: geometry and sliding velocity of each contact.
+        J: derivative of each sliding velocity with respect to ν, (contacts, 3, nv).
+        response: H⁻¹ Jᵀ with the mass matrix H, (nv, contacts, 3).
+        rate: rate of each sliding velocity without contact forces, (contacts, 3).
+    """
+
+    touching: tuple[Touching, ...]
+    J: Array
+    response: Array
+    rate: Array
+
+
+class ContactMotion(AlternatingMotion[ContactMode]):
+    """Motion of a tree with contacts; the last component of a state is the time."""
+
+    alternates = "contacts"
+
+    def __init__(
+        self, equations: DependentCoordinates, mechanism: Mechanism, stepper: Integrator, accept: Accept, step: float
+    ) -> None:
+        """Takes the size of a fixed ``step`` [s]; 0: the step adapts."""
+        super().__init__(equations, stepper, accept, breaks(mechanism.signals))
+        self._bodies, self._joints = mechanism.contacts, joint_contacts(switched_joints(mechanism))
+        self.contacts: tuple[BodyContact | JointContact, ...] = (*self._bodies, *self._joints)
+        self._index = mechanism.body_index
+        self.friction = np.array([contact.friction for contact in self.contacts])
+        self._static = np.array([contact.static for contact in self.contacts])
+        self._bounds = np.array([contact.bound for contact in self.contacts])
+        self._rubs = self.friction + self._bounds > 0
+        scale = natural_scale(mechanism)
+        self._unit = math.prod(scale)  # natural speed
+        self._still, self._rate, self._length = scale.speed, scale.rate, scale.length
+        # overlap of each contact when it opened, an error of the method: it is no impact
+        self._overlap = np.zeros(len(self.contacts))
+        turns = [mechanism.joints[each.joint.number].kind != JointKind.PRISMATIC for each in self._joints]
+        # length of each contact's motion by 1 m, or by 1 rad
+        self._arms = np.array([1.0] * len(self._bodies) + [scale.length if turn else 1.0 for turn in turns])
+        self._slipping = SlipDirections(step, self._still / self._arms)
+        self._timed = any(map(varies, mechanism.signals))
+        self._faint = max(self._still, _REST * step * float(np.linalg.norm(mechanism.gravity)))
+        self._limited = {k: item for k, item in enumerate(mechanism.actuators) if item.limit is not None}
+        start = np.append(equations.start, 0.0)
+        self._limit_efforts(start)
+        now = self.at(start)
+        closed, still = closed_and_still(
+            now.touching, scale.length / self._arms, scale.rate, start_digits(self.contacts)
+        )
+        refuse_rubbing_stops(self.contacts, closed, 0.0)
+        self.mode = tuple(OPEN for _ in self.contacts)
+        self._enter(0.0, start, self._decided(now, closed, still))
+
+    def _limit_efforts(self, y: Array) -> None:
+        """Sets the mode of each effort with a limit: linear, or clamped if the state requires more."""
+        wanted = zip(self._limited.items(), self._equations.wanted(self._at(y)), strict=True)
+        self._equations.applied.modes = {k: actuator.mode_of(effort) for (k, actuator), effort in wanted}
+
+    def at(self, y: Array) -> ContactsThere:
+        """Contacts at a state, with their response to forces."""
+        equations, spaces, x = self._equations, list[Space](), self._at(y)
+
+        def closing(space: Space, _: Array, push: Array) -> tuple[Array, Array]:
+            spaces.append(space)
+            return divided(space.H, push[:, None])[:, 0], np.zeros(0)
+
+        free = equations.solve(x, 0.0, closing)
+        moving, touching = self._moving(x), self._touching(x)
+        S, origin = spaces[0].S.reshape(-1, 4, 4), free.bodies.origin
+        J, rate = np.zeros((len(touching), 3, len(S))), np.zeros((len(touching), 3))
+        for k, (contact, there) in enumerate(zip(self._bodies, touching, strict=False)):
+            along = S[:, :3, :3] @ (there.place - origin) + S[:, :3, 3]
+            for body, sign in ((contact.body_a, 1.0), (contact.body_b, -1.0)):
+                i = self._index[body]
+                if i >= 0:
+                    J[k] += sign * (equations.tree.moves[i][:, None] * along).T
+                    rate[k] += sign * self._material(x, free, i, moving[body], there)
+        for k, each in enumerate(self._joints, len(self._bodies)):
+            J[k, :, each.joint.velocity] = each.direction
+            rate[k] = each.direction * free.rates[each.joint.velocity]
+        flat = J.reshape(-1, J.shape[2]).T
+        return ContactsThere(touching, J, divided(spaces[0].H, flat).reshape(-1, *J.shape[:2]), rate)
+
+    def _touching(self, x: Array) -> tuple[Touching, ...]:
+        """Gap, normal and sliding velocity of each contact."""
+        moving, along = self._moving(x), self._equations.watched(x) if self._joints else {}
+        bodies = (touch(each, moving[each.body_a], moving[each.body_b]) for each in self._bodies)
+        return (*bodies, *(each.touching(*along[each.joint.number]) for each in self._joints))
+
+    def _moving(self, x: Array) -> dict[str, Moving]:
+        """Motion of the frames of all bodies, and of the world."""
+        equations = self._equations
+        r, _, v, _ = equations.parts(x)
+        bodies = equations.bodies(x)
+        moving = {"world": Moving(np.zeros(3), np.eye(3), np.zeros(3), np.zeros(3))}
+        for name, i in self._index.items():
+            if i >= 0:
+                R, w = bodies.rotation[i], bodies.spin[i]
+                arm = R @ equations.com[i]
+                moving[name] = Moving(r[i] - arm, R, v[i] - cross(w, arm), w)
+        return moving
+
+    def _material(self, x: Array, free: SolvedState, i: int, body: Moving, there: Touching) -> Array:
+        """Rate of the velocity of a body's material at the contact point, which moves over the body."""
+        arm = there.place - self._equations.parts(x)[0][i]
+        turning = cross(body.R @ free.angular[i], arm) + cross(body.w, cross(body.w, arm))
+        return np.asarray(free.linear[i] + turning + cross(body.w, there.place_rate - body.velocity(there.place)))
+
+    def _rows(self, now: ContactsThere, mode: ContactMode) -> list[tuple[int, Array]]:
+        """Directions in which closed contacts are constrained, with their contact."""
+        return [
+            (k, direction)
+            for k, (own, each) in enumerate(zip(mode, now.touching, strict=True))
+            for direction in held_directions(own, each, presses=not self._bounds[k])
+        ]
+
+    def forces(self, now: ContactsThere, mode: ContactMode) -> Array:
+        """Forces on body a of each contact in a mode [N], (contacts, 3).
+
+        Raises:
+            Diverged: friction makes a normal force negative (Painlevé).
+        """
+        rows, force = self._rows(now, mode), np.zeros((len(mode), 3))
+        for k in np.flatnonzero(self._bounds).tolist():
+            if mode[k].kind == "slip":
+                force[k] = -self._bounds[k] * self._slipping.heading(k, now.touching[k])
+        if not rows:
+            return force
+        along = [
+            row - self.friction[k] * self._slipping.heading(k, now.touching[k]) if mode[k].kind == "slip" else row
+            for k, row in rows
+        ]
+        rate = now.rate + now.J @ np.einsum("nki,ki->n", now.response, force)
+        K = np.array([row @ now.J[k] for k, row in rows])
+        D = np.array([now.response[:, k] @ direction for (k, _), direction in zip(rows, along, strict=True)])
+        wanted = [-row @ rate[k] for k, row in rows]
+        for i, (k, row) in enumerate(rows):
+            if mode[k].kind == "slip":
+                wanted[i] -= now.touching[k].normal_rate @ now.touching[k].slide
+                if row @ now.J[k] @ D[i] <= 0:
+                    raise Diverged(str(torn(self.contacts[k].name, self.t)))
+        sizes = np.linalg.lstsq(K @ D.T, np.array(wanted), rcond=_RANK)[0]
+        for size, (k, _), direction in zip(sizes, rows, along, strict=True):
+            force[k] += size * direction
+        return force
+
+    def _settled(self, y: Array, mode: ContactMode) -> Array:
+        """State without velocities that violate closed contacts."""
+        now = self.at(y)
+        rows = self._rows(now, mode)
+        if not rows:
+            return y
+        K = np.array([row @ now.J[k] for k, row in rows])
+        D = np.array([now.response[:, k] @ row for k, row in rows])
+        left = np.array([row @ now.touching[k].slide for k, row in rows])
+        return self._pushed(y, -D.T @ np.linalg.lstsq(K @ D.T, left, rcond=_RANK)[0])
+
+    def _pushed(self, y: Array, change: Array) -> Array:
+        """State after a change of the velocities ν."""
+        return np.append(self._equations.pushed(y[:-1], change), y[-1])
+
+    def solve(self) -> tuple[SolvedState, Array, tuple[Touching, ...]]:
+        """Equations of motion solved now, contact forces [N], (contacts, 3), and geometry of the contacts."""
+        now = self.at(self._stepper.x)
+        force = self.forces(now, self.mode)
+        return self._equations.solve(self.x, np.einsum("kin,ki->n", now.J, force)), force, now.touching
+
+    def sampled(self, joints: int) -> dict[str, Array]:
+        """Contact forces [N], (contacts, 3); forces of dry friction and stops along the coordinates of all joints."""
+        force, along = self.solve()[1], np.full((2, joints), np.nan)
+        for each in self._joints:
+            along[:, each.joint.number] = 0.0
+        for each, push in zip(self._joints, force[len(self._bodies) :], strict=True):
+            along[int(each.side != 0), each.joint.number] += each.direction @ push
+        return {"contact_force": force[: len(self._bodies)], "friction": along[0], "stop": along[1]}
+
+    def read(self) -> dict[str, Any]:
+        """Geometry and laws of the contacts now, for :class:`.MechanismBuilt`."""
+        now = self.at(self._stepper.x)
+        count = len(self._bodies)
+        touching = now.touching[:count]
+        return {
+            "contact_gap": np.array([each.gap for each in touching]),
+            "contact_normal": np.array([each.normal for each in touching]),
+            "contact_place": np.array([each.place for each in touching]),
+            **coefficients_of(self._bodies),
+            "contact_response": np.einsum("kin,nlj->kilj", now.J[:count], now.response[:, :count]),
+        }
+
+    def _rates(self, y: Array) -> Array:
+        now = self.at(y)
+        load = np.einsum("kin,ki->n", now.J, self.forces(now, self.mode))
+        return self._equations.rates(y[:-1], load)
+
+    def _look(self, y: Array) -> None:
+        """Stores the directions of slips, to detect reversals."""
+        self._slipping.look(float(y[-1]), self.mode, self._touching(y[:-1]))
+
+    def _enter(self, t: float, x: Array, mode: ContactMode) -> None:
+        opened = [k for k, own in enumerate(mode) if own.kind == "open" and self.mode[k].kind != "open"]
+        if opened:
+            gaps = np.array([each.gap for each in self.at(x).touching])
+            self._overlap[opened] = np.maximum(-gaps[opened], 0.0) + _OVERLAP * self._length
+        x, self.mode = self._settled(x, mode), mode
+        self._slipping.begin(mode)
+        self._look(x)
+        super()._enter(t, x, mode)
+
+    def _excess(self, x: Array) -> list[Excess]:
+        now = self.at(x)
+        force, ends = self.forces(now, self.mode), list[Excess]()
+        held: ContactMode = ()
+        stops = [isinstance(each, JointContact) and not each.bound for each in self.contacts]
+        shared = sum(own.kind == "stick" or (own.kind == "slip" and s) for own, s in zip(self.mode, stops, strict=True))
+        for k, (own, each) in enumerate(zip(self.mode, now.touching, strict=True)):
+            if own.kind == "open":
+                ends.append(Excess(k, EventKind.IMPACT, -each.gap - self._overlap[k], -float(each.normal @ each.slide)))
+                continue
+            N = float(each.normal @ force[k])
+            if not self._bounds[k]:
+                ends.append(Excess(k, EventKind.LIFT_OFF, -N))
+            if own.kind == "slip" and self._rubs[k]:
+                ends.append(Excess(k, "still", self._slipping.passed(k, each)))
+            elif own.kind == "stick":
+                bound = float(self._bounds[k] or largest_friction(self._static[k], N))
+                beyond = float(np.linalg.norm(force[k] - N * each.normal)) - bound if np.isfinite(bound) else -1.0
+                if beyond > 0 and shared > 1:
+                    # forces shared by several contacts are not unique: others may hold what this one cannot
+                    held = held or self._decided(
+                        now, [one.kind != "open" for one in self.mode], [one.kind == "stick" for one in self.mode]
+                    )
+                    beyond = -beyond if held[k].kind == "stick" else beyond
+                ends.append(Excess(k, EventKind.SLIP, beyond))
+        modes, wanted = list(self._equations.applied.modes.values()), self._equations.wanted(self._at(x))
+        return ends + ends_of_efforts(self._limited.values(), modes, wanted, len(self.mode))
+
+    def _next(self, x: Array, k: int, kind: str) -> tuple[Array, ContactMode, list[tuple[str, str]]]:
+        was, happened = self.mode, list[tuple[str, str]]()
+        if k >= len(was):
+            number = list(self._limited)[k - len(was)]
+            self._equations.applied.modes = {**self._equations.applied.modes, number: kind}
+            return x, was, happened
+        if kind == EventKind.LIFT_OFF:
+            x = self._settled(x, was)  # a closing speed that the method left would hit at once
+        now, closed = self.at(x), [own.kind != "open" for own in was]
+        still = [own.kind == "stick" for own in was]
+        if kind == EventKind.IMPACT:
+            x, closed, settles = self._struck(x, now, k)
+            self._limit_efforts(x)  # the effort that a servo requires jumps with the velocity
+            happened = [(EventKind.SETTLE if settles else EventKind.IMPACT, self.contacts[k].name)]
+            now = self.at(x)
+            still = [slip <= self._still for slip in self._slips(now)]
+        elif kind == "still":
+            slips = self._slips(now)
+            still = [stuck or own == k or slips[own] <= self._faint for own, stuck in enumerate(still)]
+        mode = self._leaving(now, k) if kind == EventKind.SLIP else self._decided(now, closed, still)
+        if kind == "still" and slips[k] > self._still and mode[k].kind == "slip":  # it has turned, not stopped
+            mode = self._decided(now, closed, [stands and own != k for own, stands in enumerate(still)])
+        struck = {name for _, name in happened}
+        happened += [one for one in changes(self.contacts, was, mode, self._stands(x, mode)) if one[1] not in struck]
+        return x, mode, happened
+
+    def _slips(self, now: ContactsThere) -> list[float]:
+        """Slip speed of each contact [m/s]; of turning joints at the natural length."""
+        pairs = zip(self._arms, now.touching, strict=True)
+        return [float(arm * np.linalg.norm(slip_velocity(each))) for arm, each in pairs]
+
+    def _stands(self, y: Array, mode: ContactMode) -> bool:
+        """True if velocities and accelerations in a mode are zero within round-off."""
+        if self._timed or any(own.kind == "slip" for own in mode):
+            return False
+        now = self.at(y := self._settled(y, mode))
+        load = np.einsum("kin,ki->n", now.J, self.forces(now, mode))
+        n, rate = len(self._equations.mass), self._equations.rates(y[:-1], load)
+        sizes = np.repeat([1.0, self._unit / self._rate], 3 * n)  # for velocities and angular velocities
+        moves, will = (float(np.abs(sizes * part[7 * n : 13 * n]).max()) for part in (y, rate))
+        return moves <= self._still and will <= _STANDS * self._unit * self._rate
+
+    def _leaving(self, now: ContactsThere, k: int) -> ContactMode:
+        """Mode in which a contact starts to slip, opposite to the friction that held it."""
+        force, n = self.forces(now, self.mode)[k], now.touching[k].normal
+        held = force - n * (n @ force)
+        x, y, z = (-held / np.linalg.norm(held)).tolist()
+        line = None if self.mode[k].along is None else (x, y, z)
+        return (*self.mode[:k], Acting("slip", line, (x, y, z)), *self.mode[k + 1 :])
+
+    def _struck(self, x: Array, now: ContactsThere, hit: int) -> tuple[Array, list[bool], bool]:
+        """State after an impact by Newton's and Coulomb's laws; which contacts stay closed; True if it is the last."""
+        which = [k for k, own in enumerate(self.mode) if (own.kind != "open" or k == hit) and not self._bounds[k]]
+        frames, J, response = self._framed(now, which)
+        c = np.concatenate([frame.T @ now.touching[k].slide for frame, k in zip(frames, which, strict=True)])
+        place, law = 3 * which.index(hit), self.contacts[hit]
+        speed, e = -c[place], law.restitution
+        settles = self._settles(hit, speed * self._arms[hit] / self._unit, e)
+        e, sideways = (0.0, 0.0) if settles else (e, law.tangential_restitution)
+        c[place : place + 3] *= [1 + e, 1 + sideways, 1 + sideways]
+        impulse, _ = self._law(J @ response, c, which, [None] * len(which))
+        x = self._pushed(x, response @ impulse.ravel())
+        # by the speed, not the impulse: of a contact that the impact leaves alone that is round-off, of either sign
+        parts = [float(each.normal @ each.slide) for each in self.at(x).touching] * self._arms
+        closed = [
+            bool(self._bounds[k]) or (k in which and parts[k] <= self._still and not (k == hit and e))
+            for k in range(len(self.mode))
+        ]
+        try:
+            refuse_rubbing_stops(self.contacts, closed, self.t)
+        except Refused as error:
+            raise Diverged(str(error)) from None
+        return x, closed, settles
+
+    def _framed(self, now: ContactsThere, which: Sequence[int]) -> tuple[list[Array], Array, Array]:
+        """Normal and two tangents of some contacts; J along them, and response to forces along them."""
+        frames = [frame_of_axis(now.touching[k].normal)[:, [2, 0, 1]] for k in which]
+        J = np.concatenate([frame.T @ now.J[k] for frame, k in zip(frames, which, strict=True)])
+        response = np.concatenate([now.response[:, k] @ frame for frame, k in zip(frames, which, strict=True)], 1)
+        return frames, J, response
+
+    def _law(self, G: Array, c: Array, which: Sequence[int], sliding: Sequence[Array | None]) -> tuple[Array, Any]:
+        time = self.t if hasattr(self._stepper, "t") else 0.0
+        try:
+            at, names = list(which), [self.contacts[k].name for k in which]
+            return contact_forces(G, c, self.friction[at], sliding, names, self._bounds[at], time, 0, self._static[at])
+        except Refused as error:
+            raise Diverged(str(error)) from None
+
+    def _decided(self, now: ContactsThere, closed: Sequence[bool], still: Sequence[bool]) -> ContactMode:
+        """Mode that follows from the forces, for contacts that are closed, and at rest where ``still``."""
+        which, mode = [k for k, shut in enumerate(closed) if shut], [OPEN for _ in closed]
+        if not which:
+            return tuple(mode)
+        frames, J, response = self._framed(now, which)
+        c, sliding = np.zeros(3 * len(which)), list[Array | None]()
+        for place, (frame, k) in enumerate(zip(frames, which, strict=True)):
+            there = now.touching[k]
+            c[3 * place : 3 * place + 3] = frame.T @ now.rate[k]
+            c[3 * place] += there.normal_rate @ there.slide
+            slip = frame[:, 1:].T @ there.slide
+            sliding.append(slip / np.linalg.norm(slip) if self._rubs[k] and not still[k] else None)
+        G = J @ response
+        force, done = self._law(G, c, which, sliding)
+        for place, (frame, k) in enumerate(zip(frames, which, strict=True)):
+            own, slides = slice(3 * place, 3 * place + 3), sliding[place]
+            mode[k] = first_mode(done[place], frame, -force[place, 1:] if slides is None else slides, G[own, own])
+        return tuple(mode)

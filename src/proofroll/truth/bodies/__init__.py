@@ -1,0 +1,1 @@
+"""Route 2 of the truth: separate bodies, constraint rows, modes by trial."""

@@ -1,0 +1,36 @@
+"""Contacts that hold still: forces of all contacts within their cones and bounds that let every one of them stick."""
+
+import numpy as np
+
+from proofroll.elements.mechanism.contact.acting import ContactMode
+from proofroll.elements.mechanism.contact.distributions import best_distribution, cones_of
+from proofroll.truth.bodies.contact_equations import BodiesState, ContactEquations
+from proofroll.truth.switching.contact_guards import AT_REST
+
+SLACK = 1e-9  # violation of an inequality, relative to the forces involved, up to which it counts as kept
+
+
+def all_held(equations: ContactEquations, bodies: BodiesState, mode: ContactMode, free: float) -> bool:
+    """True if nothing moves, or contacts share loads, and some distribution of forces lets all of them hold in a mode.
+
+    ``free``: largest rate of a slide without forces of contacts.
+    """
+    solution = equations.accelerated(bodies, mode)
+    if not solution.loose and np.abs(bodies.u).max() > AT_REST:
+        return False  # forces are determinate, and a trial among others
+    for own, slide, parting in zip(mode, solution.slide, solution.parting, strict=True):
+        left = float(np.abs(slide).max()) if own.kind == "stick" else abs(parting) if own.kind == "slip" else 0.0
+        if left > SLACK * max(free, AT_REST):
+            return False
+    cones = cones_of(
+        kinds=[own.kind for own in mode],
+        normals=np.array([each.normal for each in bodies.touching]),
+        friction=equations.static,
+        bounds=equations.bounds,
+        pressed_by=[contact.pressed_by for contact in equations.contacts],
+        force=solution.force,
+        shifts=solution.shifts,
+    )
+    best = best_distribution(cones)
+    weights = np.zeros(solution.shifts.shape[2]) if best is None else best.weights
+    return cones.hold(weights, SLACK)

@@ -1,0 +1,399 @@
+"""Route 2 of a mechanism that switches: separate bodies, modes of contacts and laws of joints found by trial."""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+
+import numpy as np
+
+from proofroll.core.errors import Refused
+from proofroll.elements.mechanism.contact.acting import (
+    OPEN,
+    Acting,
+    ContactMode,
+    Features,
+    closed_in,
+    direction_of,
+    features_of,
+    following,
+    modes_of,
+    slip_velocity,
+    with_features,
+)
+from proofroll.elements.mechanism.contact.free_slides import FreeSlides
+from proofroll.elements.mechanism.contact.joint_laws import off_stops
+from proofroll.elements.mechanism.contact.sequences import groups_of
+from proofroll.elements.mechanism.contact.start import closed_and_still, start_digits
+from proofroll.elements.mechanism.contact.touching import Touching
+from proofroll.elements.mechanism.contact.turning import shut_by_pressing
+from proofroll.elements.mechanism.dynamics.analysis import RANK
+from proofroll.elements.mechanism.scene.rotations import Array, cross, frame_of_axis
+from proofroll.truth.bodies.body_impacts import ImpactLaw, impulses_in_turn
+from proofroll.truth.bodies.body_slides import slides_of
+from proofroll.truth.bodies.contact_balance import SLACK, all_held
+from proofroll.truth.bodies.contact_body_symbols import BodySymbols
+from proofroll.truth.bodies.contact_equations import BodiesSolution, BodiesState, ContactEquations
+from proofroll.truth.bodies.contact_trials import consistent, follow, next_trial, provisional
+from proofroll.truth.numerics.hybrid import Transition
+from proofroll.truth.switching.contact_guards import SLIP_ENDED, SolvedContacts, pressing, sharing
+from proofroll.truth.switching.contact_stretches import ContactStretches
+from proofroll.truth.switching.contact_taylor import ModeSymbols
+from proofroll.truth.switching.held_route import BodyStates
+
+_MOST = 6  # largest number of closed contacts of which all modes are tried: each has up to four
+_PIVOTS = 4  # exchanges at most of a search by pivots, for each contact
+_CLEAR = 1e-6  # relative margin above which a mode found by pivots is the only one
+_SHARING = 2  # least number of contacts that may share a load
+Trial = Callable[[ContactMode, Sequence[Array | None]], BodiesSolution]
+
+
+class ContactBodies(ContactStretches):
+    """Stretches of a mechanism in the coordinates of its separate bodies.
+
+    Implements :class:`proofroll.truth.numerics.hybrid.HybridRoute`.
+    """
+
+    def __init__(self, equations: ContactEquations, tolerance: float, size: float) -> None:
+        self.equations, self._rubs = equations, equations.friction + equations.bounds > 0
+        super().__init__(equations, len(equations.equations.equations.start()), tolerance, size)
+        self._after_velocities = len(equations.equations.equations.angles)
+
+    def _symbols(self) -> ModeSymbols:
+        return BodySymbols(self.equations)
+
+    @property
+    def start(self) -> Array:
+        """State at time 0."""
+        return np.append(self.equations.equations.equations.start(), 0.0)
+
+    def bodies(self, state: Array) -> BodyStates:
+        """Places, velocities, quaternions and angular velocities of all bodies, world axes."""
+        return self.equations.equations.poses(state[:-1])
+
+    def begin(self) -> Transition[ContactMode]:
+        """See the protocol."""
+        touching = self.equations.at(state := self.start).touching
+        closed, still = closed_and_still(touching, np.ones(len(touching)), 1.0, start_digits(self.contacts))
+        features = tuple(each.feature for each in touching)
+        rough = modes_of(shut_by_pressing(self.contacts, closed), still, features)
+        rough = self._moved_on(state, rough)
+        state = self.equations.eliminated(state, rough)
+        mode, margin = self._decided(state, rough)
+        return Transition(state, mode, (), margin)
+
+    def _decided(self, state: Array, rough: ContactMode, leaving: Sequence[int] = ()) -> tuple[ContactMode, float]:
+        mode, margin = self._by_trial(state, rough, leaving)
+        return with_features(mode, features_of(rough)), margin
+
+    def _by_trial(self, state: Array, rough: ContactMode, leaving: Sequence[int]) -> tuple[ContactMode, float]:
+        """See :meth:`_decided`; the features of the mode are still to be set."""
+        closed = closed_in(rough)
+        if not any(closed):
+            return rough, np.inf
+        bodies, ways = self.equations.at(state, features_of(rough)), off_stops(self.contacts, closed)
+        still = [own.kind == "stick" and k not in ways for k, own in enumerate(rough)]
+        ways = {k: np.array(own.heading) for k, own in enumerate(rough) if own.heading} | ways
+
+        def trial(mode: ContactMode, headings: Sequence[Array | None]) -> BodiesSolution:
+            directed = [
+                own if heading is None or own.along is not None else Acting("slip", None, direction_of(heading))
+                for own, heading in zip(mode, headings, strict=True)
+            ]
+            return self.equations.accelerated(bodies, tuple(directed))
+
+        free = float(np.abs(bodies.J @ np.linalg.solve(bodies.mass, bodies.force)).max())
+        if list(still) == list(closed) and not leaving:
+            own = zip(
+                provisional(self.equations, bodies, closed),
+                self._rubs,
+                strict=True,
+            )
+            resting = tuple(each if rub or each.kind == "open" else each._replace(kind="slip") for each, rub in own)
+            if all_held(self.equations, bodies, resting, free):
+                return resting, np.inf
+        best = self._tried(bodies, closed, still, ways, trial, free, leaving)[0]
+        return self._completed(bodies, closed, still, best, free)
+
+    def _completed(
+        self,
+        bodies: BodiesState,
+        closed: Sequence[bool],
+        still: Sequence[bool],
+        best: tuple[float, BodiesSolution, ContactMode],
+        free: float,
+    ) -> tuple[ContactMode, float]:
+        """Mode with all contacts closed that do not part, and its margin; the mode itself where forces then differ.
+
+        Of contacts that share a load, as corners of one face, some can carry nothing of it and not part either.
+        """
+        kept, solution, mode = best
+        size = max(float(np.abs(solution.slide).max()), free) or 1.0
+        idle = [
+            k
+            for k, own in enumerate(mode)
+            if closed[k] and own.kind == "open" and solution.parting[k] <= SLACK * size and self.contacts[k].presses
+        ]
+        if not idle:
+            return mode, kept
+        lines, whole = provisional(self.equations, bodies, closed), list(mode)
+        for k in idle:
+            each = bodies.touching[k]
+            way = solution.slide[k] if still[k] else each.slide
+            whole[k] = following(
+                lines[k], way - each.normal * (each.normal @ way), still[k] and self._rubs[k], SLACK * size
+            )
+        full = self.equations.accelerated(bodies, tuple(whole))
+        shares = sharing(full.splits)
+        apart = float(np.abs(full.moved - solution.moved).max())
+        moves = full.spread > RANK or apart > SLACK * max(free, float(np.abs(full.moved).max()))
+        if moves or not set(idle) <= set(shares):
+            return mode, kept
+        normals = pressing(tuple(whole), bodies.touching, full.force, full.splits)[self.equations.pressing]
+        margins = [
+            self._kept(k, own, still[k], bodies, full, float(normals[k]), free)
+            for k, own in enumerate(whole)
+            if closed[k]
+        ]
+        return tuple(whole), max(0.0, min(margins))
+
+    def _struck(
+        self, state: Array, rough: ContactMode, laws: Sequence[float], sideways: Sequence[float]
+    ) -> tuple[Array, list[bool], float]:
+        bodies = self.equations.at(state, features_of(rough))
+        which = np.flatnonzero(closed_in(rough)).tolist()
+        ways, G = self.equations.coupled_responses(bodies, which)
+        slides = np.concatenate(
+            [frame_of_axis(bodies.touching[k].normal)[:, [2, 0, 1]].T @ bodies.touching[k].slide for k in which]
+        )
+        struck = [ImpactLaw(self.contacts[k], laws[k], sideways[k]) for k in which]
+        together = self.equations.mechanism.together
+        groups = groups_of([self.contacts[k].pair for k in which], slides, together=together)
+        impulses = impulses_in_turn(G, slides, groups, struck, float(state[-1]))
+        e = self.equations.equations.equations
+        state = state.copy()
+        state[e.nx : e.nx + e.nu] += ways @ impulses
+        parting, stays = (slides + G @ impulses)[::3], [False] * len(self.contacts)
+        for k, away in zip(which, parting, strict=True):
+            stays[k] = bool(away <= SLIP_ENDED)
+        return state, stays, np.inf
+
+    def _tried(
+        self,
+        bodies: BodiesState,
+        closed: Sequence[bool],
+        still: Sequence[bool],
+        ways: Mapping[int, Array],
+        trial: Trial,
+        free: float,
+        leaving: Sequence[int] = (),
+    ) -> list[tuple[float, BodiesSolution, ContactMode]]:
+        """Candidate modes that violate no inequality, best first: relative margin, solution, mode.
+
+        ``ways``: directions of slips that the present slide does not tell.
+        ``free``: largest slide, or rate of a slide, without forces, to which margins are relative if those with forces
+        are less; ``leaving``: contacts that static friction no longer holds.
+
+        Raises:
+            Refused: there is none, or it is not found.
+        """
+        count = sum(closed)
+        slips = [ways.get(k, slip_velocity(touch)) for k, touch in enumerate(bodies.touching)]
+        choices = [
+            list(self._candidates(k, own, still[k], slips[k]))
+            for k, own in enumerate(provisional(self.equations, bodies, closed))
+        ]
+        for k in np.flatnonzero(slides_of(bodies).moved & still & self._rubs).tolist():
+            choices[k] = [option for option in choices[k] if option.kind != "slip"]
+        for k in leaving:
+            choices[k] = [option for option in choices[k] if option.kind != "stick"]
+        exchanged = self._exchanged(bodies, choices, still, trial, free)
+        if exchanged is not None and (count > _MOST or (exchanged[0] > _CLEAR and not exchanged[1].loose)):
+            return [exchanged]
+        if count > _MOST:
+            raise Refused(
+                f"{count} contacts are closed at once, and exchanges of one after the other lead to no mode that keeps "
+                "all inequalities of contact, as where contacts that begin to slip share a load"
+            )
+        unique, shared = (list[tuple[float, BodiesSolution, ContactMode]]() for _ in range(2))
+        for mode in consistent(self.contacts, choices):
+            attempt = self._headed(bodies, mode, still, trial)
+            if attempt is None:
+                continue
+            solution, headed = attempt
+            normals = pressing(headed, bodies.touching, solution.force, solution.splits)[self.equations.pressing]
+            apart = (
+                self._kept(k, headed[k], still[k], bodies, solution, float(normals[k]), free)
+                for k in range(len(mode))
+                if closed[k]
+            )
+            if (least := min(apart, default=np.inf)) >= -SLACK:
+                (shared if solution.loose else unique).insert(0, (max(least, 0.0), solution, headed))
+        kept = shared + unique
+        if not kept:
+            raise Refused("nothing that the contacts can do keeps all inequalities of contact")
+        return sorted(kept, key=lambda one: -one[0])
+
+    def _exchanged(
+        self,
+        bodies: BodiesState,
+        choices: Sequence[Sequence[Acting]],
+        still: Sequence[bool],
+        trial: Trial,
+        free: float,
+    ) -> tuple[float, BodiesSolution, ContactMode] | None:
+        """Mode of :meth:`_tried` by pivots: what violates its inequality most is exchanged; None: that leads nowhere.
+
+        The first mode has all contacts closed, those that may stick sticking.
+        """
+        mode = [next((each for each in options if each.kind != "open"), OPEN) for options in choices]
+        for _ in range(_PIVOTS * (1 + len(mode))):
+            attempt = self._headed(bodies, tuple(mode), still, trial)
+            if attempt is None:
+                return None
+            solution, headed = attempt
+            normals = pressing(headed, bodies.touching, solution.force, solution.splits)[self.equations.pressing]
+            kept = [
+                self._kept(k, headed[k], still[k], bodies, solution, float(normals[k]), free)
+                if len(options) > 1
+                else np.inf
+                for k, options in enumerate(choices)
+            ]
+            if min(kept, default=np.inf) >= -SLACK:
+                return max(min(kept, default=np.inf), 0.0), solution, headed
+            worst = min(kept)
+            # of contacts that share a load, the one that is pressed least is exchanged
+            k = min(
+                (k for k, value in enumerate(kept) if value <= worst + SLACK),
+                key=lambda k: float(bodies.touching[k].normal @ solution.force[k]),
+            )
+            mode[k] = next_trial(self.contacts[k], headed[k], choices[k], solution.force[k], float(normals[k]))
+            follow(self.contacts, mode, choices)
+        return None
+
+    def _candidates(self, k: int, own: Acting, still: bool, slip: Array) -> Iterator[Acting]:
+        """Candidate modes of a contact; ``slip``: along its slip, of any length."""
+        mu, bound = self.equations.friction[k], self.equations.bounds[k]
+        if own.kind == "open" or self.contacts[k].presses:
+            yield OPEN
+        if own.kind == "open":
+            return
+        if not still and np.isinf(mu):
+            name = self.contacts[k].name
+            raise Refused(f"{name} would slip, but has friction = inf; give it a number")
+        if not still or not (mu or bound):
+            x, y, z = (slip / (float(np.linalg.norm(slip)) or 1.0)).tolist()
+            yield Acting("slip", None if own.along is None else (x, y, z), (x, y, z))
+            return
+        yield Acting("stick", own.along)
+        if np.isinf(mu):
+            return
+        if own.along is None:
+            yield Acting("slip")
+        else:
+            x, y, z = own.along
+            yield Acting("slip", (x, y, z), (x, y, z))
+            yield Acting("slip", (-x, -y, -z), (-x, -y, -z))
+
+    def _headed(
+        self, bodies: BodiesState, mode: ContactMode, still: Sequence[bool], trial: Trial
+    ) -> tuple[BodiesSolution, ContactMode] | None:
+        """Solution and mode of a candidate, with unknown slip directions solved for.
+
+        None: none is consistent, or contacts that begin to rub share forces.
+        """
+        from scipy.optimize import root
+
+        frames = [frame_of_axis(each.normal) for each in bodies.touching]
+        unknown = [k for k, own in enumerate(mode) if own.kind == "slip" and own.heading is None]
+
+        def directions(angles: Array) -> list[Array]:
+            return [
+                np.cos(angle) * frames[k][:, 0] + np.sin(angle) * frames[k][:, 1]
+                for k, angle in zip(unknown, angles, strict=True)
+            ]
+
+        def tried(angles: Array) -> BodiesSolution:
+            known = dict(zip(unknown, directions(angles), strict=True))
+            headings = [
+                known.get(k, None if own.heading is None or not mu else np.array(own.heading))
+                for k, (own, mu) in enumerate(zip(mode, self.equations.friction, strict=True))
+            ]
+            return trial(mode, headings)
+
+        def sideways(angles: Array) -> Array:
+            slides = tried(angles).slide
+            across_slide = zip(unknown, directions(angles), strict=True)
+            return np.array([float(cross(way, slides[k]) @ bodies.touching[k].normal) for k, way in across_slide])
+
+        first = tried(np.zeros(len(unknown)))
+        begins = (own.kind == "slip" and rub and rests for own, rub, rests in zip(mode, self._rubs, still, strict=True))
+        if first.loose and any(begins):
+            return None  # whatever the directions are
+        if not unknown:
+            return first, mode
+        loose = first.slide
+        start = np.array([float(np.arctan2(frames[k][:, 1] @ loose[k], frames[k][:, 0] @ loose[k])) for k in unknown])
+        for turn in (0.0, 1.0, -1.0, 2.0, -2.0):
+            answer = root(sideways, start + turn, tol=1e-15)
+            solution, ways = tried(answer.x), dict(zip(unknown, directions(answer.x), strict=True))
+            size = float(np.abs(solution.slide).max()) or 1.0
+            ahead = all(float(way @ solution.slide[k]) > 0 for k, way in ways.items())
+            if np.abs(answer.fun).max() <= SLACK * size and ahead:
+                headed = (
+                    Acting("slip", None, direction_of(ways[k])) if k in ways else own for k, own in enumerate(mode)
+                )
+                return solution, tuple(headed)
+        return None
+
+    def _kept(
+        self,
+        k: int,
+        own: Acting,
+        still: bool,
+        bodies: BodiesState,
+        solution: BodiesSolution,
+        normal: float,
+        free: float,
+    ) -> float:
+        """Margin of a contact's inequalities, relative to forces or speeds; negative: one is violated."""
+        each, mu, bound = bodies.touching[k], float(self.equations.friction[k]), float(self.equations.bounds[k])
+        size_f, size_s = float(np.abs(solution.force).max()), max(float(np.abs(solution.slide).max()), free) or 1.0
+        if own.kind == "open":
+            return float(solution.parting[k]) / size_s if self.contacts[k].pressed_by is None else np.inf
+        normal = np.inf if bound else normal
+        if not size_f:
+            return np.inf
+        if own.kind == "stick":
+            force = solution.force[k]
+            held = float(np.linalg.norm(force - each.normal * (each.normal @ force)))
+            most = bound or self.equations.static[k] * normal
+            return min(normal, most - held if np.isfinite(mu) else np.inf) / size_f
+        if not still or not (mu or bound):
+            return normal / size_f
+        assert own.heading is not None  # known by now
+        return min(normal / size_f, float(np.dot(own.heading, solution.slide[k])) / size_s)
+
+    def forces(self, state: Array, mode: ContactMode) -> tuple[Array, Array]:
+        """Contact forces [N], (contacts, 3), and wrenches on the bodies about their centres of mass, (bodies, 6)."""
+        bodies = self.equations.at(self.equations.equations.normalised(state), features_of(mode))
+        return self.equations.applied(bodies, self.equations.accelerated(bodies, mode).force)
+
+    def _touching(self, state: Array, features: Features | None) -> Sequence[Touching]:
+        return self.equations.at(state, features).touching
+
+    def _free_slides(self, state: Array, rough: ContactMode) -> FreeSlides:
+        return slides_of(self.equations.at(state, features_of(rough)))
+
+    def _solution(self, state: Array, mode: ContactMode) -> SolvedContacts:
+        bodies = self.equations.at(self.equations.equations.normalised(state), features_of(mode))
+        solution = self.equations.accelerated(bodies, mode)
+        return SolvedContacts(
+            touching=bodies.touching,
+            mode=solution.mode,
+            velocity=bodies.u,
+            acceleration=solution.moved,
+            slide_rate=solution.slide,
+            force=solution.force,
+            response=solution.response,
+            splits=solution.splits,
+            spread=solution.spread,
+            shifts=solution.shifts,
+        )

@@ -1,0 +1,410 @@
+"""Equations of route 2 for bodies that touch: one linear system for accelerations and forces of joints and contacts."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from proofroll.core.last_results import LastResults
+from proofroll.elements.mechanism import Mechanism
+from proofroll.elements.mechanism.contact.acting import (
+    EXACT,
+    ContactMode,
+    Features,
+    features_of,
+    forbidding_rows,
+    heading_of,
+    held_directions,
+    turned,
+)
+from proofroll.elements.mechanism.contact.joint_laws import JointContact, joint_contacts, line_response, mode_of_joints
+from proofroll.elements.mechanism.contact.touching import Moving, Touching, touch
+from proofroll.elements.mechanism.contact.turning import TurningFriction, moments_by_pressing, turning_frictions
+from proofroll.elements.mechanism.dynamics.switches import HOLDING, STOPPED, switched_joints
+from proofroll.elements.mechanism.scene.kinks import Sides, held_sides
+from proofroll.elements.mechanism.scene.rotations import Array, cross, frame_of_axis
+from proofroll.elements.mechanism.scene.shapes.geometry import BodyContact
+from proofroll.elements.mechanism.scene.signal import value_at
+from proofroll.truth.bodies.independent_rows import accelerated_by, independent, least_motion
+from proofroll.truth.bodies.maximal_coordinates import RANK, NumericEquations
+from proofroll.truth.bodies.maximal_equations import FUNCTIONS, Switched
+
+_AXES = np.eye(3)
+_KEPT = 4  # states whose rows and loads are kept
+
+
+@dataclass(frozen=True)
+class BodiesState:
+    """Bodies at one state: rows of joints and contacts, and loads.
+
+    Attributes:
+        touching: geometry and sliding velocity of each contact.
+        J: derivative of each sliding velocity with respect to u, (contacts, 3, nu).
+        bias: rate of each sliding velocity at u̇ = 0, (contacts, 3).
+        C, of_joints: independent rows of joints and loops, (rows, nu), and their biases.
+        mass, force: mass matrix and loads: M u̇ = force + forces of joints and contacts.
+        residual: violations of all rows of joints and loops.
+        u: velocities, (nu).
+        centres: centres of mass of the bodies, and the world's origin, (bodies + 1, 3).
+        angle_rate: rates of the angles that are integrated.
+    """
+
+    touching: tuple[Touching, ...]
+    J: Array
+    bias: Array
+    C: Array
+    of_joints: Array
+    mass: Array
+    force: Array
+    residual: Array
+    u: Array
+    centres: Array
+    angle_rate: Array
+
+
+@dataclass(frozen=True)
+class BodiesSolution:
+    """Accelerations and contact forces in a mode.
+
+    Attributes:
+        mode: the mode, with lines of contacts as they lie now.
+        moved: u̇.
+        force: on body a of each contact, (contacts, 3).
+        slide: rate of each sliding velocity, (contacts, 3).
+        parting: second rate of each gap, (contacts).
+        response: Painlevé's measure, 1 without friction.
+        loose: True if the forces are not unique.
+        splits: ways to split a load that contacts share: changes of the normal forces, (contacts, ways).
+        spread: change of ``moved`` with these, the whole of unit length.
+        shifts: changes of all forces with these, (contacts, 3, ways).
+    """
+
+    mode: ContactMode
+    moved: Array
+    force: Array
+    slide: Array
+    parting: Array
+    response: float
+    loose: bool
+    splits: Array
+    spread: float
+    shifts: Array
+
+
+class ContactEquations:
+    """Equations of a mechanism's separate bodies with its contacts."""
+
+    def __init__(self, mechanism: Mechanism, equations: NumericEquations) -> None:
+        self.mechanism, self.equations, self._switched = mechanism, equations, switched_joints(mechanism)
+        self._of_joints = joint_contacts(self._switched)
+        self._turning = turning_frictions(mechanism.contacts)
+        self.contacts: tuple[BodyContact | JointContact | TurningFriction, ...] = (
+            *mechanism.contacts,
+            *self._of_joints,
+            *self._turning,
+        )
+        self.friction = np.array([contact.friction for contact in self.contacts])
+        self.static = np.array([contact.static for contact in self.contacts])
+        self.bounds = np.array([contact.bound for contact in self.contacts])
+        # contact whose normal force bounds the friction of each
+        self.pressing = [k if (by := c.pressed_by) is None else by for k, c in enumerate(self.contacts)]
+        index = mechanism.body_index
+        self.pairs = [(index[contact.body_a], index[contact.body_b]) for contact in mechanism.contacts]
+        self._com = [np.array(body.com) for body in mechanism.bodies] + [np.zeros(3)]
+        self.limited = {k: actuator for k, actuator in enumerate(mechanism.actuators) if actuator.limit is not None}
+        self._sides: tuple[int, ...] = ()
+        self._last = LastResults[tuple[bytes, tuple[float, ...], Features | None], BodiesState](_KEPT)
+        self._driven = [mechanism.joint_index[actuator.joint] for actuator in self.limited.values()]
+
+    def at(self, state: Array, features: Features | None = None) -> BodiesState:
+        """Rows and loads of the bodies at a state: coordinates, velocities, angles, and last the time [s].
+
+        ``features``: of solids that touch; None: the nearest.
+        """
+        key = state.tobytes(), (*self.mechanism.held, *self._sides), features
+        return self._last.of(key, lambda: self._at(state.copy(), features))
+
+    def _at(self, state: Array, features: Features | None) -> BodiesState:
+        e = self.equations.equations
+        constrained, C, bias, half, force = self.equations.loaded(state[:-1], float(state[-1]), self.clamped(state))
+        bodies = []
+        for view, com in zip(constrained.views, self._com, strict=True):
+            R, v, w = (np.array(part, dtype=float) for part in (view.R, view.v, view.w))
+            arm = R @ com
+            bodies.append(Moving(np.array(view.r) - arm, R, v - cross(w, arm), w))
+        given = [None] * len(self.pairs) if features is None else features[: len(self.pairs)]
+        pairs = zip(self.mechanism.contacts, self.pairs, given, strict=True)
+        touching = tuple(touch(c, bodies[a], bodies[b], feature) for c, (a, b), feature in pairs)
+        J, rates = np.zeros((len(self.contacts), 3, e.nu)), np.zeros((len(self.contacts), 3))
+        for k, (pair, each) in enumerate(zip(self.pairs, touching, strict=True)):
+            for body, sign in zip(pair, (1.0, -1.0), strict=True):
+                if body < 0 or each.absent:
+                    continue
+                view = constrained.views[body]
+                arm = each.place - np.array(view.r)
+                for row, axis in zip(J[k], _AXES, strict=True):
+                    entries = e.bodies[body].projected(view, axis.tolist(), cross(arm, axis).tolist())
+                    row[e.u_slices[body]] += sign * np.array(entries, dtype=float)
+                # ω × (ω × arm) of the material point, and ω × the velocity of the contact point relative to it
+                rates[k] += sign * cross(view.w, each.place_rate - np.array(view.v))
+        numbers = [contact.joint.number for contact in self._of_joints]
+        coordinates = zip(*self.equations.along(state[:-1], numbers), strict=True) if numbers else ()
+        moves = e.rate_rows(state[:-1].tolist(), numbers)
+        for contact, (q, v), row in zip(self._of_joints, coordinates, moves, strict=True):
+            k = len(touching)
+            touching += (contact.touching(float(q), float(v)),)
+            J[k][:, list(row.coefficients)] = np.outer(contact.direction, list(row.coefficients.values()))
+            rates[k] = contact.direction * float(row.bias)
+        for friction in self._turning:
+            k, there = len(touching), touching[friction.pressed_by]
+            turns, relative = np.zeros((3, e.nu)), np.zeros(3)
+            for body, sign in zip(self.pairs[friction.pressed_by], (1.0, -1.0), strict=True):
+                if body < 0:
+                    continue
+                view = constrained.views[body]
+                relative += sign * np.array(view.w, dtype=float)
+                for row, axis in zip(turns, _AXES, strict=True):
+                    entries = e.bodies[body].projected(view, [0.0, 0.0, 0.0], axis.tolist())
+                    row[e.u_slices[body]] += sign * np.array(entries, dtype=float)
+            touching += (friction.touching(there, relative),)
+            J[k] = friction.part(there.normal) @ turns
+            rates[k] = friction.part_rate(there) @ relative
+        mass = np.asarray(np.linalg.inv(half @ half.T), dtype=np.float64)
+        C, bias = independent(C, bias, self.equations.rank)
+        centres = np.array([view.r for view in constrained.views], dtype=float)
+        residual = np.array([row.residual for row in constrained.rows], dtype=float)
+        return BodiesState(
+            touching=touching,
+            J=J,
+            bias=rates,
+            C=C,
+            of_joints=bias,
+            mass=mass,
+            force=force,
+            residual=residual,
+            u=state[e.nx : e.nx + e.nu],
+            centres=centres,
+            angle_rate=np.array(constrained.angle_rate, dtype=float),
+        )
+
+    def accelerated(self, state: BodiesState, mode: ContactMode) -> BodiesSolution:
+        """Accelerations and forces while each contact keeps its mode."""
+        if any(own.along for own in mode):
+            mode = tuple(map(turned, mode, state.touching, map(line_response, self.contacts, self.responses(state))))
+        wanted = [
+            -held @ bias - (each.normal_rate @ each.slide if own.kind == "slip" else 0.0)
+            for held, own, each, bias in zip(self._held(state, mode), mode, state.touching, state.bias, strict=True)
+        ]
+        rubs = self.friction + self.bounds > 0
+        headings = [heading_of(own, each) if own.kind == "slip" and rub else None
+                    for own, each, rub in zip(mode, state.touching, rubs, strict=True)]  # fmt: skip
+        turning = np.array([each.normal_rate @ each.slide for each in state.touching])
+        return self._solved(state, mode, headings, wanted, state.force, -state.of_joints, state.bias, turning)
+
+    def responses(self, state: BodiesState) -> Array:
+        """Rates of each contact's slide by unit forces on it, other contacts open, (contacts, 3, 3)."""
+        root = np.linalg.cholesky(state.mass)
+        ways = np.linalg.solve(root, state.J.reshape(-1, len(state.u)).T)
+        if len(state.C):
+            joints = np.linalg.solve(root, state.C.T)
+            ways = ways - joints @ np.linalg.lstsq(joints, ways, rcond=RANK)[0]
+        each = ways.T.reshape(*state.J.shape)
+        return np.asarray(each @ each.swapaxes(1, 2))
+
+    def coupled_responses(self, state: BodiesState, which: Sequence[int]) -> tuple[Array, Array]:
+        """Changes of the velocities (nu, 3 contacts) and slides (3 contacts, 3 contacts) by unit impulses on contacts.
+
+        Components of an impulse or a slide are along the normal and two directions of the surface.
+        """
+        frames = [frame_of_axis(state.touching[k].normal)[:, [2, 0, 1]] for k in which]
+        J = np.concatenate([frame.T @ state.J[k] for frame, k in zip(frames, which, strict=True)])
+        root = np.linalg.cholesky(state.mass)
+        ways = np.linalg.solve(root, J.T)
+        if len(state.C):
+            joints = np.linalg.solve(root, state.C.T)
+            ways = ways - joints @ np.linalg.lstsq(joints, ways, rcond=RANK)[0]
+        return np.asarray(np.linalg.solve(root.T, ways)), np.asarray(ways.T @ ways)
+
+    def _held(self, state: BodiesState, mode: ContactMode) -> list[Array]:
+        """Directions in which each contact constrains the sliding velocity."""
+        return [
+            held_directions(own, each, contact.presses)
+            for own, each, contact in zip(mode, state.touching, self.contacts, strict=True)
+        ]
+
+    def _solved(
+        self,
+        state: BodiesState,
+        mode: ContactMode,
+        headings: Sequence[Array | None],
+        wanted: Sequence[Array],
+        right: Array,
+        of_joints: Array,
+        bias: Array,
+        beyond: Array,
+    ) -> BodiesSolution:
+        """Solution x of M x − Cᵀλ − Dᵀz = right, C x = of_joints, K x = wanted."""
+        rows, along, aims, owner = [state.C], [state.C], [of_joints], list[tuple[int, Array]]()
+        force, turning = np.zeros((len(mode), 3)), list[tuple[int, int, Array]]()
+        for k, held in enumerate(self._held(state, mode)):
+            rows.append(held @ state.J[k])
+            aims.append(wanted[k])
+            heading = headings[k] if mode[k].kind == "slip" else None
+            directions = held
+            by = self.contacts[k].pressed_by
+            if heading is not None and by is not None:
+                turning.append((k, by, -self.friction[k] * heading))
+            elif heading is not None:
+                force[k] = -self.bounds[k] * heading
+                directions = held - self.friction[k] * heading
+            along.append(directions @ state.J[k])
+            owner += [(k, direction) for direction in directions]
+        right = right + np.einsum("kin,ki->n", state.J, force)
+        if not owner:  # no contact holds anything: the rows of joints alone, which are independent
+            x, none = accelerated_by(state.mass, right, state.C, of_joints), np.zeros((len(mode), 3, 0))
+            slide = state.J @ x + bias
+            parting = np.array([each.normal @ rate for each, rate in zip(state.touching, slide, strict=True)]) + beyond
+            return BodiesSolution(
+                mode=mode,
+                moved=x,
+                force=force,
+                slide=slide,
+                parting=parting,
+                response=1.0,
+                loose=False,
+                splits=none[:, 0],
+                spread=0.0,
+                shifts=none,
+            )
+        K, D = np.concatenate(rows), np.concatenate(along)
+        moments = moments_by_pressing(turning, owner, [each.normal for each in state.touching])
+        for k, place, moment in moments:
+            D[len(state.C) + place] += moment @ state.J[k]
+        nu, count = len(state.u), len(K)
+        none = np.zeros((count, count))
+        # Scaled by the inertia of each velocity and by the norm of each row, so a small body's moment does not count as
+        # zero.
+        by_velocity = 1 / np.sqrt(np.diag(state.mass))
+        units = np.concatenate([by_velocity, 1 / np.linalg.norm(K * by_velocity, axis=1)])
+        system = np.block([[state.mass, -D.T], [K, none]]) * units * units[:, None]
+        answer = units * np.linalg.lstsq(system, units * np.concatenate([right, *aims]), rcond=1e-13)[0]
+        x, z = answer[:nu], answer[nu + len(state.C) :]
+        plain = np.block([[state.mass, -K.T], [K, none]]) * units * units[:, None]
+        sides, sizes, _ = np.linalg.svd(plain[nu:, :nu])
+        rank = int((sizes > RANK).sum())
+        # without what the split of a shared load changes
+        whole = np.block([[np.eye(nu), np.zeros((nu, rank))], [np.zeros((count, nu)), sides[:, :rank]]])
+        response = float(np.linalg.det(whole.T @ system @ whole) / np.linalg.det(whole.T @ plain @ whole))
+        ways = np.zeros((len(system), 0))
+        if rank < count:
+            ways = units[:, None] * np.linalg.svd(system)[2][nu + rank :].T
+            ways /= np.linalg.norm(ways[nu:], axis=0)
+        splits, shifts = np.zeros((len(mode), ways.shape[1])), np.zeros((len(mode), 3, ways.shape[1]))
+        for (k, direction), size, way in zip(owner, z, ways[nu + len(state.C) :], strict=True):
+            force[k] += size * direction
+            shifts[k] += np.outer(direction, way)
+            splits[k] += float(direction @ state.touching[k].normal) * way
+        for k, place, moment in moments:
+            force[k] += z[place] * moment
+            shifts[k] += np.outer(moment, ways[nu + len(state.C) + place])
+        slide = state.J @ x + bias
+        parting = np.array([each.normal @ rate for each, rate in zip(state.touching, slide, strict=True)]) + beyond
+        spread = float(np.linalg.norm(ways[:nu]))
+        return BodiesSolution(
+            mode=mode,
+            moved=x,
+            force=force,
+            slide=slide,
+            parting=parting,
+            response=response,
+            loose=rank < count,
+            splits=splits,
+            spread=spread,
+            shifts=shifts,
+        )
+
+    def applied(self, state: BodiesState, force: Array) -> tuple[Array, Array]:
+        """Forces of contacts between bodies, and wrenches on the bodies about their centres of mass, (bodies, 6)."""
+        moments = force[len(force) - len(self._turning) :]
+        wrenches, force = np.zeros((len(self.mechanism.bodies) + 1, 6)), force[: len(self.pairs)]
+        for pair, each, push in zip(self.pairs, state.touching, force, strict=False):
+            for body, sign in zip(pair, (1.0, -1.0), strict=True):
+                wrenches[body] += sign * np.concatenate([push, cross(each.place - state.centres[body], push)])
+        for friction, moment in zip(self._turning, moments, strict=True):
+            for body, sign in zip(self.pairs[friction.pressed_by], (1.0, -1.0), strict=True):
+                wrenches[body, 3:] += sign * moment
+        return force, wrenches[:-1]
+
+    def rate(self, state: Array, mode: ContactMode) -> Array:
+        """Time derivative of a state in a mode."""
+        e, unit = self.equations.equations, self.equations.normalised(state)
+        solution = self.accelerated(bodies := self.at(unit, features_of(mode)), mode)
+        x, u = state[: e.nx], unit[e.nx : e.nx + e.nu]
+        return np.array([*self.equations.moving(x, u), *solution.moved, *bodies.angle_rate, 1.0], dtype=float)
+
+    def drawn(self, state: Array) -> Array:
+        """Efforts with a limit before they are clamped, in parts of their limits."""
+        if not self.limited:
+            return np.zeros(0)
+        along = self.equations.along(self.equations.normalised(state[:-1]), self._driven)
+        motors = zip(self.limited.values(), *along, strict=True)
+        return np.array([motor.wanted(state[-1], q, v) / motor.bound for motor, q, v in motors])
+
+    def kinks(self, state: Array) -> Array:
+        """See :meth:`ContactDynamics.kinks`."""
+        sides = Sides(self.mechanism.kinks)
+        functions = sides.functions(FUNCTIONS)
+        self.equations.equations.at(self.equations.normalised(state[:-1]).tolist(), functions, time=float(state[-1]))
+        for signal in self.mechanism.signals:
+            value_at(signal, float(state[-1]), functions)
+        return np.array(sides.arguments, dtype=float)
+
+    def hold(self, signs: Sequence[int]) -> None:
+        """See :meth:`ContactDynamics.hold`."""
+        self._sides = tuple(signs)
+        self.equations.functions = held_sides(self.mechanism.kinks, signs[len(self.limited) :], FUNCTIONS)
+
+    def clamped(self, state: Array) -> Switched:
+        """Switched state with the efforts that are clamped at their limits."""
+        sides: Sequence[float] = self._sides[: len(self.limited)]
+        sides = sides or [np.clip(part, -1, 1) if abs(part) > 1 else 0 for part in self.drawn(state)]
+        pairs = zip(self.limited.items(), sides, strict=True)
+        return Switched(clamped={k: float(side * m.bound) for (k, m), side in pairs if side})
+
+    def switched(self, state: Array, mode: ContactMode) -> Switched:
+        """Joints that are held or slide with friction in a mode, and clamped efforts."""
+        own = mode_of_joints(self._switched, self.contacts, mode)
+        pairs = list(zip(self._switched, own, strict=True))
+        return self.clamped(state)._replace(
+            held=tuple(joint.number for joint, now in pairs if now in HOLDING),
+            stopped=tuple(joint.number for joint, now in pairs if now in STOPPED),
+            push={joint.number: joint.push(now) for joint, now in pairs if joint.push(now)},
+        )
+
+    def eliminated(self, state: Array, mode: ContactMode) -> Array:
+        """State without violations of joint rows, closed contacts and unit quaternions."""
+        e = self.equations.equations
+        unit = np.append(self.equations.normalised(state[:-1]), state[-1])
+        state = unit if np.abs(unit - state).max() > EXACT else state
+        features = features_of(mode)
+        presses, bodies = [contact.presses for contact in self.contacts], self.at(state, features)
+        closed = [k for k, own in enumerate(mode) if own.kind != "open" and presses[k]]
+        gaps = np.array([bodies.touching[k].gap for k in closed])
+        slides = forbidding_rows(mode, bodies.touching, bodies.J, presses) @ bodies.u
+        left = np.abs(np.concatenate([bodies.residual, bodies.C @ bodies.u, gaps, slides])).max(initial=0.0)
+        if left <= EXACT:
+            return state
+        state = np.append(self.equations.eliminated(state[:-1]), state[-1])
+        if not len(slides):
+            return state
+        bodies = self.at(state, features)
+        if closed:
+            normals = np.array([bodies.touching[k].normal @ bodies.J[k] for k in closed])
+            gaps = np.array([bodies.touching[k].gap for k in closed])
+            back = least_motion(bodies.mass, bodies.C, normals, gaps)
+            state[: e.nx] -= self.equations.moving(state[: e.nx], back)
+            state = self.equations.normalised(state)
+            bodies = self.at(state, features)
+        K = forbidding_rows(mode, bodies.touching, bodies.J, presses)
+        state[e.nx : e.nx + e.nu] -= least_motion(bodies.mass, bodies.C, K, K @ bodies.u)
+        return state

@@ -1,0 +1,63 @@
+"""Trials of modes in route 2: all that are consistent, and the next one of a contact that violates an inequality."""
+
+import itertools
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from proofroll.elements.mechanism.contact.acting import OPEN, Acting, ContactMode, first_mode
+from proofroll.elements.mechanism.contact.joint_laws import line_response
+from proofroll.elements.mechanism.scene.rotations import Array, frame_of_axis
+from proofroll.truth.bodies.contact_equations import BodiesState, ContactEquations
+from proofroll.truth.switching.contact_guards import Touchable
+
+
+def provisional(equations: ContactEquations, bodies: BodiesState, closed: Sequence[bool]) -> list[Acting]:
+    """Provisional mode of each contact: open, or stick, with its line if it can slide along a line only."""
+    modes, responses = list[Acting](), equations.responses(bodies)
+    for contact, each, G, shut in zip(equations.contacts, bodies.touching, responses, closed, strict=True):
+        frame = frame_of_axis(each.normal)[:, [2, 0, 1]]
+        response = frame.T @ line_response(contact, G) @ frame
+        modes.append(first_mode("stick", frame, np.zeros(2), response) if shut else OPEN)
+    return modes
+
+
+def next_trial(contact: Touchable, own: Acting, options: Sequence[Acting], force: Array, normal: float) -> Acting:
+    """Next trial of a contact whose present one violates an inequality.
+
+    Args:
+        contact: its laws.
+        own: its present trial.
+        options: all its trials.
+        force: on it in the present trial, (3,).
+        normal: the normal force that bounds its friction.
+    """
+    if own.kind == "open":
+        return options[1]
+    if (normal < 0 or np.isinf(contact.friction)) and options[0].kind == "open":
+        return OPEN
+    if own.kind == "slip":
+        return next((option for option in options if option.kind == "stick"), own)
+    slips = [option for option in options if option.kind == "slip"]
+    return next((slip for slip in slips if slip.along and np.dot(slip.along, force) < 0), slips[-1])
+
+
+def follow(contacts: Sequence[Touchable], mode: list[Acting], choices: Sequence[Sequence[Acting]]) -> None:
+    """Opens friction against turning in a mode with the contact that presses, and closes it again with it."""
+    for k, contact in enumerate(contacts):
+        if contact.pressed_by is None:
+            continue
+        if mode[contact.pressed_by].kind == "open":
+            mode[k] = OPEN
+        elif mode[k].kind == "open":
+            mode[k] = choices[k][0]
+
+
+def consistent(contacts: Sequence[Touchable], choices: Sequence[Sequence[Acting]]) -> Iterator[ContactMode]:
+    """All modes in which friction against turning is open with the contact that presses."""
+    for options in itertools.product(*choices):
+        mode = list(options)
+        follow(contacts, mode, choices)
+        # what is opened here counts once
+        if all(own == option or option == of[0] for own, option, of in zip(mode, options, choices, strict=True)):
+            yield tuple(mode)

@@ -1,0 +1,243 @@
+"""Truth of a mechanism that switches, by two routes that share the root finder of guards and the shapes.
+
+Contacts of bodies, dry friction, stops and effort limits of joints are rows with bounds of the same machine.
+"""
+
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+
+from proofroll.core.errors import Refused
+from proofroll.core.events import JUMPS, EventKind
+from proofroll.elements.mechanism import Mechanism
+from proofroll.elements.mechanism.contact.acting import ContactMode
+from proofroll.elements.mechanism.contact.dynamics import ContactDynamics
+from proofroll.elements.mechanism.contact.joint_laws import JointContact
+from proofroll.elements.mechanism.dynamics.analysis import RANK
+from proofroll.elements.mechanism.dynamics.commands import has_held
+from proofroll.elements.mechanism.dynamics.record import record_of
+from proofroll.elements.mechanism.scene.rotations import Array
+from proofroll.elements.mechanism.scene.shapes.geometry import pair_sums
+from proofroll.elements.mechanism.scene.signal import breaks
+from proofroll.truth.bodies.contact_bodies import ContactBodies
+from proofroll.truth.bodies.contact_equations import ContactEquations
+from proofroll.truth.bodies.maximal_coordinates import MaximalCoordinates
+from proofroll.truth.contact_bounces import contact_bounces
+from proofroll.truth.error_bars import TwoRouteMotion, check_start, on_same_turns
+from proofroll.truth.followed_paths import (
+    CLOSE,
+    TOLERANCES,
+    Routed,
+    at_times,
+    counterparts,
+    cut_early,
+    followed,
+    refuse_uncovered,
+    stretches_at,
+    times_known,
+    two_route_motion,
+)
+from proofroll.truth.law_verdict import held_to_laws
+from proofroll.truth.natural_units import Units, natural_units
+from proofroll.truth.numerics.hybrid import HybridPath, HybridRoute, Stretch, first_close, states_of
+from proofroll.truth.standing_ends import Face, RollingLanding, standing_ends
+from proofroll.truth.switching.held_route import HeldPath, HeldRoute
+from proofroll.truth.tree.contact_tree import ContactTree
+
+# Impacts whose intervals become shorter and shorter, and the last of these, in natural units, where they crowd.
+_CROWD, _CROWDED = 5, 1e-3
+
+_Path = HybridPath[Stretch[ContactMode]]
+
+
+def contact_truth(mechanism: Mechanism, times: Array) -> TwoRouteMotion:
+    """Truth at rising times [s].
+
+    Raises:
+        NotUnique: the laws of contact leave more than one motion, or none.
+        Refused: fewer than two routes cover the mechanism; the text says why.
+        Diverged: a route stopped.
+    """
+    refuse_uncovered(mechanism)
+    if mechanism.contacts and has_held(mechanism):
+        raise Refused("no route of the truth follows contacts under held targets yet; it follows them in the air")
+    stands = standing_ends(mechanism)
+    if stands is not None:
+        with suppress(RollingLanding):
+            return stands.folded(_of(stands.mechanism, times, stands.faces))
+    return _of(mechanism, times)
+
+
+def _of(mechanism: Mechanism, times: Array, faces: Sequence[Face] = ()) -> TwoRouteMotion:
+    """Truth at times [s]; ``faces``: ends of cylinders whose corners are contacts."""
+    units = natural_units(mechanism)
+    with units.errors_in_seconds():
+        return _in_units(mechanism, units, times / units.time, faces)
+
+
+def _in_units(mechanism: Mechanism, units: Units, times: Array, faces: Sequence[Face]) -> TwoRouteMotion:
+    """Truth at times in natural units, by routes in these units."""
+    own = units.mechanism(mechanism)
+    held = tuple(HeldPath(mechanism, units, own) for _ in range(2)) if has_held(mechanism) else ()
+    plain = [values.own for values in held] or [own, own]
+    dynamics, second = ContactDynamics(plain[0]), MaximalCoordinates(plain[1])
+    check_start(dynamics.equations, second, units.length)
+    size = _size(dynamics)
+    tree, equations = ContactTree(dynamics, TOLERANCES[0], size), ContactEquations(plain[1], second.lean)
+    bodies = ContactBodies(equations, TOLERANCES[1], size)
+    tree.faces = bodies.faces = faces
+    until, breaking, kinds = float(times[-1]), breaks(own.signals), partial(_kinds, dynamics)
+    paths, routes = _followed(tree, bodies, held, until, breaking)
+    paths, laws = held_to_laws(mechanism, units, (tree, bodies), paths, second, held)
+    asked = times_known(paths, times)
+    times = held[1].on_instants(held[0].on_instants(asked)) if held else asked
+    stretches = stretches_at(paths, times)
+    others = at_times(paths[1], counterparts(paths, stretches, kinds), times, kinds)
+    states = states_of(routes[0], paths[0], times, stretches), states_of(routes[1], paths[1], times, others)
+    for values in held:
+        values.finish()
+    first = _by_the_tree(tree, paths[0], times, states[0], stretches)
+    one, cut = first.record, None if held else cut_early(tree.early(), paths[0], until, breaking, times, kinds)
+    modes = [bodies.acting(paths[1].stretches[number], state) for number, state in zip(others, states[1], strict=True)]
+    applied = [bodies.forces(state, mode) for state, mode in zip(states[1], modes, strict=True)]
+    switched = [equations.switched(state, mode) for state, mode in zip(states[1], modes, strict=True)]
+    wrenches = [wrench for _, wrench in applied]
+    two = on_same_turns(own, one, second.recorded(times, states[1][:, :-1], switched, wrenches))
+    other = np.array([force for force, _ in applied])
+    others_sums = np.einsum("pk,tki->tpi", pair_sums(own.contacts), other) * units.force
+    # samples at instants are at the times that were asked for, to the last bit
+    one, two = (units.record(mechanism, replace(record, time=asked)) for record in (one, two))
+    left = None
+    if cut is not None:
+        earlier = cut[0].stretch_at(times)
+        early = _by_the_tree(tree, cut[0], times, states_of(tree, cut[0], times, earlier), earlier)
+        early = early._replace(record=on_same_turns(own, first.record, early.record))
+        left = _in_si(mechanism, units, early), cut[1]
+    motion = two_route_motion(
+        mechanism,
+        paths,
+        one,
+        two,
+        _names(tree, bodies),
+        _reason(dynamics, paths),
+        units,
+        kinds=kinds,
+        pressed=(first.pressed * units.force, other * units.force) if own.contacts else None,
+        sums=(first.sums * units.force, others_sums) if own.contacts else None,
+        until=until * units.time,
+        cut=left,
+    )
+    motion = replace(motion, laws=laws)
+    if not own.contacts:
+        return motion
+    last = min(until, *(path.stretches[-1].end for path in paths))
+    return replace(
+        motion, bounces=contact_bounces(own, list(zip((tree, bodies), paths, strict=True)), motion.events, units, last)
+    )
+
+
+def _followed(
+    tree: ContactTree, bodies: ContactBodies, held: Sequence[HeldPath], until: float, breaking: Sequence[float]
+) -> tuple[tuple[_Path, _Path], tuple[HybridRoute[ContactMode], HybridRoute[ContactMode]]]:
+    """Paths of both routes to a time in natural units, and the routes, which hold values if the mechanism does.
+
+    ``breaking``: times at which the rates are not smooth.
+    """
+    if not held:
+        return followed(tree, bodies, until, breaking), (tree, bodies)
+    first, second = HeldRoute(tree, held[0]), HeldRoute(bodies, held[1])
+    one, two = followed(first, second, until, sorted({*breaking, *held[0].breaks(until)}))
+    if any(item.kind == EventKind.SETTLE for item in one.happenings):
+        raise Refused("no route of the truth follows rebounds to their end under held targets yet")
+    return (first.completed(one), second.completed(two)), (first, second)
+
+
+def _kinds(dynamics: ContactDynamics, mode: ContactMode) -> tuple[tuple[str, bool], ...]:
+    """Part of a mode in which both routes must agree: kinds, and the sense of a joint that slides against friction."""
+    return tuple(
+        (own.kind, isinstance(law, JointContact) and own.kind == "slip" and own.along is not None and own.along[1] > 0)
+        for own, law in zip(mode, dynamics.contacts, strict=True)
+    )
+
+
+def _names(tree: ContactTree, bodies: ContactBodies) -> tuple[str, str]:
+    """Names of both routes."""
+    if not tree.dynamics.mechanism.contacts:
+        return (
+            f"joint coordinates, {tree.integrators}, modes by complementarity",
+            f"maximal coordinates, {bodies.integrators}, modes by trial",
+        )
+    return (
+        f"joint coordinates, {tree.integrators}, contacts by Coulomb's law at all of them at once",
+        f"bodies alone, {bodies.integrators}, contact modes by trial",
+    )
+
+
+def _reason(dynamics: ContactDynamics, paths: tuple[_Path, _Path]) -> str:
+    """Reason why the motion is not unique from its horizon or its end on."""
+    if not dynamics.mechanism.contacts:
+        return "a change of the parameters within their accuracy changes which joints hold or hit a stop"
+    ended, first = first_close(paths, CLOSE), paths[0]
+    last = first.stretches[-1].start if not first.known and first.margins[-1][1] < CLOSE else ended
+    reason = _shared_load(dynamics, first, last) if ended == 0 or not first.known else ""
+    reason = reason or _crowded(first, ended)
+    return reason or "a change of the parameters within their accuracy changes which contacts stick, slide or open"
+
+
+def _crowded(path: _Path, time: float) -> str:
+    """Reason why a motion is not unique from a time on where impacts crowd; empty: they do not."""
+    impacts = [happening for happening in path.happenings if happening.kind in JUMPS and happening.time <= time]
+    times = np.unique([impact.time for impact in impacts])[-_CROWD:]
+    intervals = np.diff(times)
+    if len(times) < _CROWD or time - times[-2] > _CROWDED or not np.all(np.diff(intervals) < 0):
+        return ""
+    names = sorted({impact.name for impact in impacts if impact.time >= times[0]})
+    return (
+        f"infinitely many impacts of {' and '.join(names)} follow each other faster and faster, in no series that can "
+        "be summed, and round-off decides what they leave"
+    )
+
+
+def _by_the_tree(tree: ContactTree, path: _Path, times: Array, states: Array, stretches: Sequence[int]) -> Routed:
+    """Motion and forces of the first route along a path with these states, in natural units."""
+    dynamics = tree.dynamics
+    records, forces, sums = zip(
+        *(
+            dynamics.sample(*dynamics.parts(state)[:2], tree.acting(path.stretches[number], state), float(state[-1]))
+            for state, number in zip(states, stretches, strict=True)
+        ),
+        strict=True,
+    )
+    return Routed(record_of(times, records), np.array(forces), np.array(sums))
+
+
+def _in_si(mechanism: Mechanism, units: Units, own: Routed) -> Routed:
+    """Motion and forces in SI units."""
+    return Routed(units.record(mechanism, own.record), own.pressed * units.force, own.sums * units.force)
+
+
+def _shared_load(dynamics: ContactDynamics, path: _Path, time: float) -> str:
+    """Reason why a motion is not unique from a time on [s], naming contacts whose normal forces are not determinate.
+
+    Empty: all are.
+    """
+    stretch = path.stretches[path.stretch_at(np.array([time]))[0]]
+    q, v, begun = dynamics.parts(stretch.first)
+    found = dynamics.solve(q, v, stretch.mode, begun)
+    pairs = zip(dynamics.contacts, found.determinate, found.state.touching, strict=True)
+    names = [contact.name for contact, known, each in pairs if not known[np.abs(each.normal) > RANK].all()]
+    if not names:
+        return ""
+    return (
+        f"{', '.join(names)} carry the load together in more ways than one, so that friction at each is not "
+        "determinate (a body on three points, or one that slides without turning, has a truth)"
+    )
+
+
+def _size(dynamics: ContactDynamics) -> float:
+    """Largest distance of a contact from the origin at the start, at least the natural length, which is 1."""
+    touching = dynamics.at(*dynamics.mechanism.start()).touching
+    return max([1.0, *(float(np.abs(each.place).max()) for each in touching)])

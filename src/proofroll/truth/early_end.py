@@ -1,0 +1,48 @@
+"""Early end of a truth: the earliest of its routes' failures and of broken checks, with its reason."""
+
+import re
+from collections.abc import Callable
+from typing import TypeVar
+
+import numpy as np
+
+from proofroll.core.errors import Diverged
+from proofroll.elements.mechanism.scene.rotations import Array
+
+_T = TypeVar("_T")
+_TIME = re.compile(r" (?:at|near|by|before) t = [\d.e+-]+ s\b")  # of a failure, in its message
+
+
+class EarlyEnd:
+    """Earliest time from which a motion is not known, and why.
+
+    Attributes:
+        time: [s]; inf: none.
+        reason: a clause without that time.
+    """
+
+    def __init__(self) -> None:
+        self.time, self.reason = float(np.inf), ""
+
+    def at(self, time: float, reason: str) -> None:
+        """Records an end, unless an earlier one is known; times in the reason are left out, for the end has one."""
+        if time < self.time:
+            self.time, self.reason = time, _TIME.sub("", reason)
+
+    def known(self, times: Array) -> Array:
+        """Times of rising ones [s] that lie before the end."""
+        return np.asarray(times[times < self.time])
+
+    def run(self, route: Callable[[Array], _T], times: Array) -> _T:
+        """Result of a route at the known ones of some times [s]; where it fails is an end.
+
+        Raises:
+            Diverged: the route fails at the first of these times, or at a time that it does not tell.
+        """
+        while True:
+            try:
+                return route(self.known(times))
+            except Diverged as stopped:
+                if stopped.time is None or not times[0] < stopped.time < self.time:
+                    raise
+                self.at(stopped.time, str(stopped))

@@ -1,0 +1,126 @@
+"""Motion by two routes with its error bars, which all truths of a mechanism give; records made comparable."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from proofroll.core.bounces import Bounce
+from proofroll.core.errors import Refused
+from proofroll.core.events import Event
+from proofroll.elements.mechanism import Mechanism
+from proofroll.elements.mechanism.dynamics.joint_coordinates import JointCoordinates
+from proofroll.elements.mechanism.dynamics.link_forces import link_values, works
+from proofroll.elements.mechanism.dynamics.placed import Placed
+from proofroll.elements.mechanism.dynamics.record import Record, record_of
+from proofroll.elements.mechanism.scene.joint_kinds import WITH_QUATERNION, JointKind
+from proofroll.elements.mechanism.scene.rotations import Array
+from proofroll.truth.bodies.maximal_coordinates import MaximalCoordinates
+
+NUDGE = float(np.finfo(float).eps)  # m, rad, part of velocities: the smallest difference that a scene file can express
+SAME_START = 1e-9  # m, 1: round-off of positions is 1e-15 of them, the error of a wrong formula far larger
+ROUND_OFF = 16 * float(np.finfo(float).eps)  # relative round-off after some ten operations
+JUDGED = ("p_WB", "v_WB", "q_WB", "w_WB", "q", "v", "wrench", "named")
+
+
+@dataclass(frozen=True)
+class TwoRouteMotion:
+    """Motion taken as the truth, with its accuracy.
+
+    Attributes:
+        record: the motion; after the horizon its error bars are large.
+        bars: error bar of each field of the record, of ``points``, ``energy`` and ``drift`` at each time: the
+            largest over bodies, components and earlier times, in the field's unit, (times).
+        differences: largest difference between the two routes, by field, up to the horizon.
+        horizon: time from which the question is ill-posed, s; inf: after the last time.
+        branches: times, s, at which a motion known in closed form passes singular poses of its loops.
+        determinate: mask of determinate components of the wrenches, (joints + loops, 6).
+        routes: names of the routes, the one of the record first.
+        checked_by: title of a closed form for a part of the motion, and its largest difference from the record.
+        events: switches along the motion.
+        reason: cause why the question is ill-posed from the horizon on.
+        end: time from which the motion is not known, s; the record ends before it; inf: it reaches all times asked for.
+        ended: reason why it ends there, as a clause.
+        pressed: contact forces on the first bodies [N], (times, contacts, 3), NaN where not determinate; None: no
+            contacts.
+        sums: their sums over the contacts of each pair with several, (times, such pairs, 3); None: as ``pressed``.
+        laws: outcome of the law check, as a clause; empty: it ended the motion, or there was none.
+    """
+
+    record: Record
+    bars: dict[str, Array]
+    differences: dict[str, float]
+    horizon: float
+    branches: list[float]
+    determinate: NDArray[np.bool_]
+    routes: tuple[str, ...]
+    checked_by: tuple[str, float] | None
+    events: Sequence[Event] = ()
+    reason: str = f"a start moved by {NUDGE:.1g} leads elsewhere: the motion is chaotic"
+    pressed: Array | None = None
+    end: float = np.inf
+    ended: str = ""
+    sums: Array | None = None
+    bounces: Sequence[Bounce] = ()
+    laws: str = ""
+
+
+def fields_with_bars(mechanism: Mechanism, record: Record) -> dict[str, Array]:
+    """Fields with an error bar: those of the record, and what follows from them, as energy."""
+    placed = record.placed(mechanism)
+    fields = {name: getattr(record, name) for name in JUDGED}
+    derived = {"links": link_values(placed), "work": works(placed, record.named)}
+    return fields | {"points": placed.points, "energy": placed.energy()} | derived
+
+
+def round_off(fields: Mapping[str, Array], placed: Placed) -> dict[str, Array]:
+    """Round-off of fields at each time, from the largest value so far; of energy from its parts, which may cancel."""
+    sizes = {name: largest(values) for name, values in fields.items()}
+    sizes["energy"] = np.abs(placed.energies()).sum(axis=-1)
+    return {name: ROUND_OFF * np.maximum.accumulate(size) for name, size in sizes.items()}
+
+
+def check_start(tree: JointCoordinates, bodies: MaximalCoordinates, unit: float = 1.0) -> None:
+    """Checks that both routes place all bodies alike at the start, where only their formulas matter.
+
+    Lengths of the routes are in a ``unit`` [m].
+
+    Raises:
+        Refused: the routes place a body apart.
+    """
+    start_time = np.zeros(1)
+    record, second_record = record_of(start_time, [tree.sample(*tree.mechanism.start())]), bodies.at_start()
+    second_record = on_same_turns(tree.mechanism, record, second_record)
+    apart = unit * max(
+        float(largest(getattr(record, name) - getattr(second_record, name))[0]) for name in ("p_WB", "q_WB")
+    )
+    if apart > SAME_START * unit * max(1.0, float(largest(record.p_WB)[0])):
+        raise Refused(
+            f"the two routes place the bodies {apart:.3g} m (or 1, of quaternions) apart at t = 0 s, where nothing has "
+            "moved yet: an error of proofroll's truth, not a property of the scene; please report it"
+        )
+
+
+def on_same_turns(mechanism: Mechanism, guide: Record, record: Record) -> Record:
+    """Record with quaternions of the same sign and angles on the same turn as in ``guide``."""
+    q_WB = _same_sign(guide.q_WB, record.q_WB)
+    q = record.q.copy()
+    for joint, columns in zip(mechanism.joints, mechanism.q_slices, strict=True):
+        if joint.kind in WITH_QUATERNION:
+            quaternion = slice(columns.stop - 4, columns.stop)
+            q[:, quaternion] = _same_sign(guide.q[:, quaternion], q[:, quaternion])
+        elif joint.kind in {JointKind.REVOLUTE, JointKind.CYLINDRICAL, JointKind.UNIVERSAL, JointKind.PLANAR}:
+            angles = columns if joint.kind == JointKind.UNIVERSAL else slice(columns.stop - 1, columns.stop)
+            q[:, angles] += 2 * np.pi * np.round((guide.q[:, angles] - q[:, angles]) / (2 * np.pi))
+    return replace(record, q_WB=q_WB, q=q)
+
+
+def _same_sign(best: Array, quaternions: Array) -> Array:
+    return np.where((best * quaternions).sum(axis=-1, keepdims=True) < 0, -quaternions, quaternions)
+
+
+def largest(values: Array) -> Array:
+    """Largest absolute value at each time, without NaN, (times)."""
+    flat = np.abs(values.reshape(len(values), -1))
+    return np.asarray(np.where(np.isnan(flat), 0.0, flat).max(axis=1, initial=0.0), dtype=np.float64)

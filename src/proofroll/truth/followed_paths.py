@@ -1,0 +1,336 @@
+"""Truth of a mechanism that switches, from the paths of two routes: horizon, events, error bars."""
+
+from bisect import bisect_right
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from proofroll.core.errors import Refused
+from proofroll.core.events import Event, EventKind
+from proofroll.elements.mechanism import Mechanism
+from proofroll.elements.mechanism.dynamics.analysis import analyse
+from proofroll.elements.mechanism.dynamics.record import Record
+from proofroll.elements.mechanism.scene.rotations import Array
+from proofroll.truth import SAFETY
+from proofroll.truth.error_bars import JUDGED, ROUND_OFF, TwoRouteMotion, fields_with_bars, largest, round_off
+from proofroll.truth.natural_units import Units
+from proofroll.truth.numerics.hybrid import HybridPath, HybridRoute, ModeT, Stretch, first_close, follow
+
+# Tolerances of each step of the two routes, in natural units. With equal tolerances their steps, and so their errors,
+# are nearly equal, and the difference hides them: three free bodies of twelve were 1.7 times their bars off.
+TOLERANCES = 1e-14, 3e-14
+# Relative margin of a decision below which uncertainties of the parameters may change it.
+CLOSE = 1e-9
+
+# Accuracies of a time by which the second route is followed beyond an early end of the first, to see its reason, too.
+_BEHIND = 10
+
+FollowedPath = HybridPath[Stretch[Any]]
+
+
+def refuse_uncovered(mechanism: Mechanism) -> None:
+    """Refuses mechanisms that no route follows from the start.
+
+    Raises:
+        Refused: the mechanism has parts that no route models, or starts in a singular pose.
+    """
+    if mechanism.unmodelled:
+        raise Refused(f"no route of the truth has {', '.join(mechanism.unmodelled)}")
+    if analyse(mechanism).singular_start:
+        raise Refused("the start is a singular pose, where the motion may branch")
+
+
+def followed(
+    first: HybridRoute[ModeT], second: HybridRoute[ModeT], until: float, kinks: Sequence[float]
+) -> tuple[HybridPath[Stretch[ModeT]], HybridPath[Stretch[ModeT]]]:
+    """Paths of two routes to ``until``, in natural units; ``kinks``: times at which the rates are not smooth.
+
+    Where the first ends early the second is not followed beyond that end, for the truth ends there, too.
+    """
+    one = follow(first, until, kinks, CLOSE)
+    end = until if one.known else one.stretches[-1].end
+    last = min(until, end + _BEHIND * time_accuracy(end))
+    return one, follow(second, last, kinks, CLOSE, first_close([one], CLOSE))
+
+
+class Routed(NamedTuple):
+    """Motion of one route at some times.
+
+    Attributes:
+        record: the motion.
+        pressed: contact forces [N], (times, contacts, 3).
+        sums: their sums over pairs with several contacts [N], (times, such pairs, 3).
+    """
+
+    record: Record
+    pressed: Array
+    sums: Array
+
+
+def cut_early(
+    route: HybridRoute[ModeT],
+    path: HybridPath[Stretch[ModeT]],
+    until: float,
+    kinks: Sequence[float],
+    times: Array,
+    kinds: Callable[[Any], Any] = lambda mode: mode,
+) -> tuple[HybridPath[Stretch[ModeT]], NDArray[np.bool_]] | None:
+    """Path of a ``route`` that cuts infinitely many rebounds early, and at which times it has the mode of the path.
+
+    The error of a cut is quadratic in its speed, so that of the path itself is at most a third of their difference.
+    None: no rebounds were cut.
+    """
+    if not any(item.kind == EventKind.SETTLE for item in path.happenings):
+        return None
+    early = follow(route, until, kinks, CLOSE)
+    modes = ([kinds(each.stretches[k].mode) for k in each.stretch_at(times)] for each in (path, early))
+    alike = np.array([one == other for one, other in zip(*modes, strict=True)])
+    return early, alike & (early.known | (times < early.stretches[-1].end))
+
+
+def end_of(paths: tuple[FollowedPath, FollowedPath]) -> tuple[float, str]:
+    """Time in natural units at which the first of two paths ends early, and the error that ended it.
+
+    Infinite: both reach the last time. The text is of either that ends there; it is empty where a decision is too close
+    to be known.
+    """
+    early = [path for path in paths if not path.known]
+    if not early:
+        return np.inf, ""
+    first = min(early, key=lambda path: path.stretches[-1].end)
+    end = first.stretches[-1].end
+    together = (path.ended for path in early if path.stretches[-1].end <= end + time_accuracy(end))
+    return end, first.ended or next(filter(None, together), "")
+
+
+def times_known(paths: tuple[FollowedPath, FollowedPath], times: Array) -> Array:
+    """Times, in natural units, at which both paths are known, of rising ones whose first always is."""
+    end = end_of(paths)[0]
+    known = times < end - time_accuracy(end) if np.isfinite(end) else np.ones(len(times), dtype=bool)
+    known[0] = True
+    return np.asarray(times[known])
+
+
+def two_route_motion(
+    mechanism: Mechanism,
+    paths: tuple[FollowedPath, FollowedPath],
+    one: Record,
+    two: Record,
+    routes: tuple[str, str],
+    reason: str,
+    units: Units,
+    *,
+    kinds: Callable[[Any], Any] = lambda mode: mode,
+    pressed: tuple[Array, Array] | None = None,
+    sums: tuple[Array, Array] | None = None,
+    until: float = np.inf,
+    cut: tuple[Routed, NDArray[np.bool_]] | None = None,
+) -> TwoRouteMotion:
+    """Motion with error bars, from the paths and records of two routes.
+
+    Args:
+        mechanism: bodies and joints, in SI units.
+        paths: of both routes, in natural units.
+        one: record of the first route, taken as the truth, in SI units.
+        two: record of the second, matched to the first, in SI units.
+        routes: their names.
+        reason: cause why the question is ill-posed from the horizon on.
+        units: natural units of the paths.
+        kinds: part of a mode in which both routes must agree.
+        pressed: contact forces by both routes [N], (times, contacts, 3).
+        sums: their sums over pairs with several contacts by both routes [N], (times, such pairs, 3).
+        until: last time asked for [s].
+        cut: motion of the first route with rebounds cut early, and at which times it counts.
+    """
+    parted, determinate = _parted(*paths, kinds) * units.time, analyse(mechanism).determinate
+    masked = replace(one, wrench=np.where(determinate, one.wrench, np.nan))
+    fields, others = fields_with_bars(mechanism, masked), fields_with_bars(mechanism, two)
+    if pressed is not None:
+        fields["pressed"], others["pressed"] = pressed
+    if sums is not None:
+        fields["sums"], others["sums"] = sums
+    left = _left_by_a_cut(mechanism, fields, cut, determinate)
+    placed = masked.placed(mechanism)
+    bars, differences, least, step = {}, {}, round_off(fields, placed), _of_a_step(mechanism, masked, units)
+    for field, values in fields.items():
+        difference = largest(np.where(np.isnan(values), np.nan, others[field]) - values)
+        bars[field] = np.maximum.accumulate(SAFETY * difference + left[field] + least[field]) + step[field]
+        differences[field] = float(difference[one.time < parted].max(initial=0.0))
+    reach = np.maximum(units.length, np.maximum(largest(placed.p_WB), largest(placed.points)))
+    bars["drift"] = np.maximum.accumulate(placed.drift() + ROUND_OFF * reach)
+    horizon = min(parted, first_close(paths, CLOSE) * units.time)
+    # A change at the horizon is what the question hangs on, and may lie before it by the root of the accuracy, as where
+    # bodies graze each other; of one at the end the last digits would say whether it is in.
+    end, ended = end_of(paths)
+    last = min(units.time * end, until)
+    certain = last - units.time * time_accuracy(last / units.time)
+    if np.isfinite(horizon):
+        certain = min(certain, horizon - np.sqrt(CLOSE) * max(units.time, horizon))
+    happened = tuple(event for event in _events(*paths, units.time) if event.time < certain)
+    force = None if pressed is None else pressed[0]
+    if np.isfinite(end):
+        ended = units.text_in_seconds(ended) or f"from t = {units.time * end:.6g} s on {reason}"
+    return TwoRouteMotion(
+        record=masked,
+        bars=bars,
+        differences=differences,
+        horizon=horizon,
+        branches=[],
+        determinate=determinate,
+        routes=routes,
+        checked_by=None,
+        events=happened,
+        reason=reason,
+        pressed=force,
+        sums=None if sums is None else sums[0],
+        end=end * units.time,
+        ended=ended,
+    )
+
+
+def _left_by_a_cut(
+    mechanism: Mechanism,
+    fields: Mapping[str, Array],
+    cut: tuple[Routed, NDArray[np.bool_]] | None,
+    determinate: NDArray[np.bool_],
+) -> dict[str, Array]:
+    """Difference in each field from the motion with rebounds cut early, at each time; zero where it does not count."""
+    left = {name: np.zeros(len(values)) for name, values in fields.items()}
+    if cut is None:
+        return left
+    routed, counts = cut
+    record = replace(routed.record, wrench=np.where(determinate, routed.record.wrench, np.nan))
+    others = fields_with_bars(mechanism, record)
+    others |= {"pressed": routed.pressed, "sums": routed.sums} if mechanism.contacts else {}
+    for name, values in fields.items():
+        left[name] = np.where(counts, largest(others[name] - values), 0.0)
+    return left
+
+
+def _of_a_step(mechanism: Mechanism, record: Record, units: Units) -> dict[str, float]:
+    """Error in each field that the tolerance of one step allows: closer agreement of the routes is chance.
+
+    A force has a part that is quadratic in velocities, and so twice their error times their size in natural units.
+    """
+    ones = {name: np.ones_like(getattr(record, name)[:1]) for name in JUDGED}
+    natural = units.record(mechanism, replace(record, time=record.time[:1], residual=record.residual[:1], **ones))
+    sizes = {name: float(largest(getattr(natural, name))[0]) for name in ones}
+    sizes |= dict.fromkeys(("energy", "work"), units.force * units.length) | {"points": units.length}
+    spin, speed = (float(np.abs(each).max(initial=0.0)) for each in (record.w_WB, record.v_WB))
+    quadratic = 2 * max(1.0, units.time * spin, units.time * speed / units.length)
+    sizes |= {
+        "wrench": quadratic * sizes["wrench"],
+        "pressed": quadratic * units.force,
+        "sums": quadratic * units.force,
+        "links": quadratic * sizes["wrench"]
+        + max((link.stiffest for link in mechanism.links), default=0.0) * units.length,
+    }
+    return {name: TOLERANCES[0] * size for name, size in sizes.items()}
+
+
+def stretches_at(paths: tuple[FollowedPath, FollowedPath], times: Array) -> list[int]:
+    """Numbers of the first route's stretches at times in natural units; within the bracket of an event, the later one.
+
+    There the routes find the event before or after the sample, and both have to give the value on the same side.
+    """
+    reached = np.array(times, dtype=float)
+    for event in _events(*paths, 1.0):
+        reached[(event.time_low <= times) & (times < event.time)] = event.time
+    return paths[0].stretch_at(reached)
+
+
+def counterparts(
+    paths: tuple[HybridPath[Stretch[ModeT]], HybridPath[Stretch[ModeT]]],
+    stretches: Sequence[int],
+    kinds: Callable[[Any], Any] = lambda mode: mode,
+) -> list[int]:
+    """Numbers of the second route's stretches in which it is while the first is in these stretches."""
+    pairs, last = _alike(*paths, kinds)[0], len(paths[1].stretches) - 1
+    found = []
+    for stretch in stretches:
+        before = pairs[max(bisect_right(pairs, (stretch, last)) - 1, 0)] if pairs else (0, 0)
+        found.append(min(max(before[1] + stretch - before[0], 0), last))
+    return found
+
+
+def at_times(
+    path: FollowedPath, stretches: Sequence[int], times: Array, kinds: Callable[[Any], Any] = lambda mode: mode
+) -> list[int]:
+    """Numbers of a path's stretches at times in natural units, near the given ones and of the same kinds of mode.
+
+    A route may divide what the other follows in one stretch at another time, as the beginning of a slip. No time is
+    taken across a jump of the state, as at an impact, where both routes give the value on the same side.
+    """
+    found = []
+    for number, time in zip(stretches, times, strict=True):
+        kind, near = kinds(path.stretches[number].mode), number
+        for step in (-1, 1):
+            while 0 <= near + step < len(path.stretches) and kinds(path.stretches[near + step].mode) == kind:
+                if time > path.stretches[near].start if step < 0 else time < path.stretches[near].end:
+                    break
+                earlier = min(near, near + step)
+                if not np.array_equal(path.stretches[earlier].last, path.stretches[earlier + 1].first):
+                    break
+                near += step
+        found.append(near)
+    return found
+
+
+def _alike(
+    one: FollowedPath, two: FollowedPath, kinds: Callable[[Any], Any]
+) -> tuple[list[tuple[int, int]], list[Stretch[Any]]]:
+    """Numbers of stretches of both routes that are in the same mode in turn, and the stretches from where they part.
+
+    Changes at the same instant may come in either order; if that order matters, the margin of a decision is small. A
+    route may divide what the other follows in one stretch.
+    """
+    pairs, left = list[tuple[int, int]](), [list(path.stretches) for path in (one, two)]
+    last: Any = None
+    while all(left):
+        if kinds(left[0][0].mode) == kinds(left[1][0].mode):
+            pairs.append((len(one.stretches) - len(left[0]), len(two.stretches) - len(left[1])))
+            last = kinds(left[0][0].mode)
+            del left[0][0], left[1][0]
+        elif passing := next((ones for ones in left if _instant(ones[0]) or kinds(ones[0].mode) == last), None):
+            del passing[0]
+        else:
+            break
+    apart = left[0] + left[1]
+    if all(left):
+        return pairs, apart
+    apart = [stretch for stretch in apart if not _instant(stretch)]
+    while pairs and apart and kinds(apart[0].mode) == kinds(one.stretches[pairs[-1][0]].mode):
+        del apart[0]  # one route divides what the other follows in one stretch to the last time
+    return pairs, apart
+
+
+def _parted(one: FollowedPath, two: FollowedPath, kinds: Callable[[Any], Any]) -> float:
+    """Start of the first stretch in which the two routes are in different modes [s]; inf: there is none."""
+    return min((stretch.start for stretch in _alike(one, two, kinds)[1]), default=np.inf)
+
+
+def _instant(stretch: Stretch[Any]) -> bool:
+    """True if a stretch is shorter than the accuracy of times."""
+    return bool(stretch.end - stretch.start <= time_accuracy(stretch.end))
+
+
+def time_accuracy(time: float) -> float:
+    """Accuracy of event times, in natural units: relative to the time, at least to the unit of time."""
+    return CLOSE * max(1.0, time)
+
+
+def _events(one: FollowedPath, two: FollowedPath, unit: float) -> Sequence[Event]:
+    """Events of both routes, each with a bracket that contains both times, a step's error and blur; ``unit`` [s]."""
+    events, least = [], ROUND_OFF + TOLERANCES[0]  # closer agreement of the routes is chance
+    for a, b in zip(one.happenings, two.happenings, strict=False):  # one route may have more events after they part
+        time, wide = (
+            unit * float(a.time),
+            unit * (SAFETY * abs(a.time - b.time) + least * max(1.0, a.time) + a.blur),
+        )
+        events.append(
+            Event(kind=a.kind, time=time, time_low=float(time - wide), time_high=float(time + wide), name=a.name)
+        )
+    return tuple(events)

@@ -1,0 +1,256 @@
+"""Records of the routes of a switching truth for the law check: states, forces and modes at points of their steps."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from itertools import pairwise
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from proofroll.core.events import EventKind
+from proofroll.elements.mechanism import Mechanism
+from proofroll.elements.mechanism.contact.acting import ContactMode, features_of
+from proofroll.elements.mechanism.contact.joint_laws import JointContact
+from proofroll.elements.mechanism.contact.turning import TurningFriction
+from proofroll.elements.mechanism.dynamics.named_forces import named_forces
+from proofroll.elements.mechanism.scene.joint_kinds import JointKind
+from proofroll.elements.mechanism.scene.rotations import Array
+from proofroll.truth.bodies.contact_bodies import ContactBodies
+from proofroll.truth.law_states import stated_named
+from proofroll.truth.laws.integrals import POINTS, TO_SERIES
+from proofroll.truth.laws.record import Modes, Passage, Pieces
+from proofroll.truth.natural_units import Units
+from proofroll.truth.numerics.hybrid import HybridPath, Stretch
+from proofroll.truth.switching.contact_taylor import CompiledStretch
+from proofroll.truth.switching.planar_slip import BegunSlip
+from proofroll.truth.switching.stopping_slip import StoppingSlip
+from proofroll.truth.tree.contact_tree import ContactTree
+
+_RESOLVED = 1e-13  # last coefficients of states on a piece, relative to their sizes, that are round-off
+_TURN = 1.0  # rad, by which bodies turn in a piece at most: more is not resolved by its points
+_HALVINGS = 7  # of a step into pieces at most
+_PARTS = 8  # into which the first instants of a slip are cut: a force that jumps inside is located to one of them
+
+
+class _Piece(NamedTuple):
+    """Times, rates of the time by -1 to 1, states and, if they are compiled, records at the points of a piece."""
+
+    time: Array
+    pace: Array
+    states: Array
+    record: Array | None = None
+    coarse: bool = False
+
+
+class LawRecorder:
+    """Takes the record of one route for the law check, in SI units.
+
+    A record at a state is a flat array: of each body place, rotation by rows, velocity, angular velocity; of each
+    contact force, place, normal; efforts, drives, couplings; force and moment of each loop. Compiled modes give it by
+    :func:`.stated_symbols`; ``state_of`` gives it at a state in a mode, in numbers.
+    """
+
+    def __init__(
+        self,
+        mechanism: Mechanism,
+        units: Units,
+        route: ContactTree | ContactBodies,
+        state_of: Callable[[Array, ContactMode], Array],
+    ) -> None:
+        self._mechanism, self._units, self._route, self._state_of = mechanism, units, route, state_of
+        named, moment = named_forces(mechanism), units.force * units.length
+        self._named_units = stated_named(
+            mechanism, np.array([units.force if item.unit == "N" else moment for item in named])
+        )
+
+    def pieces(self, stretch: Stretch[ContactMode], most: int | None = None) -> list[Pieces]:
+        """Pieces of a stretch: of steps and of dense output apart.
+
+        ``most``: number of pieces whose forces are found in numbers, the first and last among them; None: all.
+        """
+        cut, found = list(self._cut(stretch)), []
+        numeric = [piece for piece in cut if piece.record is None]
+        if most is not None and len(numeric) > most:
+            chosen = {int(k) for k in np.linspace(0, len(numeric) - 1, most)}
+            kept = {id(piece) for k, piece in enumerate(numeric) if k in chosen}
+            cut = [piece for piece in cut if piece.record is not None or id(piece) in kept]
+        for coarse in (False, True):
+            pieces = [piece for piece in cut if piece.coarse is coarse]
+            if pieces:
+                records = [
+                    np.array([self._state_of(y, self._route.acting(stretch, y)) for y in piece.states])
+                    if piece.record is None
+                    else piece.record
+                    for piece in pieces
+                ]
+                time, pace = (np.array([getattr(piece, name) for piece in pieces]) for name in ("time", "pace"))
+                found.append(self._stated(time, pace, np.array(records), stretch.mode, coarse=coarse))
+        return found
+
+    def start(self, stretch: Stretch[ContactMode], pieces: Sequence[Pieces]) -> Pieces:
+        """First point of a stretch with these pieces, as exact as its steps."""
+        if pieces and self._reaches(pieces[0], 0, stretch.start):
+            return pieces[0].points(0, 0)
+        return self._at(stretch.start, stretch.first, self._route.acting(stretch, stretch.first))
+
+    def end(self, stretch: Stretch[ContactMode], pieces: Sequence[Pieces]) -> Pieces:
+        """Last point of a stretch with these pieces, as exact as its steps."""
+        if pieces and self._reaches(pieces[-1], -1, stretch.end):
+            return pieces[-1].points(-1, -1)
+        return self._at(stretch.end, stretch.last, self._route.acting(stretch, stretch.last))
+
+    def _reaches(self, pieces: Pieces, point: int, time: float) -> bool:
+        """True if exact pieces begin or end at a time, but for its last digits: not where a slip fades away behind."""
+        apart = abs(float(pieces.time[point, point]) / self._units.time - time)
+        return not pieces.coarse and apart <= 4 * float(np.spacing(time))
+
+    def _at(self, time: float, state: Array, mode: ContactMode) -> Pieces:
+        return self._stated(np.full((1, 1), time), np.zeros((1, 1)), self._state_of(state, mode)[None, None], mode)
+
+    @staticmethod
+    def passage(path: HybridPath[Stretch[ContactMode]], number: int, before: Pieces, after: Pieces) -> Passage:
+        """Transition to a stretch of a path, from the end of the one before."""
+        sooner, later = path.stretches[number - 1], path.stretches[number]
+        change = path.transitions[number] if number < len(path.transitions) else None
+        happenings = () if change is None else change.happenings
+        border = features_of(sooner.mode) != features_of(later.mode)
+        return Passage(
+            before=before,
+            after=after,
+            impacts=frozenset(name for kind, name in happenings if kind == EventKind.IMPACT),
+            settles=frozenset(name for kind, name in happenings if kind == EventKind.SETTLE),
+            decided=sooner.guard is not None and not border,
+        )
+
+    def _stated(self, time: Array, pace: Array, record: Array, mode: ContactMode, *, coarse: bool = False) -> Pieces:
+        """Pieces from records (pieces, points, values)."""
+        m, units, shape, contacts = self._mechanism, self._units, time.shape, self._route.contacts
+        count, joints, bodies = len(m.contacts), len(m.joints), len(m.bodies)
+        sizes = [18 * bodies, 9 * len(contacts), len(m.actuators), len(m.prescribed), len(m.couplings)]
+        of_bodies, of_contacts, effort, drives, coupling, loops = np.split(record, np.cumsum(sizes), -1)
+        in_named = np.split(self._named_units, np.cumsum(sizes[2:4]))
+        of_bodies, of_contacts = of_bodies.reshape(*shape, bodies, 18), of_contacts.reshape(*shape, -1, 9)
+        length, force, moment = units.length, units.force, units.force * units.length
+        world = np.broadcast_to(np.concatenate([np.zeros(3), np.eye(3).ravel(), np.zeros(6)]), (*shape, 1, 18))
+        of_bodies, forces = np.concatenate([of_bodies, world], 2), of_contacts[..., :3]
+        drive = np.zeros((*shape, joints))
+        for k, (joint, _, _) in enumerate(m.prescribed):
+            drive[..., m.joint_index[joint.name]] = drives[..., k] * in_named[1][k]
+        friction, stops = np.zeros((*shape, joints)), np.zeros((*shape, joints, 2))
+        turning = {spins: np.zeros((*shape, count, 3)) for spins in (False, True)}
+        for k, contact in enumerate(contacts[count:], count):
+            if isinstance(contact, TurningFriction):
+                turning[contact.spins][..., contact.pressed_by, :] = forces[..., k, :] * moment
+                continue
+            assert isinstance(contact, JointContact)  # the only other kind
+            number = contact.joint.number
+            push = (
+                forces[..., k, :]
+                @ contact.direction
+                * (force if m.joints[number].kind == JointKind.PRISMATIC else moment)
+            )
+            if contact.side:
+                stops[..., number, 0 if contact.side > 0 else 1] = push
+            else:
+                friction[..., number] = push
+        return Pieces(
+            time=time * units.time,
+            pace=pace * units.time,
+            p=of_bodies[..., :3] * length,
+            R=of_bodies[..., 3:12].reshape(*shape, bodies + 1, 3, 3),
+            v=of_bodies[..., 12:15] * (length / units.time),
+            w=of_bodies[..., 15:] / units.time,
+            effort=effort * in_named[0],
+            coupling=coupling * in_named[2],
+            drive=drive,
+            loop=loops.reshape(*shape, len(m.loops), 6) * np.repeat([force, moment], 3),
+            friction=friction,
+            stops=stops,
+            force=forces[..., :count, :] * force,
+            place=of_contacts[..., :count, 3:6] * length,
+            normal=of_contacts[..., :count, 6:],
+            rolling=turning[False],
+            spinning=turning[True],
+            modes=self._modes(mode),
+            coarse=coarse,
+        )
+
+    def _modes(self, mode: ContactMode) -> Modes:
+        """Modes by their places in the record."""
+        m, contacts = self._mechanism, self._route.contacts
+        count, joints = len(m.contacts), len(m.joints)
+        friction, stops = ["open"] * joints, [["open", "open"] for _ in range(joints)]
+        turning = {spins: ["open"] * count for spins in (False, True)}
+        for contact, own in zip(contacts[count:], mode[count:], strict=True):
+            if isinstance(contact, TurningFriction):
+                turning[contact.spins][contact.pressed_by] = own.kind
+            elif isinstance(contact, JointContact) and contact.side:
+                stops[contact.joint.number][0 if contact.side > 0 else 1] = own.kind
+            elif isinstance(contact, JointContact):
+                friction[contact.joint.number] = own.kind
+        return Modes(
+            contacts=tuple(own.kind for own in mode[:count]),
+            rolling=tuple(turning[False]),
+            spinning=tuple(turning[True]),
+            friction=tuple(friction),
+            stops=tuple((low, high) for low, high in stops),
+        )
+
+    def _cut(self, stretch: Stretch[ContactMode]) -> Iterator[_Piece]:
+        """Pieces of a stretch."""
+        if isinstance(stretch, BegunSlip):
+            edges = np.linspace(stretch.start, stretch.end, _PARTS + 1)
+            compiled = self._route.by_symbols(stretch.last, stretch.mode)
+            recorded = None if compiled is None else compiled.record_of(stretch.mode, stretch.start)
+            for k, (start, end) in enumerate(pairwise(edges)):  # at rest a slip has no direction in compiled modes
+                yield from self._parts(start, end, lambda x: stretch.at(x).T, recorded if 0 < k < _PARTS - 1 else None)
+        elif isinstance(stretch, StoppingSlip):
+            return  # where a slip fades away its force has a direction by round-off alone
+        elif isinstance(stretch, CompiledStretch) and stretch.by is not None:
+            recorded = stretch.by.record_of(stretch.mode, stretch.start)
+            for start, end, inside_step in stretch.by.steps_of(stretch):
+                yield from self._parts(start, end, inside_step, recorded, paced=True)
+        elif stretch.dense:
+            for start, end, inside in stretch.dense:
+                last = min(end, stretch.end)
+                if last > start:
+                    yield from (piece._replace(coarse=True) for piece in self._parts(start, last, inside, None))
+        elif stretch.end > stretch.start:  # nothing moves
+            half = (stretch.end - stretch.start) / 2
+            states = np.repeat(stretch.first[None], len(POINTS), 0)
+            yield _Piece((stretch.start + stretch.end) / 2 + half * POINTS, np.full(len(POINTS), half), states)
+
+    def _parts(
+        self,
+        start: float,
+        end: float,
+        inside: Callable[[Array], Any],
+        recorded: Callable[[Array], tuple[Array, Array]] | None,
+        *,
+        paced: bool = False,
+        depth: int = 0,
+    ) -> Iterator[_Piece]:
+        """Pieces of a step between values of its variable, halved until their points resolve states and turns.
+
+        ``recorded``: record at states and rate of the time by that variable, which counts if it is ``paced``.
+        """
+        places = (start + end) / 2 + (end - start) / 2 * POINTS
+        states = np.asarray(inside(places))
+        coefficients = np.abs(TO_SERIES @ states.T)
+        rough = bool((coefficients[-2:].max(0) > _RESOLVED * np.maximum(1.0, coefficients.max(0))).any())
+        time = states[-1] if paced else places
+        record, pace = (np.zeros((0, 0)), np.ones(1)) if recorded is None else recorded(states)
+        if not rough and depth < _HALVINGS:
+            if not len(record):
+                spins = np.array([self._route.bodies(y)[3] for y in states.T[[0, -1]]])
+            else:
+                spins = record[: 18 * len(self._mechanism.bodies)].reshape(-1, 18, len(POINTS))[:, 15:]
+            rough = float(np.abs(spins).max(initial=0.0)) * (time[-1] - time[0]) > _TURN
+        if rough and depth < _HALVINGS:
+            middle = (start + end) / 2
+            yield from self._parts(start, middle, inside, recorded, paced=paced, depth=depth + 1)
+            yield from self._parts(middle, end, inside, recorded, paced=paced, depth=depth + 1)
+            return
+        rate = np.full(len(POINTS), (end - start) / 2) * (pace if paced else 1.0)
+        yield _Piece(time, rate, states.T, record.T if len(record) else None)

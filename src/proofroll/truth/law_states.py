@@ -1,0 +1,104 @@
+"""Record of each route at one state, in numbers, for the law check: poses and forces as they act."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from proofroll.elements.mechanism import Mechanism
+from proofroll.elements.mechanism.contact.acting import ContactMode, features_of, headed, slip_velocity
+from proofroll.elements.mechanism.contact.joint_laws import JointContact, mode_of_joints
+from proofroll.elements.mechanism.contact.touching import Touching
+from proofroll.elements.mechanism.contact.turning import TurningFriction
+from proofroll.elements.mechanism.dynamics.named_forces import named_forces
+from proofroll.elements.mechanism.scene.rotations import Array, from_quaternion
+from proofroll.truth.bodies.contact_bodies import ContactBodies
+from proofroll.truth.bodies.maximal_coordinates import MaximalCoordinates
+from proofroll.truth.switching.contact_guards import Touchable
+from proofroll.truth.tree.contact_tree import ContactTree
+
+_FIELDS = "effort", "drive", "coupling"  # named forces of a record, in its order
+_KNOWN = 1e-13  # slip speed in natural units above which the direction of a slip is that of its velocity
+
+
+def _present(mode: ContactMode, touching: Sequence[Touching]) -> ContactMode:
+    """Mode with present directions of slips: those by which a slip is integrated, however slow."""
+    pairs = zip(mode, touching, strict=True)
+    return tuple(
+        headed(own, touch) if not own.leads and float(np.linalg.norm(slip_velocity(touch))) > _KNOWN else own
+        for own, touch in pairs
+    )
+
+
+def by_the_tree(route: ContactTree, state: Array, mode: ContactMode) -> Array:
+    """Record of the first route at a state, in natural units; for its order see :class:`LawRecorder`."""
+    dynamics = route.dynamics
+    m, contacts = dynamics.mechanism, dynamics.contacts
+    q, v, time = dynamics.parts(state)
+    q = dynamics.equations.tree.normalised(q)
+    mode = _present(mode, dynamics.at(q, v, time, features_of(mode)).touching)
+    solution = dynamics.solve(q, v, mode, time)
+    motion, named, loops = solution.state.solution.motion, np.zeros(0), np.zeros(0)
+    if _has_named(m):
+        others = [k for k, contact in enumerate(contacts) if not isinstance(contact, JointContact)]
+        load = np.einsum("kin,ki->n", solution.state.J[others], solution.force[others])
+        applied = np.zeros((len(m.bodies) + 1, 6))
+        for contact, touch, force in zip(contacts, solution.state.touching, solution.force, strict=True):
+            if isinstance(contact, JointContact):
+                continue
+            pressed = m.contacts[contact.pressed_by] if isinstance(contact, TurningFriction) else contact
+            wrench = np.concatenate([force, np.cross(touch.place, force)])
+            if isinstance(contact, TurningFriction):
+                wrench = np.concatenate([0 * force, force])
+            applied[m.body_index[pressed.body_a]] += wrench
+            applied[m.body_index[pressed.body_b]] -= wrench
+        joints = mode_of_joints(dynamics.equations.switched, contacts, mode)
+        sample = dynamics.equations.sample(q, v, joints, time, load, applied)
+        named, loops = stated_named(m, sample["named"]), sample["wrench"][len(m.joints) :].ravel()
+    poses = motion.p_WB[:-1], motion.R_WB[:-1], motion.v_WB[:-1], motion.w_WB[:-1]
+    return _vector(poses, contacts, solution.state.touching, solution.force, named, loops)
+
+
+def by_the_bodies(route: ContactBodies, second: MaximalCoordinates, state: Array, mode: ContactMode) -> Array:
+    """Record of the second route at a state, in natural units; for its order see :class:`LawRecorder`."""
+    equations, m = route.equations, route.equations.mechanism
+    state = np.append(equations.equations.normalised(state[:-1]), state[-1])
+    bodies = equations.at(state, features_of(mode))
+    mode = _present(mode, bodies.touching)
+    force, named, loops = equations.accelerated(bodies, mode).force, np.zeros(0), np.zeros(0)
+    if _has_named(m):
+        _, wrenches = equations.applied(bodies, force)
+        record = second.recorded(state[-1:], state[None, :-1], [equations.switched(state, mode)], [wrenches])
+        named, loops = stated_named(m, record.named[0]), record.wrench[0, len(m.joints) :].ravel()
+    p, v, quaternions, w = equations.equations.poses(state[:-1])
+    rotations = np.array([from_quaternion(quaternion) for quaternion in quaternions])
+    return _vector((p, rotations, v, w), equations.contacts, bodies.touching, force, named, loops)
+
+
+def _has_named(m: Mechanism) -> bool:
+    return bool(m.actuators or m.couplings or m.prescribed or m.loops)
+
+
+def stated_named(m: Mechanism, named: Array) -> Array:
+    """Efforts, drives and couplings, of named forces."""
+    places = {field: [k for k, item in enumerate(named_forces(m)) if item.field == field] for field in _FIELDS}
+    return named[[k for field in _FIELDS for k in places[field]]]
+
+
+def _vector(
+    poses: tuple[Array, Array, Array, Array],
+    contacts: Sequence[Touchable],
+    touching: Sequence[Touching],
+    forces: Array,
+    named: Array,
+    loops: Array,
+) -> Array:
+    """Record at one state, flat."""
+    of_bodies = np.concatenate([part.reshape(len(poses[0]), -1) for part in poses], 1)
+    of_contacts = np.zeros((len(touching), 9))
+    for row, contact, touch, force in zip(of_contacts, contacts, touching, forces, strict=True):
+        row[:3] = force
+        if contact.pressed_by is None:
+            row[3:] = *touch.place, *touch.normal
+    return np.concatenate([of_bodies.ravel(), of_contacts.ravel(), named, loops])

@@ -1,1 +1,0 @@
-"""Two routes to the truth of a mechanism that share no kinematics, and closed forms."""

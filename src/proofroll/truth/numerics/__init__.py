@@ -1,0 +1,1 @@
+"""Numerics of all truths: hybrid motions, series, collocation, scalars."""

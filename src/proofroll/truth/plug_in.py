@@ -1,0 +1,172 @@
+"""Plug-in for the truth of mechanisms: dataset and error bars."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from proofroll.core.arrays import FloatArray
+from proofroll.core.bounces import with_bounces
+from proofroll.core.dataset import ENDED, ENDS, LAWS
+from proofroll.core.element import Element
+from proofroll.core.errors import NotUnique
+from proofroll.core.events import JUMPS, Event, with_events
+from proofroll.core.observable import Role
+from proofroll.elements.mechanism.dynamics.link_forces import coarseness
+from proofroll.elements.mechanism.dynamics.named_forces import FIELDS, named_forces
+from proofroll.elements.mechanism.dynamics.placed import Placed
+from proofroll.elements.mechanism.run.contacts.observables import PRESSES, SLIDES
+from proofroll.elements.mechanism.run.dataset import UNDETERMINED, columns
+from proofroll.elements.mechanism.run.element import MechanismElement
+from proofroll.elements.mechanism.scene.shapes.geometry import shared_pairs
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+# Error bar of the routes that a variable gets.
+_BARS = {
+    "p_WB": "p_WB", "v_WB": "v_WB", "w_WB": "w_WB", "q_WB": "q_WB", "attitudes": "q_WB", "positions": "points",
+    "forces": "wrench", "torques": "wrench", "energy": "energy", "energy_error": "energy",
+    "energy_change": "energy", "drift": "drift", "gaps": "gap", "slips": "slip", "normal_forces": "pressed",
+    "contact_forces": "pressed", "pair_forces": "sums", "penetration": "gap", "contact_pull": "pressed",
+    "cone_excess": "pressed",
+    "hop_speed": "slip", "energy_gain": "energy", "bushing_forces": "links", "bushing_torques": "links",
+}  # fmt: skip
+_POSES = ("p_WB", "v_WB", "w_WB", "q_WB")
+_PREFIXES = {"work.": "work", "q.": "q", "v.": "v", "force.": "wrench", "torque.": "wrench"}
+_PREFIXES |= dict.fromkeys((f"{field}." for field in FIELDS), "named")
+
+# Reason of the work of a drive that has no value from the first impact on.
+_IMPULSIVE = "no truth of the work of a drive from an impact on, whose impulse does work, too"
+
+
+class MechanismTruth:
+    """Plug-in; see :class:`proofroll.core.truth.ElementTruth`."""
+
+    @staticmethod
+    def covers(element: Element) -> bool:
+        """True for every mechanism; those that two routes do not cover are refused later, with the reason."""
+        return isinstance(element, MechanismElement)
+
+    @staticmethod
+    def truth(element: Element, times: FloatArray, asks: Sequence[str]) -> xr.Dataset:  # noqa: ARG004 -- nothing can be asked for
+        """See :func:`proofroll.truth.switched_truth.truth_of`; of motions that are not unique, laws alone."""
+        # imports of a third of a second, which no ball needs
+        from proofroll.truth.singular_poses import branching
+        from proofroll.truth.switched_truth import truth_of
+
+        assert isinstance(element, MechanismElement)  # by ``covers``
+        try:
+            motion = truth_of(element.mechanism, times)
+        except NotUnique as error:
+            return _laws_alone(element, times, str(error))
+        record = motion.record
+        wrench = np.stack([record.wrench[..., :3], record.wrench[..., 3:]], axis=1)
+        pressed = np.zeros((len(record.time), 0, 3)) if motion.pressed is None else motion.pressed
+        dataset = columns(
+            element, record.placed(element.mechanism), wrench, pressed, record.named, motion.sums, UNDETERMINED
+        ).dataset()
+        points = [point.name for point in element.mechanism.points]
+        fields_of = {
+            f"{kind}.{contact.name}{axis}": field
+            for contact in element.mechanism.contacts
+            for kind, axes, field in (
+                ("force", (".x", ".y", ".z"), "pressed"),
+                ("gap", ("",), "gap"),
+                ("slip", ("",), "slip"),
+            )
+            for axis in axes
+        }
+        fields_of |= {f"force.{spring.name}": "links" for spring in element.mechanism.springs}
+        fields_of |= {
+            f"{kind}.{bushing.name}.{letter}": "links"
+            for bushing in element.mechanism.bushings
+            for kind in ("force", "torque")
+            for letter in "xyz"
+        }
+        pairs = shared_pairs(element.mechanism.contacts)
+        fields_of |= {f"force.{name}.{letter}": "sums" for name in pairs for letter in "xyz"}
+        place, turn, velocity, spin = (motion.bars[field] for field in ("p_WB", "q_WB", "v_WB", "w_WB"))
+        # at the end of a body's arm; a quaternion changes by half the angle
+        bars = motion.bars | {"gap": place + 2 * element.length * turn}
+        bars["work"] = motion.bars["work"] + coarseness(record.placed(element.mechanism), record.named)
+        bars |= {"slip": velocity + element.length * spin + 2 * element.speed * turn}
+        for name, variable in dataset.data_vars.items():
+            field = (
+                fields_of.get(str(name))
+                or _BARS.get(str(name))
+                or next((v for k, v in _PREFIXES.items() if str(name).startswith(k)), None)
+            )
+            if field is None and str(name).rpartition(".")[0] in points:
+                field = "points"
+            size = float(np.nanmax(np.abs(variable.to_numpy()), initial=0.0))
+            bar = _bar_of_a_law(str(name), element, motion.bars)
+            if field is not None:
+                bar = float(bars[field][-1])
+            variable.attrs["error_bar"] = 4 * np.finfo(float).eps * size if bar is None else bar
+        dataset = _until_impacts(dataset, motion.events)
+        dataset.attrs["route"], *others = motion.routes
+        dataset.attrs["second_route"] = ", ".join(others)
+        if motion.checked_by is not None:
+            dataset.attrs["second_route"] += f", {motion.checked_by[0]}"
+        if motion.laws:
+            dataset.attrs[LAWS] = motion.laws
+        notes = [branching(motion.branches)]
+        if np.isfinite(motion.horizon):
+            dataset.attrs["horizon"] = motion.horizon
+            if not motion.ended or motion.horizon < record.time[-1]:
+                notes.append(f"from {motion.horizon:.4g} s on {motion.reason}")
+        if motion.ended:
+            dataset.attrs |= {ENDS: motion.end, ENDED: motion.ended}
+        if any(notes):
+            dataset.attrs["ill_posed"] = "; ".join(filter(None, notes))
+        if not element.mechanism.has_events:
+            return dataset
+        return with_bounces(with_events(dataset, motion.events), motion.bounces)
+
+
+def _until_impacts(dataset: xr.Dataset, events: Sequence[Event]) -> xr.Dataset:
+    """Dataset with NaN for the work of drives from the first impact on: its impulse does work, which no sample has."""
+    struck = min((event.time for event in events if event.kind in JUMPS), default=np.inf)
+    for name in [str(key) for key in dataset.data_vars if str(key).startswith("work.drive.")]:
+        values = np.where(dataset["time"].to_numpy() < struck, dataset[name].to_numpy(), np.nan)
+        dataset[name] = dataset[name].copy(data=values)
+        if np.isnan(values[1:]).all():
+            dataset[name].attrs["absent"] = _IMPULSIVE
+    return dataset
+
+
+def _laws_alone(element: MechanismElement, times: FloatArray, reason: str) -> xr.Dataset:
+    """Dataset for a motion that is not unique: zero for residuals of the laws, NaN for everything else."""
+    mechanism, count = element.mechanism, len(times)
+    resting = Placed(mechanism, times, *(np.repeat(getattr(element.start, name), count, axis=0) for name in _POSES))
+    wrench, pressed = np.zeros((count, 2, len(mechanism.connections), 3)), np.zeros((count, len(mechanism.contacts), 3))
+    dataset = columns(element, resting, wrench, pressed, np.zeros((count, len(named_forces(mechanism))))).dataset()
+    laws = {item.name for item in element.observables if item.role is Role.RESIDUAL and not item.hangs_on_events}
+    for name, variable in list(dataset.data_vars.items()):
+        if not np.issubdtype(variable.dtype, np.floating):
+            continue
+        dataset[name] = variable.copy(data=np.full(variable.shape, 0.0 if name in laws else np.nan))
+        dataset[name].attrs |= {"error_bar": 0.0} if name in laws else {"absent": "no truth"}
+    dataset.attrs |= {"route": "laws of contact alone", "second_route": "", "ill_posed": reason, ENDS: 0.0}
+    dataset.attrs[ENDED] = reason
+    return with_events(dataset, ())
+
+
+def _bar_of_a_law(name: str, element: MechanismElement, bars: Mapping[str, FloatArray]) -> float | None:
+    """Error bar of a residual that combines several fields; None for any other variable."""
+    mass = element.mechanism.mass
+    place, velocity, force = (float(bars[field][-1]) if field in bars else 0.0 for field in ("p_WB", "v_WB", "pressed"))
+    match name:
+        case "friction_direction":  # large for contacts that hardly press or slide
+            return force / (PRESSES * element.force) + velocity / (SLIDES * element.speed)
+        case "natural_map":
+            return force + velocity * element.force / element.speed
+        case "momentum_error":
+            return mass * velocity
+        case "angular_momentum_error":
+            return mass * (element.length * velocity + element.speed * place)
+        case _:
+            return None

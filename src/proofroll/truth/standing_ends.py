@@ -1,0 +1,198 @@
+"""Cylinders that land or stand on an end: the end is held at four points of its rim, as a box at its corners.
+
+While an end stays flat its motion and the sum of its forces are those of any points that surround the load. One corner
+lies where the end slides to, or where gravity pulls it, so that the load leaves the square where it leaves the rim.
+"""
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from proofroll.core.errors import NotUnique
+from proofroll.elements.mechanism import Mechanism, Tree
+from proofroll.elements.mechanism.contact.acting import ContactMode, closed_in, slip_velocity
+from proofroll.elements.mechanism.contact.start import STILL, natural_scale, touches
+from proofroll.elements.mechanism.contact.touching import Touching
+from proofroll.elements.mechanism.scene.rotations import Array, cross, to_rpy
+from proofroll.elements.mechanism.scene.shapes.geometry import Geometry, Pair, shared_pairs
+from proofroll.truth.error_bars import TwoRouteMotion
+
+_CORNERS = 8  # of a box; those of one end are every other one
+
+
+@dataclass(frozen=True)
+class Face:
+    """Contacts at the rim of one end of a cylinder, and the name of its pair."""
+
+    contacts: tuple[int, ...]
+    pair: str
+
+
+class RollingLanding(Exception):  # noqa: N818 -- no error: the cylinder is followed by its rims then
+    """A cylinder lands on its rim, not on its whole end: corners do not stand for it."""
+
+
+@dataclass(frozen=True)
+class StandingEnds:
+    """Mechanism whose cylinders touch planes by corners, and the contacts that these stand for.
+
+    Attributes:
+        mechanism: with a box in place of each such cylinder, for its planes alone.
+        faces: contacts of each end.
+        parts: numbers of the contacts that replace each contact of the mechanism with cylinders.
+        names: of those contacts, and of what they replace.
+    """
+
+    mechanism: Mechanism
+    faces: tuple[Face, ...]
+    parts: tuple[tuple[int, ...], ...]
+    names: dict[str, str]
+
+    def folded(self, motion: TwoRouteMotion) -> TwoRouteMotion:
+        """Motion with the contacts of the mechanism with cylinders: forces of an end are the sum over its corners."""
+        assert motion.pressed is not None  # of a mechanism with contacts
+        assert motion.sums is not None
+        order, pressed = list(shared_pairs(self.mechanism.contacts)), []
+        for part in self.parts:
+            forces = motion.pressed[:, list(part)].sum(axis=1)
+            if len(part) > 1:
+                pair = self.mechanism.contacts[part[0]].pair
+                others = [k for k in shared_pairs(self.mechanism.contacts)[pair] if k not in part]
+                rest = motion.sums[:, order.index(pair)] - motion.pressed[:, others].sum(axis=1)
+                forces = np.where(np.isnan(forces), rest, forces)
+            pressed.append(forces)
+        bars = dict(motion.bars)
+        bars["pressed"] = bars["sums"] + _CORNERS / 2 * bars["pressed"]
+        return replace(
+            motion,
+            bars=bars,
+            pressed=np.stack(pressed, axis=1),
+            events=self._once(motion.events),
+            bounces=self._once(motion.bounces),
+            reason=self._told(motion.reason),
+            ended=self._told(motion.ended),
+        )
+
+    def _once(self, items: Sequence[Any]) -> tuple[Any, ...]:
+        """Events or bounces by the names of ends, one of those of all corners of an end."""
+        found: dict[tuple[Any, ...], Any] = {}
+        for item in items:
+            name = self.names.get(item.name, item.name)
+            found.setdefault((getattr(item, "kind", ""), name, item.time), replace(item, name=name))
+        return tuple(found.values())
+
+    def _told(self, text: str) -> str:
+        """Sentence with the names of ends, each once in a list."""
+        name = "(?:" + "|".join(map(re.escape, self.names)) + r")(?!\d)"
+
+        def ends(listed: re.Match[str]) -> str:
+            return " and ".join(dict.fromkeys(self.names[each] for each in re.findall(name, listed[0])))
+
+        return re.sub(rf"{name}(?:(?:, | and ){name})*", ends, text)
+
+
+def standing_ends(mechanism: Mechanism) -> StandingEnds | None:
+    """Mechanism with corners for cylinders that start parallel to a plane and do not tilt; None: it has none."""
+    shapes = {geometry.name: geometry for geometry in mechanism.geometries}
+    kinds = [{shapes[name].kind for name in pair.geometries} for pair in mechanism.pairs]
+    if {"cylinder", "plane"} not in kinds:
+        return None
+    motion = Tree(mechanism).at(*mechanism.start())
+    touching, index, still = touches(mechanism, motion), mechanism.body_index, STILL * natural_scale(mechanism).rate
+    added, pairs, cornered = list[Geometry](), list[Pair](), set[str]()
+    for pair, kind in zip(mechanism.pairs, kinds, strict=True):
+        pairs.append(pair)
+        if kind != {"cylinder", "plane"}:
+            continue
+        solid, plane = sorted((shapes[name] for name in pair.geometries), key=lambda shape: shape.kind)
+        body = index[solid.body]
+        own = [each for each, contact in zip(touching, mechanism.contacts, strict=True) if contact.pair == pair.name]
+        turning = cross(motion.w_WB[body] - motion.w_WB[index[plane.body]], own[0].normal)
+        if not all(each.flat for each in own) or np.abs(turning).max() > still:
+            continue
+        slip = slip_velocity(own[0])
+        pull = slip if np.linalg.norm(slip) > still else np.array(mechanism.gravity)
+        box = _box(solid, motion.R_WB[body].T @ pull, {*shapes, *(each.name for each in added)})
+        added.append(box)
+        one, two = (box.name if name == solid.name else name for name in pair.geometries)
+        pairs[-1] = replace(pair, geometries=(one, two))
+        cornered.add(pair.name)
+    if not cornered:
+        return None
+    with_corners = replace(mechanism, geometries=(*mechanism.geometries, *added), pairs=tuple(pairs))
+    parts, names, faces, place = list[tuple[int, ...]](), dict[str, str](), list[Face](), 0
+    for contact in mechanism.contacts:
+        if contact.pair not in cornered:
+            parts.append((place,))
+            place += 1
+            continue
+        second = contact.name.endswith(".2")
+        first = place - _CORNERS if second else place
+        parts.append(tuple(range(first + second, first + _CORNERS, 2)))
+        names |= {with_corners.contacts[k].name: contact.name for k in parts[-1]}
+        faces.append(Face(parts[-1], contact.pair))
+        place = first + _CORNERS
+    return StandingEnds(with_corners, tuple(faces), tuple(parts), names)
+
+
+def _box(solid: Geometry, pull: Array, names: set[str]) -> Geometry:
+    """Box with its corners on both rims of a cylinder, one of them in the direction of a pull in the body's frame."""
+    name = f"{solid.name}_ends"
+    while name in names:
+        name += "_"
+    across = solid.frame[:, :2].T @ pull
+    angle = float(np.arctan2(across[1], across[0])) - np.pi / 4
+    c, s = np.cos(angle), np.sin(angle)
+    frame = solid.frame @ np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
+    side = np.sqrt(2) * (solid.radius or 0.0)
+    return Geometry(
+        name, solid.body, "box", solid.position, to_rpy(frame), size=(side, side, solid.length or 0.0)
+    )  # fmt: skip
+
+
+def check_faces(faces: Sequence[Face], before: ContactMode, after: ContactMode, time: float) -> None:
+    """Refuses what an end of a cylinder does when only some of its corners are closed; ``before``: the last mode.
+
+    Raises:
+        NotUnique: the cylinder begins to tip.
+        RollingLanding: the cylinder lands on its rim.
+    """
+    was, closed = closed_in(before), closed_in(after)
+    for face in faces:
+        held = [closed[k] for k in face.contacts]
+        if not any(held) or all(held):
+            continue
+        if not any(was[k] for k in face.contacts):
+            raise RollingLanding(f"a cylinder of {face.pair} lands on its rim at t = {time:.6g} s")
+        raise NotUnique(
+            f"a cylinder of {face.pair} does not stand on its whole end from t = {time:.6g} s on: it tips, or its load "
+            "lies within 0.3 radii of its rim, which is not followed; end before"
+        )
+
+
+def check_spin(
+    faces: Sequence[Face], closed: Sequence[bool], touching: Sequence[Touching], friction: Sequence[float], time: float
+) -> None:
+    """Refuses an end that spins on its plane with friction, whose moment depends on where along it the load acts.
+
+    Args:
+        faces: ends of cylinders.
+        closed: True for each contact that is closed, or hit.
+        touching: contacts at that instant.
+        friction: coefficients of all contacts.
+        time: for messages [s].
+
+    Raises:
+        NotUnique: friction resists the spin of an end.
+    """
+    for face in faces:
+        first = face.contacts[0]
+        slips = np.array([slip_velocity(touching[k]) for k in face.contacts])
+        if closed[first] and friction[first] and np.ptp(slips, axis=0).max() > STILL:
+            raise NotUnique(
+                f"a cylinder of {face.pair} spins on its end at t = {time:.6g} s: the moment of its friction depends "
+                "on where along the end the load acts, which is not determinate; end before"
+            )

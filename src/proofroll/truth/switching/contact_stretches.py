@@ -1,0 +1,365 @@
+"""Events and transitions of a mechanism whose bodies touch or whose joints switch, as both routes share them.
+
+Each route adds its own equations and its own decisions on the next mode.
+"""
+
+import math
+from abc import abstractmethod
+from collections.abc import Mapping, Sequence
+from copy import copy
+from dataclasses import replace
+from typing import Self
+
+import numpy as np
+
+from proofroll.core.errors import Refused
+from proofroll.core.events import EventKind
+from proofroll.elements.mechanism.contact.acting import (
+    FAINT,
+    OPEN,
+    ContactMode,
+    Features,
+    changes,
+    closed_in,
+    direction_of,
+    features_of,
+    headed,
+    modes_of,
+    slip_velocity,
+    with_features,
+)
+from proofroll.elements.mechanism.contact.free_slides import FreeSlides, passing
+from proofroll.elements.mechanism.contact.joint_laws import rebounding
+from proofroll.elements.mechanism.contact.touching import Touching, lying, torn
+from proofroll.elements.mechanism.contact.turning import opened, shut_by_pressing
+from proofroll.elements.mechanism.dynamics.switches import Settling
+from proofroll.elements.mechanism.scene.rotations import Array
+from proofroll.truth.numerics.hybrid import Stretch, Transition
+from proofroll.truth.standing_ends import Face, check_faces, check_spin
+from proofroll.truth.switching.box_passing import beside_border, passed_boxes
+from proofroll.truth.switching.contact_guards import (
+    SLIP_ENDED,
+    features_beyond,
+    guards_of,
+    leaves,
+    lies_against,
+    lost_grip,
+    sharing,
+    striking,
+    unloaded,
+)
+from proofroll.truth.switching.contact_walks import AHEAD, ContactWalks, SwitchedEquations
+from proofroll.truth.switching.impact_series import GeometricSeries, Impact, ImpactSeries
+from proofroll.truth.switching.planar_slip import BegunSlip, leaving_slips
+from proofroll.truth.switching.stopping_slip import StoppingSlip
+
+# Least deceleration of rebounds whose time is summed, in natural units; below it is round-off.
+_PULL = 1e-9
+_SOON = 1e-3  # natural time by which a Runge-Kutta step shows a motion that begins smoothly: its error is below 1e-15
+
+
+class ContactStretches(ContactWalks):
+    """Stretches of a mechanism that switches, and transitions between them.
+
+    Implements :class:`proofroll.truth.numerics.hybrid.HybridRoute`.
+    """
+
+    def __init__(self, equations: SwitchedEquations, length: int, tolerance: float, size: float) -> None:
+        """Takes the length of a state without time, the tolerance of each step, the mechanism's size."""
+        super().__init__(equations, length, tolerance, size)
+        self._settles, self._series = Settling(), ImpactSeries()
+        self.faces: Sequence[Face] = ()  # ends of cylinders, whose corners touch together
+        self._before: ContactMode = ()  # of the last stretch
+
+    def early(self) -> Self:
+        """The same route, which sums rebounds one before, at twice the speed at least."""
+        route = copy(self)
+        route._settles, route._series, route._span = Settling(early=True), ImpactSeries(), None
+        return route
+
+    @abstractmethod
+    def _decided(self, state: Array, rough: ContactMode, leaving: Sequence[int] = ()) -> tuple[ContactMode, float]:
+        """Mode that follows from the forces, and its relative margin from another mode.
+
+        ``rough``: what is open, moves or stands; ``leaving``: contacts that static friction no longer holds.
+        """
+
+    @abstractmethod
+    def _free_slides(self, state: Array, rough: ContactMode) -> FreeSlides:
+        """Slides of the contacts without their forces; ``rough``: what is open, moves or stands."""
+
+    def _moved_on(self, state: Array, rough: ContactMode) -> ContactMode:
+        """Rough modes with a slip in place of each rest that loops or motions end, whatever friction does.
+
+        Where the rate vanishes, too, as of a cam that begins smoothly, the slide shortly afterwards tells the sense.
+        """
+        slides = self._free_slides(state, rough)
+        rough = passing(rough, slides)
+        rests = [k for k, own in enumerate(rough) if own.kind == "stick" and slides.moved[k]]
+        if not rests:
+            return rough
+        others = tuple(OPEN._replace(feature=own.feature) if k in rests else own for k, own in enumerate(rough))
+        mode, step, rates = self._decided(state, others)[0], [0.0, 0.5, 0.5, 1.0], list[Array]()
+        for part in step:
+            rates.append(self._equations.rate(state + part * _SOON * rates[-1] if rates else state, mode))
+        ahead = state + _SOON * np.array([1.0, 2.0, 2.0, 1.0]) / 6 @ np.array(rates)
+        touching, found = self._touching(ahead, features_of(rough)), list(rough)
+        for k in rests:
+            slip = slip_velocity(touching[k])
+            if (speed := float(np.linalg.norm(slip))) > SLIP_ENDED:
+                found[k] = rough[k]._replace(kind="slip", heading=direction_of(slip / speed))
+        return tuple(found)
+
+    @abstractmethod
+    def _struck(
+        self, state: Array, rough: ContactMode, laws: Sequence[float], sideways: Sequence[float]
+    ) -> tuple[Array, list[bool], float]:
+        """State after an impact, contacts that stay closed, and the relative margin from another outcome.
+
+        Contacts that are not open in ``rough`` may take impulses; ``laws``, ``sideways``: normal and tangential
+        restitution of each contact in this impact.
+        """
+
+    @staticmethod
+    def _bouncing(name: str, rebound: float, pull: float, restitution: float, falling: float | None = None) -> float:
+        """Time until the rebounds of a joint or contact are over, from the speed of the first and its decelerations.
+
+        ``pull``: on the way out; ``falling``: on the way back, less by friction (None: the same).
+
+        Raises:
+            Refused: nothing pulls it back, in natural units, as where impacts on another joint end its rebounds.
+        """
+        if not pull > _PULL:
+            raise Refused(
+                f"rebounds of {name} shrink to nothing, and no force pulls it back between them, as where joints or "
+                "contacts hit each other without end: no route sums these; ask for an earlier end of the run"
+            )
+        slower = 1.0 if falling is None else math.sqrt(falling / pull)  # impact speed over rebound speed
+        return (1 + (1 / slower if slower else 0.0)) * rebound / (pull * (1 - restitution * slower))
+
+    def walk(self, time: float, state: Array, mode: ContactMode, until: float) -> Stretch[ContactMode]:
+        """See the protocol; ends of cylinders stay flat, and do not spin where they rub."""
+        if not self.faces:
+            return super().walk(time, state, mode, until)
+        check_faces(self.faces, mode if time == 0.0 else self._before, mode, time)
+        self._before, features = mode, features_of(mode)
+        self._check_spin(closed_in(mode), self._touching(state, features), time)
+        stretch = super().walk(time, state, mode, until)
+        self._check_spin(closed_in(mode), self._touching(stretch.last, features), time)
+        return stretch
+
+    def _check_spin(self, closed: Sequence[bool], touching: Sequence[Touching], time: float) -> None:
+        check_spin(self.faces, closed, touching, [contact.friction for contact in self.contacts], time)
+
+    def change(self, stretch: Stretch[ContactMode]) -> Transition[ContactMode]:
+        """See the protocol."""
+        changed = self._changed(stretch)
+        return replace(changed, blur=max(changed.blur, stretch.blur))
+
+    def _changed(self, stretch: Stretch[ContactMode]) -> Transition[ContactMode]:
+        if isinstance(stretch, BegunSlip):
+            mode = tuple(own._replace(leads=False) for own in stretch.mode_at(stretch.end))
+            stretch = replace(stretch, mode=mode)
+        guards = guards_of(self.contacts, stretch.mode)
+        if stretch.guard is None or not 0 <= stretch.guard < len(guards):  # a break, a slip begun, an effort, a kink
+            k = -1 if stretch.guard is None else stretch.guard - len(guards)
+            turned = {k: not self._signs[k]} if k >= 0 else {}
+            plain = Transition(stretch.last, stretch.mode, self._of_efforts(turned))
+            return self.jumped(stretch) if k >= len(self._limited) and self._jumping else plain
+        k, kind, border = guards[stretch.guard]
+        if kind == "tear":
+            slipping = zip(self.contacts, stretch.mode, strict=True)
+            raise torn(next(c.name for c, own in slipping if own.kind == "slip" and c.friction), stretch.end)
+        if kind == "flat":
+            raise lying(self._equations.mechanism.contacts[k], stretch.end)
+        solved = self._solved(stretch.last, stretch.mode)
+        passes = kind == "pass" or (kind == "close" and self._beside(stretch, k))
+        if passes or kind == "turn":
+            return self._passed(stretch, k, border) if passes else Transition(stretch.last, solved.mode, ())
+        if kind == "share" or (kind == "lift" and k in sharing(solved.splits)):
+            return self._unshared(stretch, unloaded(solved) if kind == "lift" else [])
+        if kind == "lift" or (kind == "break" and leaves(self.contacts[k], k, solved)):
+            lifted = EventKind.LIFT_OFF, self.contacts[k].name
+            return Transition(stretch.last, opened(self.contacts, stretch.mode, k), (lifted,))
+        if kind in {"break", "grip"}:
+            return self._broken(stretch, k)
+        return self._stopped(stretch, k) if kind == "still" else self._impact(stretch, k)
+
+    def jumped(self, stretch: Stretch[ContactMode]) -> Transition[ContactMode]:
+        """Transition at the end of a stretch where forces jump: the mode is decided anew."""
+        before, after = self._signs, self._after(stretch, stretch.last, closed_in(stretch.mode), ())
+        if after.mode is None:
+            return after
+        pairs = enumerate(zip(before, self._clamped(after.state, after.mode), strict=True))
+        jumps = self._of_efforts({k: bool(now) for k, (was, now) in pairs if was != now})
+        return replace(after, happenings=(*after.happenings, *jumps))
+
+    def _of_efforts(self, limited: Mapping[int, bool]) -> tuple[tuple[str, str], ...]:
+        """Events of efforts, by their numbers: True for one that reaches its limit, False for one that leaves it."""
+        if self._equations.mechanism.contacts:
+            return ()  # beside contacts of bodies no engine reports them
+        kinds = {True: EventKind.SATURATE, False: EventKind.RELEASE}
+        return tuple((kinds[at], self._limited[k]) for k, at in limited.items() if k < len(self._limited))
+
+    def _broken(self, stretch: Stretch[ContactMode], k: int) -> Transition[ContactMode]:
+        """Transition where friction no longer holds a contact, or contacts that share a load if ``k`` is -1.
+
+        Of a slip with less friction all forces jump.
+        """
+        contacts, solved = self.contacts, self._solved(stretch.last, stretch.mode)
+        held = {k: solved.force[k]}
+        if k < 0:
+            lost = lost_grip(contacts, solved)
+            if lost.lifting:
+                return self._unshared(stretch, unloaded(solved))
+            if not lost.one_way(solved.touching):
+                names = ", ".join(contacts[number].name for number in lost.slipping)
+                raise Refused(
+                    f"no distribution of friction over {names} holds from t = {stretch.end:.6g} s on, and they begin "
+                    "to slip in different directions: no route of the truth follows that; end before, or take more "
+                    "friction"
+                )
+            held = {number: lost.force[number] for number in lost.slipping}
+        if any(contacts[number].static > contacts[number].friction for number in held):
+            return self._after(stretch, stretch.last, closed_in(stretch.mode), (), leaving=tuple(held))
+        mode, leaving = list(stretch.mode), leaving_slips(stretch.mode, solved, held)
+        for number, own in leaving.items():
+            mode[number] = own
+        return Transition(stretch.last, tuple(mode), tuple((EventKind.SLIP, contacts[k].name) for k in leaving))
+
+    def _unshared(self, stretch: Stretch[ContactMode], leaving: Sequence[int]) -> Transition[ContactMode]:
+        """Transition where no even split of a load is left: contacts leave that bear nothing in any split.
+
+        Without these each split moves another way.
+        """
+        if not leaving:
+            return Transition(stretch.last, None, (), margin=0.0)
+        mode = stretch.mode
+        for number in leaving:
+            mode = opened(self.contacts, mode, number)
+        return Transition(stretch.last, mode, tuple((EventKind.LIFT_OFF, self.contacts[k].name) for k in leaving))
+
+    def _ahead(self, stretch: Stretch[ContactMode]) -> Array:
+        """State shortly after a stretch would have gone on."""
+        return np.asarray(stretch.last + AHEAD * self._equations.rate(stretch.last, stretch.mode))
+
+    def _beside(self, stretch: Stretch[ContactMode], k: int) -> bool:
+        """True for a corner of a box that comes down on a border of a face as it passes it: it strikes nothing."""
+        of_boxes = k < len(bodies := self._equations.mechanism.contacts) and bodies[k].box_slot is not None
+        return of_boxes and beside_border(bodies, stretch.mode, k, self._touching, self._ahead(stretch))
+
+    def _passed(self, stretch: Stretch[ContactMode], k: int, border: int) -> Transition[ContactMode]:
+        """Transition where the nearest features of solids are left by a border: rates of normals jump, slips go on."""
+        state, mode, of_bodies = stretch.last, stretch.mode, self._equations.mechanism.contacts
+        if of_bodies[k].box_slot is None:
+            closed, features = closed_in(mode), features_beyond(mode, k, border, self._touching, state, self._size)
+        else:
+            states = state, self._ahead(stretch)
+            closed, features = passed_boxes(of_bodies, mode, (k, border), self._touching, states, self._size)
+        if mode[k].kind == "open" and closed == closed_in(mode):
+            return Transition(state, with_features(mode, features), ())
+        after = self._after(stretch, state, closed, (), features=features)
+        return replace(after, happenings=tuple(item for item in after.happenings if item[0] != EventKind.TURN))
+
+    def _impact(self, stretch: Stretch[ContactMode], hit: int) -> Transition[ContactMode]:
+        """Transition at an impact."""
+        contacts, law, features = self.contacts, self.contacts[hit].restitution, features_of(stretch.mode)
+        touching = self._touching(stretch.last, features)
+        hits = striking(stretch.mode, touching, hit, stretch.end, self._size)
+        self._check_spin([k in hits for k in range(len(contacts))], touching, stretch.end)
+        # dry friction of joints and of turning gives no impulse
+        closed = [
+            (k in hits or lies_against(own, touch, self._size)) and contact.presses
+            for k, (own, touch, contact) in enumerate(zip(stretch.mode, touching, contacts, strict=True))
+        ]
+        laws = [contact.restitution if k in hits else 0.0 for k, contact in enumerate(contacts)]
+        sideways = [contact.tangential_restitution if k in hits else 0.0 for k, contact in enumerate(contacts)]
+        speed, delay = -float(touching[hit].normal @ touching[hit].slide), 0.0
+        series = self._series.after(contacts[hit].pair, Impact(stretch.end, frozenset(hits), speed))
+        rough = modes_of(closed, closed, features)
+        state, stays, margin = self._struck(stretch.last, rough, laws, sideways)
+        if series is not None:
+            margin = np.inf  # what impacts leave repeats, however slow they are
+        alternates = series is not None and (not law or len(series.contacts) > len(hits))
+        if self._settles(hit, speed, series.ratio if series is not None and alternates else law):
+            if series is not None and alternates:
+                return self._settled(stretch, state, stays, series, speed)
+            modes, normal = (rebounding(contacts, stretch.mode, hit), stretch.mode), touching[hit].normal
+            pull, falling = (-float(normal @ self._solved(state, mode).slide_rate[hit]) for mode in modes)
+            delay = self._bouncing(self.contacts[hit].name, speed * law, pull, law, max(falling, 0.0))
+            state, stays, margin = self._struck(stretch.last, rough, [0.0] * len(closed), [0.0] * len(closed))
+        stays = [stay or bool(contact.bound) for stay, contact in zip(stays, contacts, strict=True)]
+        settled = [bool(delay) and contacts[k].pair == contacts[hit].pair for k in hits]
+        kinds = (EventKind.SETTLE if over else EventKind.IMPACT for over in settled)
+        happened = tuple((kind, contacts[k].name) for kind, k in zip(kinds, hits, strict=True))
+        return self._after(stretch, state, stays, happened, margin, delay)
+
+    def _settled(
+        self, stretch: Stretch[ContactMode], state: Array, stays: Sequence[bool], series: GeometricSeries, speed: float
+    ) -> Transition[ContactMode]:
+        """Transition at an impact of a ``speed`` whose further ones are summed: all contacts of the series close.
+
+        Slips that are not faster have stopped by then. The error of the sum is relative to the speed.
+        """
+        touching, features = self._touching(state, features_of(stretch.mode)), features_of(stretch.mode)
+        shuts = {k for k in series.contacts if touching[k].gap <= speed * series.period}
+        closed = [
+            k in shuts or stay or bool(contact.bound)
+            for k, (stay, contact) in enumerate(zip(stays, self.contacts, strict=True))
+        ]
+        happened = tuple((EventKind.SETTLE, self.contacts[k].name) for k in sorted(shuts))
+        after = self._after(
+            stretch, state, closed, happened, delay=series.remaining, stopped=max(speed, SLIP_ENDED), features=features
+        )
+        return replace(after, blur=speed * series.remaining)
+
+    def _stopped(self, stretch: Stretch[ContactMode], k: int) -> Transition[ContactMode]:
+        """Transition where a slip stops: alone, or with all others; in the plane first to its last instants.
+
+        Bodies that turn while they slide stop all their slips at once: then all slips below FAINT count as stopped.
+        """
+        if stretch.mode[k].along is None and not isinstance(stretch, BegunSlip | StoppingSlip):
+            ending = stretch.mode[k]._replace(stops=True)
+            return Transition(stretch.last, (*stretch.mode[:k], ending, *stretch.mode[k + 1 :]), ())
+        closed, solved = closed_in(stretch.mode), self._solved(stretch.last, stretch.mode)
+        slides = [k for k, own in enumerate(stretch.mode) if own.kind == "slip"]
+        slips = np.linalg.norm([slip_velocity(solved.touching[k]) for k in slides], axis=1)
+        if slips.max() <= FAINT:
+            ended = self._after(stretch, stretch.last, closed, (), stopped=FAINT)
+            if ended.mode is not None and self._stands(ended.state, ended.mode):
+                return replace(ended, blur=float((slips / np.linalg.norm(solved.slide_rate[slides], axis=1)).max()))
+        return self._after(stretch, stretch.last, closed, ())
+
+    def _after(
+        self,
+        stretch: Stretch[ContactMode],
+        state: Array,
+        closed: Sequence[bool],
+        happened: tuple[tuple[str, str], ...],
+        margin: float = np.inf,
+        delay: float = 0.0,
+        stopped: float = SLIP_ENDED,
+        leaving: Sequence[int] = (),
+        features: Features | None = None,
+    ) -> Transition[ContactMode]:
+        """Transition to the mode that follows from the forces; contacts not faster than ``stopped`` are at rest.
+
+        ``features``: of solids that touch from now on; None: the same.
+        """
+        closed, before = shut_by_pressing(self.contacts, closed), features_of(stretch.mode)
+        features = before if features is None else features
+        slips = [float(np.linalg.norm(slip_velocity(each))) for each in self._touching(state, features)]
+        still = [shut and slip <= stopped for shut, slip in zip(closed, slips, strict=True)]
+        rough = self._moved_on(state, modes_of(closed, still, features))
+        state = self._equations.eliminated(state, rough)
+        mode, sure = self._decided(state, rough, leaving)
+        # A slip in the plane may have turned since it began: its sense is that of the last step.
+        sliding = self._touching(stretch.visited[-1][1] if stretch.visited else stretch.first, before)
+        was = tuple(
+            own._replace(along=own.along or headed(own, each).heading)
+            for own, each in zip(stretch.mode, sliding, strict=True)
+        )
+        changed = changes(self.contacts, was, mode, self._stands(state, mode))
+        struck = {name for _, name in happened}
+        happenings = (*happened, *(item for item in changed if item[1] not in struck))
+        return Transition(state, mode, happenings, margin=np.inf if delay else min(margin, sure), delay=delay)

@@ -1,0 +1,241 @@
+"""Right-hand side and guards of bodies that touch, of one mode, as symbols: what both routes compile.
+
+A route gives its own kinematics and linear system (:class:`ModeSymbols`); guards follow from its solution.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import NamedTuple
+
+from proofroll.elements.mechanism import WORLD, Mechanism
+from proofroll.elements.mechanism.contact.acting import FAINT, Acting, ContactMode
+from proofroll.elements.mechanism.contact.joint_laws import JointContact
+from proofroll.elements.mechanism.contact.touching import FLAT
+from proofroll.elements.mechanism.scene.kinks import Sides
+from proofroll.truth.numerics.scalars import Scalar, add, dot, is_zero, minus, mul, scaled, sub
+from proofroll.truth.switching.contact_guards import (
+    LEAST_RESPONSE,
+    NOT_SHARED,
+    SHARED,
+    TURNED,
+    ContactGuard,
+    Touchable,
+)
+from proofroll.truth.switching.contact_scalars import ScalarTouch, floats
+
+Vector = Sequence[Scalar]
+Row = dict[int, Scalar]
+_MOST_VELOCITIES = 10  # of one tree whose modes are compiled: 8 take a quarter of a second, 12 take eight seconds
+_NONE = (0.0, 0.0, 0.0)
+
+
+def worth_compiling(mechanism: Mechanism) -> bool:
+    """True if no tree of bodies has so many velocities that to compile its elimination takes longer than to run it."""
+    moves: dict[str, int] = {WORLD: 0}
+    root: dict[str, str] = {}
+    for joint in mechanism.joints:  # parents come first
+        root[joint.child] = joint.child if joint.parent == WORLD else root[joint.parent]
+        moves[root[joint.child]] = moves.get(root[joint.child], 0) + joint.nv
+    return max(moves.values()) <= _MOST_VELOCITIES
+
+
+class SolvedSymbols(NamedTuple):
+    """Rates and forces of a mode.
+
+    Attributes:
+        rates: of the state without the time.
+        touching: geometry of each contact.
+        lines: present direction of the line of each contact that has one, else None.
+        forces: on body a of each contact, (3,); None: open.
+        response: Painlevé's measure.
+        slide_rates: rate of each sliding velocity, (3,).
+        within_limits: guards of efforts with a limit: they reach it, or come back from it; then those of kinks.
+        poses: place, rotation by rows, velocity and angular velocity of each body, world axes.
+        efforts: of the actuators.
+        drives: forces that impose motions, in the order of prescribed joints; None: the route has no rule.
+    """
+
+    rates: Sequence[Scalar]
+    touching: Sequence[ScalarTouch]
+    lines: Sequence[Vector | None]
+    forces: Sequence[Vector | None]
+    response: Scalar
+    slide_rates: Sequence[Vector]
+    within_limits: Sequence[Scalar] = ()
+    poses: Sequence[tuple[Vector, Sequence[Vector], Vector, Vector]] = ()
+    efforts: Sequence[Scalar] = ()
+    drives: Sequence[Scalar] | None = ()
+
+
+class HeldRows(NamedTuple):
+    """Directions of a contact's rows and of the forces in them, (rows, 3) each."""
+
+    directions: Sequence[Vector]
+    along: Sequence[Vector]
+
+
+def held_rows(
+    kind: str, touch: ScalarTouch, line: Vector | None, friction: Scalar, root: Callable[[Scalar], Scalar]
+) -> HeldRows:
+    """Rows of a closed contact; friction of a slip is a load that its normal force brings."""
+    if kind == "stick":
+        if line is None:
+            axes: list[Vector] = [(1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)]
+            return HeldRows(axes, axes)
+        return HeldRows([touch.normal, line], [touch.normal, line])
+    if is_zero(friction):
+        return HeldRows([touch.normal], [touch.normal])
+    if line is None:
+        slip = touch.across(touch.slide)
+        line = scaled(1.0 / root(dot(slip, slip)), slip)
+    return HeldRows([touch.normal], [minus(touch.normal, scaled(friction, line))])
+
+
+def of_joint(contact: JointContact, q: Scalar, v: Scalar) -> ScalarTouch:
+    """A law of a joint as a contact, at a coordinate and its rate; see :meth:`JointContact.touching`."""
+    return ScalarTouch(
+        gap=mul(float(contact.side), sub(q, float(contact.stop))) if contact.side else 0.0,
+        normal=(1.0, 0.0, 0.0),
+        normal_rate=_NONE,
+        place=_NONE,
+        place_rate=_NONE,
+        slide=scaled(v, floats(contact.direction)),
+    )
+
+
+def limited(wanted: Scalar, bound: float, sign: Scalar, root: Callable[[Scalar], Scalar]) -> tuple[Scalar, Scalar]:
+    """Effort with a limit, and its guard; ``sign``: of an effort at its limit, 0 of one within, a parameter."""
+    within = sub(1.0, mul(sign, sign))
+    excess = sub(root(mul(wanted, wanted)) / bound, 1.0)
+    return add(mul(within, wanted), mul(sign, bound)), mul(sub(mul(2.0, within), 1.0), excess)
+
+
+def kink_guards(kinks: Sides) -> list[Scalar]:
+    """Guards of kinks of laws, after the evaluation of these with held sides."""
+    return [sub(0.0, mul(side, argument)) for side, argument in zip(kinks.held or (), kinks.arguments, strict=True)]
+
+
+def rows_of(
+    kind: str,
+    touch: ScalarTouch,
+    line: Vector | None,
+    contact: Touchable,
+    root: Callable[[Scalar], Scalar],
+) -> HeldRows:
+    """Rows of a closed contact or law of a joint; dry friction of a joint and of turning has no normal."""
+    if contact.pressed_by is not None and kind == "slip":
+        return HeldRows([], [])
+    if contact.bound or contact.pressed_by is not None:
+        assert line is not None  # it has one coordinate
+        return HeldRows([line], [line]) if kind == "stick" else HeldRows([], [])
+    return held_rows(kind, touch, line, float(contact.friction), root)
+
+
+def guard_symbols(
+    guards: Sequence[ContactGuard],
+    contacts: Sequence[Touchable],
+    solved: SolvedSymbols,
+    began: Sequence[Vector | None],
+    functions: Mapping[str, Callable[..., Scalar]],
+) -> list[Scalar]:
+    """Values of guards, as by :func:`proofroll.truth.switching.contact_guards.guard_value` where no load is shared."""
+
+    def size(vector: Vector) -> Scalar:
+        return functions["sqrt"](dot(vector, vector))
+
+    def value(guard: ContactGuard) -> Scalar:
+        k = guard.contact
+        touch, line, force = solved.touching[k], solved.lines[k], solved.forces[k]
+        if guard.kind == "pass":
+            return touch.borders[guard.border].left_by
+        if guard.kind == "turn":
+            start = began[k]
+            assert line is not None
+            assert start is not None
+            return sub(TURNED, dot(start, line))
+        if guard.kind == "still":
+            return sub(FAINT, size(touch.across(touch.slide))) if line is None else sub(0.0, dot(line, touch.slide))
+        if guard.kind in {"lift", "break"}:
+            assert force is not None  # the contact is closed
+            pressed = force if (by := contacts[k].pressed_by) is None else solved.forces[by]
+            assert pressed is not None  # with what presses
+            normal = dot(touch.normal if by is None else solved.touching[by].normal, pressed)
+            if guard.kind == "lift":
+                return sub(0.0, normal)
+            bound = float(contacts[k].bound) or mul(float(contacts[k].static), normal)
+            return sub(size(touch.across(force)), bound)
+        plain = {
+            "close": sub(0.0, touch.gap),
+            "flat": sub(FLAT, touch.tilt),
+            "tear": sub(LEAST_RESPONSE, solved.response),
+            "share": -SHARED,
+            "grip": NOT_SHARED,
+        }
+        return plain[guard.kind]
+
+    return [value(guard) for guard in guards]
+
+
+def slip_symbols(mode: ContactMode, contacts: Sequence[Touchable], solved: SolvedSymbols) -> list[Scalar]:
+    """Products u², u·u̇ and u̇² of each slip u in the plane with friction; u² is smooth, also where the slip stops."""
+    found: list[Scalar] = []
+    for own, contact, touch, rate in zip(mode, contacts, solved.touching, solved.slide_rates, strict=True):
+        if turning_slip(own, contact):
+            slip = touch.across(touch.slide)
+            found += [dot(slip, slip), dot(slip, rate), dot(rate, rate)]
+    return found
+
+
+def stated_symbols(mode: ContactMode, contacts: Sequence[Touchable], solved: SolvedSymbols) -> list[Scalar]:
+    """Record of the law check at a state: poses, then forces of all contacts with places and normals, efforts, drives.
+
+    Empty: the route has no rule for a force.
+    """
+    if solved.drives is None:
+        return []
+    found: list[Scalar] = []
+    for p, R, v, w in solved.poses:
+        found += [*p, *(entry for row in R for entry in row), *v, *w]
+    for own, contact, touch, line, force in zip(
+        mode, contacts, solved.touching, solved.lines, solved.forces, strict=True
+    ):
+        rubs = own.kind == "slip" and contact.bound
+        rubbing = force if not rubs or line is None else scaled(-float(contact.bound), line)
+        where = (*touch.place, *touch.normal) if contact.pressed_by is None else (*_NONE, *_NONE)
+        found += [*(rubbing or _NONE), *where]
+    return [*found, *solved.efforts, *solved.drives]
+
+
+def turning_slip(own: Acting, contact: Touchable) -> bool:
+    """True for a slip in the plane with friction, whose direction may turn."""
+    return bool(own.kind == "slip" and own.along is None and contact.friction)
+
+
+def eliminated(rows: list[Row], rights: Sequence[Sequence[Scalar]]) -> tuple[list[list[Scalar]], list[Scalar]]:
+    """Solutions x of A x = b for each right side b, and the pivots of A, sparse, in the given order, without exchanges.
+
+    Args:
+        rows: of A, column -> value.
+        rights: right sides.
+    """
+    rows, sides, count = [dict(row) for row in rows], [list(side) for side in rights], len(rows)
+    for p in range(count):
+        pivot = rows[p][p]
+        for i in range(p + 1, count):
+            value = rows[i].pop(p, 0.0)
+            if is_zero(value):
+                continue
+            factor = value / pivot
+            for j, entry in rows[p].items():
+                if j > p:
+                    rows[i][j] = sub(rows[i].get(j, 0.0), mul(factor, entry))
+            for side in sides:
+                side[i] = sub(side[i], mul(factor, side[p]))
+    for side in sides:
+        for p in reversed(range(count)):
+            for j, entry in rows[p].items():
+                if j > p:
+                    side[p] = sub(side[p], mul(entry, side[j]))
+            side[p] = 0.0 if is_zero(side[p]) else side[p] / rows[p][p]
+    return sides, [rows[p][p] for p in range(count)]

@@ -1,0 +1,341 @@
+"""Integration of a mechanism whose bodies touch or whose joints switch, as both routes share it.
+
+Each route adds its own equations and its own decisions on the next mode.
+"""
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from dataclasses import replace
+from typing import Protocol, TypeVar
+
+import numpy as np
+
+from proofroll.core.arrays import FloatArray
+from proofroll.core.errors import Diverged, Refused
+from proofroll.core.event_location import locate_rise_within
+from proofroll.core.last_results import LastResults
+from proofroll.elements.mechanism import Mechanism
+from proofroll.elements.mechanism.contact.acting import (
+    FAINT,
+    ContactMode,
+    Features,
+    features_of,
+    headed,
+    slip_velocity,
+)
+from proofroll.elements.mechanism.contact.touching import Touching
+from proofroll.elements.mechanism.dynamics.switches import REDUNDANT
+from proofroll.elements.mechanism.scene.kinks import JUMP
+from proofroll.elements.mechanism.scene.rotations import Array
+from proofroll.elements.mechanism.scene.signal import varies
+from proofroll.truth.followed_paths import CLOSE, TOLERANCES
+from proofroll.truth.numerics.hybrid import Stretch, StretchLaw, integrate_to_guard, states_at
+from proofroll.truth.switching.contact_guards import (
+    AT_REST,
+    STANDS,
+    ContactGuard,
+    SolvedContacts,
+    Touchable,
+    faint_time,
+    guard_value,
+    guards_of,
+    noise_of,
+    pressing,
+)
+from proofroll.truth.switching.contact_taylor import CompiledMode, CompiledModes, CompiledStretch, ModeSymbols
+from proofroll.truth.switching.held_route import BodyStates
+from proofroll.truth.switching.kink_sides import noise_at_start, refuse_jolts, sides_ahead
+from proofroll.truth.switching.planar_slip import SHORTEST, BegunSlip, begun_slip, held_or_stopped
+from proofroll.truth.switching.stopping_slip import NOTHING, StoppingSlip, stopping_slip
+
+_T = TypeVar("_T")
+_KEPT = 4  # solutions that are kept
+AHEAD = 1e-9  # time step, relative to the natural time, after which an effort is compared with its limit
+_CLAMPED = 1e-9  # difference of an effort from its limit, relative to the limit, up to which it starts at the limit
+# Difference of compiled accelerations from others, relative to the largest, up to which they are the same: the
+# direction of a slip of 2e-8 is known to 1e-8.
+_SAME_RATES = 1e-6
+
+# Guard of the first instants of a slip, which goes on.
+_GOES_ON = -1
+
+
+class SwitchedEquations(Protocol):
+    """Equations of a route."""
+
+    mechanism: Mechanism
+    contacts: tuple[Touchable, ...]
+
+    def rate(self, state: Array, mode: ContactMode, /) -> Array:
+        """Time derivative of a state in a mode."""
+
+    def eliminated(self, state: Array, mode: ContactMode, /) -> Array:
+        """State without violations of what holds."""
+
+    def drawn(self, state: Array, /) -> Array:
+        """Efforts with a limit before they are clamped, in parts of their limits."""
+
+    def kinks(self, state: Array, /) -> Array:
+        """Arguments of the kinks of laws, which are at a kink where theirs is zero."""
+
+    def hold(self, signs: Sequence[int], /) -> None:
+        """Keeps efforts with a limit at it, by their sign, or within it (0), and then the sides of kinks.
+
+        Without signs all follow the state.
+        """
+
+
+class ContactWalks(ABC):
+    """Stretches of a mechanism that switches; the last component of a state is the time."""
+
+    _after_velocities = 0  # components of a state after the velocities, without the time
+    _begins_by = 14  # nodes of the first instants of a slip from rest
+    _by_collocation = False  # integrator of compiled modes: collocation, or Taylor series
+
+    def __init__(self, equations: SwitchedEquations, length: int, tolerance: float, size: float) -> None:
+        """Takes the length of a state without time, the tolerance of each step, the mechanism's size."""
+        self._tolerance = np.full(length + 1, tolerance)
+        self._span: float | None = None  # length of the last stretch by DOP853
+        self._equations, self.contacts, self._size = equations, equations.contacts, size
+        self._timed = any(map(varies, equations.mechanism.signals))
+        self._last = LastResults[tuple[bytes, tuple[float, ...], ContactMode], SolvedContacts](_KEPT)
+        self._limited = [item.name for item in equations.mechanism.actuators if item.limit is not None]
+        # of efforts at their limits, and sides of the kinks of laws, in the present stretch
+        self._signs: tuple[int, ...] = ()
+        self._jumping = any(JUMP in names for names in equations.mechanism.kinks.values())
+        self._used: dict[str, None] = {}
+        symbols = self._symbols()
+        self._compiled = (
+            None if symbols is None else CompiledModes(symbols, self.contacts, length + 1, self._by_collocation)
+        )
+
+    @property
+    def integrators(self) -> str:
+        """Names of the integrators that this route has used."""
+        return " and ".join(self._used) or "DOP853"
+
+    def _symbols(self) -> ModeSymbols | None:
+        """Equations in symbols; None: the route has none."""
+        return None
+
+    def _solved(self, state: Array, mode: ContactMode) -> SolvedContacts:
+        """Motion and forces at a state."""
+        key = state.tobytes(), self._equations.mechanism.held, mode
+        return self._last.of(key, lambda: self._solution(state, mode))
+
+    @abstractmethod
+    def _solution(self, state: Array, mode: ContactMode) -> SolvedContacts:
+        """Motion and forces at a state."""
+
+    @abstractmethod
+    def _touching(self, state: Array, features: Features | None) -> Sequence[Touching]:
+        """Geometry and sliding velocity of each contact at a state; ``features``: of solids that touch."""
+
+    def _law(self, state: Array, mode: ContactMode, signs: tuple[int, ...] | None = None) -> StretchLaw:
+        """Equations of a stretch from a state; ``signs``: of efforts at their limits there, if they are known."""
+        guards, equations = guards_of(self.contacts, mode), self._equations
+        signs = self._clamped(state, mode) if signs is None else signs
+        excess = np.abs(equations.drawn(state)) - 1
+        noise = np.where(np.abs(excess) < _CLAMPED, 2 * np.abs(excess), 0.0)
+        if len(sides := np.array(signs[len(self._limited) :], dtype=float)):
+            noise = np.append(noise, noise_at_start(state, sides, equations.kinks, self._extent(state)))
+        return StretchLaw(
+            rates=lambda y: self._held(signs, lambda: equations.rate(y, mode)),
+            guards=lambda y: self._guards_and_limits(y, mode, guards, signs),
+            corrected=lambda y: equations.eliminated(y, mode),
+            noise=np.append(noise_of(guards, self._size), noise),
+            near=np.append([CLOSE * (guard.kind == "close") for guard in guards], np.zeros_like(noise)),
+        )
+
+    @abstractmethod
+    def bodies(self, state: Array) -> BodyStates:
+        """Places, velocities, quaternions and angular velocities of all bodies, world axes."""
+
+    def _extent(self, state: Array) -> float:
+        """Largest distance of a body from the origin, at least the natural length, which is 1."""
+        return max(1.0, float(np.abs(self.bodies(state)[0]).max(initial=0.0)))
+
+    def _held(self, signs: Sequence[int], value: Callable[[], _T]) -> _T:
+        """A value while efforts at their limits and kinks keep their sides."""
+        self._equations.hold(signs)
+        try:
+            return value()
+        finally:
+            self._equations.hold(())
+
+    def _guards(self, state: Array, mode: ContactMode, guards: Sequence[ContactGuard]) -> FloatArray:
+        if not guards:
+            return np.zeros(0)
+        solved, contacts = self._solved(state, mode), self.contacts
+        normals = pressing(solved.mode, solved.touching, solved.force, solved.splits)
+        return np.array([guard_value(guard, mode, contacts, solved, normals) for guard in guards])
+
+    def _guards_and_limits(
+        self, state: Array, mode: ContactMode, guards: Sequence[ContactGuard], signs: Sequence[int]
+    ) -> FloatArray:
+        """Values of guards, of efforts with a limit by the side from which these come, and of kinks."""
+        count, equations = len(self._limited), self._equations
+        side = np.array([1.0 if sign else -1.0 for sign in signs[:count]])
+        sides = np.array(signs[count:], dtype=float)
+        of_kinks = -sides * equations.kinks(state) if len(sides) else sides
+        return np.concatenate(
+            [self._guards(state, mode, guards), -side * (np.abs(equations.drawn(state)) - 1), of_kinks]
+        )
+
+    def walk(self, time: float, state: Array, mode: ContactMode, until: float) -> Stretch[ContactMode]:
+        """See the protocol."""
+        state, before = np.append(state[:-1], time), self._signs
+        self._signs = self._clamped(state, mode)
+        if time > 0.0 and before[len(self._limited) :] != self._signs[len(self._limited) :]:
+            count, mechanism = len(self._limited), self._equations.mechanism
+            refuse_jolts(mechanism, time, before[count:], self._signs[count:])
+        if not self._equations.mechanism.contacts and self._solved(state, mode).shifts.any():
+            raise Refused(REDUNDANT)
+        if self._stands(state, mode):
+            return Stretch(start=time, end=until, mode=mode, first=state, last=state, guard=None)
+        if any(own.leads for own in mode):
+            return self._begun(time, state, mode, until)
+        stopping = next((k for k, own in enumerate(mode) if own.stops), None)
+        if stopping is not None:
+            return self._stopping(time, state, mode, stopping)
+        guards = guards_of(self.contacts, mode)
+        share = next((number for number, guard in enumerate(guards) if guard.kind == "share"), None)
+        if share is not None and self._guards(state, mode, [guards[share]])[0] > 0:
+            return Stretch(start=time, end=time, mode=mode, first=state, last=state, guard=share)
+        start, begun = self._kicked(time, state, mode)
+        return replace(self._walked(begun, start, mode, until), start=time, first=state)
+
+    def _begun(self, time: float, state: Array, mode: ContactMode, until: float) -> Stretch[ContactMode]:
+        """First instants of a slip from rest in the plane, which end before another contact changes."""
+        name = next(contact.name for contact, own in zip(self.contacts, mode, strict=True) if own.leads)
+        begun = begun_slip(time, state, mode, until, self._equations.rate, self._solved, self._begins_by, name)
+        law, guards, signs = self._law(state, mode, self._signs), guards_of(self.contacts, mode), self._signs
+
+        def values(times: FloatArray) -> FloatArray:
+            pairs = zip(times.tolist(), begun.at(times), strict=True)
+            return np.array([self._guards_and_limits(y, begun.mode_at(t), guards, signs) for t, y in pairs])
+
+        grazes = list[float]()
+        rise = locate_rise_within(values, time, begun.end, law.noise, True, law.near, grazes)
+        guard = _GOES_ON if begun.end < until else None
+        if rise is not None:
+            end, guard = rise
+            k, kind = (guards[guard].contact, guards[guard].kind) if guard < len(guards) else (-1, "")
+            stops = kind == "still" and mode[k].leads
+            if not stops and end <= time + SHORTEST:
+                raise held_or_stopped(name, time)
+            begun = replace(begun, end=end, last=begun.at(np.array([end]))[0])
+            if stops:  # the error of the speed, as a time
+                slows = self._solved(begun.last, begun.mode_at(end)).slide_rate[k]
+                begun = replace(begun, blur=TOLERANCES[1] / float(np.linalg.norm(slows)))
+        last = self._equations.eliminated(begun.last, mode)
+        return replace(begun, last=last, guard=guard, grazes=grazes)
+
+    def _walked(self, time: float, state: Array, mode: ContactMode, until: float) -> Stretch[ContactMode]:
+        """Stretch by a compiled mode, or by DOP853 where there is none, and near singular poses, where it fails."""
+        compiled = self.by_symbols(state, mode)
+        if compiled is not None:
+            with suppress(Diverged):
+                stretch = compiled.walk(self._law(state, mode, self._signs), mode, time, state, until)
+                self._used.setdefault("collocation" if self._by_collocation else "Taylor series")
+                return stretch
+        self._used.setdefault("DOP853")
+        stretch = integrate_to_guard(
+            self._law(state, mode, self._signs), mode, time, state, until, self._tolerance, self._span
+        )
+        self._span = stretch.end - time if stretch.end > time else None
+        return stretch
+
+    def by_symbols(self, state: Array, mode: ContactMode) -> CompiledMode | None:
+        """Compiled mode, if all parts of the mechanism have a rule in symbols and no load is shared."""
+        solved = self._held(self._signs, lambda: self._solution(state, mode))
+        if self._compiled is None or solved.splits.shape[1]:
+            return None
+        compiled = self._compiled.of(mode, self._signs)
+        if compiled is None:
+            return None
+        rates = compiled.values(state[None], mode)[2][0]
+        place = len(state) - 1 - len(solved.acceleration) - self._after_velocities
+        apart = np.abs(rates[place : place + len(solved.acceleration)] - solved.acceleration).max()
+        agrees = apart <= _SAME_RATES * max(1.0, float(np.abs(solved.acceleration).max()))
+        return compiled if agrees else None
+
+    def _clamped(self, state: Array, mode: ContactMode) -> tuple[int, ...]:
+        """Sign of each effort that is at its limit in a stretch from a state, 0 of others, of those with a limit.
+
+        After these the sides of the kinks of laws.
+        """
+        equations, signs = self._equations, list[int]()
+        if self._limited:
+            ahead = equations.drawn(state + AHEAD * equations.rate(state, mode))
+            signs = [int(np.sign(part)) if abs(part) > 1 else 0 for part in ahead.tolist()]
+        if not equations.mechanism.kinks:
+            return tuple(signs)
+
+        def rates(y: Array, sides: tuple[int, ...]) -> Array:
+            return self._held((*signs, *sides), lambda: equations.rate(y, mode))
+
+        return (*signs, *sides_ahead(state, equations.kinks, rates))
+
+    def within(self, stretch: Stretch[ContactMode], times: Array) -> Array:
+        """See the protocol."""
+        if isinstance(stretch, BegunSlip | StoppingSlip):
+            return np.array([self._equations.eliminated(state, stretch.mode) for state in stretch.at(times)])
+        if isinstance(stretch, CompiledStretch) and stretch.by is not None:
+            return stretch.by.within(self._law(stretch.first, stretch.mode), stretch, times)
+        if not stretch.visited:
+            return np.array([stretch.first for _ in times])
+        return states_at(self._law(stretch.first, stretch.mode), stretch.visited, times, self._tolerance)
+
+    def acting(self, stretch: Stretch[ContactMode], state: Array) -> ContactMode:
+        """Mode at a state within a stretch, with the directions of slips that its integration took."""
+        time, mode = float(state[-1]), stretch.mode
+        if isinstance(stretch, BegunSlip):
+            return stretch.mode_at(time)
+        if isinstance(stretch, CompiledStretch) and stretch.visited and time > stretch.visited[0][0]:
+            return self._as_it_goes(state, mode)
+        return mode
+
+    def _as_it_goes(self, state: Array, mode: ContactMode) -> ContactMode:
+        """Mode with the present directions of slips in the plane, however slow."""
+        touching = self._touching(state, features_of(mode))
+        return tuple(headed(own, each) for own, each in zip(mode, touching, strict=True))
+
+    def _stopping(self, time: float, state: Array, mode: ContactMode, k: int) -> StoppingSlip:
+        """Last instants of a slip below FAINT.
+
+        The duration of its straight line, with that of the error of the speed, is the uncertainty of the end.
+        """
+
+        def one(y: Array) -> tuple[float, Array]:
+            now, touch = self._as_it_goes(y, mode), self._touching(y, features_of(mode))[k]
+            change = faint_time(touch, self._solved(y, now).slide_rate[k]) * self._equations.rate(y, now)
+            return float(np.linalg.norm(slip_velocity(touch))), change
+
+        def by_states(states: Array) -> tuple[Array, Array]:
+            speeds, changes = zip(*map(one, states.T), strict=True)
+            return np.array(speeds), np.array(changes).T
+
+        compiled = self.by_symbols(state, mode)
+        decay = by_states if compiled is None else compiled.decay_of(mode, k, time)
+        guard = guards_of(self.contacts, mode).index(ContactGuard(k, "still"))
+        slip = stopping_slip(time, state, mode, guard, decay)
+        slows = self._solved(slip.line, self._as_it_goes(slip.line, mode)).slide_rate[k]
+        return replace(slip, blur=(NOTHING + TOLERANCES[1]) / float(np.linalg.norm(slows)))
+
+    def _kicked(self, time: float, state: Array, mode: ContactMode) -> tuple[Array, float]:
+        """State and time shortly after a slip in the plane starts from rest, when it has a direction."""
+        solved, wait = self._solved(state, mode), 0.0
+        for k, own in enumerate(mode):
+            begins = own.kind == "slip" and own.along is None and self.contacts[k].friction
+            if begins and np.linalg.norm(slip_velocity(solved.touching[k])) < FAINT:
+                wait = max(wait, 2 * FAINT / float(np.linalg.norm(solved.slide_rate[k])))
+        return (state, time) if not wait else (state + wait * self._equations.rate(state, mode), time + wait)
+
+    def _stands(self, state: Array, mode: ContactMode) -> bool:
+        """True if nothing moves or is about to move."""
+        if self._timed or any(own.kind == "slip" for own in mode):
+            return False
+        solved = self._solved(state, mode)
+        return float(np.abs(solved.velocity).max()) <= AT_REST and float(np.abs(solved.acceleration).max()) <= STANDS

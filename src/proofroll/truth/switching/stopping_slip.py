@@ -1,0 +1,85 @@
+"""Last instants of a slip in the plane, below FAINT, for both routes: by the logarithm of its speed, then a line.
+
+The slower a slip, the faster it turns: its equations are stiff in time, and smooth in that logarithm.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from proofroll.elements.mechanism.contact.acting import ContactMode
+from proofroll.elements.mechanism.scene.rotations import Array
+from proofroll.truth.numerics.hybrid import Stretch
+from proofroll.truth.numerics.picard import PicardSteps, StatesInside
+
+# Decrease of the logarithm in a step, and slip speed from which on the slip is a straight line, in natural units: a
+# hundred times the round-off of velocities.
+_DECAY, NOTHING = 2.0, 1e-14
+
+# Slip speeds at states (state, places), and changes of the states until the slip would stop at its present rate.
+Decay = Callable[[Array], tuple[Array, Array]]
+
+
+class _Step(NamedTuple):
+    """A step: its first and last place, the time of its last state [s], and the states within."""
+
+    start: float
+    end: float
+    time: float
+    inside: StatesInside
+
+
+@dataclass(frozen=True)
+class StoppingSlip(Stretch[ContactMode]):
+    """Last instants of a slip.
+
+    Attributes:
+        steps: in the logarithm of the speed.
+        line: state at the start of the straight line.
+    """
+
+    steps: Sequence[_Step] = ()
+    line: Any = None
+
+    def at(self, times: Array) -> Array:
+        """States at times [s] within it, shape (times, state)."""
+        return np.array([self._at(time) for time in times.tolist()])
+
+    def _at(self, time: float) -> Array:
+        from scipy.optimize import brentq
+
+        step = next((step for step in self.steps if time < step.time), None)
+        if step is None:
+            begun, span = float(self.line[-1]), self.end - float(self.line[-1])
+            return np.asarray(self.line + (self.last - self.line) * (min(1.0, (time - begun) / span) if span else 1.0))
+
+        def late(place: float) -> float:
+            return float(step.inside(np.array([place]))[-1, 0]) - time
+
+        begins = late(step.start) >= 0
+        place = step.start if begins else brentq(late, step.start, step.end, xtol=1e-15)
+        return np.asarray(step.inside(np.array([place]))[:, 0])
+
+
+def stopping_slip(time: float, state: Array, mode: ContactMode, guard: int, decay: Decay) -> StoppingSlip:
+    """Last instants of a slip from a time [s] and state on; ``guard``: that it stops."""
+    first, steps, integrator, place = state, list[_Step](), PicardSteps(lambda states: decay(states)[1]), 0.0
+    last = float(np.log(np.maximum(decay(state[:, None])[0], NOTHING) / NOTHING)[0])
+    while place < last:
+        end, state, inside = integrator.step(place, state, min(last, place + _DECAY))
+        steps.append(_Step(place, end, float(state[-1]), inside))
+        place = end
+    change = np.asarray(decay(state[:, None])[1][:, 0])
+    ended = state + change
+    return StoppingSlip(
+        start=time,
+        end=float(ended[-1]),
+        mode=mode,
+        first=first,
+        last=ended,
+        guard=guard,
+        steps=steps,
+        line=state,
+    )

@@ -1,0 +1,93 @@
+"""Friction of a contact against turning, in symbols: what both routes compile of it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+from proofroll.elements.mechanism.contact.acting import ContactMode
+from proofroll.elements.mechanism.contact.turning import TurningFriction
+from proofroll.truth.numerics.scalars import Scalar, add, dot, minus, plus, scaled
+from proofroll.truth.switching.contact_guards import Touchable
+from proofroll.truth.switching.contact_scalars import ScalarTouch
+
+Vector = Sequence[Scalar]
+Row = dict[int, Scalar]
+_NONE = (0.0, 0.0, 0.0)
+
+
+def of_turning(friction: TurningFriction, touch: ScalarTouch, turning: Vector) -> ScalarTouch:
+    """Friction against turning as a contact; see :meth:`.TurningFriction.touching`.
+
+    A spin is a slide along the normal, across none.
+    """
+    slide = resisted(friction, touch, turning)
+    if not friction.spins:
+        return touch._replace(slide=slide, tilt=1.0)
+    return touch._replace(normal=_NONE, normal_rate=_NONE, slide=slide, tilt=1.0)
+
+
+def resisted(friction: TurningFriction, touch: ScalarTouch, vector: Vector) -> Vector:
+    """Part of an angular velocity, or of its rate, that a friction resists."""
+    along = scaled(dot(touch.normal, vector), touch.normal)
+    return along if friction.spins else minus(vector, along)
+
+
+def resisted_rate(friction: TurningFriction, touch: ScalarTouch, turning: Vector) -> Vector:
+    """Rate of the resisted part of an angular velocity as the normal turns."""
+    n, rate = touch.normal, touch.normal_rate
+    turned = plus(scaled(dot(n, turning), rate), scaled(dot(rate, turning), n))
+    return turned if friction.spins else scaled(-1.0, turned)
+
+
+def follows(mode: ContactMode, contacts: Sequence[Touchable]) -> bool:
+    """True if a mode has a rule in symbols: rolling that stands in its plane has none."""
+    return not any(
+        own.kind == "stick" and own.along is None and contact.pressed_by is not None
+        for own, contact in zip(mode, contacts, strict=True)
+    )
+
+
+class TurningMoments:
+    """Moments of friction against turning that the normal forces of contacts bring."""
+
+    def __init__(
+        self,
+        mode: ContactMode,
+        contacts: Sequence[Touchable],
+        touching: Sequence[ScalarTouch],
+        lines: Sequence[Vector | None],
+        root: Callable[[Scalar], Scalar],
+    ) -> None:
+        self._touching, self._found = touching, list[tuple[int, int, Vector]]()
+        self._acting: list[tuple[int, int, Vector]] = []  # friction, what presses, moment by a unit normal force
+        for k, (own, contact, touch, line) in enumerate(zip(mode, contacts, touching, lines, strict=True)):
+            if own.kind != "slip" or contact.pressed_by is None:
+                continue
+            slip = touch.across(touch.slide)
+            way = scaled(1.0 / root(dot(slip, slip)), slip) if line is None else line
+            self._acting.append((k, contact.pressed_by, scaled(-float(contact.friction), way)))
+
+    def pushed(self, push: Row, place: int, k: int, along: Vector, row_of: Callable[[int, Vector], Row]) -> Row:
+        """Loads by a unit of an unknown force, with those of the moments that it brings.
+
+        Args:
+            push: loads of the force alone.
+            place: of the force among all unknown ones.
+            k: its contact.
+            along: its direction.
+            row_of: coefficients of a contact's slide in a direction.
+        """
+        push = dict(push)
+        for number, by, moment in self._acting:
+            if by != k:
+                continue
+            carried = scaled(dot(self._touching[k].normal, along), moment)
+            self._found.append((place, number, carried))
+            for n, value in row_of(number, carried).items():
+                push[n] = add(push.get(n, 0.0), value)
+        return push
+
+    def add_to(self, forces: list[Vector | None], sizes: Sequence[Scalar]) -> None:
+        """Adds the moments to the forces of all contacts, from the sizes of the unknown ones."""
+        for place, k, moment in self._found:
+            forces[k] = plus(forces[k] or _NONE, scaled(sizes[place], moment))

@@ -1,0 +1,1 @@
+"""Route 1 of the truth: joint coordinates, all contacts at once."""

@@ -1,0 +1,1 @@
+"""Motions known in closed form."""

@@ -1,0 +1,203 @@
+"""Slips that start from rest in any direction of a surface."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
+
+from proofroll.elements.ball_on_surface.element import rolling_ball
+from proofroll.elements.mechanism import Body, Force, Joint, Mechanism
+from proofroll.elements.mechanism.scene.drives import Actuator
+from proofroll.elements.mechanism.scene.shapes.geometry import Geometry, Pair
+from proofroll.elements.mechanism.scene.signal import Formula
+from proofroll.files.scene_file import load_scene
+from proofroll.truth.switched_truth import truth_of
+from proofroll_drill.referee.random_contacts import random_contacts
+
+# s: of a ball that starts with 3 m/s in a cylinder, by its own truth
+SLIPS, STICKS = 0.3220872132861903, 0.4999850902951998
+NEAR = 2e-12  # s: error bars of that truth
+
+
+def ball_in_a_bore(speed: float) -> Mechanism:
+    """The ball of the founding scene as body, sphere and bore."""
+    scene = load_scene("sphere_in_cylinder", mu_static=0.35, speed=speed)
+    found, wall = rolling_ball(scene), scene.elements[0].surface  # type: ignore[attr-defined]
+    moment, radius = float(found.ball.inertia), float(found.ball.radius)
+    free = Joint(
+        "free", "free", "world", "ball", q0=(*map(float, found.p0), 1.0, 0.0, 0.0, 0.0),
+        v0=(*map(float, found.v0), *map(float, found.w0)),
+    )  # fmt: skip
+    shapes = (
+        Geometry("sphere", "ball", "sphere", radius=radius),
+        Geometry("wall", "world", "bore", radius=float(wall.radius)),
+    )
+    body = Body("ball", float(found.ball.mass), inertia=(moment,) * 3)
+    return Mechanism((body,), (free,), geometries=shapes, pairs=(Pair("touch", ("sphere", "wall"), 0.35),))
+
+
+@pytest.mark.drill
+def test_a_ball_slips_from_rest_and_sticks_when_its_own_truth_says() -> None:
+    """Friction turns the slip of a ball in a cylinder; start, end and motion are known to round-off."""
+    times = np.array([0.0, SLIPS + 1e-5, SLIPS + 4e-3, SLIPS + 6e-3, SLIPS + 1e-2, 0.52])
+    found = truth_of(ball_in_a_bore(3.0), times)
+    assert np.isinf(found.horizon)
+    assert np.isinf(found.end)
+    assert [event.kind for event in found.events] == ["slip", "stick"]
+    for event, right in zip(found.events, (SLIPS, STICKS), strict=True):
+        assert event.time_low - NEAR <= right <= event.time_high + NEAR
+        assert event.time == pytest.approx(right, abs=1e-14)
+    assert found.bars["p_WB"][-1] < 1e-13
+    assert found.bars["v_WB"][-1] < 1e-12
+
+
+@pytest.mark.arithmetic
+@pytest.mark.parametrize(
+    ("seed", "sticks", "beyond"), [(38, 0.04395707855805324, 0.0), (43, 0.044611843815633004, 3e-13)]
+)
+def test_the_end_of_a_slip_lies_within_its_bracket(seed: int, sticks: float, beyond: float) -> None:
+    """A slip ends where the referee's long doubles say, by a speed known to the error of a step over its slowing.
+
+    Of the second, which ends in the weakest slowing, processors differ by 2e-13 s, up to seven times a bracket.
+    """
+    _, mechanism, until = random_contacts(seed)
+    found = truth_of(mechanism, np.linspace(0.0, until, 3))
+    assert {event.kind for event in found.events} == {"rest"}
+    assert all(event.time_low - beyond <= sticks <= event.time_high + beyond for event in found.events)
+    assert all(event.time_high - event.time_low < 3e-12 for event in found.events)
+
+
+def reference(mass: np.ndarray, hold: float, until: float) -> np.ndarray:
+    """Velocity at the end of a slip against friction ``hold`` under a pull (4 t, 6 t²), by ln|u| and its direction."""
+
+    def pull(t: float) -> np.ndarray:
+        return np.array([4 * t, 6 * t**2])
+
+    begins = brentq(lambda t: np.linalg.norm(pull(t)) - hold, 0.1, 2.0, xtol=1e-15)
+    early = 1e-4  # s: after the start, where the direction of the slip is that of the pull but for its turn
+    angle = np.arctan2(*pull(begins)[::-1])
+
+    def rates(_: float, y: np.ndarray) -> list[float]:
+        size, way = np.exp(y[0]), np.array([np.cos(y[1]), np.sin(y[1])])
+        rate = (pull(y[2]) - hold * way) / mass
+        return [rate @ way, rate @ np.array([-way[1], way[0]]), size]  # by τ with dt = |u| dτ
+
+    def ends(_: float, y: np.ndarray) -> float:
+        return float(y[2] - until)
+
+    ends.terminal = True  # type: ignore[attr-defined]
+    way = np.array([np.cos(angle), np.sin(angle)])
+    growth = way @ (np.array([4.0, 12 * begins]) / mass)
+    first = [np.log(growth * early**2 / 2), angle, begins + early]
+    done = solve_ivp(rates, (0, 1e9), first, "LSODA", rtol=1e-12, atol=1e-12, events=ends)
+    size, angle, _ = done.y_events[0][0]
+    return np.asarray(np.exp(size) * np.array([np.cos(angle), np.sin(angle)]))
+
+
+@pytest.mark.drill
+def test_a_bead_slips_against_friction_that_turns_with_its_pull() -> None:
+    """A bead with another inertia along each rail, pulled harder and harder round a corner, moves as Coulomb says."""
+    hold, until = 0.3 * 9.81, 1.0
+    rails = [("x", (1, 0, 0), "4*t"), ("y", (0, 1, 0), "6*t^2"), ("z", (0, 0, 1), "")]
+    names = ["world", "one", "two", "bead"]
+    joints = tuple(
+        Joint(rail, "prismatic", names[k], names[k + 1], axis=axis)  # type: ignore[arg-type]
+        for k, (rail, axis, _) in enumerate(rails)
+    )
+    bodies = tuple(Body(name, m, inertia=(0.01,) * 3) for name, m in zip(names[1:], (0.5, 0.25, 1.0), strict=True))
+    pulls = tuple(Actuator(f"pull_{rail}", rail, "torque", target=Formula(law)) for rail, _, law in rails[:2])
+    shapes = (Geometry("floor", "world", "plane"), Geometry("tip", "bead", "sphere", radius=0.0))
+    guided = Mechanism(
+        bodies, joints, actuators=pulls, geometries=shapes, pairs=(Pair("touch", ("tip", "floor"), 0.3),)
+    )
+    found = truth_of(guided, np.array([0.0, until]))
+    assert [event.kind for event in found.events] == ["slip"]
+    assert found.bars["v"][-1] < 1e-11
+    right = reference(np.array([1.75, 1.25]), hold, until)
+    assert found.record.v[1, :2] == pytest.approx(right, abs=1e-6)
+
+
+def bead(push: str = "", speed: float = 0.0, shake: str = "") -> Mechanism:
+    """A bead of 1 kg on a floor with friction 0.5, pushed along x; the floor may be shaken along x."""
+    start = (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
+    joints = [Joint("free", "free", "world", "bead", q0=start, v0=(speed, 0.0, 0.0, 0.0, 0.0, 0.0))]
+    bodies = [Body("bead", 1.0, inertia=(0.1,) * 3)]
+    if shake:
+        joints.append(Joint("shake", "prismatic", "world", "plate", axis=(1, 0, 0), motion=Formula(shake)))
+        bodies.append(Body("plate", 1.0, inertia=(0.1,) * 3))
+    shapes = (Geometry("floor", "plate" if shake else "world", "plane"), Geometry("tip", "bead", "sphere", radius=0.0))
+    return Mechanism(
+        tuple(bodies),
+        tuple(joints),
+        forces=(Force("push", "bead", "force", value=(Formula(push), 0.0, 0.0)),) if push else (),
+        geometries=shapes,
+        pairs=(Pair("touch", ("tip", "floor"), 0.5),),
+    )
+
+
+def slip_under_a_push(push: float, rate: float, hold: float) -> tuple[float, float, float]:
+    """Begin [s], end [s] and length [m] of a slip under ``push`` sin(``rate`` t) against friction, by its integral."""
+    begin = float(np.arcsin(hold / push)) / rate
+
+    def speed(t: float) -> float:
+        return float(push / rate * (np.cos(rate * begin) - np.cos(rate * t)) - hold * (t - begin))
+
+    end = brentq(speed, begin + 1e-2, 2 * np.pi / rate, xtol=1e-15)
+    way = push / rate * (np.cos(rate * begin) * (end - begin) - (np.sin(rate * end) - np.sin(rate * begin)) / rate)
+    return begin, end, float(way - hold * (end - begin) ** 2 / 2)
+
+
+PUSHED, SLIP = bead("5.2*sin(10*t)"), slip_under_a_push(5.2, 10.0, 0.5 * 9.81)
+
+
+@pytest.mark.parametrize("until", np.linspace(0.13, 0.4, 20).tolist())
+def test_a_slip_that_stops_in_its_first_instants_ends_there(until: float) -> None:
+    """A bead under a swelling push sticks when its speed is zero, whatever the end of the run is."""
+    found = truth_of(PUSHED, np.array([0.0, until]))
+    begin, end, way = SLIP
+    right = [("slip", begin), ("stick", end)][: 1 + (until > end)]
+    assert [event.kind for event in found.events] == [kind for kind, _ in right]
+    for event, (_, time) in zip(found.events, right, strict=True):
+        assert event.time_low <= time <= event.time_high
+    if until > end:
+        assert found.record.q[-1, 0] == pytest.approx(way, abs=1e-14)
+        assert found.record.v[-1, 0] == pytest.approx(0.0, abs=1e-14)
+
+
+@pytest.mark.drill
+@pytest.mark.parametrize("until", [0.19, 0.21, 0.25, 0.4])
+def test_a_slip_on_a_shaken_floor_ends_when_the_floor_has_its_speed(until: float) -> None:
+    """A bead that holds to a shaken floor slips and holds again at one time, whatever the end of the run is."""
+    found = truth_of(bead(speed=0.5, shake="0.05*sin(10*t)"), np.array([0.0, until]))
+    begin = float(np.arcsin(0.5 * 9.81 / 5.0)) / 10  # s: the floor's deceleration reaches the bound
+    assert 0.1 < begin < 0.19
+    end = brentq(
+        lambda t: 0.5 * np.cos(10 * begin) - 0.5 * 9.81 * (t - begin) - 0.5 * np.cos(10 * t), 0.15, 0.22, xtol=1e-15
+    )
+    kinds = [event.kind for event in found.events]
+    assert kinds == ["slip", "stick"][: 1 + (until > end)]
+    for event, right in zip(found.events, (begin, end), strict=False):
+        assert event.time_low <= right <= event.time_high
+
+
+@pytest.mark.parametrize("way", [(1.0, 0.0), (0.0, 1.0), (0.6, 0.8)])
+def test_a_ball_of_unequal_moments_slides_along_an_axis_until_it_rolls(way: tuple[float, float]) -> None:
+    """A slip that keeps its direction stops without a division by zero: at 2/7 of v/(μ g) for moments alike."""
+    right = {(1.0, 0.0): 0.03, (0.0, 1.0): 0.018}.get(way)
+    start = (0.0, 0.0, 0.2, 1.0, 0.0, 0.0, 0.0)
+    free = Joint("free", "free", "world", "ball", q0=start, v0=(-2.0 * way[0], -2.0 * way[1], 0.0, 0.0, 0.0, 0.0))
+    shapes = (Geometry("floor", "world", "plane"), Geometry("skin", "ball", "sphere", radius=0.2))
+    ball = Mechanism(
+        (Body("ball", 1.0, inertia=(0.018, 0.03, 0.028)),), (free,), geometries=shapes,
+        pairs=(Pair("c", ("skin", "floor"), 0.3),), gravity=(0.0, 0.0, -10.0),
+    )  # fmt: skip
+    found = truth_of(ball, np.array([0.0, 0.4]))
+    (event,) = found.events
+    assert event.kind == "stick"
+    if right is not None:
+        end = 2.0 / (0.3 * 10.0 * (1 + 0.2**2 / right))
+        assert event.time_low <= end <= event.time_high
+        place = -2.0 * end + 1.5 * end**2 - (2.0 - 3.0 * end) * (0.4 - end)
+        assert found.record.p_WB[-1, 0] @ np.array([*way, 0.0]) == pytest.approx(place, abs=1e-14)

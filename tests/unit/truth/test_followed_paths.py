@@ -1,0 +1,41 @@
+"""Paths of two routes together."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from proofroll.core.errors import Refused
+from proofroll.elements.mechanism.scene.rotations import Array
+from proofroll.truth.followed_paths import end_of, followed
+from proofroll.truth.numerics.hybrid import Stretch, Transition
+
+
+class _Refusing:
+    """A route that stands still until a time, and follows nothing behind it."""
+
+    def __init__(self, ends: float) -> None:
+        self._ends = ends
+        self.last = 0.0
+
+    def begin(self) -> Transition[str]:
+        return Transition(np.zeros(1), "stands", ())
+
+    def walk(self, time: float, state: Array, mode: str, until: float) -> Stretch[str]:
+        self.last = until
+        return Stretch(time, min(self._ends, until), mode, state, state, 0 if self._ends < until else None)
+
+    def change(self, stretch: Stretch[str]) -> Transition[str]:
+        raise Refused(f"nothing is known from {stretch.end:g} s on")
+
+    def within(self, stretch: Stretch[str], times: Array) -> Array:
+        return np.repeat(stretch.first[None], len(times), axis=0)
+
+
+def test_the_second_route_is_not_followed_behind_an_early_end_of_the_first() -> None:
+    """What lies behind the end of a truth costs nothing, and the end is that of the first route, with its reason."""
+    first, second = _Refusing(1.0), _Refusing(90.0)
+    paths = followed(first, second, 100.0, ())
+    assert second.last < 1.001
+    assert end_of(paths) == (1.0, "nothing is known from 1 s on")
+    first, second = _Refusing(90.0), _Refusing(1.0)
+    assert end_of(followed(first, second, 100.0, ())) == (1.0, "nothing is known from 1 s on")

@@ -1,0 +1,63 @@
+"""Forces that several distributions of a load allow, wherever they reach."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from proofroll.elements.mechanism import Body, Joint, Mechanism
+from proofroll.elements.mechanism.scene.shapes.geometry import Geometry, Pair
+from proofroll.elements.mechanism.scene.signal import Formula
+from proofroll.truth.switched_truth import truth_of
+
+
+def _skid_steered() -> Mechanism:
+    """A chassis on four driven wheels, left ones backward, that turns on the spot."""
+    bodies, joints = (
+        [Body("chassis", 10.0, inertia=(0.2, 0.3, 0.4))],
+        [Joint("float", "free", "world", "chassis", q0=(0.0, 0.0, 0.06, 1.0, 0.0, 0.0, 0.0))],
+    )
+    shapes, pairs = [Geometry("floor", "world", "plane")], list[Pair]()
+    for name, x, y in (("fl", 0.15, 0.13), ("fr", 0.15, -0.13), ("rl", -0.15, 0.13), ("rr", -0.15, -0.13)):
+        bodies.append(Body(name, 0.2, inertia=(3e-4, 5e-4, 3e-4)))
+        motion = Formula(f"{-5 if y > 0 else 5}*t")
+        joints.append(Joint(f"a{name}", "revolute", "chassis", name, (x, y, 0.0), axis=(0.0, 1.0, 0.0), motion=motion))
+        shapes.append(Geometry(f"g{name}", name, "sphere", radius=0.06))
+        pairs.append(Pair(f"p{name}", (f"g{name}", "floor"), friction=0.6))
+    return Mechanism(
+        tuple(bodies), tuple(joints), gravity=(0.0, 0.0, -9.81), geometries=tuple(shapes), pairs=tuple(pairs)
+    )
+
+
+def test_forces_of_joints_and_drives_that_hang_on_a_split_are_not_given() -> None:
+    """Four wheels share the load: axles and drives have no values, the free joint has, and bars stay small."""
+    found = truth_of(_skid_steered(), np.array([0.0, 0.01]))
+    wrench, drives = found.record.wrench, found.record.named
+    assert np.isnan(drives).all()
+    assert np.isnan(wrench[:, 1:, 2]).all()
+    assert np.isfinite(wrench[:, 0]).all()
+    assert max(float(found.bars[name][-1]) for name in ("wrench", "named", "p_WB", "v_WB")) < 1e-9
+
+
+@pytest.mark.drill
+def test_a_light_body_on_a_heavy_one_slides_until_both_move_alike() -> None:
+    """A box of 2 kg on a belt of 1e6 kg sticks where momentum says, as on a light belt."""
+    belt, box, speed, mu, g = 1e6, 2.0, 0.8, 0.3, 9.81
+    bodies = Body("belt", belt), Body("box", box, inertia=(0.02,) * 3)
+    joints = (
+        Joint("run", "prismatic", "world", "belt", axis=(1.0, 0.0, 0.0), v0=(speed,)),
+        Joint("float", "free", "world", "box", q0=(0.0, 0.0, 0.1, 1.0, 0.0, 0.0, 0.0)),
+    )
+    feet = [
+        Geometry(f"foot{k}", "box", "sphere", (x, y, -0.1), radius=0.0)
+        for k, (x, y) in enumerate([(0.15, 0.15), (0.15, -0.15), (-0.15, 0.15), (-0.15, -0.15)])
+    ]
+    pairs = tuple(Pair(f"touch{k}", (f"foot{k}", "top"), friction=mu) for k in range(4))
+    shapes = (Geometry("top", "belt", "plane"), *feet)
+    mechanism = Mechanism(bodies, joints, gravity=(0.0, 0.0, -g), geometries=shapes, pairs=pairs)
+    found = truth_of(mechanism, np.array([0.0, 0.4]))
+    sticks = speed / (mu * g * (1 + box / belt))
+    common = speed * belt / (belt + box)
+    assert found.ended == ""
+    assert all(event.time_low <= sticks <= event.time_high for event in found.events)
+    assert found.record.p_WB[1, 1, 0] == pytest.approx(mu * g * sticks**2 / 2 + common * (0.4 - sticks), abs=1e-9)

@@ -1,0 +1,138 @@
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+from scipy.spatial.transform import Rotation
+
+from proofroll.core.errors import Diverged
+from proofroll.elements.mechanism import Body, Joint, Loop, Mechanism
+from proofroll.elements.mechanism.contact.dynamics import ContactDynamics
+from proofroll.elements.mechanism.dynamics.analysis import RowSign, analyse
+from proofroll.elements.mechanism.dynamics.joint_coordinates import JointCoordinates
+from proofroll.elements.mechanism.run.element import MechanismElement
+from proofroll.truth.numerics.hybrid import follow
+from proofroll.truth.plug_in import MechanismTruth
+from proofroll.truth.singular_poses import BRANCHING, singular_poses
+from proofroll.truth.smooth_truth import find_truth
+from proofroll.truth.tree.contact_tree import ContactTree
+from proofroll.truth.witnesses.closed_forms import closed_form
+
+
+@pytest.mark.drill
+def test_four_bar_passes_when_its_links_are_in_line(scene):
+    """Found where the closed form turns the rods by a quarter and three quarters."""
+    mechanism = scene("four_bar", windows=1)
+    turned = closed_form(mechanism).motion
+    expected = [
+        brentq(lambda t, a=angle: turned(np.array([t]))[0][0, 0] + a, 0.0, 1.5) for angle in (np.pi / 2, 3 * np.pi / 2)
+    ]
+    assert singular_poses(mechanism, 1.5) == pytest.approx(expected, abs=1e-3)
+
+
+@pytest.mark.parametrize("name", ["slider_crank", "bricard"])
+def test_regular_motion_passes_none(scene, name):
+    """Minima of the singular value away from zero are not taken for singular poses."""
+    assert singular_poses(scene(name), 0.4) == []
+
+
+@pytest.mark.parametrize("sizes", [[-0.2, -0.1, 0.1, 0.2], [0.2, 0.1, 0.1, 0.2]])
+def test_the_sign_of_rows_changes_where_they_lose_rank(sizes):
+    """A singular value that passes through zero is told from one that turns back before it, however it is turned."""
+    turned = [Rotation.from_rotvec([0.1 * k, 0.2, 0.3 * k]).as_matrix() for k in range(4)]
+    sign = RowSign(2)
+    rows = [np.array([[2.0, 0, 0], [0, size, 0]]) @ R for size, R in zip(sizes, turned, strict=True)]
+    assert [sign.changes(C) for C in rows] == [False, False, sizes[0] < 0, False]
+
+
+def test_rows_that_begin_without_rank_are_as_small_as_can_be():
+    """A motion that begins where the rows vanish is at a singular pose, until larger rows tell how large they are."""
+    sign, found = RowSign(1), []
+    for size in (0.0, 2.0, 1.0):
+        sign.changes(np.array([[size, 0.0]]))
+        found.append(sign.least)
+    assert found == [0.0, 1.0, 0.5]
+
+
+def parallelogram(damping):
+    """Rods of 1 m, 2 m, 1 m on joints 2 m apart, that turn at 3 rad/s towards the pose in which all are in line."""
+    rods = {name: Body(name, 1.0, (size / 2, 0, 0), (0.01, 0.1, 0.1)) for name, size in (("a", 1), ("b", 2), ("c", 1))}
+    joints = (
+        Joint("crank", "revolute", "world", "a", q0=(1.0,), v0=(-3.0,), damping=damping),
+        Joint("pin", "revolute", "a", "b", (1, 0, 0), q0=(-1.0,), v0=(3.0,)),
+        Joint("rocker", "revolute", "world", "c", (2, 0, 0), q0=(1.0,), v0=(-3.0,)),
+    )
+    loops = (Loop("loop", "revolute", "b", "c", (2, 0, 0), (1, 0, 0)),)
+    return Mechanism(tuple(rods.values()), joints, loops, gravity=(0.0, -9.81, 0.0))
+
+
+REPORTING_ERRORS = r"near t = 0.2\d*, 0.7\d* s the rows of the loops lose rank and the motion may branch"
+
+
+@pytest.mark.drill
+def test_a_parallelogram_in_closed_form_says_where_it_may_branch():
+    """It goes on as the formula does, and the truth says from where on lengths decide; before that it says nothing."""
+    element = MechanismElement(parallelogram(0.0))
+    found = MechanismTruth.truth(element, np.array([0.0, 0.5, 1.0]), ())
+    assert re.match(REPORTING_ERRORS, found.attrs["ill_posed"])
+    assert "ill_posed" not in MechanismTruth.truth(element, np.array([0.0, 0.2]), ()).attrs
+
+
+@pytest.mark.drill
+def test_a_parallelogram_without_a_closed_form_ends_there_with_the_same_words():
+    """Damped, no formula tells the branch, and what is before is kept."""
+    found = find_truth(parallelogram(0.1), np.array([0.0, 0.2, 0.5, 1.0]))
+    assert found.ended == BRANCHING
+    assert 0.2 < found.end < 0.3
+    assert found.record.time.tolist() == [0.0, 0.2]
+
+
+def test_a_step_over_a_singular_pose_is_no_truth():
+    """An error control so coarse that it passes the pose without a stall is stopped there."""
+    with pytest.raises(Diverged, match=r"at t = 0\.\d+ s: a step passes a singular pose"):
+        JointCoordinates(parallelogram(0.1)).run(np.array([0.0, 0.5]), 1e-5)
+
+
+def test_a_tree_has_none(scene):
+    """Without loops there is nothing to lose rank."""
+    assert singular_poses(scene("chain"), 1.0) == []
+
+
+@pytest.mark.arithmetic
+@pytest.mark.parametrize(
+    "part",
+    [
+        1e-13,
+        3e-10,
+        *(pytest.param(part, marks=pytest.mark.drill) for part in (1.001e-12, 1e-11, 1e-10, 1e-10 * (1 + 1e-9))),
+    ],
+)
+def test_a_motion_ends_at_what_lengths_cannot_tell_from_a_singular_pose(scene, part):
+    """A crank shorter than its rod by less than 1e-9 may reach it: no error control decides whether that is passed."""
+    with pytest.raises(
+        Diverged, match=r"at t = 0\.382\d* s: a step passes a singular pose of the loops, or one as near"
+    ):
+        JointCoordinates(scene("slider_crank", crank=0.4 * (1 - part), speed=3.0)).run(np.array([0.0, 0.5]), 1e-10)
+
+
+def test_a_motion_beside_a_singular_pose_goes_on(scene):
+    """A length that a file tells from the singular one leads past it."""
+    JointCoordinates(scene("slider_crank", crank=0.4 * (1 - 1e-7), speed=3.0)).run(np.array([0.0, 0.5]), 1e-10)
+
+
+def test_a_stop_elsewhere_ends_no_other_way_at_a_singular_pose(scene):
+    """A mechanism with a stop that it does not reach is followed by other steps, to the same pose."""
+    mechanism = scene("slider_crank", crank=0.4 * (1 - 1e-10), speed=3.0)
+    crank = replace(mechanism.joints[0], limits=(-9.0, 9.0), friction=1e-3)
+    dynamics = ContactDynamics(replace(mechanism, joints=(crank, *mechanism.joints[1:])))
+    with pytest.raises(Diverged, match=r"at t = 0\.38\d* s: a step passes a singular pose of the loops"):
+        follow(ContactTree(dynamics, 1e-9, 1.0), 0.5)
+
+
+@pytest.mark.arithmetic
+@pytest.mark.parametrize(("away", "singular"), [(0.0, True), (1e-12, True), (1e-7, True), (1e-5, True), (1e-3, False)])
+def test_a_start_that_lengths_cannot_tell_from_a_singular_pose_is_one(scene, away, singular):
+    """Crank and rod in line but for less than the root of 1e-9 rad: a length that differs by 1e-9 starts there."""
+    mechanism = scene("slider_crank", crank=0.4 * (1 - 1e-13), angle=np.pi / 2 - away - 1e-12)
+    assert analyse(mechanism).singular_start == singular

@@ -1,0 +1,35 @@
+"""Law check of smooth truths."""
+
+import numpy as np
+import pytest
+
+from proofroll.core.errors import Refused
+from proofroll.elements.mechanism.dynamics.joint_coordinates import JointCoordinates
+from proofroll.truth.bodies import maximal_taylor
+from proofroll.truth.smooth_truth import find_truth
+
+TIMES = np.array([0.0, 0.1, 0.2])
+
+
+@pytest.mark.parametrize("name", ["pendulum", "gear_pair", pytest.param("slider_crank", marks=pytest.mark.drill)])
+def test_an_honest_truth_holds_the_laws(scene, name):
+    """Joints, couplings, loops and motion hold to less than a tenth of their allowances."""
+    found = find_truth(scene(name), TIMES)
+    assert found.laws.startswith("holds ")
+    assert float(found.laws.split("largest residual ")[1].split()[0]) < 0.1
+    assert found.end == np.inf
+
+
+def test_a_wrong_load_of_one_route_is_refused_from_the_start(scene, monkeypatch):
+    """Gravity that is wrong by a millionth in joint coordinates breaks their law of motion, and theirs alone."""
+    monkeypatch.setattr(maximal_taylor, "heyoka", None)
+    begun = JointCoordinates.__init__
+
+    def heavier(self, mechanism, rank=None):
+        begun(self, mechanism, rank)
+        self._gravity = 1.000001 * self._gravity
+
+    mechanism = scene("double_pendulum")
+    monkeypatch.setattr(JointCoordinates, "__init__", heavier)
+    with pytest.raises(Refused, match=r"one route \(joint coordinates, DOP853\) breaks the law"):
+        find_truth(mechanism, TIMES, 1e-10)

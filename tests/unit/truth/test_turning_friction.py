@@ -1,0 +1,117 @@
+"""Friction of a contact against rolling and spinning, in both routes of the truth, against closed forms."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+import proofroll
+from proofroll.core.errors import InputError, Refused
+from proofroll.core.scene import Scene
+from proofroll.core.truth import truth
+from proofroll.elements.mechanism import Body, Joint, Mechanism
+from proofroll.elements.mechanism.run.element import MechanismElement
+from proofroll.elements.mechanism.scene.shapes.geometry import Geometry, Pair
+
+RADIUS, MASS, MOMENT, G = 0.05, 0.7, 0.0009, 9.81
+
+
+def ball(
+    pair: Pair,
+    velocity: tuple[float, ...] = (0.0,) * 6,
+    height: float = RADIUS,
+    inertia: tuple[float, float, float] = (MOMENT, MOMENT, MOMENT),
+    slope: float = 0.0,
+) -> Scene:
+    """A ball on a plane that gravity leans over by ``slope`` [rad] towards +x."""
+    shapes = (Geometry("s", "ball", "sphere", radius=RADIUS), Geometry("floor", "world", "plane"))
+    joint = Joint("j", "free", "world", "ball", q0=(0, 0, height, 1, 0, 0, 0), v0=velocity)
+    pull = (G * math.sin(slope), 0.0, -G * math.cos(slope))
+    parts = Mechanism((Body("ball", MASS, inertia=inertia),), (joint,), geometries=shapes, pairs=(pair,), gravity=pull)
+    return Scene("ball", "", (MechanismElement(parts),))
+
+
+def law(friction: float = 0.8, **laws: float) -> Pair:
+    """A contact of the ball with the floor."""
+    return replace(Pair("contact", ("s", "floor"), friction), **laws)
+
+
+def at(found: Any, field: str) -> np.ndarray[Any, Any]:
+    """Values of a field in time, (times, 3)."""
+    return np.asarray(found[field].to_numpy().reshape(found.sizes["time"], -1))
+
+
+def bar(found: Any, field: str) -> float:
+    """Error bar of a field."""
+    return float(np.max(found[field].attrs["error_bar"]))
+
+
+def test_a_spin_ends_when_its_friction_says() -> None:
+    """A ball that spins about the normal slows by f N/J and stands after J ω/(f N)."""
+    f, spin = 2e-3, 30.0
+    slows, times = f * MASS * G / MOMENT, np.array([0.0, 0.5, 1.0, 1.9, 2.2])
+    found = truth(ball(law(spinning_friction=f), (0, 0, 0, 0, 0, spin)), times)
+    expected = np.maximum(spin - slows * times, 0.0)
+    assert np.abs(at(found, "w_WB")[:, 2] - expected).max() <= bar(found, "w_WB") <= 1e-10
+    assert expected[-1] == 0.0
+
+
+@pytest.mark.parametrize(("f", "rolls"), [(0.004, True), (0.02, False)])
+def test_a_ball_on_a_slope_rolls_where_its_resistance_is_less_than_the_pull(f: float, rolls: bool) -> None:
+    """From rest it stays if f cos α ≥ a sin α, and else starts with the acceleration of a ball that resists."""
+    slope, time = 0.2, 0.8
+    found = truth(ball(law(rolling_resistance=f), slope=slope), np.array([0.0, time]))
+    pull = G * math.sin(slope) - f * G * math.cos(slope) / RADIUS
+    moved = 0.5 * pull / (1 + MOMENT / (MASS * RADIUS**2)) * time**2 if rolls else 0.0
+    assert abs(at(found, "p_WB")[-1, 0] - moved) <= bar(found, "p_WB") <= 1e-11
+
+
+def test_a_ball_that_slips_and_rolls_has_both_laws() -> None:
+    """While it slips, its centre slows by μ g, and its back spin by (μ a + f) m g/J."""
+    mu, f, speed, spin, time = 0.2, 0.003, 1.0, 60.0, 0.2
+    found = truth(ball(law(mu, rolling_resistance=f), (speed, 0, 0, 0, -spin, 0)), np.array([0.0, time]))
+    assert abs(at(found, "v_WB")[-1, 0] - (speed - mu * G * time)) <= bar(found, "v_WB")
+    slows = (mu * RADIUS + f) * MASS * G / MOMENT
+    assert abs(at(found, "w_WB")[-1, 1] + spin - slows * time) <= bar(found, "w_WB") <= 1e-9
+
+
+def test_both_routes_agree_on_a_ball_of_unequal_moments() -> None:
+    """A ball with three moments of inertia lands, slips, rolls and spins with all laws at once."""
+    pair = law(0.3, rolling_resistance=1e-3, spinning_friction=2e-3)
+    scene = ball(pair, (0.8, 0.3, 0, 4.0, -20.0, 9.0), 0.08, (0.0008, 0.001, 0.0013))
+    found = truth(scene, np.linspace(0.0, 0.8, 5))
+    assert bar(found, "p_WB") <= 1e-12
+    assert np.isfinite(at(found, "p_WB")).all()
+
+
+def test_a_bounce_has_a_bar_for_its_last_instants() -> None:
+    """An impact has no moment of friction, so the bar covers the short time of the bounces that are left out."""
+    scene = ball(law(0.3, restitution=0.4, rolling_resistance=1e-3), (0.8, 0.3, 0, 4.0, -20.0, 9.0), 0.08)
+    found = truth(scene, np.linspace(0.0, 0.5, 3))
+    assert bar(found, "w_WB") <= 1e-4
+    assert np.isfinite(at(found, "w_WB")).all()
+
+
+@pytest.mark.parametrize(
+    ("engine", "why"),
+    [
+        ("mujoco[formulation=geoms]", r"this formulation builds contacts that slide \(condim 3\)"),
+        ("pinocchio[formulation=impulses]", "this formulation gives a contact no moment"),
+        ("exudyn[formulation=spheres]", "this formulation gives a contact no moment"),
+        ("projection[formulation=dependent]", "this formulation gives a contact no moment"),
+    ],
+)
+def test_a_formulation_without_moments_of_contacts_says_so(engine: str, why: str) -> None:
+    """Refused, with the reason."""
+    with pytest.raises(Refused, match=f"rolling and spinning, and {why}"):
+        proofroll.simulate(ball(law(rolling_resistance=1e-3)), engine, until=0.01)
+
+
+def test_a_coefficient_below_zero_is_refused_by_its_name() -> None:
+    """The line names field, value and bound."""
+    with pytest.raises(InputError, match=r"pairs\.contact\.spinning_friction = -1\.0: must be at least 0"):
+        law(spinning_friction=-1.0)
