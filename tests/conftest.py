@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from ball_scenes import scene  # noqa: F401 -- a fixture, which pytest finds here
 from dear import pytest_runtest_setup, pytest_runtest_teardown, pytest_terminal_summary  # noqa: F401 -- hooks
 from forked_workers import Forks
 from hostile import ENTRY_POINTS
@@ -24,7 +25,6 @@ from xdist.remote import Producer
 from xdist.scheduler import LoadScopeScheduling
 
 from proofroll import cli
-from proofroll.core.scene import Scene
 from proofroll.files.scene_file import load_scene
 from proofroll.running import idle_workers, stopwatch
 from proofroll.running.case import Case, EngineFacts
@@ -105,27 +105,6 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: Producer) -> LoadSco
     """
     config.option.loadscopereorder = False
     return _TogetherWhatShares(config, log)
-
-
-# Nothing about this motion is zero or symmetric, so a lost sign or a swapped axis shows.
-GENERAL = {"speed": 3.3, "axial_speed": 0.7, "radial_spin": 12.0}
-RESISTING = {"rolling_resistance": 5e-4}
-
-
-@pytest.fixture(
-    params=[
-        ("sphere_in_cylinder", GENERAL),
-        ("sphere_in_cylinder", GENERAL | RESISTING),
-        ("sphere_in_cylinder", {"speed": -4.0}),
-        ("inclined_plane", {"normal_spin": 3.0}),
-        ("inclined_plane", RESISTING),
-    ],
-    ids=["cylinder", "cylinder-resisting", "cylinder-backwards", "plane", "plane-resisting"],
-)
-def scene(request: pytest.FixtureRequest) -> Scene:
-    """Scenes with nothing special about their numbers."""
-    name, parameters = request.param
-    return load_scene(name, **parameters)
 
 
 _WARM_WORKERS = WarmWorkers()

@@ -18,6 +18,7 @@ from proofroll.elements.mechanism.contact.start import natural_scale
 from proofroll.elements.mechanism.dynamics.named_forces import named_forces
 from proofroll.elements.mechanism.dynamics.record import Record
 from proofroll.elements.mechanism.scene.rotations import Array
+from proofroll.truth.error_bars import on_same_turns
 from proofroll.truth.laws.check import LawCheck, LawVerdict, verdict
 from proofroll.truth.laws.integrals import COUNT, POINTS, TO_SERIES
 from proofroll.truth.laws.record import Pieces, without_contacts
@@ -72,19 +73,22 @@ def dense_steps(
     return [KeptStep(begun[0], end, partial(inside, begun, end)) for begun, end in zip(visited, ends, strict=True)]
 
 
-def law_check(mechanism: Mechanism, routes: Mapping[str, KeptRoute]) -> LawVerdict:
-    """Verdict of the laws on some pieces of each route, by its name; the mechanism is in SI units."""
+def law_check(mechanism: Mechanism, routes: Mapping[str, KeptRoute], counting: str) -> LawVerdict:
+    """Verdict of the laws on some pieces of each route, by its name; the mechanism is in SI units.
+
+    ``counting``: name of the route whose coordinates count whole turns; those of the others are put on the same turns.
+    """
     scale, checked = natural_scale(mechanism), {}
     for name, route in routes.items():
         check = LawCheck(mechanism, scale.length, scale.rate)
-        if (pieces := _pieces(mechanism, route)) is not None:
+        if (pieces := _pieces(mechanism, route, routes[counting])) is not None:
             check.take(pieces)
         checked[name] = check.residuals
     return verdict(checked)
 
 
-def _pieces(mechanism: Mechanism, route: KeptRoute) -> Pieces | None:
-    """Pieces of a route, spread over its steps; None: it has no step."""
+def _pieces(mechanism: Mechanism, route: KeptRoute, counting: KeptRoute) -> Pieces | None:
+    """Pieces of a route, spread over its steps, on the turns of another one; None: it has no step."""
     steps = [step for step in route.steps if step.end > step.start]
     if not steps:
         return None
@@ -93,7 +97,22 @@ def _pieces(mechanism: Mechanism, route: KeptRoute) -> Pieces | None:
     chosen = [steps[min(int(number), len(steps) - 1)] for number in dict.fromkeys(marks.tolist())]
     windows = [_window(step, route.spin) for step in chosen]
     times, states = (np.concatenate([window[k] for window in windows]) for k in (0, 1))
-    return _stated(mechanism, route.recorded(times, states), len(windows), coarse=route.coarse)
+    record = route.recorded(times, states)
+    if route is not counting and counting.steps:
+        record = on_same_turns(mechanism, _at(counting, times), record)
+    return _stated(mechanism, record, len(windows), coarse=route.coarse)
+
+
+def _at(route: KeptRoute, times: Array) -> Record:
+    """Record of a route at times [s], from within its steps; behind its end that of its last step's end."""
+    numbers = np.searchsorted([step.end for step in route.steps[:-1]], times)
+    states = [np.empty(0)] * len(times)
+    for number in np.unique(numbers):
+        step, places = route.steps[int(number)], np.flatnonzero(numbers == number)
+        inside = step.inside(np.clip(times[places], step.start, step.end))
+        for place, state in zip(places, inside, strict=True):
+            states[int(place)] = state
+    return route.recorded(times, np.array(states))
 
 
 def _window(step: KeptStep, spin: Callable[[Array], float]) -> tuple[Array, Array]:

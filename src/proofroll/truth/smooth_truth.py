@@ -140,7 +140,7 @@ def _followed(tree: JointCoordinates, times: Array, tolerance: float, exact: Rec
             nearby = early.run(partial(_first_growth, tree, by_tree), times)
             chaotic = chaotic[: len(nearby)] & (nearby * NUDGE > CHAOS)
         _check_branch(by_tree, precise, chaotic, early)
-        checked = law_check(mechanism, dict(zip(names, kept, strict=True)))
+        checked = law_check(mechanism, dict(zip(names, kept, strict=True)), names[1])
         laws = sentence(checked, len(names))
         if checked.violation is not None:
             early.at(checked.violation.time, laws)

@@ -33,3 +33,8 @@ def test_a_wrong_load_of_one_route_is_refused_from_the_start(scene, monkeypatch)
     monkeypatch.setattr(JointCoordinates, "__init__", heavier)
     with pytest.raises(Refused, match=r"one route \(joint coordinates, DOP853\) breaks the law"):
         find_truth(mechanism, TIMES, 1e-10)
+
+
+def test_turns_of_a_fast_wheel_are_counted_in_each_route(scene):
+    """A rotor that an elbow turns 50 times as fast holds the law of its gear in both routes, whole turns included."""
+    assert find_truth(scene("arm_rotor", elbow=0.8), np.array([0.0, 0.2, 0.4])).laws.startswith("holds ")
