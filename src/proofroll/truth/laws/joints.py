@@ -45,11 +45,14 @@ class FreeDirection(NamedTuple):
 
 
 class Coordinates:
-    """Coordinates of joints with one or two of them, from poses; angles go on from those of the last point."""
+    """Coordinates of joints with one or two of them, from poses; angles go on from those of the last point.
+
+    Between points an angle changes by the mean of its rates there, but for less than half a turn.
+    """
 
     def __init__(self, scene: LawScene) -> None:
         joints = enumerate(scene.mechanism.joints)
-        self._last = {(number, k): float(q) for number, joint in joints for k, q in enumerate(joint.q0)}
+        self._last = {(number, k): (0.0, float(q), 0.0) for number, joint in joints for k, q in enumerate(joint.q0)}
 
     def at(self, number: int, k: int, pieces: Pieces, placed: PlacedFrames, kind: str) -> Array:
         """Coordinate k of a joint at the points of pieces [m, rad]."""
@@ -61,12 +64,15 @@ class Coordinates:
         if pieces.turns is not None:
             turn = pieces.turns[..., number, k] - angle
         else:
-            start = self._last[number, k]
-            path = np.unwrap(np.concatenate([[start], angle.ravel()]))[1:].reshape(angle.shape)
-            turn = path + 2 * np.pi * np.round((start - path.flat[0]) / (2 * np.pi)) - angle
-        angle = angle + 2 * np.pi * np.round(turn / (2 * np.pi))
-        self._last[number, k] = float(angle.flat[-1])
-        return np.asarray(angle)
+            last, start, before = self._last[number, k]
+            rate = dot(placed.spin, (placed.A if axes == "A" else placed.B)[..., axis]).ravel()
+            times, rates = np.append(last, pieces.time.ravel()), np.append(before, rate)
+            moved = np.diff(times) * (rates[1:] + rates[:-1]) / 2
+            apart = np.diff(np.append(start, angle.ravel())) - moved
+            path = start + np.cumsum(moved + apart - 2 * np.pi * np.round(apart / (2 * np.pi)))
+            turn = path.reshape(angle.shape) - angle
+            self._last[number, k] = float(times[-1]), float(path[-1]), float(rates[-1])
+        return np.asarray(angle + 2 * np.pi * np.round(turn / (2 * np.pi)))
 
 
 class Sizes(NamedTuple):
