@@ -294,8 +294,10 @@ def _alike(
             pairs.append((len(one.stretches) - len(left[0]), len(two.stretches) - len(left[1])))
             last = kinds(left[0][0].mode)
             del left[0][0], left[1][0]
-        elif passing := next((ones for ones in left if _instant(ones[0]) or kinds(ones[0].mode) == last), None):
+        elif passing := next(filter(lambda ones: _instant(ones[0]), left), None):
             del passing[0]
+        elif divided := next((ones for ones in left if kinds(ones[0].mode) == last), None):
+            del divided[0]
         else:
             break
     apart = left[0] + left[1]

@@ -20,7 +20,7 @@ from proofroll.truth.laws.check import LawCheck, LawVerdict, sentence, verdict
 from proofroll.truth.laws.record import Pieces, joined_pieces
 from proofroll.truth.laws.residuals import LawResiduals
 from proofroll.truth.natural_units import Units
-from proofroll.truth.numerics.hybrid import HybridPath, Stretch
+from proofroll.truth.numerics.hybrid import HybridPath, Stretch, first_close
 from proofroll.truth.switching.held_route import HeldPath
 from proofroll.truth.tree.contact_tree import ContactTree
 
@@ -57,8 +57,9 @@ def held_to_laws(
         "joint coordinates": LawRecorder(mechanism, units, tree, partial(by_the_tree, tree)),
         "bodies": LawRecorder(mechanism, units, bodies, partial(by_the_bodies, bodies, second)),
     }
-    # beyond an early end of one path the other may be on another branch, and is not judged
-    end = min((path.stretches[-1].end for path in paths if not path.known), default=np.inf)
+    # beyond an early end of one path the other may be on another branch, and beyond a close decision all is open
+    early = min((path.stretches[-1].end for path in paths if not path.known), default=np.inf)
+    end = min(early, first_close(paths, CLOSE))
     values: Sequence[HeldPath | None] = held or (None, None)
 
     def outcome(most: int | None) -> LawVerdict:

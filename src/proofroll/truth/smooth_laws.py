@@ -69,7 +69,7 @@ def dense_steps(
         controlled_step(solver, None, end)
         return np.asarray(solver.dense_output()(times)).T
 
-    ends = [*(time for time, _ in visited[1:]), last]
+    ends = [*(time for time, _ in visited[1:]), last][: len(visited)]
     return [KeptStep(begun[0], end, partial(inside, begun, end)) for begun, end in zip(visited, ends, strict=True)]
 
 

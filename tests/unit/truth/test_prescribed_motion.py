@@ -128,7 +128,7 @@ def on_a_moved_plate(kind: str, axis: tuple[float, float, float], motion: str) -
     """A ball at rest beside a plate that moves under it."""
     bodies = (Body("plate", 2.0, inertia=(0.1, 0.1, 0.1)), Body("ball", 0.5, inertia=(0.002, 0.002, 0.002)))
     joints = (
-        Joint("shaker", kind, "world", "plate", axis=axis, motion=Formula(motion, {})),  # type: ignore[arg-type]
+        Joint("shaker", kind, "world", "plate", axis=axis, motion=Formula(motion)),  # type: ignore[arg-type]
         Joint("free", "free", "world", "ball", q0=(0, 0, 0.1, 1, 0, 0, 0)),
     )
     shapes = (Geometry("floor", "plate", "plane"), Geometry("skin", "ball", "sphere", radius=0.1))

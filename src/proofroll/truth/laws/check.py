@@ -86,7 +86,9 @@ def verdict(checked: Mapping[str, LawResiduals]) -> LawVerdict:
 
 
 def sentence(result: LawVerdict, count: int) -> str:
-    """Sentence of the outcome for a person; ``count``: number of routes."""
+    """Sentence of the outcome for a person; ``count``: number of routes; empty: nothing could be held to a law."""
+    if not result.points:
+        return ""
     if result.violation is None:
         share, law, time, _ = result.largest
         events = f" and on both sides of {result.events} events" if result.events else ""

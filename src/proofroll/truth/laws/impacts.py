@@ -87,7 +87,7 @@ def impact(
     weight = np.tile(np.repeat([1.0, scene.length], 3), len(m.bodies)) * m.mass * fast
     residuals.note("impulse", "", np.array([[(np.abs(left) / weight).max()]]), 1.0, time)
     _newton(scene, passage, residuals, hits, stops, fastest)
-    if len(hits) == 1 and not stops and not passage.settles:
+    if len(hits) == 1 and not stops and not passage.settles and _rank(columns) - _rank(columns[:joints]) == 3:
         _coulomb(scene, passage, residuals, hits[0], pulses[joints:])
 
 
@@ -160,6 +160,13 @@ def _explained(columns: Sequence[Array], jump: Array) -> tuple[Array, Array]:
     units = np.where(units > 0, units, 1.0)
     pulses = np.linalg.lstsq(matrix / units, jump, rcond=_RANK)[0] / units
     return pulses, matrix @ pulses - jump
+
+
+def _rank(columns: Sequence[Array]) -> int:
+    """Number of independent impulses: a contact whose bodies joints hold in part shares its impulse with these."""
+    units = [np.linalg.norm(column) for column in columns]
+    matrix = np.array([column / unit for column, unit in zip(columns, units, strict=True) if unit > 0])
+    return int((np.linalg.svd(matrix, compute_uv=False) > _RANK).sum()) if len(matrix) else 0
 
 
 def _newton(
