@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 from itertools import pairwise
 from typing import Any, NamedTuple
 
@@ -79,7 +80,7 @@ class LawRecorder:
             pieces = [piece for piece in cut if piece.coarse is coarse]
             if pieces:
                 records = [
-                    np.array([self._state_of(y, self._route.acting(stretch, y)) for y in piece.states])
+                    self._route.in_stretch(stretch, partial(self._in_numbers, stretch, piece.states))
                     if piece.record is None
                     else piece.record
                     for piece in pieces
@@ -92,21 +93,27 @@ class LawRecorder:
         """First point of a stretch with these pieces, as exact as its steps."""
         if pieces and self._reaches(pieces[0], 0, stretch.start):
             return pieces[0].points(0, 0)
-        return self._at(stretch.start, stretch.first, self._route.acting(stretch, stretch.first))
+        return self._at(stretch, stretch.start, stretch.first)
 
     def end(self, stretch: Stretch[ContactMode], pieces: Sequence[Pieces]) -> Pieces:
         """Last point of a stretch with these pieces, as exact as its steps."""
         if pieces and self._reaches(pieces[-1], -1, stretch.end):
             return pieces[-1].points(-1, -1)
-        return self._at(stretch.end, stretch.last, self._route.acting(stretch, stretch.last))
+        return self._at(stretch, stretch.end, stretch.last)
 
     def _reaches(self, pieces: Pieces, point: int, time: float) -> bool:
         """True if exact pieces begin or end at a time, but for its last digits: not where a slip fades away behind."""
         apart = abs(float(pieces.time[point, point]) / self._units.time - time)
         return not pieces.coarse and apart <= 4 * float(np.spacing(time))
 
-    def _at(self, time: float, state: Array, mode: ContactMode) -> Pieces:
-        return self._stated(np.full((1, 1), time), np.zeros((1, 1)), self._state_of(state, mode)[None, None], mode)
+    def _at(self, stretch: Stretch[ContactMode], time: float, state: Array) -> Pieces:
+        record = self._route.in_stretch(stretch, partial(self._in_numbers, stretch, state[None]))
+        mode = self._route.acting(stretch, state)
+        return self._stated(np.full((1, 1), time), np.zeros((1, 1)), record[None], mode)
+
+    def _in_numbers(self, stretch: Stretch[ContactMode], states: Array) -> Array:
+        """Record of a stretch at states, (states, values)."""
+        return np.array([self._state_of(state, self._route.acting(stretch, state)) for state in states])
 
     @staticmethod
     def passage(path: HybridPath[Stretch[ContactMode]], number: int, before: Pieces, after: Pieces) -> Passage:

@@ -69,7 +69,7 @@ def by_the_bodies(route: ContactBodies, second: MaximalCoordinates, state: Array
     force, named, loops = equations.accelerated(bodies, mode).force, np.zeros(0), np.zeros(0)
     if _has_named(m):
         _, wrenches = equations.applied(bodies, force)
-        second.functions = equations.equations.functions  # which hold the sides of kinks
+        second.take_functions(equations.equations.functions)
         record = second.recorded(state[-1:], state[None, :-1], [equations.switched(state, mode)], [wrenches])
         named, loops = stated_named(m, record.named[0]), record.wrench[0, len(m.joints) :].ravel()
     p, v, quaternions, w = equations.equations.poses(state[:-1])

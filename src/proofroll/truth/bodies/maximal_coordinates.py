@@ -324,6 +324,10 @@ class MaximalCoordinates:
         """Poses of this route at time 0."""
         return self.recorded(np.zeros(1), self.lean.equations.start()[None])
 
+    def take_functions(self, functions: Functions) -> None:
+        """Takes functions of formulas for records, which may hold the sides of kinks."""
+        self._whole.functions = functions
+
     def recorded(
         self,
         times: Array,

@@ -164,6 +164,12 @@ class ContactWalks(ABC):
         finally:
             self._equations.hold(())
 
+    def in_stretch(self, stretch: Stretch[ContactMode], value: Callable[[], _T]) -> _T:
+        """A value while kinks keep the sides that they have in a stretch, also at its end."""
+        if not self._equations.mechanism.kinks:
+            return value()
+        return self._held(self._clamped(stretch.first, stretch.mode), value)
+
     def _guards(self, state: Array, mode: ContactMode, guards: Sequence[ContactGuard]) -> FloatArray:
         if not guards:
             return np.zeros(0)
