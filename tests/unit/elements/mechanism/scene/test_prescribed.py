@@ -30,7 +30,7 @@ def test_derivatives_of_formulas_are_those_of_heyoka(text: str) -> None:
     """Value, rate and acceleration of a formula are those that another code differentiates, to round-off."""
     heyoka: Any = pytest.importorskip("heyoka")
     formula, t = Formula(text), heyoka.make_vars("t")
-    symbols: Any = formula.at(t, {name: getattr(heyoka, name) for name in FUNCTIONS})
+    symbols: Any = formula.at(t, {name: getattr(heyoka, name) for name in FUNCTIONS if hasattr(heyoka, name)})
     rate = heyoka.diff(symbols, t)
     exact = heyoka.cfunc([symbols, rate, heyoka.diff(rate, t)], [t])([0.7])
     np.testing.assert_allclose(moved(formula, 0.7), exact, rtol=1e-13)
