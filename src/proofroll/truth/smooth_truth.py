@@ -65,7 +65,9 @@ class _Routes(NamedTuple):
         best, by_tree, by_bodies, precise = (
             record.first(count) for record in (self.best, self.by_tree, self.by_bodies, self.precise)
         )
-        return _Routes(best, by_tree, by_bodies, precise, self.chaotic[:count], self.names, self.laws)
+        return self._replace(
+            best=best, by_tree=by_tree, by_bodies=by_bodies, precise=precise, chaotic=self.chaotic[:count]
+        )
 
 
 def find_truth(mechanism: Mechanism, times: Array, tolerance: float = 1e-15) -> TwoRouteMotion:
@@ -152,11 +154,16 @@ def _followed(tree: JointCoordinates, times: Array, tolerance: float, exact: Rec
     if exact is not None and np.isfinite(early.time):
         witness = on_same_turns(mechanism, exact, tree.run_rk4(times))
         name = "joint coordinates, RK4"
-        return _Routes(exact, witness, witness, witness, np.zeros(len(times), dtype=bool), (name,)), EarlyEnd()
+        never = np.zeros(len(times), dtype=bool)
+        routes = _Routes(best=exact, by_tree=witness, by_bodies=witness, precise=witness, chaotic=never, names=(name,))
+        return routes, EarlyEnd()
     if np.isfinite(early.time):
         early.reason = _singular(mechanism, early.time) or early.reason
     best = precise if exact is None else on_same_turns(mechanism, by_tree, exact)
-    return _Routes(best, by_tree, by_bodies, precise, chaotic, names, laws), early
+    routes = _Routes(
+        best=best, by_tree=by_tree, by_bodies=by_bodies, precise=precise, chaotic=chaotic, names=names, laws=laws
+    )
+    return routes, early
 
 
 def _runs(

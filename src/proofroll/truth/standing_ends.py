@@ -149,8 +149,13 @@ def _box(solid: Geometry, pull: Array, names: set[str]) -> Geometry:
     frame = solid.frame @ np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
     side = np.sqrt(2) * (solid.radius or 0.0)
     return Geometry(
-        name, solid.body, "box", solid.position, to_rpy(frame), size=(side, side, solid.length or 0.0)
-    )  # fmt: skip
+        name=name,
+        body=solid.body,
+        kind="box",
+        position=solid.position,
+        orientation=to_rpy(frame),
+        size=(side, side, solid.length or 0.0),
+    )
 
 
 def check_faces(faces: Sequence[Face], before: ContactMode, after: ContactMode, time: float) -> None:

@@ -55,10 +55,24 @@ def all_entries() -> Iterator[KeyEntry]:
             kind = kind_of(table)
             header = table.header + (f' with kind = "{kind}"' if kind else "")
             for key, typed, default, text in keys(table):
-                yield KeyEntry(plain, header, key, typed, default, text.replace("`", "").replace("\\|", "|"))
+                yield KeyEntry(
+                    chapter=plain,
+                    table=header,
+                    key=key,
+                    type=typed,
+                    default=default,
+                    meaning=text.replace("`", "").replace("\\|", "|"),
+                )
         for section in REST.get(chapter, "").split("### ")[1:]:
             title, _, text = section.partition("\n")
-            yield KeyEntry(plain, title.replace("`", ""), "", "", "", " ".join(text.replace("`", "").split()))
+            yield KeyEntry(
+                chapter=plain,
+                table=title.replace("`", ""),
+                key="",
+                type="",
+                default="",
+                meaning=" ".join(text.replace("`", "").split()),
+            )
 
 
 def entries_about(word: str, entries: list[KeyEntry]) -> list[KeyEntry]:

@@ -23,7 +23,7 @@ from proofroll.files.scene_file import load_scene
 
 @pytest.mark.parametrize(
     ("formulation", "module"),
-    [("joints", "mujoco.mechanism_model"), ("constraint_dynamics", "pinocchio.constraint_dynamics")],
+    [("joints", "mujoco.smooth.mechanism_model"), ("constraint_dynamics", "pinocchio.smooth.constraint_dynamics")],
 )
 def test_one_point_for_a_revolute_loop_in_space_shows_in_the_mobility(formulation, module, monkeypatch):
     """Closed by one point, Bricard's ring has a mobility too many; its violation would never tell."""

@@ -228,13 +228,13 @@ def test_what_has_no_program(engine: str, options: dict[str, str], parameters: d
 @pytest.mark.parametrize(
     ("engine", "options", "where"),
     [
-        ("mujoco", {"formulation": "free", "preset": "tuned"}, "free:Free._add_curvature"),
-        ("mujoco", {"formulation": "chart", "preset": "tuned"}, "chart:Chart._resister"),
+        ("mujoco", {"formulation": "free", "preset": "tuned"}, "ball.free:Free._add_curvature"),
+        ("mujoco", {"formulation": "chart", "preset": "tuned"}, "ball.chart:Chart._resister"),
         ("mujoco", {"formulation": "joints", "preset": "tuned"}, "reproducer:stepped"),
         ("exudyn", {"formulation": "contact", "preset": "matched"}, "integration:Integration.advance"),
-        ("pinocchio", {"formulation": "contact", "preset": "matched"}, "contact:ContactSteps.kick"),
+        ("pinocchio", {"formulation": "contact", "preset": "matched"}, "ball.contact:ContactSteps.kick"),
         ("pinocchio", {"formulation": "composite", "preset": "default"}, "integrators:TangentRungeKutta4._step"),
-        ("pinocchio", {"formulation": "null_space", "preset": "matched"}, "null_space:LoopRows._of_loops"),
+        ("pinocchio", {"formulation": "null_space", "preset": "matched"}, "smooth.null_space:LoopRows._of_loops"),
         ("exudyn", {"formulation": "redundant", "preset": "matched"}, "integration:Integration.advance"),
     ],
 )

@@ -183,7 +183,20 @@ def _axes(
             size = np.abs(force)
         carrier = connection.a if frame == "A" else connection.b
         origin = placed.origin_b
-        axes.append(FreeDirection(number, direction, carrier, turns, origin, speed, rate, force, size, digits))
+        axes.append(
+            FreeDirection(
+                joint=number,
+                direction=direction,
+                carrier=carrier,
+                turns=turns,
+                origin=origin,
+                speed=speed,
+                rate=rate,
+                force=force,
+                size=size,
+                digits=digits,
+            )
+        )
     if data.motion is not None:
         prescribed = motion_of(data.motion, time)
         far = (sizes.place if data.kind == JointKind.PRISMATIC else 1.0) + np.abs(prescribed)

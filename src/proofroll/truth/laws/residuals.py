@@ -131,4 +131,4 @@ class LawResiduals:
             with np.errstate(all="ignore"):
                 size_there = float(residual[piece].flat[number] / size[piece].flat[number])
                 bound = float(allowed[piece].flat[number] / size[piece].flat[number])
-            self.first = Violation(begin, law, part, size_there, bound)
+            self.first = Violation(time=begin, law=law, part=part, size=size_there, allowed=bound)

@@ -114,7 +114,9 @@ class LawScene:
             ends = self.index[joint.parent], self.index[joint.child]
             places = np.array(joint.position), np.array(joint.child_position)
             rotation = of_angles(np.array(joint.orientation))
-            connections.append(JointFrames(joint.name, str(joint.kind), *ends, *places, rotation @ frame, frame))
+            connections.append(
+                JointFrames(joint.name, str(joint.kind), *ends, *places, frame_a=rotation @ frame, frame_b=frame)
+            )
         for loop in self.mechanism.loops:
             kind, frame = str(loop.kind), frame_of(np.array(loop.axis_a))
             other = frame_of(np.array(loop.axis_b))
@@ -124,7 +126,9 @@ class LawScene:
                 other = other[:, [2, 0, 1]]
             ends = self.index[loop.body_a], self.index[loop.body_b]
             places = np.array(loop.position_a), np.array(loop.position_b)
-            connections.append(JointFrames(loop.name, kind, *ends, *places, frame, other, loop.length))
+            connections.append(
+                JointFrames(loop.name, kind, *ends, *places, frame_a=frame, frame_b=other, length=loop.length)
+            )
         return connections
 
     def placed(self, connection: JointFrames, pieces: Pieces) -> PlacedFrames:

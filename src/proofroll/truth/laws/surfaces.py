@@ -106,7 +106,17 @@ def contacts_of(geometries: Sequence[Geometry], pairs: Sequence[Pair], index: di
         for number, (part_a, part_b) in enumerate(shapes, 1):
             name = pair.name if len(shapes) == 1 else f"{pair.name}.{number}"
             contacts.append(
-                PairContact(name, pair, index[one.body], index[two.body], part_a, part_b, a, b, alone=count == 1)
+                PairContact(
+                    name=name,
+                    pair=pair,
+                    a=index[one.body],
+                    b=index[two.body],
+                    shape_a=part_a,
+                    shape_b=part_b,
+                    solid_a=a,
+                    solid_b=b,
+                    alone=count == 1,
+                )
             )
     return contacts
 

@@ -263,7 +263,7 @@ class TreeSymbols:
         for joint, _, n in m.prescribed:
             assert joint.motion is not None  # as of all prescribed ones
             mass[n], load[n] = {n: 1.0}, moved(joint.motion, time, functions).acceleration
-        return _Inertial(mass, load, limits, efforts, driven)
+        return _Inertial(mass=mass, load=load, limits=limits, efforts=efforts, driven=driven)
 
     def _free(self, row: Row) -> list[Scalar]:
         """Loads along the velocities; those along prescribed ones move nothing."""
