@@ -36,7 +36,7 @@ test drills: install
 # What .ci/run leaves out: the longest drills, and tests near round-off as two other kinds of processors compute.
 nightly: install
 	$(BIN)/python -m pytest -n 2 -m nightly
-	$(BIN)/proofroll drill arithmetic --no-comparisons --tests sensitive --kind haswell --kind prescott --jobs 2
+	$(BIN)/proofroll drill arithmetic --no-comparisons --tests nightly --kind haswell --kind prescott --jobs 2
 
 check: install
 	$(BIN)/ruff check .
