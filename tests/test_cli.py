@@ -201,7 +201,7 @@ def test_run_tells_events(proofroll: Proofroll) -> None:
     """Each event stands with its bracket; of a long sequence the first ones do, and how many more there are."""
     slips = ["run", "sphere_in_cylinder", "--engine", "truth", "--set", "mu_static=0.15"]
     said = [" ".join(proofroll(*slips, "--until", until)[1].split()) for until in ("0.5", "4")]
-    assert re.search(r"events: slip at 0.17666799\d+ ± \de-\d+ s, stick at 0.41209057\d+ ± \de-\d+ s \d", said[0])
+    assert re.search(r"events: slip at 0\.1766679915\d* ± \de-\d+ s, stick at 0\.4120905738\d* ± \de-\d+ s \d", said[0])
     assert re.search(r"stick at \S+ ± \de-\d+ s and 6 more", said[1])
 
 
