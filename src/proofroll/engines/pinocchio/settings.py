@@ -51,8 +51,8 @@ class PinocchioSettings:
             ``contact`` always turns the ball: its spherical joint is part of the state.
             Mechanisms always have it.
         projection: put the state back on the constraints after each step; not in ``contact``, where the solver does.
-        solver: of ``contact`` and ``impulses``: projected Gauss-Seidel or alternating directions (ADMM); None with the
-            others.
+        solver: of ``contact`` and ``impulses``: projected Gauss-Seidel or alternating directions (ADMM), which diverges
+            in wide cones: ``impulses`` gives it each cone no wider than its impulse asks for; None with the others.
         solver_tolerance: of ``contact``: feasibility [m/s] and complementarity [J], both also relative [1]; of
             ``impulses``: of both, relative to speeds and impulses of the step [1]; None with the others.
         convex: of ``impulses``: whether the solver leaves De Saxcé's term out, so that what slips parts.
