@@ -269,7 +269,8 @@ def test_joints_have_no_contact():
     [
         ({"cone_correction": True, "integrator": "RK4"}, "integrator"),
         ({"cone_correction": True, "cone": "pyramidal"}, "cone"),
-        ({"curvature": True}, "curvature"),
+        ({"curvature": True, "integrator": "implicitfast"}, "integrator"),
+        ({"curvature": True, "cone": "pyramidal"}, "cone"),
         ({"condim": 6}, "condim"),
     ],
 )

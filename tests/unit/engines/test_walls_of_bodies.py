@@ -10,6 +10,7 @@ import pytest
 
 from proofroll.core.plugins import load_engine
 from proofroll.elements.mechanism import Body, Joint, Mechanism
+from proofroll.elements.mechanism.run.element import MechanismElement
 from proofroll.elements.mechanism.scene.shapes.geometry import Geometry, Pair
 
 RADIUS, MASS, SHARE = 0.025, 0.5, 0.4  # m, kg, J / (m a²)
@@ -26,6 +27,27 @@ def ball_in_bore(*, friction: float = math.inf, speed: float = 4.0) -> Mechanism
     )
     pairs = (Pair("contact", ("sphere", "wall"), friction),)
     return Mechanism((Body("ball", MASS, inertia=(MOMENT,) * 3),), (joint,), geometries=shapes, pairs=pairs)
+
+
+VELOCITY = dict.fromkeys(("shaft", "bowl", "cone", "torus"), (0.0, 0.3, 0.0, 5.0, 0.0, 3.0))
+VELOCITY["bore"] = (1.6, 0.0, -1.2, 0.0, 0.0, -80.0)
+WALLS = {
+    "bore": (Geometry("wall", "world", "bore", radius=0.225, axis=(0.6, 0.0, 0.8)), (0.0, 0.2, 0.0)),
+    "shaft": (Geometry("wall", "world", "shaft", radius=0.2, axis=(1.0, 0.0, 0.0)), (0.0, 0.0, 0.225)),
+    "bowl": (Geometry("wall", "world", "bowl", (0.0, 0.0, 0.1), radius=0.225), (0.12, 0.0, -0.06)),
+    "cone": (Geometry("wall", "world", "cone", (0.0, 0.0, -0.05), slope=0.6435011087932844), (0.04, 0.0, 0.01125)),
+    "torus": (Geometry("wall", "world", "torus", radius=0.05, ring_radius=0.2), (0.2, 0.0, 0.075)),
+}
+
+
+def on_wall(kind: str, *, friction: float = 0.3, swapped: bool = False) -> Mechanism:
+    """A sphere that slides and spins on a wall, of a body whose centre of mass is aside."""
+    wall, place = WALLS[kind]
+    joint = Joint("free", "free", "world", "ball", q0=(*place, 1, 0, 0, 0), v0=VELOCITY[kind])
+    shapes = (Geometry("sphere", "ball", "sphere", radius=RADIUS), wall)
+    names = ("wall", "sphere") if swapped else ("sphere", "wall")
+    body = Body("ball", MASS, com=(0.002, 0.0, 0.001), inertia=(MOMENT, MOMENT, 1.2 * MOMENT))
+    return Mechanism((body,), (joint,), geometries=shapes, pairs=(Pair("contact", names, friction),))
 
 
 def place_in_bore(t: float, speed: float = 4.0) -> np.ndarray:
@@ -68,3 +90,44 @@ def test_impulses_hold_a_wheel_by_any_friction(friction: float) -> None:
         run.advance(0.3)
     # both are found to 1e-8 of impulses that add up to some m/s
     np.testing.assert_allclose(wide.sample().p_WB, enough.sample().p_WB, rtol=0, atol=1e-7)
+
+
+@pytest.mark.parametrize(("preset", "errors"), [("matched", (1.9e-3, 6.1e-4)), ("tuned", (5.3e-5, 1.33e-5))])
+def test_a_plane_in_mujoco_stands_for_a_bore(preset: str, errors: tuple[float, float]) -> None:
+    """A ball that rolls round is off by the first order of steps, and with J̇v by the second, velocities included."""
+    mujoco = load_engine("mujoco")
+    for dt, error in zip((1e-3, 5e-4), errors, strict=True):
+        run = mujoco.build(ball_in_bore(), replace(mujoco.presets["geoms"][preset], dt=dt))
+        run.advance(0.2)
+        sample, little = run.sample(), 1e-6
+        assert float(np.linalg.norm(sample.p_WB[0] - place_in_bore(0.2))) == pytest.approx(error, rel=0.05)
+        v = (place_in_bore(0.2 + little) - place_in_bore(0.2 - little)) / (2 * little)
+        # over the wall it is off by 20 to 40 /s times the place
+        assert float(np.linalg.norm(sample.v_WB[0] - v)) < 50 * error
+
+
+def test_a_plane_in_mujoco_presses_in_every_step() -> None:
+    """With J̇v the wall holds a ball from the first step on: no step is without a force, and no gap opens."""
+    mujoco = load_engine("mujoco")
+    run = mujoco.build(ball_in_bore(), mujoco.presets["geoms"]["tuned"])
+    press = MASS * 4.0**2 / 0.2
+    for step in range(1, 40):
+        run.advance(step * 1e-3)
+        sample = run.sample()
+        inward = -sample.p_WB[0] * (1, 1, 0) / 0.2
+        assert sample.contact_force[0] @ inward == pytest.approx(press, rel=2e-3)  # (Ω dt)² is 4e-4
+        assert abs(np.hypot(*sample.p_WB[0, :2]) - 0.2) < 1e-7
+
+
+@pytest.mark.parametrize("kind", ["bore", "shaft", "bowl", "cone", "torus"])
+@pytest.mark.parametrize("preset", ["matched", "tuned"])
+@pytest.mark.parametrize("swapped", [False, True])
+def test_walls_in_mujoco_are_certified(kind: str, preset: str, swapped: bool) -> None:
+    """Gap, normal, place, responses and first accelerations on each wall are the scene's, either way round."""
+    mechanism = on_wall(kind, swapped=swapped)
+    run = load_engine("mujoco").build(mechanism, load_engine("mujoco").presets["geoms"][preset])
+    lines = MechanismElement(mechanism).certify(run.built(), run.sample())
+    assert [str(line) for line in lines if not line.holds] == []
+    told = {line.quantity for line in lines if line.difference is not None}
+    assert {"gaps", "normals of contact", "places of contact", "responses of contacts", "friction of contacts"} <= told
+    assert preset == "matched" or "forces of contact" in told

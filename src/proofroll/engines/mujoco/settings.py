@@ -41,7 +41,10 @@ LARGEST_PYRAMIDAL_FRICTION = 1.0
 _OF_CONTACT = ("cone", "friction", "friction_damping", "start", "curvature", "cone_correction", "condim")
 # Settings of joints; formulations of mechanisms, and those of the settings above that each has.
 _OF_JOINTS = ("damping_armature",)
-OF_MECHANISMS: Mapping[str, tuple[str, ...]] = {"joints": _OF_JOINTS, "geoms": (*_OF_JOINTS, "cone", "cone_correction")}
+OF_MECHANISMS: Mapping[str, tuple[str, ...]] = {
+    "joints": _OF_JOINTS,
+    "geoms": (*_OF_JOINTS, "cone", "cone_correction", "curvature"),
+}
 # Preload of a corrected contact as a part of the normal force, so that the next slip does not end the contact.
 PRELOAD = 0.01
 
@@ -78,7 +81,7 @@ class MujocoSettings:
         start: ``touching``: at depth zero, where a soft contact is not loaded yet; ``settled``: at the depth at which
             the contact already bends the path as the wall does.
         curvature: True if the adapter adds to the contact's reference acceleration the term J̇v, which MuJoCo leaves
-            out (``free`` only).
+            out (``free``, and ``geoms`` on curved walls).
         cone_correction: True if the adapter takes from the contact's reference acceleration, while the ball slips,
             the lift that MuJoCo's convex cone gives it; in ``geoms`` the lift by the missing J̇v too.
         condim: dimensions of the contact's friction: 3 slides; 4 also resists turning about the normal, 6 also rolling,
@@ -129,7 +132,7 @@ class MujocoSettings:
     @property
     def scheme(self) -> Scheme | str:
         """See :class:`proofroll.core.engine.Settings`; Euler and implicitfast move positions with the new velocity."""
-        if self.curvature:
+        if self.curvature and self.formulation == "free":
             return Scheme.LEAPFROG
         return {"RK4": Scheme.RK4, "Euler": Scheme.SEMI_IMPLICIT_EULER}.get(self.integrator, self.integrator)
 
@@ -237,6 +240,7 @@ def _rules_of_mechanism(settings: MujocoSettings) -> Iterator[tuple[bool, str, s
         # mj_step1 and mj_step2, between which the contacts are edited, always make an Euler step.
         yield settings.integrator != "Euler", "integrator", "cone_correction=true needs integrator=Euler"
         yield settings.cone == "pyramidal", "cone", "cone_correction=true of a mechanism needs cone=elliptic"
+    yield from _rules_of_curvature(settings)
 
 
 def _rules_of_contact(settings: MujocoSettings, bounded: bool) -> Iterator[tuple[bool, str, str]]:
@@ -262,11 +266,15 @@ def _rules_of_contact(settings: MujocoSettings, bounded: bool) -> Iterator[tuple
         yield bounded, "condim", "with bounded friction stick and slip could not be distinguished; set condim=3"
         yield curvature, "condim", "curvature=true is made for sliding alone; set condim=3"
         yield corrects, "condim", "cone_correction=true is made for sliding alone; set condim=3"
-    if curvature:
-        yield not is_free, "curvature", unused
-        yield not is_euler, "integrator", "curvature=true needs integrator=Euler"
+    yield curvature and not is_free, "curvature", unused
+    yield from _rules_of_curvature(settings)
+
+
+def _rules_of_curvature(settings: MujocoSettings) -> Iterator[tuple[bool, str, str]]:
+    if settings.curvature:
+        yield settings.integrator != "Euler", "integrator", "curvature=true needs integrator=Euler"
         # A pyramid's rows are sums of normal and friction; the term belongs to each of them alone.
-        yield pyramidal, "cone", "curvature=true needs cone=elliptic"
+        yield settings.cone == "pyramidal", "cone", "curvature=true needs cone=elliptic"
 
 
 def check_restitution(settings: MujocoSettings) -> None:
@@ -341,7 +349,9 @@ PRESETS: Mapping[str, Mapping[str, MujocoSettings]] = {
         "matched": MujocoSettings("geoms", "matched", integrator="Euler"),
         # The lift of what slips and what turns is taken away: an edit of mjData.efc_aref that its manual does not have.
         # Dampers and servos are implicit by an armature, for MuJoCo's contacts do not see its implicit damping.
-        "tuned": MujocoSettings("geoms", "tuned", integrator="Euler", cone_correction=True, damping_armature=True),
+        "tuned": MujocoSettings(
+            "geoms", "tuned", integrator="Euler", curvature=True, cone_correction=True, damping_armature=True
+        ),
     },
 }
 

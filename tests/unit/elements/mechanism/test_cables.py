@@ -107,11 +107,16 @@ def test_a_cable_between_bodies_keeps_momentum() -> None:
 
 @pytest.mark.drill
 @pytest.mark.parametrize(
-    ("engine", "reason"),
-    [("pinocchio", ""), ("projection", ""), ("mujoco", "k has the wall bowl"), ("exudyn", "touches in k")],
+    ("engine", "slack_after", "reason"),
+    [
+        ("pinocchio", 1e-4, ""),
+        ("projection", 1e-4, ""),
+        ("mujoco", 0.1, ""),  # m; its softness returns up to a quarter of 5 m/s, the speed of the jerk
+        ("exudyn", 0.0, "touches in k"),
+    ],
 )
-def test_engines_follow_a_cable_or_refuse_it(tmp_path: Path, engine: str, reason: str) -> None:
-    """Pinocchio and the projection solver follow a cable that goes slack and taut; others say why not."""
+def test_engines_follow_a_cable_or_refuse_it(tmp_path: Path, engine: str, slack_after: float, reason: str) -> None:
+    """Pinocchio, MuJoCo and the projection solver follow a cable that goes slack and taut; others say why not."""
     one_body(tmp_path, "free", SWING)
     scene = load_scene(str(tmp_path))
     if reason:
@@ -123,4 +128,4 @@ def test_engines_follow_a_cable_or_refuse_it(tmp_path: Path, engine: str, reason
     gap = run["gap.k"].to_numpy()
     flies = (run["time"].to_numpy() > slack + 0.05) & (run["time"].to_numpy() < taut - 0.01)
     assert gap[flies].min() > 1e-4
-    assert np.abs(gap[run["time"].to_numpy() > taut + 0.01]).max() < 1e-4
+    assert np.abs(gap[run["time"].to_numpy() > taut + 0.01]).max() < slack_after

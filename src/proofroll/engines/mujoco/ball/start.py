@@ -13,6 +13,7 @@ from proofroll.core.errors import Refused
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.engines.mujoco.ball.formulation import Formulation
 from proofroll.engines.mujoco.ball.friction import corrects
+from proofroll.engines.mujoco.running import evaluate_behind
 from proofroll.engines.mujoco.settings import MujocoSettings
 
 # Evaluations until the resistance's torque, which uses the normal force of the evaluation before, has converged.
@@ -74,16 +75,7 @@ def start(
 
     def evaluate_at(depth: float) -> None:
         put_ball(model, data, body, depth)
-        now = data.qvel.copy()
-        for index in range(rounds):
-            last_rates = data.qacc.copy()
-            data.qvel[:] = now - lag * last_rates
-            formulation.evaluate(data)
-            if lag and index % 2:
-                # In a plain round the error contracts by ``share`` along the contact's rows and vanishes elsewhere.
-                # Extrapolation removes the first and brings errors elsewhere back with the other sign, so it
-                # alternates with plain rounds, and the last round is plain.
-                data.qacc[:] = (data.qacc - share * last_rates) / (1 - share)
+        evaluate_behind(data, formulation.evaluate, lag, share, rounds)
 
     depth = 0.0 if body.gap0 else _TOUCHING * body.ball.radius
     if settings.start == "settled" and not body.flies:

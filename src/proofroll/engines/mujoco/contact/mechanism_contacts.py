@@ -1,7 +1,7 @@
 """Contacts of a mechanism: geoms and pairs of an MjSpec, and the contacts that MuJoCo finds, read back.
 
 A vertex is a sphere of almost no radius, a circle a cylinder of almost no height, and a plane on a moving body, which
-MuJoCo refuses, the top of a wide box.
+MuJoCo refuses, the top of a wide box. A curved wall is a plane that :mod:`.walls` poses anew in each step.
 """
 
 from collections.abc import Callable
@@ -11,8 +11,7 @@ import mujoco
 import numpy as np
 
 from proofroll.core.errors import Refused
-from proofroll.elements.mechanism import WORLD, Mechanism, Tree
-from proofroll.elements.mechanism.contact.start import touches
+from proofroll.elements.mechanism import WORLD, Mechanism
 from proofroll.elements.mechanism.contact.touching import Moving, touch
 from proofroll.elements.mechanism.run.sampling import DEPENDENT
 from proofroll.elements.mechanism.scene.rotations import Array, cross, frame_of_axis, to_quaternion
@@ -30,6 +29,7 @@ from proofroll.elements.mechanism.scene.shapes.shapes import (
 )
 from proofroll.elements.mechanism.scene.shapes.walls import CurvedWall
 from proofroll.engines.mujoco.ball.friction import NEAR_CONE, check_coefficients
+from proofroll.engines.mujoco.contact.walls import check_walls, curved_end, shapes_at_start
 from proofroll.engines.mujoco.settings import UNBOUNDED_FRICTION, MujocoSettings
 
 # m; MuJoCo has no sphere of radius 0.
@@ -51,15 +51,11 @@ _LEAD = 1.1
 def check_contacts(mechanism: Mechanism, settings: MujocoSettings) -> None:
     """Refuses the first contact that MuJoCo would silently change or cannot represent."""
     moving = _moving(mechanism)
+    check_walls(mechanism, settings)
     for contact in mechanism.contacts:
         check_coefficients([_coefficient(contact)], settings, "a contact")
         sides = ((contact.body_a, contact.shape_a), (contact.body_b, contact.shape_b))
         for (body, shape), (_, partner) in (sides, sides[::-1]):
-            if isinstance(shape, CurvedWall):
-                raise Refused(
-                    f"{contact.name} has the wall {shape.kind}; this adapter builds convex geoms alone, as facets are "
-                    "another surface"
-                )
             if isinstance(shape, HalfSpace) and body in moving and not isinstance(partner, SphereShape):
                 raise Refused(
                     f"the plane of {contact.name} moves with {body}; MuJoCo's planes stand, and a box in its place "
@@ -71,12 +67,11 @@ def write_contacts(spec: Any, bodies: dict[str, Any], mechanism: Mechanism, sett
     """Adds geoms ``contact<k>a`` and ``contact<k>b`` and a pair for each contact k; no other geoms meet."""
     spec.option.cone = getattr(mujoco.mjtCone, f"mjCONE_{settings.cone.upper()}")
     moving = _moving(mechanism)
-    for number, contact in enumerate(mechanism.contacts):
+    for number, (contact, shapes) in enumerate(zip(mechanism.contacts, shapes_at_start(mechanism), strict=True)):
         if contact.box_slot is not None and contact.slot:
             continue  # the first contact of two boxes stands for all
         names = [f"contact{number}{end}" for end in "ab"]
-        ends = ((contact.body_a, contact.shape_a), (contact.body_b, contact.shape_b))
-        for name, (body, shape) in zip(names, ends, strict=True):
+        for name, body, shape in zip(names, (contact.body_a, contact.body_b), shapes, strict=True):
             geom = bodies[body].add_geom(name=name, mass=0.0, contype=0, conaffinity=0)
             _set_shape(geom, shape, body in moving)
         pair = spec.add_pair(name=f"contact{number}", geomname1=names[0], geomname2=names[1], margin=_MARGIN)
@@ -112,7 +107,7 @@ def _set_shape(geom: Any, shape: Shape, moves: bool) -> None:
         else:
             geom.type, geom.size, geom.pos = mujoco.mjtGeom.mjGEOM_PLANE, (0.0, 0.0, 1.0), shape.point
         return
-    assert not isinstance(shape, CurvedWall)  # refused
+    assert not isinstance(shape, CurvedWall)  # planes stand for them
     geom.pos = shape.centre
     if isinstance(shape, SphereShape):
         geom.type, geom.size = mujoco.mjtGeom.mjGEOM_SPHERE, (max(shape.radius, _VERTEX), 0.0, 0.0)
@@ -156,8 +151,8 @@ class ContactsRead(NamedTuple):
 class Contacts:
     """The contacts of a compiled model."""
 
-    def __init__(self, model: Any, mechanism: Mechanism) -> None:
-        self._model, self._mechanism = model, mechanism
+    def __init__(self, model: Any, mechanism: Mechanism, settings: MujocoSettings) -> None:
+        self._model, self._mechanism, self._settings = model, mechanism, settings
         firsts = [k - contact.slot if contact.box_slot else k for k, contact in enumerate(mechanism.contacts)]
         self._geoms = [[model.geom(f"contact{k}{end}").id for end in "ab"] for k in firsts]
         self._boxes = {k for k, contact in enumerate(mechanism.contacts) if contact.box_slot and not contact.slot}
@@ -165,6 +160,10 @@ class Contacts:
         self._of_geom = {a: (k, 1.0) for k, (a, _) in zip(firsts, self._geoms, strict=True)}
         self._of_geom |= {b: (k, -1.0) for k, (_, b) in zip(firsts, self._geoms, strict=True)}
         self._normal_rows: dict[int, list[Array]] = {}
+        curved = {k for k, contact in enumerate(mechanism.contacts) if curved_end(contact) is not None}
+        self._turned = curved if settings.curvature else set()
+        self._on_cone: set[int] = set()
+        self._rates: Array | None = None
 
     def forces(self, data: Any) -> Array:
         """Forces on body a of each contact in the world [N], shape (contacts, 3)."""
@@ -186,6 +185,9 @@ class Contacts:
         second lift is the turning of the normal row (J̇v), which MuJoCo leaves out; it follows from the row of the step
         before (:meth:`remember`). Rates that press a contact instead are left to it.
 
+        Where :meth:`add_curvature` adds J̇v, to be called before, velocities lag, and r is the whole residual of the
+        friction rows, of contacts whose force was on the cone in the evaluation before (:meth:`watch`).
+
         Args:
             data: MuJoCo's data after its reference accelerations and before its forces.
             rows: Jacobian of all rows, shape (nefc, nv).
@@ -200,10 +202,14 @@ class Contacts:
             if turns:  # a pair that meets in several points: the nearest row
                 turning = float(min(turns, key=np.linalg.norm) @ data.qvel) / dt
                 data.efc_aref[row] -= _LEAD * max(turning, 0.0)
-            friction = slice(row + 1, row + contact.dim)
-            slip = float(np.linalg.norm(data.efc_vel[friction]))
-            if contact.dim == 1:
+            number, friction = self._number(contact), slice(row + 1, row + contact.dim)
+            if contact.dim == 1 or np.isinf(self._mechanism.contacts[number].friction):
                 continue
+            if number in self._turned:
+                if number in self._on_cone:
+                    data.efc_aref[row] -= mu * float(np.linalg.norm(rates[friction] - data.efc_aref[friction]))
+                continue
+            slip = float(np.linalg.norm(data.efc_vel[friction]))
             # from rest a slip starts along its acceleration
             slip_rates = rates[friction] if slip == 0 else data.efc_vel[friction]
             size = float(np.linalg.norm(slip_rates))
@@ -212,12 +218,38 @@ class Contacts:
             if damped + rate > 0:
                 data.efc_aref[row] -= mu * (damped + _LEAD * max(rate, 0.0))
 
-    def remember(self, data: Any, rows: Array) -> None:
-        """Keeps the normal rows of a step for :meth:`correct` in the next one; the same arguments."""
-        self._normal_rows = {}
+    def depths(self, data: Any) -> dict[int, float]:
+        """Depth at which each contact carries its normal force in ``data``, by number of contact [m].
+
+        With the softness R of a normal row and its force f, the row misses its reference acceleration by R f, which a
+        depth adds by K I times itself and the margin.
+        """
+        depths = dict[int, float]()
         for index in range(data.ncon):
             contact = data.contact[index]
-            if contact.efc_address >= 0:
+            row = int(contact.efc_address)
+            if row >= 0:
+                K, _, impedance, _ = data.efc_KBIP[row].tolist()
+                depths[self._number(contact)] = float(data.efc_R[row] * data.efc_force[row]) / (K * impedance) - _MARGIN
+        return depths
+
+    def watch(self, data: Any) -> None:
+        """Keeps which contacts of curved walls have their force on the cone; ``data``: with the last forces."""
+        self._on_cone = set()
+        for index in range(data.ncon) if self._turned else ():
+            contact = data.contact[index]
+            row, number = int(contact.efc_address), self._number(contact)
+            if row >= 0 and contact.dim > 1 and number in self._turned:
+                N, T1, T2 = data.efc_force[row : row + 3].tolist()
+                if np.hypot(T1, T2) >= NEAR_CONE * float(contact.friction[0]) * N > 0:
+                    self._on_cone.add(number)
+
+    def remember(self, data: Any, rows: Array) -> None:
+        """Keeps normal rows of a step, and accelerations of that before, for the next one; arguments of correct."""
+        self._normal_rows, self._rates = {}, data.qacc.copy()
+        for index in range(data.ncon):
+            contact = data.contact[index]
+            if contact.efc_address >= 0 and self._number(contact) not in self._turned:
                 self._normal_rows.setdefault(self._number(contact), []).append(rows[int(contact.efc_address)])
 
     def _number(self, contact: Any) -> int:
@@ -242,26 +274,57 @@ class Contacts:
         return number + int(np.argmin(away)), sign
 
     def add_turning(self, data: Any) -> None:
-        """Adds J̇v, which MuJoCo leaves out of the rows of contacts, to the reference accelerations at the start."""
-        mechanism = self._mechanism
-        motion = Tree(mechanism).at(*mechanism.start())
-        touching, rate = touches(mechanism, motion), np.zeros((3, self._model.nv))
+        """Adds J̇v, which MuJoCo leaves out of the rows of contacts, to the reference accelerations of ``data``."""
         for index in range(data.ncon):
             contact = data.contact[index]
-            row = int(contact.efc_address)
-            number, sign = self._contact(data, contact)
-            contact_of_scene, touch = mechanism.contacts[number], touching[number]
-            missing = np.zeros(3)
-            for body, side in ((contact_of_scene.body_a, 1.0), (contact_of_scene.body_b, -1.0)):
-                k = mechanism.body_index[body]
-                mujoco.mj_jacDot(self._model, data, rate, None, touch.place, self._model.body(body).id)
-                moving = Moving(motion.p_WB[k], motion.R_WB[k], motion.v_WB[k], motion.w_WB[k])
-                along_body = touch.place_rate - moving.velocity(touch.place)
-                missing += side * (rate @ data.qvel + cross(moving.w, along_body))
-            shift = sign * contact.frame.reshape(3, 3) @ missing
-            shift[0] += float(touch.normal_rate @ touch.slide)
-            if row >= 0:
-                data.efc_aref[row : row + contact.dim] -= shift[: contact.dim]
+            if contact.efc_address >= 0:
+                row = int(contact.efc_address)
+                data.efc_aref[row : row + contact.dim] -= self._turning(data, contact)[: contact.dim]
+
+    def add_curvature(self, data: Any) -> None:
+        """Adds J̇v to the rows of curved walls, but for what MuJoCo's damping of velocities that lag supplies.
+
+        To be called like :meth:`correct`. See :attr:`.MujocoSettings.velocity_lag` and those after it.
+        """
+        contacts = [data.contact[index] for index in range(data.ncon)]
+        contacts = [each for each in contacts if each.efc_address >= 0 and self._number(each) in self._turned]
+        if not contacts:
+            return
+        settings, lagging, turnings = self._settings, data.qvel.copy(), []
+        # of the evaluation before, whose direction has turned since: extrapolated
+        rates = data.qacc.copy() if self._rates is None else 2 * data.qacc - self._rates
+        for lead in (0.0, settings.normal_lead):
+            data.qvel[:] = lagging + (settings.velocity_lag + lead) * rates
+            mujoco.mj_comVel(self._model, data)
+            turnings.append([self._turning(data, contact) for contact in contacts])
+        data.qvel[:] = lagging
+        mujoco.mj_comVel(self._model, data)
+        for contact, turning, ahead in zip(contacts, *turnings, strict=True):
+            row, dim = int(contact.efc_address), int(contact.dim)
+            turning[0] = ahead[0]
+            data.efc_aref[row : row + dim] -= (1 - settings.own_share) * turning[:dim]
+
+    def _turning(self, data: Any, contact: Any) -> Array:
+        """J̇v of a contact in its frame [m/s²], for the joint velocities of the last ``mj_comVel``."""
+        number, sign = self._contact(data, contact)
+        contact_of_scene, rate = self._mechanism.contacts[number], np.zeros((3, self._model.nv))
+        names = contact_of_scene.body_a, contact_of_scene.body_b
+        bodies = [self._model.body(name).id for name in names]
+        movings = [self._moving(data, body) for body in bodies]
+        found, missing = touch(contact_of_scene, *movings), np.zeros(3)
+        for body, moving, side in zip(bodies, movings, (1.0, -1.0), strict=True):
+            mujoco.mj_jacDot(self._model, data, rate, None, found.place, body)
+            along_body = found.place_rate - moving.velocity(found.place)
+            missing += side * (rate @ data.qvel + cross(moving.w, along_body))
+        shift: Array = sign * contact.frame.reshape(3, 3) @ missing
+        shift[0] += float(found.normal_rate @ found.slide)
+        return shift
+
+    def _moving(self, data: Any, body: int) -> Moving:
+        """Motion of a body as of the last computation of velocities."""
+        twist = np.zeros(6)
+        mujoco.mj_objectVelocity(self._model, data, mujoco.mjtObj.mjOBJ_XBODY, body, twist, 0)
+        return Moving(data.xpos[body], data.xmat[body].reshape(3, 3), twist[3:], twist[:3])
 
     def take_lift(self, data: Any, rates: Array) -> None:
         """Subtracts the lift of each contact whose force is on the cone, from the residual of its friction rows.
@@ -324,4 +387,4 @@ class Contacts:
         """Signed half: times the gap, the step along the normal from MuJoCo's contact point to the curved shape."""
         contact = self._mechanism.contacts[number]
         of_second = isinstance(contact.box_slot, BoxSlot) and CORNERS <= contact.slot < 2 * CORNERS  # a corner of it
-        return -0.5 if isinstance(contact.shape_a, HalfSpace) or of_second else 0.5
+        return -0.5 if isinstance(contact.shape_a, HalfSpace | CurvedWall) or of_second else 0.5

@@ -16,6 +16,8 @@ from proofroll.elements.mechanism.run.contacts.family import Family, of_contact
 from proofroll.elements.mechanism.run.sampling import DEPENDENT, MechanismBuilt, MechanismSample, mechanism_of
 from proofroll.elements.mechanism.scene.rotations import Array
 from proofroll.engines.mujoco.contact.mechanism_contacts import Contacts, check_contacts
+from proofroll.engines.mujoco.contact.walls import Walls
+from proofroll.engines.mujoco.running import evaluate_behind, silent
 from proofroll.engines.mujoco.settings import LARGEST_IMPEDANCE, MujocoSettings, check_restitution
 from proofroll.engines.mujoco.smooth import mechanism
 from proofroll.engines.mujoco.smooth.mechanism import MujocoMechanism
@@ -24,6 +26,8 @@ _CAPABILITY = MechanismCapability
 # Rounds for the lift of slip; each at least halves its error.
 _ROUNDS = 40
 _MARGIN = 1.1
+# Evaluations of a start with velocities that lag: each halves the error along the rows of contacts.
+_LAGS = 41
 # Factor on the share of the load that the impedance does not carry, for it acts on the bodies with lever arms.
 _OF_LOAD = 10.0
 _SOFT = (
@@ -60,33 +64,77 @@ class MujocoGeoms(MujocoMechanism):
         if any(pair.restitution for pair in mechanism.pairs):
             check_restitution(settings)
         super().__init__(mechanism, settings)
-        self._contacts = Contacts(self._model, mechanism)
+        self._contacts = Contacts(self._model, mechanism, settings)
+        self._walls = Walls(self._model, mechanism)
+        self._curvature = settings.curvature and bool(self._walls)
+        self._lag = settings.velocity_lag if self._curvature else 0.0
+        if self._lag:
+            with silent():
+                self._start_behind(2 * self._lag / settings.contact_time)
+
+    def _start_behind(self, share: float) -> None:
+        """Takes the velocities at the start back by their lag, and loads the contacts of curved walls.
+
+        An evaluation leaves the part ``share`` of an error of accelerations.
+        """
+        now = self._data.qvel.copy()
+        evaluate_behind(self._data, self._evaluate_step, self._lag, share, _LAGS)
+        self._walls.lift(self._contacts.depths(self._data))
+        self._data.qvel[:] = now
+        evaluate_behind(self._data, self._evaluate_step, self._lag, share, _LAGS)
 
     def spec(self) -> Any:
-        """MjSpec, whose keyframe ``start`` is time 0. Raises Refused if each step edits the contacts."""
+        """MjSpec, whose keyframe ``start`` is time 0. Raises Refused if each step poses or edits the contacts."""
+        if self._walls:
+            raise Refused("the plane that stands for a curved wall is posed in every step, and in no MJCF")
         if self._settings.cone_correction:
             raise Refused("the correction of the cone is made in every step, and in no MJCF; set cone_correction=false")
         return super().spec()
 
     def _run(self, steps: int) -> None:
-        if not self._settings.cone_correction:
+        if not (self._settings.cone_correction or self._walls):
             super()._run(steps)
             return
         for _ in range(steps):
+            self._walls.pose(self._data)
+            if not (self._settings.cone_correction or self._curvature):
+                super()._run(1)
+                continue
+            self._contacts.watch(self._data)
             mujoco.mj_step1(self._model, self._data)
             self._drive(self._model, self._data)
-            rows = self._rows(self._data, self._data.nefc)
-            self._contacts.correct(self._data, rows)
-            self._contacts.remember(self._data, rows)
+            self._edit(self._data, remember=True)
             mujoco.mj_step2(self._model, self._data)
 
+    def _edit(self, data: Any, *, remember: bool = False) -> None:
+        """Corrects the reference accelerations of contacts as the settings ask."""
+        if self._curvature:
+            self._contacts.add_curvature(data)
+        rows = self._rows(data, data.nefc)
+        if self._settings.cone_correction:
+            self._contacts.correct(data, rows)
+        if remember:
+            self._contacts.remember(data, rows)
+
+    def _evaluate_step(self, data: Any) -> None:
+        """Computes forces and accelerations of the state in ``data`` as a step would, with velocities that may lag."""
+        super()._evaluate(data)
+
+    def _evaluate(self, data: Any) -> None:
+        super()._evaluate(data)
+        if self._lag:
+            data.qvel += self._lag * data.qacc
+            mujoco.mj_fwdVelocity(self._model, data)
+
     def _forward(self, data: Any) -> None:
-        if not self._settings.cone_correction:
+        self._walls.pose(data)
+        if not (self._settings.cone_correction or self._curvature):
             super()._forward(data)
             return
+        self._contacts.watch(data)
         mujoco.mj_fwdPosition(self._model, data)
         mujoco.mj_fwdVelocity(self._model, data)
-        self._contacts.correct(data, self._rows(data, data.nefc))
+        self._edit(data)
         mujoco.mj_fwdActuation(self._model, data)
         mujoco.mj_fwdAcceleration(self._model, data)
         mujoco.mj_fwdConstraint(self._model, data)
@@ -100,7 +148,7 @@ class MujocoGeoms(MujocoMechanism):
     @override
     def built(self) -> MechanismBuilt:
         plain = super().built()
-        with self._without_steps():
+        with self._without_steps(), self._walls.unlifted():
             read = self._contacts.read(self._evaluated(), self._rows)
         contacts = {f"contact_{name}": value for name, value in read._asdict().items()}
         if not self._evaluated().ncon:
