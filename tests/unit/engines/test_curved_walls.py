@@ -32,6 +32,7 @@ def bored() -> Scene:
         ("projection[formulation=dependent]", 1e-10),
         ("pinocchio[formulation=impulses,dt=1e-4]", 1e-4),
         ("mujoco[formulation=geoms,preset=tuned,dt=1e-4]", 1e-6),
+        ("exudyn[formulation=spheres,dt=1e-4]", 1e-6),
     ],
 )
 def test_a_ball_in_a_bore_agrees(engine: str, largest: float, bored: Scene) -> None:
@@ -47,7 +48,6 @@ def test_a_ball_in_a_bore_agrees(engine: str, largest: float, bored: Scene) -> N
     ("engine", "why"),
     [
         ("mujoco[formulation=geoms,integrator=RK4]", "curved wall of contact is posed once a step, and RK4 needs it"),
-        ("exudyn[formulation=spheres]", "contact has a shape that is neither sphere nor plane"),
     ],
 )
 def test_who_has_no_bore_says_so(engine: str, why: str, bored: Scene) -> None:
@@ -71,6 +71,7 @@ WALLS = {
         "projection[formulation=dependent]",
         "pinocchio[formulation=impulses,dt=1e-4]",
         "mujoco[formulation=geoms,preset=tuned,dt=1e-4]",
+        "exudyn[formulation=spheres,dt=1e-4]",
     ],
 )
 def test_a_ball_slides_on_each_wall_as_its_truth_says(engine: str, kind: str) -> None:

@@ -76,7 +76,7 @@ def test_two_spheres_press_apart():
     ("geometry", "pair", "said"),
     [
         (Geometry("g", "b", "sphere", radius=0.0), {}, "a corner touches in p"),
-        (Geometry("g", "b", "ellipsoid", axes=(0.1, 0.2, 0.3)), {}, "p has a shape that is neither sphere nor plane"),
+        (Geometry("g", "b", "ellipsoid", axes=(0.1, 0.2, 0.3)), {}, "p has a shape that is neither sphere nor wall"),
         (Geometry("g", "b", "sphere", radius=0.1), {"restitution": 0.5}, "restitution"),
     ],
 )

@@ -65,5 +65,5 @@ def test_what_slides_over_a_border_agrees(engine: str, kind: str) -> None:
 
 def test_who_has_spheres_and_planes_alone_says_so() -> None:
     """Refused, with the reason."""
-    with pytest.raises(Refused, match="touch has a shape that is neither sphere nor plane"):
+    with pytest.raises(Refused, match="touch has a shape that is neither sphere nor wall"):
         proofroll.simulate(over("box"), "exudyn[formulation=spheres]", until=0.01)

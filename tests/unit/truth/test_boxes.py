@@ -222,7 +222,7 @@ def test_engines_agree_on_a_slide_over_a_rim(engine: str) -> None:
     ("engine", "why"),
     [
         ("projection[formulation=dependent]", "begin and end at borders of faces"),
-        ("exudyn[formulation=spheres]", "neither sphere nor plane"),
+        ("exudyn[formulation=spheres]", "neither sphere nor wall"),
     ],
 )
 def test_who_has_no_boxes_says_so(engine: str, why: str) -> None:

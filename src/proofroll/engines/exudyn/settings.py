@@ -36,7 +36,7 @@ class ExudynSettings:
         stiffness: stiffness of the normal force [N/m]; this and the next: ``contact`` and ``spheres`` only.
         friction_zone: slip velocity up to which friction is proportional to it [m/s].
         grip: coefficient that stands for unbounded friction [1]; the ball creeps by friction_zone |F| / (grip N).
-            ``contact`` only.
+            ``contact`` only; ``spheres`` have 100, with a friction_zone as much wider.
     """
 
     formulation: Literal["generic", "carrier", "rolling_disc", "contact", "redundant", "spheres", "discs", "tree"] = (

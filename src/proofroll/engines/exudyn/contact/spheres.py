@@ -1,8 +1,9 @@
 """Formulation ``spheres``: bodies of :mod:`redundant` with Exudyn's penalty contacts of spheres.
 
 A sphere meets a plane as ``ObjectContactSphereTriangle``, with a triangle so wide that its edges are out of reach, and
-another sphere as ``ObjectContactSphereSphere``. Friction is proportional to the slip up to ``friction_zone`` and
-Coulomb's beyond, in the direction of the slip: a contact that should stick creeps.
+another sphere as ``ObjectContactSphereSphere``, a curved wall as a hollow one (:mod:`.hollow_spheres`). Friction is
+proportional to the slip up to ``friction_zone`` and Coulomb's beyond, in the direction of the slip: a contact that
+should stick creeps.
 """
 
 import math
@@ -15,7 +16,7 @@ from typing_extensions import override
 
 from proofroll.core.engine import Regularised
 from proofroll.core.errors import NotUnique, Refused
-from proofroll.elements.mechanism import Mechanism
+from proofroll.elements.mechanism import WORLD, Mechanism, Tree
 from proofroll.elements.mechanism.contact.acting import OPEN
 from proofroll.elements.mechanism.contact.dynamics import ContactDynamics
 from proofroll.elements.mechanism.run.capabilities import MechanismCapability
@@ -24,16 +25,18 @@ from proofroll.elements.mechanism.run.sampling import MechanismBuilt, MechanismS
 from proofroll.elements.mechanism.scene.rotations import Array, frame_of_axis
 from proofroll.elements.mechanism.scene.shapes.geometry import BodyContact
 from proofroll.elements.mechanism.scene.shapes.shapes import HalfSpace, SphereShape
+from proofroll.elements.mechanism.scene.shapes.walls import CurvedWall
+from proofroll.engines.exudyn.contact.hollow_spheres import HollowSphere, hollow_centre, hollow_radius
 from proofroll.engines.exudyn.native import Output, exu, items
 from proofroll.engines.exudyn.settings import ExudynSettings
 from proofroll.engines.exudyn.smooth import redundant
 from proofroll.engines.exudyn.smooth.redundant import Redundant
 
 _CAPABILITY = MechanismCapability
-PROVIDES = (redundant.PROVIDES | {_CAPABILITY.CONTACT, _CAPABILITY.CONTACT_FRICTION}) - {_CAPABILITY.MOTIONS}
+_OF_CONTACT = {_CAPABILITY.CONTACT, _CAPABILITY.CONTACT_FRICTION, _CAPABILITY.UNBOUNDED_FRICTION}
+PROVIDES = (redundant.PROVIDES | _OF_CONTACT) - {_CAPABILITY.MOTIONS}
 LACKING: Mapping[str, str] = {
     **redundant.LACKING,
-    _CAPABILITY.UNBOUNDED_FRICTION: "this model gives a contact a coefficient, and creeps by friction_zone with any",
     _CAPABILITY.STATIC_FRICTION: "this formulation gives a contact one coefficient",
     _CAPABILITY.SLIP_REBOUNDS: "this formulation has no rebounds",
     _CAPABILITY.MOTIONS: "this formulation reads the force of a drive without that of contacts",
@@ -47,6 +50,9 @@ _WIDE = 1e3
 _LITTLE, _LARGEST = 1e-6, 0.5
 # Relative error of accelerations at the start that Exudyn differentiates numerically.
 _DIFFERENCED = 1e-5
+# Coefficient that stands for unbounded friction. Its zone is as much wider, so that friction rises with the slip as
+# that of a coefficient of 1, and a contact creeps by friction_zone times its friction over its normal force.
+_GRIP = 100.0
 _CORNERS = ((-1.0, -1.0, 0.0), (2.0, -1.0, 0.0), (-1.0, 2.0, 0.0))
 
 
@@ -74,6 +80,7 @@ class Spheres(Redundant):
     def _add_contacts(self, mechanism: Mechanism, settings: ExudynSettings) -> None:
         """Adds contacts at the depth of their load at the start, with spheres enlarged by that depth."""
         self._contacts: list[_Made] = []
+        self._hollow: list[HollowSphere] = []
         self._softness, self._larger, self._builds_up = 0.0, 0.0, False
         if not mechanism.contacts:
             return
@@ -92,6 +99,8 @@ class Spheres(Redundant):
             self._contacts.append(self._add_contact(contact, each.gap, pressed, speed, settings))
             if speed < settings.penalty[1]:
                 lacking += float(np.linalg.norm(start.force[number] - pressed * each.normal))
+        if self._hollow:
+            self.system.SetPreNewtonResidualUserFunction(self._follow)
         load = float(np.abs(start.force[: len(mechanism.contacts)]).max(initial=0.0))
         self._builds_up = lacking > _LITTLE * load
         if self._builds_up:
@@ -105,7 +114,7 @@ class Spheres(Redundant):
         sunk = pressed / stiffness
         sides = [(contact.body_a, contact.shape_a), (contact.body_b, contact.shape_b)]
         sign = 1.0
-        if isinstance(contact.shape_a, HalfSpace):
+        if isinstance(contact.shape_a, HalfSpace | CurvedWall):
             sides, sign = sides[::-1], -1.0
         (body, shape), (other, second) = sides
         assert isinstance(shape, SphereShape)
@@ -114,8 +123,8 @@ class Spheres(Redundant):
             "nodeNumber": self.system.AddNode(
                 items.NodeGenericData(initialCoordinates=[gap - sunk, slip, 0.0, 0.0], numberOfDataCoordinates=4)
             ),
-            "dynamicFriction": contact.friction,
-            "frictionProportionalZone": zone,
+            "dynamicFriction": min(contact.friction, _GRIP),
+            "frictionProportionalZone": zone * _GRIP if np.isinf(contact.friction) else zone,
             "contactStiffness": stiffness,
             "contactDamping": 2 * math.sqrt(stiffness * self._moved(body, other)),
         }
@@ -128,6 +137,15 @@ class Spheres(Redundant):
                 includeEdges=0,
                 **law,
             )
+        elif isinstance(second, CurvedWall):
+            hollow = self._add_hollow(second, other, shape, body)
+            self._hollow.append(hollow)
+            made = items.ObjectContactSphereSphere(
+                markerNumbers=[hollow.sphere, hollow.marker],
+                spheresRadii=[shape.radius + sunk / 2, hollow.radius - sunk / 2],  # or what rolls would slip
+                isHollowSphere1=True,
+                **law,
+            )
         else:
             assert isinstance(second, SphereShape)
             made = items.ObjectContactSphereSphere(
@@ -136,6 +154,31 @@ class Spheres(Redundant):
                 **law,
             )
         return _Made(self.system.AddObject(made), sign, sunk)
+
+    def _add_hollow(self, wall: CurvedWall, wall_body: str, sphere: SphereShape, body: str) -> HollowSphere:
+        """Adds the markers of a hollow sphere that stands for a wall, where it is at the start."""
+        mechanism = self._mechanism
+        motion = Tree(mechanism).at(*mechanism.start())
+        own, other = mechanism.body_index[wall_body], mechanism.body_index[body]
+        centre = motion.p_WB[other] + motion.R_WB[other] @ sphere.centre
+        centre = motion.R_WB[own].T @ (centre - motion.p_WB[own])
+        turn, com, radius = self._turns[wall_body], self._com[wall_body], hollow_radius(wall, centre, sphere.radius)
+        place = turn @ (hollow_centre(wall, centre, sphere.radius, radius) - com)
+        marker = items.MarkerBodyRigid(bodyNumber=self.bodies[wall_body], localPosition=place)
+        return HollowSphere(
+            marker=self.system.AddMarker(marker),
+            sphere=self.marker(body, sphere.centre),
+            body=None if wall_body == WORLD else self.bodies[wall_body],
+            wall=wall,
+            turn=turn,
+            com=com,
+            radius=radius,
+            of_sphere=sphere.radius,
+        )
+
+    def _follow(self, system: Any, t: float, newton_iteration: int, discontinuous_iteration: int) -> None:  # noqa: ARG002 -- Exudyn's signature
+        for hollow in self._hollow:
+            hollow.follow(system)
 
     def _moved(self, *bodies: str) -> float:
         """Reduced mass of two bodies [kg]; the world counts as infinite."""
@@ -173,9 +216,13 @@ class Spheres(Redundant):
         now = exu.ConfigurationType.Current
         one, two = (np.array(self.system.GetMarkerOutput(k, Output.Position, now)) for k in item["markerNumbers"])
         if "spheresRadii" in item:
-            n = (one - two) / np.linalg.norm(one - two)
-            radius = item["spheresRadii"][0] - made.sunk
-            return float(n @ (one - two)) - radius - item["spheresRadii"][1], n, one - radius * n
+            distance = float(np.linalg.norm(one - two))
+            n, (first, second) = (one - two) / distance, item["spheresRadii"]
+            if item["isHollowSphere1"]:
+                radius = first - made.sunk / 2
+                return second + made.sunk / 2 - radius - distance, -made.sign * n, one + radius * n
+            radius = first - made.sunk
+            return distance - radius - second, n, one - radius * n
         R = np.reshape(self.system.GetMarkerOutput(item["markerNumbers"][1], Output.RotationMatrix, now), (3, 3))
         corners = np.array([item["trianglePoints"][k] for k in range(3)]) @ R.T  # iterated over, it never ends
         n = np.cross(corners[1] - corners[0], corners[2] - corners[0])
@@ -189,7 +236,7 @@ def _check(contact: BodyContact) -> None:
     for shape in (contact.shape_a, contact.shape_b):
         if isinstance(shape, SphereShape) and not shape.radius:
             raise Refused(f"a corner touches in {contact.name}; Exudyn's contacts are of spheres with a radius")
-        if not isinstance(shape, SphereShape | HalfSpace):
+        if not isinstance(shape, SphereShape | HalfSpace | CurvedWall):
             raise Refused(
-                f"{contact.name} has a shape that is neither sphere nor plane; this formulation has no contact for it"
+                f"{contact.name} has a shape that is neither sphere nor wall; this formulation has no contact for it"
             )

@@ -1,0 +1,66 @@
+"""Curved walls of bodies in Exudyn: hollow spheres that follow the spheres over their walls.
+
+Exudyn has no contact between a sphere and a curved wall, but one with the inside of a sphere
+(``ObjectContactSphereSphere``). Its marker is moved on the wall's body before every Newton residual, so that it touches
+the wall where the sphere does: then normal, distance and the velocity of its material are the wall's.
+"""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from proofroll.elements.mechanism.scene.rotations import Array
+from proofroll.elements.mechanism.scene.shapes.walls import CurvedWall
+from proofroll.engines.exudyn.ball.contact import ON_A_PLANE
+from proofroll.engines.exudyn.native import Output, exu
+
+
+class HollowSphere(NamedTuple):
+    """A hollow sphere that stands for a wall.
+
+    Attributes:
+        marker, sphere: Exudyn's markers of its centre, on the wall's body, and of the centre of the sphere.
+        body: Exudyn's number of the wall's body; None: the world.
+        wall: in the frame of its body.
+        turn, com: rotation from that frame to Exudyn's axes of the body, and its centre of mass in that frame [m].
+        radius, of_sphere: radii [m].
+    """
+
+    marker: Any
+    sphere: Any
+    body: Any
+    wall: CurvedWall
+    turn: Array
+    com: Array
+    radius: float
+    of_sphere: float
+
+    def follow(self, system: Any) -> None:
+        """Moves the hollow sphere to where the sphere is nearest to the wall."""
+        centre = np.array(system.GetMarkerOutput(self.sphere, Output.Position, exu.ConfigurationType.Current))
+        if self.body is not None:
+            R = np.reshape(system.GetObjectOutputBody(self.body, Output.RotationMatrix, [0, 0, 0]), (3, 3))
+            centre = R.T @ (centre - system.GetObjectOutputBody(self.body, Output.Position, [0, 0, 0]))
+        place = self.turn @ (self.centre(self.turn.T @ centre + self.com) - self.com)
+        system.SetMarkerParameter(self.marker, "localPosition", place.tolist())
+
+    def centre(self, sphere: Array) -> Array:
+        """Its centre for a centre of the sphere, both in the frame of the wall's body [m]."""
+        return hollow_centre(self.wall, sphere, self.of_sphere, self.radius)
+
+
+def hollow_centre(wall: CurvedWall, sphere: Array, of_sphere: float, radius: float) -> Array:
+    """Centre of a hollow sphere that touches a wall where a sphere is nearest, in the frame of the wall's body [m].
+
+    Beyond a gap of half the distance of the two centres it follows the sphere and not the wall.
+    """
+    near, distance = wall.near(wall.frame.T @ (sphere - wall.point)), radius - of_sphere
+    return np.asarray(sphere + (distance - min(near.distance - of_sphere, 0.5 * distance)) * (wall.frame @ near.normal))
+
+
+def hollow_radius(wall: CurvedWall, sphere: Array, of_sphere: float) -> float:
+    """Radius that fits a wall's largest curvature where a sphere is nearest, or :data:`ON_A_PLANE` radii [m]."""
+    near = wall.near(wall.frame.T @ (sphere - wall.point))
+    most = float(np.linalg.eigvalsh(-near.bend)[-1])  # of the surface on which the centre moves
+    flat = of_sphere * ON_A_PLANE
+    return flat if most * flat <= 1 else of_sphere + 1 / most
