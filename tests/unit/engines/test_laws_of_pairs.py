@@ -5,10 +5,12 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import proofroll
 from proofroll.core.errors import InputError, Refused
+from proofroll.core.plugins import load_engine
 from proofroll.core.scene import Scene
 from proofroll.elements.mechanism import Body, Joint, Mechanism
 from proofroll.elements.mechanism.run.element import MechanismElement
@@ -98,6 +100,13 @@ def test_static_friction_holds_what_kinetic_would_not() -> None:
         ("exudyn[formulation=spheres]", {"static_friction": 0.9}, "this formulation gives a contact one coefficient"),
         ("mujoco[formulation=geoms]", {"tangential_restitution": 0.5}, "sets restitution along the normal alone"),
         ("exudyn[formulation=spheres]", {"tangential_restitution": 0.5}, "this formulation has no rebounds"),
+        (
+            "mujoco[formulation=geoms]",
+            {"rolling_resistance": 1e-3},
+            "condim 6. it shares one cone with sliding",
+        ),
+        ("mujoco[formulation=geoms]", {"spinning_friction": 1e-3}, "friction = inf is the same in both"),
+        ("exudyn[formulation=spheres]", {"spinning_friction": 1e-3}, "this formulation gives a contact no moment"),
     ],
 )
 def test_who_lacks_a_law_says_so(engine: str, law: dict[str, float], why: str) -> None:
@@ -133,3 +142,25 @@ def test_laws_of_a_pair_are_read(law: str, said: str, tmp_path: Path) -> None:
         load_scene(str(tmp_path))
     assert said in str(error.value)
     assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize(("dt", "largest"), [(1e-3, 1.0), (2.5e-4, 0.02)])
+def test_friction_against_spin_in_mujoco_is_that_of_a_pair_that_never_slips(dt: float, largest: float) -> None:
+    """A ball that rolls and spins loses s m g / J of its spin each second, to rest; it rolls on as before."""
+    mujoco, lost = load_engine("mujoco"), 0.005 * 0.5 * 9.81 / 5e-4
+    joint = Joint("free", "free", "world", "ball", q0=(0, 0, 0.05, 1, 0, 0, 0), v0=(0.5, 0, 0, 0, 10, 10))
+    shapes = (Geometry("sphere", "ball", "sphere", radius=0.05), Geometry("floor", "world", "plane"))
+    pair, body = (
+        Pair("contact", ("sphere", "floor"), np.inf, spinning_friction=0.005),
+        Body("ball", 0.5, inertia=(5e-4,) * 3),
+    )
+    mechanism = Mechanism((body,), (joint,), geometries=shapes, pairs=(pair,))
+    run = mujoco.build(mechanism, replace(mujoco.presets["geoms"]["tuned"], dt=dt))
+    lines = MechanismElement(mechanism).certify(run.built(), run.sample())
+    assert [str(line) for line in lines if not line.holds] == []
+    for t in (0.1, 0.15, 0.25, 0.4):
+        run.advance(t)
+        sample = run.sample()
+        # a slow spin stops within some steps: friction against it is soft by (50 / s)²
+        assert sample.w_WB[0, 2] == pytest.approx(max(10 - lost * t, 0.0), abs=1e-5 if t < 0.2 else largest)
+        np.testing.assert_allclose(sample.p_WB[0], (0.5 * t, 0.0, 0.05), atol=20 * dt**2)

@@ -28,9 +28,9 @@ from proofroll.elements.mechanism.scene.shapes.shapes import (
     SphereShape,
 )
 from proofroll.elements.mechanism.scene.shapes.walls import CurvedWall
-from proofroll.engines.mujoco.ball.friction import NEAR_CONE, check_coefficients
+from proofroll.engines.mujoco.ball.friction import NEAR_CONE, SMALLEST_FRICTION, check_coefficients
 from proofroll.engines.mujoco.contact.walls import check_walls, curved_end, shapes_at_start
-from proofroll.engines.mujoco.settings import UNBOUNDED_FRICTION, MujocoSettings
+from proofroll.engines.mujoco.settings import SLIDES, TURNS, UNBOUNDED_FRICTION, MujocoSettings
 
 # m; MuJoCo has no sphere of radius 0.
 _VERTEX = 1e-12
@@ -43,6 +43,9 @@ _WIDE, _DEEP = 1e3, 1.0
 _MARGIN = 1e-9
 # m: margin within which contacts are searched to be read back, so large that every one is found.
 _FAR = 1e6
+# Coefficient that stands for unbounded friction beside friction against spin, which MuJoCo makes softer by the square
+# of their ratio; a friction of 0.3 N takes 2e-5 of what spin has in their cone.
+_BESIDE_SPIN = 50.0
 # Factor on rates of the step before, so that their errors open no contact. With twice the rate, contacts that stick
 # beside others that slide would swing with a period of two steps.
 _LEAD = 1.1
@@ -53,7 +56,8 @@ def check_contacts(mechanism: Mechanism, settings: MujocoSettings) -> None:
     moving = _moving(mechanism)
     check_walls(mechanism, settings)
     for contact in mechanism.contacts:
-        check_coefficients([_coefficient(contact)], settings, "a contact")
+        check_coefficients([_coefficient(contact), contact.spinning_friction], settings, "a contact")
+        _check_turning(contact)
         sides = ((contact.body_a, contact.shape_a), (contact.body_b, contact.shape_b))
         for (body, shape), (_, partner) in (sides, sides[::-1]):
             if isinstance(shape, HalfSpace) and body in moving and not isinstance(partner, SphereShape):
@@ -61,6 +65,20 @@ def check_contacts(mechanism: Mechanism, settings: MujocoSettings) -> None:
                     f"the plane of {contact.name} moves with {body}; MuJoCo's planes stand, and a box in its place "
                     "meets spheres alone exactly"
                 )
+
+
+def _check_turning(contact: BodyContact) -> None:
+    """Raises Refused for friction against turning that MuJoCo's one cone of a contact bounds by another law."""
+    if contact.rolling_resistance:
+        raise Refused(
+            f"{contact.name} has rolling resistance: in MuJoCo (condim 6) it shares one cone with sliding and spin, "
+            f"of {SMALLEST_FRICTION:g} m at least, and what one takes the others lack; the scene bounds each alone"
+        )
+    if contact.spinning_friction and np.isfinite(contact.friction):
+        raise Refused(
+            f"{contact.name} has friction against spin: in MuJoCo (condim 4) it shares one cone with sliding, and what "
+            "one takes the other lacks; the scene bounds each alone, and friction = inf is the same in both"
+        )
 
 
 def write_contacts(spec: Any, bodies: dict[str, Any], mechanism: Mechanism, settings: MujocoSettings) -> None:
@@ -84,17 +102,23 @@ def _set_pair_law(pair: Any, contact: BodyContact, settings: MujocoSettings) -> 
     Restitution is one step of damping in solref's direct format: (1 + e)/dt takes away 1 + e times the normal velocity.
     Friction has its own ``solreffriction``, or the slip would be reversed too.
     """
-    pair.condim = 3 if contact.friction else 1
-    pair.friction = (_coefficient(contact), _coefficient(contact), 0.0, 0.0, 0.0)
+    pair.condim = (TURNS if contact.spinning_friction else SLIDES) if contact.friction else 1
+    pair.friction = (_coefficient(contact), _coefficient(contact), contact.spinning_friction, 0.0, 0.0)
     settings.soften(pair)
     if contact.restitution:
         pair.solref = (-1.0, -(1 + contact.restitution) / settings.dt)
         pair.solreffriction = (-1e-9, -1 / settings.dt)
 
 
+def times_softer(mechanism: Mechanism) -> float:
+    """Factor by which the normal rows of contacts that slip or spin are softer in MuJoCo's cone, at most: 1 + mu²."""
+    slip = [contact for contact in mechanism.contacts if np.isfinite(contact.friction) or contact.spinning_friction]
+    return max((1 + _coefficient(contact) ** 2 for contact in slip), default=1.0)
+
+
 def _coefficient(contact: BodyContact) -> float:
     """Coefficient of a contact in MuJoCo, which has no unbounded friction."""
-    return min(contact.friction, UNBOUNDED_FRICTION)
+    return min(contact.friction, _BESIDE_SPIN if contact.spinning_friction else UNBOUNDED_FRICTION)
 
 
 def _set_shape(geom: Any, shape: Shape, moves: bool) -> None:
@@ -195,16 +219,15 @@ class Contacts:
         dt, rates = self._model.opt.timestep, rows @ data.qacc
         for index in range(data.ncon):
             contact = data.contact[index]
-            row, mu = int(contact.efc_address), float(contact.friction[0])
+            row = int(contact.efc_address)
             if row < 0:
                 continue
-            turns = [rows[row] - previous for previous in self._normal_rows.get(self._number(contact), ())]
+            number = self._number(contact)
+            turns = [rows[row] - previous for previous in self._normal_rows.get(number, ())]
             if turns:  # a pair that meets in several points: the nearest row
                 turning = float(min(turns, key=np.linalg.norm) @ data.qvel) / dt
                 data.efc_aref[row] -= _LEAD * max(turning, 0.0)
-            number, friction = self._number(contact), slice(row + 1, row + contact.dim)
-            if contact.dim == 1 or np.isinf(self._mechanism.contacts[number].friction):
-                continue
+            mu, friction = self._slipping(contact)
             if number in self._turned:
                 if number in self._on_cone:
                     data.efc_aref[row] -= mu * float(np.linalg.norm(rates[friction] - data.efc_aref[friction]))
@@ -233,15 +256,22 @@ class Contacts:
                 depths[self._number(contact)] = float(data.efc_R[row] * data.efc_force[row]) / (K * impedance) - _MARGIN
         return depths
 
+    def _slipping(self, contact: Any) -> tuple[float, slice]:
+        """Coefficient and rows of a contact's friction that may slip: of a pair that never slides, against spin."""
+        row = int(contact.efc_address)
+        if np.isinf(self._mechanism.contacts[self._number(contact)].friction):
+            return float(contact.friction[2]), slice(row + SLIDES, row + max(SLIDES, int(contact.dim)))
+        return float(contact.friction[0]), slice(row + 1, row + min(SLIDES, int(contact.dim)))
+
     def watch(self, data: Any) -> None:
         """Keeps which contacts of curved walls have their force on the cone; ``data``: with the last forces."""
         self._on_cone = set()
         for index in range(data.ncon) if self._turned else ():
             contact = data.contact[index]
             row, number = int(contact.efc_address), self._number(contact)
-            if row >= 0 and contact.dim > 1 and number in self._turned:
-                N, T1, T2 = data.efc_force[row : row + 3].tolist()
-                if np.hypot(T1, T2) >= NEAR_CONE * float(contact.friction[0]) * N > 0:
+            if row >= 0 and number in self._turned:
+                mu, friction = self._slipping(contact)
+                if np.linalg.norm(data.efc_force[friction]) >= NEAR_CONE * mu * data.efc_force[row] > 0:
                     self._on_cone.add(number)
 
     def remember(self, data: Any, rows: Array) -> None:
@@ -278,8 +308,8 @@ class Contacts:
         for index in range(data.ncon):
             contact = data.contact[index]
             if contact.efc_address >= 0:
-                row = int(contact.efc_address)
-                data.efc_aref[row : row + contact.dim] -= self._turning(data, contact)[: contact.dim]
+                row, dim = int(contact.efc_address), min(SLIDES, int(contact.dim))
+                data.efc_aref[row : row + dim] -= self._turning(data, contact)[:dim]
 
     def add_curvature(self, data: Any) -> None:
         """Adds J̇v to the rows of curved walls, but for what MuJoCo's damping of velocities that lag supplies.
@@ -300,7 +330,7 @@ class Contacts:
         data.qvel[:] = lagging
         mujoco.mj_comVel(self._model, data)
         for contact, turning, ahead in zip(contacts, *turnings, strict=True):
-            row, dim = int(contact.efc_address), int(contact.dim)
+            row, dim = int(contact.efc_address), min(SLIDES, int(contact.dim))
             turning[0] = ahead[0]
             data.efc_aref[row : row + dim] -= (1 - settings.own_share) * turning[:dim]
 
@@ -338,12 +368,12 @@ class Contacts:
         missed = rates - data.efc_aref
         for index in range(data.ncon):
             contact = data.contact[index]
-            row, mu = int(contact.efc_address), float(contact.friction[0])
-            if row < 0 or contact.dim == 1:
+            row = int(contact.efc_address)
+            if row < 0:
                 continue
-            N, T1, T2 = data.efc_force[row : row + 3].tolist()
-            if np.hypot(T1, T2) >= NEAR_CONE * mu * N:
-                data.efc_aref[row] -= mu * np.hypot(*missed[row + 1 : row + 3])
+            mu, friction = self._slipping(contact)
+            if np.linalg.norm(data.efc_force[friction]) >= NEAR_CONE * mu * data.efc_force[row]:
+                data.efc_aref[row] -= mu * np.linalg.norm(missed[friction])
 
     def read(self, data: Any, rows_of: Callable[[Any, int], Array]) -> ContactsRead:
         """All contacts, by MuJoCo's own search with a margin so wide that it finds every one; overwrites ``data``.
@@ -367,7 +397,8 @@ class Contacts:
             if not contact.dist >= gap[number]:  # a cylinder has several contact points: the nearest is taken
                 gap[number], normal[number] = contact.dist, sign * contact.frame[:3]
                 place[number] = contact.pos + self._to_surface(number) * contact.dist * normal[number]
-                row, dim, damping = int(contact.efc_address), int(contact.dim), float(contact.solref[1])
+                row, dim = int(contact.efc_address), min(SLIDES, int(contact.dim))
+                damping = float(contact.solref[1])
                 friction[number] = contact.friction[0] if dim > 1 else 0.0
                 restitution[number] = -damping * model.opt.timestep - 1.0 if damping < 0 else 0.0
                 rows[number] = contact.frame.reshape(3, 3)[:dim].T @ all_rows[row : row + dim]

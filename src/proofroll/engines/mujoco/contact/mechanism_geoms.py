@@ -15,7 +15,7 @@ from proofroll.elements.mechanism.run.capabilities import MechanismCapability
 from proofroll.elements.mechanism.run.contacts.family import Family, of_contact
 from proofroll.elements.mechanism.run.sampling import DEPENDENT, MechanismBuilt, MechanismSample, mechanism_of
 from proofroll.elements.mechanism.scene.rotations import Array
-from proofroll.engines.mujoco.contact.mechanism_contacts import Contacts, check_contacts
+from proofroll.engines.mujoco.contact.mechanism_contacts import Contacts, check_contacts, times_softer
 from proofroll.engines.mujoco.contact.walls import Walls
 from proofroll.engines.mujoco.running import evaluate_behind, silent
 from proofroll.engines.mujoco.settings import LARGEST_IMPEDANCE, MujocoSettings, check_restitution
@@ -35,12 +35,11 @@ _SOFT = (
     "would change that much"
 )
 PROVIDES = mechanism.PROVIDES | {_CAPABILITY.CONTACT, _CAPABILITY.CONTACT_FRICTION, _CAPABILITY.CONTACT_REBOUNDS}
-PROVIDES = (PROVIDES | {_CAPABILITY.UNBOUNDED_FRICTION}) - {_CAPABILITY.MOTIONS}
+PROVIDES = (PROVIDES | {_CAPABILITY.UNBOUNDED_FRICTION, _CAPABILITY.TURNING_FRICTION}) - {_CAPABILITY.MOTIONS}
 LACKING: Mapping[str, str] = {
     **mechanism.LACKING,
     _CAPABILITY.STATIC_FRICTION: "this formulation gives a contact one coefficient",
     _CAPABILITY.MOTIONS: "this formulation reads the force of a drive without that of contacts",
-    _CAPABILITY.TURNING_FRICTION: "this formulation builds contacts that slide (condim 3), not such that turn",
     _CAPABILITY.SLIP_REBOUNDS: "this formulation sets restitution along the normal alone",
 }
 
@@ -156,7 +155,11 @@ class MujocoGeoms(MujocoMechanism):
         softened = dict(plain.regularised)
         with self._without_steps():
             hard = self._hard(self._evaluated())
-        load = (1 - LARGEST_IMPEDANCE) * _OF_LOAD * float(np.linalg.norm(self._mechanism.gravity))
+        load = (
+            (1 - LARGEST_IMPEDANCE)
+            * max(_OF_LOAD, times_softer(self._mechanism))
+            * float(np.linalg.norm(self._mechanism.gravity))
+        )
         for name, expected in hard.items():
             size = longest(expected) or np.finfo(float).tiny
             rest = load / (longest(hard["acceleration"]) or np.finfo(float).tiny)
