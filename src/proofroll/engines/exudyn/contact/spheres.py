@@ -34,12 +34,11 @@ from proofroll.engines.exudyn.smooth.redundant import Redundant
 
 _CAPABILITY = MechanismCapability
 _OF_CONTACT = {_CAPABILITY.CONTACT, _CAPABILITY.CONTACT_FRICTION, _CAPABILITY.UNBOUNDED_FRICTION}
-PROVIDES = (redundant.PROVIDES | _OF_CONTACT) - {_CAPABILITY.MOTIONS}
+PROVIDES = redundant.PROVIDES | _OF_CONTACT
 LACKING: Mapping[str, str] = {
     **redundant.LACKING,
     _CAPABILITY.STATIC_FRICTION: "this formulation gives a contact one coefficient",
     _CAPABILITY.SLIP_REBOUNDS: "this formulation has no rebounds",
-    _CAPABILITY.MOTIONS: "this formulation reads the force of a drive without that of contacts",
     _CAPABILITY.TURNING_FRICTION: "this formulation gives a contact no moment",
     _CAPABILITY.CONTACT_REBOUNDS: "its restitution is a damping that comes near it with ever shorter steps alone",
 }

@@ -16,7 +16,7 @@ from proofroll.elements.mechanism.run.contacts.family import Family, of_contact
 from proofroll.elements.mechanism.run.sampling import DEPENDENT, MechanismBuilt, MechanismSample, mechanism_of
 from proofroll.elements.mechanism.scene.rotations import Array
 from proofroll.engines.mujoco.contact.mechanism_contacts import Contacts, check_contacts, times_softer
-from proofroll.engines.mujoco.contact.walls import Walls
+from proofroll.engines.mujoco.contact.walls import Walls, curved_end
 from proofroll.engines.mujoco.running import evaluate_behind, silent
 from proofroll.engines.mujoco.settings import LARGEST_IMPEDANCE, MujocoSettings, check_restitution
 from proofroll.engines.mujoco.smooth import mechanism
@@ -35,11 +35,10 @@ _SOFT = (
     "would change that much"
 )
 PROVIDES = mechanism.PROVIDES | {_CAPABILITY.CONTACT, _CAPABILITY.CONTACT_FRICTION, _CAPABILITY.CONTACT_REBOUNDS}
-PROVIDES = (PROVIDES | {_CAPABILITY.UNBOUNDED_FRICTION, _CAPABILITY.TURNING_FRICTION}) - {_CAPABILITY.MOTIONS}
+PROVIDES |= {_CAPABILITY.UNBOUNDED_FRICTION, _CAPABILITY.TURNING_FRICTION}
 LACKING: Mapping[str, str] = {
     **mechanism.LACKING,
     _CAPABILITY.STATIC_FRICTION: "this formulation gives a contact one coefficient",
-    _CAPABILITY.MOTIONS: "this formulation reads the force of a drive without that of contacts",
     _CAPABILITY.SLIP_REBOUNDS: "this formulation sets restitution along the normal alone",
 }
 
@@ -59,17 +58,18 @@ class MujocoGeoms(MujocoMechanism):
 
     def __init__(self, scene: Any, settings: MujocoSettings) -> None:
         mechanism = mechanism_of(scene)
+        if mechanism.prescribed or all(curved_end(contact) is None for contact in mechanism.contacts):
+            # nothing to curve, or motions, whose rows take velocities for those of the positions
+            settings = replace(settings, curvature=False)
         check_contacts(mechanism, settings)
         if any(pair.restitution for pair in mechanism.pairs):
             check_restitution(settings)
         super().__init__(mechanism, settings)
         self._contacts = Contacts(self._model, mechanism, settings)
         self._walls = Walls(self._model, mechanism)
-        self._curvature = settings.curvature and bool(self._walls)
-        self._lag = settings.velocity_lag if self._curvature else 0.0
-        if self._lag:
+        if settings.curvature:
             with silent():
-                self._start_behind(2 * self._lag / settings.contact_time)
+                self._start_behind(2 * settings.velocity_lag / settings.contact_time)
 
     def _start_behind(self, share: float) -> None:
         """Takes the velocities at the start back by their lag, and loads the contacts of curved walls.
@@ -77,10 +77,10 @@ class MujocoGeoms(MujocoMechanism):
         An evaluation leaves the part ``share`` of an error of accelerations.
         """
         now = self._data.qvel.copy()
-        evaluate_behind(self._data, self._evaluate_step, self._lag, share, _LAGS)
+        evaluate_behind(self._data, self._evaluate_step, self._settings.velocity_lag, share, _LAGS)
         self._walls.lift(self._contacts.depths(self._data))
         self._data.qvel[:] = now
-        evaluate_behind(self._data, self._evaluate_step, self._lag, share, _LAGS)
+        evaluate_behind(self._data, self._evaluate_step, self._settings.velocity_lag, share, _LAGS)
 
     def spec(self) -> Any:
         """MjSpec, whose keyframe ``start`` is time 0. Raises Refused if each step poses or edits the contacts."""
@@ -96,10 +96,11 @@ class MujocoGeoms(MujocoMechanism):
             return
         for _ in range(steps):
             self._walls.pose(self._data)
-            if not (self._settings.cone_correction or self._curvature):
+            if not (self._settings.cone_correction or self._settings.curvature):
                 super()._run(1)
                 continue
             self._contacts.watch(self._data)
+            self._motions.apply(self._data)
             mujoco.mj_step1(self._model, self._data)
             self._drive(self._model, self._data)
             self._edit(self._data, remember=True)
@@ -107,7 +108,7 @@ class MujocoGeoms(MujocoMechanism):
 
     def _edit(self, data: Any, *, remember: bool = False) -> None:
         """Corrects the reference accelerations of contacts as the settings ask."""
-        if self._curvature:
+        if self._settings.curvature:
             self._contacts.add_curvature(data)
         rows = self._rows(data, data.nefc)
         if self._settings.cone_correction:
@@ -121,13 +122,13 @@ class MujocoGeoms(MujocoMechanism):
 
     def _evaluate(self, data: Any) -> None:
         super()._evaluate(data)
-        if self._lag:
-            data.qvel += self._lag * data.qacc
+        if self._settings.curvature:
+            data.qvel += self._settings.velocity_lag * data.qacc
             mujoco.mj_fwdVelocity(self._model, data)
 
     def _forward(self, data: Any) -> None:
         self._walls.pose(data)
-        if not (self._settings.cone_correction or self._curvature):
+        if not (self._settings.cone_correction or self._settings.curvature):
             super()._forward(data)
             return
         self._contacts.watch(data)
@@ -152,9 +153,10 @@ class MujocoGeoms(MujocoMechanism):
         contacts = {f"contact_{name}": value for name, value in read._asdict().items()}
         if not self._evaluated().ncon:
             return replace(plain, **contacts)
-        softened = dict(plain.regularised)
+        softened, forces = dict(plain.regularised), self._forces(self._evaluated())
         with self._without_steps():
-            hard = self._hard(self._evaluated())
+            data = self._evaluated()
+            hard, hard_forces = self._hard(data), self._forces(data)
         load = (
             (1 - LARGEST_IMPEDANCE)
             * max(_OF_LOAD, times_softer(self._mechanism))
@@ -165,6 +167,12 @@ class MujocoGeoms(MujocoMechanism):
             rest = load / (longest(hard["acceleration"]) or np.finfo(float).tiny)
             difference = longest(expected - getattr(plain, name)) / size
             softened[name] = Regularised(_MARGIN * difference + rest + DEPENDENT, _SOFT)
+        least = max(softened[name].tolerance for name in hard)
+        for name, expected in hard_forces.items():
+            size = np.nanmax(np.abs(expected)) or np.finfo(float).tiny
+            share = max(_MARGIN * float(np.nanmax(np.abs(expected - forces[name])) / size), least)
+            loops = plain.regularised.get(name)
+            softened[name] = Regularised(share + (0.0 if loops is None else loops.tolerance), _SOFT)
         return replace(plain, **contacts, regularised=softened)
 
     def _hard(self, data: Any) -> dict[str, Array]:

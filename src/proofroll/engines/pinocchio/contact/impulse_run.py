@@ -51,8 +51,8 @@ class ImpulseRun(MechanismRun):
     def _renew(self) -> None:
         """Keeps the stepper, which evaluates all forces anew in each step."""
 
-    def _kick(self) -> tuple[Array, Array, Array]:
-        """Joint accelerations v̇, forces on body a of each contact [N], and forces of joint rows, in the next step.
+    def _kick(self) -> tuple[Array, Array, Array, Array]:
+        """Joint accelerations v̇, forces on body a of each contact [N], of joint rows and of motions, in the next step.
 
         At time 0 they belong to a fraction of that step, and include effects that later steps see one step late.
         """
@@ -62,11 +62,11 @@ class ImpulseRun(MechanismRun):
         else:
             span = _PART * self._dt
             kick = steps.beginning(span, convex=self._settings.convex)
-        return (kick.v - steps.v) / span, kick.impulse / span, kick.along / span
+        return (kick.v - steps.v) / span, kick.impulse / span, kick.along / span, kick.driving / span
 
     def _evaluated(self) -> tuple[Any, Array, Array, Array, Any, Array]:
         """Data of the present state, q, v, accelerations, joint forces in the next step, and empty loop forces."""
-        q, v, (acceleration, pressing, _) = self.steps.q, self.steps.v, self._kick()
+        q, v, (acceleration, pressing, *_) = self.steps.q, self.steps.v, self._kick()
         touching = self.steps.terms(q, v, self._dt)[-1]
         self.tree.now = self.steps.t
         data = self._placed(acceleration)
@@ -87,9 +87,14 @@ class ImpulseRun(MechanismRun):
 
     def sample(self) -> MechanismSample:
         """See :class:`proofroll.core.engine.Engine`; the forces are those of the next step."""
-        _, pressing, joint_forces = self._kick()
+        _, pressing, joint_forces, _ = self._kick()
         forces = self.steps.joints.along_joints(self.steps.q, joint_forces) if joint_forces.size else {}
         return replace(super().sample(), contact_force=pressing if self.steps.contacts else None, **forces)
+
+    @override
+    def _drives(self) -> Array:
+        self.dynamics.on_motions = self._kick()[-1]
+        return super()._drives()
 
     @override
     def built(self) -> MechanismBuilt:
@@ -99,7 +104,7 @@ class ImpulseRun(MechanismRun):
         )
         step = self._accelerations(self.steps.kick(self.steps.q, self.steps.v), self._dt)
         softened = dict[str, Regularised]()
-        now = Impulses(self.steps.v, np.zeros(0), np.zeros(0))
+        now = Impulses(self.steps.v, *np.zeros((3, 0)))
         still, errors = self._accelerations(now, span), self.steps.unsure(span)
         off = [self._accelerations(now._replace(v=now.v + error), span) for error in errors]
         for name, value in hard.items():

@@ -30,7 +30,7 @@ PROVIDES: frozenset[str] = (
     | {_CAPABILITY.ARMATURE, _CAPABILITY.CONTACT, _CAPABILITY.CONTACT_FRICTION, _CAPABILITY.CONTACT_REBOUNDS}
     | {_CAPABILITY.UNBOUNDED_FRICTION, _CAPABILITY.SLIP_REBOUNDS}
     | {_CAPABILITY.ACTUATORS, _CAPABILITY.SATURATION, _CAPABILITY.SIGNALS, _CAPABILITY.HELD}
-    | {_CAPABILITY.JOINT_FRICTION, _CAPABILITY.STOPS, _CAPABILITY.REBOUNDS}
+    | {_CAPABILITY.JOINT_FRICTION, _CAPABILITY.STOPS, _CAPABILITY.REBOUNDS, _CAPABILITY.MOTIONS}
 )
 _OF_A_TREE = "its steps are those of a tree with contacts"
 LACKING: Mapping[str, str] = {
@@ -69,11 +69,13 @@ class Impulses(NamedTuple):
         v: velocity after it, shape (nv,).
         impulse: on body a of each contact, world axes [N s], shape (contacts, 3).
         along: impulses of joint rows [N s, N m s], shape (rows,).
+        driving: impulses that impose motions [N s, N m s], shape (motions,).
     """
 
     v: Array
     impulse: Array
     along: Array
+    driving: Array
 
 
 class _Solver(NamedTuple):
@@ -117,6 +119,8 @@ class ImpulseSteps:
         stops = [item.joint.restitution for item in self.joints.stops]
         self._returned = np.concatenate([self.restitution, np.zeros(len(self.joints.friction)), stops])
         self._solvers: dict[tuple[int, ...], _Solver] = {}
+        # Impulses that impose motions without contacts, and velocities by a unit rate of each.
+        self._motions = np.zeros(0), np.zeros((tree.model.nv, 0))
         try:
             J, _, inverse, _ = self.terms(self.q, self.v, self._dt)
             for k in range(len(self.contacts)):
@@ -164,8 +168,8 @@ class ImpulseSteps:
 
         Open gaps stay open.
         """
-        J, free, inverse, touching = self.terms(self.q, self.v, span)
         ahead = self.terms(pin.integrate(self._model, self.q, span * self.v), self.v, span)[0]
+        J, free, inverse, touching = self.terms(self.q, self.v, span)
         shifts = np.zeros((len(self._returned), 3))
         shifts[: len(touching)] = (ahead - J) @ self.v
         apart = [touch.absent or touch.gap > self._touching for touch in touching] + [False] * len(self.joints.friction)
@@ -210,12 +214,30 @@ class ImpulseSteps:
         free = v + span * rate
         inverse = np.triu(pin.computeMinverse(model, data, q))
         inverse = inverse + np.triu(inverse, 1).T
+        if len(tree.geared):
+            free, inverse = self._driven(q, free, inverse, span)
         pin.computeJointJacobians(model, data, q)
         J = np.zeros((len(touching), 3, model.nv))
         all_of = self._solver(tuple(range(len(touching))))
         for k, contact_touch in enumerate(touching):
             J[k] = self._posed(all_of, k, contact_touch)
         return J, free, inverse, touching
+
+    def _driven(self, q: Array, free: Array, inverse: Array, span: float) -> tuple[Array, Array]:
+        """Velocity without impulses and inverse mass matrix where motions are imposed, whose impulses hold in a step.
+
+        A driven joint has the rate of its motion at the end of the step, and comes back to its place.
+        """
+        tree, rows = self._tree, self._tree.geared
+        now, tree.now = tree.now, self.t + 0.5 * span * self._midpoint
+        off = tree.apart(q)[0]
+        tree.now = self.t + span
+        rates = tree.apart(q)[1] - (_CLOSED if self._midpoint else 1.0) * off / self._dt
+        tree.now = now
+        into = inverse @ rows.T
+        held = into @ np.linalg.inv(rows @ into)
+        self._motions = np.linalg.solve(rows @ into, rates - rows @ free), held
+        return free + held @ (rates - rows @ free), inverse - held @ into.T
 
     def unsure(self, span: float) -> Array:
         """Velocities by which errors of each row within the tolerance change those after a ``span`` [s], (rows, nv)."""
@@ -317,18 +339,19 @@ class ImpulseSteps:
         rubs = count + len(self.joints.friction)
         gaps = [k for k in (*range(count), *range(rubs, len(blocks))) if np.isfinite(shifts[k, 2])]
         impulse, along_rows, which = np.zeros((count, 3)), np.zeros(len(blocks) - count), tuple(range(count, rubs))
-        changed = bool(which)
+        changed, pushed = bool(which), np.zeros(len(free))
+        alone, held = self._motions
         while True:
             # a speed that is round-off of its rows would be the unit of impulses, in which slips are huge
             closing = {k for k in gaps if blocks[k][-1] @ v + shifts[k, 2] < -_SMALL * np.abs(blocks[k] @ v).max()}
             if closing <= set(which) and not changed:
-                return Impulses(v, impulse, along_rows)
+                return Impulses(v=v, impulse=impulse, along=along_rows, driving=alone - held.T @ pushed)
             which, changed = tuple(sorted({*which, *closing})), False
             rows = np.concatenate([blocks[k] for k in which])
             to_joints = inverse @ rows.T
             g = rows @ free + np.concatenate([of_blocks[k] for k in which])
             got = self._found(which, rows @ to_joints, g, touching, span, convex=convex)
-            v = free + to_joints @ got
+            v, pushed = free + to_joints @ got, rows.T @ got
             impulse[:], along_rows[:] = 0.0, 0.0
             ends = np.cumsum([len(blocks[k]) for k in which])
             for end, k in zip(ends, which, strict=True):

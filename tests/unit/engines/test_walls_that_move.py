@@ -1,0 +1,91 @@
+"""Contacts with driven bodies: a table that turns, a bore that shakes, a belt; motions and forces of their drives."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+import proofroll
+from proofroll.core.scene import Scene
+from proofroll.elements.mechanism import Body, Joint, Mechanism
+from proofroll.elements.mechanism.run.element import MechanismElement
+from proofroll.elements.mechanism.scene.shapes.geometry import Geometry, Pair
+from proofroll.elements.mechanism.scene.signal import Formula
+
+RADIUS, MASS = 0.025, 0.5
+BALL = Body("ball", MASS, inertia=(0.4 * MASS * RADIUS**2,) * 3)
+SPHERE = Geometry("sphere", "ball", "sphere", radius=RADIUS)
+ENGINES = [
+    "mujoco[formulation=geoms,preset=tuned]",
+    "exudyn[formulation=spheres]",
+    "pinocchio[formulation=impulses]",
+]
+
+
+def _scene(joint: Joint, wall: Geometry, place: tuple[float, ...], v0: tuple[float, ...], friction: float) -> Scene:
+    """A ball at a place with a velocity on a wall of a body that a joint drives."""
+    free = Joint("free", "free", "world", "ball", q0=(*place, 1, 0, 0, 0), v0=v0)
+    driven = Body(joint.child, 1.0, inertia=(1.0, 1.0, 1.0))
+    mechanism = Mechanism(
+        (BALL, driven),
+        (free, joint),
+        geometries=(SPHERE, wall),
+        pairs=(Pair("contact", ("sphere", wall.name), friction),),
+    )
+    return Scene("driven", "", (MechanismElement(mechanism),))
+
+
+SCENES = {
+    # a ball at rest in the world, on a table that turns at 3 rad/s under it
+    "turntable": _scene(
+        Joint("axle", "revolute", "world", "table", motion=Formula("3*t")),
+        Geometry("top", "table", "plane"),
+        (0.3, 0.0, RADIUS),
+        (0.0, 0.0, 0.0, 0.9 / RADIUS, 0.0, 0.0),
+        math.inf,
+    ),
+    # a ball at rest at the bottom of a lying bore that shakes across its axis: it slips, and then rolls
+    "shaken bore": _scene(
+        Joint("shake", "prismatic", "world", "tube", axis=(1.0, 0.0, 0.0), motion=Formula("0.005*sin(20*t)")),
+        Geometry("inside", "tube", "bore", radius=0.225, axis=(0.0, 1.0, 0.0)),
+        (0.0, 0.0, -0.2),
+        (0.0,) * 6,
+        0.3,
+    ),
+}
+
+
+@pytest.mark.parametrize(("name", "place", "push"), [("turntable", 1e-7, 5e-3), ("shaken bore", 1e-4, 0.1)])
+@pytest.mark.parametrize("engine", ENGINES)
+def test_a_ball_on_a_driven_wall_moves_as_the_truth_says(engine: str, name: str, place: float, push: float) -> None:
+    """Path, and forces of contact and drive, are off by no more than first order; the model passes its certificate.
+
+    ``place`` [m] and ``push`` [N, N m]: some times what the worst engine leaves at 1e-3 s.
+    """
+    scene = SCENES[name]
+    found = proofroll.judge(proofroll.simulate(scene, engine, until=0.2, every=0.05), scene)
+    errors = {item.judgement.observable: item.judgement.error for item in found.compared}
+    assert errors["positions"] < place
+    (drive,) = (error for observable, error in errors.items() if observable.startswith("drive."))
+    assert max(drive, errors["contact_forces"]) < push
+
+
+@pytest.mark.parametrize("engine", [ENGINES[0], ENGINES[2]])
+def test_a_parcel_is_carried_along_by_a_belt(engine: str) -> None:
+    """It gains mu g until it has the belt's speed; the drive pulls with mu m g, and then with nothing."""
+    mu, m, g, speed = 0.3, 2.0, 9.81, 0.8
+    joints = (
+        Joint("run", "prismatic", "world", "belt", axis=(1.0, 0.0, 0.0), motion=Formula(f"{speed}*t")),
+        Joint("free", "free", "world", "parcel", q0=(0, 0, 0.1, 1, 0, 0, 0)),
+    )
+    shapes = (Geometry("top", "belt", "plane"), Geometry("sides", "parcel", "box", size=(0.3, 0.3, 0.2)))
+    bodies = (Body("belt", 5.0), Body("parcel", m, inertia=(0.02,) * 3))
+    mechanism = Mechanism(bodies, joints, geometries=shapes, pairs=(Pair("carry", ("sides", "top"), mu),))
+    run = proofroll.simulate(Scene("belt", "", (MechanismElement(mechanism),)), engine, until=0.5, every=0.1)
+    t, carried = run["time"].to_numpy(), speed / (mu * g)
+    x = np.where(t < carried, mu * g * t**2 / 2, speed * t - speed * carried / 2)
+    np.testing.assert_allclose(run["p_WB"].sel(body="parcel").to_numpy()[:, 0], x, atol=1e-3)  # a step at 0.8 m/s
+    pull = np.where(t < carried, mu * m * g, 0.0)
+    np.testing.assert_allclose(run["drive.run"].to_numpy()[1:], pull[1:], atol=1e-5)
