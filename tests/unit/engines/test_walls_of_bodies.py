@@ -141,3 +141,16 @@ def test_walls_are_certified(kind: str, setting: str, swapped: bool) -> None:
     assert {"gaps", "normals of contact", "places of contact", "friction of contacts"} <= told
     assert engine != "mujoco" or "responses of contacts" in told
     assert setting == "mujoco geoms matched" or "forces of contact" in told
+
+
+@pytest.mark.parametrize("setting", ["mujoco geoms matched", "exudyn spheres matched"])
+def test_a_ball_at_the_centre_of_a_bowl_falls(setting: str) -> None:
+    """Where all points of a wall are as near, no contact acts, and the ball falls freely."""
+    engine, formulation, preset = setting.split()
+    shapes = (Geometry("sphere", "ball", "sphere", radius=RADIUS), Geometry("wall", "world", "bowl", radius=0.5))
+    body = Body("ball", MASS, inertia=(MOMENT,) * 3)
+    pairs = (Pair("contact", ("sphere", "wall"), 0.3),)
+    mechanism = Mechanism((body,), (Joint("free", "free", "world", "ball"),), geometries=shapes, pairs=pairs)
+    run = load_engine(engine).build(mechanism, load_engine(engine).presets[formulation][preset])
+    run.advance(0.1)
+    assert run.sample().p_WB[0] == pytest.approx([0, 0, -GRAVITY * 0.1**2 / 2], abs=GRAVITY * 0.1 * 1e-3)

@@ -57,6 +57,17 @@ SCENES = {
 }
 
 
+@pytest.mark.parametrize("engine", ENGINES)
+def test_a_table_turns_under_a_ball(engine: str) -> None:
+    """A ball whose spin is the table's speed there stays in its place, without friction."""
+    run = proofroll.simulate(SCENES["turntable"], engine, until=0.1, every=0.1)
+    # 1e-7 m is some times what the softest contact leaves
+    np.testing.assert_allclose(run["p_WB"].sel(body="ball").to_numpy()[-1], (0.3, 0.0, RADIUS), atol=1e-7)
+    np.testing.assert_allclose(run["w_WB"].to_numpy()[-1], [[0.9 / RADIUS, 0, 0], [0, 0, 3.0]], atol=1e-4)
+    assert float(np.abs(run["drive.axle"].to_numpy()).max()) < 5e-3
+
+
+@pytest.mark.drill
 @pytest.mark.parametrize(("name", "place", "push"), [("turntable", 1e-7, 5e-3), ("shaken bore", 1e-4, 0.1)])
 @pytest.mark.parametrize("engine", ENGINES)
 def test_a_ball_on_a_driven_wall_moves_as_the_truth_says(engine: str, name: str, place: float, push: float) -> None:
@@ -72,7 +83,7 @@ def test_a_ball_on_a_driven_wall_moves_as_the_truth_says(engine: str, name: str,
     assert max(drive, errors["contact_forces"]) < push
 
 
-@pytest.mark.parametrize("engine", [ENGINES[0], ENGINES[2]])
+@pytest.mark.parametrize("engine", [ENGINES[0], "pinocchio[formulation=impulses,dt=2e-3]"])
 def test_a_parcel_is_carried_along_by_a_belt(engine: str) -> None:
     """It gains mu g until it has the belt's speed; the drive pulls with mu m g, and then with nothing."""
     mu, m, g, speed = 0.3, 2.0, 9.81, 0.8
@@ -83,9 +94,9 @@ def test_a_parcel_is_carried_along_by_a_belt(engine: str) -> None:
     shapes = (Geometry("top", "belt", "plane"), Geometry("sides", "parcel", "box", size=(0.3, 0.3, 0.2)))
     bodies = (Body("belt", 5.0), Body("parcel", m, inertia=(0.02,) * 3))
     mechanism = Mechanism(bodies, joints, geometries=shapes, pairs=(Pair("carry", ("sides", "top"), mu),))
-    run = proofroll.simulate(Scene("belt", "", (MechanismElement(mechanism),)), engine, until=0.5, every=0.1)
+    run = proofroll.simulate(Scene("belt", "", (MechanismElement(mechanism),)), engine, until=0.4, every=0.1)
     t, carried = run["time"].to_numpy(), speed / (mu * g)
     x = np.where(t < carried, mu * g * t**2 / 2, speed * t - speed * carried / 2)
-    np.testing.assert_allclose(run["p_WB"].sel(body="parcel").to_numpy()[:, 0], x, atol=1e-3)  # a step at 0.8 m/s
+    np.testing.assert_allclose(run["p_WB"].sel(body="parcel").to_numpy()[:, 0], x, atol=1e-3)  # half a step at 0.8 m/s
     pull = np.where(t < carried, mu * m * g, 0.0)
     np.testing.assert_allclose(run["drive.run"].to_numpy()[1:], pull[1:], atol=1e-5)

@@ -52,10 +52,12 @@ class HollowSphere(NamedTuple):
 def hollow_centre(wall: CurvedWall, sphere: Array, of_sphere: float, radius: float) -> Array:
     """Centre of a hollow sphere that touches a wall where a sphere is nearest, in the frame of the wall's body [m].
 
-    Beyond a gap of half the distance of the two centres it follows the sphere and not the wall.
+    Beyond a gap of half the distance of the two centres it follows the sphere and not the wall. Where several points of
+    the wall are as near, it lies along the axis.
     """
     near, distance = wall.near(wall.frame.T @ (sphere - wall.point)), radius - of_sphere
-    return np.asarray(sphere + (distance - min(near.distance - of_sphere, 0.5 * distance)) * (wall.frame @ near.normal))
+    normal = wall.frame @ near.normal if near.normal.any() else wall.axis
+    return np.asarray(sphere + (distance - min(near.distance - of_sphere, 0.5 * distance)) * normal)
 
 
 def hollow_radius(wall: CurvedWall, sphere: Array, of_sphere: float) -> float:

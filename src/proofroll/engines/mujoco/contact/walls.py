@@ -51,16 +51,17 @@ class _Plane(NamedTuple):
         R = data.xmat[own].reshape(3, 3)
         centre = data.xpos[other] + data.xmat[other].reshape(3, 3) @ self.sphere.centre
         plane = tangent(wall, R.T @ (centre - data.xpos[own]))
-        if not plane.normal.any():
-            return  # several points of the wall are as near
         model.geom_quat[self.geom] = to_quaternion(frame_of_axis(plane.normal))
         model.geom_pos[self.geom] = plane.point + (above - self.under) * plane.normal
 
 
 def tangent(wall: CurvedWall, centre: Array) -> HalfSpace:
-    """Plane tangent to a wall where a sphere is nearest, whose centre is given in the frame of the wall's body [m]."""
+    """Plane tangent to a wall where a sphere is nearest, whose centre is given in the frame of the wall's body [m].
+
+    Where several points are as near, it lies across the axis.
+    """
     near = wall.near(wall.frame.T @ (centre - wall.point))
-    normal = wall.frame @ near.normal
+    normal = wall.frame @ near.normal if near.normal.any() else wall.axis
     return HalfSpace(centre - near.distance * normal, normal)
 
 
