@@ -228,6 +228,8 @@ class Contacts:
                 turning = float(min(turns, key=np.linalg.norm) @ data.qvel) / dt
                 data.efc_aref[row] -= _LEAD * max(turning, 0.0)
             mu, friction = self._slipping(contact)
+            if friction.start == friction.stop:
+                continue
             if number in self._turned:
                 if number in self._on_cone:
                     data.efc_aref[row] -= mu * float(np.linalg.norm(rates[friction] - data.efc_aref[friction]))
@@ -237,7 +239,7 @@ class Contacts:
             slip_rates = rates[friction] if slip == 0 else data.efc_vel[friction]
             size = float(np.linalg.norm(slip_rates))
             rate = float(slip_rates @ rates[friction]) / size if size else 0.0
-            damped = float(data.efc_KBIP[row + 1, 1]) * slip
+            damped = float(data.efc_KBIP[friction.start, 1]) * slip
             if damped + rate > 0:
                 data.efc_aref[row] -= mu * (damped + _LEAD * max(rate, 0.0))
 

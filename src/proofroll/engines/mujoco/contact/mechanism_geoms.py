@@ -18,7 +18,7 @@ from proofroll.elements.mechanism.scene.rotations import Array
 from proofroll.engines.mujoco.contact.mechanism_contacts import Contacts, check_contacts, times_softer
 from proofroll.engines.mujoco.contact.walls import Walls, curved_end
 from proofroll.engines.mujoco.running import evaluate_behind, silent
-from proofroll.engines.mujoco.settings import LARGEST_IMPEDANCE, MujocoSettings, check_restitution
+from proofroll.engines.mujoco.settings import LARGEST_IMPEDANCE, MujocoSettings, check, check_restitution
 from proofroll.engines.mujoco.smooth import mechanism
 from proofroll.engines.mujoco.smooth.mechanism import MujocoMechanism
 
@@ -58,6 +58,7 @@ class MujocoGeoms(MujocoMechanism):
 
     def __init__(self, scene: Any, settings: MujocoSettings) -> None:
         mechanism = mechanism_of(scene)
+        check(settings, bounded=False)
         if mechanism.prescribed or all(curved_end(contact) is None for contact in mechanism.contacts):
             # nothing to curve, or motions, whose rows take velocities for those of the positions
             settings = replace(settings, curvature=False)
