@@ -343,7 +343,7 @@ class Contacts:
         names = contact_of_scene.body_a, contact_of_scene.body_b
         bodies = [self._model.body(name).id for name in names]
         movings = [self._moving(data, body) for body in bodies]
-        found, missing = touch(contact_of_scene, *movings), np.zeros(3)
+        found, missing = touch(contact_of_scene, movings[0], movings[1]), np.zeros(3)
         for body, moving, side in zip(bodies, movings, (1.0, -1.0), strict=True):
             mujoco.mj_jacDot(self._model, data, rate, None, found.place, body)
             along_body = found.place_rate - moving.velocity(found.place)

@@ -120,7 +120,7 @@ class ImpulseSteps:
         self._returned = np.concatenate([self.restitution, np.zeros(len(self.joints.friction)), stops])
         self._solvers: dict[tuple[int, ...], _Solver] = {}
         # Impulses that impose motions without contacts, and velocities by a unit rate of each.
-        self._motions = np.zeros(0), np.zeros((tree.model.nv, 0))
+        self._motions: tuple[Array, Array] = np.zeros(0), np.zeros((tree.model.nv, 0))
         try:
             J, _, inverse, _ = self.terms(self.q, self.v, self._dt)
             for k in range(len(self.contacts)):
@@ -236,7 +236,7 @@ class ImpulseSteps:
         tree.now = now
         into = inverse @ rows.T
         held = into @ np.linalg.inv(rows @ into)
-        self._motions = np.linalg.solve(rows @ into, rates - rows @ free), held
+        self._motions = np.array(np.linalg.solve(rows @ into, rates - rows @ free), dtype=float), held
         return free + held @ (rates - rows @ free), inverse - held @ into.T
 
     def unsure(self, span: float) -> Array:
