@@ -220,7 +220,7 @@ def test_the_nightly_workflow_parses_and_runs_what_there_is() -> None:
     (names,) = re.findall(r"proofroll report ([a-z_ ]+) --out", scripts[-1])
     assert set(names.split()) <= {*comparison_names(), *(Path(name).name for name in further_comparison_names())}
     options = {f"--{name.replace('_', '-')}" for name in inspect.signature(report).parameters}
-    assert set(re.findall(r"--(?:against|history|out)", scripts[-1])) <= options
+    assert set(re.findall(r"--(?:against|out)", scripts[-1])) <= options
     assert "://" not in (ROOT / "docs" / "nightly.yml").read_text(encoding="utf-8")
 
 

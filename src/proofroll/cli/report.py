@@ -53,9 +53,6 @@ def report(
         Path | None,
         typer.Option(help="An earlier report.json: tells what changed; exit 1 if a verdict, an error or a cost did."),
     ] = None,
-    history: Annotated[
-        Path | None, typer.Option(help="Runs nothing: draws the reports in this folder over time, in history.html.")
-    ] = None,
     as_json: options.Json = False,
 ) -> None:
     """Run the comparisons and the further studies, and write report.html and report.json.
@@ -81,9 +78,6 @@ def report(
     from proofroll.studies.comparison.by_name import comparison_named
 
     begin = _processor_seconds()
-    if history:
-        _show_history(history, out, as_json=as_json)
-        return
     earlier = EarlierReport.read(against) if against else None
     workers, assigned = Workers(), options.assignments(settings)
     if budget and scheduler:
@@ -127,16 +121,6 @@ def _processor_seconds() -> float:
     from proofroll.running.process import processor_seconds
 
     return processor_seconds()
-
-
-def _show_history(folder: Path, out: Path, *, as_json: bool) -> None:
-    """Writes the history of the reports in a folder, and prints its changes."""
-    from proofroll.report.history import read_history, write_history
-
-    history = read_history(folder)
-    write_history(history, out)
-    places = f"The history is in {out / 'history.html'}, the same content in {out / 'history.json'}."
-    options.show(history, as_json, lambda: [*history.lines(), places])
 
 
 class _Growing:
