@@ -1,7 +1,7 @@
 """Runs cases on other machines, through a Dask cluster.
 
-The runner stays the only planner: it sends cases to the cluster instead of its own threads. The cluster never holds
-more cases than keep its workers busy, and returns each result as the runner's own worker process would.
+The runner stays the only planner: it sends cases to the cluster instead of its own threads. Each result comes back as
+the runner's own worker process would give it.
 """
 
 import contextlib
@@ -11,11 +11,10 @@ import os
 import re
 import sys
 import threading
-import time
 import uuid
 import weakref
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import CancelledError
+from concurrent.futures import CancelledError, Future
 from functools import partial
 from multiprocessing import resource_tracker
 from pathlib import Path
@@ -31,13 +30,8 @@ from proofroll.running.memory import VARIABLE, memory_limit
 from proofroll.running.process import WorkerDied
 from proofroll.running.process_end import interrupt_held
 
-# Most cases that the scheduler holds: _AHEAD per thread (one runs, one waits) plus _AT_LEAST, so that a cluster that
-# grows with its load sees waiting work.
-_AHEAD, _AT_LEAST = 2, 64
-# Most results that are fetched together.
-_TOGETHER = 64
-# Interval at which the threads of a cluster are counted, as workers come and go [s].
-_COUNTED = 2.0
+# Most cases that the scheduler holds, which bounds its memory.
+_AHEAD = 1000
 # Time limit for an answer of a scheduler [s].
 _PATIENCE = 30.0
 # Time limit for the start of a scheduler on this machine, which may be busy [s].
@@ -68,21 +62,17 @@ class Cluster:
         self._task = task
         self._client, started = _connected(address)
         self._close = weakref.finalize(self, _end, self._client, started, self._asked.command)
-        self._room = threading.Condition()
-        self._sent: dict[Any, tuple[Case, Arrived]] = {}
-        self._threads, self._counted = 0, -_COUNTED
-        self._stopped = False
+        self._executor: Any = None
 
     @property
     def threads(self) -> int:
-        """Number of cases that it runs at once, counted at most two seconds ago."""
-        self._most()
-        return self._threads
+        """Number of cases that it runs at once."""
+        return sum(self._client.nthreads().values())
 
     def serve(
         self, take: Callable[[str | None], Case | None], arrived: Arrived, failed: Callable[[Exception], None]
     ) -> None:
-        """Runs cases for a runner until there are no more.
+        """Sends cases of a runner until there are no more.
 
         Args:
             take: gives the next case, preferably of the named engine; None: there are no more.
@@ -90,10 +80,10 @@ class Cluster:
                 result.
             failed: called with an error that ends the whole run.
         """
-        self._stopped = False
+        room, executor = threading.Semaphore(_AHEAD), self._new_executor()
         engine = None
         try:
-            while self._has_room() and (case := take(engine)) is not None:
+            while (case := take(engine)) is not None:
                 engine = case.engine.name
                 content = dataclasses.asdict(case) | {"timed": False}
                 try:
@@ -105,10 +95,11 @@ class Cluster:
                 except InputError as error:
                     arrived(case, partial(_raise, error))
                     continue
-                future = self._submit(self._task, (content, files), case.key)
-                with self._room:
-                    self._sent[future] = case, arrived
-                future.add_done_callback(partial(self._come, failed))
+                room.acquire()
+                if self._client.status != "running":
+                    raise self._gone(None)
+                future = executor.submit(self._task, self._asked, content, files)
+                future.add_done_callback(partial(self._come, room, case, arrived, failed))
         except Exception as error:
             failed(self._gone(error))
 
@@ -120,90 +111,44 @@ class Cluster:
         Raises:
             ProofrollError: a process or the scheduler ended, or the function raised it.
         """
-        waiting: list[Any] = []
-        rest = iter(items)
-        self._stopped = False
         try:
-            while True:
-                for item in rest:
-                    waiting.append(self._submit(cluster_task.call, (function, item), str(len(waiting))))
-                    if len(waiting) >= self._most():
-                        break
-                if not waiting:
-                    return
-                try:
-                    yield waiting.pop(0).result()
-                except ProofrollError:
-                    raise
-                except Exception as error:
-                    raise self._gone(error) from None
-        finally:
-            self.stop(waiting)
+            yield from self._new_executor().map(partial(cluster_task.call, self._asked, function), items)
+        except BaseException as error:
+            self.stop()
+            raise self._gone(error) if isinstance(error, Exception) else error from None
 
-    def stop(self, futures: Sequence[Any] = ()) -> None:
+    def stop(self) -> None:
         """Ends the running and waiting cases of this command on the cluster."""
-        with self._room:
-            self._stopped = True
-            futures = [*futures, *self._sent]
-            self._sent.clear()
-            self._room.notify_all()
-        if futures and self._client.status == "running":
+        if self._executor is not None and self._client.status == "running":
             with contextlib.suppress(Exception):  # a scheduler that is gone needs no end
-                self._client.cancel(futures)
+                self._executor.shutdown(wait=False)
                 self._client.run(cluster_task.end, self._asked.command, on_error="ignore")
 
-    def _submit(self, task: Callable[..., Any], arguments: tuple[Any, ...], name: str) -> Any:
-        key = f"proofroll-{self._asked.command}-{uuid.uuid4().hex[:8]}-{name}"
-        if self._client.status != "running":
-            raise self._gone(None)
-        return self._client.submit(task, self._asked, *arguments, key=key, pure=False)
+    def _new_executor(self) -> Any:
+        """Dask's ``concurrent.futures`` executor of one run; cases are never taken from an earlier run."""
+        self._executor = self._client.get_executor(pure=False)
+        return self._executor
 
-    def _has_room(self) -> bool:
-        """Waits until another case may be sent; False if the cluster was stopped."""
-        most = self._most()
-        with self._room:
-            while not self._stopped and len(self._sent) >= most:
-                self._room.wait(_COUNTED)
-            return not self._stopped
+    def _come(
+        self,
+        room: threading.Semaphore,
+        case: Case,
+        arrived: Arrived,
+        failed: Callable[[Exception], None],
+        future: Future[tuple[dict[str, Any], bytes | None]],
+    ) -> None:
+        """Hands the result of a finished case to the run that sent it."""
+        from distributed.scheduler import KilledWorker
 
-    def _most(self) -> int:
-        """Largest number of cases that the cluster may hold."""
-        if time.monotonic() - self._counted > _COUNTED:
-            self._threads, self._counted = sum(self._client.nthreads().values()), time.monotonic()
-        return _AHEAD * self._threads + _AT_LEAST
-
-    def _come(self, failed: Callable[[Exception], None], future: Any) -> None:
-        """Fetches the result of a finished case with all others finished by now, which costs no more than one.
-
-        Each result goes to the run that sent its case; that run may be over when Dask reports a result fetched before.
-        """
-        with self._room:
-            if future not in self._sent:  # fetched already, with others
-                return
-            done = [item for item in self._sent if item.status == "finished"][:_TOGETHER]
-            done = done if future in done else [future]
-            sent = [(item, *self._sent.pop(item)) for item in done]
-            self._room.notify()
-        self._fetch(sent, failed)
-
-    def _fetch(self, sent: Sequence[tuple[Any, Case, Arrived]], failed: Callable[[Exception], None]) -> None:
-        """Fetches results and hands each, with its case, to the run that sent it."""
+        room.release()
         try:
-            answers = self._client.gather([future for future, _, _ in sent])
+            content, data = future.result()
+        except KilledWorker as error:
+            lost = f"each of {error.allowed_failures + 1} workers of the cluster that ran it was lost"
+            arrived(case, partial(_raise, WorkerDied(Status.CRASHED, lost)))
         except Exception as error:
-            from distributed.scheduler import KilledWorker
-
-            if not isinstance(error, KilledWorker):
-                failed(self._gone(error))
-            elif len(sent) > 1:  # one of them killed its workers: find it by fetching each alone
-                for sent_future in sent:
-                    self._fetch([sent_future], failed)
-            else:
-                lost = f"each of {error.allowed_failures + 1} workers of the cluster that ran it was lost"
-                ((_, case, arrived),) = sent
-                arrived(case, partial(_raise, WorkerDied(Status.CRASHED, lost)))
-            return
-        for (_, case, arrived), (content, data) in zip(sent, answers, strict=True):
+            failed(self._gone(error))
+        else:
             arrived(case, partial(_made, content, data))
 
     def _gone(self, error: Exception | None) -> ProofrollError:
