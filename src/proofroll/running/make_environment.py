@@ -1,8 +1,6 @@
 """Makes the environment of an engine in another version: a virtual environment with the engine and this proofroll."""
 
-import base64
 import contextlib
-import hashlib
 import json
 import os
 import re
@@ -10,12 +8,9 @@ import shutil
 import signal
 import subprocess
 import sys
-import tempfile
-import zipfile
 from collections.abc import Callable, Sequence
 from difflib import get_close_matches
 from importlib import metadata
-from importlib.util import find_spec
 from pathlib import Path
 
 from proofroll.core.entry_points import announced
@@ -24,15 +19,8 @@ from proofroll.core.plugins import GROUP, distribution_of, engine_names, release
 from proofroll.running import environments
 from proofroll.running.engine_questions import describe
 from proofroll.running.environments import Environment
-from proofroll.running.interpreters import OLDEST
 from proofroll.running.process import environment_of_another
 
-_PACKAGES = """
-import json, platform
-from importlib.metadata import distributions
-found = sorted({f"{item.name}=={item.version}" for item in distributions()})
-print(json.dumps([platform.python_version(), found]))
-"""
 _PINNED = re.compile(r"\s*([\w.-]+)(?:\[[^\]]*\])?\s*==\s*(\w[\w.+-]*)\s*")
 _VERSIONS = re.compile(r"\(from versions: (?:[^)]*, )?((?:[^,)]+, ){2}[^,)]+)\)")  # in an error message of pip
 _WORDS = 400  # length of the end of pip's message that is shown [characters]
@@ -53,7 +41,7 @@ def add(
         name: of the engine.
         requirements: as pip reads them, e.g. ``mujoco==3.8.1``.
         label: by default the version that the first requirement pins.
-        python: command or path of the Python; by default this one.
+        python: its Python, as virtualenv finds it: a command, a path or a version; by default this one.
         tell: called with lines about the progress.
 
     Raises:
@@ -83,11 +71,10 @@ def add(
         advice = f"it is there already ({', '.join(taken.requirements)}); proofroll engines remove {name}@{label} first"
         raise InputError("label", label, advice)
     _require_supported(name, requirements)
-    base = _interpreter(python)
     with environments.making(folder):
         environments.delete(folder)  # a half that an interrupted process left
         try:
-            made = _made(name, label, folder, base, requirements, tell)
+            made = _made(name, label, folder, python, requirements, tell)
             if pinned == label and release(made.version) != release(label):
                 raise ProofrollError(f"{name} there is version {made.version}, not {label}; look at the requirements")
             made.stamp()
@@ -142,121 +129,52 @@ def _require_supported(name: str, requirements: Sequence[str]) -> None:
 
 
 def _made(
-    name: str, label: str, folder: Path, base: Path, requirements: Sequence[str], tell: Callable[[str], None]
+    name: str, label: str, folder: Path, base: str, requirements: Sequence[str], tell: Callable[[str], None]
 ) -> Environment:
     venv = folder / "venv"
-    with tempfile.TemporaryDirectory() as wheels:
-        asked = [*_carried(name, Path(wheels)), *requirements]
-        tell(f"making {venv}")
-        uv = shutil.which("uv")
-        try:
-            if uv:
-                _install_by_uv(uv, venv, base, asked, tell)
-            else:
-                raise ProofrollError("there is no uv")
-        except ProofrollError as error:
-            if uv:
-                tell(f"{error}; trying pip")
-            environments.delete(folder)
-            folder.mkdir(parents=True)
-            _install_by_pip(venv, base, asked, tell)
-    tell(f"importing {name}")
     python = venv / "bin" / "python"
+    tell(f"making {venv}")
+    try:
+        _call([sys.executable, "-m", "virtualenv", "--quiet", "--python", base or sys.executable, venv])
+    except ProofrollError as error:
+        raise InputError("--python", base or sys.executable, f"no environment can be made from it: {error}") from None
+    carried = _carried(name, next(venv.glob("lib/python*/site-packages")))
+    tell("installing by pip")
+    _call([python, "-m", "pip", "install", "--quiet", "--only-binary", ":all:", *carried, *requirements])
+    tell(f"importing {name}")
     try:
         version = describe(f"{name}@{python}").version
     except ProofrollError as error:
         reason = str(error).replace(f"{name}@{python}: ", "")
         raise ProofrollError(f"{name} does not work with {', '.join(requirements)}: {reason}") from None
-    interpreter, packages = json.loads(_call([python, "-c", _PACKAGES]))
+    inspected = json.loads(_call([python, "-m", "pip", "inspect"]))
     return Environment(
         name=name,
         label=label,
         folder=folder,
         version=version,
         requirements=list(requirements),
-        interpreter=interpreter,
-        packages=packages,
+        interpreter=inspected["environment"]["python_full_version"],
+        packages=sorted("{name}=={version}".format_map(item["metadata"]) for item in inspected["installed"]),
     )
 
 
-def _install_by_pip(venv: Path, base: Path, packages: Sequence[str], tell: Callable[[str], None]) -> None:
-    """Installs packages into the environment by pip.
+def _carried(name: str, site: Path) -> list[str]:
+    """Requirements for this proofroll and the package of the engine's adapter, whose files are copied to ``site``.
 
-    The pip of this Python serves if the environment has the same Python; otherwise one is installed there first.
+    For a package in editable mode these name the path of the source, which is then shared.
     """
-    target = venv / "bin" / "python"
-    if base == Path(sys.executable) and find_spec("pip"):
-        _call([base, "-m", "venv", "--without-pip", venv])
-        command: list[str | Path] = [base, "-m", "pip", "--python", target]
-    else:  # pip does not serve Pythons newer than its own
-        _call([base, "-m", "venv", venv])
-        command = [target, "-m", "pip"]
-    tell("installing by pip")
-    _call([*command, "install", "--quiet", "--only-binary", ":all:", *packages])
-
-
-def _install_by_uv(uv: str, venv: Path, base: Path, packages: Sequence[str], tell: Callable[[str], None]) -> None:
-    _call([uv, "venv", "--quiet", "--python", base, venv])
-    tell("installing by uv")
-    target = str(venv / "bin" / "python")
-    _call([uv, "pip", "install", "--quiet", "--python", target, "--only-binary", ":all:", *packages])
-
-
-def _interpreter(python: str) -> Path:
-    """Path of the Python from which an environment is made. Raises InputError if it is no Python or too old."""
-    if not python:
-        return Path(sys.executable)
-    program = shutil.which(str(Path(python).expanduser()))
-    if program is None:
-        raise InputError("--python", python, "there is no such program; give the command or the path of a Python")
-    try:
-        # A command may be a script around the real one, as pyenv's are.
-        output = _call(
-            [program, "-c", "import sys; print(sys.executable); print(sys.version_info[0], sys.version_info[1])"]
-        )
-        executable, version = output.splitlines()[-2:]
-        numbers = tuple(map(int, version.split()))
-    except (ProofrollError, ValueError) as error:
-        raise InputError("--python", python, f"it does not run as a Python: {error}") from None
-    if numbers < OLDEST:
-        least = ".".join(map(str, OLDEST))
-        raise InputError(
-            "--python", python, f"it is Python {version.replace(' ', '.')}; proofroll needs {least} or later"
-        )
-    return Path(executable)
-
-
-def _carried(name: str, wheels: Path) -> list[str]:
-    """Wheels of this proofroll and of the package of the engine's adapter: the environment gets the same code."""
-    names = ["proofroll"]
-    for point in announced(GROUP):
-        if point.name == name and point.dist is not None and point.dist.name not in names:
-            names.append(point.dist.name)
-    return [str(_wheel(metadata.distribution(item), wheels)) for item in names]
-
-
-def _wheel(item: metadata.Distribution, folder: Path) -> Path:
-    """Wheel rebuilt from the files of an installed package (PEP 376, PEP 427).
-
-    For a package in editable mode it contains the path of the source, which is then shared.
-    """
-    files = [file for file in item.files or () if ".." not in file.parts and "__pycache__" not in file.parts]
-    info = next((file.parts[0] for file in files if file.parts[0].endswith(".dist-info")), None)
-    if info is None:
-        raise ProofrollError(f"{item.name} was installed without a list of its files; install it by pip")
-    written = re.sub(r"[-_.]+", "_", item.name)
-    path = folder / f"{written}-{item.version}-py3-none-any.whl"
-    records = []
-    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
-        for file in files:
-            if file.parts[0] == info and file.name in {"RECORD", "INSTALLER", "REQUESTED", "direct_url.json"}:
-                continue
-            content = Path(str(item.locate_file(file))).read_bytes()
-            archive.writestr(str(file), content)
-            seal = base64.urlsafe_b64encode(hashlib.sha256(content).digest()).rstrip(b"=").decode()
-            records.append(f"{file},sha256={seal},{len(content)}")
-        archive.writestr(f"{info}/RECORD", "\n".join([*records, f"{info}/RECORD,,", ""]))
-    return path
+    adapters = (point.dist.name for point in announced(GROUP) if point.name == name and point.dist is not None)
+    requirements = []
+    for item in map(metadata.distribution, dict.fromkeys(["proofroll", *adapters])):
+        if item.files is None:
+            raise ProofrollError(f"{item.name} was installed without a list of its files; install it by pip")
+        for file in item.files:
+            if ".." not in file.parts and "__pycache__" not in file.parts:
+                (site / file).parent.mkdir(parents=True, exist_ok=True)
+                shutil.copyfile(file.locate(), site / file)
+        requirements.append(f"{item.name}=={item.version}")
+    return requirements
 
 
 def _call(command: Sequence[str | Path]) -> str:

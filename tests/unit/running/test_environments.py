@@ -41,7 +41,6 @@ def wheels(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
                 archive.writestr(name, text)
     for name, value in {"NO_INDEX": "1", "NO_DEPS": "1", "FIND_LINKS": str(folder), "CONFIG_FILE": os.devnull}.items():
         monkeypatch.setenv(f"PIP_{name}", value)
-    monkeypatch.setenv("PATH", "/usr/bin:/bin")  # pip is tested, not uv
     monkeypatch.setenv(environments.VARIABLE, str(tmp_path / "engines"))
     return folder
 
@@ -90,14 +89,14 @@ def test_a_version_that_is_too_old_is_not_installed(
         (["aged>=1.0"], {}, "say by which label"),
         (["aged==1.0"], {"label": "../up"}, "use letters, digits"),
         (["--upgrade"], {"label": "x"}, "not an option of pip"),
-        (["aged==1.0"], {"python": "no-such-python"}, "there is no such program"),
-        (["aged==1.0"], {"python": "false"}, "it does not run as a Python"),
+        (["aged==1.0"], {"python": "no-such-python"}, "no environment can be made from it"),
+        (["aged==1.0"], {"python": "/bin/false"}, "no environment can be made from it"),
     ],
 )
 def test_what_makes_no_environment_says_why(
     wheels: Path, requirements: list[str], options: dict[str, str], says: str
 ) -> None:
-    """Bad input is told before anything is made."""
+    """Bad input is told in one line, and nothing is left."""
     with pytest.raises(InputError, match=says):
         make_environment.add("aged", requirements, **options)
     assert not list(wheels.parent.glob("engines/*"))
@@ -131,10 +130,7 @@ def test_a_mistyped_engine_is_not_installed(
 def test_an_interrupted_environment_leaves_nothing(wheels: Path, tmp_path: Path) -> None:
     """Ctrl-C ends what was started, exits 130, and no half is taken for a whole."""
     pidfile = tmp_path / "pid"
-    slow = script(
-        tmp_path / "slow",
-        f'[ "$1" = -c ] && {{ echo "$0"; echo 3 12; exit 0; }}\necho $$ > {pidfile}\nmkdir -p "$3/bin"\nsleep 1000',
-    )
+    slow = script(tmp_path / "slow", f"echo $$ > {pidfile}\nsleep 1000")
     command = [sys.executable, "-m", "proofroll", "engines", "add", "aged", "--requirement", "aged==2.0"]
     process = subprocess.Popen([*command, "--python", str(slow)], stderr=subprocess.PIPE, text=True)
     while not pidfile.is_file() or not pidfile.read_text().strip():
