@@ -10,7 +10,6 @@ from collections.abc import Iterable, Iterator
 from importlib.machinery import PathFinder
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any
 
 import proofroll
 from proofroll.core.entry_points import announced
@@ -24,8 +23,6 @@ from proofroll.files.toml import named_file
 from proofroll.files.trajectory_file import NETCDF, STORED, read
 
 FILE = "references.bib"
-_ENTRY = re.compile(r"^@(\w+)\{\s*([^\s,]+)\s*,\n(.*?)^\}", flags=re.DOTALL | re.MULTILINE)
-_FIELD = re.compile(r"^\s*(\w+)\s*=\s*\{(.*)\},?\s*$", flags=re.MULTILINE)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -184,60 +181,7 @@ def _folder(module: str) -> Path | None:
 
 
 def entries(folder: Path) -> list[str]:
-    """Entries of a folder's ``references.bib``; none if there is no such file.
-
-    Raises:
-        InputError: the file has lines that are no entries with one field in braces a line, or an entry without a title.
-    """
+    """Entries of a folder's ``references.bib``; none if there is no such file."""
     path = folder / FILE
-    if not path.is_file():
-        return []
-    text = path.read_text(encoding="utf-8")
-    references = [match[0] for match in _ENTRY.finditer(text)]
-    rest = [line for line in _ENTRY.sub("", text).splitlines() if line.strip() and not line.startswith("%")]
-    if rest or not all("title" in fields(entry) for entry in references):
-        fault = rest[0] if rest else "an entry without a title"
-        raise InputError(str(path), fault, "write entries of BibTeX, a line for each field: name = {value},")
-    return references
-
-
-def fields(entry: str) -> dict[str, str]:
-    """Fields of an entry, as plain text."""
-    return {name.lower(): _plain(value) for name, value in _FIELD.findall(entry)}
-
-
-def _plain(text: str) -> str:
-    return text.replace("{", "").replace("}", "").replace("--", "–").replace("~", " ").replace("\\&", "&")
-
-
-def sentence(entry: str) -> str:
-    """Line of a bibliography: authors, title, publication, year, pages, DOI or address."""
-    entries = fields(entry)
-    publication = (
-        entries.get("journal") or entries.get("booktitle") or entries.get("publisher") or entries.get("howpublished")
-    )
-    volume = f"{entries.get('volume', '')}{'(' + entries['number'] + ')' if 'number' in entries else ''}"
-    parts = [
-        _names(entries.get("author", "")),
-        entries["title"],
-        " ".join(filter(None, [publication, volume])),
-        entries.get("year", ""),
-        entries.get("pages", ""),
-        f"doi:{entries['doi']}" if "doi" in entries else entries.get("url", ""),
-    ]
-    return ", ".join(filter(None, parts))
-
-
-def _names(authors: str) -> str:
-    """Authors of BibTeX, ``Blajer, Wojciech and Izzo, Dario``, as ``Wojciech Blajer and Dario Izzo``."""
-    turned = [author.partition(", ") for author in re.split(r"\s+and\s+", authors)]
-    *some, last = [f"{forename} {family}".strip() for family, _, forename in turned]
-    return f"{', '.join(some)} and {last}" if some else last
-
-
-def content(told: Iterable[Cited]) -> list[dict[str, Any]]:
-    """Citations as plain data for ``--json``."""
-    return [
-        dataclasses.asdict(item) | {"references": [{"bibtex": entry, **fields(entry)} for entry in item.references]}
-        for item in told
-    ]
+    text = path.read_text(encoding="utf-8") if path.is_file() else ""
+    return [entry.strip() for entry in re.split(r"^(?=@)", text, flags=re.MULTILINE) if entry.startswith("@")]

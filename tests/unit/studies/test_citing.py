@@ -15,14 +15,14 @@ from proofroll.core.errors import InputError
 from proofroll.core.plugins import engine_names
 from proofroll.files.data_folders import data_folder
 from proofroll.files.trajectory_file import read, write
-from proofroll.studies.citing import citations, entries, fields, sentence
+from proofroll.studies.citing import citations, entries
 
 Proofroll = Callable[..., tuple[int, str, str]]
 ROOT = Path(__file__).resolve().parents[3]
 
 
 def test_a_run_is_cited_with_its_versions(proofroll: Proofroll, tmp_path: Path) -> None:
-    """Trajectory (of both kinds) and document of a run name engine, version, scene, truth and suite; so does BibTeX."""
+    """Trajectory (of both kinds) and document of a run name engine, version, scene, truth and suite."""
     run, stored, document = tmp_path / "run.nc", tmp_path / "run.npz", tmp_path / "run.json"
     words = ("run", "pendulum", "--engine", "projection", "--until", "0.02", "--out", str(run), "--json")
     code, out, err = proofroll(*words)
@@ -36,8 +36,8 @@ def test_a_run_is_cited_with_its_versions(proofroll: Proofroll, tmp_path: Path) 
     for file in (run, stored):
         code, out, _ = proofroll("cite", str(file))
         assert code == 0
-        assert f"engine projection {version}\n  Wojciech Blajer, Elimination of constraint violation" in out
-    code, out, _ = proofroll("cite", str(document), "sphere_in_cylinder", "--bibtex")
+        assert f"% engine projection {version}\n@article{{blajer2002elimination," in out
+    code, out, _ = proofroll("cite", str(document), "sphere_in_cylinder")
     keys = re.findall(r"^@\w+\{(\w+),", out, flags=re.MULTILINE)
     assert code == 0
     assert {"proofroll", "blajer2002elimination", "blajer2006sphere", "whittaker1937treatise"} <= set(keys)
@@ -62,15 +62,6 @@ def test_a_file_that_is_no_result(text: str, tmp_path: Path) -> None:
         citations([str(path)])
 
 
-def test_a_narrow_terminal(proofroll: Proofroll, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Citations keep to the width of the terminal; the rest of one stands under it, indented."""
-    monkeypatch.setenv("COLUMNS", "80")
-    code, out, _ = proofroll("cite", "pinocchio")
-    assert code == 0
-    assert max(map(len, out.splitlines())) <= 80
-    assert "\n    " in out
-
-
 def test_nothing_of_the_name(proofroll: Proofroll) -> None:
     """A word that is neither a scene, a comparison, an engine nor a file is wrong usage, in one line."""
     code, out, err = proofroll("cite", "no_such_thing")
@@ -84,14 +75,7 @@ def test_every_engine_of_ours_is_cited() -> None:
     files = [*(ROOT / "src").rglob("references.bib"), *data_folder("models").rglob("references.bib")]
     assert len(files) > 8
     for path in files:
-        assert all(sentence(entry) for entry in entries(path.parent))
-
-
-def test_references_that_cannot_be_read(tmp_path: Path) -> None:
-    """A broken file is named with the line that is wrong."""
-    (tmp_path / "references.bib").write_text("@book{a,\n  title = {A},\n}\nnonsense\n", encoding="utf-8")
-    with pytest.raises(InputError, match=r"references\.bib.*nonsense"):
-        entries(tmp_path)
+        assert all(re.match(r"@\w+\{\w+,\n[^@]*title = ", entry) for entry in entries(path.parent))
 
 
 def test_the_suite_says_the_same_everywhere() -> None:
@@ -99,6 +83,6 @@ def test_the_suite_says_the_same_everywhere() -> None:
     cff = yaml.safe_load((ROOT / "CITATION.cff").read_text(encoding="utf-8"))
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     (entry,) = citations([])[0].references
-    assert fields(entry)["title"] == cff["title"]
-    assert fields(entry)["author"] == cff["authors"][0]["name"]
+    assert f"title = {{{{{cff['title']}}}}}" in entry or f"title = {{{cff['title']}}}" in entry
+    assert cff["authors"][0]["name"] in entry
     assert (cff["version"], cff["license"]) == (project["version"], project["license"])
