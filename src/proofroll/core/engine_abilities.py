@@ -195,10 +195,8 @@ class Reproduces(Protocol):
     def reproducer(cls, scene: Scene, settings: Any) -> str:
         """Source of a program that uses only numpy and the engine's own interface.
 
-        For a ball it assigns RADIUS [m], MASS [kg], INERTIA [kg m²], GRAVITY [m/s²] and the initial state, and defines
-        ``frame(p)``, ``gap(p)`` (:func:`proofroll.elements.ball_on_surface.reproducer_source.cut_program`) and
-        ``run(times)``. That is a generator of the ball's centre, velocity and angular velocity in the world at each
-        time [s]; if the engine reports a failure, it raises RuntimeError with the engine's text.
+        It defines ``run(times)``, a generator of what the element's program checks at each time [s], of a
+        mechanism places [m], energy [J] and how far joints are open [m]. If the engine fails, it raises RuntimeError.
 
         Raises:
             Refused: there is no program for this; the text says why.

@@ -24,7 +24,7 @@ from proofroll.running.program import path_of
 # Folders whose code decides every result; reports and the command line do not.
 FOUNDATION = ("core", "elements", "files", "running")
 # Names of modules and folders, at any depth, that only show or explain results.
-ASIDE = frozenset({"reproducer", "reproducer_source", "robot_reader", "report", "failure_program", "diagnosis"})
+ASIDE = frozenset({"reproducer", "robot_reader", "report", "failure_program", "diagnosis"})
 
 
 def describe(engine: str) -> dict[str, Any]:

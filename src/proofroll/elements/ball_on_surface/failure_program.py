@@ -1,4 +1,4 @@
-"""Text of programs that show a failure of a ball: the engine's part, the reference values, the check."""
+"""Text of programs that show a failure of a ball: the run by proofroll, the reference values, the check."""
 
 import numpy as np
 
@@ -13,8 +13,18 @@ from proofroll.elements.ball_on_surface.failure import (
     off_surface,
 )
 from proofroll.elements.ball_on_surface.model import RollingBall
-from proofroll.elements.ball_on_surface.reproducer_source import WALL, ball_numbers
 
+_WALL = '''
+
+def frame(p):
+    """e1 (into the wall), e2, e3 for a ball at p."""
+    return np.reshape(BODY.surface.triad(*map(float, p)), (3, 3))
+
+
+def gap(p):
+    """Distance of the ball from the wall [m], negative where it has sunk in."""
+    return float(BODY.surface.nearby(*map(float, p))[0])
+'''
 _SIGNS = '''
 
 def signs(stopped, p, v, w):
@@ -47,22 +57,25 @@ def signs(stopped, p, v, w):
 '''
 
 
-def through_proofroll(body: RollingBall, failed: FailedRun) -> str:
-    """Engine's part of the program, with calls of proofroll, for failures that involve proofroll's own code."""
+def _run(body: RollingBall, failed: FailedRun) -> str:
+    """Part of the program that runs the ball by proofroll."""
     head = "import numpy as np\nfrom proofroll import load_scene, simulate\n"
     head += "from proofroll.elements.ball_on_surface.element import rolling_ball\n\n"
-    return (
-        head
-        + assignment(**ball_numbers(body))
-        + "\n"
-        + asking(failed, "p_WB", "v_WB", "w_WB")
-        + f"\n\nBODY = rolling_ball(SCENE)\n{WALL}"
+    numbers = assignment(
+        RADIUS=body.ball.radius,
+        MASS=body.ball.mass,
+        INERTIA=body.ball.inertia,
+        GRAVITY=body.gravity,
+        POSITION=body.p0,
+        VELOCITY=body.v0,
     )
+    run = asking(failed, "p_WB", "v_WB", "w_WB")
+    return f"{head}{numbers}\n{run}\n\nBODY = rolling_ball(SCENE)\n{_WALL}"
 
 
 def program(body: RollingBall, failed: FailedRun, engine: str | None) -> str:
     """Text of the program; see :class:`proofroll.core.element_abilities.WritesPrograms`."""
-    truth, part = failed.truth, engine if engine is not None else through_proofroll(body, failed)
+    truth, part = failed.truth, engine if engine is not None else _run(body, failed)
     generators = body.surface.generators
     generator = None if generators is None else generators[-1]
     true: list[float] = []

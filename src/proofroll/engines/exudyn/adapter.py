@@ -183,11 +183,8 @@ class Exudyn:
     @classmethod
     def reproducer(cls, scene: Scene, settings: ExudynSettings) -> str:
         """See :class:`proofroll.core.engine_abilities.Reproduces`."""
-        from proofroll.engines.exudyn.reproducer import mechanism_source, source
+        from proofroll.engines.exudyn.reproducer import mechanism_source
 
-        model = cls.build(scene, settings)
-        if settings.formulation in {"spheres", "discs"}:
-            raise Refused("programs hold no contacts between bodies yet")
-        if settings.formulation in OF_MECHANISMS:
-            return mechanism_source(model, mechanism_of(scene), settings)
-        return source(model, rolling_ball(scene), settings)
+        if settings.formulation not in {"redundant", "tree"}:
+            raise Refused("the steps of bodies in contact are proofroll's")
+        return mechanism_source(cls.build(scene, settings), mechanism_of(scene), settings)

@@ -1,59 +1,38 @@
-"""Source of a program that repeats a run with Exudyn alone, without proofroll: of a ball on a wall or a mechanism."""
+"""Source of a program that repeats a run of a mechanism with Exudyn alone, without proofroll."""
 
-import math
 from typing import Any
 
 import numpy as np
 
-from proofroll.core.cut_out import CutOut
 from proofroll.core.errors import Refused
-from proofroll.elements.ball_on_surface.model import RollingBall
-from proofroll.elements.ball_on_surface.reproducer_source import cut_program
+from proofroll.core.program_text import assignment
 from proofroll.elements.mechanism import Mechanism
-from proofroll.engines.exudyn.ball.generic import Generic
-from proofroll.engines.exudyn.integration import Integration
-from proofroll.engines.exudyn.native import exu
-from proofroll.engines.exudyn.settings import ExudynSettings
+from proofroll.engines.exudyn.settings import EXPLICIT, ExudynSettings
 
-_RUN = '''
-
-def run(times):
-    """Centre, velocity and angular velocity of the ball in the world at each time."""
-    model = {model}(BODY, SETTINGS)
-    for t in times:
-        model.advance(t)
-        seen = model.sample()
-        yield np.array(seen.p_WB), np.array(seen.v_WB), np.array(seen.w_WB)
-'''
-
-
-def source(model: Any, body: RollingBall, settings: ExudynSettings) -> str:
-    """Program for a ball, cut out of the adapter; see :class:`proofroll.core.engine_abilities.Reproduces`."""
-    if body.flies:
-        raise Refused("there is no program with impacts yet")
-    if isinstance(model, Generic) and math.isfinite(body.contact.mu_static):
-        raise Refused("the loop that switches Exudyn's constraint of rolling off while the ball slips is proofroll's")
-    kind = type(model)
-    run, never = _RUN.format(model=kind.__name__), {"SwitchedIntegration": "SwitchedIntegration = None"}
-    return cut_program(body, settings, [kind], ["advance", "sample"], run, never)
-
-
-_SYSTEM = """
+_HEAD = "from __future__ import annotations\nimport exudyn as exu\nimport numpy as np\n\n\n"
+_STATE = '''
 exu.config.printToConsole = False
 mbs = exu.SystemContainer().AddSystem()
 for add, items in ((mbs.AddNode, NODES), (mbs.AddObject, OBJECTS), (mbs.AddMarker, MARKERS), (mbs.AddLoad, LOADS)):
     for item in items:
         add(item)
-"""
-_STATE = '''
 mbs.Assemble()
-integration = Integration(mbs, SETTINGS, dependent=DEPENDENT, mass=MASS)
+settings = exu.SimulationSettings()
+settings.SetDictionary(SETTINGS)
+solver = SOLVER()
+solver.InitializeSolver(mbs, settings)
 
 
 def run(times):
     """Followed quantities at each time."""
+    last = 0.0
     for t in times:
-        integration.advance(t)
+        if t > last:
+            solver.it.startTime, solver.it.currentTime, solver.it.endTime = last, last, t
+            solver.it.numberOfSteps = round((t - last) / DT)
+            if not solver.SolveSteps(mbs, settings) or abs(solver.it.currentTime - t) > DT / 2:
+                raise RuntimeError(f"Exudyn stopped at {solver.it.currentTime:g} s: {solver.GetErrorString()}")
+            last = t
         yield seen()
 
 
@@ -85,8 +64,8 @@ def seen():
             opened = max(opened, np.abs(held * apart).max())
         elif kind == "KinematicTree":
             q, v = mbs.systemData.GetODE2Coordinates(), mbs.systemData.GetODE2Coordinates_t()
-            integration.solver.ComputeMassMatrix(mbs, 1.0)
-            energy += v @ integration.solver.GetSystemMassMatrix() @ v / 2
+            solver.ComputeMassMatrix(mbs, 1.0)
+            energy += v @ solver.GetSystemMassMatrix() @ v / 2
             energy += np.array(item["jointPControlVector"]) @ (q - item["jointPositionOffsetVector"]) ** 2 / 2
             heights = [mbs.GetMarkerOutput(marker, *where) @ GRAVITY for marker in CENTRES]
             energy -= float(np.dot(item["linkMasses"], heights))
@@ -100,17 +79,16 @@ def mechanism_source(model: Any, mechanism: Mechanism, settings: ExudynSettings)
     system = model.system
     places = [int(model.marker(body, position)) for body, position in mechanism.followed]
     centres = [int(model.marker(joint.child, com[joint.child])) for joint in mechanism.joints]
-    cut = CutOut([Integration], ["advance", "solver"])
-    text = [f"{cut.head}\n{cut.text}\n\n# The system as Exudyn lists it.\n"]
+    text = [f"{_HEAD}# The system as Exudyn lists it.\n"]
     data = system.systemData
     for name in ("Node", "Object", "Marker", "Load"):
         count, get = getattr(data, f"NumberOf{name}s")(), getattr(system, f"Get{name}")
         lines = "".join(f"    {_literal(_essential(get(number)))},\n" for number in range(count))
         text.append(f"{name.upper()}S = [\n{lines}]\n")
     text.append(f"GRAVITY = {list(mechanism.gravity)!r}\n# Markers of what is followed, and of the centres of mass.\n")
-    text.append(f"PLACES = {places!r}\nCENTRES = {centres!r}\n{_SYSTEM}SETTINGS = {cut.literal(settings)}\n")
-    text.append(f"DEPENDENT = {model.integration.options.linearSolver.ignoreSingularJacobian!r}\n")
-    text.append(f"MASS = {mechanism.mass!r}\n")
+    solver = "MainSolverExplicit" if settings.integrator in EXPLICIT else "MainSolverImplicitSecondOrder"
+    text.append(assignment(DT=settings.dt, PLACES=places, CENTRES=centres))
+    text.append(f"SETTINGS = {_literal(model.integration.options.GetDictionary())}\nSOLVER = exu.{solver}\n")
     return "".join([*text, _STATE])
 
 
@@ -136,8 +114,8 @@ def _literal(value: Any) -> str:
         return repr(value.tolist())
     if hasattr(value, "GetIndex"):
         return repr(value.GetIndex())
-    if isinstance(value, exu.JointType):
-        return f"exu.JointType.{value.name}"
+    if hasattr(value, "name"):  # of an enumeration
+        return f"exu.{type(value).__name__}.{value.name}"
     if isinstance(value, (bool, int, float, str)):
         return repr(value)
     inner, name = ", ".join(_literal(value[number]) for number in range(len(value))), type(value).__name__

@@ -8,6 +8,7 @@ import mujoco
 import numpy as np
 
 from proofroll.core.engine_abilities import Level, Term, require_provided
+from proofroll.core.errors import Refused
 from proofroll.core.events import Event
 from proofroll.core.plugins import resolve_settings
 from proofroll.core.scene import Scene
@@ -172,15 +173,12 @@ class Mujoco(SteppedModel):
 
     @classmethod
     def reproducer(cls, scene: Scene, settings: MujocoSettings) -> str:
-        """See :class:`proofroll.core.engine_abilities.Reproduces`."""
-        from proofroll.engines.mujoco.reproducer import mechanism_source, source
+        """See :class:`proofroll.core.engine_abilities.Reproduces`: steps of the model file."""
+        from proofroll.engines.mujoco.reproducer import mechanism_source
 
-        if settings.formulation in _MECHANISMS:
-            xml = cls.model_file(scene, settings)
-            return mechanism_source(xml, mechanism_of(scene))
-        built, spec = cls._build_ball(scene, settings), _spec(scene, rolling_ball(scene), settings)
-        compiled(spec)
-        return source(written(spec), built._model, built._data, built._body, settings)
+        if settings.formulation not in _MECHANISMS:
+            raise Refused("the steps of a ball on a wall are proofroll's")
+        return mechanism_source(cls.model_file(scene, settings), mechanism_of(scene))
 
     def _run(self, steps: int) -> None:
         self._formulation.run(self._data, steps)

@@ -125,17 +125,6 @@ class Pinocchio:
         settings = _decided(scene, settings)
         return (ContactRun if settings.formulation == "contact" else RowsRun)(rolling_ball(scene), settings)
 
-    @classmethod
-    def reproducer(cls, scene: Scene, settings: PinocchioSettings) -> str:
-        """See :class:`proofroll.core.engine_abilities.Reproduces`."""
-        from proofroll.engines.pinocchio.reproducer import mechanism_source, source
-
-        if settings.formulation == "impulses":
-            raise Refused("programs hold no contacts between bodies yet")
-        if settings.formulation in OF_MECHANISMS:
-            return mechanism_source(_of_mechanism(scene, settings), settings)
-        return source(rolling_ball(scene), _decided(scene, settings))
-
 
 def _of_mechanism(scene: Scene, settings: PinocchioSettings) -> MechanismRun:
     mechanism, formulation = mechanism_of(scene), settings.formulation

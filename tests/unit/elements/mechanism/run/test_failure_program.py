@@ -52,7 +52,6 @@ def written(engine: str, options: dict[str, Any]) -> str:
             marks=pytest.mark.drill,
         ),
         ("exudyn", {"formulation": "redundant", "preset": "default", "dt": 0.05}, {"exudyn", "numpy"}),
-        ("pinocchio", {"formulation": "null_space", "preset": "default", "dt": 0.1}, {"numpy", "pinocchio", "scipy"}),
     ],
 )
 def test_a_program_shows_the_failure(tmp_path: Path, engine: str, options: dict[str, Any], needs: set[str]) -> None:
@@ -88,8 +87,6 @@ def test_a_right_run_is_not_accused(tmp_path: Path) -> None:
         ("bricard", "exudyn", {"formulation": "redundant", "preset": "matched"}),
         ("slider_crank", "exudyn", {"formulation": "redundant", "preset": "matched"}),
         ("oscillators", "exudyn", {"formulation": "tree", "preset": "matched"}),
-        ("gyroscope_cart", "pinocchio", {"formulation": "null_space", "preset": "tuned"}),
-        ("bricard", "pinocchio", {"formulation": "constraint_dynamics", "preset": "matched"}),
     ],
 )
 def test_a_program_moves_as_the_adapter_does(scene: str, engine: str, options: dict[str, Any]) -> None:
