@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 from annotated_types import Gt, Interval
 
@@ -106,206 +106,99 @@ CONTACT_ONLY: Mapping[str, tuple[str, ...]] = {
 }
 
 
+# More than any scene needs to roll; the larger it is, the steeper friction rises inside its zone.
+GRIP = 10.0
+
 # ``default`` is Exudyn's own choice of integrator, damping and Newton options at a common step of 1e-3 s. Exudyn's own
 # step, a hundredth of the simulated time, would be 1e-2 s for one second, in which the ball turns by 1.6 rad. So
 # ``default`` shows those options, not a script that sets no step. Of the formulations for balls, only ``contact`` has
 # Exudyn's adaptive step: see ``simulation_settings``.
-
-
-def _default(formulation: Literal["generic", "carrier", "rolling_disc", "redundant", "discs"]) -> ExudynSettings:
-    # The tolerance of 1e-8 matters: with rolling resistance it moves z by about 1e-6 m at dt = 1e-3, and leaves noise
-    # of 0.3 N in the carrier's F2. With rigid bodies, ρ = 0.9 stops being stable where the ball turns by more than
-    # about 0.3 rad per step.
-    return ExudynSettings(
-        formulation=formulation,
-        preset="default",
-        dt=1e-3,
-        integrator="generalized_alpha",
-        spectral_radius=0.9,
-        newton_tolerance=1e-8,
-        jacobian="reused",
-    )
-
-
-# More than any scene needs to roll; the larger it is, the steeper friction rises inside its zone.
-GRIP = 10.0
+# The tolerance of 1e-8 matters: with rolling resistance it moves z by about 1e-6 m at dt = 1e-3, and leaves noise of
+# 0.3 N in the carrier's F2. With rigid bodies, ρ = 0.9 stops being stable where the ball turns by more than about 0.3
+# rad per step.
+_OWN: Mapping[str, Any] = {
+    "dt": 1e-3,
+    "integrator": "generalized_alpha",
+    "spectral_radius": 0.9,
+    "newton_tolerance": 1e-8,
+    "jacobian": "reused",
+}
+_VELOCITIES: Mapping[str, Any] = {**_OWN, "integrator": "trapezoidal_index2", "spectral_radius": None}
+# Adaptive step and friction zone as Exudyn has them; a stiffness it does not have.
+_PENALTY: Mapping[str, Any] = {"halvings": 10, "stiffness": 1e6, "friction_zone": 1e-3}
+_DAMPED: Mapping[str, Any] = {
+    **_OWN,
+    "dt": 1e-4,
+    "spectral_radius": 0.8,
+    "newton_tolerance": 1e-10,
+    "jacobian": "step",
+}
+# The trapezoidal rule is the one that does not chatter at the edge of the zone. Newton's method cannot always pass that
+# edge within a step, which is then halved. Round-off, magnified by the contact, is larger than what a tighter tolerance
+# would ask for.
+_FINE: Mapping[str, Any] = {**_VELOCITIES, "dt": 1e-4, "jacobian": "step"}
+_STIFF: Mapping[str, Any] = {**_FINE, **_PENALTY, "friction_zone": 1e-5, "grip": GRIP}
 
 PRESETS: Mapping[str, Mapping[str, ExudynSettings]] = {
-    "generic": {
-        "default": _default("generic"),
-        # Constant constraint matrix: the undamped trapezoidal rule is exact in the constraints, and its multipliers
-        # start consistent, so that they do not ring. The Jacobian barely changes.
-        "matched": ExudynSettings(
-            formulation="generic",
-            preset="matched",
-            dt=1e-4,
-            integrator="trapezoidal_index2",
-            spectral_radius=None,
-            newton_tolerance=1e-11,
-            jacobian="reused",
-        ),
-    },
-    "carrier": {
-        "default": _default("carrier"),
-        # A new Jacobian at every step costs less than the seven iterations per step that an old one needs.
-        "matched": ExudynSettings(
-            formulation="carrier",
-            preset="matched",
-            dt=1e-4,
-            integrator="trapezoidal_index2",
-            spectral_radius=None,
-            newton_tolerance=1e-10,
-            jacobian="step",
-        ),
-        # Index 3 keeps the gap closed to round-off (index 2 lets it open by 1e-7 m), slips less and is a little more
-        # accurate without rolling resistance. ρ = 0.8 damps the multipliers enough to stay stable up to half a radian
-        # of spin per step (0.9: up to 0.3) at the price of a tenth more energy error; 0.6 costs twice the energy error.
-        "tuned": ExudynSettings(
-            formulation="carrier",
-            preset="tuned",
-            dt=1e-4,
-            integrator="generalized_alpha",
-            spectral_radius=0.8,
-            newton_tolerance=1e-10,
-            jacobian="step",
-        ),
-    },
-    "rolling_disc": {
-        "default": _default("rolling_disc"),
-        # The joint is a constraint on velocities only, and its re-aiming disturbs the multipliers a little at every
-        # step: the damping of generalized-alpha keeps them quiet (ρ as above), the trapezoidal rule lets them ring
-        # (F2 is off by 1e-3 N instead of 2e-5 N, and z by twice as much).
-        "matched": ExudynSettings(
-            formulation="rolling_disc",
-            preset="matched",
-            dt=1e-4,
-            integrator="generalized_alpha",
-            spectral_radius=0.8,
-            newton_tolerance=1e-10,
-            jacobian="step",
-        ),
-    },
-    "contact": {
-        # Integrator, Newton options, adaptive step and friction zone as Exudyn has them; a stiffness it does not have.
-        # The ball creeps by up to 1e-3 m/s, and at a grazing onset the damped integrator leaves the zone too late.
-        "default": ExudynSettings(
-            formulation="contact",
-            preset="default",
-            dt=1e-3,
-            integrator="generalized_alpha",
-            spectral_radius=0.9,
-            newton_tolerance=1e-8,
-            jacobian="reused",
-            halvings=10,
-            stiffness=1e6,
-            friction_zone=1e-3,
-            grip=GRIP,
-        ),
-        # A hundredth of the default's creep. The trapezoidal rule is the one that does not chatter at the edge of the
-        # zone. Newton's method cannot always pass that edge within a step, which is then halved. Round-off, magnified
-        # by the contact, is larger than what a tighter tolerance would ask for.
-        "matched": ExudynSettings(
-            formulation="contact",
-            preset="matched",
-            dt=1e-4,
-            integrator="trapezoidal_index2",
-            spectral_radius=None,
-            newton_tolerance=1e-8,
-            jacobian="step",
-            halvings=10,
-            stiffness=1e7,
-            friction_zone=1e-5,
-            grip=GRIP,
-        ),
-        # Stiffer: as N falls, the ball comes out of the wall by N/k, and its angle runs away by N/(k c) of its way.
-        "tuned": ExudynSettings(
-            formulation="contact",
-            preset="tuned",
-            dt=1e-4,
-            integrator="trapezoidal_index2",
-            spectral_radius=None,
-            newton_tolerance=1e-8,
-            jacobian="step",
-            halvings=10,
-            stiffness=1e8,
-            friction_zone=1e-5,
-            grip=GRIP,
-        ),
-    },
-    "redundant": {
-        "default": _default("redundant"),
-        # Passes singular poses and dependent constraints, and keeps loops closed to round-off. A tolerance of 1e-10
-        # takes four fifths of the error out of the forces of stiff small mechanisms; a new Jacobian at every step
-        # ends Newton's method where constraints depend on each other.
-        "matched": ExudynSettings(
-            formulation="redundant",
-            preset="matched",
-            dt=1e-3,
-            integrator="generalized_alpha",
-            spectral_radius=0.9,
-            newton_tolerance=1e-10,
-            jacobian="reused",
-        ),
-        # Constraints at velocity level: loops open by 1e-6 m at 1e-3 s, and forces are a hundred times as accurate: on
-        # the slider-crank off by 8e-3 of 87 N, at second order. No other reading of multipliers mends that, for exact
-        # reactions at these states, 5e-5 rad off themselves, are off by 1.4e-2 N; Newmark's β below 1/4, which Exudyn
-        # offers too, and nodes without Euler parameters do worse.
-        # Dependent constraints leave Newton's method with more round-off than a tighter tolerance asks for.
-        "tuned": ExudynSettings(
-            formulation="redundant",
-            preset="tuned",
-            dt=1e-3,
-            integrator="trapezoidal_index2",
-            spectral_radius=None,
-            newton_tolerance=1e-8,
-            jacobian="reused",
-        ),
-    },
-    "spheres": {
-        # Integrator, Newton options, adaptive step and friction zone as Exudyn has them; a stiffness it does not have.
-        "default": ExudynSettings(
-            formulation="spheres",
-            preset="default",
-            dt=1e-3,
-            integrator="generalized_alpha",
-            spectral_radius=0.9,
-            newton_tolerance=1e-8,
-            jacobian="reused",
-            halvings=10,
-            stiffness=1e6,
-            friction_zone=1e-3,
-            grip=None,
-        ),
-        # A tenth of the default's creep.
-        "matched": ExudynSettings(
-            formulation="spheres",
-            preset="matched",
-            dt=1e-3,
-            integrator="generalized_alpha",
-            spectral_radius=0.9,
-            newton_tolerance=1e-8,
-            jacobian="step",
-            halvings=10,
-            stiffness=1e6,
-            friction_zone=1e-4,
-            grip=None,
-        ),
-    },
-    "discs": {
-        "default": _default("discs"),
-        # The joint constrains velocities; the trapezoidal rule tells forces that are some per cent off at any step.
-        "matched": ExudynSettings(
-            formulation="discs",
-            preset="matched",
-            dt=1e-3,
-            integrator="generalized_alpha",
-            spectral_radius=0.9,
-            newton_tolerance=1e-10,
-            jacobian="step",
-        ),
-    },
-    "tree": {
-        "default": ExudynSettings("tree", "default", 1e-3, "rk44"),
-        "matched": ExudynSettings("tree", "matched", 1e-3, "rk67"),
-    },
+    formulation: {
+        preset: ExudynSettings(**{**values, "formulation": formulation, "preset": preset})
+        for preset, values in presets.items()
+    }
+    for formulation, presets in dict[str, dict[str, Mapping[str, Any]]](
+        generic={
+            "default": _OWN,
+            # Constant constraint matrix: the undamped trapezoidal rule is exact in the constraints, and its multipliers
+            # start consistent, so that they do not ring. The Jacobian barely changes.
+            "matched": {**_FINE, "newton_tolerance": 1e-11, "jacobian": "reused"},
+        },
+        carrier={
+            "default": _OWN,
+            # A new Jacobian at every step costs less than the seven iterations per step that an old one needs.
+            "matched": {**_FINE, "newton_tolerance": 1e-10},
+            # Index 3 keeps the gap closed to round-off (index 2 lets it open by 1e-7 m), slips less and is a little
+            # more accurate without rolling resistance. ρ = 0.8 damps the multipliers enough to stay stable up to half a
+            # radian of spin per step (0.9: up to 0.3) at the price of a tenth more energy error; 0.6 costs twice the
+            # energy error.
+            "tuned": _DAMPED,
+        },
+        rolling_disc={
+            "default": _OWN,
+            # The joint is a constraint on velocities only, and its re-aiming disturbs the multipliers a little at every
+            # step: the damping of generalized-alpha keeps them quiet (ρ as above), the trapezoidal rule lets them ring
+            # (F2 is off by 1e-3 N instead of 2e-5 N, and z by twice as much).
+            "matched": _DAMPED,
+        },
+        contact={
+            # The ball creeps by up to 1e-3 m/s, and at a grazing onset the damped integrator leaves the zone too late.
+            "default": {**_OWN, **_PENALTY, "grip": GRIP},
+            # A hundredth of the default's creep.
+            "matched": {**_STIFF, "stiffness": 1e7},
+            # Stiffer: as N falls, the ball comes out of the wall by N/k, and its angle runs away by N/(k c) of its way.
+            "tuned": {**_STIFF, "stiffness": 1e8},
+        },
+        redundant={
+            "default": _OWN,
+            # Passes singular poses and dependent constraints, and keeps loops closed to round-off. A tolerance of 1e-10
+            # takes four fifths of the error out of the forces of stiff small mechanisms; a new Jacobian at every step
+            # ends Newton's method where constraints depend on each other.
+            "matched": {**_OWN, "newton_tolerance": 1e-10},
+            # Constraints at velocity level: loops open by 1e-6 m at 1e-3 s, and forces are a hundred times as accurate:
+            # on the slider-crank off by 8e-3 of 87 N, at second order. No other reading of multipliers mends that, for
+            # exact reactions at these states, 5e-5 rad off themselves, are off by 1.4e-2 N; Newmark's β below 1/4,
+            # which Exudyn offers too, and nodes without Euler parameters do worse.
+            # Dependent constraints leave Newton's method with more round-off than a tighter tolerance asks for.
+            "tuned": _VELOCITIES,
+        },
+        spheres={
+            "default": {**_OWN, **_PENALTY},
+            # A tenth of the default's creep.
+            "matched": {**_OWN, **_PENALTY, "jacobian": "step", "friction_zone": 1e-4},
+        },
+        discs={
+            "default": _OWN,
+            # The joint constrains velocities; the trapezoidal rule tells forces that are some per cent off at any step.
+            "matched": {**_OWN, "newton_tolerance": 1e-10, "jacobian": "step"},
+        },
+        tree={"default": {"dt": 1e-3, "integrator": "rk44"}, "matched": {"dt": 1e-3, "integrator": "rk67"}},
+    ).items()
 }

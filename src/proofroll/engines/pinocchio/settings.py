@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from annotated_types import Ge, Gt
 
@@ -154,100 +154,49 @@ def lowered(settings: PinocchioSettings) -> Mapping[str, int]:
 PROXIMAL = 1e-8
 
 
-def _presets(formulation: Literal["composite", "free_flyer"]) -> Mapping[str, PinocchioSettings]:
-    return {
-        # the obvious first model: a classical scheme with pin.integrate, which turns the ball, without drift correction
-        "default": PinocchioSettings(
-            formulation=formulation,
-            preset="default",
-            integrator="rk4",
-            dt=1e-3,
-            rtol=None,
-            orientation=True,
-            projection=False,
-        ),
-        # the same model, integrated to round-off; without the orientation, unless the scene requires it, as the fast
-        # turning of the ball's own axes would dictate the step
-        "matched": PinocchioSettings(formulation, "matched", rtol=3e-14),
-        # tightest useful tolerance: a tighter one takes a tenth more time and gains no digit
-        "tuned": PinocchioSettings(formulation, "tuned"),
-    }
-
-
-def _impulses(
-    preset: Literal["default", "matched", "tuned"],
-    integrator: Literal["semi_implicit_euler", "midpoint"],
-    tolerance: float,
-) -> PinocchioSettings:
-    return PinocchioSettings(
-        formulation="impulses",
-        preset=preset,
-        integrator=integrator,
-        dt=1e-3,
-        rtol=None,
-        projection=False,
-        solver="admm",
-        solver_tolerance=tolerance,
-    )
-
+# A fixed step; ``default`` does not put the state back on the constraints.
+_STEPS: Mapping[str, Any] = {"integrator": "rk4", "dt": 1e-3, "rtol": None}
+_FREE: Mapping[str, Any] = {**_STEPS, "projection": False}
+_BALL: Mapping[str, Mapping[str, Any]] = {
+    # the obvious first model: a classical scheme with pin.integrate, which turns the ball, without drift correction
+    "default": {**_FREE, "orientation": True},
+    # the same model, integrated to round-off; without the orientation, unless the scene requires it, as the fast
+    # turning of the ball's own axes would dictate the step
+    "matched": {"rtol": 3e-14},
+    # tightest useful tolerance: a tighter one takes a tenth more time and gains no digit
+    "tuned": {},
+}
+_PGS: Mapping[str, Any] = {**_FREE, "solver": "pgs"}
+_ADMM: Mapping[str, Any] = {**_FREE, "integrator": "semi_implicit_euler", "solver": "admm"}
+_PROXIMAL: Mapping[str, Any] = {"proximal": PROXIMAL}
 
 PRESETS: Mapping[str, Mapping[str, PinocchioSettings]] = {
-    "composite": _presets("composite"),
-    "free_flyer": _presets("free_flyer"),
-    "contact": {
-        # the obvious first model: the plane at the ball's position when the step begins, the solver's default tolerance
-        "default": PinocchioSettings(
-            formulation="contact",
-            preset="default",
-            integrator="semi_implicit_euler",
-            dt=1e-3,
-            rtol=None,
-            projection=False,
-            solver="pgs",
-            solver_tolerance=1e-6,
-        ),
-        # the same contact, with the plane's turning during a step taken into account, solved to round-off
-        "matched": PinocchioSettings(
-            formulation="contact",
-            preset="matched",
-            integrator="leapfrog",
-            dt=1e-3,
-            rtol=None,
-            projection=False,
-            solver="pgs",
-            solver_tolerance=1e-12,
-        ),
-    },
-    "impulses": {
-        # the obvious first model: contacts at the bodies' positions when the step begins, the solver's default
-        # tolerance
-        "default": _impulses("default", "semi_implicit_euler", 1e-6),
-        # solved as accurately as ADMM can within its iterations, impacts included
-        "matched": _impulses("matched", "semi_implicit_euler", 1e-8),
-        # all terms in the middle of the step
-        "tuned": _impulses("tuned", "midpoint", 1e-8),
-    },
-    "null_space": {
-        "default": PinocchioSettings(
-            formulation="null_space", preset="default", integrator="rk4", dt=1e-3, rtol=None, projection=False
-        ),
-        "matched": PinocchioSettings(formulation="null_space", preset="matched", integrator="rk4", dt=1e-3, rtol=None),
-        # integrated to round-off
-        "tuned": PinocchioSettings("null_space", "tuned", rtol=TIGHTEST),
-    },
-    "constraint_dynamics": {
-        "default": PinocchioSettings(
-            formulation="constraint_dynamics",
-            preset="default",
-            integrator="rk4",
-            dt=1e-3,
-            rtol=None,
-            projection=False,
-            proximal=PROXIMAL,
-        ),
-        "matched": PinocchioSettings(
-            formulation="constraint_dynamics", preset="matched", integrator="rk4", dt=1e-3, rtol=None, proximal=PROXIMAL
-        ),
-        "tuned": PinocchioSettings("constraint_dynamics", "tuned", rtol=1e-13, proximal=PROXIMAL),
-    },
+    formulation: {
+        preset: PinocchioSettings(**{**values, "formulation": formulation, "preset": preset})
+        for preset, values in presets.items()
+    }
+    for formulation, presets in dict[str, Mapping[str, Mapping[str, Any]]](
+        composite=_BALL,
+        free_flyer=_BALL,
+        contact={
+            # the obvious first model: the plane at the ball's position when the step begins, the solver's tolerance
+            "default": {**_PGS, "integrator": "semi_implicit_euler", "solver_tolerance": 1e-6},
+            # the same contact, with the plane's turning during a step taken into account, solved to round-off
+            "matched": {**_PGS, "integrator": "leapfrog", "solver_tolerance": 1e-12},
+        },
+        impulses={
+            # the obvious first model: contacts at the bodies' positions when the step begins, the solver's tolerance
+            "default": {**_ADMM, "solver_tolerance": 1e-6},
+            # solved as accurately as ADMM can within its iterations, impacts included
+            "matched": {**_ADMM, "solver_tolerance": 1e-8},
+            # all terms in the middle of the step
+            "tuned": {**_ADMM, "integrator": "midpoint", "solver_tolerance": 1e-8},
+        },
+        null_space={"default": _FREE, "matched": _STEPS, "tuned": {"rtol": TIGHTEST}},
+        constraint_dynamics={
+            "default": {**_FREE, **_PROXIMAL},
+            "matched": {**_STEPS, **_PROXIMAL},
+            "tuned": {"rtol": 1e-13, **_PROXIMAL},
+        },
+    ).items()
 }
