@@ -95,10 +95,7 @@ def test_the_documented_line_reads_the_table(
     names: dict[str, Any] = {}
     exec(program[1], names)
     frame, same = names["frame"], names["same"]
-    assert len(frame[~frame.record.astype(bool)]) == len(whole.content.table.lines)
-    (mass,) = frame[frame.record.str.fullmatch(r"runs\[0\]\.certificate\[0\]\[0\]")].itertuples()
-    assert (mass.engine, mass.formulation, mass.preset, mass.quantity) == ("alpha", "fine", "matched", "mass")
-    assert (mass.value, mass.expected, mass.unit, mass.verdict) == (0.5, 0.5, "kg", "holds")
+    assert len(frame) == len(whole.content.table.lines)
     assert {"invented", *(part.asked.name for part in further())} >= set(frame.study) > {"invented"}
     for name in frame:
         both = zip(frame[name].astype(object), same[name].astype(object), strict=True)
@@ -117,8 +114,8 @@ def test_brackets_in_a_sentence_leave_the_json_readable(made: tuple[Outcome, Sto
     asked = "Is it [[1, n], [n, n^2]]?"
     comparison = dataclasses.replace(made[0].comparison, question=asked)
     begun([dataclasses.replace(made[0], comparison=comparison)], "proofroll report").write(tmp_path)
-    table = json.loads((tmp_path / "report.json").read_text(encoding="utf-8"))["table"]
-    assert any(asked in line for line in table["data"])
+    content = json.loads((tmp_path / "report.json").read_text(encoding="utf-8"))
+    assert content["comparisons"][0]["question"] == asked
 
 
 def _section(text: str) -> str:

@@ -118,9 +118,9 @@ class EarlierReport:
         try:
             content: dict[str, Any] = json.loads(ordinary_content(path))
             table, made = content["table"], content["environment"]
-            rows = [zip(table["columns"], row, strict=True) for row in table["data"]]
-            lines = [TableLine(**{name: value for name, value in row if name in COLUMNS}) for row in rows]
-            lines = [line for line in lines if not line.record]
+            rows = [dict(zip(table["columns"], row, strict=True)) for row in table["data"]]
+            # Reports of format 1 have further lines, with a ``record``.
+            lines = [TableLine(**{name: row[name] for name in COLUMNS}) for row in rows if not row.get("record")]
             return cls(path, content["date"], made["machine"], made["versions"], lines, content.get("names", {}))
         except OSError as problem:
             why = f"cannot be read: {problem.strerror or problem}; proofroll report writes one"

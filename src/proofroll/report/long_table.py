@@ -1,4 +1,4 @@
-"""Long table of a report: a line for each quantity of each run and for each recorded number, in JSON and CSV."""
+"""Long table of a report: a line for each quantity of each run, in JSON and CSV."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class TableLine:
-    """One quantity of one run, a run without quantities, or a number of a study's record.
+    """One quantity of one run, or a run without quantities.
 
     Attributes:
         study: name of the file that asked for the run.
@@ -48,9 +48,6 @@ class TableLine:
         order: observed order of the time step.
         cost: wall seconds per simulated second.
         cost_low, cost_high: its interval; None: it was measured once.
-        record: address of a number in its study's record (:mod:`proofroll.report.recorded`); empty: a line of a run.
-        value: number of the line; None: the sentence ``message`` has it.
-        expected: number that the scene asks for where ``value`` is what an engine built.
         clean: True if clean runs of their own measured the cost; else it is that of the sampled run, during which other
             processes ran, by processor time where that is less.
     """
@@ -90,9 +87,6 @@ class TableLine:
     cost_low: float | None
     cost_high: float | None
     clean: bool
-    record: str = ""
-    value: float | None = None
-    expected: float | None = None
 
     @property
     def relative(self) -> float:

@@ -15,7 +15,6 @@ from proofroll.report.long_table import LongTable, TableLine
 from proofroll.report.page.html import page
 from proofroll.report.page.records import ReportContent, report_content
 from proofroll.report.parts import Part, PartEntry, absent, attempt
-from proofroll.report.recorded import recorded_lines
 from proofroll.report.replay.records import Replay
 from proofroll.report.replay.replay import joined, replay_content
 from proofroll.running.store import write_text
@@ -96,13 +95,12 @@ class Report:
         content = self.content
         content_json = plain(content)
         del content_json["table"]
-        whole = LongTable([*content.table.lines, *recorded_lines(content_json)])
-        table = plain(whole)
+        table = plain(content.table)
         rows = ",\n  ".join(json.dumps(row, allow_nan=False) for row in table.pop("data"))
         head = json.dumps(table).removesuffix("}")
         text = json.dumps(content_json, indent=1, allow_nan=False).removesuffix("\n}")
         write_text(out / "report.json", f'{text},\n "table": {head}, "data": [{rows}]}}\n}}\n')
-        write_text(out / "report.csv", whole.csv)
+        write_text(out / "report.csv", content.table.csv)
         write_text(out / "report.html", page(content, self.curves, self.pictures, self.replay))
 
     def _put(self, part: Part, entry: PartEntry) -> None:

@@ -97,11 +97,16 @@ class Sentences:
     sentences: list[str]
 
 
+# Of report.json: 2 has no lines of records in its table, which format 1 had.
+FORMAT = 2
+
+
 @dataclass(frozen=True)
 class ReportContent:
     """Content of a report.
 
     Attributes:
+        format: version of the structure of ``report.json``.
         date: of its writing.
         comparisons: in their order.
         awaited: titles of comparisons that are still being run.
@@ -128,6 +133,7 @@ class ReportContent:
     environment: MadeWith
     findings: Sentences
     table: LongTable
+    format: int = FORMAT
     replay: Sequence[Any] | None = field(default=None, metadata=OPTIONAL)
     against: Against | None = field(default=None, metadata=OPTIONAL)
 

@@ -1,8 +1,9 @@
-"""Numbers of the page's tables and captions, each of which the long table has."""
+"""Numbers of the page's tables and captions, each of which report.json has."""
 
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
@@ -12,14 +13,12 @@ from folded import whole
 from numpy.typing import NDArray
 
 from proofroll.files.json_data import plain
-from proofroll.report.long_table import LongTable
-from proofroll.report.recorded import recorded_lines
 
 _NUMBER = re.compile(r"(?<![\w.\-−])[-−]?\d+(?:\.\d+)?(?:e[-+−]?\d+)?(?![\w]|\.\d)", re.IGNORECASE)
 # What is no result: counts of certificates' lines, half-widths of intervals of costs in per cent, multiples of a
 # tolerance, and the confidence of those intervals.
 _NO_RESULT = re.compile(r"\b\d+ of \d+\b|±\s?\d+\s?%|\d+\s%|(?:more than )?[\d.]+ times better than asked")
-# Versions and titles of findings; speeds, which are reciprocals of the table's costs.
+# Versions and titles of findings; speeds, which are reciprocals of costs.
 _OF_FILES = {"Findings about engines", "What to use for each scene", "Which engine for which scenes, and how fast"}
 
 
@@ -56,19 +55,26 @@ def _numbers(text: str) -> list[str]:
     return [found[0].replace("−", "-").lstrip("-").lower() for found in _NUMBER.finditer(_NO_RESULT.sub(" ", text))]
 
 
-def _sizes(table: dict[str, Any]) -> NDArray[np.float64]:
-    """Sizes of all numbers of a table, those in its sentences and errors relative to their scale among them."""
+def _sizes(content: dict[str, Any]) -> NDArray[np.float64]:
+    """Sizes of all numbers in report.json: those in its sentences, errors relative to their scale, steps a period."""
+    table = content["table"]
     rows = [dict(zip(table["columns"], row, strict=True)) for row in table["data"]]
-    values = [value for row in rows for value in row.values() if isinstance(value, int | float)]
-    values += [float(text) for row in rows for text in _numbers(f"{row['message']} {row['place']} {row['setting']}")]
-    for row in rows:
-        if row["scale"]:
-            values += [row[name] / row["scale"] for name in ("error", "tolerance") if row[name] is not None]
-    at = {(row["study"], row["record"]): row["value"] for row in rows if row["value"]}
-    for (study, record), period in at.items():  # steps per natural time, as a stability map has them
-        if record.endswith(".period"):
-            values.append(period / at.get((study, record.replace(".period", ".largest_accurate")), np.inf))
-    return np.sort(np.abs(np.array(values, float)))
+    values = [row[name] / row["scale"] for row in rows for name in ("error", "tolerance") if row["scale"] and row[name]]
+    return np.sort(np.abs(np.array([*values, *_values(content)], float)))
+
+
+def _values(value: Any) -> Iterator[float]:
+    if isinstance(value, dict):
+        if value.get("period") and value.get("largest_accurate"):  # as a stability map has them
+            yield value["period"] / value["largest_accurate"]
+        value = list(value.values())
+    if isinstance(value, list):
+        for item in value:
+            yield from _values(item)
+    elif isinstance(value, str):
+        yield from map(float, _numbers(value))
+    elif isinstance(value, int | float):
+        yield value
 
 
 def _is_in(text: str, sizes: NDArray[np.float64]) -> bool:
@@ -80,9 +86,9 @@ def _is_in(text: str, sizes: NDArray[np.float64]) -> bool:
     return bool(sizes.searchsorted(float(text) + half, "right") > sizes.searchsorted(float(text) - half))
 
 
-def missing_numbers(html: str, table: dict[str, Any]) -> dict[str, list[tuple[str, str]]]:
-    """Numbers of a page's cells and captions that a long table lacks, with their cell, by table."""
-    sizes, missing = _sizes(table), dict[str, list[tuple[str, str]]]()
+def missing_numbers(html: str, content: dict[str, Any]) -> dict[str, list[tuple[str, str]]]:
+    """Numbers of a page's cells and captions that report.json lacks, with their cell, by table."""
+    sizes, missing = _sizes(content), dict[str, list[tuple[str, str]]]()
     for label, cell in Cells(whole(html)).found:
         lacking = [(text, cell) for text in _numbers(cell) if not _is_in(text, sizes)]
         if lacking and label not in _OF_FILES:
@@ -90,10 +96,10 @@ def missing_numbers(html: str, table: dict[str, Any]) -> dict[str, list[tuple[st
     return missing
 
 
-def test_the_long_table_has_every_number_of_the_page(report_page: Path, everything: Any) -> None:
-    """Each number in a cell or caption of the page is one of the table, rounded, but for what is no result."""
-    html = report_page.read_text(encoding="utf-8")
-    content = everything.content
-    lines = [*content.table.lines, *recorded_lines(plain(content))]
-    assert missing_numbers(html, plain(LongTable(lines))) == {}
-    assert missing_numbers(html, plain(content.table)), "lines of runs alone have neither certificates nor claims"
+def test_the_json_has_every_number_of_the_page(report_page: Path, everything: Any) -> None:
+    """Each number in a cell or caption of the page is one of report.json, rounded, but for what is no result."""
+    html, content = report_page.read_text(encoding="utf-8"), plain(everything.content)
+    assert missing_numbers(html, content) == {}
+    assert missing_numbers(html, {"table": content["table"]}), (
+        "lines of runs alone have neither certificates nor claims"
+    )
