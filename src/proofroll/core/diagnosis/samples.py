@@ -89,33 +89,20 @@ def another_clock(state: Callable[[Any, xr.Dataset], FloatArray], covers: tuple[
             return
         time, weights = pair[1]["time"].to_numpy(), _alike(reported, true)
         reported, true = reported * weights, true * weights
-        moved = best_delay(time, reported, true)
-        if moved is not None:
-            delay, difference, remainder = moved
+        causes = []
+        if (moved := best_delay(time, reported, true)) is not None:
+            delay, *sizes = moved
             says = f"every sample is {delay_text(delay, evidence.step)}: the motion is right at another time"
             remedy = "advance(t) has to end at t, neither a step before nor after it"
-            change = in_steps(delay, evidence.step)
-            yield Cause(
-                id="late",
-                says=says,
-                quantity="state",
-                unit="m",
-                before=difference,
-                after=remainder,
-                remedy=remedy,
-                fitted=1,
-                covers=covers,
-                closes=_CLOCK,
-                change=change,
-            )
-        paced = best_clock_factor(time, reported, true)
-        if paced is not None:
-            rate, difference, remainder = paced
+            causes.append(("late", says, remedy, sizes, in_steps(delay, evidence.step)))
+        if (paced := best_clock_factor(time, reported, true)) is not None:
+            rate, *sizes = paced
             says = f"the engine's time runs {rate:.6g} times as fast as it says: the motion is right at other times"
             remedy = "the step that the engine takes is not the one that is counted"
-            change = change_by(rate)
+            causes.append(("clock", says, remedy, sizes, change_by(rate)))
+        for name, says, remedy, (difference, remainder), change in causes:
             yield Cause(
-                id="clock",
+                id=name,
                 says=says,
                 quantity="state",
                 unit="m",
