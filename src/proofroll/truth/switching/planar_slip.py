@@ -186,7 +186,7 @@ def _settled(
     if not abs(answer) > _FREE * float(np.abs(rates).max()) / _TURN:
         return None
     states, angles, before = np.repeat(state[None], count, axis=0), np.zeros(count), np.inf
-    for _ in range(_ROUNDS):
+    for number in range(_ROUNDS):
         points = [led(angle, y) for angle, y in zip(angles, states, strict=True)]
         speeds = np.array([slip_velocity(point[3].touching[k]) @ point[1] for point in points])
         turning = nodes.derivative @ np.array([point[2] for point in points]) / length
@@ -199,7 +199,8 @@ def _settled(
         new = state + length * nodes.integral @ np.array([point[4] for point in points])
         change = max(float(np.abs(turns).max()), float(np.abs(new - states).max()))
         states, angles = new, angles + turns
-        if not np.isfinite(change) or (change > _STALLED and change > _SLOWEST * before):
+        # the first round moves states alone, and the second one is the first to turn the slip
+        if not np.isfinite(change) or (number > 1 and change > _STALLED and change > _SLOWEST * before):
             return None
         if change <= _SETTLED or (change <= _STALLED and change >= before / 2):
             tail = np.abs((nodes.to_series @ states)[-2:]).max()

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
@@ -69,19 +71,18 @@ def test_the_end_of_a_slip_lies_within_its_bracket(seed: int, sticks: float, bey
     assert all(event.time_high - event.time_low < 3e-12 for event in found.events)
 
 
-def reference(mass: np.ndarray, hold: float, until: float) -> np.ndarray:
-    """Velocity at the end of a slip against friction ``hold`` under a pull (4 t, 6 t²), by ln|u| and its direction."""
+Pull = Callable[[float], tuple[float, float]]
 
-    def pull(t: float) -> np.ndarray:
-        return np.array([4 * t, 6 * t**2])
 
-    begins = brentq(lambda t: np.linalg.norm(pull(t)) - hold, 0.1, 2.0, xtol=1e-15)
+def reference(mass: np.ndarray, hold: float, until: float, pull: Pull, rate_of: Pull) -> np.ndarray:
+    """Velocity at the end of a slip against friction ``hold`` under a pull, by ln|u| and its direction."""
+    begins = brentq(lambda t: np.linalg.norm(pull(t)) - hold, 0.0, 2.0, xtol=1e-15)
     early = 1e-4  # s: after the start, where the direction of the slip is that of the pull but for its turn
     angle = np.arctan2(*pull(begins)[::-1])
 
     def rates(_: float, y: np.ndarray) -> list[float]:
         size, way = np.exp(y[0]), np.array([np.cos(y[1]), np.sin(y[1])])
-        rate = (pull(y[2]) - hold * way) / mass
+        rate = (np.array(pull(y[2])) - hold * way) / mass
         return [rate @ way, rate @ np.array([-way[1], way[0]]), size]  # by τ with dt = |u| dτ
 
     def ends(_: float, y: np.ndarray) -> float:
@@ -89,7 +90,7 @@ def reference(mass: np.ndarray, hold: float, until: float) -> np.ndarray:
 
     ends.terminal = True  # type: ignore[attr-defined]
     way = np.array([np.cos(angle), np.sin(angle)])
-    growth = way @ (np.array([4.0, 12 * begins]) / mass)
+    growth = way @ (np.array(rate_of(begins)) / mass)
     first = [np.log(growth * early**2 / 2), angle, begins + early]
     done = solve_ivp(rates, (0, 1e9), first, "LSODA", rtol=1e-12, atol=1e-12, events=ends)
     size, angle, _ = done.y_events[0][0]
@@ -115,12 +116,12 @@ def test_a_bead_slips_against_friction_that_turns_with_its_pull() -> None:
     found = truth_of(guided, np.array([0.0, until]))
     assert [event.kind for event in found.events] == ["slip"]
     assert found.bars["v"][-1] < 1e-11
-    right = reference(np.array([1.75, 1.25]), hold, until)
+    right = reference(np.array([1.75, 1.25]), hold, until, lambda t: (4 * t, 6 * t**2), lambda t: (4.0, 12 * t))
     assert found.record.v[1, :2] == pytest.approx(right, abs=1e-6)
 
 
-def bead(push: str = "", speed: float = 0.0, shake: str = "") -> Mechanism:
-    """A bead of 1 kg on a floor with friction 0.5, pushed along x; the floor may be shaken along x."""
+def bead(push: str = "", speed: float = 0.0, shake: str = "", aside: str = "0") -> Mechanism:
+    """A bead of 1 kg on a floor with friction 0.5, pushed along x and ``aside``; the floor may be shaken along x."""
     start = (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
     joints = [Joint("free", "free", "world", "bead", q0=start, v0=(speed, 0.0, 0.0, 0.0, 0.0, 0.0))]
     bodies = [Body("bead", 1.0, inertia=(0.1,) * 3)]
@@ -131,7 +132,7 @@ def bead(push: str = "", speed: float = 0.0, shake: str = "") -> Mechanism:
     return Mechanism(
         tuple(bodies),
         tuple(joints),
-        forces=(Force("push", "bead", "force", value=(Formula(push), 0.0, 0.0)),) if push else (),
+        forces=(Force("push", "bead", "force", value=(Formula(push), Formula(aside), 0.0)),) if push else (),
         geometries=shapes,
         pairs=(Pair("touch", ("tip", "floor"), 0.5),),
     )
@@ -150,6 +151,19 @@ def slip_under_a_push(push: float, rate: float, hold: float) -> tuple[float, flo
 
 
 PUSHED, SLIP = bead("5.2*sin(10*t)"), slip_under_a_push(5.2, 10.0, 0.5 * 9.81)
+
+
+def test_a_slip_that_turns_fast_is_followed_from_its_first_instant() -> None:
+    """A pull that turns by 20 rad/s as friction gives way takes the bead with it, as Coulomb's law says."""
+    until, hold = 0.05, 0.5 * 9.81
+    found = truth_of(bead("4.9", aside="100*t"), np.array([0.0, until]))
+    (event,) = found.events
+    begin = float(np.sqrt(hold**2 - 4.9**2)) / 100
+    assert event.kind == "slip"
+    assert event.time_low <= begin <= event.time_high
+    assert not found.ended
+    right = reference(np.ones(2), hold, until, lambda t: (4.9, 100 * t), lambda _: (0.0, 100.0))
+    assert found.record.v[-1, :2] == pytest.approx(right, abs=1e-6)
 
 
 @pytest.mark.parametrize("until", np.linspace(0.13, 0.4, 20).tolist())
