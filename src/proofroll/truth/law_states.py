@@ -15,7 +15,7 @@ from proofroll.elements.mechanism.dynamics.named_forces import named_forces
 from proofroll.elements.mechanism.scene.rotations import Array, from_quaternion
 from proofroll.truth.bodies.contact_bodies import ContactBodies
 from proofroll.truth.bodies.maximal_coordinates import MaximalCoordinates
-from proofroll.truth.switching.contact_guards import Touchable
+from proofroll.truth.switching.contact_guards import Touchable, borne_forces
 from proofroll.truth.tree.contact_tree import ContactTree
 
 _FIELDS = "effort", "drive", "coupling"  # named forces of a record, in its order
@@ -40,11 +40,12 @@ def by_the_tree(route: ContactTree, state: Array, mode: ContactMode) -> Array:
     mode = _present(mode, dynamics.at(q, v, time, features_of(mode)).touching)
     solution = dynamics.solve(q, v, mode, time)
     motion, named, loops = solution.state.solution.motion, np.zeros(0), np.zeros(0)
+    forces = borne_forces(contacts, solution.state.touching, solution)
     if _has_named(m):
         others = [k for k, contact in enumerate(contacts) if not isinstance(contact, JointContact)]
-        load = np.einsum("kin,ki->n", solution.state.J[others], solution.force[others])
+        load = np.einsum("kin,ki->n", solution.state.J[others], forces[others])
         applied = np.zeros((len(m.bodies) + 1, 6))
-        for contact, touch, force in zip(contacts, solution.state.touching, solution.force, strict=True):
+        for contact, touch, force in zip(contacts, solution.state.touching, forces, strict=True):
             if isinstance(contact, JointContact):
                 continue
             pressed = m.contacts[contact.pressed_by] if isinstance(contact, TurningFriction) else contact
@@ -57,7 +58,7 @@ def by_the_tree(route: ContactTree, state: Array, mode: ContactMode) -> Array:
         sample = dynamics.equations.sample(q, v, joints, time, load, applied)
         named, loops = stated_named(m, sample["named"]), sample["wrench"][len(m.joints) :].ravel()
     poses = motion.p_WB[:-1], motion.R_WB[:-1], motion.v_WB[:-1], motion.w_WB[:-1]
-    return _vector(poses, contacts, solution.state.touching, solution.force, named, loops)
+    return _vector(poses, contacts, solution.state.touching, forces, named, loops)
 
 
 def by_the_bodies(route: ContactBodies, second: MaximalCoordinates, state: Array, mode: ContactMode) -> Array:
@@ -66,7 +67,8 @@ def by_the_bodies(route: ContactBodies, second: MaximalCoordinates, state: Array
     state = np.append(equations.equations.normalised(state[:-1]), state[-1])
     bodies = equations.at(state, features_of(mode))
     mode = _present(mode, bodies.touching)
-    force, named, loops = equations.accelerated(bodies, mode).force, np.zeros(0), np.zeros(0)
+    solution, named, loops = equations.accelerated(bodies, mode), np.zeros(0), np.zeros(0)
+    force = borne_forces(equations.contacts, bodies.touching, solution)
     if _has_named(m):
         _, wrenches = equations.applied(bodies, force)
         second.take_functions(equations.equations.functions)

@@ -61,3 +61,29 @@ def test_a_light_body_on_a_heavy_one_slides_until_both_move_alike() -> None:
     assert found.ended == ""
     assert all(event.time_low <= sticks <= event.time_high for event in found.events)
     assert found.record.p_WB[1, 1, 0] == pytest.approx(mu * g * sticks**2 / 2 + common * (0.4 - sticks), abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("lean", "bend", "holds"),
+    [(0.02, 1.8, (0.52, 2.85)), pytest.param(0.5, -0.88, (1.51, 2.94), marks=pytest.mark.drill)],
+)
+def test_a_leg_that_rubs_in_its_joints_rests_on_its_tip(lean: float, bend: float, holds: tuple[float, float]) -> None:
+    """Dry friction and the floor hold a leg of two links together: it rests where any distribution of that holds."""
+    links = tuple(Body(name, 1.0, com=(0.0, 0.0, -0.5), inertia=(0.1, 0.1, 0.01)) for name in ("upper", "lower"))
+    axis, low = (0.0, -1.0, 0.0), -np.cos(lean) - np.cos(lean + bend)
+    joints = (
+        Joint("shoulder", "revolute", "world", "upper", axis=axis, q0=(lean,), friction=holds[0]),
+        Joint("elbow", "revolute", "upper", "lower", (0.0, 0.0, -1.0), axis=axis, q0=(bend,), friction=holds[1]),
+    )
+    shapes = (
+        Geometry("floor", "world", "plane", position=(0.0, 0.0, float(low))),
+        Geometry("tip", "lower", "sphere", position=(0.0, 0.0, -1.0), radius=0.0),
+    )
+    pairs = (Pair("touch", ("tip", "floor"), friction=0.1),)
+    found = truth_of(
+        Mechanism(links, joints, gravity=(0.0, 0.0, -9.81), geometries=shapes, pairs=pairs), np.array([0.0, 0.1])
+    )
+    assert found.laws
+    assert not found.ended
+    assert found.record.v[-1] == pytest.approx([0.0, 0.0], abs=0.0)
+    assert np.isnan(found.record.named).all()

@@ -2,7 +2,7 @@
 
 import itertools
 from collections.abc import Callable, Sequence
-from typing import Literal, NamedTuple
+from typing import Literal, NamedTuple, Protocol
 
 import numpy as np
 
@@ -165,7 +165,7 @@ def guard_value(
 def _of_all(guard: ContactGuard, contacts: Sequence[Touchable], solved: SolvedContacts) -> float:
     """Value of a guard that concerns all contacts."""
     if guard.kind == "grip":
-        grip = best_grip(contacts, solved)
+        grip = best_grip(contacts, solved.touching, solved)
         return NOT_SHARED if grip is None else -grip.margin
     return LEAST_RESPONSE - solved.response if guard.kind == "tear" else _undecided(contacts, solved)
 
@@ -175,14 +175,38 @@ def gripped(solved: SolvedContacts, k: int) -> bool:
     return any(own.kind == "stick" for own in solved.mode) and bool(np.abs(solved.shifts[k]).max(initial=0.0) > RANK)
 
 
-def best_grip(contacts: Sequence[Touchable], solved: SolvedContacts) -> Distribution | None:
+class SharedForces(Protocol):
+    """Forces in a mode, and how they may be distributed; see :class:`SolvedContacts`."""
+
+    @property
+    def mode(self) -> ContactMode:
+        """The mode."""
+
+    @property
+    def force(self) -> Array:
+        """Of each contact, (contacts, 3)."""
+
+    @property
+    def shifts(self) -> Array:
+        """Changes of all forces that cause no motion, (contacts, 3, ways)."""
+
+
+def borne_forces(contacts: Sequence[Touchable], touching: Sequence[Touching], solved: SharedForces) -> Array:
+    """Forces, (contacts, 3); of a load that joints with dry friction share in a distribution that they can bear."""
+    shared = np.abs(solved.shifts).max(axis=(1, 2), initial=0.0) > RANK
+    rubs = any(contact.bound for contact, shares in zip(contacts, shared, strict=True) if shares)
+    grip = best_grip(contacts, touching, solved) if rubs else None
+    return solved.force if grip is None else np.asarray(solved.force + solved.shifts @ grip.weights)
+
+
+def best_grip(contacts: Sequence[Touchable], touching: Sequence[Touching], solved: SharedForces) -> Distribution | None:
     """Distribution of a shared load that closed contacts bear best; None: they share none, or nothing sticks."""
     if not solved.shifts.shape[2] or all(own.kind != "stick" for own in solved.mode):
         return None
     return best_distribution(
         cones_of(
             kinds=[own.kind for own in solved.mode],
-            normals=np.array([touch.normal for touch in solved.touching]),
+            normals=np.array([touch.normal for touch in touching]),
             friction=np.array([contact.static for contact in contacts]),
             bounds=np.array([contact.bound for contact in contacts]),
             pressed_by=[contact.pressed_by for contact in contacts],
@@ -256,7 +280,7 @@ def lost_grip(contacts: Sequence[Touchable], solved: SolvedContacts) -> LostGrip
 
     Sticking contacts whose speed in that motion is zero are its pivots and hold on.
     """
-    grip = best_grip(contacts, solved)
+    grip = best_grip(contacts, solved.touching, solved)
     assert grip is not None  # it ended the stretch
     force = np.asarray(solved.force + solved.shifts @ grip.weights)
     moving = np.flatnonzero(grip.speeds > _MOVES).tolist()

@@ -100,8 +100,8 @@ def contact_forces(
     f = np.zeros(len(c)) if turns else _guessed(G, c, friction, sliding, bounds, guess)
     static = friction if static is None else static
     least = _RESTS * float(np.abs(c).max())
-    if len(friction) > 1 and friction.all() and not bounds.any() and all(slip is None for slip in sliding):
-        held = _all_held(G, c, static, max(near, _RESTS), max(near, AT_BOUND), pressing)
+    if len(friction) > 1 and (friction + bounds).all() and all(slip is None for slip in sliding):
+        held = _all_held(G, c, static, bounds, max(near, _RESTS), max(near, AT_BOUND), pressing)
         if held is not None:
             return held.reshape(-1, 3), ["stick"] * len(friction)
     for _ in range(_SWEEPS):
@@ -254,9 +254,15 @@ def _idle(
 
 
 def _all_held(
-    G: Array, c: Array, friction: Array, rests: float, near: float, pressing: Sequence[int | None]
+    G: Array,
+    c: Array,
+    friction: Array,
+    bounds: Array,
+    rests: float,
+    near: float,
+    pressing: Sequence[int | None],
 ) -> Array | None:
-    """Forces that let every contact stick and press within the cones of friction, in any distribution; else None."""
+    """Forces that let every contact stick and press within the bounds of friction, in any distribution; else None."""
     scale = natural_rows(G)
     values, vectors = np.linalg.eigh(G * np.outer(scale, scale))
     whole = values > _NULL * values[-1]
@@ -269,7 +275,7 @@ def _all_held(
         kinds=["stick"] * count,
         normals=np.tile([1.0, 0.0, 0.0], (count, 1)),
         friction=friction,
-        bounds=np.zeros(count),
+        bounds=bounds,
         pressed_by=pressing,
         force=held.reshape(count, 3),
         shifts=(scale[:, None] * vectors[:, ~whole]).reshape(count, 3, -1),

@@ -81,3 +81,15 @@ def test_what_two_walls_may_jam_is_no_answer() -> None:
     J = np.concatenate([np.eye(3), np.diag([-1.0, 1.0, 1.0])])  # normals against each other
     loads = J @ np.array([0.0, 0.0, -9.81])
     assert not robust_forces(J @ J.T, loads, np.full(2, 0.5), [None] * 2, ["left", "right"])[2]
+
+
+def test_a_contact_and_joints_that_rub_hold_together_in_any_distribution() -> None:
+    """Two coordinates held by a tip and two joints with dry friction rest, though the smallest forces slip."""
+    tip = [[-1.05, -0.69], [0.68, 0.49], [0.79, -2.48]]
+    J = np.array([*tip, [0.0, 0.0], [1.84, 0.0], [0.0, 0.0], [0.0, 0.0], [-3.13, 3.85], [0.0, 0.0]])
+    c, bounds, mu = J @ np.array([0.96, 0.19]), np.array([0.0, 0.05, 0.06]), 0.1
+    f, done = contact_forces(J @ J.T, c, np.array([mu, 0.0, 0.0]), [None] * 3, ["tip", "one", "two"], bounds)
+    assert done == ["stick"] * 3
+    assert np.abs(c + J @ J.T @ f.ravel()).max() < 1e-12
+    assert np.linalg.norm(f[0, 1:]) <= mu * f[0, 0]
+    assert (np.linalg.norm(f[1:], axis=1) <= bounds[1:]).all()
