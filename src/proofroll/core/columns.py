@@ -17,6 +17,8 @@ SMALLEST = "smallest_"
 # Attribute UNCERTAIN of a variable: why its values may be wrong through no fault of an engine, as a clause. An angle
 # with the attribute PERIOD (in its unit) may be wrong by whole periods.
 UNCERTAIN, PERIOD = "uncertain", "period"
+# Attribute of a variable that a run sums over its samples: error of that sum, in its unit.
+SAMPLED_BAR = "sampled_bar"
 
 
 class Variable(NamedTuple):

@@ -38,6 +38,8 @@ class Observable:
         hangs_on_events: True if it is unpredictable once the time of an event is ill-posed.
         at_impacts: False if it has no value beside an impact, whose length is an engine's own, nor where the question
             is ill-posed.
+        sums_samples: True if runs sum it over their samples, which have no impulses: it is compared up to the first
+            impact.
         difference_of: larger variable whose small difference, with its round-off, it is; empty: none.
         absent: reason for which no run of the scene has it, and the remedy; empty: runs have it.
     """
@@ -58,6 +60,7 @@ class Observable:
     audit: bool = False
     hangs_on_events: bool = True
     at_impacts: bool = True
+    sums_samples: bool = False
     absent: str = ""
     difference_of: str = ""
 

@@ -132,6 +132,7 @@ class RunCurve:
         own_bar: uncertainty of the run's own value (an event between two of its samples); an error that this alone may
             explain is no difference.
         sampled_bar: largest part of ``own_bar`` that may excuse an error: the part that the sampling interval explains.
+        bar_of: what ``own_bar`` is the error of, as a clause; empty: of a time between two samples.
         between: values at a few times off the grid, and the true ones; None: there are none.
         magnitude: size of the numbers whose round-off enters, if above the curve's scale: of a gap, that of positions.
         precision: in which the run was computed, see :func:`proofroll.core.engine.precision_of`.
@@ -140,6 +141,7 @@ class RunCurve:
     values: FloatArray
     own_bar: float = 0.0
     sampled_bar: float = np.inf
+    bar_of: str = ""
     between: tuple[FloatArray, FloatArray] | None = None
     magnitude: float = 0.0
     precision: str = "double"
@@ -196,7 +198,7 @@ def judge_curve(
     remarks = []
     if rungs.wrong_within:
         remarks.append(f"within tolerance, but the limit of small steps is shown not to be the truth: {rungs.text}")
-    if run.own_bar > tolerance and verdict in {Verdict.AGREES, Verdict.UNCONFIRMED}:
+    if run.own_bar > tolerance and not run.bar_of and verdict in {Verdict.AGREES, Verdict.UNCONFIRMED}:
         remarks.append("within tolerance by luck: the run leaves its events open by more than the tolerance")
     reason = _reason(verdict, error, allowance, true, run, rungs)
     if hidden:
@@ -310,7 +312,7 @@ def _reason(
     if verdict == Verdict.NOT_JUDGED:
         whose = "the truth's error bar"
         if own_bar > truth_error_bar:
-            bar, whose = f"{number(own_bar)}{unit}", "known only between two times"
+            bar, whose = f"{number(own_bar)}{unit}", run.bar_of or "known only between two times"
         return f"not judged: error {shown_error}{unit} ± {bar}, {whose}, may be within {allowed}{unit} or beyond"
     text = f"error {shown_error}{unit} {'within' if error <= tolerance else 'beyond'} {allowed}{unit}"
     if not np.isfinite(error):

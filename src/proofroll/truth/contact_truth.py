@@ -40,7 +40,7 @@ from proofroll.truth.followed_paths import (
     times_known,
     two_route_motion,
 )
-from proofroll.truth.law_verdict import held_to_laws
+from proofroll.truth.law_verdict import held_to_laws, work_along
 from proofroll.truth.natural_units import Units, natural_units
 from proofroll.truth.numerics.hybrid import HybridPath, HybridRoute, Stretch, first_close, states_of
 from proofroll.truth.standing_ends import Face, RollingLanding, standing_ends
@@ -91,7 +91,7 @@ def _in_units(mechanism: Mechanism, units: Units, times: Array, faces: Sequence[
     tree.faces = bodies.faces = faces
     until, breaking, kinds = float(times[-1]), breaks(own.signals), partial(_kinds, dynamics)
     paths, routes = _followed(tree, bodies, held, until, breaking)
-    paths, laws = held_to_laws(mechanism, units, (tree, bodies), paths, second, held)
+    paths, laws, along = held_to_laws(mechanism, units, (tree, bodies), paths, second, held)
     asked = times_known(paths, times)
     times = held[1].on_instants(held[0].on_instants(asked)) if held else asked
     stretches = stretches_at(paths, times)
@@ -99,7 +99,9 @@ def _in_units(mechanism: Mechanism, units: Units, times: Array, faces: Sequence[
     states = states_of(routes[0], paths[0], times, stretches), states_of(routes[1], paths[1], times, others)
     for values in held:
         values.finish()
-    first = _by_the_tree(tree, paths[0], times, states[0], stretches)
+    seconds = times * units.time
+    works = along[0].at(seconds, stretches), along[1].at(seconds, others)
+    first = _by_the_tree(tree, paths[0], times, states[0], stretches, works[0])
     one, cut = first.record, None if held else cut_early(tree.early(), paths[0], until, breaking, times, kinds)
     modes = [bodies.acting(paths[1].stretches[number], state) for number, state in zip(others, states[1], strict=True)]
     applied = [bodies.forces(state, mode) for state, mode in zip(states[1], modes, strict=True)]
@@ -113,7 +115,8 @@ def _in_units(mechanism: Mechanism, units: Units, times: Array, faces: Sequence[
     left = None
     if cut is not None:
         earlier = cut[0].stretch_at(times)
-        early = _by_the_tree(tree, cut[0], times, states_of(tree, cut[0], times, earlier), earlier)
+        early_works = work_along(mechanism, units, tree, cut[0]).at(seconds, earlier)
+        early = _by_the_tree(tree, cut[0], times, states_of(tree, cut[0], times, earlier), earlier, early_works)
         early = early._replace(record=on_same_turns(own, first.record, early.record))
         left = _in_si(mechanism, units, early), cut[1]
     motion = two_route_motion(
@@ -124,6 +127,8 @@ def _in_units(mechanism: Mechanism, units: Units, times: Array, faces: Sequence[
         _names(tree, bodies),
         _reason(dynamics, paths),
         units,
+        works,
+        unresolved=max(float(work.unresolved.max(initial=0.0)) for work in along),
         kinds=kinds,
         pressed=(first.pressed * units.force, other * units.force) if own.contacts else None,
         sums=(first.sums * units.force, others_sums) if own.contacts else None,
@@ -201,8 +206,10 @@ def _crowded(path: _Path, time: float) -> str:
     )
 
 
-def _by_the_tree(tree: ContactTree, path: _Path, times: Array, states: Array, stretches: Sequence[int]) -> Routed:
-    """Motion and forces of the first route along a path with these states, in natural units."""
+def _by_the_tree(
+    tree: ContactTree, path: _Path, times: Array, states: Array, stretches: Sequence[int], works: Array
+) -> Routed:
+    """Motion and forces of the first route along a path with these states, in natural units; ``works``: in SI units."""
     dynamics = tree.dynamics
     records, forces, sums = zip(
         *(
@@ -211,12 +218,13 @@ def _by_the_tree(tree: ContactTree, path: _Path, times: Array, states: Array, st
         ),
         strict=True,
     )
-    return Routed(record_of(times, records), np.array(forces), np.array(sums))
+    return Routed(record_of(times, records), np.array(forces), np.array(sums), works)
 
 
 def _in_si(mechanism: Mechanism, units: Units, own: Routed) -> Routed:
     """Motion and forces in SI units."""
-    return Routed(units.record(mechanism, own.record), own.pressed * units.force, own.sums * units.force)
+    pressed, sums = own.pressed * units.force, own.sums * units.force
+    return Routed(units.record(mechanism, own.record), pressed, sums, own.works)
 
 
 def _shared_load(dynamics: ContactDynamics, path: _Path, time: float) -> str:

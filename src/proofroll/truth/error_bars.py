@@ -11,7 +11,7 @@ from proofroll.core.errors import Refused
 from proofroll.core.events import Event
 from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.dynamics.joint_coordinates import JointCoordinates
-from proofroll.elements.mechanism.dynamics.link_forces import link_values, works
+from proofroll.elements.mechanism.dynamics.link_forces import link_values
 from proofroll.elements.mechanism.dynamics.placed import Placed
 from proofroll.elements.mechanism.dynamics.record import Record, record_of
 from proofroll.elements.mechanism.scene.joint_kinds import WITH_QUATERNION, JointKind
@@ -45,6 +45,7 @@ class TwoRouteMotion:
         pressed: contact forces on the first bodies [N], (times, contacts, 3), NaN where not determinate; None: no
             contacts.
         sums: their sums over the contacts of each pair with several, (times, such pairs, 3); None: as ``pressed``.
+        works: work of drives since the start [J], (times, drives).
         laws: outcome of the law check, as a clause; empty: it ended the motion, or there was none.
     """
 
@@ -63,6 +64,7 @@ class TwoRouteMotion:
     ended: str = ""
     sums: Array | None = None
     bounces: Sequence[Bounce] = ()
+    works: Array | None = None
     laws: str = ""
 
 
@@ -70,8 +72,7 @@ def fields_with_bars(mechanism: Mechanism, record: Record) -> dict[str, Array]:
     """Fields with an error bar: those of the record, and what follows from them, as energy."""
     placed = record.placed(mechanism)
     fields = {name: getattr(record, name) for name in JUDGED}
-    derived = {"links": link_values(placed), "work": works(placed, record.named)}
-    return fields | {"points": placed.points, "energy": placed.energy()} | derived
+    return fields | {"points": placed.points, "energy": placed.energy(), "links": link_values(placed)}
 
 
 def round_off(fields: Mapping[str, Array], placed: Placed) -> dict[str, Array]:

@@ -63,11 +63,13 @@ class Routed(NamedTuple):
         record: the motion.
         pressed: contact forces [N], (times, contacts, 3).
         sums: their sums over pairs with several contacts [N], (times, such pairs, 3).
+        works: work of drives since the start [J], (times, drives).
     """
 
     record: Record
     pressed: Array
     sums: Array
+    works: Array
 
 
 def cut_early(
@@ -122,7 +124,9 @@ def two_route_motion(
     routes: tuple[str, str],
     reason: str,
     units: Units,
+    works: tuple[Array, Array],
     *,
+    unresolved: float = 0.0,
     kinds: Callable[[Any], Any] = lambda mode: mode,
     pressed: tuple[Array, Array] | None = None,
     sums: tuple[Array, Array] | None = None,
@@ -139,6 +143,8 @@ def two_route_motion(
         routes: their names.
         reason: cause why the question is ill-posed from the horizon on.
         units: natural units of the paths.
+        works: work of drives along both [J], (times, drives).
+        unresolved: part of it that its quadrature does not resolve [J].
         kinds: part of a mode in which both routes must agree.
         pressed: contact forces by both routes [N], (times, contacts, 3).
         sums: their sums over pairs with several contacts by both routes [N], (times, such pairs, 3).
@@ -148,6 +154,7 @@ def two_route_motion(
     parted, determinate = _parted(*paths, kinds) * units.time, analyse(mechanism).determinate
     masked = replace(one, wrench=np.where(determinate, one.wrench, np.nan))
     fields, others = fields_with_bars(mechanism, masked), fields_with_bars(mechanism, two)
+    fields["work"], others["work"] = works
     if pressed is not None:
         fields["pressed"], others["pressed"] = pressed
     if sums is not None:
@@ -159,6 +166,7 @@ def two_route_motion(
         difference = largest(np.where(np.isnan(values), np.nan, others[field]) - values)
         bars[field] = np.maximum.accumulate(SAFETY * difference + left[field] + least[field]) + step[field]
         differences[field] = float(difference[one.time < parted].max(initial=0.0))
+    bars["work"] += unresolved
     reach = np.maximum(units.length, np.maximum(largest(placed.p_WB), largest(placed.points)))
     bars["drift"] = np.maximum.accumulate(placed.drift() + ROUND_OFF * reach)
     horizon = min(parted, first_close(paths, CLOSE) * units.time)
@@ -186,6 +194,7 @@ def two_route_motion(
         reason=reason,
         pressed=force,
         sums=None if sums is None else sums[0],
+        works=works[0],
         end=end * units.time,
         ended=ended,
     )
@@ -204,6 +213,7 @@ def _left_by_a_cut(
     routed, counts = cut
     record = replace(routed.record, wrench=np.where(determinate, routed.record.wrench, np.nan))
     others = fields_with_bars(mechanism, record)
+    others |= {"work": routed.works}
     others |= {"pressed": routed.pressed, "sums": routed.sums} if mechanism.contacts else {}
     for name, values in fields.items():
         left[name] = np.where(counts, largest(others[name] - values), 0.0)

@@ -31,6 +31,7 @@ from proofroll.truth.tree.contact_tree import ContactTree
 _RESOLVED = 1e-13  # last coefficients of states on a piece, relative to their sizes, that are round-off
 _TURN = 1.0  # rad, by which bodies turn in a piece at most: more is not resolved by its points
 _HALVINGS = 7  # of a step into pieces at most
+_TOGETHER = 3  # steps of DOP853 that the points of a piece resolve
 _PARTS = 8  # into which the first instants of a slip are cut: a force that jumps inside is located to one of them
 
 
@@ -70,7 +71,7 @@ class LawRecorder:
 
         ``most``: number of pieces whose forces are found in numbers, the first and last among them; None: all.
         """
-        cut, found = list(self._cut(stretch)), []
+        cut, found = list(self._cut(stretch, most)), []
         numeric = [piece for piece in cut if piece.record is None]
         if most is not None and len(numeric) > most:
             chosen = {int(k) for k in np.linspace(0, len(numeric) - 1, most)}
@@ -204,8 +205,8 @@ class LawRecorder:
             stops=tuple((low, high) for low, high in stops),
         )
 
-    def _cut(self, stretch: Stretch[ContactMode]) -> Iterator[_Piece]:
-        """Pieces of a stretch."""
+    def _cut(self, stretch: Stretch[ContactMode], most: int | None) -> Iterator[_Piece]:
+        """Pieces of a stretch; ``most``: see :meth:`pieces`."""
         if isinstance(stretch, BegunSlip):
             edges = np.linspace(stretch.start, stretch.end, _PARTS + 1)
             compiled = self._route.by_symbols(stretch.last, stretch.mode)
@@ -219,8 +220,11 @@ class LawRecorder:
             for start, end, inside_step in stretch.by.steps_of(stretch):
                 yield from self._parts(start, end, inside_step, recorded, paced=True)
         elif stretch.dense:
-            for start, end, inside in stretch.dense:
-                last = min(end, stretch.end)
+            together = 1 if most else _TOGETHER
+            for first in range(0, len(stretch.dense), together):
+                steps = stretch.dense[first : first + together]
+                start, last = steps[0][0], min(steps[-1][1], stretch.end)
+                inside = steps[0][2] if len(steps) == 1 else partial(_inside, steps)
                 if last > start:
                     yield from (piece._replace(coarse=True) for piece in self._parts(start, last, inside, None))
         elif stretch.end > stretch.start:  # nothing moves
@@ -261,3 +265,9 @@ class LawRecorder:
             return
         rate = np.full(len(POINTS), (end - start) / 2) * (pace if paced else 1.0)
         yield _Piece(time, rate, states.T, record.T if len(record) else None)
+
+
+def _inside(steps: Sequence[tuple[float, float, Callable[[Array], Array]]], times: Array) -> Array:
+    """States at rising times [s] within successive steps, (state, times)."""
+    numbers = np.searchsorted([end for _, end, _ in steps[:-1]], times)
+    return np.concatenate([steps[k][2](times[numbers == k]) for k in np.unique(numbers)], axis=1)

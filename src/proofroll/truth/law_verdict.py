@@ -11,6 +11,7 @@ import numpy as np
 from proofroll.core.errors import Refused
 from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.contact.acting import ContactMode
+from proofroll.elements.mechanism.dynamics.link_forces import working
 from proofroll.truth.bodies.contact_bodies import ContactBodies
 from proofroll.truth.bodies.maximal_coordinates import MaximalCoordinates
 from proofroll.truth.followed_paths import CLOSE
@@ -23,6 +24,7 @@ from proofroll.truth.natural_units import Units
 from proofroll.truth.numerics.hybrid import HybridPath, Stretch, first_close
 from proofroll.truth.switching.held_route import HeldPath
 from proofroll.truth.tree.contact_tree import ContactTree
+from proofroll.truth.work_of_drives import WorkAlong
 
 # Pieces of a stretch whose forces are found in numbers, at a third of the cost of its steps. Some suffice to see a
 # violation: after one a motion does not come right again.
@@ -38,8 +40,10 @@ def held_to_laws(
     paths: tuple[_Path, _Path],
     second: MaximalCoordinates,
     held: Sequence[HeldPath],
-) -> tuple[tuple[_Path, _Path], str]:
-    """Paths up to the first violation of a law by either, and the outcome of the check; empty after a violation.
+) -> tuple[tuple[_Path, _Path], str, list[WorkAlong]]:
+    """Paths up to the first violation of a law by either, the outcome of the check and the work of drives along both.
+
+    The outcome is empty after a violation.
 
     Args:
         mechanism: in SI units.
@@ -54,67 +58,101 @@ def held_to_laws(
     """
     tree, bodies = routes
     recorders = {
-        "joint coordinates": LawRecorder(mechanism, units, tree, partial(by_the_tree, tree)),
+        "joint coordinates": _recorder_of(mechanism, units, tree),
         "bodies": LawRecorder(mechanism, units, bodies, partial(by_the_bodies, bodies, second)),
     }
     # beyond an early end of one path the other may be on another branch, and beyond a close decision all is open
     early = min((path.stretches[-1].end for path in paths if not path.known), default=np.inf)
     end = min(early, first_close(paths, CLOSE))
     values: Sequence[HeldPath | None] = held or (None, None)
+    works = list[WorkAlong]()
 
     def outcome(most: int | None) -> LawVerdict:
         checked = {}
+        works.clear()
         for (name, recorder), path, value in zip(recorders.items(), paths, values, strict=True):
-            check = LawCheck(mechanism, units.length, 1 / units.time)
-            checked[name] = _checked(check, recorder, path, end * (1 - CLOSE), value, most)
+            walk = _Walk(mechanism, units, recorder, path, value)
+            checked[name] = walk.through(end * (1 - CLOSE), most)
+            works.append(walk.work)
         return verdict(checked)
 
-    result = outcome(_MOST)
-    if result.violation is not None:
+    result = outcome(None if working(mechanism) else _MOST)
+    if result.violation is not None and not working(mechanism):
         # The first violation may lie in a piece that was left out, and a joint may have turned around meanwhile.
         result = outcome(None)
     if result.violation is None:
-        return paths, sentence(result, len(recorders))
+        return paths, sentence(result, len(recorders)), works
     text = sentence(result, len(recorders))
     if not result.violation.time > 0:
         raise Refused(text)
     cut = result.violation.time / units.time
-    return (_cut(paths[0], cut, text), _cut(paths[1], cut, text)), ""
+    return (_cut(paths[0], cut, text), _cut(paths[1], cut, text)), "", works
 
 
-def _checked(
-    check: LawCheck, recorder: LawRecorder, path: _Path, end: float, held: HeldPath | None, most: int | None
-) -> LawResiduals:
-    """Remainders of the laws along one path, whose stretches are judged up to a time.
+def work_along(mechanism: Mechanism, units: Units, tree: ContactTree, path: _Path) -> WorkAlong:
+    """Work of drives along another path of the first route; ``mechanism`` in SI units."""
+    walk = _Walk(mechanism, units, _recorder_of(mechanism, units, tree), path, None)
+    if working(mechanism):
+        walk.through(0.0, None)
+    return walk.work
 
-    ``most``: pieces of a stretch whose forces are found in numbers; None: all.
+
+def _recorder_of(mechanism: Mechanism, units: Units, tree: ContactTree) -> LawRecorder:
+    return LawRecorder(mechanism, units, tree, partial(by_the_tree, tree))
+
+
+class _Walk:
+    """Takes the record of one route along its path.
+
+    Attributes:
+        work: of drives so far.
     """
-    before: Pieces | None = None
-    waiting = list[Pieces]()  # of stretches in one mode, which are checked together
 
-    def check_waiting() -> None:
-        if waiting:
-            check.take(joined_pieces(waiting))
-            waiting.clear()
+    def __init__(
+        self, mechanism: Mechanism, units: Units, recorder: LawRecorder, path: _Path, held: HeldPath | None
+    ) -> None:
+        self._recorder, self._path, self._held = recorder, path, held
+        self._check = LawCheck(mechanism, units.length, 1 / units.time)
+        self.work, self._working = WorkAlong(mechanism, units.length, 1 / units.time), bool(working(mechanism))
+        self._waiting = list[Pieces]()  # of stretches in one mode, which are checked together
 
-    for number, stretch in enumerate(path.stretches):
-        if stretch.start >= end:
-            break
-        if held is not None:
-            held.recall(stretch.start)
-        pieces = recorder.pieces(stretch, most)
-        if before is not None:
-            passage = recorder.passage(path, number, before, recorder.start(stretch, pieces))
-            if passage.happens:
-                check_waiting()
-            check.passes(passage)
-        for part in pieces:
-            if waiting and (waiting[-1].modes, waiting[-1].coarse) != (part.modes, part.coarse):
-                check_waiting()
-            waiting.append(part)
-        before = recorder.end(stretch, pieces)
-    check_waiting()
-    return check.residuals
+    def through(self, end: float, most: int | None) -> LawResiduals:
+        """Remainders of the laws along the path, whose stretches are judged up to a time in natural units.
+
+        ``most``: pieces of a stretch whose forces are found in numbers; None: all.
+        """
+        before: Pieces | None = None
+        judged = self._check.residuals
+        for number, stretch in enumerate(self._path.stretches):
+            if stretch.start >= end and self._check.residuals is judged:
+                if not self._working:
+                    break
+                self._take_waiting()
+                self._check.residuals = LawResiduals(rate=judged.rate)  # behind the end work alone goes on
+            if self._held is not None:
+                self._held.recall(stretch.start)
+            pieces = self._recorder.pieces(stretch, most)
+            if before is not None:
+                passage = self._recorder.passage(self._path, number, before, self._recorder.start(stretch, pieces))
+                if passage.happens:
+                    self._take_waiting()
+                impulses = self._check.passes(passage)
+                if self._working:
+                    self.work.passes(passage, impulses)
+            for part in pieces:
+                if self._waiting and (self._waiting[-1].modes, self._waiting[-1].coarse) != (part.modes, part.coarse):
+                    self._take_waiting()
+                self._waiting.append(part)
+            if self._working:
+                self.work.take(number, pieces)
+            before = self._recorder.end(stretch, pieces)
+        self._take_waiting()
+        return judged
+
+    def _take_waiting(self) -> None:
+        if self._waiting:
+            self._check.take(joined_pieces(self._waiting))
+            self._waiting.clear()
 
 
 def _cut(path: _Path, end: float, text: str) -> _Path:

@@ -12,9 +12,8 @@ from proofroll.core.bounces import with_bounces
 from proofroll.core.dataset import ENDED, ENDS, LAWS
 from proofroll.core.element import Element
 from proofroll.core.errors import NotUnique
-from proofroll.core.events import JUMPS, Event, with_events
+from proofroll.core.events import with_events
 from proofroll.core.observable import Role
-from proofroll.elements.mechanism.dynamics.link_forces import coarseness
 from proofroll.elements.mechanism.dynamics.named_forces import FIELDS, named_forces
 from proofroll.elements.mechanism.dynamics.placed import Placed
 from proofroll.elements.mechanism.run.contacts.observables import PRESSES, SLIDES
@@ -37,9 +36,6 @@ _BARS = {
 _POSES = ("p_WB", "v_WB", "w_WB", "q_WB")
 _PREFIXES = {"work.": "work", "q.": "q", "v.": "v", "force.": "wrench", "torque.": "wrench"}
 _PREFIXES |= dict.fromkeys((f"{field}." for field in FIELDS), "named")
-
-# Reason of the work of a drive that has no value from the first impact on.
-_IMPULSIVE = "no truth of the work of a drive from an impact on, whose impulse does work, too"
 
 
 class MechanismTruth:
@@ -66,7 +62,14 @@ class MechanismTruth:
         wrench = np.stack([record.wrench[..., :3], record.wrench[..., 3:]], axis=1)
         pressed = np.zeros((len(record.time), 0, 3)) if motion.pressed is None else motion.pressed
         dataset = columns(
-            element, record.placed(element.mechanism), wrench, pressed, record.named, motion.sums, UNDETERMINED
+            element,
+            record.placed(element.mechanism),
+            wrench,
+            pressed,
+            record.named,
+            motion.sums,
+            UNDETERMINED,
+            motion.works,
         ).dataset()
         points = [point.name for point in element.mechanism.points]
         fields_of = {
@@ -91,7 +94,6 @@ class MechanismTruth:
         place, turn, velocity, spin = (motion.bars[field] for field in ("p_WB", "q_WB", "v_WB", "w_WB"))
         # at the end of a body's arm; a quaternion changes by half the angle
         bars = motion.bars | {"gap": place + 2 * element.length * turn}
-        bars["work"] = motion.bars["work"] + coarseness(record.placed(element.mechanism), record.named)
         bars |= {"slip": velocity + element.length * spin + 2 * element.speed * turn}
         for name, variable in dataset.data_vars.items():
             field = (
@@ -106,7 +108,6 @@ class MechanismTruth:
             if field is not None:
                 bar = float(bars[field][-1])
             variable.attrs["error_bar"] = 4 * np.finfo(float).eps * size if bar is None else bar
-        dataset = _until_impacts(dataset, motion.events)
         dataset.attrs["route"], *others = motion.routes
         dataset.attrs["second_route"] = ", ".join(others)
         if motion.checked_by is not None:
@@ -125,17 +126,6 @@ class MechanismTruth:
         if not element.mechanism.has_events:
             return dataset
         return with_bounces(with_events(dataset, motion.events), motion.bounces)
-
-
-def _until_impacts(dataset: xr.Dataset, events: Sequence[Event]) -> xr.Dataset:
-    """Dataset with NaN for the work of drives from the first impact on: its impulse does work, which no sample has."""
-    struck = min((event.time for event in events if event.kind in JUMPS), default=np.inf)
-    for name in [str(key) for key in dataset.data_vars if str(key).startswith("work.drive.")]:
-        values = np.where(dataset["time"].to_numpy() < struck, dataset[name].to_numpy(), np.nan)
-        dataset[name] = dataset[name].copy(data=values)
-        if np.isnan(values[1:]).all():
-            dataset[name].attrs["absent"] = _IMPULSIVE
-    return dataset
 
 
 def _laws_alone(element: MechanismElement, times: FloatArray, reason: str) -> xr.Dataset:

@@ -6,7 +6,7 @@ times, so that a selection finds it at a cost that does not grow with the run.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
 from typing import NamedTuple
 
@@ -15,6 +15,7 @@ import numpy as np
 from proofroll.core.dop853 import controlled_step, solver_from
 from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.contact.start import natural_scale
+from proofroll.elements.mechanism.dynamics.link_forces import working
 from proofroll.elements.mechanism.dynamics.named_forces import named_forces
 from proofroll.elements.mechanism.dynamics.record import Record
 from proofroll.elements.mechanism.scene.rotations import Array
@@ -22,6 +23,7 @@ from proofroll.truth.error_bars import on_same_turns
 from proofroll.truth.laws.check import LawCheck, LawVerdict, verdict
 from proofroll.truth.laws.integrals import COUNT, POINTS, TO_SERIES
 from proofroll.truth.laws.record import Pieces, without_contacts
+from proofroll.truth.work_of_drives import WorkAlong
 
 _PIECES = 2  # of a route: they cost a tenth of a truth of few samples
 _RESOLVED = 1e-13  # last coefficients of states, relative to the largest, that are round-off
@@ -85,6 +87,28 @@ def law_check(mechanism: Mechanism, routes: Mapping[str, KeptRoute], counting: s
             check.take(pieces)
         checked[name] = check.residuals
     return verdict(checked)
+
+
+def works_along(mechanism: Mechanism, route: KeptRoute, times: Array) -> tuple[Array, Array]:
+    """Work of drives along a route's steps at times [s], (times, drives), and what is not resolved of it [J], (drives).
+
+    It is integrated over all steps, cut into windows whose points resolve the motion.
+    """
+    scale = natural_scale(mechanism)
+    along = WorkAlong(mechanism, scale.length, scale.rate)
+    windows = [window for step in route.steps for window in _windows(step, route.spin)] if working(mechanism) else []
+    if windows:
+        moments, states = (np.concatenate([window[k] for window in windows]) for k in (0, 1))
+        along.take(0, [_stated(mechanism, route.recorded(moments, states), len(windows), coarse=False)])
+    return along.at(times, [0] * len(times)), along.unresolved
+
+
+def _windows(step: KeptStep, spin: Callable[[Array], float]) -> Iterator[tuple[Array, Array]]:
+    """Windows of a whole step, one after the other."""
+    while step.end > step.start:
+        window = _window(step, spin)
+        yield window
+        step = step._replace(start=float(window[0][-1]))
 
 
 def _pieces(mechanism: Mechanism, route: KeptRoute, counting: KeptRoute) -> Pieces | None:

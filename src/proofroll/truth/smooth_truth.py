@@ -21,6 +21,7 @@ from proofroll.elements.mechanism.contact.start import natural_scale
 from proofroll.elements.mechanism.dynamics.analysis import analyse
 from proofroll.elements.mechanism.dynamics.complementarity import refuse_switching
 from proofroll.elements.mechanism.dynamics.joint_coordinates import JointCoordinates
+from proofroll.elements.mechanism.dynamics.link_forces import powers, working
 from proofroll.elements.mechanism.dynamics.record import Record, record_of
 from proofroll.elements.mechanism.scene.rotations import Array
 from proofroll.truth import SAFETY
@@ -39,7 +40,7 @@ from proofroll.truth.error_bars import (
 )
 from proofroll.truth.laws.check import sentence
 from proofroll.truth.singular_poses import BRANCHING, singular_poses, singular_poses_of
-from proofroll.truth.smooth_laws import KeptRoute, KeptStep, dense_steps, law_check
+from proofroll.truth.smooth_laws import KeptRoute, KeptStep, dense_steps, law_check, works_along
 from proofroll.truth.stiff_routes import run_stiff, stiff
 from proofroll.truth.witnesses.closed_forms import ClosedForm, closed_form
 
@@ -50,7 +51,10 @@ AT_LIMIT = 1e-9  # rad, m: a joint that swings exactly to its limit exceeds it b
 
 
 class _Routes(NamedTuple):
-    """Records of all routes at the same times, the truth first, which of these are chaotic, and the routes' names."""
+    """Records of all routes at the same times, the truth first, which of these are chaotic, and the routes' names.
+
+    ``laws``: outcome of their check; ``kept``: steps of the precise one; None: it failed.
+    """
 
     best: Record
     by_tree: Record
@@ -59,6 +63,7 @@ class _Routes(NamedTuple):
     chaotic: NDArray[np.bool_]
     names: tuple[str, ...]
     laws: str = ""
+    kept: KeptRoute | None = None
 
     def first(self, count: int) -> "_Routes":
         """The same at the first times alone."""
@@ -89,7 +94,7 @@ def find_truth(mechanism: Mechanism, times: Array, tolerance: float = 1e-15) -> 
     times = early.known(times)
     if not len(times):
         raise Refused(f"no truth behind t = {early.time:.6g} s: {early.reason}; ask for earlier times")
-    best, by_tree, by_bodies, precise, chaotic, names, _ = routes.first(len(times))
+    best, by_tree, by_bodies, precise, chaotic, names, laws, steps = routes.first(len(times))
     masked = replace(best, wrench=np.where(analysis.determinate, best.wrench, np.nan))
     placed, fields = masked.placed(mechanism), fields_with_bars(mechanism, masked)
     bars, differences, least = {}, {}, round_off(fields, placed)
@@ -102,6 +107,12 @@ def find_truth(mechanism: Mechanism, times: Array, tolerance: float = 1e-15) -> 
         bar = SAFETY * difference + largest(others[1] - others[2]) + least[field]
         bars[field] = np.maximum.accumulate(bar)
         differences[field] = float(difference[times < horizon].max(initial=0.0))
+    powers_of = [powers(record.placed(mechanism), record.named) for record in (best, by_tree, by_bodies, precise)]
+    apart = np.max([largest(other - powers_of[0]) for other in powers_of[1:]], axis=0, initial=0.0)
+    works, unresolved = _works(mechanism, steps, times)
+    # routes whose powers differ by less than a bound have works that differ by less than its integral
+    lasting = np.cumsum(np.maximum.accumulate(SAFETY * apart) * np.diff(times, prepend=0.0))
+    bars["work"] = lasting + ROUND_OFF * np.maximum.accumulate(largest(works)) + unresolved
     # the true drift is zero: all drift is error; plus round-off of positions and cosines
     of_places = ROUND_OFF * np.maximum(1.0, np.maximum(largest(placed.p_WB), largest(placed.points)))
     bars["drift"] = np.maximum.accumulate(placed.drift() + of_places)
@@ -120,7 +131,8 @@ def find_truth(mechanism: Mechanism, times: Array, tolerance: float = 1e-15) -> 
         checked_by=checked,
         end=early.time,
         ended=early.reason,
-        laws=routes.laws,
+        laws=laws,
+        works=works,
     )
 
 
@@ -161,9 +173,24 @@ def _followed(tree: JointCoordinates, times: Array, tolerance: float, exact: Rec
         early.reason = _singular(mechanism, early.time) or early.reason
     best = precise if exact is None else on_same_turns(mechanism, by_tree, exact)
     routes = _Routes(
-        best=best, by_tree=by_tree, by_bodies=by_bodies, precise=precise, chaotic=chaotic, names=names, laws=laws
+        best=best,
+        by_tree=by_tree,
+        by_bodies=by_bodies,
+        precise=precise,
+        chaotic=chaotic,
+        names=names,
+        laws=laws,
+        kept=kept[0],
     )
     return routes, early
+
+
+def _works(mechanism: Mechanism, steps: KeptRoute | None, times: Array) -> tuple[Array, float]:
+    """Work of drives at times [s], (times, drives), and what is not resolved of it [J]; NaN without steps."""
+    if steps is None:
+        return np.full((len(times), len(working(mechanism))), np.nan), np.inf
+    works, unresolved = works_along(mechanism, steps, times)
+    return works, float(unresolved.max(initial=0.0))
 
 
 def _runs(

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.beside_events import beside_events
+from proofroll.core.columns import SAMPLED_BAR
 from proofroll.core.dataset import LEFT_OUT, Key, before_end, common_span, ended_early, observe, part, scales
 from proofroll.core.element_abilities import KnowsAnotherScene
 from proofroll.core.events import EVENT_ORDER, JUMPS, Event, events_of
@@ -149,8 +150,10 @@ class Reference:
         return max(self.scale(name) or 0.0, *(float(np.max(np.abs(values), initial=0.0)) for values in numbers))
 
     def own_bar(self, name: str, dataset: xr.Dataset) -> float:
-        """Error bar of a run's events: half the width of the widest bracket; 0 for other observables."""
+        """Error bar of a run's events, half the width of the widest bracket, or of a sum over its samples; else 0."""
         item = self.scene.observables[name]
+        if item.sums_samples and name in dataset.variables:
+            return float(dataset.variables[name].attrs.get(SAMPLED_BAR, 0.0))
         if item.role != Role.EVENT or item.name == EVENT_ORDER:
             return 0.0
         widths = [event.time_high - event.time_low for event in self.events_of(dataset)]
@@ -200,12 +203,18 @@ def _true_curves(scene: Scene, dataset: xr.Dataset) -> tuple[dict[str, FloatArra
     """``curves`` and ``determinate`` of a :class:`Reference`."""
     curves, determinate = observe(scene, dataset), {}
     for name, item in scene.observables.items():
-        if item.role is not Role.REACTION or name not in dataset.variables or (name in curves and item.at_impacts):
+        if (
+            item.role is not Role.REACTION
+            or name not in dataset.variables
+            or (name in curves and item.at_impacts and not item.sums_samples)
+        ):
             continue
         values = dataset.variables[name].values[1:]
         mask = np.isfinite(values)
         if not item.at_impacts:
             mask[_unsteady(scene, dataset)[1:]] = False
+        if item.sums_samples:
+            mask[_behind_impacts(scene, dataset)[1:]] = False
         if mask.all():
             continue
         if mask.any():
@@ -213,6 +222,13 @@ def _true_curves(scene: Scene, dataset: xr.Dataset) -> tuple[dict[str, FloatArra
         else:
             curves.pop(name, None)
     return curves, determinate
+
+
+def _behind_impacts(scene: Scene, dataset: xr.Dataset) -> NDArray[np.bool_]:
+    """Samples behind the first impact, shape (time,)."""
+    happened = [event for element in scene.elements for event in events_of(part(scene, element, dataset))]
+    first = min((event.time_low for event in happened if event.kind in JUMPS), default=np.inf)
+    return np.asarray(dataset.variables["time"].values >= first)
 
 
 def _unsteady(scene: Scene, dataset: xr.Dataset) -> NDArray[np.bool_]:

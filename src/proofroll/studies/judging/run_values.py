@@ -144,7 +144,8 @@ def run_curve(
     return RunCurve(
         values,
         own_bar=reference.own_bar(name, dataset),
-        sampled_bar=reference.sampled_bar,
+        sampled_bar=reference.sampled_bar if reference.scene.observables[name].role is Role.EVENT else np.inf,
+        bar_of="its sum over the samples" if reference.scene.observables[name].sums_samples else "",
         between=values_off_grid(reference, name, dataset),
         magnitude=reference.magnitude(name),
         precision=precision,

@@ -43,11 +43,15 @@ class LawCheck:
         momenta(self._scene, pieces, residuals, loads, axes)
         energy(self._scene, pieces, residuals, loads, axes)
 
-    def passes(self, passage: Passage) -> None:
-        """Checks the transition after the pieces that were taken last."""
+    def passes(self, passage: Passage) -> dict[int, float]:
+        """Checks the transition after the pieces that were taken last.
+
+        Returns:
+            Impulse along each driven joint, by its number, of an impact [N s, N m s]; NaN where not determinate.
+        """
         self.residuals.coarse = 1.0
         self.residuals.events += 1
-        transition(self._scene, passage, self.residuals, self._coordinates, self._fastest)
+        return transition(self._scene, passage, self.residuals, self._coordinates, self._fastest)
 
 
 class LawVerdict(NamedTuple):

@@ -54,17 +54,22 @@ class Stop(NamedTuple):
 
 def impact(
     scene: LawScene, passage: Passage, residuals: LawResiduals, coordinates: Coordinates, fastest: dict[str, float]
-) -> None:
-    """Checks a jump of velocities; ``fastest``: largest speed of impact of each contact and stop so far."""
+) -> dict[int, float]:
+    """Checks a jump of velocities; impulse along each driven joint, by its number [N s, N m s], NaN if not determinate.
+
+    ``fastest``: largest speed of impact of each contact and stop so far.
+    """
     before, after, time = passage.before, passage.after, passage.before.time
     m, fast = scene.mechanism, scene.speed + float(np.abs(before.v).max())
-    columns, moving, stops = list[Array](), dict[str, Coordinate](), list[Stop]()
+    columns, moving, stops, driven = list[Array](), dict[str, Coordinate](), list[Stop](), dict[int, int]()
     for number, connection in enumerate(scene.connections):
         columns += _held(scene, before, connection)
         if number < len(m.joints) and m.joints[number].nq == 1:
             moving[connection.name] = _coordinate(scene, passage, number)
             reached = _reached(scene, before, coordinates, number, moving[connection.name])
-            if reached or m.joints[number].motion is not None:
+            if m.joints[number].motion is not None:
+                driven[number] = len(columns)
+            if reached or number in driven:
                 columns.append(moving[connection.name].column)
             stops += reached
     for coupling in m.couplings:
@@ -89,6 +94,8 @@ def impact(
     _newton(scene, passage, residuals, hits, stops, fastest)
     if len(hits) == 1 and not stops and not passage.settles and _rank(columns) - _rank(columns[:joints]) == 3:
         _coulomb(scene, passage, residuals, hits[0], pulses[joints:])
+    alone = {number: _rank(columns) > _rank([*columns[:k], *columns[k + 1 :]]) for number, k in driven.items()}
+    return {number: float(pulses[k]) if alone[number] else np.nan for number, k in driven.items()}
 
 
 def _column(scene: LawScene, before: Pieces, ends: tuple[int, int], place: Array, force: Array, moment: Array) -> Array:

@@ -21,21 +21,25 @@ _STRUCK = 1e-9  # jump of velocities, in natural sizes, above which there was an
 
 def transition(
     scene: LawScene, passage: Passage, residuals: LawResiduals, coordinates: Coordinates, fastest: dict[str, float]
-) -> None:
-    """Checks a transition; ``fastest``: largest speed of impact of each contact and stop so far, kept up to date."""
+) -> dict[int, float]:
+    """Checks a transition; impulse along each driven joint, by its number, if velocities jump [N s, N m s].
+
+    ``fastest``: largest speed of impact of each contact and stop so far, kept up to date.
+    """
     before, after = passage.before, passage.after
     residuals.note(
         "joined", "", jump(scene, after, before, slice(None), slice(None), rates=False), 1.0, before.time[:, 0]
     )
     is_struck = bool(jump(scene, after, before, slice(None), slice(None))[0] > _STRUCK)
     if is_struck:
-        impact(scene, passage, residuals, coordinates, fastest)
-    if not passage.decided or is_struck:
-        return
+        return impact(scene, passage, residuals, coordinates, fastest)
+    if not passage.decided:
+        return {}
     zeros = [*_of_contacts(scene, before, after), *_of_joints(scene, before, after)]
     if zeros:
         name, value = min(zeros, key=lambda item: item[1])
         residuals.note("event", name, np.array([[value]]), 1.0, before.time)
+    return {}
 
 
 def _of_contacts(scene: LawScene, before: Pieces, after: Pieces) -> Iterator[tuple[str, float]]:

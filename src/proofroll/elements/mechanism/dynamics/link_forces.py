@@ -6,12 +6,11 @@ The harness evaluates them for truth and engines alike, at the motion that each 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import fields, replace
-from typing import Any
 
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
+from proofroll.core.columns import SAMPLED_BAR
 from proofroll.core.observable import Observable, Role
 from proofroll.elements.mechanism.dynamics.named_forces import NamedForce, named_forces
 from proofroll.elements.mechanism.dynamics.placed import Placed
@@ -59,46 +58,46 @@ def working(mechanism: Mechanism) -> list[tuple[int, NamedForce]]:
     return [(number, item) for number, item in enumerate(named_forces(mechanism)) if item.field in WORKING]
 
 
-def works(placed: Placed, named: FloatArray) -> FloatArray:
-    """Work of each of :func:`working` since the first time [J], shape (time, drives).
+def working_joints(mechanism: Mechanism) -> list[str]:
+    """Names of the joints of :func:`working`."""
+    joints = {f"effort.{item.name}": item.joint for item in mechanism.actuators}
+    return [joints.get(item.name, item.name.removeprefix("drive.")) for _, item in working(mechanism)]
 
-    Simpson's rule over the samples, for truth and engines alike; ``named``: all named forces, shape (time, forces).
-    """
+
+def powers(placed: Placed, named: FloatArray) -> FloatArray:
+    """Power of each of :func:`working` [W], shape (time, drives); ``named``: all named forces, shape (time, forces)."""
     drives, rates = working(placed.mechanism), placed.coordinates()
-    if not drives:
-        return np.zeros((len(placed.time), 0))
-    joints = {f"effort.{item.name}": item.joint for item in placed.mechanism.actuators}
-    names = [joints.get(item.name, item.name.removeprefix("drive.")) for _, item in drives]
-    powers = [named[:, number] * rates[name][1] for (number, _), name in zip(drives, names, strict=True)]
-    return np.stack([_integral(placed.time, power) for power in powers], axis=1)
+    values = [
+        named[:, number] * rates[name][1]
+        for (number, _), name in zip(drives, working_joints(placed.mechanism), strict=True)
+    ]
+    return np.stack(values, axis=1) if values else np.zeros((len(placed.time), 0))
 
 
-def coarseness(placed: Placed, named: FloatArray) -> FloatArray:
-    """Change of :func:`works` where every other sample is left out, largest so far [J], shape (time,).
+def sampled_works(time: FloatArray, power: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Work since the first sample [J], (time, drives), and its error by the quadrature, largest over time, (drives).
 
-    It bounds the error of the quadrature, which falls by sixteen where samples are twice as dense and nothing jumps.
+    Simpson's rule over the samples of an engine, which has nothing between them. The error is the change where every
+    other sample is left out; it falls by sixteen where samples are twice as dense and nothing jumps.
     """
-    every, count = works(placed, named), len(placed.time)
-    change = np.zeros(count)
-    if every.shape[1] and count > 2:
-        names = [item.name for item in fields(placed) if item.name != "mechanism"]
-        parts = {name: getattr(placed, name) for name in names}
-        thinned: dict[str, Any] = {name: None if part is None else part[::2] for name, part in parts.items()}
-        sparse = replace(placed, **thinned)
-        gap = np.abs(works(sparse, named[::2]) - every[::2])
-        change[::2] = np.where(np.isnan(gap), 0.0, gap).max(axis=1)
-    return np.maximum.accumulate(change)
+    work, change = _integral(time, power), np.zeros(power.shape[1])
+    if len(time) > 2 and len(change):
+        gap = np.abs(_integral(time[::2], power[::2]) - work[::2])
+        change = np.where(np.isnan(gap), 0.0, gap).max(axis=0)
+    return work, change
 
 
 def _integral(time: FloatArray, values: FloatArray) -> FloatArray:
-    if len(time) < 2:
-        return np.zeros(len(time))
+    if len(time) < 2 or not values.shape[1]:
+        return np.zeros_like(values)
     from scipy.integrate import cumulative_simpson
 
-    return np.asarray(cumulative_simpson(values, x=time, initial=0.0))
+    return np.asarray(cumulative_simpson(values, x=time, axis=0, initial=0.0))
 
 
-def put_links(placed: Placed, named: FloatArray, put: Callable[..., None], unsaid: str) -> None:
+def put_links(
+    placed: Placed, named: FloatArray, put: Callable[..., None], unsaid: str, work: FloatArray | None = None
+) -> None:
     """Puts forces of springs and bushings, and work of drives, among the variables of a run.
 
     Args:
@@ -106,6 +105,7 @@ def put_links(placed: Placed, named: FloatArray, put: Callable[..., None], unsai
         named: named forces, shape (time, forces).
         put: takes a variable's name, values, unit, meaning and dimensions.
         unsaid: reason of work that has no value.
+        work: of drives [J], shape (time, drives); None: integrated over the samples, with the error of that.
     """
     mechanism, values = placed.mechanism, link_values(placed)
     count = len(mechanism.springs)
@@ -119,8 +119,13 @@ def put_links(placed: Placed, named: FloatArray, put: Callable[..., None], unsai
                 put(f"{kind}.{bushing.name}.{letter}", loads[:, number, part, axis], unit, meaning)
     for part, (name, unit, what) in enumerate(_BUSHINGS if mechanism.bushings else ()):
         put(name, loads[:, :, part], unit, f"{what} of bushings by their laws", "bushing", "xyz")
-    for work, (_, item) in zip(works(placed, named).T, working(mechanism), strict=True):
-        put(f"work.{item.name}", work, "J", f"work of {item.name}", absent=unsaid if np.all(np.isnan(work[1:])) else "")
+    drives, errors = working(mechanism), np.zeros(0)
+    if work is None:
+        work, errors = sampled_works(placed.time, powers(placed, named))
+    for k, (_, item) in enumerate(drives):
+        absent = unsaid if np.all(np.isnan(work[1:, k])) else ""
+        error = {SAMPLED_BAR: float(errors[k])} if len(errors) else {}
+        put(f"work.{item.name}", work[:, k], "J", f"work of {item.name}", absent=absent, **error)
 
 
 def link_observables(mechanism: Mechanism, floors: dict[str, float]) -> Iterator[Observable]:
@@ -130,4 +135,6 @@ def link_observables(mechanism: Mechanism, floors: dict[str, float]) -> Iterator
     for name, unit, what in _BUSHINGS if mechanism.bushings else ():
         yield Observable(name, unit, f"{what} of bushings on their bodies b", Role.REACTION, floor=floors[unit])
     for _, item in working(mechanism):
-        yield Observable(f"work.{item.name}", "J", f"work of {item.name}", Role.REACTION, floor=floors["J"])
+        yield Observable(
+            f"work.{item.name}", "J", f"work of {item.name}", Role.REACTION, floor=floors["J"], sums_samples=True
+        )

@@ -115,12 +115,14 @@ def columns(
     named: FloatArray,
     sums: FloatArray | None = None,
     unsaid: str = UNSAID,
+    work: FloatArray | None = None,
 ) -> Columns:
     """Variables of a run, from the motion of the bodies and the forces and moments on them.
 
     ``wrench``: of joints and loops, shape (time, 2, joints + loops, 3); ``pressed``: of contacts, (time, contacts, 3);
     ``sums``: of the contacts of each pair with several, (time, such pairs, 3), by default from ``pressed``;
-    ``unsaid``: reason of what is NaN at all times;
+    ``unsaid``: reason of what is NaN at all times; ``work``: of drives [J], (time, drives), by default summed over the
+    samples;
     ``named``: see :func:`~proofroll.elements.mechanism.dynamics.named_forces.named_forces`, (time, forces).
     Variables: ``p_WB`` [m], ``v_WB`` [m/s], ``w_WB`` [rad/s] over (time, body, xyz), ``q_WB`` over (time, body, wxyz);
     ``positions`` [m] of the tracked points; ``q.<joint>``, ``v.<joint>`` of joints with one coordinate;
@@ -173,7 +175,7 @@ def columns(
         _put_contacts(element, placed, pressed, sums, unsaid, put)
     for values, item in zip(named.T, named_forces(mechanism), strict=True):
         put(item.name, values, str(item.unit), item.meaning, absent=unsaid if np.all(np.isnan(values)) else "")
-    put_links(placed, named, put, unsaid)
+    put_links(placed, named, put, unsaid, work)
     energy = placed.energy()
     wound = [doubts[joint.name][UNCERTAIN] for joint in mechanism.joints if joint.stiffness and joint.name in doubts]
     unsure = {UNCERTAIN: wound[0]} if wound else {}

@@ -1,0 +1,128 @@
+"""Work of drives along the record of a route: integrals of power over its pieces, and impulses times rates at impacts.
+
+It is a property of the motion: the samples of a user have no part in it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.polynomial import chebyshev
+
+from proofroll.elements.mechanism.dynamics.link_forces import working, working_joints
+from proofroll.elements.mechanism.scene.joint_kinds import JointKind
+from proofroll.truth.laws.integrals import TO_SERIES, dot, integral, tail
+from proofroll.truth.laws.record import Array, Passage, Pieces
+from proofroll.truth.laws.scene import LawScene
+
+if TYPE_CHECKING:
+    from proofroll.elements.mechanism import Mechanism
+
+_CORRECTIONS = 8  # of Newton's method for the place of a time in a piece, at most: it converges in three
+
+
+class _Part(NamedTuple):
+    """Work on a part of a stretch: series of time [s] and work [J] by a variable from -1 to 1."""
+
+    stretch: int
+    start: float
+    end: float
+    time: Array
+    work: Array
+
+    def at(self, time: float) -> Array:
+        """Work of each drive at a time [s]."""
+        if time <= self.start:
+            return np.asarray(chebyshev.chebval(-1.0, self.work))
+        if time >= self.end:
+            return np.asarray(chebyshev.chebval(1.0, self.work))
+        place, pace = 2 * (time - self.start) / (self.end - self.start) - 1, chebyshev.chebder(self.time)
+        for _ in range(_CORRECTIONS):
+            moved = np.clip(
+                place + (time - chebyshev.chebval(place, self.time)) / chebyshev.chebval(place, pace), -1, 1
+            )
+            done, place = abs(moved - place) <= 4 * np.spacing(1.0), float(moved)
+            if done:
+                break
+        return np.asarray(chebyshev.chebval(place, self.work))
+
+
+class WorkAlong:
+    """Work of each of :func:`.working` along one route since the start [J].
+
+    Attributes:
+        unresolved: what the points of pieces do not resolve of it, so far [J], (drives).
+    """
+
+    def __init__(self, mechanism: Mechanism, length: float, rate: float) -> None:
+        """Takes a mechanism in SI units with its natural length [m] and rate [1/s]."""
+        self._scene, self._drives = LawScene(mechanism, length, rate), [item for _, item in working(mechanism)]
+        self._joints = [mechanism.joint_index[name] for name in working_joints(mechanism)]
+        self._total, self._parts = np.zeros(len(self._drives)), list[_Part]()
+        self.unresolved = np.zeros(len(self._drives))
+        self._last: tuple[float, Array] | None = None  # time and power of the last point
+
+    def take(self, stretch: int, parts: Sequence[Pieces]) -> None:
+        """Adds pieces of a stretch, and the mean power between them and the last ones."""
+        for pieces in parts:
+            power = self._power(pieces)
+            summed, unresolved = integral(power, pieces.pace), tail(power, pieces.pace)[:, 0]
+            for time, powers, work, rest in zip(pieces.time, power, summed, unresolved, strict=True):
+                self._over_a_gap(stretch, float(time[0]), powers[0])
+                series = TO_SERIES @ (self._total + work)
+                self._parts.append(_Part(stretch, float(time[0]), float(time[-1]), TO_SERIES @ time, series))
+                self._total = self._total + work[-1]
+                self.unresolved = self.unresolved + rest
+                self._last = float(time[-1]), powers[-1]
+
+    def passes(self, passage: Passage, impulses: Mapping[int, float]) -> None:
+        """Adds the work of impulses of driven joints, by their numbers; an effort is finite and has none."""
+        before, after = passage.before, passage.after
+        self._over_a_gap(
+            self._parts[-1].stretch if self._parts else 0, float(before.time[0, 0]), self._power(before)[0, 0]
+        )
+        for k, (drive, joint) in enumerate(zip(self._drives, self._joints, strict=True)):
+            if drive.field == "drive" and joint in impulses:
+                rate = (self._rate(joint, before) + self._rate(joint, after))[0, 0] / 2
+                # a joint that a motion holds at rest does no work, whatever its impulse
+                self._total[k] += impulses[joint] * rate if rate else 0.0
+        self._last = float(after.time[0, 0]), self._power(after)[0, 0]
+
+    def at(self, times: Array, stretches: Sequence[int]) -> Array:
+        """Work at times [s] in stretches, (times, drives)."""
+        found = []
+        for time, stretch in zip(times.tolist(), stretches, strict=True):
+            last = [part for part in self._parts if part.stretch <= stretch]
+            inside = [part for part in last if part.stretch == stretch] or last
+            part = next((part for part in reversed(inside) if part.start <= time), inside[0] if inside else None)
+            found.append(np.zeros(len(self._drives)) if part is None else part.at(time))
+        return np.array(found).reshape(len(times), len(self._drives))
+
+    def _over_a_gap(self, stretch: int, time: float, power: Array) -> None:
+        """Adds the mean of the powers on both sides of a gap, as in the last instants of a slip."""
+        if self._last is None or not time > self._last[0]:
+            return
+        (begun, before), ended = self._last, self._total
+        span = time - begun
+        self._total = ended + span * (before + power) / 2
+        self.unresolved = self.unresolved + span * np.abs(before - power) / 2
+        line = np.array([[1.0, 1.0], [-1.0, 1.0]]) / 2
+        series = np.array([(begun + time) / 2, span / 2]), line @ np.array([ended, self._total])
+        self._parts.append(_Part(stretch, begun, time, *series))
+        self._last = time, power
+
+    def _power(self, pieces: Pieces) -> Array:
+        """Power of each drive at the points of pieces [W]."""
+        powers = [
+            getattr(pieces, drive.field)[..., drive.number] * self._rate(joint, pieces)
+            for drive, joint in zip(self._drives, self._joints, strict=True)
+        ]
+        return np.stack(powers, -1) if powers else np.zeros((*pieces.time.shape, 0))
+
+    def _rate(self, joint: int, pieces: Pieces) -> Array:
+        """Rate of a joint with one coordinate at the points of pieces [m/s, rad/s]."""
+        placed = self._scene.placed(self._scene.connections[joint], pieces)
+        turns = self._scene.mechanism.joints[joint].kind == JointKind.REVOLUTE
+        return dot(placed.spin if turns else placed.slide, placed.A[..., 2])
