@@ -87,3 +87,19 @@ def test_a_leg_that_rubs_in_its_joints_rests_on_its_tip(lean: float, bend: float
     assert not found.ended
     assert found.record.v[-1] == pytest.approx([0.0, 0.0], abs=0.0)
     assert np.isnan(found.record.named).all()
+
+
+@pytest.mark.parametrize("ratio", [1e6, pytest.param(1e8, marks=pytest.mark.drill)])
+def test_a_box_rests_on_one_that_is_far_lighter(ratio: float) -> None:
+    """Forces that cancel on a light body leave few digits of its own: both boxes rest, whatever the ratio of masses."""
+    bodies, joints, shapes = [], [], [Geometry("floor", "world", "plane")]
+    for name, mass, height in (("light", 1.0, 0.1), ("heavy", ratio, 0.3)):
+        bodies.append(Body(name, mass, inertia=(mass * 0.04 / 6,) * 3))
+        joints.append(Joint(f"f{name}", "free", "world", name, q0=(0.0, 0.0, height, 1.0, 0.0, 0.0, 0.0)))
+        shapes.append(Geometry(f"{name}_box", name, "box", size=(0.2, 0.2, 0.2)))
+    pairs = (Pair("ground", ("light_box", "floor"), 0.5), Pair("stack", ("heavy_box", "light_box"), 0.5))
+    stack = Mechanism(tuple(bodies), tuple(joints), gravity=(0.0, 0.0, -9.81), geometries=tuple(shapes), pairs=pairs)
+    found = truth_of(stack, np.array([0.0, 0.1]))
+    assert found.laws
+    assert found.record.p_WB[-1] == pytest.approx(np.array([[0.0, 0.0, 0.1], [0.0, 0.0, 0.3]]), abs=1e-15)
+    assert found.bars["p_WB"][-1] < 1e-14

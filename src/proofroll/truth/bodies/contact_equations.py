@@ -30,6 +30,8 @@ from proofroll.truth.bodies.maximal_coordinates import RANK, NumericEquations
 from proofroll.truth.bodies.maximal_equations import FUNCTIONS, Switched
 
 _AXES = np.eye(3)
+_NULL = 1e-13  # singular value, relative to the largest, that is round-off
+_ROUNDS = 2  # of a solution: one, and one for its residual
 _KEPT = 4  # states whose rows and loads are kept
 
 
@@ -286,8 +288,9 @@ class ContactEquations:
         # zero.
         by_velocity = 1 / np.sqrt(np.diag(state.mass))
         units = np.concatenate([by_velocity, 1 / np.linalg.norm(K * by_velocity, axis=1)])
-        system = np.block([[state.mass, -D.T], [K, none]]) * units * units[:, None]
-        answer = units * np.linalg.lstsq(system, units * np.concatenate([right, *aims]), rcond=1e-13)[0]
+        matrix, target = np.block([[state.mass, -D.T], [K, none]]), np.concatenate([right, *aims])
+        system = matrix * units * units[:, None]
+        answer, V = _answer(matrix, target, units)
         x, z = answer[:nu], answer[nu + len(state.C) :]
         plain = np.block([[state.mass, -K.T], [K, none]]) * units * units[:, None]
         sides, sizes, _ = np.linalg.svd(plain[nu:, :nu])
@@ -297,7 +300,7 @@ class ContactEquations:
         response = float(np.linalg.det(whole.T @ system @ whole) / np.linalg.det(whole.T @ plain @ whole))
         ways = np.zeros((len(system), 0))
         if rank < count:
-            ways = units[:, None] * np.linalg.svd(system)[2][nu + rank :].T
+            ways = units[:, None] * V[nu + rank :].T
             ways /= np.linalg.norm(ways[nu:], axis=0)
         splits, shifts = np.zeros((len(mode), ways.shape[1])), np.zeros((len(mode), 3, ways.shape[1]))
         for (k, direction), size, way in zip(owner, z, ways[nu + len(state.C) :], strict=True):
@@ -408,3 +411,16 @@ class ContactEquations:
         K = forbidding_rows(mode, bodies.touching, bodies.J, presses)
         state[e.nx : e.nx + e.nu] -= least_motion(bodies.mass, bodies.C, K, K @ bodies.u)
         return state
+
+
+def _answer(matrix: Array, target: Array, units: Array) -> tuple[Array, Array]:
+    """Smallest solution of a square system scaled by units, and its right singular vectors, (vectors, unknowns).
+
+    Its residual is solved for once more: forces of heavy bodies that cancel on a light one leave few digits to it.
+    """
+    U, sizes, V = np.linalg.svd(matrix * units * units[:, None])
+    kept, answer = sizes > _NULL * sizes[0], np.zeros(len(matrix))
+    for _ in range(_ROUNDS):
+        left = units * (target - matrix @ answer)
+        answer = answer + units * (V[kept].T @ (U[:, kept].T @ left / sizes[kept]))
+    return answer, np.asarray(V)

@@ -27,7 +27,7 @@ _SHARES = 1e-9
 # unique. Each further contact gets an extra 0.382 of it: equal changes would cancel between two walls.
 _NUDGE, _APART = 1e-6, 0.382
 _ROUND_OFF = 1e-14  # of motions, in parts of what they are the sum of: a light body between heavy ones has 2e-16
-_NULL = 1e-12  # response to forces, relative to the largest of unit rows, that counts as none: round-off is 1e-16
+NULL = 1e-12  # response to forces, relative to the largest of unit rows, that counts as none: round-off is 1e-16
 
 
 def largest_friction(friction: Any, normal: Any) -> Any:
@@ -265,7 +265,7 @@ def _all_held(
     """Forces that let every contact stick and press within the bounds of friction, in any distribution; else None."""
     scale = natural_rows(G)
     values, vectors = np.linalg.eigh(G * np.outer(scale, scale))
-    whole = values > _NULL * values[-1]
+    whole = values > NULL * values[-1]
     held: Array = -scale * (vectors[:, whole] @ ((vectors[:, whole].T @ (scale * c)) / values[whole]))
     rounded = _ROUND_OFF * float((scale * (np.abs(G) @ np.abs(held))).max())
     if np.abs(scale * (c + G @ held)).max() > max(rests * float(np.abs(scale * c).max()), rounded):

@@ -25,6 +25,7 @@ from proofroll.elements.mechanism.contact.acting import (
     with_features,
 )
 from proofroll.elements.mechanism.contact.coulomb import (
+    NULL,
     contact_forces,
     least_motion_for,
     natural_rows,
@@ -63,6 +64,7 @@ from proofroll.elements.mechanism.scene.signal import FUNCTIONS
 
 # Impulse, relative to the largest of an impact, that counts as none; a pressure nudged by 1e-6 makes such impulses.
 _NO_IMPULSE = 1e-4
+_ROUNDS = 2  # of the solution for forces: one, and one for its residual
 _ROUND_OFF = 1e-13  # of slides in a sequence of impacts, relative to the largest
 
 
@@ -117,7 +119,7 @@ class ContactDynamics:
             parts.append((part @ J, part @ rate + friction.part_rate(there) @ turning))
         J = np.array([row for row, _ in parts]).reshape(-1, 3, len(v))
         bias = np.array([rate for _, rate in parts]).reshape(-1, 3)
-        return ContactsNow(solution=found, W=W, loose=loose, touching=touching, J=J, bias=bias)
+        return ContactsNow(solution=found, mass=mass, W=W, loose=loose, touching=touching, J=J, bias=bias)
 
     def solve(self, q: Array, v: Array, mode: ContactMode, time: float = 0.0) -> ContactSolution:
         """Accelerations and forces while each contact keeps the given mode, at a time [s].
@@ -160,14 +162,23 @@ class ContactDynamics:
         moments = moments_by_pressing(turning, owned, [each.normal for each in state.touching])
         for k, place, moment in moments:
             D[place] += moment @ state.J[k]
-        S, wanted = K @ state.W @ D.T, -(K @ free + np.concatenate(bias))
+        S, wanted = K @ state.W @ D.T, -np.concatenate(bias)
         smooth = K @ state.W @ K.T
         units = natural_rows(K @ state.loose @ K.T)
         values, vectors = np.linalg.eigh(smooth * np.outer(units, units))
-        weak, even = values < max(RANK * values[-1], NO_RESPONSE), S * np.outer(units, units)
-        z = units * np.linalg.lstsq(even, units * wanted, rcond=RANK)[0] if weak.any() else np.linalg.solve(S, wanted)
-        ways = units[:, None] * np.linalg.svd(even)[2][len(S) - weak.sum() :].T if weak.any() else np.zeros((len(S), 0))
+        weak, even = values < max(NULL * values[-1], NO_RESPONSE), S * np.outer(units, units)
+        U, sizes, V = np.linalg.svd(even)
+        rank = len(S) - int(weak.sum())
+        ways = units[:, None] * V[rank:].T
         ways /= np.linalg.norm(ways, axis=0)
+        kept = slice(0, int((sizes[:rank] > NULL * sizes[0]).sum()))
+        z, bound = np.zeros(len(S)), free
+        # forces of a heavy body that cancel on a light one leave digits to the second round
+        for _ in range(_ROUNDS):
+            step = state.W @ (state.mass @ (bound - free) + D.T @ z)
+            left = U[:, kept].T @ (units * (wanted - K @ (free + step)))
+            change = units * (V[kept].T @ (left / sizes[kept]))
+            z, free = z + change, free + step + state.W @ (D.T @ change)
         shifts = np.zeros((len(mode), 3, ways.shape[1]))
         for k, direction, size, loose in zip(owner, along, z, ways, strict=True):
             force[k] += size * direction
@@ -178,7 +189,6 @@ class ContactDynamics:
         whole = units[:, None] * vectors[:, ~weak]  # without what the split of a shared load changes
         response = float(np.linalg.det(whole.T @ S @ whole) / np.linalg.det(whole.T @ smooth @ whole))
         spread = float(np.linalg.norm(state.W @ (D.T @ ways)))
-        free = free + state.W @ D.T @ z
         return ContactSolution(state, mode, free, force, response=response, shifts=shifts, spread=spread)
 
     @staticmethod

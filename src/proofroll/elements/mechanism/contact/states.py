@@ -20,6 +20,7 @@ class ContactsNow:
 
     Attributes:
         solution: of the mechanism without forces of contact.
+        mass: of the velocities, (nv, nv).
         W: accelerations caused by unit forces along the velocities, (nv, nv).
         loose: the same without loops, couplings and motions, (nv, nv).
         touching: geometry and rates of each contact.
@@ -28,6 +29,7 @@ class ContactsNow:
     """
 
     solution: Solution
+    mass: Array
     W: Array
     loose: Array
     touching: tuple[Touching, ...]
