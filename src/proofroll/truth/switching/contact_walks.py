@@ -299,6 +299,8 @@ class ContactWalks(ABC):
         time, mode = float(state[-1]), stretch.mode
         if isinstance(stretch, BegunSlip):
             return stretch.mode_at(time)
+        if isinstance(stretch, StoppingSlip):
+            return self._as_it_goes(stretch.line if time >= stretch.line[-1] else state, mode)
         if isinstance(stretch, CompiledStretch) and stretch.visited and time > stretch.visited[0][0]:
             return self._as_it_goes(state, mode)
         return mode

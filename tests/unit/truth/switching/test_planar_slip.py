@@ -196,18 +196,35 @@ def test_a_slip_on_a_shaken_floor_ends_when_the_floor_has_its_speed(until: float
         assert event.time_low <= right <= event.time_high
 
 
+def rolling_in(way: tuple[float, float]) -> Mechanism:
+    """A ball of unequal moments that slides backward along a ``way`` until it rolls, at μ g = 3 m/s²."""
+    start = (0.0, 0.0, 0.2, 1.0, 0.0, 0.0, 0.0)
+    free = Joint("free", "free", "world", "ball", q0=start, v0=(-2.0 * way[0], -2.0 * way[1], 0.0, 0.0, 0.0, 0.0))
+    shapes = (Geometry("floor", "world", "plane"), Geometry("skin", "ball", "sphere", radius=0.2))
+    return Mechanism(
+        (Body("ball", 1.0, inertia=(0.018, 0.03, 0.028)),), (free,), geometries=shapes,
+        pairs=(Pair("c", ("skin", "floor"), 0.3),), gravity=(0.0, 0.0, -10.0),
+    )  # fmt: skip
+
+
+def test_friction_opposes_a_slip_until_its_last_instant() -> None:
+    """Friction turns with a slip that vanishes: a sample just before its end has the force against its direction."""
+    ball = rolling_in((0.6, 0.8))
+    (event,) = truth_of(ball, np.array([0.0, 0.4])).events
+    before = event.time - np.array([3e-8, 3e-9, 1e-9, 1e-10])
+    found = truth_of(ball, np.array([0.0, *before]))
+    assert found.pressed is not None
+    slip = (found.record.v_WB[:, 0] + np.cross(found.record.w_WB[:, 0], [0.0, 0.0, -0.2]))[1:, :2]
+    ways = slip / np.linalg.norm(slip, axis=1)[:, None]
+    assert np.linalg.norm(found.pressed[1:, 0, :2] + 0.3 * 10.0 * ways, axis=1).max() < 1e-5  # of 3 N
+    assert found.bars["pressed"][-1] < 1e-5
+
+
 @pytest.mark.parametrize("way", [(1.0, 0.0), (0.0, 1.0), (0.6, 0.8)])
 def test_a_ball_of_unequal_moments_slides_along_an_axis_until_it_rolls(way: tuple[float, float]) -> None:
     """A slip that keeps its direction stops without a division by zero: at 2/7 of v/(μ g) for moments alike."""
     right = {(1.0, 0.0): 0.03, (0.0, 1.0): 0.018}.get(way)
-    start = (0.0, 0.0, 0.2, 1.0, 0.0, 0.0, 0.0)
-    free = Joint("free", "free", "world", "ball", q0=start, v0=(-2.0 * way[0], -2.0 * way[1], 0.0, 0.0, 0.0, 0.0))
-    shapes = (Geometry("floor", "world", "plane"), Geometry("skin", "ball", "sphere", radius=0.2))
-    ball = Mechanism(
-        (Body("ball", 1.0, inertia=(0.018, 0.03, 0.028)),), (free,), geometries=shapes,
-        pairs=(Pair("c", ("skin", "floor"), 0.3),), gravity=(0.0, 0.0, -10.0),
-    )  # fmt: skip
-    found = truth_of(ball, np.array([0.0, 0.4]))
+    found = truth_of(rolling_in(way), np.array([0.0, 0.4]))
     (event,) = found.events
     assert event.kind == "stick"
     if right is not None:
