@@ -184,7 +184,10 @@ def _newton(
     stops: Sequence[Stop],
     fastest: dict[str, float],
 ) -> None:
-    """No contact that was struck closes further; of one alone v+ = -e v-, or 0 where its rebounds are summed."""
+    """No contact that was struck closes further; of one alone v+ = -e v-, or 0 where its rebounds are summed.
+
+    Of several each leaves with e of its speed at least, and one with no more: impulses that press have caused the jump.
+    """
     before, time = passage.before, passage.before.time
     fast, strikes = scene.speed + float(np.abs(before.v).max()), list[Stop]()
     happened = passage.impacts | passage.settles
@@ -194,7 +197,17 @@ def _newton(
         if before.modes.contacts[hit.number] != "open" or hit.contact.name in happened:
             residuals.note("restitution", hit.contact.name, np.array([[max(-speeds[1], 0.0)]]), fast, time)
     strikes += stops
-    if len(strikes) != 1:  # of several Newton's law holds for each impact of their sequence, not for the whole
+    if len(strikes) != 1:
+        beyond = {
+            name: left + restitution * came
+            for name, restitution, (came, left) in strikes
+            if name in passage.impacts and came < 0 and not passage.settles
+        }
+        for name, speed in beyond.items():
+            residuals.note("restitution", name, np.array([[max(-speed, 0.0)]]), fast, time)
+        if beyond:
+            nearest = min(beyond, key=lambda name: abs(beyond[name]))
+            residuals.note("restitution", nearest, np.array([[beyond[nearest]]]), fast, time)
         return
     name, restitution, (came, left) = strikes[0]
     if not passage.settles:

@@ -126,14 +126,14 @@ def floor_under(kind: str, **pair: float) -> Mechanism:
     )
 
 
-def touching(mode: str) -> Modes:
-    """Modes of one contact of a body on one joint."""
-    return Modes((mode,), ("open",), ("open",), ("open",), (("open", "open"),))
+def touching(mode: str, count: int = 1) -> Modes:
+    """Modes of contacts of a body on one joint."""
+    return Modes((mode,) * count, ("open",) * count, ("open",) * count, ("open",), (("open", "open"),))
 
 
-def contact(time: Array, force: Any, place: Any) -> dict[str, Any]:
-    """Fields of one contact with a floor."""
-    none = np.zeros((*time.shape, 1, 3))
+def contact(time: Array, force: Any, place: Any, count: int = 1) -> dict[str, Any]:
+    """Fields of contacts with a floor at one place."""
+    none = np.zeros((*time.shape, count, 3))
     return {
         "force": none + np.asarray(force, float)[..., None, :],
         "place": none + np.asarray(place, float)[..., None, :],
@@ -175,10 +175,18 @@ def guided(*, reverses: bool) -> HandMade:
     return HandMade(mechanism, (pieces,))
 
 
-def bounce(restitution: float = 0.5, speed: float = 0.0, kinetic: float = 0.2) -> HandMade:
-    """A ball that falls by 0.2 m on a floor and rises with half its speed; it may slide as it strikes."""
+def bounce(restitution: float = 0.5, speed: float = 0.0, kinetic: float = 0.2, count: int = 1) -> HandMade:
+    """A ball that falls by 0.2 m on a floor and rises with half its speed; it may slide as it strikes.
+
+    ``count``: of skins of the ball, which strike together.
+    """
     mechanism, drop, radius = floor_under("free", friction=0.2, static_friction=0.5, restitution=0.5), 0.2, 0.1
     mass, inertia = mechanism.bodies[0].mass, mechanism.bodies[0].inertia[1][1]
+    if count > 1:
+        (skin, floor), (pair,) = mechanism.geometries, mechanism.pairs
+        more = [replace(skin, name=f"skin{k}") for k in range(1, count)]
+        pairs = [replace(pair, name=f"contact{k}", geometries=(f"skin{k}", "floor")) for k in range(1, count)]
+        mechanism = replace(mechanism, geometries=(skin, floor, *more), pairs=(pair, *pairs))
     landing = np.sqrt(2 * drop / GRAVITY)
     impact = GRAVITY * landing
     lost = kinetic * (1 + restitution) * impact if speed else 0.0  # of the speed along the floor
@@ -192,7 +200,8 @@ def bounce(restitution: float = 0.5, speed: float = 0.0, kinetic: float = 0.2) -
         height, x = level + rises * past - GRAVITY / 2 * past**2 + radius, speed * start + slides * past
         p, v = np.stack([x, none, height], -1), np.stack([none + slides, none, rises - GRAVITY * past], -1)
         w = np.stack([none, none + turns, none], -1)
-        fields = contact(time, 0 * p, np.stack([x, none, none], -1)) | poses(p, v, about(1, turns * past), w)
-        pieces.append(without_contacts(mechanism, time, pace=pace, **fields, modes=touching("open")))
-    passage = Passage(pieces[0].points(-1, -1), pieces[1].points(0, 0), impacts=frozenset({"contact"}))
+        fields = contact(time, 0 * p, np.stack([x, none, none], -1), count) | poses(p, v, about(1, turns * past), w)
+        pieces.append(without_contacts(mechanism, time, pace=pace, **fields, modes=touching("open", count)))
+    names = frozenset(each.name for each in mechanism.pairs)
+    passage = Passage(pieces[0].points(-1, -1), pieces[1].points(0, 0), impacts=names)
     return HandMade(mechanism, tuple(pieces), (passage,))

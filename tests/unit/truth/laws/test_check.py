@@ -99,6 +99,15 @@ def test_an_impact_that_slides_has_kinetic_friction() -> None:
     assert bounce(speed=5.0, kinetic=0.2 * MILLIONTH).broken() == ("impact cone", "contact")
 
 
+@pytest.mark.parametrize("part", [MILLIONTH, 1 / MILLIONTH])
+def test_newtons_law_holds_for_contacts_that_are_struck_together(part: float) -> None:
+    """Each leaves with e of its speed at least, and one with no more: a ball with two skins bounces as with one."""
+    assert bounce(count=2).broken() == ("", "")
+    law, name = bounce(restitution=0.5 * part, count=2).broken()
+    assert law == "restitution"
+    assert name.startswith("contact")
+
+
 def test_a_slip_that_goes_on_beyond_its_stop_is_seen() -> None:
     """A motion that ignores the reversal of friction inside a piece breaks the law of momentum, by far."""
     assert guided(reverses=False).broken() == ("", "")
