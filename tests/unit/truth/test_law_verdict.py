@@ -2,12 +2,19 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
 from proofroll.core.columns import Columns
 from proofroll.core.dataset import LAWS, truth_message
 from proofroll.core.errors import Refused
+from proofroll.elements.mechanism import Body, Joint, Mechanism
+from proofroll.elements.mechanism.dynamics.commands import Commands
+from proofroll.elements.mechanism.scene.control import Control
+from proofroll.elements.mechanism.scene.drives import Actuator
+from proofroll.elements.mechanism.scene.signal import Formula
 from proofroll.truth.switched_truth import truth_of
 from proofroll_drill.law_faults import FAULTS, SCENES, planted
 
@@ -43,3 +50,28 @@ def test_a_truth_says_that_it_holds_all_laws() -> None:
     assert laws.startswith("holds 12 laws at ")
     line = truth_message(Columns({}, {"route": "one", "second_route": "two", LAWS: laws}))
     assert line == f"one, checked by two; {laws}"
+
+
+def held_servo(held: str, delay: int) -> Mechanism:
+    """A wheel on a servo whose controller reads its target, or sets its effort, fifty times a second."""
+    wheel = Body("wheel", 1.0, inertia=(0.4, 0.4, 0.4))
+    hinge = Joint("hinge", "revolute", "world", "wheel", q0=(0.2,), v0=(1.0,))
+    servo = Actuator("servo", "hinge", "position", Formula("0.4*sin(9*t)"), kp=30.0, kd=1.5)
+    control = Control(50.0, ("servo",), pose=(-0.3,), delay=delay, held=held)
+    return Mechanism((wheel,), (hinge,), actuators=(servo,), control=control)
+
+
+@pytest.mark.parametrize(("held", "delay"), [("target", 1), ("effort", 0)])
+def test_what_a_controller_sets_follows_its_law(held: str, delay: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Values that are held between instants are those of the formula at the instant; a fault of a millionth is seen."""
+    times = np.linspace(0.0, 0.11, 3)
+    assert truth_of(held_servo(held, delay), times).laws
+    commanded = Commands._commanded
+
+    def faulty(self: Any, time: float, sample: Any) -> Any:
+        return commanded(self, time, sample) * (1.0 + 1e-6 * (time > 0.05))
+
+    monkeypatch.setattr(Commands, "_commanded", faulty)
+    motion = truth_of(held_servo(held, delay), times)
+    assert motion.end == pytest.approx(0.06, abs=1e-3)
+    assert "effort = law of the actuator" in motion.ended

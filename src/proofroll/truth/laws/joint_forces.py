@@ -12,9 +12,11 @@ from proofroll.truth.laws.residuals import LAWS, LawResiduals
 from proofroll.truth.laws.scene import LawScene, value_of
 
 if TYPE_CHECKING:
+    from proofroll.elements.mechanism.scene.control import Control
     from proofroll.elements.mechanism.scene.drives import Actuator
 
 _CERTAIN = 10.0  # allowances of a rate from which on its sign is certain
+_INSTANT = 1e-6  # part of an interval of a controller up to which a time is its instant
 _PART = 1e-6  # part of a scene's natural force that counts in the size of an effort
 
 
@@ -62,22 +64,46 @@ def _effort(
 ) -> None:
     """Effort = law of the actuator, clamped to its limit."""
     k, data = motor
-    controlled = scene.mechanism.control is not None and data.name in scene.mechanism.control.actuators
-    target = value_of(data.target, pieces.time)
-    if controlled:  # what the controller has set is part of the record
-        if pieces.target is None:
-            return
-        target = pieces.target[..., k]
     length, fast, force = _sizes(scene, scene.mechanism.joint_index[data.joint])
-    n, effort = data.gear, pieces.effort[..., k]
+    n, effort, control = data.gear, pieces.effort[..., k], scene.mechanism.control
+    if control is not None and data.name in control.actuators:
+        law = _controlled(control, data, pieces.time, effort, place, rate)
+    else:
+        law = _law(data, value_of(data.target, pieces.time), place, rate)
+    size = np.abs(effort) + n * n * (data.kp * length + data.kd * fast) + _PART * force
+    residuals.note("effort", data.name, effort - law, size, pieces.time)
+
+
+def _law(data: Actuator, target: Array, place: Array, rate: Array) -> Array:
+    """Effort of an actuator by its law [N, N m]."""
+    n, limit = data.gear, np.inf if data.limit is None else data.limit
     law = {
         "torque": n * target,
         "velocity": n * data.kd * (target - n * rate),
         "position": n * (data.kp * (target - n * place) - data.kd * n * rate),
     }[data.kind]
-    limit = np.inf if data.limit is None else data.limit
-    size = np.abs(effort) + n * n * (data.kp * length + data.kd * fast) + _PART * force
-    residuals.note("effort", data.name, effort - np.clip(law, -limit, limit), size, pieces.time)
+    return np.clip(law, -limit, limit)
+
+
+def _controlled(control: Control, data: Actuator, time: Array, effort: Array, place: Array, rate: Array) -> Array:
+    """Effort under a controller that sets targets, or efforts, at its instants and holds them [N, N m].
+
+    The answer of a policy is not known here: what it has set is that of the first point of a piece.
+    """
+    instant = np.floor((time[:, :1] + time[:, -1:]) / 2 * control.rate)
+    sent, n = instant - control.delay, data.gear
+    if control.policy is None:
+        pose = control.pose[control.actuators.index(data.name)]
+        target = np.where(sent >= 0, value_of(data.target, sent / control.rate), pose)
+    else:
+        target = (effort[:, :1] / n + data.kd * n * rate[:, :1]) / data.kp + n * place[:, :1]
+    if control.held == "target":
+        law, limit = _law(data, target, place, rate), np.inf if data.limit is None else data.limit
+        clamped = control.policy is not None and np.abs(effort).max() >= limit
+        return effort if clamped else law  # an effort at its limit does not tell the target
+    begins = np.abs(time[:, :1] - instant / control.rate) <= _INSTANT / control.rate
+    known = begins & (control.policy is None)
+    return np.where(known, _law(data, target, place[:, :1], rate[:, :1]), effort[:, :1]) + 0.0 * effort
 
 
 def _dry_friction(scene: LawScene, pieces: Pieces, residuals: LawResiduals, number: int, rate: Array) -> None:

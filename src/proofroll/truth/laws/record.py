@@ -67,7 +67,6 @@ class Pieces:
         coarse: True if states inside a piece are known to fewer digits than at its ends (dense output of DOP853).
         turns: coordinates of joints with one or two coordinates, for their whole turns, (joints, 2); None: angles
             go on from the last point.
-        target: target of each actuator that a controller sets, NaN for the others, (actuators); None: NaN.
     """
 
     time: Array
@@ -90,7 +89,6 @@ class Pieces:
     modes: Modes
     coarse: bool = False
     turns: Array | None = None
-    target: Array | None = None
 
     def points(self, piece: int, point: int) -> Pieces:
         """One point as pieces of one point."""
