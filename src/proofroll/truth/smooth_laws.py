@@ -52,12 +52,14 @@ class KeptRoute(NamedTuple):
         steps: in order of time.
         recorded: times [s] and states (times, state) -> record.
         spin: state -> largest angular velocity of a body [rad/s].
+        powers: times [s] and states -> power of each of :func:`.working` [W], (times, drives); None: not asked of it.
         coarse: True if states inside steps have fewer digits than at their ends.
     """
 
     steps: Sequence[KeptStep]
     recorded: Callable[[Array, Array], Record]
     spin: Callable[[Array], float]
+    powers: Callable[[Array, Array], Array] | None = None
     coarse: bool = False
 
 
@@ -97,9 +99,10 @@ def works_along(mechanism: Mechanism, route: KeptRoute, times: Array) -> tuple[A
     scale = natural_scale(mechanism)
     along = WorkAlong(mechanism, scale.length, scale.rate)
     windows = [window for step in route.steps for window in _windows(step, route.spin)] if working(mechanism) else []
-    if windows:
+    if windows and route.powers is not None:
         moments, states = (np.concatenate([window[k] for window in windows]) for k in (0, 1))
-        along.take(0, [_stated(mechanism, route.recorded(moments, states), len(windows), coarse=False)])
+        time, power = moments.reshape(-1, COUNT), route.powers(moments, states).reshape(len(windows), COUNT, -1)
+        along.add(0, time, np.broadcast_to((time[:, -1:] - time[:, :1]) / 2, time.shape), power)
     return along.at(times, [0] * len(times)), along.unresolved
 
 

@@ -9,6 +9,7 @@ conservative mechanism has failed, and shows no chaos.
 
 from dataclasses import replace
 from functools import partial
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -47,6 +48,7 @@ from proofroll.truth.witnesses.closed_forms import ClosedForm, closed_form
 CHAOS = 1e-9  # m, 1 (quaternions): a larger distance between motions with indistinguishable starts is chaos
 BRANCH = 1e-3  # m, 1: distance between routes that chaos causes only long after the horizon
 ENERGY = 1e-8  # change of energy relative to its parts, a thousand times that of routes through chaos, 1e-11
+_FORM_STEPS = 4  # into which a closed form is cut; its law check looks at the start of two of them
 AT_LIMIT = 1e-9  # rad, m: a joint that swings exactly to its limit exceeds it by round-off, 1e-14
 
 
@@ -89,7 +91,7 @@ def find_truth(mechanism: Mechanism, times: Array, tolerance: float = 1e-15) -> 
     exact = _from_form(tree, form, times) if form is not None and form.motion is not None else None
     if exact is None and analysis.singular_start:
         raise Refused("the start is a singular pose, where the motion may branch, and no closed form is known")
-    routes, early = _followed(tree, times, tolerance, exact)
+    routes, early = _followed(tree, times, tolerance, exact, form)
     _check_limits(mechanism, routes.best, early)
     times = early.known(times)
     if not len(times):
@@ -136,7 +138,9 @@ def find_truth(mechanism: Mechanism, times: Array, tolerance: float = 1e-15) -> 
     )
 
 
-def _followed(tree: JointCoordinates, times: Array, tolerance: float, exact: Record | None) -> tuple[_Routes, EarlyEnd]:
+def _followed(
+    tree: JointCoordinates, times: Array, tolerance: float, exact: Record | None, form: ClosedForm | None
+) -> tuple[_Routes, EarlyEnd]:
     """Motion by all routes, and where it ends; where they fail a motion in closed form has equal steps as its witness.
 
     Raises:
@@ -145,6 +149,9 @@ def _followed(tree: JointCoordinates, times: Array, tolerance: float, exact: Rec
     mechanism, early = tree.mechanism, EarlyEnd()
     bodies = MaximalCoordinates(mechanism)
     check_start(tree, bodies)
+    known = (
+        {f"closed form: {form.title}": _of_form(tree, form, times)} if exact is not None and form is not None else {}
+    )
     try:
         by_tree, by_bodies, precise, growth, names, kept = _runs(tree, bodies, times, tolerance, early)
         _check_energy(mechanism, by_tree, names[1], early)
@@ -154,8 +161,8 @@ def _followed(tree: JointCoordinates, times: Array, tolerance: float, exact: Rec
             nearby = early.run(partial(_first_growth, tree, by_tree), times)
             chaotic = chaotic[: len(nearby)] & (nearby * NUDGE > CHAOS)
         _check_branch(by_tree, precise, chaotic, early)
-        checked = law_check(mechanism, dict(zip(names, kept, strict=True)), names[1])
-        laws = sentence(checked, len(names))
+        checked = law_check(mechanism, {**known, **dict(zip(names, kept, strict=True))}, names[1])
+        laws = sentence(checked, len(names) + len(known))
         if checked.violation is not None:
             early.at(checked.violation.time, laws)
             laws = ""
@@ -166,9 +173,16 @@ def _followed(tree: JointCoordinates, times: Array, tolerance: float, exact: Rec
     if exact is not None and np.isfinite(early.time):
         witness = on_same_turns(mechanism, exact, tree.run_rk4(times))
         name = "joint coordinates, RK4"
-        never = np.zeros(len(times), dtype=bool)
-        routes = _Routes(best=exact, by_tree=witness, by_bodies=witness, precise=witness, chaotic=never, names=(name,))
-        return routes, EarlyEnd()
+        never, early = np.zeros(len(times), dtype=bool), EarlyEnd()
+        checked = law_check(mechanism, known, next(iter(known)))
+        laws = sentence(checked, len(known))
+        if checked.violation is not None:
+            early.at(checked.violation.time, laws)
+            laws = ""
+        routes = _Routes(
+            best=exact, by_tree=witness, by_bodies=witness, precise=witness, chaotic=never, names=(name,), laws=laws
+        )
+        return routes, early
     if np.isfinite(early.time):
         early.reason = _singular(mechanism, early.time) or early.reason
     best = precise if exact is None else on_same_turns(mechanism, by_tree, exact)
@@ -183,6 +197,21 @@ def _followed(tree: JointCoordinates, times: Array, tolerance: float, exact: Rec
         kept=kept[0],
     )
     return routes, early
+
+
+def _of_form(tree: JointCoordinates, form: ClosedForm, times: Array) -> KeptRoute:
+    """A closed form as a route whose steps are parts of the run; its states are poses and velocities."""
+
+    def inside(moments: Array) -> Array:
+        record = _from_form(tree, form, moments)
+        parts = record.p_WB, record.q_WB, record.v_WB, record.w_WB
+        return np.concatenate([part.reshape(len(moments), -1) for part in parts], axis=1)
+
+    edges, turning = np.linspace(0.0, float(times[-1]), _FORM_STEPS + 1), 3 * len(tree.mechanism.bodies)
+    steps = [KeptStep(start, end, inside) for start, end in pairwise(edges.tolist())]
+    return KeptRoute(
+        steps, lambda moments, _: _from_form(tree, form, moments), lambda y: float(np.abs(y[-turning:]).max())
+    )
 
 
 def _works(mechanism: Mechanism, steps: KeptRoute | None, times: Array) -> tuple[Array, float]:
@@ -310,7 +339,7 @@ def _second(route: MaximalCoordinates, times: Array, tolerance: float) -> tuple[
         visited: list[tuple[float, Array]] = []
         coarse = route.run_dop853(times, 10 * tolerance)
         record, steps = route.run_dop853(times, tolerance, visited), dense_steps(route.lean.rate, visited, times[-1])
-        kept = KeptRoute(steps, route.recorded, route.spin, coarse=True)
+        kept = KeptRoute(steps, route.recorded, route.spin, route.powers, coarse=True)
         return coarse, record, "maximal coordinates, DOP853", kept
     ends = [*(float(time) for _, time, _ in series[1:]), float(times[-1])]
     taken = [
@@ -318,4 +347,4 @@ def _second(route: MaximalCoordinates, times: Array, tolerance: float) -> tuple[
         for (taylor, time, state), end in zip(series, ends, strict=True)
     ]
     name = "maximal coordinates, Taylor series in long doubles"
-    return double, long, name, KeptRoute(taken, route.recorded, route.spin)
+    return double, long, name, KeptRoute(taken, route.recorded, route.spin, route.powers)

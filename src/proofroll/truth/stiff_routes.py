@@ -89,7 +89,9 @@ def run_stiff(mechanism: Mechanism, rank: int, times: Array) -> StiffRuns:
     one, precise = (units.record(mechanism, each) for each in (one, bodies.recorded(moments, alone)))
     kept = (
         _kept(steps[0], units, lambda t, y: units.record(mechanism, tree.recorded(t, y)), tree.spin),
-        _kept(steps[1], units, lambda t, y: units.record(mechanism, bodies.recorded(t, y)), bodies.spin),
+        _kept(steps[1], units, lambda t, y: units.record(mechanism, bodies.recorded(t, y)), bodies.spin)._replace(
+            powers=lambda t, y: bodies.powers(t / units.time, y) * (units.force * units.length / units.time)
+        ),
     )
     return StiffRuns(one, precise, growth, kept)
 

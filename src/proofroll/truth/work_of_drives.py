@@ -67,15 +67,18 @@ class WorkAlong:
     def take(self, stretch: int, parts: Sequence[Pieces]) -> None:
         """Adds pieces of a stretch, and the mean power between them and the last ones."""
         for pieces in parts:
-            power = self._power(pieces)
-            summed, unresolved = integral(power, pieces.pace), tail(power, pieces.pace)[:, 0]
-            for time, powers, work, rest in zip(pieces.time, power, summed, unresolved, strict=True):
-                self._over_a_gap(stretch, float(time[0]), powers[0])
-                series = TO_SERIES @ (self._total + work)
-                self._parts.append(_Part(stretch, float(time[0]), float(time[-1]), TO_SERIES @ time, series))
-                self._total = self._total + work[-1]
-                self.unresolved = self.unresolved + rest
-                self._last = float(time[-1]), powers[-1]
+            self.add(stretch, pieces.time, pieces.pace, self._power(pieces))
+
+    def add(self, stretch: int, time: Array, pace: Array, power: Array) -> None:
+        """Adds powers [W], (pieces, points, drives), at points of pieces of a stretch."""
+        summed, unresolved = integral(power, pace), tail(power, pace)[:, 0]
+        for moments, powers, work, rest in zip(time, power, summed, unresolved, strict=True):
+            start, end = float(moments[0]), float(moments[-1])
+            self._over_a_gap(stretch, start, powers[0])
+            self._parts.append(_Part(stretch, start, end, TO_SERIES @ moments, TO_SERIES @ (self._total + work)))
+            self._total = self._total + work[-1]
+            self.unresolved = self.unresolved + rest
+            self._last = end, powers[-1]
 
     def passes(self, passage: Passage, impulses: Mapping[int, float]) -> None:
         """Adds the work of impulses of driven joints, by their numbers; an effort is finite and has none."""

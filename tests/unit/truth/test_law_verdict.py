@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,7 @@ from proofroll.elements.mechanism.dynamics.commands import Commands
 from proofroll.elements.mechanism.scene.control import Control
 from proofroll.elements.mechanism.scene.drives import Actuator
 from proofroll.elements.mechanism.scene.signal import Formula
+from proofroll.truth import smooth_truth
 from proofroll.truth.switched_truth import truth_of
 from proofroll_drill.law_faults import FAULTS, SCENES, planted
 
@@ -75,3 +77,23 @@ def test_what_a_controller_sets_follows_its_law(held: str, delay: int, monkeypat
     motion = truth_of(held_servo(held, delay), times)
     assert motion.end == pytest.approx(0.06, abs=1e-3)
     assert "effort = law of the actuator" in motion.ended
+
+
+def test_a_closed_form_is_held_to_the_laws(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Velocities of a closed form that are a millionth off break a law, and the form is named."""
+    bob = Body("bob", 1.0, com=(0.0, 0.0, -0.5), inertia=(0.1, 0.1, 0.01))
+    pendulum = Mechanism((bob,), (Joint("pivot", "revolute", "world", "bob", axis=(0.0, 1.0, 0.0), q0=(1.0,)),))
+    times = np.linspace(0.0, 0.5, 3)
+    assert "in 3 routes" in truth_of(pendulum, times).laws
+    form = smooth_truth.closed_form(pendulum)
+    assert form is not None
+    assert form.motion is not None
+    motion = form.motion
+
+    def faulty(moments: Any) -> Any:
+        q, v = motion(moments)
+        return q, v * (1.0 + 1e-6)
+
+    monkeypatch.setattr(smooth_truth, "closed_form", lambda _: replace(form, motion=faulty))
+    with pytest.raises(Refused, match="closed form: pendulum, Jacobi elliptic functions"):
+        truth_of(pendulum, times)

@@ -20,6 +20,7 @@ from proofroll.core.dop853 import integrate
 from proofroll.core.errors import Missing
 from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.dynamics.complementarity import refuse_switching
+from proofroll.elements.mechanism.dynamics.link_forces import working, working_joints
 from proofroll.elements.mechanism.dynamics.named_forces import joint_force_shares, lengths, pick_named
 from proofroll.elements.mechanism.dynamics.record import Record, record_of
 from proofroll.elements.mechanism.scene.kinks import Functions
@@ -369,6 +370,18 @@ class MaximalCoordinates:
             "named": self._named(solved, switched or Switched()),
             "residual": np.array([np.abs(solved.residual).max(initial=0.0), np.abs(opening).max(initial=0.0)]),
         }
+
+    def powers(self, times: Array, states: Array) -> Array:
+        """Power of each of :func:`.working` at states [W], (times, drives)."""
+        numbers = [number for number, _ in working(self.mechanism)]
+        joints = [self.mechanism.joint_index[name] for name in working_joints(self.mechanism)]
+        return np.array(
+            [
+                self._named(self.lean.solve(self.lean.normalised(y), float(t)), Switched())[numbers]
+                * self.lean.along(y, joints)[1]
+                for t, y in zip(times, states, strict=True)
+            ]
+        ).reshape(len(times), len(joints))
 
     def _complete(self, views: list[BodyInScalars], angles: Array) -> Array:
         """State with seven coordinates for each body, also for planar ones."""

@@ -96,7 +96,7 @@ def sentence(result: LawVerdict, count: int) -> str:
     if result.violation is None:
         share, law, time, _ = result.largest
         events = f" and on both sides of {result.events} events" if result.events else ""
-        routes = "both routes" if count == 2 else f"{count} routes"
+        routes = {1: "one route", 2: "both routes"}.get(count, f"{count} routes")
         return (
             f"holds {result.laws} laws at {result.points:,} points in {routes}{events}; "
             f"largest residual {share:.2g} of its allowance ({law}, {time:.3g} s)"
