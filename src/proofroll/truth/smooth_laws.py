@@ -6,7 +6,7 @@ times, so that a selection finds it at a cost that does not grow with the run.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import NamedTuple
 
@@ -30,6 +30,9 @@ _RESOLVED = 1e-13  # last coefficients of states, relative to the largest, that 
 _HALVINGS = 20
 _LOOSE = 1e-3  # tolerance of a step that is taken again: it was accepted
 _TURN = 1.0  # rad, in which rotations are polynomials of eleven degrees to the last digit
+
+
+_Powers = tuple[Array, Array]  # times [s] and powers [W] at the points of a window
 
 
 class KeptStep(NamedTuple):
@@ -94,24 +97,36 @@ def law_check(mechanism: Mechanism, routes: Mapping[str, KeptRoute], counting: s
 def works_along(mechanism: Mechanism, route: KeptRoute, times: Array) -> tuple[Array, Array]:
     """Work of drives along a route's steps at times [s], (times, drives), and what is not resolved of it [J], (drives).
 
-    It is integrated over all steps, cut into windows whose points resolve the motion.
+    It is integrated over all steps, halved until their points resolve the powers.
     """
     scale = natural_scale(mechanism)
     along = WorkAlong(mechanism, scale.length, scale.rate)
-    windows = [window for step in route.steps for window in _windows(step, route.spin)] if working(mechanism) else []
-    if windows and route.powers is not None:
-        moments, states = (np.concatenate([window[k] for window in windows]) for k in (0, 1))
-        time, power = moments.reshape(-1, COUNT), route.powers(moments, states).reshape(len(windows), COUNT, -1)
+    if route.powers is not None and working(mechanism):
+        windows, parts = (
+            [(step, step.start, step.end) for step in route.steps if step.end > step.start],
+            list[_Powers](),
+        )
+        for last in [False] * _HALVINGS + [True]:
+            time = np.array([start + (end - start) * (POINTS + 1) / 2 for _, start, end in windows])
+            states = [step.inside(moments) for (step, _, _), moments in zip(windows, time, strict=True)]
+            if not states:
+                break
+            power = route.powers(time.ravel(), np.concatenate(states)).reshape(*time.shape, -1)
+            series = np.abs(np.einsum("kn,snd->skd", TO_SERIES, power))
+            rough = (series[:, -2:].max((1, 2)) > _RESOLVED * series.max()) & (not last)
+            parts += [(moments, each) for moments, each, again in zip(time, power, rough, strict=True) if not again]
+            halves = [window for window, again in zip(windows, rough, strict=True) if again]
+            windows = [half for step, start, end in halves for half in _halved(step, start, end)]
+        parts.sort(key=lambda part: float(part[0][0]))
+        time, power = np.array([moments for moments, _ in parts]), np.array([each for _, each in parts])
         along.add(0, time, np.broadcast_to((time[:, -1:] - time[:, :1]) / 2, time.shape), power)
     return along.at(times, [0] * len(times)), along.unresolved
 
 
-def _windows(step: KeptStep, spin: Callable[[Array], float]) -> Iterator[tuple[Array, Array]]:
-    """Windows of a whole step, one after the other."""
-    while step.end > step.start:
-        window = _window(step, spin)
-        yield window
-        step = step._replace(start=float(window[0][-1]))
+def _halved(step: KeptStep, start: float, end: float) -> list[tuple[KeptStep, float, float]]:
+    """Both halves of a window of a step."""
+    middle = (start + end) / 2
+    return [(step, start, middle), (step, middle, end)]
 
 
 def _pieces(mechanism: Mechanism, route: KeptRoute, counting: KeptRoute) -> Pieces | None:

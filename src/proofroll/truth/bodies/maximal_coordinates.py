@@ -7,6 +7,7 @@ DOP853 with projection: the rank is fixed at the start, and violations are elimi
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from copy import copy
 from dataclasses import dataclass, replace
 from functools import partial
@@ -28,7 +29,7 @@ from proofroll.elements.mechanism.scene.rotations import Array
 from proofroll.truth.bodies.constraint_rows import ConstraintRow
 from proofroll.truth.bodies.maximal_bodies import BodyInScalars
 from proofroll.truth.bodies.maximal_equations import FUNCTIONS, ConstrainedEquations, MaximalEquations, Switched
-from proofroll.truth.bodies.maximal_taylor import MaximalTaylor, Visited
+from proofroll.truth.bodies.maximal_taylor import MaximalTaylor, Visited, compiled_powers
 
 # Initial displacement for growth, m, rad and relative to velocities: far above round-off, small if grown by 1e7.
 BESIDE = 1e-9
@@ -97,6 +98,15 @@ class NumericEquations:
     def redundant(self) -> bool:
         """True if some rows follow from the others."""
         return len(self._weighted(self.equations.start())) > self.rank
+
+    def moved_alone(self) -> bool:
+        """True if each row of a prescribed motion is independent of all others at the start."""
+        moved, C = self.equations.at(self.equations.start().tolist()).moved, self._weighted(self.equations.start())
+
+        def rank(rows: Array) -> int:
+            return int(np.linalg.matrix_rank(rows, RANK * float(np.abs(C).max()))) if len(rows) else 0
+
+        return all(rank(np.delete(C, k, 0)) < self.rank for k in range(moved.start, moved.stop))
 
     def independence(self, rows: Sequence[int], state: Array) -> float:
         """Least singular value of some rows at a state, relative to that of all rows without the redundant ones."""
@@ -373,8 +383,20 @@ class MaximalCoordinates:
 
     def powers(self, times: Array, states: Array) -> Array:
         """Power of each of :func:`.working` at states [W], (times, drives)."""
-        numbers = [number for number, _ in working(self.mechanism)]
         joints = [self.mechanism.joint_index[name] for name in working_joints(self.mechanism)]
+        forces = [item for _, item in working(self.mechanism)]
+        driven = [self.mechanism.joint_index[joint.name] for joint, _, _ in self.mechanism.prescribed]
+        places = [driven.index(item.number) if item.field == "drive" else item.number for item in forces]
+        fields = [item.field for item in forces]
+        with suppress(Missing):
+            if not self.lean.moved_alone():
+                raise Missing("forces of drives that independent rows determine")
+            compiled = compiled_powers(
+                self.lean.equations, self.lean.independent_rows(), list(zip(fields, places, joints, strict=True))
+            )
+            unit = np.array([self.lean.normalised(y) for y in states])
+            return compiled(np.column_stack([unit, times]))
+        numbers = [number for number, _ in working(self.mechanism)]
         return np.array(
             [
                 self._named(self.lean.solve(self.lean.normalised(y), float(t)), Switched())[numbers]

@@ -128,6 +128,35 @@ def compiled_rates(equations: MaximalEquations, rows: Sequence[int]) -> Callable
     return lambda states: np.asarray(function(np.ascontiguousarray(states.T)).T)
 
 
+def compiled_powers(
+    equations: MaximalEquations, rows: Sequence[int], forces: Sequence[tuple[str, int, int]]
+) -> Callable[[Array], Array]:
+    """Compiled powers of efforts and drives at many states; the last column is the time [s]: (states, n + 1) -> [W].
+
+    ``forces``: field (``effort`` or ``drive``), index of the actuator or prescribed motion, and index of the joint.
+
+    Raises:
+        Missing: heyoka is not installed, or a drive is not among the independent ``rows``.
+    """
+    if heyoka is None:
+        raise Missing("compiled equations need heyoka: pip install 'proofroll[fast]'")
+    functions, time = {name: getattr(heyoka, name) for name in SMOOTH}, heyoka.make_vars("t")
+    state = [heyoka.make_vars(f"s{index}") for index in range(len(equations.start()))]
+    at_state = equations.at(state, functions, time=time)
+    moved = {number: at_state.moved.start + number for field, number, _ in forces if field == "drive"}
+    if not set(moved.values()) <= set(rows):
+        raise Missing("a drive whose force is not determined by independent rows")
+    multipliers = _solution(equations, at_state, [at_state.rows[k] for k in rows])[1] if moved else []
+    u, powers = state[equations.nx : equations.nx + equations.nu], list[Scalar]()
+    made = equations.rate_rows(state, [joint for _, _, joint in forces], functions)
+    for (field, number, _), row in zip(forces, made, strict=True):
+        rate = add(*(mul(value, u[k]) for k, value in row.coefficients.items()))
+        force = at_state.efforts[number] if field == "effort" else multipliers[list(rows).index(moved[number])]
+        powers.append(mul(force, rate))
+    function = heyoka.cfunc([_expression(value, float) for value in powers], [*state, time], compact_mode=True)
+    return lambda states: np.asarray(function(np.ascontiguousarray(states.T)).T)
+
+
 def _in_symbols(equations: MaximalEquations, rows: Sequence[int], time: Any) -> tuple[list[Any], list[Scalar]]:
     """Variables of a state, and its rates as expressions in them."""
     state = [heyoka.make_vars(f"s{index}") for index in range(len(equations.start()))]
@@ -139,7 +168,14 @@ def _in_symbols(equations: MaximalEquations, rows: Sequence[int], time: Any) -> 
 def accelerations(
     equations: MaximalEquations, constrained: ConstrainedEquations, rows: Sequence[ConstraintRow]
 ) -> list[Scalar]:
-    """Accelerations u̇ = M⁻¹(force + Cᵀλ), with (C M⁻¹ Cᵀ) λ = −bias − C M⁻¹ force solved sparsely in scalars.
+    """Accelerations u̇ = M⁻¹(force + Cᵀλ), see :func:`_solution`."""
+    return _solution(equations, constrained, rows)[0]
+
+
+def _solution(
+    equations: MaximalEquations, constrained: ConstrainedEquations, rows: Sequence[ConstraintRow]
+) -> tuple[list[Scalar], list[Scalar]]:
+    """Accelerations, and multipliers λ of the rows: (C M⁻¹ Cᵀ) λ = −bias − C M⁻¹ force, solved sparsely in scalars.
 
     A drive is an additional row with compliance 1/inertia. Accelerations u̇₀ of bodies without inertia, whose M is
     singular, are additional unknowns: C₀ᵀλ − M₀u̇₀ = −force₀.
@@ -171,7 +207,7 @@ def accelerations(
             result[k] = add(result[k], mul(value, multiplier))
     for k, value in zip(equations.light, unknowns[m:], strict=True):
         result[k] = value
-    return result
+    return result, unknowns[:held]
 
 
 def _of_light_bodies(
