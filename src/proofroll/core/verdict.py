@@ -132,7 +132,7 @@ class RunCurve:
         own_bar: uncertainty of the run's own value (an event between two of its samples); an error that this alone may
             explain is no difference.
         sampled_bar: largest part of ``own_bar`` that may excuse an error: the part that the sampling interval explains.
-        bar_of: what ``own_bar`` is the error of, as a clause; empty: of a time between two samples.
+        bar_of: quantity with the error ``own_bar``, as a clause; empty: a time between two samples.
         between: values at a few times off the grid, and the true ones; None: there are none.
         magnitude: size of the numbers whose round-off enters, if above the curve's scale: of a gap, that of positions.
         precision: in which the run was computed, see :func:`proofroll.core.engine.precision_of`.

@@ -53,7 +53,7 @@ class WorkAlong:
     """Work of each of :func:`.working` along one route since the start [J].
 
     Attributes:
-        unresolved: what the points of pieces do not resolve of it, so far [J], (drives).
+        unresolved: part of it that the points of pieces do not resolve, so far [J], (drives).
     """
 
     def __init__(self, mechanism: Mechanism, length: float, rate: float) -> None:

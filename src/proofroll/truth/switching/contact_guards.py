@@ -184,7 +184,7 @@ class SharedForces(Protocol):
 
     @property
     def force(self) -> Array:
-        """Of each contact, (contacts, 3)."""
+        """Forces on body a of each contact, (contacts, 3)."""
 
     @property
     def shifts(self) -> Array:
