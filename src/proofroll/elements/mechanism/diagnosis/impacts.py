@@ -238,7 +238,7 @@ def _struck(mechanism: Mechanism, dataset: Any, followed: Followed, presses: Any
                 ).of_tree()
                 for velocity, spin in zip((v, v_after), spins, strict=True)
             )
-            root = np.linalg.cholesky(np.linalg.inv(dynamics.at(q[0], v_in[0]).W)).T / np.sqrt(mass)
+            root = np.linalg.cholesky(dynamics.at(q[0], v_in[0]).mass).T / np.sqrt(mass)
             yield _Struck(contact=contact, q=q[0], before=v_in[0], after=v_out[0], root=root)
 
 

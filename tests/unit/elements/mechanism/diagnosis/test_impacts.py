@@ -16,6 +16,7 @@ from proofroll.core.truth import truth
 from proofroll.elements.mechanism import Body, Joint, Mechanism
 from proofroll.elements.mechanism.run.element import MechanismElement
 from proofroll.elements.mechanism.scene.shapes.geometry import Geometry, Pair
+from proofroll.elements.mechanism.scene.signal import Formula
 from proofroll.files.scene_file import load_scene
 from proofroll.running.simulation import simulate
 
@@ -106,6 +107,24 @@ def test_one_impact_tells_a_law_by_all_velocities_after_it(law: str) -> None:
     told = [cause.says for cause in diagnose(Evidence(element, [], run, true, STEP), hypotheses_of(element))]
     assert told == [f"{law} of impacts is 0.9 times"]
     assert diagnose(Evidence(element, [], true, true, STEP), hypotheses_of(element)) == []
+
+
+def test_an_impact_on_a_driven_plate_is_followed() -> None:
+    """A motion takes one velocity from the mechanism; its impacts have an inertia all the same."""
+    bodies = (Body("plate", 1.0, inertia=(0.1,) * 3), Body("ball", 1.0, inertia=(0.004,) * 3))
+    lift = Joint("lift", "prismatic", "world", "plate", axis=(0, 0, 1), motion=Formula("0.2*t"))
+    joints = (lift, Joint("fall", "prismatic", "world", "ball", axis=(0, 0, 1), q0=(0.2,)))
+    shapes = (Geometry("floor", "plate", "plane"), Geometry("skin", "ball", "sphere", radius=0.1))
+    element, wrong = (
+        MechanismElement(Mechanism(bodies, joints, geometries=shapes, pairs=(Pair("c", ("skin", "floor"), 0.0, e),)))
+        for e in (0.7, 0.63)
+    )
+    true, run = (truth(Scene("", "", (each,)), np.arange(0, 0.3, 0.01)) for each in (element, wrong))
+    (touch,) = impacts.touch_of(Evidence(element, [], run, true, STEP))
+    (struck,) = impacts._struck(touch.mechanism, run, touch.found, touch.presses)
+    comes, leaves = struck.before - 0.2, struck.after - 0.2
+    assert -leaves[1] / comes[1] == pytest.approx(0.63, rel=2e-3)
+    assert struck.root.T @ struck.root == pytest.approx(np.eye(2) / 2.0)
 
 
 @pytest.mark.drill
