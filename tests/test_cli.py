@@ -759,6 +759,7 @@ def test_a_map_of_stability(proofroll: Proofroll, tmp_path: Path) -> None:
     }
 
 
+@pytest.mark.drill
 def test_a_reader_that_stops_reading() -> None:
     """Output into a pipe that is closed early, as by head, is no error, while a command writes or at its end."""
     for words in ("scenes --json", "scenes", "--version"):

@@ -38,6 +38,7 @@ def unfolded(seen: Visit) -> Iterator[Visit]:
     seen.page.evaluate("folded.forEach((fold) => { fold.open = false; })")
 
 
+@pytest.mark.drill
 def test_tab_reaches_everything_in_order_and_shows_where_it_is(seen: Visit) -> None:
     """Each link, button, fold and scrolling table gets the focus once, in the page's order, outlined and in sight."""
     reachable = seen.page.evaluate("reading.reachable()")

@@ -49,6 +49,7 @@ def test_a_table_with_rows_below_says_so(report_page: Path, visit: Visiting) -> 
         seen.wait(f"{says} === 'none'")
 
 
+@pytest.mark.drill
 def test_figures_are_drawn_when_they_come_into_view(report_page: Path, drawn_page: Drawn) -> None:
     """None far below before, each after a reader has scrolled to it, one that is not there is missed.
 
@@ -67,6 +68,7 @@ def test_figures_are_drawn_when_they_come_into_view(report_page: Path, drawn_pag
     seen.page.evaluate("document.querySelector('main').lastElementChild.remove()")
 
 
+@pytest.mark.drill
 def test_links_lead_to_evidence_that_opens(report_page: Path, visit: Visiting) -> None:
     """Every link within the page ends at something one can see, however it was folded; a dead one is found."""
     with visit(report_page, before=UNDRAWN) as seen:
@@ -129,6 +131,7 @@ def test_an_address_with_a_fragment_opens_its_evidence(report_page: Path, visit:
         seen.wait(f"document.getElementById('{name}').getBoundingClientRect().top < innerHeight")
 
 
+@pytest.mark.drill
 def test_a_command_is_copied(report_page: Path, visit: Visiting) -> None:
     """The button beside the command of a run copies it, letter by letter, also in a part that is unfolded later."""
     name = "evidence-invented.beta.speed-4"

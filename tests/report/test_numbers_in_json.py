@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pytest
 from folded import whole
 from numpy.typing import NDArray
 
@@ -96,6 +97,7 @@ def missing_numbers(html: str, content: dict[str, Any]) -> dict[str, list[tuple[
     return missing
 
 
+@pytest.mark.drill
 def test_the_json_has_every_number_of_the_page(report_page: Path, everything: Any) -> None:
     """Each number in a cell or caption of the page is one of report.json, rounded, but for what is no result."""
     html, content = report_page.read_text(encoding="utf-8"), plain(everything.content)

@@ -347,6 +347,7 @@ def passes(opened: Visit, time: float) -> None:
     opened.until(lambda: clock(opened) > time, what=f"the time {time} s is shown")
 
 
+@pytest.mark.drill
 def test_the_replay_plays(written: Any, replayed: Visit) -> None:
     """From file:// without network: nothing before it is seen, then time and picture advance; no error, no request."""
     opened = replayed

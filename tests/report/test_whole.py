@@ -171,6 +171,7 @@ def test_nothing_in_a_further_study_becomes_markup(report: Report, written_page:
     assert sum(tag == "script" for tag, _ in elements.tags) == len(parse(written_page).scripts)
 
 
+@pytest.mark.drill
 def test_json_has_no_nan_and_no_path_outside(report: Report, tmp_path: Path) -> None:
     """Everything that is written can be read by any JSON reader, and every file it names is below the report."""
 

@@ -98,6 +98,7 @@ def test_why_nobody_can_is_said_engine_by_engine(
     assert f"can represent all of the scene: {said} (revolute joints)" in err
 
 
+@pytest.mark.drill
 def test_a_first_look_stays_within_its_budget(
     tmp_path: Path, command_line: Callable[..., tuple[int, str, str]], monkeypatch: pytest.MonkeyPatch
 ) -> None:

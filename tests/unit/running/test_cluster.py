@@ -151,6 +151,7 @@ def room(dask: DaskCluster) -> Path:
     return dask.folder
 
 
+@pytest.mark.drill
 def test_a_worker_with_other_engines(dask: DaskCluster, shared: Cluster, tmp_path: Path) -> None:
     """A worker that has not the same versions and engines is refused, with what both have."""
     other = tmp_path / "other"

@@ -21,6 +21,7 @@ Proofroll = Callable[..., tuple[int, str, str]]
 ROOT = Path(__file__).resolve().parents[3]
 
 
+@pytest.mark.drill
 def test_a_run_is_cited_with_its_versions(proofroll: Proofroll, tmp_path: Path) -> None:
     """Trajectory (of both kinds) and document of a run name engine, version, scene, truth and suite."""
     run, stored, document = tmp_path / "run.nc", tmp_path / "run.npz", tmp_path / "run.json"
