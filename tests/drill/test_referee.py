@@ -9,7 +9,6 @@ import pytest
 from typer.testing import CliRunner
 
 from proofroll.cli import app
-from proofroll.core.truth import truth
 from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.contact.start import check_contacts
@@ -24,7 +23,7 @@ from proofroll.truth.bodies.maximal_coordinates import MaximalCoordinates
 from proofroll.truth.switched_truth import truth_of
 from proofroll_drill.referee import holding
 from proofroll_drill.referee.balls import BallReferee
-from proofroll_drill.referee.holding import errors, hold, hold_ball, hold_contacts
+from proofroll_drill.referee.holding import as_body, errors, hold, hold_ball, hold_contacts
 from proofroll_drill.referee.random_balls import STYLES as STYLES_OF_BALLS
 from proofroll_drill.referee.random_balls import WALLS, random_ball
 from proofroll_drill.referee.random_contacts import TURNS, random_contacts
@@ -140,8 +139,7 @@ def test_the_referee_of_balls_notices_what_is_wrong(monkeypatch: pytest.MonkeyPa
     (element,) = scene.elements
     ball = replace(element.ball, inertia_ratio=element.ball.inertia_ratio * (1 + 1e-6))
     heavier = replace(scene, elements=(replace(element, ball=ball),))
-    monkeypatch.setattr(holding, "random_ball", lambda _: ("", heavier))
-    monkeypatch.setattr(holding, "truth", lambda _, times: truth(scene, times))
+    monkeypatch.setattr(holding, "as_body", lambda _: as_body(heavier.elements[0]))  # type: ignore[arg-type]  # a ball
     assert not hold_ball(17).sound
 
 

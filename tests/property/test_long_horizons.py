@@ -10,8 +10,8 @@ import pytest
 
 from proofroll.elements.ball_on_surface.compiled import library, rolling
 from proofroll.elements.ball_on_surface.element import rolling_ball
-from proofroll.elements.ball_on_surface.mechanics import energy
 from proofroll.elements.ball_on_surface.rolling_equations import closed_form
+from proofroll.elements.mechanism.run.contacts.on_wall import energy
 from proofroll.files.scene_file import load_scene
 from proofroll.running.simulation import build
 

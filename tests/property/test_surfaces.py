@@ -16,9 +16,10 @@ from proofroll.core.gravity import Gravity
 from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.element import BallOnSurface
 from proofroll.elements.ball_on_surface.mechanics import newton_euler
-from proofroll.elements.ball_on_surface.model import Ball, Contact, InitialMotion, RollingBall
+from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.rolling_equations import closed_form, reduced_rates, start
 from proofroll.elements.ball_on_surface.surfaces import Bowl, Cone, Plane, Torus
+from proofroll.elements.mechanism.scene.balls import Ball, Contact, InitialMotion
 from proofroll.files.scene_file import load_scene
 from proofroll.truth.ball_on_surface.plug_in import truth
 

@@ -16,7 +16,7 @@ from proofroll.core.certificate import certify, first_difference
 from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.dataset import columns
 from proofroll.elements.ball_on_surface.element import rolling_ball, scene_with
-from proofroll.elements.ball_on_surface.observables import energy_balance
+from proofroll.elements.mechanism.run.contacts.audits import energy_balance
 from proofroll.files.scene_file import load_scene
 from proofroll.running.simulation import build, simulate
 from proofroll.truth.ball_on_surface.rolling import reduced, unreduced

@@ -16,6 +16,7 @@ from proofroll.core.events import with_events
 from proofroll.core.observable import Role
 from proofroll.elements.mechanism.dynamics.named_forces import FIELDS, named_forces
 from proofroll.elements.mechanism.dynamics.placed import Placed
+from proofroll.elements.mechanism.run.contacts.local_frame import local_bars
 from proofroll.elements.mechanism.run.contacts.observables import PRESSES, SLIDES
 from proofroll.elements.mechanism.run.dataset import UNDETERMINED, columns
 from proofroll.elements.mechanism.run.element import MechanismElement
@@ -95,6 +96,8 @@ class MechanismTruth:
         # at the end of a body's arm; a quaternion changes by half the angle
         bars = motion.bars | {"gap": place + 2 * element.length * turn}
         bars |= {"slip": velocity + element.length * spin + 2 * element.speed * turn}
+        body = element.on_wall
+        local = {} if body is None else local_bars(body, dataset, {key: float(bar[-1]) for key, bar in bars.items()})
         for name, variable in dataset.data_vars.items():
             field = (
                 fields_of.get(str(name))
@@ -107,6 +110,7 @@ class MechanismTruth:
             bar = _bar_of_a_law(str(name), element, motion.bars)
             if field is not None:
                 bar = float(bars[field][-1])
+            bar = local.get(str(name), bar)
             variable.attrs["error_bar"] = 4 * np.finfo(float).eps * size if bar is None else bar
         dataset.attrs["route"], *others = motion.routes
         dataset.attrs["second_route"] = ", ".join(others)

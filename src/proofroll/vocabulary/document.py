@@ -12,9 +12,9 @@ from typing import Any, NamedTuple, get_args
 from proofroll.ball_studies import regimes as regimes_study
 from proofroll.core import comparison
 from proofroll.core.gravity import Gravity
-from proofroll.elements.ball_on_surface import model as balls
 from proofroll.elements.ball_on_surface.surfaces import surface_kinds
 from proofroll.elements.mechanism import Body, Force, Joint, Loop, Point, Spring
+from proofroll.elements.mechanism.scene import balls
 from proofroll.elements.mechanism.scene.bushing import Bushing
 from proofroll.elements.mechanism.scene.composed import Cable, Gimbal, Screw, SprungJoint
 from proofroll.elements.mechanism.scene.drives import Actuator, ActuatorKind, Coupling

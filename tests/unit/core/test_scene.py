@@ -14,9 +14,10 @@ from proofroll.core.errors import InputError, Refused
 from proofroll.core.gravity import Gravity
 from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.element import rolling_ball, scene_with
-from proofroll.elements.ball_on_surface.mechanics import slip_velocity
-from proofroll.elements.ball_on_surface.model import Ball, BallCapability, Contact, InitialMotion
+from proofroll.elements.ball_on_surface.model import BallCapability
 from proofroll.elements.ball_on_surface.surfaces import Cylinder, Plane
+from proofroll.elements.mechanism.run.contacts.on_wall import slip_velocity
+from proofroll.elements.mechanism.scene.balls import Ball, Contact, InitialMotion
 from proofroll.files.data_folders import data_folder
 from proofroll.files.scene_file import load_scene
 from proofroll.running.case import EngineFacts

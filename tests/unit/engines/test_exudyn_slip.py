@@ -14,7 +14,7 @@ from proofroll.core.events import events_of
 from proofroll.core.scene import Scene
 from proofroll.core.time_grid import time_grid
 from proofroll.elements.ball_on_surface.element import rolling_ball
-from proofroll.elements.ball_on_surface.mechanics import resistance_moment
+from proofroll.elements.mechanism.run.contacts.on_wall import resistance_moment
 from proofroll.running.recording import record
 from proofroll.running.simulation import build
 

@@ -9,8 +9,8 @@ import proofroll
 from proofroll.core.errors import Diverged, InputError
 from proofroll.core.events import events_of
 from proofroll.elements.ball_on_surface.element import rolling_ball, scene_with
-from proofroll.elements.ball_on_surface.mechanics import slip_velocity
 from proofroll.elements.ball_on_surface.surfaces import Cylinder
+from proofroll.elements.mechanism.run.contacts.on_wall import slip_velocity
 from proofroll.engines.projection.ball import ball_modes
 from proofroll.engines.projection.ball.friction import Friction
 from proofroll.engines.projection.ball.geometry import geometry_of

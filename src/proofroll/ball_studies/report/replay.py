@@ -16,7 +16,7 @@ from proofroll.core.events import EventKind
 from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.elements.ball_on_surface.model import RollingBall
-from proofroll.elements.ball_on_surface.stretches import carried
+from proofroll.elements.mechanism.run.contacts.stretches import carried
 from proofroll.files.json_data import plain
 from proofroll.report.labels import symbol, unit
 from proofroll.report.replay.records import PackedNumbers, Replayed, present

@@ -14,11 +14,10 @@ from proofroll.elements.ball_on_surface.mechanics import (
     initial_response,
     natural_acceleration,
     resistance_undirected,
-    slip_velocity,
-    wall_velocity,
 )
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.sampling import BallBuilt, BallSample
+from proofroll.elements.mechanism.run.contacts.on_wall import slip_velocity, wall_velocity
 
 _DEEP = "a ball that is sunk in by its radius has its centre in the wall"
 _LEVER = "a soft contact rolls about a point midway in its depth, and the depth is at most the radius"

@@ -4,13 +4,13 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from proofroll.core.arrays import FloatArray, on_turns
+from proofroll.core.arrays import FloatArray
 from proofroll.core.columns import SMALLEST, Columns, Variable, axes
-from proofroll.core.whole_turns import doubt
-from proofroll.elements.ball_on_surface.mechanics import energy, slip_velocity, wall_velocity
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.natural_scales import turn_interval
 from proofroll.elements.ball_on_surface.sampling import BallSample
+from proofroll.elements.mechanism.run.contacts.local_frame import local_variables
+from proofroll.elements.mechanism.run.contacts.on_wall import energy
 
 
 def from_samples(body: RollingBall, times: FloatArray, samples: Sequence[BallSample]) -> Columns:
@@ -56,18 +56,6 @@ def columns(
     ``slip2``, ``slip3`` [m/s] and ``N``, ``F2``, ``F3`` [N] in the local frame e1, e2, e3; ``needed_friction``
     |F|/N [1]; ``gap`` [m]; ``energy`` [J]. Variables that the engine does not report are absent.
     """
-    surface = body.surface
-    u = np.array(surface.locate(p_WB))
-    rates = np.einsum("tij,tj->ti", np.linalg.pinv(surface.tangents(u)), v_WB)
-    for column, period in enumerate(surface.periods):
-        if period is not None:
-            u[:, column] = on_turns(times, u[:, column], rates[:, column], body.u0[column], period)
-    frame = surface.frame(u)
-    e1 = surface.normal(p_WB)
-    spin = np.einsum("tij,ti->tj", frame, w_WB)
-    sliding = slip_velocity(body.ball.radius, e1, v_WB, w_WB) - wall_velocity(body, p_WB, e1)
-    slip = np.einsum("tij,ti->tj", frame, sliding)
-
     variables: dict[str, Variable] = {}
 
     def put(name: str, values: FloatArray, units: str, meaning: str, *dims: str) -> None:
@@ -79,26 +67,7 @@ def columns(
     if q_WB is not None:
         put("q_WB", q_WB, "1", "orientation, quaternion scalar first", "wxyz")
         put("attitude", q_WB, "1", "quaternion of the ball", "wxyz")
-    for index, (name, unit) in enumerate(zip(surface.coordinates, surface.units, strict=True)):
-        put(name, u[:, index], unit, f"surface coordinate {name}")
-        period = surface.periods[index]
-        if period is not None:
-            warning = doubt(times, u[:, index], rates[:, index], period, turn_interval(body))
-            variables[name] = variables[name]._replace(attrs={**variables[name].attrs, **warning})
-        put(f"{name}_rate", rates[:, index], f"{unit}/s", f"rate of {name}")
-    for index in range(3):
-        put(f"omega{index + 1}", spin[:, index], "rad/s", f"angular velocity about e{index + 1}")
-    for index in (1, 2):
-        put(f"slip{index + 1}", slip[:, index], "m/s", f"velocity of the contact point along e{index + 1}")
-    put("slip", np.hypot(slip[:, 1], slip[:, 2]), "m/s", "speed of the contact point along the wall")
-    if force is not None:
-        local = np.einsum("tij,ti->tj", frame, force)
-        put("N", 0.0 - local[:, 0], "N", "normal force")  # not -0 in flight
-        put("F2", local[:, 1], "N", "friction on the ball along e2")
-        put("F3", local[:, 2], "N", "friction on the ball along e3")
-        with np.errstate(divide="ignore", invalid="ignore"):
-            put("needed_friction", np.hypot(local[:, 1], local[:, 2]) / -local[:, 0], "1", "friction needed, |F|/N")
-    put("gap", surface.gap(p_WB), "m", "distance of the ball from the wall")
+    variables |= local_variables(body, times, p_WB, v_WB, w_WB, force, turn_interval(body))
     put("energy", energy(body, p_WB, v_WB, w_WB), "J", "kinetic plus potential energy")
     return Columns(variables | axes(times), _smallest(variables))
 

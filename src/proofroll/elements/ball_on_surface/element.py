@@ -23,14 +23,16 @@ from proofroll.core.number_format import vector
 from proofroll.core.observable import Observable
 from proofroll.core.program_text import FailedRun
 from proofroll.core.scene import Scene
-from proofroll.elements.ball_on_surface import certificate, events, failure, natural_scales, observables
+from proofroll.elements.ball_on_surface import certificate, events, failure, natural_scales
 from proofroll.elements.ball_on_surface.dataset import from_samples
 from proofroll.elements.ball_on_surface.failure_program import program
-from proofroll.elements.ball_on_surface.mechanics import initial_response, normal_force
-from proofroll.elements.ball_on_surface.model import Ball, BallCapability, Contact, InitialMotion, RollingBall
+from proofroll.elements.ball_on_surface.mechanics import initial_response, natural_acceleration, normal_force
+from proofroll.elements.ball_on_surface.model import BallCapability, RollingBall
 from proofroll.elements.ball_on_surface.optional_terms import optional_terms
 from proofroll.elements.ball_on_surface.sampling import BallSample
 from proofroll.elements.ball_on_surface.surfaces import Surface
+from proofroll.elements.mechanism.run.contacts import local_frame
+from proofroll.elements.mechanism.scene.balls import Ball, Contact, InitialMotion
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -177,7 +179,8 @@ class BallOnSurface:
     @cached_property
     def observables(self) -> tuple[Observable, ...]:
         """See the protocol."""
-        return observables.table(self.rolling)
+        body = self.rolling
+        return local_frame.table(body, natural_acceleration(body), body.surface.length_scales)
 
     @property
     def length(self) -> float:
@@ -232,11 +235,11 @@ class BallOnSurface:
 
     def observe(self, dataset: xr.Dataset) -> dict[str, FloatArray]:
         """See the protocol."""
-        return observables.observe(self.rolling, dataset)
+        return local_frame.observe(self.rolling, dataset)
 
     def scales(self, truth: xr.Dataset) -> dict[str, float]:
         """See the protocol."""
-        return observables.scales(self.rolling, truth)
+        return local_frame.scales(self.rolling, truth)
 
     def certify(self, built: Any, sample: BallSample) -> list[Line]:
         """See the protocol."""

@@ -9,7 +9,7 @@ import numpy as np
 from proofroll.core.arrays import FloatArray
 from proofroll.core.element import Sign
 from proofroll.elements.ball_on_surface.model import RollingBall
-from proofroll.elements.ball_on_surface.observables import creep
+from proofroll.elements.mechanism.run.contacts.local_frame import creep
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -9,14 +9,16 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Union, cast
 
 from pydantic import Field
 
-from proofroll.core.errors import InputError, require_known
+from proofroll.core.errors import InputError
 from proofroll.core.gravity import Gravity
 from proofroll.core.parameters import Parameters
 from proofroll.core.scene import Scene
 from proofroll.core.validation import strict, units_of, validated
 from proofroll.elements.ball_on_surface.element import BallOnSurface, scene_with
-from proofroll.elements.ball_on_surface.model import Ball, Contact, InitialMotion
 from proofroll.elements.ball_on_surface.surfaces import Declared, Surface, surface_kinds
+from proofroll.elements.mechanism.run.balls import BallTables, PlacedBall, ball_as_body, placed_balls
+from proofroll.elements.mechanism.run.element import MechanismElement
+from proofroll.elements.mechanism.scene.balls import Ball, Contact, InitialMotion
 
 if TYPE_CHECKING:
     from proofroll.core.diagnosis import Hypothesis
@@ -27,16 +29,13 @@ else:
 
 
 @dataclass(frozen=True)
-class BallTables:
+class _Tables(BallTables):
     """Tables of a scene file that describe balls on surfaces."""
 
-    balls: tuple[Ball, ...]
-    contacts: tuple[Contact, ...]
-    initial: tuple[InitialMotion, ...]
     surfaces: tuple[Annotated[AnySurface, Field(discriminator="kind")], ...] = field(default=())
 
 
-strict(BallTables, Ball, Contact, InitialMotion, *surface_kinds())
+strict(_Tables, Ball, Contact, InitialMotion, *surface_kinds())
 
 
 class BallOnSurfaceKind:
@@ -49,38 +48,15 @@ class BallOnSurfaceKind:
     @staticmethod
     def read(tables: Mapping[str, Any], gravity: Gravity, numbers: Parameters, where: str) -> Sequence[BallOnSurface]:
         """Elements of a file: one for each contact, with the ball, the surface and the start that it names."""
-        units = BallOnSurfaceKind.units
-        filled = {key: numbers.filled(table, f"{where}: {key}", units) for key, table in tables.items()}
-        contents = validated(BallTables, filled, where)
-        balls = {ball.name: ball for ball in contents.balls}
-        surfaces = {surface.name: surface for surface in contents.surfaces}
-        _check_names(contents, where)
-        for surface in contents.surfaces:
-            if isinstance(surface, Declared):
-                surface.checked()
-        starts = {start.body: (index, start) for index, start in enumerate(contents.initial)}
         elements = []
-        for index, contact in enumerate(contents.contacts):
-            if contact.body not in starts:
-                raise InputError(
-                    f"{where}: initial", contact.body, "say how this ball starts; add an [[initial]] of it"
-                )
-            if any(contact.body == earlier.body for earlier in contents.contacts[:index]):
-                raise InputError(f"{where}: contacts.{index}.body", contact.body, "a ball touches one surface")
-            ball, surface, (number, start) = balls[contact.body], surfaces[contact.surface], starts[contact.body]
-            # Only with the surface are the units of its coordinates known.
-            coordinates = tables["initial"][number].get("coordinates", [])
-            numbers.filled(coordinates, f"{where}: initial.{number}.coordinates", {}, surface.units)
+        for placed in _placed(tables, numbers, where):
+            ball, surface, contact, start, _ = placed
             try:
                 elements.append(
                     BallOnSurface(ball=ball, surface=surface, contact=contact, start=start, gravity=gravity)
                 )
             except InputError as error:
                 raise error.within(f"{where}: initial", ball.name) from None
-        for name in balls.keys() - {contact.body for contact in contents.contacts}:
-            raise InputError(
-                f"{where}: contacts", name, "this ball touches no surface; add a contact or remove the ball"
-            )
         return elements
 
     @staticmethod
@@ -129,22 +105,29 @@ def _with_tilt(scene: Scene, gamma: float, tilt: float, **motion: Any) -> Scene:
     return scene_with(scene, start=start, surface=dataclasses.replace(cast(Any, element.surface), tilt=tilt))
 
 
-def _check_names(tables: BallTables, place: str) -> None:
-    """Raises InputError unless contacts and starts name balls and surfaces of the file, and all names are unique."""
-    balls, surfaces = [ball.name for ball in tables.balls], [surface.name for surface in tables.surfaces]
-    for kind, names in (("balls", balls), ("surfaces", surfaces)):
-        for index, name in enumerate(names):
-            if name in names[:index]:
-                raise InputError(f"{place}: {kind}.{index}.name", name, "two have this name; rename one")
-    for kind, items in (("contacts", tables.contacts), ("initial", tables.initial)):
-        for index, item in enumerate(items):
-            for key, known_names in (("body", balls), ("surface", surfaces)):
-                named = getattr(item, key, None)
-                if named is not None:
-                    require_known(f"{place}: {kind}.{index}.{key}", named, known_names)
-    for index, contact in enumerate(tables.contacts):
-        ball, wall = tables.balls[balls.index(contact.body)], tables.surfaces[surfaces.index(contact.surface)]
+class BallsAsBodies(BallOnSurfaceKind):
+    """The same tables read as mechanisms, one for each ball: the kind to announce once engines have all walls."""
+
+    @staticmethod
+    def read(  # type: ignore[override]  # other elements, by the same protocol
+        tables: Mapping[str, Any], gravity: Gravity, numbers: Parameters, where: str
+    ) -> Sequence[MechanismElement]:
+        """See :func:`proofroll.elements.mechanism.run.balls.ball_as_body`."""
+        return [ball_as_body(placed, gravity, where) for placed in _placed(tables, numbers, where)]
+
+
+def _placed(tables: Mapping[str, Any], numbers: Parameters, where: str) -> list[PlacedBall]:
+    """Each contact of a file with its ball, surface and start. Raises InputError for a mistake, with its location."""
+    units = BallOnSurfaceKind.units
+    filled = {key: numbers.filled(table, f"{where}: {key}", units) for key, table in tables.items()}
+    contents = validated(_Tables, filled, where)
+    placed = list(placed_balls(contents, contents.surfaces, tables.get("initial", []), numbers, where))
+    for ball, wall, contact, _, index in placed:
         try:
             wall.offset(ball.radius)
         except InputError as error:
-            raise error.within(f"{place}: contacts.{index}", contact.body) from None
+            raise error.within(f"{where}: contacts.{index}", contact.body) from None
+    for surface in contents.surfaces:
+        if isinstance(surface, Declared):
+            surface.checked()
+    return placed

@@ -7,46 +7,16 @@ Array arguments may carry leading dimensions.
 import math
 
 import numpy as np
-import numpy.typing as npt
 
 from proofroll.core.arrays import FloatArray, cross
 from proofroll.core.bounces import Course
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.surfaces import Declared
+from proofroll.elements.mechanism.run.contacts.on_wall import energy, resistance_moment
 
 # Speed of a ball about to move from rest, relative to that of a fall by one radius: it has a direction and no effect.
 _SETTING_OFF = 1e-12
 _PULLS = 1e-9  # relative to the whole force: a smaller pull is round-off
-
-
-def slip_velocity(radius: float, e1: FloatArray, v_WB: FloatArray, w_WB: FloatArray) -> FloatArray:
-    """Velocity of the ball's contact point in the world [m/s], shape (..., 3): v + ω × a e1."""
-    return np.asarray(v_WB + radius * cross(w_WB, e1))
-
-
-def wall_velocity(body: RollingBall, p_WB: FloatArray, e1: FloatArray) -> FloatArray:
-    """Velocity of the wall where the ball touches it [m/s], shape (..., 3): W × (p + a e1)."""
-    if body.wall_rate is None:
-        return np.zeros_like(p_WB)
-    return np.asarray(cross(body.wall_rate, p_WB + body.ball.radius * e1))
-
-
-def resistance_moment(f: float, N: npt.ArrayLike, e1: FloatArray, v_WB: FloatArray) -> FloatArray:
-    """Moment of the rolling resistance about the centre [N m], shape (..., 3).
-
-    The normal force -N e1 is shifted by ``f`` [m] along the direction of the centre's velocity (Blajer 2006,
-    section 2.4), which gives f (v/V) × (-N e1). At V = 0 the direction does not exist and the moment is zero.
-    """
-    speed = np.linalg.norm(v_WB, axis=-1, keepdims=True)
-    direction = np.divide(v_WB, speed, out=np.zeros_like(v_WB), where=speed > 0)
-    return np.asarray(-f * np.asarray(N)[..., None] * cross(direction, e1))
-
-
-def energy(body: RollingBall, p_WB: FloatArray, v_WB: FloatArray, w_WB: FloatArray) -> FloatArray:
-    """Kinetic plus potential energy [J], shape (...); the potential is zero at the world's origin."""
-    m, J = body.ball.mass, body.ball.inertia
-    kinetic = 0.5 * m * np.sum(v_WB**2, axis=-1) + 0.5 * J * np.sum(w_WB**2, axis=-1)
-    return np.asarray(kinetic - m * p_WB @ body.gravity)
 
 
 def course_of(body: RollingBall, times: FloatArray, p_WB: FloatArray, v_WB: FloatArray, w_WB: FloatArray) -> Course:

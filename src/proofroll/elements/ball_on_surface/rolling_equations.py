@@ -9,10 +9,10 @@ import math
 import numpy as np
 
 from proofroll.core.arrays import FloatArray, cross
-from proofroll.elements.ball_on_surface.mechanics import wall_velocity
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.motion import BallMotion
 from proofroll.elements.ball_on_surface.surfaces import Cylinder, Plane
+from proofroll.elements.mechanism.run.contacts.on_wall import wall_velocity
 
 
 def start(body: RollingBall) -> FloatArray:

@@ -10,9 +10,10 @@ import numpy as np
 from proofroll.core.arrays import FloatArray
 from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.element import rolling_ball, scene_with
-from proofroll.elements.ball_on_surface.mechanics import newton_euler, slip_velocity
+from proofroll.elements.ball_on_surface.mechanics import newton_euler
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.sampling import BallSample
+from proofroll.elements.mechanism.run.contacts.on_wall import slip_velocity
 from proofroll_drill.mutants.base import STEP, Honest, Mutant
 
 RESISTED = ("sphere_in_cylinder", {"rolling_resistance": 5e-4})

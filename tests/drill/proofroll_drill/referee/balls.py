@@ -19,7 +19,7 @@ from .linear_algebra import long, turn
 
 _LONGEST = 0.02  # s
 _NEAR_STOP = 0.4  # of the time that a slip still takes, the most that a step makes of it: no friction is reversed in it
-_STOPPED = 1e-12  # s before the end of a slip, when its last way is straight
+_STOPPED = 1e-16  # s before the end of a slip, when its last way is straight; a slip in the plane turns until then
 _LOW = 1e-3  # of the speed of a fall by the radius: slower bounces, and slower rolling with resistance, are left out
 _Z = long([0, 0, 1])
 

@@ -9,12 +9,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from proofroll.core.errors import ProofrollError
-from proofroll.core.events import events_of
+from proofroll.core.events import JUMPS, events_of
+from proofroll.core.scene import Scene
 from proofroll.core.truth import truth
+from proofroll.elements.ball_on_surface.element import BallOnSurface
 from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.contact.start import check_contacts
 from proofroll.elements.mechanism.dynamics.record import Record
 from proofroll.elements.mechanism.run.assembly import check_start
+from proofroll.elements.mechanism.run.balls import PlacedBall, ball_as_body
 from proofroll.elements.mechanism.scene.rotations import Array
 from proofroll.truth.error_bars import TwoRouteMotion
 from proofroll.truth.smooth_truth import find_truth
@@ -61,7 +64,7 @@ class Held:
     def text(self) -> str:
         """One line for a person."""
         largest = max(self.worst, key=lambda name: self.worst[name], default="")
-        found = self.refused or f"largest error {self.worst[largest]:.2g} of its bar, {largest}"
+        found = self.refused or f"largest error {self.worst.get(largest, 0.0):.2g} of its bar, {largest}"
         return f"{self.seed} {self.style} ({self.kinds}): {found}"
 
 
@@ -83,41 +86,51 @@ def hold(seed: int, until: float = UNTIL) -> Held:
 
 
 def hold_ball(seed: int, until: float = UNTIL_OF_BALLS) -> Held:
-    """The truth of a random ball against the referee's, as far as that goes; events too, within their brackets."""
+    """The truth of a random ball as a body against the referee's, as far as that goes; events too, within brackets."""
     style, scene = random_ball(seed)
     (element,) = scene.elements
+    assert isinstance(element, BallOnSurface)
     times = np.linspace(0, until, 6)
-    told = BallReferee(element).run(times.astype(np.longdouble))  # type: ignore[arg-type]  # it is a ball
+    told = BallReferee(element).run(times.astype(np.longdouble))
     does = " ".join([*(kind for kind, _ in told.events), *["bounce"] * len(told.bounces), told.why])
     known = len(told.seen)
     times = np.append(times[:known], [told.end + _BEYOND] if told.end < until else [])
     try:
-        found = truth(scene, times)
+        found = truth(as_body(element), times)
     except ProofrollError as error:
         return Held(seed, style, does, str(error), {}, 0)
     worst = {}
-    for name in ("p_WB", "v_WB", "w_WB", "q_WB", "N", "gap"):
-        if name not in found or not known:
-            continue
-        apart = np.abs(found[name].to_numpy()[:known] - long([one[name] for one in told.seen]))
-        bar = found[name].attrs["error_bar"]
-        largest = float(np.max(apart))
+    known = min(known, found.sizes["time"])
+    for name in ("p_WB", "v_WB", "w_WB", "q_WB", "N", "gap") if known else ():
+        values, right = found[name].to_numpy()[:known], long([one[name] for one in told.seen[:known]])
+        values = values[:, 0] if values.ndim > 1 else values  # the ball is the first body
+        apart = np.abs(values - right)
+        if name == "q_WB":  # of either sign
+            apart = np.minimum(apart.max(axis=1), np.abs(values + right).max(axis=1))
+        bar, largest = found[name].attrs["error_bar"], float(np.max(apart))
         worst[name] = largest / bar if bar else (np.inf if largest else 0.0)
-    events, left = events_of(found), list(told.events)
+    events = [event for event in events_of(found) if event.time > 0]
+    left = [(kind, time) for kind, time in told.events if time > 0]
     for event in events:
         wide = max(event.time_high - event.time, np.finfo(float).eps * max(event.time, 1e-3))
         if event.time > told.end + wide:
             break
-        if event.kind == "bounce":
+        if event.kind in JUMPS:
             off = min((abs(time - event.time) for time in told.bounces), default=np.inf)
         else:
             kind, time = left.pop(0) if left else ("nothing", np.inf)
-            off = abs(time - event.time) if kind == event.kind else np.inf
+            off = abs(time - event.time) if kind == _ALIKE.get(event.kind, event.kind) else np.inf
         worst["event"] = max(worst.get("event", 0.0), off / wide)
     said = str(found.attrs.get("ill_posed", ""))
-    if left and not said and "event_time" in found:
+    if left and not said:
         worst["event"] = np.inf
     return Held(seed, style, does, said, worst, 0)
+
+
+def as_body(element: BallOnSurface) -> Scene:
+    """Scene of a ball as a body with a sphere that touches a wall."""
+    placed = PlacedBall(element.ball, element.surface, element.contact, element.start)
+    return Scene("random_ball", "", (ball_as_body(placed, element.gravity, "random"),))
 
 
 def hold_contacts(seed: int) -> Held:

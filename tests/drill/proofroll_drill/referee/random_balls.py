@@ -9,8 +9,8 @@ import numpy as np
 from proofroll.core.gravity import Gravity
 from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.element import BallOnSurface
-from proofroll.elements.ball_on_surface.model import Ball, Contact, InitialMotion
 from proofroll.elements.ball_on_surface.surfaces import Bowl, Cone, Cylinder, Plane, Torus
+from proofroll.elements.mechanism.scene.balls import Ball, Contact, InitialMotion
 
 WALLS = ("plane", "cylinder", "bowl", "cone", "torus")
 STYLES = ("rolls", "resisted", "may slip", "starts slipping", "falls")

@@ -5,13 +5,8 @@ import pytest
 
 from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.element import rolling_ball
-from proofroll.elements.ball_on_surface.mechanics import (
-    energy,
-    initial_response,
-    newton_euler,
-    resistance_moment,
-    slip_velocity,
-)
+from proofroll.elements.ball_on_surface.mechanics import initial_response, newton_euler
+from proofroll.elements.mechanism.run.contacts.on_wall import energy, resistance_moment, slip_velocity
 from proofroll.files.scene_file import load_scene
 
 G = 9.81

@@ -17,8 +17,8 @@ from proofroll.core.time_grid import off_grid
 from proofroll.elements.ball_on_surface.dataset import columns
 from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.elements.ball_on_surface.motion import BallMotion
-from proofroll.elements.ball_on_surface.observables import energy_balance, force_audit, rate_audit
 from proofroll.elements.ball_on_surface.sampling import BallSample
+from proofroll.elements.mechanism.run.contacts.audits import energy_balance, force_audit, rate_audit
 from proofroll.files.scene_file import load_scene
 from proofroll.truth.ball_on_surface.orientation import QUATERNIONS, orientation
 from proofroll.truth.ball_on_surface.rolling import reduced

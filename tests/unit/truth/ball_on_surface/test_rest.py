@@ -15,7 +15,7 @@ from proofroll.core.truth import truth
 from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.elements.ball_on_surface.mechanics import can_rest, setting_off
 from proofroll.elements.ball_on_surface.model import RollingBall
-from proofroll.elements.ball_on_surface.observables import energy_balance
+from proofroll.elements.mechanism.run.contacts.audits import energy_balance
 from proofroll.files.scene_file import load_scene
 from proofroll.running.simulation import simulate
 

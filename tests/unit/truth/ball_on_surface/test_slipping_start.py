@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from proofroll.core.errors import InputError
 from proofroll.core.events import events_of
 from proofroll.elements.ball_on_surface.element import scene_with
-from proofroll.elements.ball_on_surface.model import InitialMotion
+from proofroll.elements.mechanism.scene.balls import InitialMotion
 from proofroll.files.scene_file import load_scene
 from proofroll.truth.ball_on_surface.plug_in import truth
 

@@ -17,8 +17,8 @@ from proofroll.core.gravity import Gravity
 from proofroll.core.scene import Scene
 from proofroll.core.truth import truth
 from proofroll.elements.ball_on_surface.element import BallOnSurface, rolling_ball, scene_with
-from proofroll.elements.ball_on_surface.model import Ball, Contact, InitialMotion
 from proofroll.elements.ball_on_surface.surfaces import Plane
+from proofroll.elements.mechanism.scene.balls import Ball, Contact, InitialMotion
 from proofroll.truth.ball_on_surface import implicit, taylor
 from proofroll.truth.ball_on_surface import stick_slip as module
 from proofroll.truth.ball_on_surface.contact import ContactRates

@@ -12,10 +12,10 @@ from proofroll.core.scene import Scene
 from proofroll.core.truth import truth
 from proofroll.elements.ball_on_surface.dataset import columns
 from proofroll.elements.ball_on_surface.element import rolling_ball, scene_with
-from proofroll.elements.ball_on_surface.model import Ball
 from proofroll.elements.ball_on_surface.motion import BallMotion
 from proofroll.elements.ball_on_surface.rolling_equations import closed_form
 from proofroll.elements.ball_on_surface.surfaces import Cylinder
+from proofroll.elements.mechanism.scene.balls import Ball
 from proofroll.files.scene_file import load_scene
 from proofroll.truth.ball_on_surface import rolling, unreduced_taylor
 from proofroll.truth.ball_on_surface.rolling import reduced, unreduced

@@ -16,8 +16,8 @@ from proofroll.elements.ball_on_surface.diagnosis.equations import (
     is_bounded,
     residuals_of,
 )
-from proofroll.elements.ball_on_surface.mechanics import resistance_moment
 from proofroll.elements.ball_on_surface.model import RollingBall
+from proofroll.elements.mechanism.run.contacts.on_wall import resistance_moment
 
 _ANGLES = 90
 _FEWEST = 5

@@ -19,14 +19,10 @@ from proofroll.core.diagnosis import CLOSES, CLOSES_EXACTLY, Evidence
 from proofroll.core.diagnosis.fitting import ABOVE, Residuals, cached_on_evidence
 from proofroll.core.diagnosis.lines import differing, relative_differences
 from proofroll.core.first_steps import OF_FIRST_STEPS
-from proofroll.elements.ball_on_surface.mechanics import (
-    natural_acceleration,
-    newton_euler,
-    resistance_moment,
-    slip_velocity,
-)
+from proofroll.elements.ball_on_surface.mechanics import natural_acceleration, newton_euler
 from proofroll.elements.ball_on_surface.model import RollingBall
-from proofroll.elements.ball_on_surface.stretches import DEGREE, ENDS, accelerations, stretches
+from proofroll.elements.mechanism.run.contacts.on_wall import resistance_moment, slip_velocity
+from proofroll.elements.mechanism.run.contacts.stretches import DEGREE, ENDS, accelerations, stretches
 
 if TYPE_CHECKING:
     import xarray as xr

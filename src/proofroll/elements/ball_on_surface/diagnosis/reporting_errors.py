@@ -24,7 +24,7 @@ from proofroll.core.diagnosis.samples import (
 )
 from proofroll.core.diagnosis.vectors import ReportedVector, components_along
 from proofroll.elements.ball_on_surface.model import RollingBall
-from proofroll.elements.ball_on_surface.stretches import carried
+from proofroll.elements.mechanism.run.contacts.stretches import carried
 
 if TYPE_CHECKING:
     import xarray as xr

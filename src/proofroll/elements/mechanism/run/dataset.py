@@ -15,6 +15,7 @@ from proofroll.core.whole_turns import doubt
 from proofroll.elements.mechanism.dynamics.link_forces import put_links
 from proofroll.elements.mechanism.dynamics.named_forces import lengths, named_forces, pick_named
 from proofroll.elements.mechanism.dynamics.placed import TURN, Placed
+from proofroll.elements.mechanism.run.contacts.local_frame import local_variables
 from proofroll.elements.mechanism.run.contacts.observables import (
     LAWS,
     RESIDUALS,
@@ -190,7 +191,20 @@ def columns(
             if name in kept:
                 put(name, value, unit, meaning, *(("xyz",) if value.ndim > 1 else ()))
     put("drift", placed.drift(), "m", "how far joints and loops are open")
+    variables |= _local(element, placed, pressed)
     return Columns(variables | axes(placed.time) | {"body": Variable(("body",), np.array(element.bodies, dtype=str))})
+
+
+def _local(element: MechanismElement, placed: Placed, pressed: FloatArray) -> dict[str, Variable]:
+    """Variables in the local frame of a wall, of an element that is described in it."""
+    body = element.on_wall
+    if body is None:
+        return {}
+    p, v, w, q = (values[:, body.index] for values in (placed.p_WB, placed.v_WB, placed.w_WB, placed.q_WB))
+    force = body.sign * pressed[:, body.contact_index]
+    given = None if np.isnan(force[1:]).any() else force
+    attitude = Variable(("time", "wxyz"), q, {"units": "1", "long_name": "quaternion of the ball"})
+    return {"attitude": attitude} | local_variables(body, placed.time, p, v, w, given, element.turn_interval)
 
 
 def _put_contacts(

@@ -30,12 +30,14 @@ from proofroll.elements.mechanism.dynamics.placed import Placed
 from proofroll.elements.mechanism.dynamics.switches import first_change
 from proofroll.elements.mechanism.run.capabilities import MechanismCapability, required
 from proofroll.elements.mechanism.run.certificate import CAPS, certify
+from proofroll.elements.mechanism.run.contacts.local_frame import local_observables, local_sizes, observe_locally
 from proofroll.elements.mechanism.run.contacts.observables import (
     LAWS,
     RESIDUALS,
     contact_observables,
     event_observables,
 )
+from proofroll.elements.mechanism.run.contacts.on_wall import BodyOnWall, LocalStart, body_on_wall
 from proofroll.elements.mechanism.run.dataset import from_samples
 from proofroll.elements.mechanism.run.failure_program import program
 from proofroll.elements.mechanism.run.optional_terms import optional_terms
@@ -76,11 +78,13 @@ class MechanismElement:
 
     Attributes:
         mechanism: its data.
+        local: ball whose motion and force are described in the local frame of its wall, see
+            :mod:`proofroll.elements.mechanism.run.contacts.local_frame`; None: none.
     """
 
     mechanism: Mechanism
+    local: LocalStart | None = None
 
-    name: ClassVar[str] = "mechanism"  # a scene has at most one
     sample_type: ClassVar[type[MechanismSample]] = MechanismSample
     askable: ClassVar[Mapping[str, str]] = {}  # every sample has all fields
     softened: ClassVar[frozenset[str]] = frozenset(CAPS)
@@ -89,6 +93,11 @@ class MechanismElement:
         ENERGY_GAIN: f"the energy grew by more than {GAIN:.0%} of what its weight or speed can make",
     }
     failing_events: ClassVar[Mapping[str, str]] = {}
+
+    @property
+    def name(self) -> str:
+        """See the protocol; a scene has at most one mechanism that is no ball on its wall."""
+        return "mechanism" if self.local is None else self.local.ball
 
     @property
     def bodies(self) -> tuple[str, ...]:
@@ -231,8 +240,15 @@ class MechanismElement:
         return self.mechanism.conservative
 
     @cached_property
+    def on_wall(self) -> BodyOnWall | None:
+        """Its ball on a wall, if it is described in the local frame of that wall."""
+        return None if self.local is None else body_on_wall(self.mechanism, self.local)
+
+    @cached_property
     def observables(self) -> tuple[Observable, ...]:
-        """See the protocol."""
+        """See the protocol; those of the local frame alone if it is described in one."""
+        if self.on_wall is not None:
+            return local_observables(self.on_wall, self.first_motion.acceleration)
         # A point at rest has no size but that of its motion, see `scales`.
         least = {unit: _LEAST * size if self._own_length else 0.0 for unit, size in self._sizes.items()}
         a, force, turn = least["m"], least["N"], _LEAST * self.speed / self.length
@@ -331,6 +347,8 @@ class MechanismElement:
 
     def observe(self, dataset: xr.Dataset) -> dict[str, FloatArray]:
         """See the protocol; reactions that an engine gives in part only are left out."""
+        if self.on_wall is not None:
+            return observe_locally(self.on_wall, dataset)
         observed = {}
         if self.mechanism.has_events and "event_kind" in dataset:
             observed["event_times"] = np.array([event.time for event in events_of(dataset)])
@@ -344,6 +362,8 @@ class MechanismElement:
 
     def scales(self, truth: xr.Dataset) -> dict[str, float]:
         """See the protocol: ranges, largest reactions, and natural sizes of what should be zero."""
+        if self.on_wall is not None:
+            return local_sizes(self.on_wall, truth)
         variables = truth.variables
         reach, speed = (float(np.max(np.ptp(variables[name].values, axis=0))) for name in ("positions", "v_WB"))
         by_motion = not self._own_length and reach and speed

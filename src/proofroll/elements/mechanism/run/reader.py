@@ -68,18 +68,24 @@ def made_mechanism(content: Mapping[str, Any], gravity: checks.Vector, numbers: 
         raise InputError("bodies", "none", "a mechanism needs a body; add a [[bodies]] table")
     parts: dict[str, Any] = {kind: tuple(items) for kind, items in made.items()}
     law, control = content.get("impacts", IN_ANY_ORDER), made_control(content.get("control"), numbers)
-    mechanism = assemble(
-        Mechanism(gravity=gravity, unmodelled=_texts(content, "unmodelled"), impacts=law, control=control, **parts)
+    mechanism = Mechanism(
+        gravity=gravity, unmodelled=_texts(content, "unmodelled"), impacts=law, control=control, **parts
     )
-    check_start(mechanism)
     try:
-        check_contacts(mechanism)
+        return started(mechanism)
     except InputError as error:
         short = next((item for item in cables if error.field == f"pairs.{item.name}"), None)
         if short is None:
             raise
         advice = "its ends are farther apart at the start, or are pulled apart there; lengthen it or move one"
         raise InputError(f"loops.{short.name}.at_most", short.at_most, advice) from None
+
+
+def started(mechanism: Mechanism) -> Mechanism:
+    """The mechanism with its loops closed. Raises InputError if it cannot start or move."""
+    mechanism = assemble(mechanism)
+    check_start(mechanism)
+    check_contacts(mechanism)
     check_commands(mechanism)
     return mechanism
 

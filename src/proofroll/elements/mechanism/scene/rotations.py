@@ -99,3 +99,13 @@ def frame_of_axis(z: ArrayLike, x: ArrayLike | None = None) -> Array:
     e1 = np.asarray(x, dtype=float) - e3 * (e3 @ np.asarray(x, dtype=float))
     e1 /= np.linalg.norm(e1)
     return np.array([e1, cross(e3, e1), e3]).T
+
+
+def from_z(axis: ArrayLike) -> Array:
+    """Smallest rotation that turns z to a unit vector; about y where that is -z."""
+    x, y, z = np.asarray(axis, dtype=float).tolist()
+    across = x * x + y * y
+    if not across:
+        return np.diag([1.0 if z > 0 else -1.0, 1.0, 1.0 if z > 0 else -1.0])
+    k = 1.0 / (1.0 + z) if z > 0 else (1.0 - z) / across  # the same number, each without cancellation
+    return np.array([[1.0 - k * x * x, -k * x * y, x], [-k * x * y, 1.0 - k * y * y, y], [-x, -y, z]])

@@ -9,7 +9,8 @@ import numpy as np
 
 from proofroll.core.errors import Refused
 from proofroll.core.events import Event, EventKind
-from proofroll.elements.ball_on_surface.model import Contact, RollingBall
+from proofroll.elements.ball_on_surface.model import RollingBall
+from proofroll.elements.mechanism.scene.balls import Contact
 from proofroll.engines.mujoco.settings import LARGEST_PYRAMIDAL_FRICTION, PRELOAD, MujocoSettings
 
 # MuJoCo silently raises a smaller coefficient to this (mjMINMU), unless the contact has no friction at all.

@@ -19,7 +19,7 @@ from typing_extensions import override
 from proofroll.core.arrays import FloatArray
 from proofroll.core.event_location import Rise, locate_rise
 from proofroll.core.events import Event, EventKind
-from proofroll.elements.ball_on_surface.model import Contact
+from proofroll.elements.mechanism.scene.balls import Contact
 from proofroll.engines.pinocchio.ball.ball_with_rows import NOISE, BallWithRows, SlidingContact, left_the_wall, unit
 from proofroll.engines.pinocchio.integrators import Adaptive, FixedStep, SemiImplicitEuler, TangentRungeKutta4
 from proofroll.engines.pinocchio.settings import PinocchioSettings

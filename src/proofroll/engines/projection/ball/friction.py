@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from proofroll.elements.ball_on_surface.model import Contact
+from proofroll.elements.mechanism.scene.balls import Contact
 from proofroll.engines.projection.ball.method import Kinematics, ProjectedBall, Response
 
 # Round-off of the comparison of needed friction with the cone, relative to available friction plus weight.

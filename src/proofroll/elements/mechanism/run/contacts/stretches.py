@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
-from proofroll.core.events import events_of
-from proofroll.elements.ball_on_surface.surfaces import Surface
+from proofroll.core.events import EventKind, events_of
+from proofroll.elements.mechanism.run.contacts.on_wall import LocalCoordinates, OnWall
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -20,6 +20,23 @@ if TYPE_CHECKING:
 DEGREE = 7
 # The ends of an interpolating spline's derivative are worse than its middle; they are left out.
 ENDS = 5
+# Components of the wall's force on a ball in the local frame.
+FORCES = ("N", "F2", "F3")
+
+
+def with_sticking(body: OnWall, dataset: xr.Dataset) -> xr.Dataset:
+    """The run with ``sticking`` at each sample, as its events show it, where friction is bounded and it has events.
+
+    A sample at an event belongs to what follows it.
+    """
+    if np.isinf(body.contact.mu_static) or "event_kind" not in dataset:
+        return dataset
+    kinds = {EventKind.SLIP: False, EventKind.STICK: True, EventKind.REST: True}
+    changes = [(event.time, kinds[EventKind(event.kind)]) for event in events_of(dataset) if event.kind in kinds]
+    before = not changes or not changes[0][1]  # what sticks first has slipped
+    reached = np.searchsorted([time for time, _ in changes], dataset["time"].to_numpy(), side="right")
+    sticks = np.array([before, *(sticks for _, sticks in changes)])[reached]
+    return dataset.assign(sticking=("time", sticks))
 
 
 def stretches(dataset: xr.Dataset) -> list[xr.Dataset]:
@@ -33,7 +50,9 @@ def stretches(dataset: xr.Dataset) -> list[xr.Dataset]:
     return [part for part in parts if part.sizes["time"] > DEGREE + 2 * ENDS]
 
 
-def accelerations(surface: Surface, dataset: xr.Dataset, at: FloatArray | None = None) -> tuple[FloatArray, FloatArray]:
+def accelerations(
+    surface: LocalCoordinates, dataset: xr.Dataset, at: FloatArray | None = None
+) -> tuple[FloatArray, FloatArray]:
     """Surface coordinates, (time, 2), and accelerations of the centre [m/s²], (time, 3), in a stretch without events.
 
     They come from the rates of the coordinates, which vary slowly, unlike velocities in the world. They are given at

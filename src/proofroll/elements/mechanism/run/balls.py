@@ -1,0 +1,249 @@
+"""Reads balls on walls, ``[[balls]] [[surfaces]] [[contacts]] [[initial]]``, as bodies with spheres that touch walls.
+
+Each ball is a mechanism of its own: a free body, a sphere, a wall in the world or on a body that turns, and their pair.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+
+from proofroll.core.errors import InputError, require_known
+from proofroll.core.gravity import Gravity
+from proofroll.core.parameters import Parameters
+from proofroll.elements.mechanism.run.contacts.on_wall import LocalStart
+from proofroll.elements.mechanism.run.element import MechanismElement
+from proofroll.elements.mechanism.run.reader import started
+from proofroll.elements.mechanism.scene.balls import Ball, Contact, InitialMotion
+from proofroll.elements.mechanism.scene.checks import WORLD, Vector
+from proofroll.elements.mechanism.scene.joint import Joint
+from proofroll.elements.mechanism.scene.joint_kinds import JointKind
+from proofroll.elements.mechanism.scene.model import Mechanism
+from proofroll.elements.mechanism.scene.parts import Body
+from proofroll.elements.mechanism.scene.rotations import Array, cross
+from proofroll.elements.mechanism.scene.shapes.geometry import Geometry, Pair
+from proofroll.elements.mechanism.scene.shapes.shapes import HalfSpace
+from proofroll.elements.mechanism.scene.shapes.walls import CurvedWall
+from proofroll.elements.mechanism.scene.shapes.walls.charts import WallCoordinates, wall_coordinates
+from proofroll.elements.mechanism.scene.signal import Formula
+
+# Slip at the start, relative to the speed of the ball, that counts as round-off of rolling.
+_ROUND_OFF = 1e-12
+
+
+class SurfaceTable(Protocol):
+    """A table of ``[[surfaces]]``; its further fields are those of its kind."""
+
+    @property
+    def name(self) -> str:
+        """Name that contacts use."""
+
+    @property
+    def kind(self) -> str:
+        """Kind of wall."""
+
+    @property
+    def units(self) -> tuple[str, str]:
+        """Units of its coordinates."""
+
+
+@dataclass(frozen=True)
+class BallTables:
+    """Tables of a scene file that describe balls on walls, but for the surfaces, whose kinds packages may add."""
+
+    balls: tuple[Ball, ...]
+    contacts: tuple[Contact, ...]
+    initial: tuple[InitialMotion, ...]
+
+
+class PlacedBall(NamedTuple):
+    """A ball with the wall that it touches, the law of their contact and its number, and its start."""
+
+    ball: Ball
+    surface: Any
+    contact: Contact
+    start: InitialMotion
+    number: int = 0
+
+
+def placed_balls(
+    contents: BallTables,
+    surfaces: Sequence[SurfaceTable],
+    initial: Sequence[Mapping[str, Any]],
+    numbers: Parameters,
+    where: str,
+) -> Iterator[PlacedBall]:
+    """Each contact of the tables with the ball, the surface and the start that it names.
+
+    Args:
+        contents: the tables.
+        surfaces: of the file.
+        initial: the tables of starts as the file writes them.
+        numbers: the parameters.
+        where: the file, for messages.
+
+    Raises:
+        InputError: a name is missing or used twice, or a coordinate has another unit than its surface.
+    """
+    _check_names(contents, surfaces, where)
+    balls, walls = {ball.name: ball for ball in contents.balls}, {surface.name: surface for surface in surfaces}
+    starts = {start.body: (index, start) for index, start in enumerate(contents.initial)}
+    for index, contact in enumerate(contents.contacts):
+        if contact.body not in starts:
+            raise InputError(f"{where}: initial", contact.body, "say how this ball starts; add an [[initial]] of it")
+        if any(contact.body == earlier.body for earlier in contents.contacts[:index]):
+            raise InputError(f"{where}: contacts.{index}.body", contact.body, "a ball touches one surface")
+        surface, (number, start) = walls[contact.surface], starts[contact.body]
+        # Only with the surface are the units of its coordinates known.
+        place = f"{where}: initial.{number}.coordinates"
+        numbers.filled(initial[number].get("coordinates", []), place, {}, surface.units)
+        yield PlacedBall(ball=balls[contact.body], surface=surface, contact=contact, start=start, number=index)
+    for name in balls.keys() - {contact.body for contact in contents.contacts}:
+        raise InputError(f"{where}: contacts", name, "this ball touches no surface; add a contact or remove the ball")
+
+
+def _check_names(contents: BallTables, surfaces: Sequence[SurfaceTable], where: str) -> None:
+    """Raises InputError unless contacts and starts name balls and surfaces of the file, and all names are unique."""
+    balls, walls = [ball.name for ball in contents.balls], [surface.name for surface in surfaces]
+    for kind, names in (("balls", balls), ("surfaces", walls)):
+        for index, name in enumerate(names):
+            if name in names[:index]:
+                raise InputError(f"{where}: {kind}.{index}.name", name, "two have this name; rename one")
+    for kind, items in (("contacts", contents.contacts), ("initial", contents.initial)):
+        for index, item in enumerate(items):
+            for key, known_names in (("body", balls), ("surface", walls)):
+                named = getattr(item, key, None)
+                if named is not None:
+                    require_known(f"{where}: {kind}.{index}.{key}", named, known_names)
+
+
+def ball_as_body(placed: PlacedBall, gravity: Gravity, where: str) -> MechanismElement:
+    """Mechanism of a ball on its wall.
+
+    A restitution that is left out is 0: the ball stays where it lands.
+
+    Raises:
+        InputError: no body has such a wall or law of contact, or the ball cannot start so.
+    """
+    ball, contact = placed.ball, placed.contact
+    x, y, z = gravity.vector.tolist()
+    try:
+        wall, turning = _wall(placed)
+        if not contact.mu_kinetic < contact.mu_static or contact.mu_kinetic:
+            pair = _pair(placed, wall)
+        else:
+            advice = "what holds by friction slides with some: give a number above 0, or mu_static = 0"
+            raise InputError("mu_kinetic", contact.mu_kinetic, advice).of(f"{where}: contacts.{placed.number}")
+        free = _free_joint(placed, wall, turning)
+        moving = _turning_wall(ball, wall, turning)
+        mechanism = Mechanism(
+            bodies=(Body(ball.name, ball.mass, inertia=_isotropic(ball.inertia)), *(body for body, _ in moving)),
+            joints=(free, *(joint for _, joint in moving)),
+            geometries=(Geometry(ball.name, ball.name, "sphere", radius=ball.radius), wall),
+            pairs=(pair,),
+            gravity=(x, y, z),
+        )
+        flies = bool(placed.start.gap) or contact.restitution is not None
+        local = LocalStart(ball.name, placed.start.coordinates, flies)
+        return MechanismElement(started(mechanism), local=local)
+    except InputError as error:
+        if error.field.startswith(where):
+            raise
+        table = f"contacts.{placed.number}" if error.field.startswith("pairs.") else "initial"
+        raise error.within(f"{where}: {table}", ball.name) from None
+
+
+def wall_name(placed: PlacedBall) -> str:
+    """Name of the wall among the bodies and shapes of its mechanism: the surface's, unless the ball has it."""
+    name: str = placed.surface.name
+    return f"{name}_wall" if name == placed.ball.name else name
+
+
+def _wall(placed: PlacedBall) -> tuple[Geometry, float]:
+    """Shape of a surface, and the rate at which it turns about its axis [rad/s]."""
+    surface, name = placed.surface, wall_name(placed)
+    turning, tilt = float(getattr(surface, "turning", 0.0)), float(getattr(surface, "tilt", 0.0))
+    body, axis = name if turning else WORLD, (math.sin(tilt), 0.0, math.cos(tilt))
+    match surface.kind:
+        case "plane":
+            x, y, z = (surface.height * part for part in axis)
+            return Geometry(name, body, "plane", position=(x, y, z), normal=axis), turning
+        case "cylinder":
+            return Geometry(name, body, "bore", radius=surface.radius, axis=axis), turning
+        case "bowl":
+            return Geometry(name, body, "bowl", radius=surface.radius), turning
+        case "cone":
+            return Geometry(name, body, "cone", slope=surface.slope, position=(0.0, 0.0, surface.tip)), turning
+        case "torus":
+            ring, wire = surface.ring_radius, surface.wire_radius
+            return Geometry(name, body, "torus", ring_radius=ring, radius=wire), turning
+    raise InputError("kind", surface.kind, "no wall of a body has this form")
+
+
+def _turning_wall(ball: Ball, wall: Geometry, turning: float) -> list[tuple[Body, Joint]]:
+    """Body of a wall that turns, and the joint that turns it; no motion or force depends on the body's mass."""
+    if not turning:
+        return []
+    axis = wall.normal if wall.kind == "plane" else wall.axis
+    body = Body(wall.body, ball.mass, inertia=_isotropic(ball.inertia))
+    motion = Formula(f"{turning!r}*t")
+    return [(body, Joint(f"{wall.body}_turning", JointKind.REVOLUTE, WORLD, wall.body, axis=axis, motion=motion))]
+
+
+def _free_joint(placed: PlacedBall, wall: Geometry, turning: float) -> Joint:
+    """Joint of the ball's body, with its start."""
+    ball, contact, start = placed.ball, placed.contact, placed.start
+    shape = wall.solid
+    assert isinstance(shape, HalfSpace | CurvedWall)  # by `_wall`
+    on_wall = wall_coordinates(shape, ball.radius)
+    p0, v0, w0, slip = _initial(on_wall, ball.radius, start, turning * on_wall.axis)
+    if not np.all(np.isfinite([p0, v0, w0])):
+        advice = "the surface has no normal there, as at an apex; start elsewhere"
+        raise InputError("coordinates", list(start.coordinates), advice)
+    if slip and not start.gap and math.isinf(contact.mu_static):
+        advice = "a ball that starts slipping needs a number for mu_static, or leave its tangential_spin out"
+        raise InputError("tangential_spin", start.tangential_spin, advice)
+    q0, velocity = (*p0.tolist(), 1.0, 0.0, 0.0, 0.0), (*v0.tolist(), *w0.tolist())
+    return Joint(f"{ball.name}_free", JointKind.FREE, WORLD, ball.name, q0=q0, v0=velocity)
+
+
+def _initial(
+    on_wall: WallCoordinates, radius: float, start: InitialMotion, rate: Array
+) -> tuple[Array, Array, Array, bool]:
+    """Centre, velocity and spin at the start [SI], and whether the ball slips on a wall that turns at a ``rate``."""
+    u0 = np.asarray(start.coordinates, dtype=np.float64)
+    frame, centre = on_wall.frame(u0), on_wall.position(u0)
+    v0 = frame[:, 1:] @ np.asarray(start.velocity)
+    carried = cross(rate, centre + radius * frame[:, 0])
+    w0 = start.spin * frame[:, 0] - cross(frame[:, 0], v0 - carried) / radius
+    p0 = centre - start.gap * frame[:, 0]
+    if start.tangential_spin is None:
+        return p0, v0, w0, False
+    spin = frame @ (start.spin, *start.tangential_spin)
+    slip = radius * float(np.linalg.norm(cross(spin - w0, frame[:, 0])))
+    slips = slip > _ROUND_OFF * float(np.linalg.norm(v0))
+    return p0, v0, spin if slips else w0, slips
+
+
+def _pair(placed: PlacedBall, wall: Geometry) -> Pair:
+    """Pair of the ball and its wall; what never slips has no kinetic friction."""
+    ball, law = placed.ball, placed.contact
+    friction = math.inf if math.isinf(law.mu_static) else law.mu_kinetic
+    return Pair(
+        name=f"{ball.name}_on_{wall.name}",
+        geometries=(ball.name, wall.name),
+        friction=friction,
+        restitution=law.restitution or 0.0,
+        static_friction=law.mu_static if friction < law.mu_static else None,
+        tangential_restitution=law.tangential_restitution,
+        rolling_resistance=law.rolling_resistance,
+    )
+
+
+def _isotropic(moment: float) -> tuple[Vector, Vector, Vector]:
+    """Inertia with one moment about every axis [kg m²]."""
+    return (moment, 0.0, 0.0), (0.0, moment, 0.0), (0.0, 0.0, moment)
