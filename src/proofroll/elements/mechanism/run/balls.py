@@ -139,7 +139,7 @@ def ball_as_body(placed: PlacedBall, gravity: Gravity, where: str) -> MechanismE
             advice = "what holds by friction slides with some: give a number above 0, or mu_static = 0"
             raise InputError("mu_kinetic", contact.mu_kinetic, advice).of(f"{where}: contacts.{placed.number}")
         free = _free_joint(placed, wall, turning)
-        moving = _turning_wall(ball, wall, turning)
+        moving = _turning_wall(ball, wall, turning, free)
         mechanism = Mechanism(
             bodies=(Body(ball.name, ball.mass, inertia=_isotropic(ball.inertia)), *(body for body, _ in moving)),
             joints=(free, *(joint for _, joint in moving)),
@@ -184,12 +184,16 @@ def _wall(placed: PlacedBall) -> tuple[Geometry, float]:
     raise InputError("kind", surface.kind, "no wall of a body has this form")
 
 
-def _turning_wall(ball: Ball, wall: Geometry, turning: float) -> list[tuple[Body, Joint]]:
-    """Body of a wall that turns, and the joint that turns it; no motion or force depends on the body's mass."""
+def _turning_wall(ball: Ball, wall: Geometry, turning: float, free: Joint) -> list[tuple[Body, Joint]]:
+    """Body of a wall that turns, and the joint that turns it; no motion or force depends on its mass or inertia.
+
+    They are of the size of the ball's about the axis, for a body that is much lighter loses digits.
+    """
     if not turning:
         return []
     axis = wall.normal if wall.kind == "plane" else wall.axis
-    body = Body(wall.body, ball.mass, inertia=_isotropic(ball.inertia))
+    about_axis = ball.inertia + ball.mass * math.hypot(*free.q0[:3]) ** 2
+    body = Body(wall.body, ball.mass, inertia=_isotropic(about_axis))
     motion = Formula(f"{turning!r}*t")
     return [(body, Joint(f"{wall.body}_turning", JointKind.REVOLUTE, WORLD, wall.body, axis=axis, motion=motion))]
 

@@ -104,7 +104,7 @@ def test_events_say_when_a_ball_sticks() -> None:
     assert "sticking" not in with_sticking(unbounded, told)
 
 
-@pytest.mark.parametrize("name", ["sphere_in_cylinder", "turntable"])
+@pytest.mark.parametrize("name", ["sphere_in_cylinder", pytest.param("turntable", marks=pytest.mark.drill)])
 def test_the_truth_of_a_ball_as_a_body_is_told_in_its_local_frame(name: str) -> None:
     """Each variable of the local frame agrees with the ball's own truth within both bars."""
     own = load_scene(name, **SCENES[name])
