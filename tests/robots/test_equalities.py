@@ -97,3 +97,49 @@ def test_what_is_not_represented_is_named(tmp_path: Path) -> None:
     scene = load_scene(written(tmp_path, FOUR_BAR.format(held=quartic)))
     with pytest.raises(Refused, match=r"the equality constraint joint joint0 \(couplings=0 leaves it out\)"):
         simulate(scene, "mujoco[formulation=joints]", until=0.1)
+
+
+BOX = """<mujoco><worldbody><site name="w1" pos=".5 .5 5"/><site name="w2" pos=".5 -.5 5"/><site name="w3" pos="-.5 0 5"/>
+<body name="box" pos="0 0 2"><freejoint name="root"/><geom type="box" mass="5" size=".5 .5 .5"/>
+<site name="a1" pos=".5 .5 .5"/><site name="a2" pos=".5 -.5 .5"/><site name="a3" pos="-.5 0 .5"/></body></worldbody>
+<default><tendon limited="true" range="0 2.5"/></default><tendon>
+<spatial name="root"><site site="w1"/><site site="a1"/></spatial>
+<spatial name="t2"><site site="w2"/><site site="a2"/></spatial>
+<spatial name="t3"><site site="w3"/><site site="a3"/></spatial></tendon></mujoco>"""
+RANGES = DIFFERENTIAL.replace('<fixed name="in">', '<fixed name="in" limited="true" range="-0.1 0.1">').partition("<eq")[0]
+
+
+def test_a_limited_tendon_between_two_sites_is_a_cable(tmp_path: Path) -> None:
+    """A box that hangs on three limited tendons starts as in its file and stays, in MuJoCo too; none falls freely."""
+    scene = load_scene(str(written(tmp_path, BOX)))
+    assert [pair.name for pair in scene.elements[0].mechanism.pairs] == ["root_cord", "t2", "t3"]  # type: ignore[attr-defined]
+    true = find(scene)
+    run = simulate(scene, "mujoco[formulation=geoms]", until=0.1, every=0.1)
+    for pulled, share in (("root_cord", 0.25), ("t2", 0.25), ("t3", 0.5)):
+        weight = share * 5 * 9.81
+        assert float(true[f"force.{pulled}.z"][-1]) == pytest.approx(weight, rel=1e-12)
+        assert float(run[f"force.{pulled}.z"][-1]) == pytest.approx(weight, rel=1e-3)  # softness at rest
+    assert np.abs(run.p_WB.to_numpy() - [0, 0, 2]).max() < 1e-6
+
+
+def find(scene: Any) -> Any:
+    """Truth of a scene to 0.1 s."""
+    from proofroll.core.truth import truth
+
+    return truth(scene, np.array([0.0, 0.1]))
+
+
+@pytest.mark.parametrize(
+    ("text", "named"),
+    [
+        (RANGES + "</mujoco>", "the range of the tendon fixed in"),
+        (BOX.replace('range="0 2.5"', 'range="1 2.5"'), "the range of the tendon spatial root"),
+    ],
+    ids=["of joints", "least length"],
+)
+def test_other_limits_of_tendons_are_refused_by_name(tmp_path: Path, text: str, named: str) -> None:
+    """Limits that no scene has are named where they are asked for, and where couplings=0 leaves them out."""
+    path = str(written(tmp_path, text))
+    with pytest.raises(Refused, match=rf"{named} \(couplings=0 leaves it out\)"):
+        find(load_scene(path))
+    assert any("(couplings=1)" in clause for clause in load_scene(path, couplings=0).omitted)

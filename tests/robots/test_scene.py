@@ -236,3 +236,28 @@ def test_what_is_advised_is_followed_to_the_end(
     code, _, said = proofroll("report", "--set", "friction=0")
     assert code == 2
     assert "studies have their own points" in " ".join(said.split())
+
+
+def test_what_a_file_has_beyond_the_answer_is_said(robot):
+    """Ranges, actuators, laws and couplings that a scene leaves out are named, each with what brings it in."""
+    body = '<body gravcomp="1"><joint name="j" damping="1"/><geom size="0.1"/></body>'
+    path = robot("arm.xml", f'<mujoco><worldbody>{body}</worldbody><actuator><motor joint="j"/></actuator></mujoco>')
+    compensated = "gravity compensation of 1 body"
+    assert load_scene(path).omitted == ("1 actuator (actuators=1)", compensated, "contacts")
+    assert load_scene(path, actuators=1).omitted == (compensated, "contacts")
+    arm = robot("arm.urdf", urdf(first='<dynamics damping="0.3"/>'))
+    assert load_scene(arm).omitted == ("2 joint ranges (limits=1)", "contacts")
+    assert load_scene(arm, limits=1, damping=0).omitted == ("damping of joints (damping=1)", "contacts")
+
+
+@pytest.mark.drill
+def test_commands_say_what_is_not_in_the_answer(robot):
+    """Run and compare print a line on what the file has and the answer leaves out."""
+    arm = robot("arm.urdf", urdf())
+    for arguments in (
+        ["run", arm, "--engine", "mujoco", "--until", "0.1"],
+        ["compare", arm, "--engine", "mujoco", "--until", "0.1", "--budget", "20"],
+    ):
+        answered = CliRunner().invoke(app, arguments)
+        assert answered.exit_code == 0, answered.output
+        assert "Not in the answer: 2 joint ranges (limits=1), contacts." in answered.output

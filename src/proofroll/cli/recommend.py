@@ -110,7 +110,8 @@ def recommend(
     study = _stored_study(question, engine or [], claims, ranges, out, jobs, measure_first=measure_first)
     names = {*study.absent, *(point.engine for point in study.points)}
     not_measured = [] if engine else [name for name in engine_names() if name not in names]
-    recommendation = replace(answered(study, required), not_measured=not_measured)
+    omitted = list(question.loaded.omitted) or None
+    recommendation = replace(answered(study, required), not_measured=not_measured, omitted=omitted)
     options.show(recommendation, as_json, lambda: answer_lines(recommendation))
     raise typer.Exit(options.OK if recommendation.answer.choice and recommendation.affordable else options.CONTRADICTED)
 

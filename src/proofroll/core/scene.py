@@ -34,6 +34,7 @@ class Scene:
         folder: folder of the scene's file and its engine-native models.
         asks: results wanted besides the motion; others need not be modelled.
         files: names of the engine-native models in the folder, and of files that these read.
+        omitted: clauses on what its file describes and the scene leaves out, with the option that brings it in.
 
     Raises:
         InputError: no elements, two elements of one name, or a question that no element can answer.
@@ -46,6 +47,7 @@ class Scene:
     folder: Path = Path()
     asks: tuple[str, ...] = ()
     files: tuple[str, ...] = ()
+    omitted: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         """Checks names and questions, and makes the arrays of its elements read-only."""

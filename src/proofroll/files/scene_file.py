@@ -98,18 +98,19 @@ def read_scene_file(name: str) -> SceneFile:
     return _read(name, {})[0]
 
 
-def _read(name: str, asked: Mapping[str, object]) -> tuple[SceneFile, dict[str, float], Path]:
-    """File of a scene, the value of each parameter, and the path of the file."""
+def _read(name: str, asked: Mapping[str, object]) -> tuple[SceneFile, dict[str, float], Path, tuple[str, ...]]:
+    """File of a scene, the value of each parameter, the path of the file, and clauses on what the scene omits of it."""
     importer = source_of(name)
     if importer is None:
         path = scene_folder(name) / "scene.toml"
         file = _checked(read_toml(path), path)
-        return file, values_of(file.parameters, asked), path
+        return file, values_of(file.parameters, asked), path, ()
     source, path = importer
     file = _checked({"gravity": {}, **source.content(path)}, path)
     values = values_of(file.parameters, asked)
     tables = dict(source.tables(path, values))
-    return dataclasses.replace(file, gravity=tables.pop("gravity"), tables=tables), values, path
+    omitted = tuple(tables.pop("omitted", ()))
+    return dataclasses.replace(file, gravity=tables.pop("gravity"), tables=tables), values, path, omitted
 
 
 def scene_folder(name: str) -> Path:
@@ -160,7 +161,7 @@ def load_scene(name: str, /, *, asks: Any = (), **parameters: float) -> Scene:
     Raises:
         InputError: unknown scene, parameter or question, or a value that makes no sense.
     """
-    file, values, path = _read(name, parameters)
+    file, values, path, omitted = _read(name, parameters)
     is_own_file = path.name == "scene.toml"
     place = str(path)
     numbers = Parameters(values, {name: item.unit for name, item in file.parameters.items()})
@@ -175,6 +176,7 @@ def load_scene(name: str, /, *, asks: Any = (), **parameters: float) -> Scene:
             folder=path.parent if is_own_file else Path(),
             asks=tuple(dict.fromkeys([*file.asks, *requirements])),
             files=tuple(sorted(file.files)),
+            omitted=omitted,
         )
     except InputError as error:
         raise error if error.field == "asks" and error.value in requirements else error.of(place) from None

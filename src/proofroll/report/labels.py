@@ -197,6 +197,11 @@ def settings_text(settings: dict[str, Any]) -> str:
     return ", ".join(f"{key}={value}" for key, value in settings.items() if value is not None)
 
 
+def omitted_lines(clauses: Sequence[str]) -> list[str]:
+    """Line on what the file of a scene describes and the answer leaves out; none without clauses."""
+    return [f"Not in the answer: {', '.join(clauses)}."] if clauses else []
+
+
 def values(numbers: list[float | None]) -> str:
     """A number, or the components of a vector, as text."""
     return ", ".join(number(value, 8, none="not finite") for value in numbers)

@@ -149,7 +149,7 @@ def _mjcf(file: RobotFile) -> Iterator[_Noticed]:
                 yield "note", "option", f"{name}: forces of the medium are not compared"
     yield from _closed(file)
     if next(file.root.iter("tendon"), None) is not None:
-        yield "note", "tendon", "springs and damping of tendons are not compared"
+        yield "note", "tendon", "springs, damping and limits of tendons are not compared"
     if any(body.get("gravcomp") for body in file.root.iter("body")):
         yield "note", "bodies", "compensation of gravity (gravcomp) is not compared"
     if (trees := sum(map(_trees, file.root.iter("worldbody")))) > 1:

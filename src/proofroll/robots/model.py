@@ -77,7 +77,7 @@ class RobotJoint:
         armature: inertia added to the joint's own coordinate [kg m² or kg].
         stiffness: spring torque per coordinate [N m/rad or N/m].
         rest: coordinate at which the spring is at rest [rad or m].
-        lower, upper: limits of the coordinate [rad or m]; None: there is none.
+        lower, upper: limits of the coordinate, of a spherical joint the largest angle [rad or m]; None: there is none.
         effort: largest size of its drive's effort [N m or N]; None: none is given.
         speed: largest velocity of its drive [rad/s or m/s]; None: none is given.
         actuated: True if an actuator acts on the joint.
@@ -152,6 +152,25 @@ class Tie:
 
 
 @dataclasses.dataclass(frozen=True)
+class Cord:
+    """A tendon between two places that pulls where it is as long as it can be.
+
+    Attributes:
+        name: of the tendon.
+        body_a, body_b: bodies, or :data:`NO_BODY`.
+        position_a, position_b: its ends in each body's frame [m], shape (3,).
+        at_most: largest length [m].
+    """
+
+    name: str
+    body_a: str
+    body_b: str
+    position_a: Array
+    position_b: Array
+    at_most: float
+
+
+@dataclasses.dataclass(frozen=True)
 class Robot:
     """A tree of bodies, every joint after the joint of its parent.
 
@@ -162,7 +181,8 @@ class Robot:
         mimics: joints that follow another.
         loops: constraints that close the tree; a check of importers compares the tree alone.
         ties: further linear relations of joints.
-        further: names of constraints that none of these represents.
+        cords: tendons with a largest length.
+        further: clauses on constraints and laws of tendons that none of these represents.
         gravity: acceleration [m/s²], shape (3,).
         sources: body -> facts of the file that only hypotheses need: its inertia as written, for example.
     """
@@ -175,6 +195,7 @@ class Robot:
     sources: Mapping[str, Any] = dataclasses.field(default_factory=dict)
     loops: tuple[RobotLoop, ...] = ()
     ties: tuple[Tie, ...] = ()
+    cords: tuple[Cord, ...] = ()
     further: tuple[str, ...] = ()
 
     @cached_property

@@ -14,7 +14,7 @@ import numpy as np
 from proofroll.core.entry_points import announced
 from proofroll.core.errors import InputError, Missing, Refused, require_known
 from proofroll.files.json_data import plain
-from proofroll.robots.model import Mimic, Robot, RobotBody, RobotJoint, RobotLoop, Tie
+from proofroll.robots.model import Cord, Mimic, Robot, RobotBody, RobotJoint, RobotLoop, Tie
 from proofroll.robots.protocol import GROUP, Reading, Request, Whole
 from proofroll.robots.robot_file import RobotFile
 from proofroll.robots.states import RobotStates
@@ -231,6 +231,7 @@ def robot_from(data: Mapping[str, Any]) -> Robot:
         ties=tuple(
             Tie(tie["name"], tuple(tie["joints"]), tuple(tie["coefficients"]), tie["value"]) for tie in data["ties"]
         ),
+        cords=tuple(Cord(**_arrays(cord)) for cord in data["cords"]),
         further=tuple(data["further"]),
     )
 

@@ -14,7 +14,16 @@ from proofroll.robots.controlled import ControlledScenes
 from proofroll.robots.model import Robot
 from proofroll.robots.opening import BASES
 from proofroll.robots.robot_file import RobotFile
-from proofroll.robots.scene_tables import ENDINGS, SWITCH, ParameterRow, described, laws, read_robot, tables_of
+from proofroll.robots.scene_tables import (
+    ENDINGS,
+    SWITCH,
+    ParameterRow,
+    described,
+    held_start,
+    laws,
+    read_robot,
+    tables_of,
+)
 from proofroll.robots.states import random_states
 
 _DURATION = 1.0  # s: an arm falls through much of its reach, and few are chaotic so early
@@ -39,16 +48,12 @@ class RobotScenes:
         """Title, source and parameters of a robot's scene."""
         file, robot = read_robot(path, "fixed")
         parameters = dict(_RELEASE) | _parameters(file, robot)
-        left_out = ["contacts"]
         if any(len(part) for part in file.root.findall("actuator")):
             words = "whether the file's actuators act, with their controls at zero (1), or not (0)"
             parameters["actuators"] = (0, "1", words, SWITCH)
-            left_out.append("actuators (unless actuators=1)")
-        if "limits" in parameters:
-            left_out.append("stops of joints (unless limits=1)")
         return {
             "title": f"{robot.name}, released from a random pose",
-            "reason": f"How engines move this robot; without {', '.join(left_out)}",
+            "reason": "How engines move this robot",
             "duration": _DURATION,
         } | described(file, parameters)
 
@@ -62,7 +67,9 @@ class RobotScenes:
         file, robot = read_robot(path, BASES[int(values.get("free_base", 0))])
         acting, silent = scene_actuators(file.root, robot) if values.get("actuators") else ([], [])
         clauses = [f"{what} (actuators=0 leaves all out)" for what in silent]
-        tables = tables_of(file, robot, random_states(robot, 1, int(values["seed"])), values)
+        start = random_states(robot, 1, int(values["seed"]))
+        start = held_start(robot, start) if values["couplings"] else start
+        tables = tables_of(file, robot, start, values)
         return tables | {"actuators": acting, "unmodelled": [*clauses, *tables["unmodelled"]]}
 
     @staticmethod

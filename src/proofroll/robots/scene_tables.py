@@ -5,19 +5,22 @@ tree are loops and couplings; joints in them start near the file's pose, at rest
 """
 
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
-from xml.etree.ElementTree import Element, tostring
+from xml.etree.ElementTree import tostring
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from proofroll.core.errors import InputError
-from proofroll.elements.mechanism.scene.joint_kinds import LAWS, JointKind
+from proofroll.core.number_format import counted
+from proofroll.elements.mechanism.scene.joint_kinds import DISTANCE, LAWS, JointKind
 from proofroll.elements.mechanism.scene.rotations import to_rpy
 from proofroll.robots.meaning import opened, robot_of_text
-from proofroll.robots.model import NO_BODY, Array, Mimic, Robot, RobotJoint, RobotLoop, Tie
+from proofroll.robots.mjcf.parse import COMPENSATION
+from proofroll.robots.model import NO_BODY, Array, Cord, Mimic, Robot, RobotJoint, RobotLoop, Tie
 from proofroll.robots.robot_file import RobotFile
 from proofroll.robots.states import RobotStates
 
@@ -91,7 +94,7 @@ def tables_of(file: RobotFile, robot: Robot, start: RobotStates, values: Mapping
             _joint(robot, joint, names, start, values) | (_guess(joint, start) if joint.name in following else {})
             for joint in robot.moving
         ],
-        "loops": [_loop(robot, loop, names) for loop in robot.loops] if held else [],
+        "loops": [_loop(robot, loop, names) for loop in (*robot.loops, *_pulling(robot))] if held else [],
         "points": [
             {"name": name, "body": name, "position": body.com.tolist()}
             for joint, (name, body) in zip(robot.moving, bodies, strict=True)
@@ -106,8 +109,35 @@ def tables_of(file: RobotFile, robot: Robot, start: RobotStates, values: Mapping
                 for law in _FACTORS
                 if values.get(law, 0) * getattr(joint, law) and joint.kind not in LAWS[law]
             ),
+            *(
+                f"the range of the {joint.kind} joint {joint.name} (limits=0 leaves all out)"
+                for joint in robot.moving
+                if values.get("limits") and joint.upper is not None and joint.dofs != 1
+            ),
         ],
+        "omitted": list(_omitted(file, robot, values)),
     }
+
+
+def _omitted(file: RobotFile, robot: Robot, values: Mapping[str, float]) -> Iterator[str]:
+    """Clauses on what a robot file describes and its scene leaves out, each with the parameter that brings it in."""
+    ranges = sum(joint.lower is not None or joint.upper is not None for joint in robot.moving)
+    if ranges and not values.get("limits"):
+        yield f"{counted(ranges, 'joint ranges')} (limits=1)"
+    actuators = sum(len(part) for part in file.root.findall("actuator"))
+    if actuators and values.get("actuators") == 0:
+        yield f"{counted(actuators, 'actuators')} (actuators=1)"
+    for law in _FACTORS:
+        if values.get(law) == 0 and any(getattr(joint, law) for joint in robot.moving):
+            yield f"{law} of joints ({law}=1)"
+    coupled = len(robot.mimics) + len(robot.loops) + len(robot.ties) + len(robot.cords)
+    coupled += sum(1 for _ in _couplings(file, robot.change(mimics=(), ties=())))
+    if coupled and not values["couplings"]:
+        yield f"{counted(coupled, 'couplings')} (couplings=1)"
+    compensated = sum(remark.what == COMPENSATION for remark in file.remarks)
+    if compensated:
+        yield f"gravity compensation of {counted(compensated, 'bodies')}"
+    yield "contacts"
 
 
 def read_robot(path: Path, base: str) -> tuple[RobotFile, Robot]:
@@ -182,6 +212,14 @@ def _tied(robot: Robot, tie: Tie) -> bool:
 
 def _following(robot: Robot) -> frozenset[str]:
     """Moving joints whose start follows from loops and ties: those between the bodies of a loop, and those of a tie."""
+    between = (_between(robot, loop) for loop in robot.loops)
+    tied = (set(tie.joints) for tie in robot.ties if _tied(robot, tie))
+    free = {joint.name for joint in robot.moving if joint.kind == JointKind.FREE}
+    return frozenset(set().union(*between, *tied) - free)
+
+
+def _between(robot: Robot, link: RobotLoop | Cord) -> set[str]:
+    """Moving joints between the two bodies of a loop or a cord."""
     by_child = {joint.child: joint for joint in robot.joints}
 
     def carriers(body: str) -> set[str]:
@@ -192,10 +230,32 @@ def _following(robot: Robot) -> frozenset[str]:
             names |= {joint.name} if joint.dofs else set()
         return names
 
-    between = (carriers(loop.body_a) ^ carriers(loop.body_b) for loop in robot.loops)
-    tied = (set(tie.joints) for tie in robot.ties if _tied(robot, tie))
-    free = {joint.name for joint in robot.moving if joint.kind == JointKind.FREE}
-    return frozenset(set().union(*between, *tied) - free)
+    return carriers(link.body_a) ^ carriers(link.body_b)
+
+
+def _pulling(robot: Robot) -> list[Cord]:
+    """Cords between bodies that move relative to each other, with names that no joint and no loop has."""
+    taken = {item.name for item in (*robot.joints, *robot.loops)}
+    cords = [cord for cord in robot.cords if _between(robot, cord)]
+    return [replace(cord, name=f"{cord.name}_cord") if cord.name in taken else cord for cord in cords]
+
+
+def held_start(robot: Robot, start: RobotStates) -> RobotStates:
+    """First of some states, with the joints that move an end of a cord at rest in the pose of the file."""
+    joints = {joint.name: joint for joint in robot.moving}
+    names = set().union(*(_between(robot, cord) for cord in robot.cords))
+    held = {name: joints[name] for name in names}
+    poses = {name: robot.sources[joint.child] for name, joint in held.items() if joint.kind == JointKind.FREE}
+    turning = {name for name, joint in held.items() if joint.kind == JointKind.SPHERICAL}
+    return replace(
+        start,
+        angle=start.angle | {name: np.zeros(1) for name in names & start.angle.keys()},
+        rotation=start.rotation
+        | {name: np.eye(3)[None] for name in turning}
+        | {name: np.array(pose["rotation"])[None] for name, pose in poses.items()},
+        position=start.position | {name: np.array(pose["position"])[None] for name, pose in poses.items()},
+        velocity=start.velocity | {name: np.zeros((1, joint.dofs)) for name, joint in held.items()},
+    )
 
 
 def _guess(joint: RobotJoint, start: RobotStates) -> dict[str, Any]:
@@ -205,9 +265,10 @@ def _guess(joint: RobotJoint, start: RobotStates) -> dict[str, Any]:
     return {"dependent": True, "q0": [_NEAR * float(start.angle[joint.name][0])]}
 
 
-def _loop(robot: Robot, loop: RobotLoop, names: Mapping[str, str]) -> dict[str, Any]:
-    """Scene table of a loop; its ends are the scene's bodies, which may hold several links."""
-    table: dict[str, Any] = {"name": loop.name, "kind": loop.kind}
+def _loop(robot: Robot, loop: RobotLoop | Cord, names: Mapping[str, str]) -> dict[str, Any]:
+    """Scene table of a loop or a cord; its ends are the scene's bodies, which may hold several links."""
+    table: dict[str, Any] = {"name": loop.name}
+    table |= {"kind": loop.kind} if isinstance(loop, RobotLoop) else {"kind": DISTANCE, "at_most": loop.at_most}
     turns = {}
     for side, link, position in (("a", loop.body_a, loop.position_a), ("b", loop.body_b, loop.position_b)):
         home, p, R = robot.welded[link]
@@ -215,7 +276,7 @@ def _loop(robot: Robot, loop: RobotLoop, names: Mapping[str, str]) -> dict[str, 
         table |= {f"body_{side}": "world" if home == NO_BODY else names[carrier]}
         table |= {f"position_{side}": (p + R @ position).tolist()}
         turns[side] = R
-    if loop.kind == JointKind.FIXED:
+    if isinstance(loop, RobotLoop) and loop.kind == JointKind.FIXED:
         table["orientation"] = list(to_rpy(turns["a"] @ loop.rotation @ turns["b"].T))
     return table
 
@@ -226,17 +287,10 @@ def _couplings(file: RobotFile, robot: Robot) -> Iterator[str]:
         yield f"joint {mimic.joint} following {mimic.other} (mimic)"
     if file.kind != "mjcf":
         return
-    for name in (*robot.further, *(f"tendon {tie.name}" for tie in robot.ties if not _tied(robot, tie))):
-        yield f"the equality constraint {name}"
-    for tendons in file.root.iter("tendon"):
-        for item in tendons:
-            if any(item.get(key) not in {None, "0"} for key in ("stiffness", "damping", "frictionloss", "armature")):
-                yield f"the tendon {_called(item)}"
+    yield from robot.further
+    for tie in (tie for tie in robot.ties if not _tied(robot, tie)):
+        yield f"the equality constraint tendon {tie.name}"
     for option in file.root.iter("option"):
         for key in ("density", "viscosity"):
             if option.get(key) not in {None, "0"}:
                 yield f"a medium of {key} {option.get(key)}"
-
-
-def _called(item: Element) -> str:
-    return f"{item.tag} {item.get('name', '')}".strip()

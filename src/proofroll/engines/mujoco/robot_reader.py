@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 from proofroll.core.errors import Refused
 from proofroll.elements.mechanism.scene.joint_kinds import ONE_COORDINATE, JointKind
 from proofroll.engines.mujoco.running import mass_matrix, written
-from proofroll.robots.model import NO_BODY, Array, Mimic, Robot, RobotBody, RobotJoint, RobotLoop, Tie, composed
+from proofroll.robots.model import NO_BODY, Array, Cord, Mimic, Robot, RobotBody, RobotJoint, RobotLoop, Tie, composed
 from proofroll.robots.protocol import AtState, Reading, Request, Whole, evaluate
 
 # Springs and dampers; MuJoCo up to 3.3 has one flag for both.
@@ -238,6 +238,7 @@ def robot_of(model: Any) -> Robot:
             parent, position, rotation = child, np.zeros(3), np.eye(3)
     gravity = np.zeros(3) if _off(model, "GRAVITY") else np.array(model.opt.gravity)
     loops, ties, further = _constraints(model, names)
+    cords, laws_of_tendons = _tendons(model, names)
     robot = Robot(
         name="robot",
         bodies=bodies,
@@ -247,7 +248,8 @@ def robot_of(model: Any) -> Robot:
         sources=_sources(model, names),
         loops=loops,
         ties=ties,
-        further=further,
+        cords=cords,
+        further=(*further, *laws_of_tendons),
     )
     laws = {"SPRING": "stiffness", "DAMPER": "damping", "FRICTIONLOSS": "friction"}
     return robot.with_joints(**{law: 0.0 for flag, law in laws.items() if _off(model, flag)})
@@ -291,7 +293,7 @@ def _joint(
     dof, start = int(model.jnt_dofadr[index]), int(model.jnt_qposadr[index])
     anchor = np.array(model.jnt_pos[index]) * (kind != JointKind.FREE)
     shift = float(model.qpos0[start]) * (kind in ONE_COORDINATE)
-    bounded = bool(model.jnt_limited[index]) and kind in ONE_COORDINATE
+    bounded = bool(model.jnt_limited[index])
     return RobotJoint(
         name=model.joint(index).name, kind=kind, parent=parent, child=child,
         position=position + rotation @ anchor if kind != JointKind.FREE else np.zeros(3),
@@ -302,7 +304,7 @@ def _joint(
         armature=float(model.dof_armature[dof]),
         stiffness=_first(model.jnt_stiffness[index]),
         rest=float(model.qpos_spring[start]) - shift,
-        lower=float(model.jnt_range[index, 0]) - shift if bounded else None,
+        lower=float(model.jnt_range[index, 0]) - shift if bounded and kind in ONE_COORDINATE else None,
         upper=float(model.jnt_range[index, 1]) - shift if bounded else None,
         actuated=driven,
     )  # fmt: skip
@@ -322,7 +324,7 @@ def _mimics(model: Any) -> tuple[Mimic, ...]:
 
 
 def _constraints(model: Any, names: Sequence[str]) -> tuple[tuple[RobotLoop, ...], tuple[Tie, ...], tuple[str, ...]]:
-    """Active equality constraints as loops, as ties of joints, and the names of all others but mimics.
+    """Active equality constraints as loops, as ties of joints, and clauses on all others but mimics.
 
     Coordinates count from ``qpos0``, where a tendon that an equality holds has the length that is kept.
     """
@@ -360,8 +362,34 @@ def _constraints(model: Any, names: Sequence[str]) -> tuple[tuple[RobotLoop, ...
         elif kind == int(kinds.mjEQ_TENDON) and (terms := _held_sum(model, a, b, data)):
             ties.append(Tie(name, tuple(terms), tuple(terms.values()), float(data[0])))
         elif kind != int(kinds.mjEQ_JOINT) or b < 0 or np.any(data[2:5]):
-            further.append(f"{word} {name}")
+            further.append(f"the equality constraint {word} {name}")
     return tuple(loops), tuple(ties), tuple(further)
+
+
+def _tendons(model: Any, names: Sequence[str]) -> tuple[tuple[Cord, ...], tuple[str, ...]]:
+    """Limited tendons between two sites as cords, and clauses on all other limits and laws of tendons."""
+    cords: list[Cord] = []
+    further: list[str] = []
+    laws = {"stiffness": "SPRING", "stiffnesspoly": "SPRING", "damping": "DAMPER", "dampingpoly": "DAMPER"}
+    laws |= {"frictionloss": "FRICTIONLOSS"}
+    for index in range(model.ntendon):
+        begin = int(model.tendon_adr[index])
+        wraps = [int(kind) for kind in model.wrap_type[begin : begin + int(model.tendon_num[index])]]
+        kind = "fixed" if mujoco.mjtWrap.mjWRAP_JOINT in wraps else "spatial"
+        name = model.tendon(index).name or f"tendon{index}"
+        values = {law: getattr(model, f"tendon_{law}", None) for law in laws}
+        if any(item is not None and np.any(item[index]) and not _off(model, laws[law]) for law, item in values.items()):
+            further.append(f"the tendon {kind} {name}")
+        if not model.tendon_limited[index] or _off(model, "LIMIT"):
+            continue
+        low, high = model.tendon_range[index].tolist()
+        if wraps != [mujoco.mjtWrap.mjWRAP_SITE] * 2 or low > 0:
+            further.append(f"the range of the tendon {kind} {name}")
+            continue
+        (a, at_a, _), (b, at_b, _) = (_site(model, int(site)) for site in model.wrap_objid[begin : begin + 2])
+        cord = Cord(name=name, body_a=names[a], body_b=names[b], position_a=at_a, position_b=at_b, at_most=high)
+        cords.append(cord)
+    return tuple(cords), tuple(further)
 
 
 def _site(model: Any, site: int) -> tuple[int, Array, Array]:

@@ -199,6 +199,7 @@ class ReportedComparison:
         requires: capabilities that its scene requires of a formulation, sorted.
         spread: of the points where only laws of mechanics are judged.
         step_bound: clause on the longest stable step and on those of the rows; empty: nothing bounds it.
+        omitted: clauses on what the scene's file describes and the comparison leaves out.
     """
 
     name: str
@@ -225,6 +226,7 @@ class ReportedComparison:
     truth_ends: list[str] = field(default_factory=list)
     spread: list[Spread] = field(default_factory=list)
     step_bound: str = ""
+    omitted: list[str] = field(default_factory=list)
     evidence: ComparisonEvidence | None = field(default=None, metadata=MERGED)
 
     @property

@@ -79,6 +79,7 @@ def outcome_content(outcome: Outcome) -> ReportedComparison:
         beyond_budget=outcome.beyond_budget,
         truth_ends=_truth_ends(outcome),
         step_bound=step_bound(scene.elements, steps),
+        omitted=list(scene.omitted),
     )
 
 

@@ -19,7 +19,7 @@ from proofroll.core.scene import Scene
 from proofroll.files.json_data import OPTIONAL
 from proofroll.files.scene_file import load_scene
 from proofroll.files.trajectory_file import read_columns
-from proofroll.report.labels import engine_title, precision_words, settings_text
+from proofroll.report.labels import engine_title, omitted_lines, precision_words, settings_text
 from proofroll.report.run.last_values import FORCES, bounce_table, short_names, value_table
 from proofroll.running.case import Case, Result
 
@@ -47,6 +47,7 @@ class RunContent:
         trajectory, plot, event_table: files that were written.
         bounces: energy and height of each impact; without error bars they are those of samples beside the impacts.
         step_bound: clause on the longest stable step and on that of the run; None: nothing bounds it.
+        omitted: clauses on what the file describes and the run leaves out; None: nothing.
         ends: time from which the truth is not known [s]; samples from there on are missing; None: none is.
     """
 
@@ -78,6 +79,7 @@ class RunContent:
     bounces: list[Bounce] | None = field(default=None, metadata=OPTIONAL)
     ends: float | None = field(default=None, metadata=OPTIONAL)
     step_bound: str | None = field(default=None, metadata=OPTIONAL)
+    omitted: list[str] | None = field(default=None, metadata=OPTIONAL)
 
 
 def run_content(case: Case, result: Result, trajectory: Path) -> RunContent:
@@ -100,6 +102,7 @@ def run_content(case: Case, result: Result, trajectory: Path) -> RunContent:
         versions=result.versions,
         certificate=result.certificate,
         diagnosis=causes,
+        omitted=list(scene.omitted) or None,
         step_bound=step_bound(scene.elements, [] if case.engine.step is None else [case.engine.step]) or None,
     )
     if result.trajectory is None:
@@ -189,6 +192,7 @@ def run_lines(content: RunContent, *, forces: bool = True) -> list[Any]:
     with_settings = f" ({settings})" if settings else ""
     lines: list[Any] = [Text(f"{content.scene} in {engine_title(content.engine)}{with_settings}")]
     lines += [Text(content.step_bound)] if content.step_bound else []
+    lines += [Text(words) for words in omitted_lines(content.omitted or [])]
     lines.append(Text(f"{content.status}: {content.message}"))
     lines += [Text(f"  {cause.sentence}") for cause in content.diagnosis]
     if not content.final:

@@ -13,7 +13,7 @@ from proofroll.core.number_format import counted, number
 from proofroll.report.comparison.closing import closing_notes
 from proofroll.report.comparison.spread import ALONE
 from proofroll.report.comparison.tables import observables, remarks, seconds_before
-from proofroll.report.labels import SYMBOLS, engine_words, step, unit, unjudged, verdict_text
+from proofroll.report.labels import SYMBOLS, engine_words, omitted_lines, step, unit, unjudged, verdict_text
 from proofroll.report.page.answer import answer, closest_words, forces_words, next_words, take_words
 from proofroll.report.parts import part_kinds
 from proofroll.report.terminal.screen import Screen, numeric, plain_table, unbroken
@@ -111,8 +111,9 @@ def columns(content: ReportedComparison) -> list[tuple[str, str]]:
 def verdict_parts(content: ReportedComparison) -> Iterator[Table | str]:
     """Parts of a comparison's text: the verdict table, spreads, and closing lines; or why no run was made."""
     if content.unreached and content.budget is None:
-        yield from (content.title, content.unreached, "")
+        yield from (content.title, content.unreached, *omitted_lines(content.omitted), "")
         return
+    yield from omitted_lines(content.omitted)
     if content.step_bound:
         yield f"{content.step_bound}."
     yield verdict_table(content)

@@ -10,7 +10,7 @@ from rich.table import Column, Table
 from rich.text import Text
 
 from proofroll.core.number_format import error, number
-from proofroll.report.labels import family_and_caveat, listed, name_of, step, with_caveat
+from proofroll.report.labels import family_and_caveat, listed, name_of, omitted_lines, step, with_caveat
 from proofroll.report.page.choice_matrix import FIRST_TOLERANCE
 from proofroll.report.terminal.screen import numeric, plain_table, unbroken
 from proofroll.running.timing import CONFIDENCE
@@ -260,6 +260,7 @@ def _steps(item: CurveBudget) -> str:
 def answer_lines(advice: Recommendation) -> Iterator[str]:
     """Lines of a recommendation."""
     answer = advice.answer
+    yield from omitted_lines(advice.omitted or [])
     asked = f"{answer.quantity} to {number(answer.tolerance)} {answer.unit}"
     if answer.choice is None:
         yield f"Nothing that was measured holds {asked} with margin."

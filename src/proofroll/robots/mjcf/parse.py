@@ -32,6 +32,7 @@ _LOOKS = {
 }
 # Elements that change masses or motion in a way that the check does not cover.
 _UNCOVERED = {"deformable", "flexcomp", "flex", "plugin"}
+COMPENSATION = "its gravity compensation is left out, as actuators are; all engines read it without"
 # Macros, which the engine that defines the format writes out.
 _MACROS = {"replicate", "attach", "composite"}
 
@@ -172,8 +173,7 @@ def _gravity_compensations(root: Element) -> Iterator[LintRemark]:
     """Removes compensation of gravity from bodies; yields a remark for each."""
     for body in root.iter("body"):
         if body.attrib.pop("gravcomp", "0") not in {"0", "0.0"}:
-            words = "its gravity compensation is left out, as actuators are; all engines read it without"
-            yield LintRemark("note", f"body {body.get('name', '')}", words)
+            yield LintRemark("note", f"body {body.get('name', '')}", COMPENSATION)
 
 
 def name_all(root: Element) -> None:

@@ -98,6 +98,7 @@ class Recommendation:
         checked: range of parameters.
         measured: time, machine and versions.
         not_measured: engines that were not asked about.
+        omitted: clauses on what the scene's file describes and the answer leaves out; None: nothing.
     """
 
     answer: Answer = field(metadata=MERGED)
@@ -109,6 +110,7 @@ class Recommendation:
     checked: CheckedOver
     measured: Measured
     not_measured: list[str] | None = field(default=None, metadata=OPTIONAL)
+    omitted: list[str] | None = field(default=None, metadata=OPTIONAL)
 
 
 def recommend(study: TradeoffStudy, required: Requirements) -> Recommendation:
