@@ -99,14 +99,17 @@ def test_what_is_not_represented_is_named(tmp_path: Path) -> None:
         simulate(scene, "mujoco[formulation=joints]", until=0.1)
 
 
-BOX = """<mujoco><worldbody><site name="w1" pos=".5 .5 5"/><site name="w2" pos=".5 -.5 5"/><site name="w3" pos="-.5 0 5"/>
+BOX = """<mujoco><worldbody>
+<site name="w1" pos=".5 .5 5"/><site name="w2" pos=".5 -.5 5"/><site name="w3" pos="-.5 0 5"/>
 <body name="box" pos="0 0 2"><freejoint name="root"/><geom type="box" mass="5" size=".5 .5 .5"/>
 <site name="a1" pos=".5 .5 .5"/><site name="a2" pos=".5 -.5 .5"/><site name="a3" pos="-.5 0 .5"/></body></worldbody>
 <default><tendon limited="true" range="0 2.5"/></default><tendon>
 <spatial name="root"><site site="w1"/><site site="a1"/></spatial>
 <spatial name="t2"><site site="w2"/><site site="a2"/></spatial>
 <spatial name="t3"><site site="w3"/><site site="a3"/></spatial></tendon></mujoco>"""
-RANGES = DIFFERENTIAL.replace('<fixed name="in">', '<fixed name="in" limited="true" range="-0.1 0.1">').partition("<eq")[0]
+RANGES = DIFFERENTIAL.replace('<fixed name="in">', '<fixed name="in" limited="true" range="-0.1 0.1">').partition(
+    "<eq"
+)[0]
 
 
 def test_a_limited_tendon_between_two_sites_is_a_cable(tmp_path: Path) -> None:

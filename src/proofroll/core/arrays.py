@@ -2,6 +2,7 @@
 
 import dataclasses
 import itertools
+import math
 from collections.abc import Iterable, Mapping
 from typing import Any, TypeVar
 
@@ -69,11 +70,57 @@ def longest(vectors: FloatArray) -> float:
     return float(np.max(np.linalg.norm(vectors, axis=-1), initial=0.0))
 
 
-def largest_difference(curve: FloatArray, rival: FloatArray) -> float:
-    """Largest difference of two curves; infinite if their shapes differ or a difference is not finite."""
+_SWEEPS = 4  # of largest_distance; along a line two suffice
+# Number of the vector to which each component of a sample belongs, ascending; None: every component is on its own.
+Vectors = tuple[int, ...] | None
+
+
+def magnitudes(values: FloatArray, vectors: Vectors = None) -> FloatArray:
+    """Lengths of the vectors in the samples of a curve, which are the same in all axes; shape (samples, vectors).
+
+    Args:
+        values: of the curve, shape (samples, …).
+        vectors: of its components.
+    """
+    flat = np.abs(values.reshape(len(values), math.prod(values.shape[1:])))
+    if vectors is None or len(vectors) != flat.shape[1]:
+        return flat
+    begins = np.flatnonzero(np.diff(vectors, prepend=-1))
+    return np.asarray(np.sqrt(np.add.reduceat(flat * flat, begins, axis=1)))
+
+
+def largest_magnitude(values: FloatArray, vectors: Vectors = None) -> float:
+    """Largest of the :func:`magnitudes` of a curve; 0 if it has none."""
+    return float(np.max(magnitudes(values, vectors), initial=0.0))
+
+
+def largest_distance(values: FloatArray, vectors: Vectors = None) -> float:
+    """Largest distance between two samples of one vector of a curve, or at least half of it; the same in all axes.
+
+    It goes from the first sample to the farthest, and from there on until none is farther.
+    """
+    flat = values.reshape(len(values), math.prod(values.shape[1:]))
+    members = np.arange(flat.shape[1]) if vectors is None else np.unique(vectors, return_inverse=True)[1]
+    if not flat.size or len(members) != flat.shape[1]:
+        return 0.0
+    begin, distance = np.zeros(int(members.max()) + 1, dtype=int), 0.0
+    for _ in range(_SWEEPS):
+        away = magnitudes(flat - flat[begin[members], np.arange(flat.shape[1])], vectors)
+        farthest = float(np.nanmax(away, initial=0.0))
+        if farthest <= distance:
+            break
+        begin, distance = np.argmax(np.nan_to_num(away), axis=0), farthest
+    return distance
+
+
+def largest_difference(curve: FloatArray, rival: FloatArray, vectors: Vectors = None) -> float:
+    """Largest difference of two curves; infinite if their shapes differ or a difference is not finite.
+
+    ``vectors``: of their components, whose lengths are taken.
+    """
     if curve.shape != rival.shape:
         return float("inf")
-    difference = float(np.max(np.abs(curve - rival), initial=0.0))
+    difference = largest_magnitude(curve - rival, vectors) if curve.size else 0.0
     return difference if np.isfinite(difference) else float("inf")
 
 

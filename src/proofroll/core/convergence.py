@@ -2,15 +2,17 @@
 
 import itertools
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
-from proofroll.core.arrays import FloatArray
+from proofroll.core.arrays import FloatArray, Vectors, largest_magnitude
 from proofroll.core.engine import EPSILON
 from proofroll.core.number_format import number
 
+_Size = Callable[[FloatArray], float]
 # Number of steps in a ladder: the fewest that show an order.
 LADDER_RUNGS = 3
 # A ladder is asymptotic if its observed order differs from the scheme's by at most this.
@@ -71,7 +73,11 @@ class Limit:
 
 
 def richardson(
-    curves: Sequence[FloatArray], steps: Sequence[float], declared: int | None = None, scatter: float = 0.0
+    curves: Sequence[FloatArray],
+    steps: Sequence[float],
+    declared: int | None = None,
+    scatter: float = 0.0,
+    vectors: Vectors = None,
 ) -> Limit:
     """Extrapolates three curves computed with three steps, coarse first.
 
@@ -95,29 +101,31 @@ def richardson(
         steps: their steps, falling; only the ratios matter.
         declared: order of the scheme; None: the nearest integer to the observed one.
         scatter: round-off of one run, see :func:`scatter_of`.
+        vectors: of the components of a curve.
     """
     coarse, middle, fine = curves
+    size = partial(largest_magnitude, vectors=vectors)
     h = np.asarray(steps, dtype=np.float64) / steps[-1]
-    change_1, change_2 = largest_magnitude(middle - coarse), largest_magnitude(fine - middle)
+    change_1, change_2 = size(middle - coarse), size(fine - middle)
     if change_2 == 0:  # exact, or reported in increments coarser than the change by the refinement
         return Limit(fine, change_1, float("nan"))
     order = observed_order(change_1, change_2, h)
-    one_law = _one_law(order, declared, (middle - coarse) / change_1, (fine - middle) / change_2) if change_1 else False
+    one_law = (
+        _one_law(order, declared, (middle - coarse) / change_1, (fine - middle) / change_2, size) if change_1 else False
+    )
     below_any = order < 1 - _ASYMPTOTIC  # an unstable motion amplifies round-off beyond the estimated scatter
     if scatter and not one_law and (min(change_1, change_2) <= _FAR_ABOVE * scatter or below_any):
-        bar = max(change_1, change_2, _walked(middle - coarse, fine - middle))
+        bar = max(change_1, change_2, _walked(middle - coarse, fine - middle, size))
         return Limit(fine, bar, float("nan"), shown=False, rounded=True)
     if not np.isfinite(order) or order < _NO_CONVERGENCE:
         # The finest curve, as uncertain as the largest change seen; from one that vanishes at once no order follows.
         shown = change_2 < change_1 * (h[1] / h[0]) ** _NO_CONVERGENCE
-        return Limit(fine, max(change_1, change_2, _walked(middle - coarse, fine - middle)), float("nan"), shown)
+        return Limit(fine, max(change_1, change_2, _walked(middle - coarse, fine - middle, size)), float("nan"), shown)
     power, rounding, chance = declared or max(1, round(order)), 0.0, 0.0
     unextrapolated = 2 * change_2 * max(1.0, 1 / (h[1] ** order - 1))
     if abs(order - power) > _ASYMPTOTIC:
         power = max(1, round(order))
-        of_one_shape = (
-            largest_magnitude((fine - middle) - (middle - coarse) * change_2 / change_1) <= _ASYMPTOTIC * change_2
-        )
+        of_one_shape = size((fine - middle) - (middle - coarse) * change_2 / change_1) <= _ASYMPTOTIC * change_2
         if abs(order - power) > _ASYMPTOTIC or not of_one_shape:
             chance = max(0.0, change_1 / _shrinkage(declared or order, h) - change_2)
             return Limit(fine, unextrapolated, order, chance=2 * chance)
@@ -127,7 +135,7 @@ def richardson(
     fine_limit = fine + (fine - middle) / (h[1] ** power - 1)
     finer = _removes(power + 1, h, power)
     hidden = _removes(power - 1, h, power) if power > 1 else 0.0
-    change = largest_magnitude(fine_limit - coarse_limit)
+    change = size(fine_limit - coarse_limit)
     bar = max(2 * abs(finer) * change, abs(hidden - finer) * change, 2 * rounding)
     return Limit(fine_limit + (fine_limit - coarse_limit) * finer, bar, order, chance=chance)
 
@@ -149,26 +157,23 @@ def falls_faster(errors: Sequence[float], steps: Sequence[float]) -> bool:
     return min(orders) > 0 and all(later > earlier + _ASYMPTOTIC for earlier, later in itertools.pairwise(orders))
 
 
-def _one_law(order: float, declared: int | None, coarse_change: FloatArray, fine_change: FloatArray) -> bool:
+def _one_law(
+    order: float, declared: int | None, coarse_change: FloatArray, fine_change: FloatArray, size: _Size
+) -> bool:
     """True if two normalised changes follow one power law of the step, of the declared or a whole order."""
     whole = declared or (round(order) if np.isfinite(order) else 0)
-    return (
-        abs(order - whole) <= _ASYMPTOTIC and whole > 0 and largest_magnitude(fine_change - coarse_change) <= _ONE_SHAPE
-    )
+    return abs(order - whole) <= _ASYMPTOTIC and whole > 0 and size(fine_change - coarse_change) <= _ONE_SHAPE
 
 
-def _walked(change: FloatArray, next_change: FloatArray) -> float:
+def _walked(change: FloatArray, next_change: FloatArray, size: _Size) -> float:
     """Estimated sum of three further changes if these two grow in one direction; otherwise 0.
 
     Growth by more than a factor of four, which halving the step makes of h^-2, is a jump of one of the runs: 0.
     """
-    growth = largest_magnitude(next_change) / max(largest_magnitude(change), sys.float_info.min)
-    if (
-        not 1 < growth <= _GROWS
-        or largest_magnitude(next_change - growth * change) > largest_magnitude(next_change) / 2
-    ):
+    growth = size(next_change) / max(size(change), sys.float_info.min)
+    if not 1 < growth <= _GROWS or size(next_change - growth * change) > size(next_change) / 2:
         return 0.0
-    return largest_magnitude(next_change) * (growth + growth**2 + growth**3) / 3
+    return size(next_change) * (growth + growth**2 + growth**3) / 3
 
 
 def observed_order(change: float, next_change: float, steps: Sequence[float] | FloatArray) -> float:
@@ -206,17 +211,17 @@ def _removes(term: int, h: FloatArray, power: int) -> float:
     return fine_term / (coarse_term - fine_term)
 
 
-def tightest(curves: Sequence[FloatArray]) -> Limit:
+def tightest(curves: Sequence[FloatArray], vectors: Vectors = None) -> Limit:
     """Limit of a method with adaptive steps: the curve of its tightest tolerance.
 
     The error bar is the change by the last tightening, or the sum of all further changes if each shrinks as the last
     one did, whichever is larger. Where one tightening changed nothing, or all changed round-off only, it is the largest
-    change: two nearly equal changes of that kind would be extrapolated as slow convergence.
+    change: two nearly equal changes of that kind would be extrapolated as slow convergence. ``vectors``: of components.
     """
-    changes = [largest_magnitude(fine - coarse) for coarse, fine in itertools.pairwise(curves)]
+    changes = [largest_magnitude(fine - coarse, vectors) for coarse, fine in itertools.pairwise(curves)]
     if min(changes) <= _SAME * max(changes):
         return Limit(curves[-1], max(changes), float("nan"), shown=False, saturated=True)
-    if max(changes) <= _SCATTER * np.finfo(np.float64).eps * largest_magnitude(curves[-1]):
+    if max(changes) <= _SCATTER * np.finfo(np.float64).eps * largest_magnitude(curves[-1], vectors):
         return Limit(curves[-1], max(changes), float("nan"), shown=True)
     shown, last = len(changes) == 1 or changes[-1] < changes[-2], changes[-1]
     rest = last / (changes[-2] / last - 1) if shown and len(changes) > 1 and last > 0 else 0.0
@@ -285,8 +290,3 @@ def envelope(errors: Sequence[float], floor: int | None = None) -> list[float]:
         finer = [finer_error for finer_error in errors[index + 1 : last] if finer_error != float("inf")][:_NEIGHBOURS]
         largest.append(max([error, *finer]))
     return [*largest, *errors[last:]]
-
-
-def largest_magnitude(values: FloatArray) -> float:
-    """Largest magnitude of a curve."""
-    return float(np.max(np.abs(values)))

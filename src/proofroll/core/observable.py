@@ -41,6 +41,7 @@ class Observable:
         sums_samples: True if runs sum it over their samples, which have no impulses: it is compared up to the first
             impact.
         difference_of: larger variable whose small difference, with its round-off, it is; empty: none.
+        vectors: number of the vector of each component, for values whose last axis is not one of axes of the world.
         absent: reason for which no run of the scene has it, and the remedy; empty: runs have it.
     """
 
@@ -63,6 +64,7 @@ class Observable:
     sums_samples: bool = False
     absent: str = ""
     difference_of: str = ""
+    vectors: tuple[int, ...] = ()
 
     def __deepcopy__(self, _: object) -> Self:
         """The observable itself, which is immutable: a scene has hundreds, and every engine gets a copy of it."""

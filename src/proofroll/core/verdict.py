@@ -5,7 +5,7 @@ from enum import StrEnum
 
 import numpy as np
 
-from proofroll.core.arrays import FloatArray, largest_difference
+from proofroll.core.arrays import FloatArray, Vectors, largest_difference
 from proofroll.core.convergence import Limit
 from proofroll.core.engine import EPSILON
 from proofroll.core.number_format import counted, number, spaced
@@ -136,6 +136,7 @@ class RunCurve:
         between: values at a few times off the grid, and the true ones; None: there are none.
         magnitude: size of the numbers whose round-off enters, if above the curve's scale: of a gap, that of positions.
         precision: in which the run was computed, see :func:`proofroll.core.engine.precision_of`.
+        vectors: of its components, which are compared by their lengths.
     """
 
     values: FloatArray
@@ -145,6 +146,7 @@ class RunCurve:
     between: tuple[FloatArray, FloatArray] | None = None
     magnitude: float = 0.0
     precision: str = "double"
+    vectors: Vectors = None
 
 
 @dataclass(frozen=True)
@@ -179,13 +181,12 @@ def judge_curve(
     """
     refinement = refinement or Refinement()
     tolerance, limit = allowance.tolerance, refinement.limit
-    on_grid = largest_difference(run.values, true.values)
-    off_grid = 0.0 if run.between is None else largest_difference(*run.between)
+    on_grid = largest_difference(run.values, true.values, run.vectors)
+    off_grid = 0.0 if run.between is None else largest_difference(*run.between, run.vectors)
     hidden = off_grid > max(tolerance, _BETWEEN * on_grid)
     rungs = _Ladder(refinement.unknown, lost=refinement.lost)
     if limit is not None:
-        round_off = round_off_of(run.precision, max(allowance.scale, run.magnitude))
-        rungs = _read(limit, allowance, true, round_off, refinement.faster)
+        rungs = _read(limit, allowance, run, true, refinement.faster)
     if hidden:
         rungs = replace(rungs, finding=refinement.unknown)
     error = max(on_grid, off_grid)
@@ -249,12 +250,11 @@ class _Ladder:
     lost: str = ""
 
 
-def _read(limit: Limit, allowance: Allowance, true: TrueCurve, round_off: float, faster: bool) -> _Ladder:
-    """Summary of a ladder with this limit of small steps.
-
-    ``round_off`` is that of the curve; ``faster``: see :class:`Refinement`.
-    """
-    tolerance, unit, error = allowance.tolerance, allowance.shown_unit, largest_difference(limit.values, true.values)
+def _read(limit: Limit, allowance: Allowance, run: RunCurve, true: TrueCurve, faster: bool) -> _Ladder:
+    """Summary of the ladder of a run with this limit of small steps; ``faster``: see :class:`Refinement`."""
+    round_off = round_off_of(run.precision, max(allowance.scale, run.magnitude))
+    tolerance, unit = allowance.tolerance, allowance.shown_unit
+    error = largest_difference(limit.values, true.values, run.vectors)
     bar, order = limit.error_bar + true.error_bar, limit.order if np.isfinite(limit.order) else None
     settled = limit.shown or limit.error_bar <= _FLAT * tolerance
     far_inside = error + _SEVERAL * bar <= tolerance

@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from proofroll.core.arrays import FloatArray, largest_difference
+from proofroll.core.arrays import FloatArray, Vectors, largest_difference
 from proofroll.core.comparison import Band, Comparison
 from proofroll.core.convergence import Limit, falls_faster, floor_of, richardson, scatter_of, tightest
 from proofroll.core.diagnosis.scene_diagnosis import diagnose_scene
 from proofroll.core.errors import ProofrollError
 from proofroll.core.observable import Role
-from proofroll.core.verdict import Allowance, Judgement, Refinement, Verdict, judge_curve
+from proofroll.core.verdict import Allowance, Judgement, Refinement, RunCurve, Verdict, judge_curve
 from proofroll.files.trajectory_file import StoredTrajectory
 from proofroll.running.case import LASTING, Case, EngineFacts, Result, Status
 from proofroll.running.process import status_of
@@ -233,7 +233,7 @@ def _judgements(
             continue
         true, scale = reference.true(name, curve), reference.sizes.get(name, 1.0)
         run_curve = run_values.run_curve(reference, name, curve, trajectories[1.0], facts.precision)
-        limit = _limit(run, facts, name, curves, run_curve.magnitude)
+        limit = _limit(run, facts, name, curves, run_curve)
         if limit is not None:
             finest = run.row.ladder[-1]
             step = None if facts.step is None else facts.step * finest
@@ -241,7 +241,7 @@ def _judgements(
             limit = replace(limit, beside=beside, floor=_floor(facts, name, limit, curves, true.values, reference))
         ladder = facts.resolution is not None and len(run.row.ladder) > 1 and curve.size > 0
         allowance = Allowance(name, reference.scene.observables[name].unit, tolerance.absolute(scale), scale)
-        faster = limit is not None and _falls_faster(run, name, curves, true.values)
+        faster = limit is not None and _falls_faster(run, name, curves, true.values, run_curve.vectors)
         judgement = judge_curve(allowance, run_curve, true, Refinement(limit, ladder, lost, faster))
         if name not in tolerances and judgement.verdict is not Verdict.DIFFERS:
             continue
@@ -267,9 +267,9 @@ def _rungs(run: Planned, results: dict[str, Result], errors: dict[float, dict[st
 
 
 def _limit(
-    run: Planned, facts: EngineFacts, name: str, curves: dict[float, dict[str, FloatArray]], magnitude: float
+    run: Planned, facts: EngineFacts, name: str, curves: dict[float, dict[str, FloatArray]], run_curve: RunCurve
 ) -> Limit | None:
-    """Limit of small steps of an observable, if every rung has it; ``magnitude``: size of its numbers."""
+    """Limit of small steps of an observable, if every rung has it; ``run_curve``: at the row's own step."""
     stepped = facts.resolution == "dt"
     # tolerances that the engine refuses are left out
     factors = run.row.ladder if stepped else [factor for factor in run.row.ladder if factor in run.ladder]
@@ -279,16 +279,19 @@ def _limit(
     if len({v.shape for v in values}) > 1 or not values[0].size or not all(np.all(np.isfinite(v)) for v in values):
         return None
     if not stepped:
-        return tightest(values)
+        return tightest(values, run_curve.vectors)
     finest = run.ladder[factors[-1]]
     steps = finest.until / (finest.engine.step or finest.until)
-    return richardson(values, run.row.ladder, facts.order, scatter_of(facts.precision, magnitude, steps))
+    scatter = scatter_of(facts.precision, run_curve.magnitude, steps)
+    return richardson(values, run.row.ladder, facts.order, scatter, run_curve.vectors)
 
 
-def _falls_faster(run: Planned, name: str, curves: dict[float, dict[str, FloatArray]], true: FloatArray) -> bool:
+def _falls_faster(
+    run: Planned, name: str, curves: dict[float, dict[str, FloatArray]], true: FloatArray, vectors: Vectors
+) -> bool:
     """True if the errors of a row's steps fall ever faster; see :func:`proofroll.core.convergence.falls_faster`."""
     factors = [factor for factor in run.row.ladder if factor in curves]
-    return falls_faster([largest_difference(curves[factor][name], true) for factor in factors], factors)
+    return falls_faster([largest_difference(curves[factor][name], true, vectors) for factor in factors], factors)
 
 
 def _floor(
@@ -302,7 +305,10 @@ def _floor(
     """Clause on the error floor where single precision hides the limit; else empty."""
     if not limit.rounded or facts.step is None:
         return limit.floor
-    errors = {facts.step * factor: largest_difference(observed[name], true) for factor, observed in curves.items()}
+    errors = {
+        facts.step * factor: largest_difference(observed[name], true, reference.vectors(name))
+        for factor, observed in curves.items()
+    }
     return floor_of(errors, reference.scale(name), reference.scene.observables[name].unit)
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from proofroll.core.arrays import FloatArray
+from proofroll.core.arrays import FloatArray, largest_distance, largest_magnitude, magnitudes
 from proofroll.core.columns import UNCERTAIN
 from proofroll.core.comparison import Tolerance
 from proofroll.core.dataset import BETWEEN, off_impacts
@@ -316,7 +316,10 @@ def _states(reference: Reference, variables: Sequence[str]) -> list[str]:
 
 
 def _size(reference: Reference, name: str, true: FloatArray, unit: str) -> float:
-    """Size to which a percentage refers: the range of a variable, but at least a hundredth of its natural size."""
+    """Size to which a percentage refers, but at least a hundredth of its natural size.
+
+    It is the way of places and angles, and of energies, whose zero is anywhere; the largest value of all else.
+    """
     if unit == "1":
         return 1.0  # of quaternions
     natural = 0.0
@@ -324,7 +327,9 @@ def _size(reference: Reference, name: str, true: FloatArray, unit: str) -> float
         speed = 2 * np.pi / element.natural_time
         sizes = {"m": element.length, "m/s": element.length * speed, "rad/s": speed, "rad": 1.0}
         natural = max(natural, sizes.get(unit, 0.0))
-    return max(reference.sizes.get(name, 0.0), float(np.ptp(true)), _LEAST * natural) or 1.0
+    size = (largest_distance if unit in {"m", "rad", "J"} else largest_magnitude)(true, reference.vectors(name))
+    whole = reference.sizes.get("energy_error", 0.0) if unit == "J" else 0.0
+    return max(reference.sizes.get(name, 0.0), size, whole, _LEAST * natural) or 1.0
 
 
 def _comparable(reference: Reference, name: str) -> bool:
@@ -360,18 +365,20 @@ def _compared(
         ):  # of forces, where they are not determinate
             determinate = np.isfinite(true_values)
             values, true_values = np.where(determinate, values, 0.0), np.where(determinate, true_values, 0.0)
-        run = RunCurve(values, between=run_values.values_off_grid(reference, name, dataset))
+        between, vectors = run_values.values_off_grid(reference, name, dataset), reference.vectors(name)
+        run = RunCurve(values, between=between, vectors=vectors)
         true, scale = (
             TrueCurve(true_values, float(truth_of.attrs["error_bar"])),
             _size(reference, name, true_values, unit),
         )
     judgement = judge_curve(Allowance(name, unit, bound.absolute(scale), scale), run, true)
-    return Compared(judgement, _farthest(run.values, true.values, times))
+    return Compared(judgement, _farthest(run, true.values, times))
 
 
-def _farthest(values: FloatArray, true: FloatArray, times: FloatArray) -> float | None:
+def _farthest(run: RunCurve, true: FloatArray, times: FloatArray) -> float | None:
     """Time of the largest difference of two curves [s]; None if it is undefined."""
+    values = run.values
     if values.shape != true.shape or not values.size or len(values) not in {len(times), len(times) - 1}:
         return None
-    apart = np.abs(values - true).reshape(len(values), -1).max(axis=1)
+    apart = magnitudes(values - true, run.vectors).max(axis=1, initial=0.0)
     return float(times[len(times) - len(values) :][int(np.argmax(apart))]) if np.all(np.isfinite(apart)) else None

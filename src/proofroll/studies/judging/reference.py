@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -11,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from proofroll.core.arrays import FloatArray
+from proofroll.core.arrays import FloatArray, Vectors
 from proofroll.core.beside_events import beside_events
 from proofroll.core.columns import SAMPLED_BAR
 from proofroll.core.dataset import LEFT_OUT, Key, before_end, common_span, ended_early, observe, part, scales
@@ -148,6 +149,16 @@ class Reference:
                 if item.difference_of and self.scene.label(element, item.name) == name:
                     numbers.append(part(self.scene, element, self.dataset)[item.difference_of].to_numpy())
         return max(self.scale(name) or 0.0, *(float(np.max(np.abs(values), initial=0.0)) for values in numbers))
+
+    def vectors(self, name: str) -> Vectors:
+        """Number of the vector of each component of a variable; None: its components are on their own."""
+        item, variables = self.scene.observables.get(name), self.dataset.variables
+        if item is not None and item.vectors:
+            return item.vectors
+        if name not in variables or variables[name].dims[-1:] not in {("xyz",), ("wxyz",)}:
+            return None
+        shape = variables[name].shape[1:]
+        return tuple(np.repeat(np.arange(math.prod(shape[:-1])), shape[-1]).tolist())
 
     def own_bar(self, name: str, dataset: xr.Dataset) -> float:
         """Error bar of a run's events, half the width of the widest bracket, or of a sum over its samples; else 0."""

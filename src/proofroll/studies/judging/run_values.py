@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from proofroll.core.arrays import FloatArray, largest_difference
+from proofroll.core.arrays import FloatArray, largest_difference, magnitudes
 from proofroll.core.comparison import Tolerance
 from proofroll.core.dataset import BETWEEN, observe, part
 from proofroll.core.events import EVENT_ORDER, events_of
@@ -44,7 +44,7 @@ def rates_remark(reference: Reference, curves: Mapping[str, FloatArray], judged:
         if true is None or run is None or name in judged or run.shape != true.shape or not len(true):
             continue
         unit, size = scene.observables[name].unit, reference.sizes.get(name, 1.0)
-        apart = float(np.median(np.abs(run - true).reshape(len(true), -1).max(axis=1)))
+        apart = float(np.median(magnitudes(run - true, reference.vectors(name)).max(axis=1)))
         if unit.endswith("/s") and not apart <= _CONTRADICTS * size:
             return f"{name} does not belong to this motion: off by {number(apart)} {unit} at half of the samples"
     return ""
@@ -99,7 +99,11 @@ def on_true_turns(reference: Reference, name: str, values: FloatArray, dataset: 
 def values_off_grid(reference: Reference, name: str, dataset: xr.Dataset) -> tuple[FloatArray, FloatArray] | None:
     """Values of :func:`off_grid` with their true values, where the truth knows them; None: nothing to compare."""
     triple = off_grid(reference, name, dataset)
-    return None if triple is None else (triple[1][finite := np.isfinite(triple[2])], triple[2][finite])
+    if triple is None:
+        return None
+    finite = np.isfinite(triple[2])
+    run, true = (np.where(finite, values, 0.0) for values in triple[1:])
+    return run, true
 
 
 def off_grid(reference: Reference, name: str, dataset: xr.Dataset) -> tuple[FloatArray, FloatArray, FloatArray] | None:
@@ -149,14 +153,15 @@ def run_curve(
         between=values_off_grid(reference, name, dataset),
         magnitude=reference.magnitude(name),
         precision=precision,
+        vectors=reference.vectors(name),
     )
 
 
 def error(reference: Reference, name: str, values: FloatArray, dataset: xr.Dataset) -> float:
     """Largest distance of an observable from the truth, at the samples and off the grid."""
-    apart = values_off_grid(reference, name, dataset)
-    on_grid = largest_difference(values, reference.true(name, values).values)
-    return on_grid if apart is None else max(on_grid, largest_difference(*apart))
+    apart, vectors = values_off_grid(reference, name, dataset), reference.vectors(name)
+    on_grid = largest_difference(values, reference.true(name, values).values, vectors)
+    return on_grid if apart is None else max(on_grid, largest_difference(*apart, vectors))
 
 
 def turned_alike(values: FloatArray, true: FloatArray) -> FloatArray:

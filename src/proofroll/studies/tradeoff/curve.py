@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from proofroll.core.arrays import FloatArray, largest_difference
+from proofroll.core.arrays import FloatArray, Vectors, largest_difference
 from proofroll.core.convergence import envelope, is_floor
 from proofroll.core.dataset import BETWEEN, off_impacts
 from proofroll.core.limits import STUDY_TIME_LIMIT
@@ -106,6 +106,7 @@ class CurvePoint:
         errors: observable -> largest distance from the truth, that of ``sparse`` included.
         bars: observable -> error bar of the truth.
         scales: observable -> :meth:`proofroll.studies.judging.reference.Reference.scale`.
+        vectors: observable -> :meth:`proofroll.studies.judging.reference.Reference.vectors`.
         dense: ``errors`` without those of ``sparse``.
         sparse: the run over few samples, with its errors; None with a fixed step, which samples do not change.
         timing: wall time per simulated second; None if it was not measured.
@@ -118,6 +119,7 @@ class CurvePoint:
     errors: dict[str, float] = field(default_factory=dict)
     bars: dict[str, float] = field(default_factory=dict)
     scales: dict[str, float | None] = field(default_factory=dict)
+    vectors: dict[str, Vectors] = field(default_factory=dict)
     dense: dict[str, float] = field(default_factory=dict)
     sparse: CurvePoint | None = None
     timing: Timing | None = None
@@ -192,7 +194,10 @@ class Curve:
             return None
         done = [point for point in self.points if np.isfinite(point.errors.get(quantity, np.inf))]
         used = [point for point in done if point.curves[quantity].shape == done[-1].curves[quantity].shape]
-        changes = [largest_difference(a.curves[quantity], b.curves[quantity]) for a, b in itertools.pairwise(used)]
+        changes = [
+            largest_difference(a.curves[quantity], b.curves[quantity], a.vectors.get(quantity))
+            for a, b in itertools.pairwise(used)
+        ]
         if not changes or changes[-1] == min(changes):
             return None
         least = int(np.argmin(changes))
@@ -257,4 +262,5 @@ def with_errors(point: CurvePoint, reference: Reference, run: xr.Dataset) -> Cur
         },
         bars={name: reference.true(name, curve).error_bar for name, curve in curves.items()},
         scales={name: reference.scale(name) for name in curves},
+        vectors={name: reference.vectors(name) for name in curves},
     )

@@ -12,11 +12,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from proofroll.core.arrays import FloatArray
+from proofroll.core.arrays import FloatArray, largest_magnitude
 from proofroll.core.convergence import (
     Limit,
     floor_text,
-    largest_magnitude,
     observed_order,
     richardson,
     scatter_of,
@@ -100,10 +99,11 @@ def budget(
         )
     values = [point.curves[quantity] for point in used]
     steps = [point.step or 0.0 for point in used]
-    differences = [largest_magnitude(a - b) for a, b in itertools.pairwise(values)]
+    vectors = used[-1].vectors.get(quantity)
+    differences = [largest_magnitude(a - b, vectors) for a, b in itertools.pairwise(values)]
     if curve.fixed_step:
         scatter = scatter_of(curve.facts.precision, magnitude, used[-1].case.until / steps[-1])
-        limit = richardson(values[-3:], steps[-3:], curve.facts.order, scatter)
+        limit = richardson(values[-3:], steps[-3:], curve.facts.order, scatter, vectors)
         stalled = not observed_order(differences[-2], differences[-1], steps[-3:]) > _STALLED
         seen = differences
         if single:
@@ -114,7 +114,7 @@ def budget(
         moved = max(differences) > round_off_of(curve.facts.precision, magnitude)  # round-off alone has no order
         order = order_of(steps[: len(seen) + 1], seen) if moved else Order()
     else:
-        limit, order = tightest(values), Order()
+        limit, order = tightest(values, vectors), Order()
         # Differences that no longer shrink: the tolerance has no effect, or only round-off changes.
         stalled = differences[-1] >= differences[-2]
     floor = max(differences[-2:]) if stalled else None
@@ -122,9 +122,12 @@ def budget(
         floor = single.error
     if curve.facts.precision == "single":
         limit = replace(limit, error_bar=max(limit.error_bar, floor or 0.0, round_off_of("single", magnitude)))
-    model_form, error = largest_magnitude(limit.values - true), used[-1].errors[quantity]
+    model_form, error = largest_magnitude(limit.values - true, vectors), used[-1].errors[quantity]
     begin, departure = _coarse_end(curve, quantity, every, limit) or (used[0], values[0] - limit.values)
-    coarse, fine = (_dominant(away, limit, model_form, floor, bar) for away in (departure, values[-1] - limit.values))
+    coarse, fine = (
+        _dominant(largest_magnitude(away, vectors), limit, model_form, floor, bar)
+        for away in (departure, values[-1] - limit.values)
+    )
     budget_of_curve = replace(
         budget_of_curve,
         model_form=model_form,
@@ -221,10 +224,10 @@ def _coarse_end(curve: Curve, quantity: str, every: float, limit: Limit) -> tupl
     return (point, values - common) if values.shape == common.shape else None
 
 
-def _dominant(departure: FloatArray, limit: Limit, model_form: float, floor: float | None, truth: float) -> str:
+def _dominant(departure: float, limit: Limit, model_form: float, floor: float | None, truth: float) -> str:
     """Name of the dominating part of the error of a run with this departure from the limit of small steps."""
     # While runs still approach one another, the uncertainty of the limit counts as error of the time step.
-    time_step = max(largest_magnitude(departure), limit.error_bar if floor is None else 0.0)
+    time_step = max(departure, limit.error_bar if floor is None else 0.0)
     parts = {TIME_STEP: time_step, TRUTH: truth, FLOOR: floor or 0.0}
     # A limit that differs from the truth by no more than its uncertainty shows no error of the model.
     parts[MODEL_FORM] = model_form if model_form > limit.error_bar + truth else 0.0

@@ -31,18 +31,14 @@ from proofroll.elements.mechanism.dynamics.switches import first_change
 from proofroll.elements.mechanism.run.capabilities import MechanismCapability, required
 from proofroll.elements.mechanism.run.certificate import CAPS, certify
 from proofroll.elements.mechanism.run.contacts.local_frame import local_observables, local_sizes, observe_locally
-from proofroll.elements.mechanism.run.contacts.observables import (
-    LAWS,
-    RESIDUALS,
-    contact_observables,
-    event_observables,
-)
+from proofroll.elements.mechanism.run.contacts.observables import contact_observables, event_observables
 from proofroll.elements.mechanism.run.contacts.on_wall import BodyOnWall, LocalStart, body_on_wall
 from proofroll.elements.mechanism.run.dataset import from_samples
 from proofroll.elements.mechanism.run.failure_program import program
 from proofroll.elements.mechanism.run.optional_terms import optional_terms
 from proofroll.elements.mechanism.run.plausibility import implausible
 from proofroll.elements.mechanism.run.sampling import MechanismSample
+from proofroll.elements.mechanism.run.scales import scales
 from proofroll.elements.mechanism.run.sentences import start_facts
 from proofroll.elements.mechanism.run.step_limits import law_rates, servo_steps, step_numbers
 from proofroll.elements.mechanism.scene.joint_kinds import TURNING, JointKind
@@ -185,10 +181,11 @@ class MechanismElement:
 
         Where all of these are at one place, a length of :func:`.natural_length`, or 1 m.
         """
-        return self._own_length or 1.0
+        return self.own_length or 1.0
 
     @cached_property
-    def _own_length(self) -> float:
+    def own_length(self) -> float:
+        """Length of the mechanism itself [m]; 0 where all of it is at one place and nothing gives a length."""
         solution = self._solution
         return extent(self.mechanism, solution.motion) or natural_length(self.mechanism, solution)
 
@@ -226,13 +223,14 @@ class MechanismElement:
         return max(moving, fall) or self.length / self.natural_time
 
     @cached_property
-    def _sizes(self) -> dict[str, float]:
+    def sizes(self) -> dict[str, float]:
+        """Unit -> natural size, see :meth:`Mechanism.natural_sizes`."""
         return self.mechanism.natural_sizes(self.length, self.speed)
 
     @property
     def force(self) -> float:
         """Weight, or if larger the centripetal force of its mass at its speed and length [N]."""
-        return self._sizes["N"]
+        return self.sizes["N"]
 
     @property
     def conservative(self) -> bool:
@@ -250,7 +248,7 @@ class MechanismElement:
         if self.on_wall is not None:
             return local_observables(self.on_wall, self.first_motion.acceleration)
         # A point at rest has no size but that of its motion, see `scales`.
-        least = {unit: _LEAST * size if self._own_length else 0.0 for unit, size in self._sizes.items()}
+        least = {unit: _LEAST * size if self.own_length else 0.0 for unit, size in self.sizes.items()}
         a, force, turn = least["m"], least["N"], _LEAST * self.speed / self.length
         what = "tracked points" if self.mechanism.points else "centres of mass"
         moves = followed_moves(self.mechanism, self._solution.motion, self.length)
@@ -272,13 +270,18 @@ class MechanismElement:
         table.append(Observable("w_WB", "rad/s", "angular velocities of the bodies", floor=turn, **more))
         turns: dict[str, Any] = dict.fromkeys(("asked_for", "headline", "decides"), not moves)
         table.append(Observable("attitudes", "1", "quaternions of the bodies", Role.MOTION, floor=1.0, **turns))
-        if np.any(self.analysis.determinate[:, :3]):
+        of_forces, of_torques = (
+            tuple(np.nonzero(self.analysis.determinate[:, part])[0].tolist()) for part in (slice(3), slice(3, None))
+        )
+        if of_forces:
             meaning = "determinate components of the forces on children"
-            table.append(Observable("forces", "N", meaning, Role.REACTION, floor=force, headline=True, column=True))
-        if np.any(self.analysis.determinate[:, 3:]):
+            told: dict[str, Any] = {"floor": force, "headline": True, "column": True, "vectors": of_forces}
+            table.append(Observable("forces", "N", meaning, Role.REACTION, **told))
+        if of_torques:
             meaning = "determinate components of the moments on children at their joints"
-            table.append(Observable("torques", "N m", meaning, Role.REACTION, floor=least["N m"]))
-        table += contact_observables(self.mechanism, self._sizes, _LEAST)
+            told = {"floor": least["N m"], "vectors": of_torques}
+            table.append(Observable("torques", "N m", meaning, Role.REACTION, **told))
+        table += contact_observables(self.mechanism, self.sizes, _LEAST)
         table += event_observables(self.mechanism)
         for item in named_forces(self.mechanism):
             floor, column = least[str(item.unit)], item.field == "coupling"
@@ -361,27 +364,10 @@ class MechanismElement:
         return observed
 
     def scales(self, truth: xr.Dataset) -> dict[str, float]:
-        """See the protocol: ranges, largest reactions, and natural sizes of what should be zero."""
+        """See the protocol and :func:`proofroll.elements.mechanism.run.scales.scales`."""
         if self.on_wall is not None:
             return local_sizes(self.on_wall, truth)
-        variables = truth.variables
-        reach, speed = (float(np.max(np.ptp(variables[name].values, axis=0))) for name in ("positions", "v_WB"))
-        by_motion = not self._own_length and reach and speed
-        natural_sizes = self.mechanism.natural_sizes(reach, speed) if by_motion else self._sizes
-        natural = {"attitudes": 1.0, "energy_error": natural_sizes["J"], "drift": natural_sizes["m"]}
-        natural |= {name: natural_sizes[unit] for name, unit, _ in (*RESIDUALS, *LAWS)} | {"unpressed": 1.0}
-        sizes = {}
-        for item in self.observables:
-            if item.role == Role.EVENT:
-                continue
-            values = variables[item.name].values if item.name in variables else np.zeros(1)
-            if item.role == Role.REACTION and item.name not in natural:
-                sizes[item.name] = float(np.nanmax(np.abs(values), initial=0.0))
-            else:
-                sizes[item.name] = natural.get(item.name) or float(np.max(np.ptp(values, axis=0)))
-            if not self._own_length:
-                sizes[item.name] = max(sizes[item.name], _LEAST * natural_sizes.get(item.unit, 0.0))
-        return sizes
+        return scales(self, truth, _LEAST)
 
     def watch(self, asks: Sequence[str]) -> RunWatch:  # noqa: ARG002 -- the protocol's
         """See :class:`proofroll.core.element_abilities.WatchesRuns`."""
