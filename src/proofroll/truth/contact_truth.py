@@ -20,7 +20,7 @@ from proofroll.elements.mechanism.dynamics.analysis import RANK
 from proofroll.elements.mechanism.dynamics.commands import has_held
 from proofroll.elements.mechanism.dynamics.record import record_of
 from proofroll.elements.mechanism.scene.rotations import Array
-from proofroll.elements.mechanism.scene.shapes.geometry import pair_sums
+from proofroll.elements.mechanism.scene.shapes.geometry import contact_sums
 from proofroll.elements.mechanism.scene.signal import breaks
 from proofroll.truth.bodies.contact_bodies import ContactBodies
 from proofroll.truth.bodies.contact_equations import ContactEquations
@@ -109,7 +109,7 @@ def _in_units(mechanism: Mechanism, units: Units, times: Array, faces: Sequence[
     wrenches = [wrench for _, wrench in applied]
     two = on_same_turns(own, one, second.recorded(times, states[1][:, :-1], switched, wrenches))
     other = np.array([force for force, _ in applied])
-    others_sums = np.einsum("pk,tki->tpi", pair_sums(own.contacts), other) * units.force
+    others_sums = np.einsum("pk,tki->tpi", contact_sums(own.contacts), other) * units.force
     # samples at instants are at the times that were asked for, to the last bit
     one, two = (units.record(mechanism, replace(record, time=asked)) for record in (one, two))
     left = None

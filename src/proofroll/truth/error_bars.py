@@ -44,7 +44,7 @@ class TwoRouteMotion:
         ended: reason why it ends there, as a clause.
         pressed: contact forces on the first bodies [N], (times, contacts, 3), NaN where not determinate; None: no
             contacts.
-        sums: their sums over the contacts of each pair with several, (times, such pairs, 3); None: as ``pressed``.
+        sums: their sums, (times, sums, 3); None: as ``pressed``.
         works: work of drives since the start [J], (times, drives).
         laws: outcome of the law check, as a clause; empty: it ended the motion, or there was none.
     """

@@ -62,7 +62,7 @@ class Routed(NamedTuple):
     Attributes:
         record: the motion.
         pressed: contact forces [N], (times, contacts, 3).
-        sums: their sums over pairs with several contacts [N], (times, such pairs, 3).
+        sums: their sums [N], (times, sums, 3).
         works: work of drives since the start [J], (times, drives).
     """
 
@@ -147,7 +147,7 @@ def two_route_motion(
         unresolved: part of it that its quadrature does not resolve [J].
         kinds: part of a mode in which both routes must agree.
         pressed: contact forces by both routes [N], (times, contacts, 3).
-        sums: their sums over pairs with several contacts by both routes [N], (times, such pairs, 3).
+        sums: their sums by both routes [N], (times, sums, 3).
         until: last time asked for [s].
         cut: motion of the first route with rebounds cut early, and at which times it counts.
     """

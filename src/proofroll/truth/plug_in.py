@@ -30,8 +30,8 @@ _BARS = {
     "p_WB": "p_WB", "v_WB": "v_WB", "w_WB": "w_WB", "q_WB": "q_WB", "attitudes": "q_WB", "positions": "points",
     "forces": "wrench", "torques": "wrench", "energy": "energy", "energy_error": "energy",
     "energy_change": "energy", "drift": "drift", "gaps": "gap", "slips": "slip", "normal_forces": "pressed",
-    "contact_forces": "pressed", "pair_forces": "sums", "penetration": "gap", "contact_pull": "pressed",
-    "cone_excess": "pressed",
+    "contact_forces": "pressed", "pair_forces": "sums", "net_forces": "sums", "penetration": "gap",
+    "contact_pull": "pressed", "cone_excess": "pressed",
     "hop_speed": "slip", "energy_gain": "energy", "bushing_forces": "links", "bushing_torques": "links",
 }  # fmt: skip
 _POSES = ("p_WB", "v_WB", "w_WB", "q_WB")

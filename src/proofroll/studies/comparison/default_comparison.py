@@ -137,17 +137,19 @@ def _stepped(engines: Sequence[str], dt: float | None, workers: Workers | None) 
 def bounds(scene: Scene, every: float) -> dict[str, Tolerance]:
     """Tolerances: one per cent of each motion, or a thousandth of its unit if it has no size of its own.
 
-    The tolerance of watched times of events is the sampling interval ``every`` [s].
+    Watched reactions have one per cent, watched times of events the sampling interval ``every`` [s].
     """
+    watched = {key: item for key, item in scene.observables.items() if item.watched}
     all_of = {key: item for key, item in scene.observables.items() if item.role is Role.MOTION}
     moves = {key: item for key, item in all_of.items() if item.headline}
     moves = moves or {scene.deciding: scene.observable(scene.deciding)}
     moves |= {key: item for key, item in all_of.items() if item.watched or item.asked_as in scene.asks}
+    moves |= {key: item for key, item in watched.items() if item.role is Role.REACTION}
     tolerances = {
         key: Tolerance(0.01, True) if item.floor is not None else Tolerance(1e-3, False, item.unit)
         for key, item in moves.items()
     }
-    events = [key for key, item in scene.observables.items() if item.watched and item.role is Role.EVENT]
+    events = [key for key, item in watched.items() if item.role is Role.EVENT]
     return tolerances | dict.fromkeys(events, Tolerance(every, False, "s"))
 
 

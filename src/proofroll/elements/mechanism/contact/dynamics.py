@@ -59,7 +59,7 @@ from proofroll.elements.mechanism.scene.drives import MODES
 from proofroll.elements.mechanism.scene.kinks import held_sides
 from proofroll.elements.mechanism.scene.model import Mechanism
 from proofroll.elements.mechanism.scene.rotations import Array, cross, frame_of_axis
-from proofroll.elements.mechanism.scene.shapes.geometry import BodyContact, pair_sums
+from proofroll.elements.mechanism.scene.shapes.geometry import BodyContact, contact_sums
 from proofroll.elements.mechanism.scene.signal import FUNCTIONS
 
 # Impulse, relative to the largest of an impact, that counts as none; a pressure nudged by 1e-6 makes such impulses.
@@ -84,7 +84,7 @@ class ContactDynamics:
         self._static = np.array([contact.static for contact in self.contacts])
         self._bounds = np.array([contact.bound for contact in self.contacts])
         others = len(self.contacts) - len(mechanism.contacts)
-        self.sums = np.pad(pair_sums(mechanism.contacts), ((0, 0), (0, others)))
+        self.sums = np.pad(contact_sums(mechanism.contacts), ((0, 0), (0, others)))
         index = mechanism.body_index
         self._bodies = [(index[contact.body_a], index[contact.body_b]) for contact in mechanism.contacts]
         self._held: tuple[int, ...] = ()
@@ -391,9 +391,9 @@ class ContactDynamics:
                 raise lying(self.mechanism.contacts[k], time)
 
     def sample(self, q: Array, v: Array, mode: ContactMode, time: float = 0.0) -> tuple[dict[str, Any], Array, Array]:
-        """Fields of a record at one time [s], contact forces between bodies, and sums of pairs with several contacts.
+        """Fields of a record at one time [s], contact forces between bodies, and their sums.
 
-        Forces [N], (contacts, 3), and sums [N], (such pairs, 3), are NaN where they are not determinate.
+        Forces [N], (contacts, 3), and the :func:`contact_sums` [N], (sums, 3), are NaN where they are not determinate.
         """
         found, count = self.solve(q, v, mode, time), len(self._bodies)
         joints = mode_of_joints(self.equations.switched, self.contacts, mode)

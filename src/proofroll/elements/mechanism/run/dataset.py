@@ -27,7 +27,7 @@ from proofroll.elements.mechanism.run.contacts.observables import (
 )
 from proofroll.elements.mechanism.run.sampling import MechanismSample
 from proofroll.elements.mechanism.scene.joint_kinds import TURNING, JointKind
-from proofroll.elements.mechanism.scene.shapes.geometry import shared_pairs
+from proofroll.elements.mechanism.scene.shapes.geometry import carried_bodies, contact_sums, shared_pairs
 
 if TYPE_CHECKING:
     from proofroll.elements.mechanism.run.element import MechanismElement
@@ -121,7 +121,7 @@ def columns(
     """Variables of a run, from the motion of the bodies and the forces and moments on them.
 
     ``wrench``: of joints and loops, shape (time, 2, joints + loops, 3); ``pressed``: of contacts, (time, contacts, 3);
-    ``sums``: of the contacts of each pair with several, (time, such pairs, 3), by default from ``pressed``;
+    ``sums``: of forces of contacts by :func:`.contact_sums`, (time, sums, 3), by default from ``pressed``;
     ``unsaid``: reason of what is NaN at all times; ``work``: of drives [J], (time, drives), by default summed over the
     samples;
     ``named``: see :func:`~proofroll.elements.mechanism.dynamics.named_forces.named_forces`, (time, forces).
@@ -217,18 +217,24 @@ def _put_contacts(
 ) -> None:
     """Puts gaps, slips, forces and residuals of Coulomb's law, of each contact, pair and of all together."""
     followed = follow_contacts(placed)
-    shared = shared_pairs(placed.mechanism.contacts)
+    contacts = placed.mechanism.contacts
+    shared, carried = shared_pairs(contacts), carried_bodies(contacts)
     if sums is None:
-        sums = np.stack([pressed[:, numbers].sum(axis=1) for numbers in shared.values()], axis=1) if shared else None
-    for index, (name, numbers) in enumerate(shared.items() if sums is not None else ()):
-        assert sums is not None  # by the loop
+        parts = [(row, np.flatnonzero(row)) for row in contact_sums(contacts)]
+        summed = [np.einsum("k,tki->ti", row[of], pressed[:, of]) for row, of in parts]
+        sums = np.stack(summed, axis=1) if summed else np.zeros((len(pressed), 0, 3))
+    for index, (name, numbers) in enumerate(shared.items()):
         for axis, letter in enumerate("xyz"):
             component = sums[:, index, axis]
             absent = unsaid if np.all(np.isnan(component)) else ""
             meaning = f"sum of the forces of {name} on {placed.mechanism.contacts[numbers[0]].body_a}"
             put(f"force.{name}.{letter}", component, "N", meaning, absent=absent)
-    if sums is not None and shared:
-        put("pair_forces", sums, "N", "sums of the forces of pairs that touch at several places", "pair", "xyz")
+    if shared:
+        meaning = "sums of the forces of pairs that touch at several places"
+        put("pair_forces", sums[:, : len(shared)], "N", meaning, "pair", "xyz")
+    if carried:
+        meaning = "sums of the contact forces on bodies that touch in several pairs"
+        put("net_forces", sums[:, len(shared) :], "N", meaning, "carried", "xyz")
     for index, contact in enumerate(placed.mechanism.contacts):
         for axis, letter in enumerate("xyz"):
             component = pressed[:, index, axis]

@@ -269,6 +269,7 @@ class MechanismElement:
             table.append(Observable(key, unit, f"{of} of the origins of the bodies' frames", floor=least[unit], **more))
         table.append(Observable("w_WB", "rad/s", "angular velocities of the bodies", floor=turn, **more))
         turns: dict[str, Any] = dict.fromkeys(("asked_for", "headline", "decides"), not moves)
+        turns["watched"] = True
         table.append(Observable("attitudes", "1", "quaternions of the bodies", Role.MOTION, floor=1.0, **turns))
         of_forces, of_torques = (
             tuple(np.nonzero(self.analysis.determinate[:, part])[0].tolist()) for part in (slice(3), slice(3, None))

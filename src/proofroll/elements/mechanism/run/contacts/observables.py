@@ -14,7 +14,7 @@ from proofroll.core.observable import Observable, Role
 from proofroll.elements.mechanism.contact.coulomb import largest_friction
 from proofroll.elements.mechanism.contact.touching import Moving, touch
 from proofroll.elements.mechanism.scene.joint_kinds import JointKind
-from proofroll.elements.mechanism.scene.shapes.geometry import shared_pairs
+from proofroll.elements.mechanism.scene.shapes.geometry import carried_bodies, shared_pairs
 from proofroll.elements.mechanism.scene.signal import varies
 
 if TYPE_CHECKING:
@@ -102,7 +102,7 @@ def event_observables(mechanism: Mechanism) -> Iterator[Observable]:
     """Observables of the events of contacts, joints and efforts."""
     if mechanism.has_events:
         meaning = "times of all events of contacts, joints and efforts"
-        yield Observable("event_times", "s", meaning, Role.EVENT, asked_for=False)
+        yield Observable("event_times", "s", meaning, Role.EVENT, asked_for=False, watched=True)
         meaning = "events of another kind than the truth's"
         yield Observable(EVENT_ORDER, "events", meaning, Role.EVENT, asked_for=False)
 
@@ -123,11 +123,14 @@ def contact_observables(mechanism: Mechanism, sizes: Mapping[str, float], least:
     meaning = "normal forces between what may touch"
     yield Observable("normal_forces", "N", meaning, Role.REACTION, floor=force, headline=True, column=True)
     meaning = "contact forces, where they are determinate"
-    told: dict[str, Any] = {"asked_for": False, "at_impacts": False}
+    told: dict[str, Any] = {"asked_for": False, "at_impacts": False, "watched": True}
     yield Observable("contact_forces", "N", meaning, Role.REACTION, floor=force, always=_WRONG, **told)
     if shared_pairs(mechanism.contacts):
         meaning = "sums of the forces of each pair that touches at several places, where they are determinate"
         yield Observable("pair_forces", "N", meaning, Role.REACTION, floor=force, **told)
+    if carried_bodies(mechanism.contacts):
+        meaning = "sums of the contact forces on each body that touches in several pairs, where they are determinate"
+        yield Observable("net_forces", "N", meaning, Role.REACTION, floor=force, **told)
     meaning = "share of the samples so far without a normal force"
     yield Observable("unpressed", "1", meaning, Role.REACTION, floor=1.0, asked_for=False)
     laws = [law for law in LAWS if law[0] in kept_laws(mechanism)]

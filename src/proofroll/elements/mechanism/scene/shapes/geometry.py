@@ -374,10 +374,24 @@ def shared_pairs(contacts: Sequence[BodyContact]) -> dict[str, list[int]]:
     return {name: numbers for name, numbers in found.items() if len(numbers) > 1}
 
 
-def pair_sums(contacts: Sequence[BodyContact]) -> Array:
-    """Matrix that sums over the contacts of each pair with several, (such pairs, contacts)."""
-    sums = [np.isin(np.arange(len(contacts)), numbers) for numbers in shared_pairs(contacts).values()]
-    return np.array(sums, dtype=float).reshape(len(sums), len(contacts))
+def carried_bodies(contacts: Sequence[BodyContact]) -> tuple[str, ...]:
+    """Names of the bodies that touch in several pairs, in the order of their contacts."""
+    pairs: dict[str, set[str]] = {}
+    for contact in contacts:
+        for body in (contact.body_a, contact.body_b):
+            pairs.setdefault(body, set()).add(contact.pair)
+    return tuple(body for body, names in pairs.items() if len(names) > 1 and body != WORLD)
+
+
+def contact_sums(contacts: Sequence[BodyContact]) -> Array:
+    """Signed matrix that sums forces of contacts, (sums, contacts).
+
+    First over each of the :func:`shared_pairs`, on its first body, then on each of the :func:`carried_bodies`.
+    """
+    sums = [np.isin(np.arange(len(contacts)), numbers).astype(float) for numbers in shared_pairs(contacts).values()]
+    for body in carried_bodies(contacts):
+        sums.append(np.array([(contact.body_a == body) - float(contact.body_b == body) for contact in contacts]))
+    return np.array(sums).reshape(len(sums), len(contacts))
 
 
 def _a(kind: str) -> str:
