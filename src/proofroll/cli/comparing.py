@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 
 # Processor time that is reserved for the last page and for the start of Python [s].
 _PAGE = 8.0
+_LONG = 10.0  # time after which a comparison tells the runs that have ended [s]
 
 
 def compare(
@@ -74,24 +75,17 @@ def compare(
         loaded = comparison_named(
             comparison, options.assignments(settings), workers, budget, scheduler, engine or [], until, every
         )
-    if not engine:
-        mention_scene(comparison, loaded)
     mention_absent(loaded.absent)
-    outcomes = outcomes_of([loaded], engine or [], options.new_runner(out, fresh, jobs, scheduler, workers))
+
+    def interrupted(outcome: Outcome) -> None:
+        content = outcome_content(outcome)
+        options.show(content, as_json, lambda: verdict_parts(content))
+
+    runner = options.new_runner(out, fresh, jobs, scheduler, workers)
+    outcomes = outcomes_of([loaded], engine or [], runner, interrupted=interrupted)
     content = outcome_content(outcomes[0])
     options.show(content, as_json, lambda: verdict_parts(content))
     raise typer.Exit(exit_code(outcomes))
-
-
-def mention_scene(name: str, comparison: Comparison) -> None:
-    """Prints on standard error that a name is also a scene's, if its comparison lacks an installed engine."""
-    from proofroll.core.plugins import engine_names, parse_engine
-    from proofroll.files.scene_file import is_scene
-
-    lacking = sorted(set(engine_names()) - {parse_engine(row.engine).name for row in comparison.rows})
-    if lacking and is_scene(name) and comparison.budget is None:
-        rows = f"{name} is the comparison of that name, which has no row of {', '.join(lacking)}"
-        options.complain(f"{rows}; the scene alone, with every engine: proofroll compare {name} --budget 60")
 
 
 def mention_absent(absent: Mapping[str, str]) -> None:
@@ -130,6 +124,7 @@ def outcomes_of(
     finished: Callable[[dict[int, Outcome], bool], None] | None = None,
     budget: float | None = None,
     spent: float = 0.0,
+    interrupted: Callable[[Outcome], None] | None = None,
 ) -> list[Outcome]:
     """Runs all comparisons with one progress bar, one after the other as far as that leaves no worker idle.
 
@@ -145,6 +140,8 @@ def outcomes_of(
         budget: processor time of all of them [s]. All runs then come before the first ladder, and each comparison has
             an equal share of the time left; what it does not use is for later ones.
         spent: part of the budget that was used before [s].
+        interrupted: called with each comparison, judged by the runs that ended, if the user ends the command; ended
+            runs are then told one by one, too, once that takes long.
     """
     from proofroll.running.process import processor_seconds
     from proofroll.running.time_budget import TimeBudget
@@ -157,8 +154,9 @@ def outcomes_of(
     brief = [item.brief for item in plans]
     grown = [(index, item.cases) for index, item in enumerate(plans) if len(item.truths) > len(brief[index].truths)]
     if budget:
-        runs = [(index, [case for cases in item.stages[:-1] for case in cases]) for index, item in enumerate(brief)]
-        ladders = [(index, item.stages[-1]) for index, item in enumerate(brief)]
+        ladders = [(index, item.ladders) for index, item in enumerate(brief)]
+        later = {case.key for _, cases in ladders for case in cases}
+        runs = [(index, [case for case in item.cases if case.key not in later]) for index, item in enumerate(brief)]
         phases = [phase for phase in (runs, ladders, grown) if phase]
     else:
         phases = [[*((index, item.cases) for index, item in enumerate(brief)), *grown]]
@@ -168,11 +166,21 @@ def outcomes_of(
         limit.after += _PAGE
     with options.progress_bar(f"{stage}cases", total=len(owner)) as advance:
         running = _Comparing(plans, runner, limit, finished, lambda text: advance(f"{stage}{text}"))
-        for item in plans:
-            if item.comparison.budget:
-                running.results |= run_plan(item, runner, lambda case, _: advance(f"{stage}{case.engine.name}"))
-        for phase in phases:
-            running.run(phase, last=phase is phases[-1])
+        running.tell_runs = interrupted is not None
+
+        def ended(case: Case, result: Result) -> None:
+            running.add(case, result)
+            advance(f"{stage}{case.engine.name}")
+
+        try:
+            for item in plans:
+                if item.comparison.budget:
+                    running.results |= run_plan(item, runner, ended)
+            for phase in phases:
+                running.run(phase, last=phase is phases[-1])
+        except KeyboardInterrupt:
+            running.show_ended(interrupted)
+            raise
     if not finished:
         for index in range(len(plans)):
             running.judge(index)
@@ -208,6 +216,8 @@ class _Comparing:
         self._keys = list(dict.fromkeys(case.key for item in plans for case in item.cases))
         self._truths = {case.key for item in plans for case in item.truths.values()}
         self._start, self._reused = time.monotonic(), runner.reused
+        self.tell_runs = False
+        self._untold: list[str] = []
         self._budget = limit.left if limit else 0.0
 
     def judge(self, index: int) -> None:
@@ -221,6 +231,31 @@ class _Comparing:
         if self._judged[index] < len(self.plans[index].cases):
             outcome = replace(outcome, beyond_budget=[])  # missing cases are not left out yet
         self.ended[index] = outcome
+
+    def add(self, case: Case, result: Result) -> None:
+        """Keeps a result; a line on standard error names what has ended, once the comparison takes long."""
+        from proofroll.running.case import Status
+
+        self.results[case.key] = result
+        if not self.tell_runs or result.status in {Status.REFUSED, Status.LEFT_OUT}:
+            return
+        engine = case.engine
+        words = [f"{engine.resolution}={engine.settings[engine.resolution]:g}"] if engine.resolution else []
+        name = f"{engine.name}[{','.join([str(engine.settings.get('formulation', '')), *words]).strip(',')}]"
+        reason = "" if result.trajectory else f": {result.message}"
+        self._untold.append(f"{name} {result.status.value} after {result.wall_seconds:.2g} s{reason}")
+        if time.monotonic() - self._start > _LONG:
+            for line in self._untold:
+                options.complain(line)
+            self._untold.clear()
+
+    def show_ended(self, show: Callable[[Outcome], None] | None) -> None:
+        """Shows each comparison with a run that has ended, judged by what there is."""
+        for index, item in enumerate(self.plans if show else ()):
+            if any(case.key in self.results for run in item.runs for case in run.ladder.values()):
+                self.judge(index)
+                assert show is not None  # by the loop
+                show(self.ended[index])
 
     def _known(self, index: int) -> int:
         """Number of a comparison's cases that have ended, also as cases of other comparisons."""
@@ -237,7 +272,7 @@ class _Comparing:
         postponed: list[Case] = []
 
         def arrived(case: Case, result: Result) -> None:
-            self.results[case.key] = result
+            self.add(case, result)
             self._tell(case)
             for _, keys in awaited:
                 keys.discard(case.key)
@@ -297,7 +332,7 @@ class _Comparing:
 
 
 def exit_code(outcomes: list[Outcome]) -> int:
-    """Exit code: 3 if an engine was lost or nothing was judged, 1 if a verdict contradicts its file, else 0."""
-    if any(outcome.lost for outcome in outcomes):
+    """Exit code: 3 if an engine was lost, nothing judged, or no contact reached; 1 if a verdict is wrong; else 0."""
+    if any(outcome.lost or outcome.no_contact for outcome in outcomes):
         return options.ENGINE
     return options.CONTRADICTED if any(outcome.contradictions for outcome in outcomes) else options.OK

@@ -161,7 +161,9 @@ class Comparison:
         brief: parameter -> values; a report without names has only the combinations that have one of them for each.
         left_out: number of combinations left out of a report without names.
         budget: processor time that all cases may take together [s]; cases beyond it are left out; None: no limit.
+        cut: True if the budget suffices for a shorter time than was asked for.
         spent: part of the budget that was spent on asking the engines [s].
+        unfit: installed engine without a row in a comparison of all engines -> why.
         absent: engine that is not installed, so has no row in a comparison of all engines -> why, and how to get it.
     """
 
@@ -181,8 +183,10 @@ class Comparison:
     brief: dict[str, list[float]] = field(default_factory=dict)
     left_out: int = 0
     budget: float | None = None
+    cut: bool = False
     spent: float = 0.0
     absent: dict[str, str] = field(default_factory=dict)
+    unfit: dict[str, str] = field(default_factory=dict)
 
     def briefly(self) -> Comparison:
         """The comparison reduced to its ``brief`` combinations."""

@@ -127,6 +127,29 @@ def test_a_first_look_stays_within_its_budget(
     assert {row["verdict"] for row in content["rows"]} == {"agrees"}
 
 
+def test_rows_that_exist_are_shown_where_a_comparison_is_interrupted(
+    tmp_path: Path, command_line: Callable[..., tuple[int, str, str]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Ctrl-C after the first run: its row is in the table, what else it waits for is named, and the exit code is 130."""
+    from proofroll.running.runner import Runner
+
+    follow = Runner.follow
+
+    def one(runner: Runner, cases: Any, then: Any, *others: Any) -> Any:
+        cases = list(cases)
+        told = follow(runner, cases[:1], then, *others)
+        if cases and cases[0].engine.name != "truth":
+            raise KeyboardInterrupt
+        return told
+
+    monkeypatch.setattr(Runner, "follow", one)
+    asked = ("--engine", "reduced", "--until", "0.1", "--out", str(tmp_path), "--jobs", "1")
+    code, out, err = command_line("compare", "sphere_in_cylinder", *asked)
+    assert code == 130, err
+    assert "gamma: error" in out
+    assert "it has not been run yet" in " ".join(out.split())
+
+
 def test_the_time_that_is_left_is_never_less_than_none() -> None:
     """While results that are kept are being judged, a line says nothing about the rest; later it counts what ran."""
     said: list[str] = []

@@ -200,6 +200,7 @@ class ReportedComparison:
         spread: of the points where only laws of mechanics are judged.
         step_bound: clause on the longest stable step and on those of the rows; empty: nothing bounds it.
         omitted: clauses on what the scene's file describes and the comparison leaves out.
+        unfit: installed engine without a row -> why.
     """
 
     name: str
@@ -227,6 +228,7 @@ class ReportedComparison:
     spread: list[Spread] = field(default_factory=list)
     step_bound: str = ""
     omitted: list[str] = field(default_factory=list)
+    unfit: dict[str, str] = field(default_factory=dict)
     evidence: ComparisonEvidence | None = field(default=None, metadata=MERGED)
 
     @property

@@ -77,9 +77,10 @@ def outcome_content(outcome: Outcome) -> ReportedComparison:
         ],
         budget=comparison.budget,
         beyond_budget=outcome.beyond_budget,
-        truth_ends=_truth_ends(outcome),
+        truth_ends=[*_truth_ends(outcome), *([outcome.no_contact] if outcome.no_contact else [])],
         step_bound=step_bound(scene.elements, steps),
         omitted=list(scene.omitted),
+        unfit=comparison.unfit,
     )
 
 

@@ -13,7 +13,16 @@ from proofroll.core.number_format import counted, number
 from proofroll.report.comparison.closing import closing_notes
 from proofroll.report.comparison.spread import ALONE
 from proofroll.report.comparison.tables import observables, remarks, seconds_before
-from proofroll.report.labels import SYMBOLS, engine_words, omitted_lines, step, unit, unjudged, verdict_text
+from proofroll.report.labels import (
+    SYMBOLS,
+    engine_title,
+    engine_words,
+    omitted_lines,
+    step,
+    unit,
+    unjudged,
+    verdict_text,
+)
 from proofroll.report.page.answer import answer, closest_words, forces_words, next_words, take_words
 from proofroll.report.parts import part_kinds
 from proofroll.report.terminal.screen import Screen, numeric, plain_table, unbroken
@@ -174,6 +183,8 @@ def closing_lines(content: ReportedComparison) -> list[str]:
             if left
             else "Every verdict is as the comparison file expects."
         )
+    unfit = "; ".join(f"{engine_title(name)} ({why})" for name, why in content.unfit.items())
+    lines += [f"Not in the table: {unfit}."] if unfit else []
     return [*lines, *budget_lines(content), *closing_notes(content), *host_sentences(content.hosts)]
 
 

@@ -7,7 +7,7 @@ from typing import Any
 from proofroll.core.bounds import require_bounds
 from proofroll.core.comparison import Band, Comparison, Row, Tolerance
 from proofroll.core.engine_abilities import offered
-from proofroll.core.errors import InputError, Missing
+from proofroll.core.errors import InputError, Missing, ProofrollError
 from proofroll.core.multi_element import each_alone, represents
 from proofroll.core.observable import Role
 from proofroll.core.plugins import engine_names, parse_engine, require_engine
@@ -78,7 +78,29 @@ def default_comparison(
         budget=budget,
         spent=processor_seconds() - begin,
         absent={name: str(answer) for name, answer in described.items() if isinstance(answer, Missing)},
+        unfit={
+            name: _unfit(scene, answer)
+            for name, answer in described.items()
+            if not isinstance(answer, Missing) and not any(parse_engine(row.engine).name == name for row in rows)
+        },
     )
+
+
+_SAID = 3  # most missing capabilities that are named
+
+
+def _unfit(scene: Scene, engine: EngineDescription | ProofrollError) -> str:
+    """Reason why no formulation of an engine can represent a scene: what the nearest one lacks, or its error."""
+    if isinstance(engine, ProofrollError):
+        return str(engine)
+    lacking = [sorted(scene.requires - set(capabilities)) for capabilities in engine.provides.values()]
+    least = min(lacking, key=len, default=[])
+    if not least:
+        return (
+            "its formulations are for other scenes" if len(scene.elements) == 1 else "it has none of all its elements"
+        )
+    more = f" and {len(least) - _SAID} more" if len(least) > _SAID else ""
+    return f"lacks {', '.join(least[:_SAID])}{more}"
 
 
 def asked_rows(

@@ -166,15 +166,28 @@ class Outcome:
         return names
 
     @property
+    def no_contact(self) -> str:
+        """Sentence on a time that the budget cut before anything touches; empty: something does, or nothing was cut."""
+        references = [point.reference for point in self.points.values()]
+        if not self.comparison.cut or not any(item is not None and item.untouched for item in references):
+            return ""
+        enough = f"the budget suffices for {self.comparison.until:g} s, in which nothing touches"
+        return f"No contact was reached: {enough}; give a larger --budget."
+
+    @property
     def lost(self) -> list[Run]:
         """Runs whose engine is missing, crashed or hung, unless the comparison claims that it fails.
 
-        Where nothing is claimed also runs that failed in another way, or all of them if none was judged.
+        Where nothing is claimed also runs that failed in another way, or all of them if none was judged. A witness,
+        which cross-checks the truth, counts there only if no engine was compared.
         """
+        engines = any(run.facts is not None and not run.facts.witness for run in self.runs)
         lost = []
         for run in self.runs:
             verdicts = set(run.row.expected(run.parameters))
             claims = verdicts != set(Verdict)
+            if engines and not claims and run.facts is not None and run.facts.witness:
+                continue
             if run.result.status in _BROKEN:
                 lost += [run] * (Verdict.FAILED not in verdicts or not claims)
             elif not claims and run.verdict is Verdict.FAILED:

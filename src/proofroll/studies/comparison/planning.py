@@ -57,6 +57,11 @@ class Planned:
     facts: EngineFacts | ProofrollError
     ladder: dict[float, Case] = field(default_factory=dict)
 
+    @property
+    def witness(self) -> bool:
+        """True if its engine cross-checks the truth."""
+        return isinstance(self.facts, EngineFacts) and self.facts.witness
+
     def keys(self, truths: Mapping[str, Case]) -> set[str]:
         """Keys of the cases that its judgement needs."""
         return {case.key for case in (truths[point_name(self.parameters)], *self.ladder.values())}
@@ -89,10 +94,19 @@ class Plan:
 
     @property
     def stages(self) -> list[list[Case]]:
-        """Cases in order of value if not all can be run: truths, runs, then the other steps of ladders."""
-        runs = [case for run in self.runs for factor, case in run.ladder.items() if factor == 1]
-        steps = [case for run in self.runs for factor, case in run.ladder.items() if factor != 1]
-        return [[*self.truths.values()], runs, steps]
+        """Cases in order of value if not all can be run: truths, runs of engines, and the other steps of their ladders.
+
+        Those of witnesses come last: they cross-check the truth and cost no engine its time.
+        """
+        engines = [run for run in self.runs if not run.witness]
+        witnesses = [run for run in self.runs if run.witness]
+        parts = [part for runs in (engines, witnesses) for part in (_runs(runs), _further_steps(runs))]
+        return [[*self.truths.values()], *parts]
+
+    @property
+    def ladders(self) -> list[Case]:
+        """Cases of the further steps of all rows."""
+        return _further_steps(self.runs)
 
     @property
     def brief(self) -> Plan:
@@ -108,7 +122,7 @@ class Plan:
         title = f"{self.comparison.title.partition(_FIRST)[0]}{_FIRST}{until:g} s, for which the budget suffices)"
         return replace(
             self,
-            comparison=replace(self.comparison, until=until, title=title),
+            comparison=replace(self.comparison, until=until, title=title, cut=True),
             truths={name: earlier(case) for name, case in self.truths.items()},
             runs=[
                 replace(run, ladder={factor: earlier(case) for factor, case in run.ladder.items()}) for run in self.runs
@@ -132,6 +146,14 @@ class Plan:
             truths=truths,
             runs=[run for run in self.runs if point_name(run.parameters) in names],
         )
+
+
+def _runs(runs: Sequence[Planned]) -> list[Case]:
+    return [case for run in runs for factor, case in run.ladder.items() if factor == 1]
+
+
+def _further_steps(runs: Sequence[Planned]) -> list[Case]:
+    return [case for run in runs for factor, case in run.ladder.items() if factor != 1]
 
 
 def plan(comparison: Comparison, engines: Iterable[str] = (), workers: Workers | None = None) -> Plan:

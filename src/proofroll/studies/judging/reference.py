@@ -82,6 +82,15 @@ class Reference:
         end = ended_early(self.dataset)
         return f"the truth ends at t = {end[0]:.6g} s: {end[1]}" if end else ""
 
+    @property
+    def untouched(self) -> bool:
+        """True if bodies may touch and none does: no event, and no force of a contact."""
+        forces = [
+            part(self.scene, element, self.dataset).variables.get("contact_forces") for element in self.scene.elements
+        ]
+        known = [item.values for item in forces if item is not None and item.size]
+        return bool(known) and not self.events and not any(np.any(values != 0) for values in known)
+
     def shared(self, routes: Collection[str]) -> str:
         """Sentence about a route of the truth that is among ``routes``, and its check; empty if none is."""
         names = {key: str(self.dataset.attrs.get(key, "")) for key in ("route", "second_route")}

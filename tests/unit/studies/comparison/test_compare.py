@@ -356,6 +356,32 @@ def test_a_failure_counts_where_nothing_is_claimed(tmp_path: Path, status: Statu
     assert exit_code([outcome]) == (0 if status is Status.REFUSED else 3)
 
 
+@pytest.mark.parametrize(("witness", "engine", "code"), [(True, True, 0), (True, False, 3), (False, True, 3)])
+def test_a_witness_that_fails_fails_no_comparison(tmp_path: Path, witness: bool, engine: bool, code: int) -> None:
+    """What cross-checks the truth, and fails, costs an exit code only where nothing else is compared."""
+    free = dataclasses.replace(ROW, expect=list(Verdict))
+    comparison = claim([free], [4.0])
+    failed = judged(tmp_path / "w", comparison, lambda *_: Result(Status.DIVERGED, "the step fell to nothing")).runs
+    facts = dataclasses.replace(FACTS, witness=witness)
+    runs = [dataclasses.replace(run, facts=facts) for run in failed]
+    whole = judged(tmp_path / "e", comparison, the_truth)
+    outcome = dataclasses.replace(whole, runs=[*(whole.runs if engine else []), *runs])
+    assert exit_code([outcome]) == code
+
+
+def test_a_time_that_is_cut_before_anything_touches_is_no_success(tmp_path: Path) -> None:
+    """Bodies that fall and touch nothing in what is left of the time: said, and exit 3; whole, or touched: exit 0."""
+    free = dataclasses.replace(ROW, tolerance="fall", expect=list(Verdict))
+    fall = Band("", {"positions": Tolerance(1e-9, False, "m")})
+    codes = {}
+    for until in (0.1, 0.6):
+        compared = Comparison("fall", "", "", "spinning_bounce", until, until / 4, bands={"fall": fall}, rows=[free])
+        outcome = judged(tmp_path / f"{until}", compared, the_truth)
+        cut = dataclasses.replace(outcome, comparison=dataclasses.replace(compared, cut=True))
+        codes[until] = exit_code([outcome]), exit_code([cut]), cut.no_contact.partition(":")[0]
+    assert codes == {0.1: (0, 3, "No contact was reached"), 0.6: (0, 0, "")}
+
+
 @pytest.mark.parametrize("status", [Status.REFUSED, Status.LEFT_OUT])
 def test_a_comparison_that_judges_nothing_is_no_success(tmp_path: Path, status: Status) -> None:
     """A first look without a truth exits 3, also if every engine ran; one that expects it exits 0."""

@@ -83,3 +83,23 @@ def test_a_point_with_an_edge_is_named_by_its_ends() -> None:
     near, far = ({"speed": 4.0, "mu_static": Edge((0.1, end))} for end in (0.2, 0.3))
     assert planning.point_name(near) == "speed=4, mu_static=0.1…0.2"
     assert planning.point_name(far) == "speed=4, mu_static=0.1…0.3"
+
+
+def test_engines_come_before_witnesses() -> None:
+    """Of a budget, all steps of engines that may be taken come before runs that cross-check the truth."""
+    comparison = first_look.default_comparison("pendulum", {}, engines=["projection", "mujoco"], until=0.1)
+    stages = [[case.engine.witness for case in cases] for cases in planning.plan(comparison).stages]
+    assert stages[0] == [False]
+    flat = [witness for cases in stages[1:] for witness in cases]
+    assert flat == sorted(flat)
+    assert set(flat) == {False, True}
+
+
+def test_an_engine_without_a_row_is_named_with_the_reason(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A first look names the installed engines that have no formulation for its scene, and what they lack."""
+    module = "proofroll.studies.comparison.default_comparison"
+    monkeypatch.setattr(f"{module}.engine_names", lambda: ["projection", "reduced"])
+    comparison = first_look.default_comparison("stop", {}, until=0.1)
+    assert list(comparison.unfit) == ["reduced"]
+    assert comparison.unfit["reduced"].startswith("lacks ")
+    assert "stops of joints" in comparison.unfit["reduced"]
