@@ -17,6 +17,8 @@ _Size = Callable[[FloatArray], float]
 LADDER_RUNGS = 3
 # A ladder is asymptotic if its observed order differs from the scheme's by at most this.
 _ASYMPTOTIC = 0.1
+# Furthest an observed order is from the scheme's where steps that are not yet asymptotic approach it.
+_TOWARDS = 0.5
 # Range of orders in which the observed one is searched.
 _ORDERS = (1e-3, 20.0)
 # A tightening of the tolerance that changes less than this fraction of another tightening changes round-off alone.
@@ -52,11 +54,14 @@ class Limit:
             change that further refinement may still make.
         order: observed order of convergence, NaN where there is none in (0, 20].
         shown: True if the differences shrink, so that there is a limit to speak of.
-        saturated: True if two tolerances gave the same run: something else (samples at which steps end) limits the
-            steps, so that no limit of small steps follows.
+        saturated: True if two tolerances gave the same run but for round-off: something else (samples at which steps
+            end) limits the steps, so that no limit of small steps follows.
         beside: effect on the finest curve of events that are one step late (:mod:`proofroll.core.beside_events`).
         chance: further doubt in a limit whose order is not the scheme's: its last change may be small by chance, or the
             next order may yet show.
+        regular: True if the differences follow one power of the step, or come from tolerances; only then do they show
+            that a limit is not the truth.
+        unsettled: clause on the event behind which the steps do not settle; empty: none is known.
         rounded: True if the differences are so near to the round-off of single precision that no order shows.
         floor: clause about the error floor of single precision that ends the refinement; empty: there is none.
     """
@@ -68,6 +73,8 @@ class Limit:
     saturated: bool = False
     beside: float = 0.0
     chance: float = 0.0
+    regular: bool = True
+    unsettled: str = ""
     rounded: bool = False
     floor: str = ""
 
@@ -116,11 +123,12 @@ def richardson(
     below_any = order < 1 - _ASYMPTOTIC  # an unstable motion amplifies round-off beyond the estimated scatter
     if scatter and not one_law and (min(change_1, change_2) <= _FAR_ABOVE * scatter or below_any):
         bar = max(change_1, change_2, _walked(middle - coarse, fine - middle, size))
-        return Limit(fine, bar, float("nan"), shown=False, rounded=True)
+        return Limit(fine, bar, float("nan"), shown=False, rounded=True, regular=False)
     if not np.isfinite(order) or order < _NO_CONVERGENCE:
         # The finest curve, as uncertain as the largest change seen; from one that vanishes at once no order follows.
         shown = change_2 < change_1 * (h[1] / h[0]) ** _NO_CONVERGENCE
-        return Limit(fine, max(change_1, change_2, _walked(middle - coarse, fine - middle, size)), float("nan"), shown)
+        bar = max(change_1, change_2, _walked(middle - coarse, fine - middle, size))
+        return Limit(fine, bar, float("nan"), shown, regular=False)
     power, rounding, chance = declared or max(1, round(order)), 0.0, 0.0
     unextrapolated = 2 * change_2 * max(1.0, 1 / (h[1] ** order - 1))
     if abs(order - power) > _ASYMPTOTIC:
@@ -128,7 +136,9 @@ def richardson(
         of_one_shape = size((fine - middle) - (middle - coarse) * change_2 / change_1) <= _ASYMPTOTIC * change_2
         if abs(order - power) > _ASYMPTOTIC or not of_one_shape:
             chance = max(0.0, change_1 / _shrinkage(declared or order, h) - change_2)
-            return Limit(fine, unextrapolated, order, chance=2 * chance)
+            if declared and abs(order - declared) > _TOWARDS:
+                order = float("nan")  # that of chance
+            return Limit(fine, unextrapolated, order, chance=2 * chance, regular=False)
         chance = unextrapolated if declared else 0.0
         rounding = change_2 * abs(1 / (h[1] ** order - 1) - 1 / (h[1] ** power - 1))
     coarse_limit = middle + (middle - coarse) / ((h[0] / h[1]) ** power - 1)
@@ -222,7 +232,7 @@ def tightest(curves: Sequence[FloatArray], vectors: Vectors = None) -> Limit:
     if min(changes) <= _SAME * max(changes):
         return Limit(curves[-1], max(changes), float("nan"), shown=False, saturated=True)
     if max(changes) <= _SCATTER * np.finfo(np.float64).eps * largest_magnitude(curves[-1], vectors):
-        return Limit(curves[-1], max(changes), float("nan"), shown=True)
+        return Limit(curves[-1], max(changes), float("nan"), shown=True, saturated=True)
     shown, last = len(changes) == 1 or changes[-1] < changes[-2], changes[-1]
     rest = last / (changes[-2] / last - 1) if shown and len(changes) > 1 and last > 0 else 0.0
     return Limit(curves[-1], max(last, rest), float("nan"), shown)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
@@ -53,7 +54,10 @@ class DoubtsNumbers(Protocol):
 
 @runtime_checkable
 class BoundsSteps(Protocol):
-    """Ability of an element whose laws bound the step of explicit schemes, known before any run."""
+    """Ability of an element whose laws bound the step of explicit schemes, known before any run.
+
+    It may have the attribute ``longest_step`` [s], too, beyond which a ladder of steps shows nothing.
+    """
 
     def step_bound(self, taken: Iterable[float]) -> str | None:
         """Clause on the longest stable step and on the steps that engines take [s]; None: nothing bounds it."""
@@ -64,6 +68,11 @@ def step_bound(elements: Iterable[object], taken: Iterable[float] = ()) -> str:
     steps = [*taken]
     bounds = (element.step_bound(steps) for element in elements if isinstance(element, BoundsSteps))
     return "; ".join(filter(None, bounds))
+
+
+def longest_step(elements: Iterable[object]) -> float:
+    """Longest stable step of explicit schemes [s], by ``longest_step`` of elements that bound it; inf: none does."""
+    return min((float(getattr(element, "longest_step", math.inf)) for element in elements), default=math.inf)
 
 
 class RunWatch(Protocol):

@@ -267,7 +267,8 @@ def _read(limit: Limit, allowance: Allowance, run: RunCurve, true: TrueCurve, fa
         finding = LimitResult.ANOTHER
     shown = limit.shown or limit.error_bar <= _SHOWN_WRONG * round_off
     beyond = _SHOWN_WRONG * (bar + round_off) + limit.beside + limit.chance
-    wrong = shown and not faster and finding == LimitResult.WITHIN and error > beyond
+    wrong = shown and limit.regular and not (faster or limit.saturated)
+    wrong = wrong and finding == LimitResult.WITHIN and error > beyond
     shown_order = (
         f"no order{' shows in single precision' if limit.rounded else ''}" if order is None else f"order {order:.3g}"
     )
@@ -276,6 +277,8 @@ def _read(limit: Limit, allowance: Allowance, run: RunCurve, true: TrueCurve, fa
         text = _unlike(limit.values, true.values, allowance.items)
     elif limit.beside > bar:
         text += f"; one step beside an event contributes {number(limit.beside, 1)}{unit}"
+    if limit.unsettled and finding == LimitResult.NOT_SHOWN:
+        text = f"smaller steps do not settle {limit.unsettled}: {text}"
     if faster and finding == LimitResult.NOT_SHOWN:
         text += "; the errors of these steps fall ever faster, so a shorter step is needed: --engine NAME[dt=…]"
     if limit.floor:

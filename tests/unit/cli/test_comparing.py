@@ -130,7 +130,7 @@ def test_a_first_look_stays_within_its_budget(
 def test_rows_that_exist_are_shown_where_a_comparison_is_interrupted(
     tmp_path: Path, command_line: Callable[..., tuple[int, str, str]], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Ctrl-C after the first run: its row is in the table, what else it waits for is named, and the exit code is 130."""
+    """Ctrl-C after the first run: its row is in the table, what is missing is named, and the exit code is 130."""
     from proofroll.running.runner import Runner
 
     follow = Runner.follow

@@ -66,7 +66,7 @@ def test_an_order_above_the_schemes_is_chance_in_the_last_change() -> None:
     """A last change that happens to be small leaves a limit of which as much is in doubt as by the scheme's order."""
     coarse, middle = (LIMIT + h * np.sin(5 * T) for h in (0.4, -0.4))
     found = richardson([coarse, middle, middle + 0.1 * np.cos(7 * T)], (4, 2, 1), 1)
-    assert found.order > 2.5
+    assert np.isnan(found.order), "no scheme has it"
     assert found.error_bar + found.chance >= 0.4
 
 
@@ -87,7 +87,7 @@ def test_changes_of_two_shapes_are_not_extrapolated() -> None:
     middle = fine + 1e-3 * np.sin(9 * T)
     coarse = middle + 4e-3 * np.max(np.abs(np.sin(9 * T))) * np.cos(5 * T)
     found = richardson([coarse, middle, fine], (4, 2, 1), 4)
-    assert found.order == pytest.approx(2, abs=1e-9)
+    assert np.isnan(found.order)
     assert found.values is fine
     assert found.error_bar >= 1e-3
 
@@ -111,7 +111,7 @@ def test_curves_that_do_not_converge() -> None:
 def test_round_off_that_an_unstable_motion_enlarges_shows_no_order() -> None:
     """In single precision differences far above round-off show no order below the first; in doubles they do."""
     curves = [curve(h, 0.49) for h in (4e-3, 2e-3, 1e-3)]
-    assert richardson(curves, (4, 2, 1), 4).order == pytest.approx(0.49, abs=0.01)
+    assert richardson(curves, (4, 2, 1)).order == pytest.approx(0.49, abs=0.01)
     single = richardson(curves, (4, 2, 1), 4, scatter=1e-6)
     assert math.isnan(single.order)
     assert single.rounded

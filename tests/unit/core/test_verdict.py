@@ -100,6 +100,34 @@ def test_a_limit_by_another_order_than_the_schemes_is_in_doubt() -> None:
     assert (beyond.verdict, beyond.limit) == (Verdict.DIFFERS, LimitResult.ANOTHER)
 
 
+def test_differences_that_follow_no_power_show_no_order_and_accuse_nobody() -> None:
+    """Errors in a saw-tooth, as of steps that end beside an event: no order, and no limit that is not the truth."""
+    saw = [TRUE + off * np.sin(k * T) for off, k in ((7.6e-3, 2), (16.7e-3, 5), (7.6e-3, 9))]
+    settled = [TRUE + 3e-3 + off * np.sin(k * T) for off, k in ((7.6e-3, 2), (1e-3, 5), (1e-6, 9))]
+    allowance, true = Allowance("q", "m", 0.1, 1.0), TrueCurve(TRUE, 1e-12)
+    for curves in (saw, settled):
+        found = judge_curve(allowance, RunCurve(curves[-1]), true, Refinement(richardson(curves, (4, 2, 1), 4), True))
+        assert found.order is None
+        assert found.remarks == ()
+
+
+def test_two_tolerances_that_give_the_same_run_show_no_limit() -> None:
+    """An adaptive engine whose samples set its steps is off by its own error, and by no other limit."""
+    off = np.array([2e-4, 2e-4 + 3e-15])
+    found = verdict_of(off[0], tightest([TRUE + value for value in off]), tolerance=1e-5, ladder=True)
+    assert (found.verdict, found.limit) == (Verdict.DIFFERS, LimitResult.NOT_SHOWN)
+    assert "two tolerances give the same run" in found.reason
+    right = verdict_of(1e-6, tightest([TRUE + 1e-6, TRUE + 1e-6 + 3e-15]), tolerance=1e-5, ladder=True)
+    assert (right.verdict, right.limit) == (Verdict.AGREES, LimitResult.WITHIN)
+
+
+def test_steps_that_part_at_an_event_name_it() -> None:
+    """A ladder that does not settle says behind which event."""
+    limit = Limit(TRUE + 0.02, 0.01, float("nan"), shown=False, regular=False, unsettled="after the impact at 0.502 s")
+    found = verdict_of(0.02, limit, ladder=True)
+    assert "smaller steps do not settle after the impact at 0.502 s: off by 0.02 ± 0.01 m" in found.reason
+
+
 def test_steps_whose_errors_fall_ever_faster_show_no_other_limit() -> None:
     """Errors of 6.39, 2.67 and 0.766 that fall on to 0.0003 show order 1 by chance: they do not pass the truth."""
     wave, steps = np.cos(9 * T), (4, 2, 1)

@@ -12,6 +12,7 @@ from proofroll.core.arrays import FloatArray, Vectors, largest_difference
 from proofroll.core.comparison import Band, Comparison
 from proofroll.core.convergence import Limit, falls_faster, floor_of, richardson, scatter_of, tightest
 from proofroll.core.diagnosis.scene_diagnosis import diagnose_scene
+from proofroll.core.element_abilities import longest_step
 from proofroll.core.errors import ProofrollError
 from proofroll.core.observable import Role
 from proofroll.core.verdict import Allowance, Judgement, Refinement, RunCurve, Verdict, judge_curve
@@ -224,6 +225,7 @@ def _judgements(
     main = curves[1.0]
     judgements: list[Judgement] = []
     errors: dict[float, dict[str, float]] = {factor: {} for factor in curves if factor != 1}
+    longest = longest_step(reference.scene.elements)
     always, tolerances = run_values.always_judged(reference, main), band.bounds | run.row.bound
     if reference.ended and {reference.scene.observables[name].role for name in tolerances} == {Role.RESIDUAL}:
         always = {}  # laws alone are asked for, which hold behind the end of the truth too
@@ -233,11 +235,13 @@ def _judgements(
             continue
         true, scale = reference.true(name, curve), reference.sizes.get(name, 1.0)
         run_curve = run_values.run_curve(reference, name, curve, trajectories[1.0], facts.precision)
-        limit = _limit(run, facts, name, curves, run_curve)
+        limit = _limit(run, facts, name, curves, run_curve, longest)
         if limit is not None:
             finest = run.row.ladder[-1]
             step = None if facts.step is None else facts.step * finest
             beside = reference.beside(name, limit.values, trajectories[finest], step)
+            if not limit.regular:
+                limit = replace(limit, unsettled=reference.unsettled(name, _last_change(run, name, curves)))
             limit = replace(limit, beside=beside, floor=_floor(facts, name, limit, curves, true.values, reference))
         ladder = facts.resolution is not None and len(run.row.ladder) > 1 and curve.size > 0
         allowance = Allowance(name, reference.scene.observables[name].unit, tolerance.absolute(scale), scale)
@@ -267,9 +271,17 @@ def _rungs(run: Planned, results: dict[str, Result], errors: dict[float, dict[st
 
 
 def _limit(
-    run: Planned, facts: EngineFacts, name: str, curves: dict[float, dict[str, FloatArray]], run_curve: RunCurve
+    run: Planned,
+    facts: EngineFacts,
+    name: str,
+    curves: dict[float, dict[str, FloatArray]],
+    run_curve: RunCurve,
+    longest: float,
 ) -> Limit | None:
-    """Limit of small steps of an observable, if every rung has it; ``run_curve``: at the row's own step."""
+    """Limit of small steps of an observable, if every rung has it.
+
+    ``run_curve``: at the row's own step; ``longest``: stable step [s], beyond which irregular differences show nothing.
+    """
     stepped = facts.resolution == "dt"
     # tolerances that the engine refuses are left out
     factors = run.row.ladder if stepped else [factor for factor in run.row.ladder if factor in run.ladder]
@@ -283,7 +295,15 @@ def _limit(
     finest = run.ladder[factors[-1]]
     steps = finest.until / (finest.engine.step or finest.until)
     scatter = scatter_of(facts.precision, run_curve.magnitude, steps)
-    return richardson(values, run.row.ladder, facts.order, scatter, run_curve.vectors)
+    limit = richardson(values, run.row.ladder, facts.order, scatter, run_curve.vectors)
+    unstable = facts.step is not None and max(run.row.ladder) * facts.step > longest
+    return replace(limit, order=float("nan"), shown=False) if unstable and not limit.regular else limit
+
+
+def _last_change(run: Planned, name: str, curves: dict[float, dict[str, FloatArray]]) -> FloatArray:
+    """Difference of an observable by the last refinement."""
+    middle, fine = (curves[factor][name] for factor in [factor for factor in run.row.ladder if factor in curves][-2:])
+    return fine - middle
 
 
 def _falls_faster(

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from proofroll.core.arrays import FloatArray, Vectors
+from proofroll.core.arrays import FloatArray, Vectors, magnitudes
 from proofroll.core.beside_events import beside_events
 from proofroll.core.columns import SAMPLED_BAR
 from proofroll.core.dataset import LEFT_OUT, Key, before_end, common_span, ended_early, observe, part, scales
@@ -25,6 +25,7 @@ from proofroll.core.verdict import TrueCurve
 if TYPE_CHECKING:
     import xarray as xr
 
+_PARTED = 0.1  # part of their largest difference at which two runs have parted
 # Units of what an impact leaves as it is: places, angles, directions.
 _CONTINUOUS = frozenset({"m", "rad", "1"})
 
@@ -203,6 +204,21 @@ class Reference:
         widest = max((event.time_high - event.time_low for event in events), default=0.0)
         late = min(widest if reported else 2 * self.sampled_bar, step or np.inf)
         return beside_events(times, values, [event.time for event in events], late)
+
+    def unsettled(self, name: str, change: FloatArray) -> str:
+        """Clause on the event behind which an observable of two runs first differs; empty: there is none.
+
+        Args:
+            name: of the observable.
+            change: difference of the runs.
+        """
+        times = self.dataset["time"].to_numpy()
+        if self.scene.observables[name].role == Role.EVENT or not 0 < len(change) <= len(times):
+            return ""
+        apart = magnitudes(change, self.vectors(name)).max(axis=1, initial=0.0)
+        parted = times[len(times) - len(change) :][int(np.argmax(apart > _PARTED * apart.max()))]
+        earlier = [event for event in self.events if event.time <= parted]
+        return f"after the {earlier[-1].kind.replace('_', '-')} at {earlier[-1].time:.4g} s" if earlier else ""
 
     @cached_property
     def sampled_bar(self) -> float:

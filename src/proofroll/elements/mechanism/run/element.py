@@ -40,7 +40,7 @@ from proofroll.elements.mechanism.run.plausibility import implausible
 from proofroll.elements.mechanism.run.sampling import MechanismSample
 from proofroll.elements.mechanism.run.scales import scales
 from proofroll.elements.mechanism.run.sentences import start_facts
-from proofroll.elements.mechanism.run.step_limits import law_rates, servo_steps, step_numbers
+from proofroll.elements.mechanism.run.step_limits import ServoSteps, law_rates, servo_steps, step_numbers
 from proofroll.elements.mechanism.scene.joint_kinds import TURNING, JointKind
 from proofroll.elements.mechanism.scene.model import Mechanism
 
@@ -146,8 +146,16 @@ class MechanismElement:
 
     def step_bound(self, taken: Iterable[float]) -> str | None:
         """See :class:`proofroll.core.element_abilities.BoundsSteps`."""
-        bounds = servo_steps(JointCoordinates(self.mechanism, self._equations.rank))
-        return None if bounds is None else bounds.sentence(taken)
+        return None if self._servo_steps is None else self._servo_steps.sentence(taken)
+
+    @property
+    def longest_step(self) -> float:
+        """See :class:`proofroll.core.element_abilities.BoundsSteps`."""
+        return np.inf if self._servo_steps is None else self._servo_steps.explicit
+
+    @cached_property
+    def _servo_steps(self) -> ServoSteps | None:
+        return servo_steps(JointCoordinates(self.mechanism, self._equations.rank))
 
     @cached_property
     def _solution(self) -> Solution:
