@@ -200,6 +200,7 @@ class ReportedComparison:
         spread: of the points where only laws of mechanics are judged.
         step_bound: clause on the longest stable step and on those of the rows; empty: nothing bounds it.
         omitted: clauses on what the scene's file describes and the comparison leaves out.
+        unjudged: reactions that a comparison without a file does not judge.
         unfit: installed engine without a row -> why.
     """
 
@@ -228,6 +229,7 @@ class ReportedComparison:
     spread: list[Spread] = field(default_factory=list)
     step_bound: str = ""
     omitted: list[str] = field(default_factory=list)
+    unjudged: list[str] = field(default_factory=list)
     unfit: dict[str, str] = field(default_factory=dict)
     evidence: ComparisonEvidence | None = field(default=None, metadata=MERGED)
 

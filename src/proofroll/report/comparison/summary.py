@@ -3,7 +3,10 @@
 import dataclasses
 from typing import Any
 
+from proofroll.core.comparison import Comparison
 from proofroll.core.element_abilities import step_bound
+from proofroll.core.observable import Role
+from proofroll.core.scene import Scene
 from proofroll.core.verdict import Judgement, Verdict
 from proofroll.files.trajectory_file import StoredTrajectory
 from proofroll.report.comparison.records import (
@@ -81,7 +84,19 @@ def outcome_content(outcome: Outcome) -> ReportedComparison:
         step_bound=step_bound(scene.elements, steps),
         omitted=list(scene.omitted),
         unfit=comparison.unfit,
+        unjudged=[] if comparison.budget is None else _unjudged(scene, comparison),
     )
+
+
+def _unjudged(scene: Scene, comparison: Comparison) -> list[str]:
+    """Reactions of a scene, with ``*`` for the parts of its mechanism, that no tolerance of a comparison judges."""
+    bounds = {name for band in comparison.bands.values() for name in band.bounds}
+    names = [
+        f"{name.partition('.')[0]}.*" if "." in name else name
+        for name, item in scene.observables.items()
+        if item.role is Role.REACTION and item.unit != "1" and name not in bounds and not item.absent
+    ]
+    return [name for name in dict.fromkeys(names) if not (name == "normal_forces" and "contact_forces" in bounds)]
 
 
 def _truth_ends(outcome: Outcome) -> list[str]:

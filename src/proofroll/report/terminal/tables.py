@@ -183,6 +183,9 @@ def closing_lines(content: ReportedComparison) -> list[str]:
             if left
             else "Every verdict is as the comparison file expects."
         )
+    if content.unjudged:
+        told = ", ".join(content.unjudged)
+        lines.append(f"Not judged: {told} (a comparison file judges them: proofroll new comparison).")
     unfit = "; ".join(f"{engine_title(name)} ({why})" for name, why in content.unfit.items())
     lines += [f"Not in the table: {unfit}."] if unfit else []
     return [*lines, *budget_lines(content), *closing_notes(content), *host_sentences(content.hosts)]

@@ -254,7 +254,7 @@ def _judgements(
             if name in curves[factor]:
                 rung = curves[factor][name]
                 own_errors[name] = run_values.error(reference, name, rung, trajectories[factor])
-    remark = run_values.rates_remark(reference, main, tolerances)
+    remark = run_values.rates_remark(reference, trajectories[1.0].variables, tolerances)
     if remark and judgements and all(item.verdict in {Verdict.AGREES, Verdict.UNCONFIRMED} for item in judgements):
         judgements[0] = replace(judgements[0], remarks=(*judgements[0].remarks, remark))
     return judgements, errors

@@ -195,6 +195,8 @@ def judge(
     further = {
         name: bound for name, bound in run_values.always_judged(reference, observed).items() if name not in bounds
     }
+    rates = run_values.contradicted_rates(reference, given_variables, bounds)
+    further |= {name: Tolerance(run_values.CONTRADICTS, True) for name, _ in rates if name in sure}
     unasked = [_compared(name, bound, reference, observed, dataset) for name, bound in further.items()]
     compared += [item for item in unasked if item.judgement.verdict is Verdict.DIFFERS]
     compared.sort(key=lambda item: item.judgement.error / item.judgement.tolerance, reverse=True)

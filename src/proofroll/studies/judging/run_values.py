@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import itertools
 from collections import Counter
-from collections.abc import Container, Iterable, Mapping
-from typing import TYPE_CHECKING
+from collections.abc import Container, Iterable, Iterator, Mapping
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from proofroll.core.arrays import FloatArray, largest_difference, magnitudes
+from proofroll.core.arrays import FloatArray, largest_difference, largest_magnitude, magnitudes
 from proofroll.core.comparison import Tolerance
 from proofroll.core.dataset import BETWEEN, observe, part
 from proofroll.core.events import EVENT_ORDER, events_of
@@ -22,7 +22,7 @@ from proofroll.studies.judging.reference import Reference
 if TYPE_CHECKING:
     import xarray as xr
 
-_CONTRADICTS = 0.1  # part of their range by which velocities are off at most samples of another motion
+CONTRADICTS = 0.1  # part of their size by which velocities are off at most samples of another motion
 
 
 def always_judged(reference: Reference, names: Iterable[str]) -> dict[str, Tolerance]:
@@ -32,21 +32,40 @@ def always_judged(reference: Reference, names: Iterable[str]) -> dict[str, Toler
     return {name: end if item.role is Role.EVENT else Tolerance(item.always, True) for name, item in items.items()}
 
 
-def rates_remark(reference: Reference, curves: Mapping[str, FloatArray], judged: Container[str]) -> str:
-    """Clause on velocities that no tolerance judges and that contradict the motion; empty if there are none.
+def contradicted_rates(
+    reference: Reference, variables: Mapping[Any, Any], judged: Container[str]
+) -> Iterator[tuple[str, float]]:
+    """Velocities that no tolerance judges and that contradict the motion, each with its error at half of the samples.
 
-    Velocities of a right motion are right: at most samples they differ from the true ones by less than ``_CONTRADICTS``
-    of their range. Impacts, which an engine may have a step late, are at few samples.
+    Velocities of a right motion are right: at most samples they differ from the true ones by less than ``CONTRADICTS``
+    of their size. Impacts, which an engine may have a step late, are at few samples.
+
+    Args:
+        reference: the truth.
+        variables: of the run, arrays by name.
+        judged: names that a tolerance judges.
     """
     scene = reference.scene
     for name in [scene.label(element, key) for element in scene.elements for key in element.sample_type.widths]:
-        true, run = reference.curves.get(name), curves.get(name)
-        if true is None or run is None or name in judged or run.shape != true.shape or not len(true):
+        known = reference.dataset.variables.get(name)
+        if known is None or name not in variables or name in judged:
             continue
-        unit, size = scene.observables[name].unit, reference.sizes.get(name, 1.0)
-        apart = float(np.median(magnitudes(run - true, reference.vectors(name)).max(axis=1)))
-        if unit.endswith("/s") and not apart <= _CONTRADICTS * size:
-            return f"{name} does not belong to this motion: off by {number(apart)} {unit} at half of the samples"
+        true, run, vectors = known.values, np.asarray(variables[name]), reference.vectors(name)
+        known_at = np.isfinite(true).reshape(len(true), -1).all(axis=1)
+        if run.shape != true.shape or not known_at.any() or not str(known.attrs.get("units", "")).endswith("/s"):
+            continue
+        true, run = true[known_at], run[known_at]
+        size = reference.sizes.get(name) or largest_magnitude(true, vectors) or 1.0
+        apart = float(np.median(magnitudes(run - true, vectors).max(axis=1, initial=0.0)))
+        if not apart <= CONTRADICTS * size:
+            yield name, apart
+
+
+def rates_remark(reference: Reference, variables: Mapping[Any, Any], judged: Container[str]) -> str:
+    """Clause on the first of the :func:`contradicted_rates`; empty if there are none."""
+    for name, apart in contradicted_rates(reference, variables, judged):
+        unit = str(reference.dataset.variables[name].attrs["units"])
+        return f"{name} does not belong to this motion: off by {number(apart)} {unit} at half of the samples"
     return ""
 
 

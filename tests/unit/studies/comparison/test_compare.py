@@ -369,6 +369,17 @@ def test_a_witness_that_fails_fails_no_comparison(tmp_path: Path, witness: bool,
     assert exit_code([outcome]) == code
 
 
+def test_reactions_without_a_tolerance_are_named(tmp_path: Path) -> None:
+    """A first look says which forces and moments it does not judge; a comparison file states what it judges."""
+    free = dataclasses.replace(ROW, tolerance="fall", expect=list(Verdict))
+    bands = {"fall": Band("", {"positions": Tolerance(1e-9, False, "m")})}
+    compared = Comparison("fall", "", "", "gear_pair", 0.1, 0.05, bands=bands, rows=[free], budget=60.0)
+    outcome = judged(tmp_path, compared, the_truth)
+    assert {"forces", "torques", "coupling.*"} <= set(outcome_content(outcome).unjudged)
+    claimed = dataclasses.replace(outcome, comparison=dataclasses.replace(compared, budget=None))
+    assert outcome_content(claimed).unjudged == []
+
+
 def test_a_time_that_is_cut_before_anything_touches_is_no_success(tmp_path: Path) -> None:
     """Bodies that fall and touch nothing in what is left of the time: said, and exit 3; whole, or touched: exit 0."""
     free = dataclasses.replace(ROW, tolerance="fall", expect=list(Verdict))

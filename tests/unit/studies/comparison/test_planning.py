@@ -8,6 +8,7 @@ import pytest
 
 from proofroll.core.comparison import Edge, Row
 from proofroll.core.errors import InputError
+from proofroll.core.observable import Role
 from proofroll.files.comparison_file import load_comparison
 from proofroll.files.scene_file import load_scene
 from proofroll.studies.comparison import default_comparison as first_look
@@ -103,3 +104,19 @@ def test_an_engine_without_a_row_is_named_with_the_reason(monkeypatch: pytest.Mo
     assert list(comparison.unfit) == ["reduced"]
     assert comparison.unfit["reduced"].startswith("lacks ")
     assert "stops of joints" in comparison.unfit["reduced"]
+
+
+@pytest.mark.parametrize(("name", "bound"), [("gear_pair", "coupling."), ("driven_four_bar", "drive.")])
+def test_forces_of_what_drives_and_couples_are_judged(name: str, bound: str) -> None:
+    """A first look at a driven or coupled scene has bounds on these forces."""
+    scene = load_scene(name)
+    names = [key for key in first_look.bounds(scene, 0.01) if key.startswith(bound)]
+    assert names
+    assert all(scene.observables[key].role is Role.REACTION for key in names)
+
+
+def test_a_first_look_judges_contact_forces_attitudes_and_events() -> None:
+    """Bounds as those of a judgement without tolerances."""
+    found = first_look.bounds(load_scene("sled"), 0.01)
+    assert {"contact_forces", "net_forces", "attitudes", "event_times"} <= found.keys()
+    assert found["contact_forces"].absolute(100.0) == pytest.approx(1.0)

@@ -16,7 +16,8 @@ TIMES = np.linspace(0.0, 1.0, 11)
 def reference() -> Reference:
     """A reference with velocities of the one body of a scene."""
     v = np.stack([np.cos(TIMES), np.sin(TIMES), 0 * TIMES], axis=1)[:, None]
-    return Reference(load_scene("pendulum"), xr.Dataset(), {"v_WB": v}, {"v_WB": 1.0})
+    dataset = xr.Dataset({"v_WB": (("time", "body", "xyz"), v, {"units": "m/s"})})
+    return Reference(load_scene("pendulum"), dataset, {"v_WB": v}, {"v_WB": 1.0})
 
 
 @pytest.mark.parametrize("factor", [0.0, -1.0, 100.0, np.nan])

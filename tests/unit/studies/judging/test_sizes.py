@@ -58,3 +58,15 @@ def test_a_verdict_does_not_turn_with_the_axes() -> None:
         run = {"time": TIMES, "p_WB": true.p_WB.to_numpy(), "q_WB": true.q_WB.to_numpy()}
         run |= {"v_WB": true.v_WB.to_numpy() + size * np.array(off), "w_WB": true.w_WB.to_numpy()}
         assert proofroll.judge(run, scene, {"v_WB": "1 %"}).agrees is agrees
+
+
+@pytest.mark.parametrize("garbage", [0.0, -1.0, 3.0])
+def test_places_alone_do_not_excuse_velocities_of_another_motion(garbage: float) -> None:
+    """A tolerance of places alone still compares the velocities that are given with the motion."""
+    scene = pendulum(False)
+    true = truth(scene, TIMES)
+    run = {"time": TIMES} | {name: true[name].to_numpy() for name in ("p_WB", "q_WB", "v_WB", "w_WB")}
+    assert proofroll.judge(run, scene, {"p_WB": "1e-3 m"}).agrees
+    found = proofroll.judge(run | {"v_WB": garbage * run["v_WB"]}, scene, {"p_WB": "1e-3 m"})
+    assert not found.agrees
+    assert "v_WB" in {item.judgement.observable for item in found.compared}

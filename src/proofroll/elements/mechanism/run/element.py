@@ -293,8 +293,9 @@ class MechanismElement:
         table += contact_observables(self.mechanism, self.sizes, _LEAST)
         table += event_observables(self.mechanism)
         for item in named_forces(self.mechanism):
-            floor, column = least[str(item.unit)], item.field == "coupling"
-            table.append(Observable(item.name, str(item.unit), item.meaning, Role.REACTION, floor=floor, column=column))
+            told = {"floor": least[str(item.unit)], "column": item.field == "coupling"}
+            told["watched"] = item.field in {"coupling", "drive"}
+            table.append(Observable(item.name, str(item.unit), item.meaning, Role.REACTION, **told))
         table += link_observables(self.mechanism, least)
         if self.conservative:
             never: dict[str, Any] = {"hangs_on_events": False, "difference_of": "energy", "floor": least["J"]}
