@@ -64,6 +64,10 @@ class Evidence:
     asked: Any = None
     found: dict[Any, Sequence[Any]] = field(default_factory=dict, init=False, repr=False, compare=False)
 
+    def read_back(self, quantity: str) -> bool:
+        """True if the engine's own model, read back, has the scene's numbers of a quantity: no cause contradicts it."""
+        return any(line["quantity"] == quantity and line["holds"] and bool(line["found"]) for line in self.lines)
+
 
 @dataclass(frozen=True)
 class Cause:

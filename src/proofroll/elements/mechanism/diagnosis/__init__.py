@@ -24,6 +24,7 @@ from proofroll.elements.mechanism.diagnosis.numbers import (
 from proofroll.elements.mechanism.diagnosis.reactions import reactions, reactions_at_start
 from proofroll.elements.mechanism.diagnosis.reporting_errors import REPORTING_ERRORS
 from proofroll.elements.mechanism.diagnosis.residuals import COVERED, GIVEN, residuals_of
+from proofroll.elements.mechanism.diagnosis.starts import start_not_taken
 from proofroll.elements.mechanism.diagnosis.structure import (
     axis_of_first_steps,
     loop_lacks_row,
@@ -38,6 +39,7 @@ GRAVITY = any_gravity(
 )
 BUILT = built_otherwise([name for name in GIVEN if name != "joint axes"], COVERED)
 HYPOTHESES: tuple[Any, ...] = (
+    start_not_taken,
     *REPORTING_ERRORS,
     reactions,
     reactions_at_start,

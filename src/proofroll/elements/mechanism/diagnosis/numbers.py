@@ -25,6 +25,7 @@ def factor_of_all(
     has: Callable[[Mechanism], bool],
     remedy: str,
     signed: bool = True,
+    line: str = "",
 ) -> Hypothesis:
     """Hypothesis that the engine moves all bodies or joints with one factor on a number.
 
@@ -35,12 +36,13 @@ def factor_of_all(
         has: True if a mechanism has the number at all.
         remedy: advice to the author.
         signed: True if the engine may have the wrong sign of the number; masses are never negative.
+        line: quantity of the certificate that reads the number back; empty: none does.
     """
 
     @hypothesis(name, "the equations of motion are linear in it: one factor balances them at every state of the run")
     def test(evidence: Evidence) -> Iterator[Cause]:
         mechanism = evidence.element.mechanism
-        for residuals in residuals_of(evidence) if has(mechanism) else ():
+        for residuals in residuals_of(evidence) if has(mechanism) and not evidence.read_back(line) else ():
             factor, fitted = best(residuals, lambda x: change(mechanism, x))
             changed = change(mechanism, factor)
             if possible(factor, signed) and not _by_scheme(evidence, changed):
@@ -77,10 +79,19 @@ FACTORS_OF_ALL: tuple[Any, ...] = (
         lambda m, x: Change(m, gravity=x * np.array(m.gravity)),
         lambda m: any(m.gravity),
         "give the engine the scene's gravity: an acceleration in the world, its sign and its unit",
+        line="gravity",
     ),
-    factor_of_all("mass", "all masses", _masses, lambda m: bool(m.bodies), "give each body its mass once", False),
     factor_of_all(
-        "inertia", "all inertias", _inertias, lambda m: bool(m.bodies), "give each body its inertia once", False
+        "mass", "all masses", _masses, lambda m: bool(m.bodies), "give each body its mass once", False, "mass"
+    ),
+    factor_of_all(
+        "inertia",
+        "all inertias",
+        _inertias,
+        lambda m: bool(m.bodies),
+        "give each body its inertia once",
+        signed=False,
+        line="inertia",
     ),
     _of_joints(
         "joint damping",
@@ -141,6 +152,8 @@ def of_each_body(evidence: Evidence) -> Iterator[Cause]:
             which = np.arange(len(mass)) == i
 
             for what, values in (("mass", mass), ("inertia", inertia)):
+                if evidence.read_back(what):
+                    continue
 
                 def change(x: float, what: str = what, values: FloatArray = values, which: Any = which) -> Change:
                     scaled = (np.where(which, x, 1.0) * values.T).T
@@ -152,8 +165,9 @@ def of_each_body(evidence: Evidence) -> Iterator[Cause]:
                 says = f"the engine moves the body {body.name} with its {what} {factor_text(factor)}"
                 model, remedy = change(factor), f"give {body.name} its {what} once"
                 yield residuals.cause(f"{what} of {body.name}", says, model, remedy, number, change_by(factor))
-        yield from _reordered(residuals, mechanism, inertia)
-        if np.any(com):
+        if not evidence.read_back("inertia"):
+            yield from _reordered(residuals, mechanism, inertia)
+        if np.any(com) and not evidence.read_back("centre of mass"):
             yield from _about_origin(residuals, mechanism, mass, com, inertia)
 
 
