@@ -107,6 +107,8 @@ def run(
     done = content.status == "done"
     if not done:
         options.complain(f"{content.engine} {content.status}: {content.message}{_shorter_step(scene, engine, case)}")
+        for told in content.diagnosis:
+            options.complain(f"{told.sentence}: {told.cause.remedy}")
     if as_json or done or content.final:
         options.show(content, as_json, lambda: run_lines(content, forces=forces))
     if not done or content.ends is not None:
