@@ -209,9 +209,9 @@ def _compare_response(element: MechanismElement, built: MechanismBuilt, compare:
         return
     state = dynamics.at(*mechanism.start())
     near = TOUCHING * element.length  # a disc that lies flat has no one place, which its response depends on
-    shut = [
-        k for k, touch in enumerate(state.touching[: len(mechanism.contacts)]) if touch.gap <= near and not touch.flat
-    ]
+    touching = state.touching[: len(mechanism.contacts)]
+    # an absent contact, as of edges that are parallel, carries nothing however near it is
+    shut = [k for k, touch in enumerate(touching) if touch.gap <= near and not touch.flat and not touch.absent]
     if not shut:
         return
     normals = [np.outer(state.touching[k].normal, state.touching[k].normal) for k in shut]
