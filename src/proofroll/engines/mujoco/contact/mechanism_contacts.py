@@ -187,6 +187,7 @@ class Contacts:
         curved = {k for k, contact in enumerate(mechanism.contacts) if curved_end(contact) is not None}
         self._turned = curved if settings.curvature else set()
         self._on_cone: set[int] = set()
+        self._sticking: set[int] = set()
         self._rates: Array | None = None
 
     def forces(self, data: Any) -> Array:
@@ -228,7 +229,7 @@ class Contacts:
                 turning = float(min(turns, key=np.linalg.norm) @ data.qvel) / dt
                 data.efc_aref[row] -= _LEAD * max(turning, 0.0)
             mu, friction = self._slipping(contact)
-            if friction.start == friction.stop:
+            if friction.start == friction.stop or number in self._sticking:
                 continue
             if number in self._turned:
                 if number in self._on_cone:
@@ -266,15 +267,20 @@ class Contacts:
         return float(contact.friction[0]), slice(row + 1, row + min(SLIDES, int(contact.dim)))
 
     def watch(self, data: Any) -> None:
-        """Keeps which contacts of curved walls have their force on the cone; ``data``: with the last forces."""
-        self._on_cone = set()
-        for index in range(data.ncon) if self._turned else ():
+        """Keeps which contacts have their force on the cone, and which stick; ``data``: with the last forces.
+
+        Friction of what sticks misses nothing and lifts nothing; rates of the evaluation before would only seem to.
+        """
+        self._on_cone, within = set(), set()
+        for index in range(data.ncon):
             contact = data.contact[index]
-            row, number = int(contact.efc_address), self._number(contact)
-            if row >= 0 and number in self._turned:
+            row = int(contact.efc_address)
+            if row >= 0:
                 mu, friction = self._slipping(contact)
-                if np.linalg.norm(data.efc_force[friction]) >= NEAR_CONE * mu * data.efc_force[row] > 0:
-                    self._on_cone.add(number)
+                bound = NEAR_CONE * mu * data.efc_force[row]
+                on_cone = np.linalg.norm(data.efc_force[friction]) >= bound
+                (self._on_cone if on_cone and bound > 0 else within).add(self._number(contact))
+        self._sticking = within - self._on_cone - self._turned
 
     def remember(self, data: Any, rows: Array) -> None:
         """Keeps normal rows of a step, and accelerations of that before, for the next one; arguments of correct."""
