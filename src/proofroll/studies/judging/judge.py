@@ -12,6 +12,7 @@ from proofroll.core.arrays import FloatArray, largest_distance, largest_magnitud
 from proofroll.core.columns import UNCERTAIN
 from proofroll.core.comparison import Tolerance
 from proofroll.core.dataset import BETWEEN, off_impacts
+from proofroll.core.diagnosis.scene_diagnosis import diagnose_scene
 from proofroll.core.element_abilities import step_bound
 from proofroll.core.errors import InputError, require_known
 from proofroll.core.multi_element import REQUIRED
@@ -24,6 +25,7 @@ from proofroll.core.whole_turns import samples_between
 from proofroll.files.scene_file import load_scene
 from proofroll.studies.html_table import gauge, html_table
 from proofroll.studies.judging import run_values
+from proofroll.studies.judging.causes import GivenVariable, causes_of
 from proofroll.studies.judging.reference import Reference
 from proofroll.studies.judging.run_values import turned_alike
 from proofroll.studies.judging.user_trajectory import GivenRun, RunInput, read_run
@@ -33,6 +35,7 @@ if TYPE_CHECKING:
 
 _USUAL = Tolerance(0.01, True)
 _LEAST = 0.01
+_MILLI = 1e3
 _NO_TOLERANCE = "no tolerance is given for it"
 _UNDETERMINED = "the truth does not determine it"
 _MOST_TRUTHS = 64
@@ -85,6 +88,7 @@ class Judged:
         unjudged: given variable that is not judged -> reason.
         ended: time and reason of an early end of the truth, behind which nothing is judged; empty: there is none.
         step_bound: clause on the longest stable step of an explicit scheme; empty: nothing bounds it.
+        causes: clauses on mistakes that explain a difference.
     """
 
     scene: str
@@ -93,6 +97,7 @@ class Judged:
     unjudged: Mapping[str, str] = field(default_factory=dict)
     ended: str = ""
     step_bound: str = ""
+    causes: tuple[str, ...] = ()
 
     @property
     def agrees(self) -> bool:
@@ -104,6 +109,7 @@ class Judged:
         why = f" (tolerance: {self.because})" if self.because else ""
         head = f"{'agrees with' if self.agrees else 'differs from'} the truth of {self.scene}{why}"
         lines = [f"  {'ok' if item.agrees else '!!'} {item}" for item in self.compared]
+        lines += [f"  cause: {cause}" for cause in self.causes]
         for why in dict.fromkeys(self.unjudged.values()):
             lines.append(f"  not judged: {', '.join(name for name, its in self.unjudged.items() if its == why)}; {why}")
         if self.ended:
@@ -142,6 +148,7 @@ class Judged:
             "unjudged": dict(self.unjudged),
             "ended": self.ended,
             "step_bound": self.step_bound,
+            "causes": list(self.causes),
         }
 
 
@@ -177,6 +184,7 @@ def judge(
     user_run = read_run(run, scene, columns)
     dataset = user_run.dataset
     between = dataset[BETWEEN].to_numpy() if BETWEEN in dataset else np.zeros(0)
+    _require_seconds(scene, dataset)
     asked = scene.fully_asked if "q_WB" in {str(name).partition(".")[0] for name in dataset.data_vars} else scene
     reference = Reference.of(scene, _truth(asked, dataset["time"].to_numpy(), between))
     user_run.require_units(reference.dataset)
@@ -211,6 +219,8 @@ def judge(
     for item in compared:  # judged observables, though perhaps derived from other given variables
         unjudged.pop(item.judgement.observable, None)
     bound = step_bound(scene.elements)
+    differs = any(item.judgement.verdict is Verdict.DIFFERS for item in compared)
+    causes = _causes(scene, dataset, reference.dataset) if differs and "scene_digest" not in dataset.attrs else []
     return Judged(
         scene=scene.name,
         compared=tuple(compared),
@@ -218,7 +228,53 @@ def judge(
         unjudged=unjudged,
         ended=reference.ended,
         step_bound=bound,
+        causes=tuple(causes),
     )
+
+
+def _require_seconds(scene: Scene, run: xr.Dataset) -> None:
+    """Raises InputError for times that are farther apart than the scene's motion lasts, if they are milliseconds."""
+    times = run["time"].to_numpy()
+    if len(times) < 2 or float(np.min(np.diff(times))) < scene.natural_time or "scene_digest" in run.attrs:
+        return
+    sooner = run.assign_coords(time=times / _MILLI)
+    given = _given(sooner, _truth(scene, times / _MILLI, np.zeros(0)))
+    if given and not any(item.wrong for item in given.values()):
+        advice = "with these times in milliseconds it follows the truth; say --map COLUMN=time[ms], or give seconds"
+        raise InputError("run", f"times up to {times[-1]:g} s", advice)
+
+
+def _given(run: xr.Dataset, true: xr.Dataset) -> dict[str, GivenVariable]:
+    """Variables of one finite number for each time that a trajectory and the truth have."""
+    variables = {}
+    for name, item in run.data_vars.items():
+        known = true.variables.get(name)
+        if item.dims == ("time",) and known is not None and known.dims == ("time",) and known.shape == item.shape:
+            given, values = item.to_numpy(), known.values
+            if given.dtype.kind == "f" and np.isfinite(given).all() and np.isfinite(values).all():
+                variables[str(name)] = GivenVariable(given, values, str(known.attrs.get("units", "")))
+    return variables
+
+
+def _causes(scene: Scene, run: xr.Dataset, true: xr.Dataset) -> list[str]:
+    """Clauses on typical mistakes in a trajectory that differs, and on causes that its whole state proves."""
+    free = [f"{name}.{axis}" for name in _free_points(scene) for axis in "xyz"]
+    causes = causes_of(_given(run, true), run["time"].to_numpy(), free)
+    if causes or any(name not in run for name in (*REQUIRED, "w_WB", "q_WB")):
+        return causes
+    return [item.sentence for item in diagnose_scene(scene, [], run, true)]
+
+
+def _free_points(scene: Scene) -> list[str]:
+    """Names of tracked points of bodies that nothing holds or touches."""
+    mechanisms = [element.mechanism for element in scene.elements if hasattr(element, "mechanism")]
+    return [
+        point.name
+        for mechanism in mechanisms
+        for point in mechanism.points
+        if not (mechanism.contacts or mechanism.links or mechanism.loops)
+        and any(joint.child == point.body and joint.kind == "free" for joint in mechanism.joints)
+    ]
 
 
 def _unjudged(user_run: GivenRun, reference: Reference, judged: Mapping[str, Tolerance]) -> dict[str, str]:

@@ -1,0 +1,129 @@
+"""Typical mistakes in a given trajectory, each named only if it closes the difference from the truth."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Collection, Iterator, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from proofroll.core.arrays import FloatArray
+from proofroll.core.diagnosis import CLOSES
+from proofroll.core.number_format import number, spaced
+
+_DEGREE = np.pi / 180
+# Unit -> factors by which numbers in another unit or sign differ, each with a clause.
+_SIGN = (-1.0, "the opposite of the truth: its sign?")
+_ANGLES = (
+    (1 / _DEGREE, "57.3 times the truth: degrees?"),
+    (_DEGREE, "the truth over 57.3: radians, read as degrees?"),
+    _SIGN,
+)
+_LENGTHS = (
+    (1e3, "a thousand times the truth: millimetres?"),
+    (1e2, "a hundred times the truth: centimetres?"),
+    (1e-3, "a thousandth of the truth: metres, read as millimetres?"),
+    _SIGN,
+)
+_FACTORS = {"rad": _ANGLES, "rad/s": _ANGLES, "m": _LENGTHS, "m/s": _LENGTHS}
+_FEW = 5  # samples from which a fitted number proves something
+_LIKE_ITS_TRUTH = 1e-3  # part of a variable's size up to which it needs no cause
+
+
+@dataclass(frozen=True)
+class GivenVariable:
+    """Values of a given variable.
+
+    Attributes:
+        values, true: in the trajectory and in the truth at its times, shape (time,).
+        unit: of both.
+    """
+
+    values: FloatArray
+    true: FloatArray
+    unit: str
+
+    @property
+    def off(self) -> float:
+        """Largest difference."""
+        return float(np.max(np.abs(self.values - self.true), initial=0.0))
+
+    @property
+    def wrong(self) -> bool:
+        """True if it differs by more than a small part of its size."""
+        return self.off > _LIKE_ITS_TRUTH * float(np.max(np.abs(self.true), initial=0.0))
+
+
+def causes_of(given: Mapping[str, GivenVariable], times: FloatArray, falling: Collection[str]) -> list[str]:
+    """Clauses on the mistakes that explain variables of a trajectory, and on a first row that is not the start.
+
+    Args:
+        given: variables of one number for each time, by name.
+        times: of the samples [s].
+        falling: names of the coordinates of bodies that nothing holds.
+    """
+    wrong = {name: item for name, item in given.items() if item.wrong}
+    found: dict[str, str] = {}
+    for name, item in wrong.items():
+        hypotheses = (*_scaled(item), *_combined(name, given), *(_damped(item, times) if name in falling else ()))
+        for says, other in hypotheses:
+            left = float(np.max(np.abs(item.values - other), initial=0.0))
+            if left <= CLOSES * item.off and name not in found:
+                unit = spaced(item.unit)
+                found[name] = (
+                    f"{name} is {says} (off by {number(item.off)}{unit}, by {number(left, 1)}{unit} with that)"
+                )
+    for a, b in itertools.combinations(wrong, 2):
+        if _exchanged(given[a], given[b]):
+            found |= {a: f"{a} and {b} are each the other: swapped columns?", b: ""}
+    open_ones = {name: item for name, item in wrong.items() if name not in found}
+    return [*filter(None, found.values()), *_first_row(open_ones, times)]
+
+
+def _scaled(item: GivenVariable) -> Iterator[tuple[str, FloatArray]]:
+    for factor, says in _FACTORS.get(item.unit, (_SIGN,)):
+        yield says, factor * item.true
+
+
+def _combined(name: str, given: Mapping[str, GivenVariable]) -> Iterator[tuple[str, FloatArray]]:
+    """Sums and differences of angles: absolute where the scene's are relative, or the other way."""
+    own = given[name]
+    for other, item in given.items():
+        if other != name and item.unit == own.unit == "rad":
+            yield f"its sum with {other}: an absolute angle, where the scene's is relative?", own.true + item.true
+            yield f"less by {other}: a relative angle, where the scene's is absolute?", own.true - item.true
+
+
+def _damped(item: GivenVariable, times: FloatArray) -> Iterator[tuple[str, FloatArray]]:
+    """The fall with damping of the body's velocity by one rate, and late by one part of a step, both fitted."""
+    if len(times) < _FEW:
+        return
+    way = item.true - item.true[0]
+    steps = np.diff(times) * (way[1:] + way[:-1]) / 2
+    lost, late = np.concatenate([[0.0], np.cumsum(steps)]), np.gradient(item.true, times)
+    basis = np.stack([-lost, late], axis=1)
+    rate, delay = np.linalg.lstsq(basis, item.values - item.true, rcond=None)[0]
+    if rate > 0:
+        says = f"slowed down: damping of {rate:.2g} 1/s of the velocity of a free body, which the scene has not?"
+        yield says, item.true + basis @ [rate, delay]
+
+
+def _exchanged(one: GivenVariable, two: GivenVariable) -> bool:
+    if one.unit != two.unit or one.true.shape != two.true.shape:
+        return False
+    left = max(float(np.max(np.abs(a.values - b.true), initial=0.0)) for a, b in ((one, two), (two, one)))
+    return left <= CLOSES * min(one.off, two.off)
+
+
+def _first_row(wrong: Mapping[str, GivenVariable], times: FloatArray) -> Iterator[str]:
+    """Clause on variables whose first row at time 0 is not the scene's start."""
+    if not times.size or times[0] > 0:
+        return
+    apart = []
+    for name, item in wrong.items():
+        size = float(np.max(np.abs(item.true), initial=0.0)) or 1.0
+        if abs(item.values[0] - item.true[0]) > 10 * _LIKE_ITS_TRUTH * size:
+            apart.append(f"{name} {number(item.values[0], 4)} instead of {number(item.true[0], 4)}{spaced(item.unit)}")
+    if apart:
+        yield f"the first row is not the scene's start: {', '.join(apart)}"
