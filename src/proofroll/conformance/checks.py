@@ -14,7 +14,15 @@ from typing import Any
 from unittest import SkipTest
 
 from proofroll.conformance import building, declarations, motion, response
-from proofroll.conformance.subject import Subject, UnlikeSceneError, checked_on, failure_message, scenes, truth_scenes
+from proofroll.conformance.subject import (
+    Subject,
+    UnlikeSceneError,
+    checked_on,
+    contrasts,
+    failure_message,
+    scenes,
+    truth_scenes,
+)
 
 # Outcome of a check in a separate process; these processes, one for each formulation and preset of an engine.
 _PASSED, _SKIPPED, _FAILED = "passed", "skipped", "failed"
@@ -203,6 +211,10 @@ def runs(engine: Any) -> Iterator[tuple[str, Callable[[], None]]]:
                         continue  # `provides_for_some_scene` checks that some scene is left
                     subject = Subject(engine, settings, scene)
                     yield f"{check.__name__}[{formulation}-{preset}-{name}]", partial(check, subject)
+            for name, (scene, without) in contrasts().items():
+                if checked_on(engine, formulation, scene):
+                    subject = Subject(engine, settings, scene)
+                    yield f"law_acts[{formulation}-{preset}-{name}]", partial(response.law_acts, subject, without)
 
 
 def _first(engine: Any, settings: Any) -> Subject | None:

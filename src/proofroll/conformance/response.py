@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import math
 from functools import cache
 from typing import TYPE_CHECKING
@@ -10,8 +11,8 @@ from unittest import SkipTest
 
 import numpy as np
 
-from proofroll.conformance.subject import Subject, UnlikeSceneError, truth_scenes
-from proofroll.core.arrays import FloatArray
+from proofroll.conformance.subject import Subject, UnlikeSceneError, contrasts, truth_scenes
+from proofroll.core.arrays import FloatArray, largest_difference
 from proofroll.core.certificate import first_difference
 from proofroll.core.dataset import columns_of, part, scales
 from proofroll.core.engine import precision_of
@@ -35,6 +36,8 @@ _MOST = 0.1
 # Tolerance in changes by halving the step: an error of first order is twice that, and as much again is for other terms.
 _MARGIN = 4.0
 _ROUND_OFF = 1e-8
+# Least change of a velocity by a law, in changes by accelerations as at the start, that shows whether it acts.
+_SEEN = 1e-2
 # Time before and after an event [s] between which only jumps change the state.
 _MOMENT = 1e-7
 
@@ -78,6 +81,33 @@ def moves_as_the_truth(subject: Subject) -> None:
                 f"{name} is off by {number(error * scale)} {unit}, {error:.2g} of its scale in a run of "
                 f"{times[-1]:.2g} s, {number(scale)} {unit}; allowed {allowed:.2g}",
             )
+
+
+def law_acts(subject: Subject, without: Scene) -> None:
+    """Check: a run under a law is nearer to the truth with it than to that of the scene ``without`` it.
+
+    However soft an engine is, a limit of efforts, a restitution or a target that it drops shows here.
+    """
+    times = _times(subject.settings.dt if subject.fixed_step else None)
+    true, other = (_trajectory(scene.digest, tuple(times.tolist())) for scene in (subject.scene, without))
+    sizes = _sizes(subject.scene, times[-1], true)
+    moved = _moved(subject, times, true)
+    parts = {
+        name: largest_difference(true[name].to_numpy()[1:], other[name].to_numpy()[1:]) / sizes[name]
+        for name in ("v_WB", "w_WB")
+        if name in moved and name in other
+    }
+    name = max(parts, key=lambda key: parts[key], default="")
+    if not name or parts[name] <= _SEEN:
+        raise SkipTest("the law changes nothing within this run")
+    with_law, without_it = (largest_difference(moved[name], known[name].to_numpy()[1:]) for known in (true, other))
+    if not with_law < without_it:
+        unit = true[name].attrs["units"]
+        raise UnlikeSceneError(
+            subject,
+            f"{name} is off by {number(with_law)} {unit} from the truth, and by {number(without_it)} {unit} from that "
+            "of the scene without this law: the engine does not follow it",
+        )
 
 
 def _times(step: float | None) -> FloatArray:
@@ -145,4 +175,5 @@ def _trajectory(digest: str, times: tuple[float, ...]) -> xr.Dataset:
     """Truth of the scene with this digest at these times, cached for all engines and presets."""
     from proofroll.core.truth import truth
 
-    return truth(next(scene for scene in truth_scenes().values() if scene.digest == digest), np.array(times))
+    known = [*truth_scenes().values(), *itertools.chain.from_iterable(contrasts().values())]
+    return truth(next(scene for scene in known if scene.digest == digest), np.array(times))

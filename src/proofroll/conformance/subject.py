@@ -7,7 +7,7 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cache, cached_property
-from typing import Any
+from typing import Any, TypeVar
 from unittest import SkipTest
 
 import numpy as np
@@ -23,6 +23,7 @@ from proofroll.core.multi_element import build
 from proofroll.core.plugins import load_element_kinds
 from proofroll.core.scene import Scene
 
+T = TypeVar("T")
 # Simulated time of a check of the motion [s]: the ball goes a sixth of a turn round the cylinder.
 _SPAN = 0.05
 # Number of samples of a run for the diagnosis, and their number per natural time: splines through them resolve it.
@@ -39,8 +40,14 @@ def truth_scenes() -> dict[str, Scene]:
     return {name: scene for kind in load_element_kinds() for name, scene in _made(kind.truth_scenes).items()}
 
 
+def contrasts() -> dict[str, tuple[Scene, Scene]]:
+    """Scenes in whose run one law acts, with the same scene without it, of kinds that have such, by the law's name."""
+    kinds = [kind for kind in load_element_kinds() if hasattr(kind, "contrasts")]
+    return {name: scenes for kind in kinds for name, scenes in _made(kind.contrasts).items()}
+
+
 @cache
-def _made(by: Callable[[], Mapping[str, Scene]]) -> Mapping[str, Scene]:
+def _made(by: Callable[[], Mapping[str, T]]) -> Mapping[str, T]:
     return by()
 
 

@@ -7,7 +7,9 @@ import pytest
 import xarray as xr
 
 from proofroll.conformance import response
+from proofroll.conformance.subject import Subject, UnlikeSceneError, contrasts
 from proofroll.core.events import Event, with_events
+from proofroll.core.plugins import load_engine
 from proofroll.files.scene_file import load_scene
 
 STEP, APART = 1e-3, 2e-8
@@ -35,3 +37,21 @@ def test_jumps_that_follow_at_once_count_together(
     assert set(found) == allowed
     if names:
         assert found["p_WB"] == pytest.approx(3 * STEP)
+
+
+@pytest.mark.parametrize(
+    ("law", "formulation"),
+    [("limit_of_efforts", "joints"), ("held_targets", "joints"), ("restitution", "geoms")],
+)
+def test_a_law_that_an_engine_drops_is_found(law: str, formulation: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """An honest engine is nearer to the truth with a law; one that runs the scene without it fails, however soft."""
+    pytest.importorskip("mujoco")
+    engine, (scene, without) = load_engine("mujoco"), contrasts()[law]
+    settings = engine.presets[formulation]["matched"]
+    response.law_acts(Subject(engine, settings, scene), without)
+    moved = response._moved
+    monkeypatch.setattr(
+        response, "_moved", lambda _, times, true: moved(Subject(engine, settings, without), times, true)
+    )
+    with pytest.raises(UnlikeSceneError, match="the engine does not follow it"):
+        response.law_acts(Subject(engine, settings, scene), without)

@@ -13,6 +13,7 @@ from proofroll.core.scene import Scene
 from proofroll.core.validation import all_units_of
 from proofroll.elements.mechanism.run.element import MechanismElement, the_mechanism
 from proofroll.elements.mechanism.run.reader import KINDS, made_mechanism
+from proofroll.elements.mechanism.scene.control import Control
 from proofroll.elements.mechanism.scene.drives import Actuator, Coupling
 from proofroll.elements.mechanism.scene.published import read_published
 from proofroll.elements.mechanism.scene.signal import Formula
@@ -74,6 +75,7 @@ def _with_drive(scene: Scene, drive: str) -> Scene:
 
 # s: the spheres then hit and stick at 0.03822 s, an impact that half a step resolves better than a step of 2e-3 s does.
 _SOONER = 0.06178
+_RATE = 50.0  # Hz, of a controller; common steps divide the time between its instants
 _DRIVES = ("servo", "limit", "target", "coupling")
 
 
@@ -129,6 +131,22 @@ class MechanismKind:
         scenes["two_spheres"] = _sooner(load_scene("two_spheres", friction=0.5), _SOONER)
         scenes |= {f"{_PLAIN}-{law}": _with_law(plain, law, value) for law, value in _LAWS.items()}
         return scenes | {f"{_PLAIN}-{drive}": _with_drive(plain, drive) for drive in _DRIVES}
+
+    @staticmethod
+    def contrasts() -> Mapping[str, tuple[Scene, Scene]]:
+        """Scenes in whose run one law acts, each with the same scene without it; see :mod:`proofroll.conformance`."""
+        from proofroll.files.scene_file import load_scene
+
+        plain = load_scene(_PLAIN)
+        held = _with_drive(plain, "target")
+        (servo,) = the_mechanism(held).mechanism.actuators
+        resting = _changed(held, f"{held.name}-still", actuators=(replace(servo, target=1.0),))
+        spheres = [_sooner(load_scene("two_spheres", friction=0.0, restitution=e), _SOONER) for e in (0.8, 0.0)]
+        return {
+            "limit_of_efforts": (_with_drive(plain, "limit"), _with_drive(plain, "servo")),
+            "held_targets": (_changed(held, f"{held.name}-held", control=Control(_RATE, (servo.name,))), resting),
+            "restitution": (spheres[0], spheres[1]),
+        }
 
     @staticmethod
     def hypotheses() -> Sequence[Hypothesis]:
