@@ -92,7 +92,7 @@ def law_acts(subject: Subject, without: Scene) -> None:
     true, other = (_trajectory(scene.digest, tuple(times.tolist())) for scene in (subject.scene, without))
     sizes = _sizes(subject.scene, times[-1], true)
     moved = _moved(subject, times, true)
-    parts = {
+    parts: dict[str, float] = {
         name: largest_difference(true[name].to_numpy()[1:], other[name].to_numpy()[1:]) / sizes[name]
         for name in ("v_WB", "w_WB")
         if name in moved and name in other

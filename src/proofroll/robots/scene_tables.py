@@ -94,7 +94,7 @@ def tables_of(file: RobotFile, robot: Robot, start: RobotStates, values: Mapping
             _joint(robot, joint, names, start, values) | (_guess(joint, start) if joint.name in following else {})
             for joint in robot.moving
         ],
-        "loops": [_loop(robot, loop, names) for loop in (*robot.loops, *_pulling(robot))] if held else [],
+        "loops": [_loop(robot, link, names) for link in _links(robot)] if held else [],
         "points": [
             {"name": name, "body": name, "position": body.com.tolist()}
             for joint, (name, body) in zip(robot.moving, bodies, strict=True)
@@ -233,11 +233,12 @@ def _between(robot: Robot, link: RobotLoop | Cord) -> set[str]:
     return carriers(link.body_a) ^ carriers(link.body_b)
 
 
-def _pulling(robot: Robot) -> list[Cord]:
-    """Cords between bodies that move relative to each other, with names that no joint and no loop has."""
-    taken = {item.name for item in (*robot.joints, *robot.loops)}
+def _links(robot: Robot) -> list[RobotLoop | Cord]:
+    """Loops, and cords between bodies that move relative to each other, with names that no joint and no loop has."""
+    taken = {joint.name for joint in robot.joints} | {loop.name for loop in robot.loops}
     cords = [cord for cord in robot.cords if _between(robot, cord)]
-    return [replace(cord, name=f"{cord.name}_cord") if cord.name in taken else cord for cord in cords]
+    named = (replace(cord, name=f"{cord.name}_cord") if cord.name in taken else cord for cord in cords)
+    return [*robot.loops, *named]
 
 
 def held_start(robot: Robot, start: RobotStates) -> RobotStates:

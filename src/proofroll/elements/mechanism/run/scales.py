@@ -30,9 +30,11 @@ def scales(element: MechanismElement, truth: xr.Dataset, least: float) -> dict[s
     """
     variables, mechanism = truth.variables, element.mechanism
     placed = Placed(mechanism, *(variables[name].values for name in ("time", "p_WB", "v_WB", "w_WB", "q_WB")))
-    centres = [(placed.point(body.name, body.com), placed.velocity(body.name, body.com)) for body in mechanism.bodies]
-    ways = max(_way(placed.p_WB), *(_way(place) for place, _ in centres))
-    speed = max(_largest(placed.v_WB), *(_largest(rate) for _, rate in centres))
+    # where no motion is unique there is none
+    bodies = mechanism.bodies if np.isfinite(placed.q_WB).all() else ()
+    centres = [(placed.point(body.name, body.com), placed.velocity(body.name, body.com)) for body in bodies]
+    ways = max([_way(placed.p_WB), *(_way(place) for place, _ in centres)])
+    speed = max([_largest(placed.v_WB), *(_largest(rate) for _, rate in centres)])
     sizes = {"p_WB": ways, "v_WB": speed, "w_WB": _largest(placed.w_WB)}
     reach, alone = _way(variables["positions"].values), not element.own_length
     natural_sizes = mechanism.natural_sizes(reach, speed) if alone and reach and speed else element.sizes
