@@ -410,16 +410,6 @@ class ContactDynamics:
         sums = np.where(moved <= RANK, self.sums[:, :count] @ pressed, np.nan)
         return fields, np.where(found.determinate[:count], pressed, np.nan), sums
 
-    def wrench(self, q: Array, v: Array, mode: ContactMode, more: Array) -> Array:
-        """Wrenches of joints and loops at one instant with ``more`` forces of contacts on first bodies [N].
-
-        Shape (joints + loops, 6) [N, N m]; ``more`` has shape (contacts, 3).
-        """
-        found, joints = self.solve(q, v, mode), mode_of_joints(self.equations.switched, self.contacts, mode)
-        force = found.force.copy()
-        force[: len(more)] += more
-        return np.asarray(self.equations.sample(q, v, joints, 0.0, *self._loads(found.state, force))["wrench"])
-
     def _loads(self, state: ContactsNow, force: Array) -> tuple[Array, Array]:
         """Loads by contacts of bodies: along the velocities, and about the world's origin, (bodies + 1, 6)."""
         count = len(self._bodies)

@@ -14,7 +14,6 @@ from proofroll.core.diagnosis.samples import run_and_truth
 from proofroll.core.diagnosis.vectors import ReportedVector
 from proofroll.elements.mechanism.diagnosis.equations import is_motion, placed_of
 from proofroll.elements.mechanism.dynamics.placed import Placed
-from proofroll.elements.mechanism.run.contacts.family import Family
 from proofroll.elements.mechanism.run.contacts.observables import (
     PRESSES,
     SLIDES,
@@ -241,55 +240,6 @@ def convex_cone_from_rest(evidence: Evidence) -> Iterator[Cause]:
         )
 
 
-@hypothesis(
-    "convex cone in a slip",
-    "first reactions of joints are those with further normal forces, and their friction, at contacts that slide; the "
-    "engine declares the convex cone, which lifts what slips",
-)
-def convex_cone_in_a_slip(evidence: Evidence) -> Iterator[Cause]:
-    """Hypothesis: a certificate at the start of a slip has the forces by which the convex cone lifts what slides."""
-    from scipy.optimize import nnls
-
-    element, name = evidence.element, "forces"
-    line = next((line for line in evidence.lines if line["quantity"] == name and not line["holds"]), None)
-    declared = any(Family.CONVEX in str(line["quantity"]) for line in evidence.lines)
-    touching, followed = element.touching, follow_contacts(element.start)
-    if line is None or not declared or touching is None:
-        return
-    found, expected = (np.asarray(line[key], dtype=np.float64) for key in ("found", "expected"))
-    slip, closed = followed.slip[0], np.abs(followed.gap[0]) < _SUNK * element.length
-    sliding = np.flatnonzero(closed & (slip > SLIDES * element.speed))
-    if found.shape != expected.shape or not len(sliding):
-        return
-    dynamics, mode = touching
-    contacts, start = element.mechanism.contacts, element.mechanism.start()
-    none = np.zeros((len(contacts), 3))
-    base, columns = dynamics.wrench(*start, mode, none), []
-    for k in sliding.tolist():
-        normal, slide = followed.normal[0, k], followed.slide[0, k]
-        across = slide - normal * (normal @ slide)
-        push = none.copy()
-        push[k] = element.force * (normal - min(contacts[k].friction, 1 / SLIDES) * across / slip[k])
-        columns.append((dynamics.wrench(*start, mode, push) - base)[:, :3].ravel())
-    known = np.isfinite(found) & np.isfinite(expected)
-    away, matrix = (found - expected)[known], np.array(columns).T[known]
-    left = away - matrix @ nnls(matrix, away)[0]
-    says = "convex cone: a contact that slides is pushed apart by μ times the rate at which friction ends its slip"
-    before, after = float(np.abs(away).max(initial=0.0)), float(np.abs(left).max(initial=0.0))
-    fitted = int(np.linalg.matrix_rank(matrix))
-    yield contact_cause(
-        "convex cone",
-        says,
-        "forces of joints at time 0",
-        "N",
-        before,
-        after,
-        _UNCONVEX,
-        fitted,
-        explains=int(known.sum()),
-    )
-
-
 def _as_velocities(start: Placed, rates: list[FloatArray]) -> dict[str, FloatArray]:
     """Fields of a start whose velocities are these accelerations: of bodies at rest, contacts follow both alike."""
     linear, angular = (np.reshape(np.array(rate, dtype=np.float64), start.v_WB.shape) for rate in rates)
@@ -394,7 +344,6 @@ HYPOTHESES = (
     forces_at_start,
     convex_cone,
     convex_cone_from_rest,
-    convex_cone_in_a_slip,
     pyramid,
     friction_factor,
     left_out,

@@ -164,10 +164,10 @@ class MechanismElement:
     @cached_property
     def _pressed(self) -> ContactSolution | None:
         """Accelerations and forces of contact at the start; None: nothing may touch, or they are not unique."""
-        return None if self.touching is None else self.touching[0].solve(*self.mechanism.start(), self.touching[1])
+        return None if self._touching is None else self._touching[0].solve(*self.mechanism.start(), self._touching[1])
 
     @cached_property
-    def touching(self) -> tuple[ContactDynamics, ContactMode] | None:
+    def _touching(self) -> tuple[ContactDynamics, ContactMode] | None:
         """Equations of contacts with laws of joints, and modes at the start; None: no contacts, or no unique modes."""
         from proofroll.elements.mechanism.contact.dynamics import ContactDynamics
 
@@ -317,8 +317,8 @@ class MechanismElement:
         acceleration = (motion.J @ rates + motion.bias)[:-1]
         scale = max(longest(acceleration[:, :3]), self.speed**2 / self.length)
         lasts = first_change(self._equations.switched, *self.mechanism.start(), rates)
-        if self._pressed is not None and self.touching is not None:
-            lasts = min(lasts, self._pressed.lasts(self.touching[1]))
+        if self._pressed is not None and self._touching is not None:
+            lasts = min(lasts, self._pressed.lasts(self._touching[1]))
         elif self.mechanism.contacts:
             acceleration, lasts = np.full_like(acceleration, np.nan), 0.0
         moment = _PART * min(self.natural_time, lasts or np.inf)
@@ -344,8 +344,8 @@ class MechanismElement:
     @cached_property
     def _first(self) -> dict[str, FloatArray]:
         start = self.mechanism.start()
-        if self.touching is not None:
-            return self.touching[0].sample(*start, self.touching[1])[0]
+        if self._touching is not None:
+            return self._touching[0].sample(*start, self._touching[1])[0]
         sample = self._equations.sample(*start)
         return sample | {"wrench": np.full_like(sample["wrench"], np.nan)} if self.mechanism.contacts else sample
 

@@ -271,15 +271,16 @@ class Contacts:
 
         Friction of what sticks misses nothing and lifts nothing; rates of the evaluation before would only seem to.
         """
-        self._on_cone, within = set(), set()
+        self._on_cone, within = set[int](), set[int]()
         for index in range(data.ncon):
             contact = data.contact[index]
             row = int(contact.efc_address)
             if row >= 0:
                 mu, friction = self._slipping(contact)
                 bound = NEAR_CONE * mu * data.efc_force[row]
-                on_cone = np.linalg.norm(data.efc_force[friction]) >= bound
-                (self._on_cone if on_cone and bound > 0 else within).add(self._number(contact))
+                if bound > 0:
+                    on_cone = np.linalg.norm(data.efc_force[friction]) >= bound
+                    (self._on_cone if on_cone else within).add(self._number(contact))
         self._sticking = within - self._on_cone - self._turned
 
     def remember(self, data: Any, rows: Array) -> None:

@@ -11,16 +11,10 @@ import pytest
 import xarray as xr
 
 from proofroll.core.diagnosis import Evidence, diagnose, hypotheses_of
-from proofroll.core.diagnosis.scene_diagnosis import diagnose_scene
-from proofroll.core.first_steps import certificate
-from proofroll.core.multi_element import build
 from proofroll.core.plugins import load_engine
 from proofroll.core.scene import Scene
 from proofroll.core.truth import truth
-from proofroll.elements.mechanism import Body, Joint, Mechanism
 from proofroll.elements.mechanism.diagnosis.contacts import convex_cone_from_rest
-from proofroll.elements.mechanism.run.element import MechanismElement
-from proofroll.elements.mechanism.scene.shapes.geometry import Geometry, Pair
 from proofroll.files.scene_file import load_scene
 from proofroll.running.simulation import simulate
 
@@ -132,25 +126,3 @@ def test_a_convex_cone_is_named_from_rest_with_a_remedy_that_holds(tmp_path: Pat
     true = simulate(scene, "truth", until=0.1, every=0.02)
     for name, allowed in (("p_WB", 4e-4), ("v_WB", 2e-5), ("w_WB", 1e-7)):
         assert float(np.abs(run[name].to_numpy() - true[name].to_numpy()).max()) < allowed, name
-
-
-@pytest.mark.parametrize("corrects", [False, True])
-def test_a_convex_cone_is_named_in_a_slip_with_a_remedy_that_holds(corrects: bool) -> None:
-    """A parcel put on a running belt: the certificate names what lifts it, and with the remedy the model is right."""
-    bodies = (Body("belt", 5.0), Body("parcel", 2.0, inertia=(0.02, 0.02, 0.02)))
-    joints = (
-        Joint("run", "prismatic", "world", "belt", axis=(1, 0, 0), v0=(0.8,)),
-        Joint("float", "free", "world", "parcel", q0=(0, 0, 0.1, 1, 0, 0, 0)),
-    )
-    shapes = (Geometry("top", "belt", "plane"), Geometry("sides", "parcel", "box", size=(0.3, 0.3, 0.2)))
-    pairs = (Pair("carry", ("sides", "top"), 0.3),)
-    made = Mechanism(bodies, joints, geometries=shapes, pairs=pairs, gravity=(0, 0, -9.81))
-    scene, kind = Scene("belt", "", (MechanismElement(made),)), load_engine("mujoco")
-    settings = replace(kind.presets["geoms"]["matched"], cone_correction=corrects)
-    lines = [line.as_dict() for line in certificate(kind, build(kind, scene, settings), scene, settings)]
-    found = diagnose_scene(scene, lines)
-    assert [item.cause.id for item in found] == ([] if corrects else ["convex cone"])
-    assert all(line["holds"] for line in lines if line["difference"] is not None) is corrects
-    for item in found:
-        assert item.cause.after < 1e-6 * item.cause.before
-        assert "cone_correction=true" in item.cause.remedy
