@@ -141,7 +141,7 @@ def outcomes_of(
             an equal share of the time left; what it does not use is for later ones.
         spent: part of the budget that was used before [s].
         interrupted: called with each comparison, judged by the runs that ended, if the user ends the command; ended
-            runs are then told one by one, too, once that takes long.
+            runs have a line each, too, once that takes long.
     """
     from proofroll.running.process import processor_seconds
     from proofroll.running.time_budget import TimeBudget

@@ -86,7 +86,7 @@ def moves_as_the_truth(subject: Subject) -> None:
 def law_acts(subject: Subject, without: Scene) -> None:
     """Check: a run under a law is nearer to the truth with it than to that of the scene ``without`` it.
 
-    However soft an engine is, a limit of efforts, a restitution or a target that it drops shows here.
+    A law that an engine drops shows here, whatever softness it declares.
     """
     times = _times(subject.settings.dt if subject.fixed_step else None)
     true, other = (_trajectory(scene.digest, tuple(times.tolist())) for scene in (subject.scene, without))

@@ -96,7 +96,7 @@ def _unjudged(scene: Scene, comparison: Comparison) -> list[str]:
         for name, item in scene.observables.items()
         if item.role is Role.REACTION and item.unit != "1" and name not in bounds and not item.absent
     ]
-    return [name for name in dict.fromkeys(names) if not (name == "normal_forces" and "contact_forces" in bounds)]
+    return list(dict.fromkeys(names))
 
 
 def _truth_ends(outcome: Outcome) -> list[str]:

@@ -376,7 +376,7 @@ def _states(reference: Reference, variables: Sequence[str]) -> list[str]:
 def _size(reference: Reference, name: str, true: FloatArray, unit: str) -> float:
     """Size to which a percentage refers, but at least a hundredth of its natural size.
 
-    It is the way of places and angles, and of energies, whose zero is anywhere; the largest value of all else.
+    It is the way of places and angles, and of energies, whose zero is anywhere; the largest value or way of all else.
     """
     if unit == "1":
         return 1.0  # of quaternions
@@ -385,8 +385,11 @@ def _size(reference: Reference, name: str, true: FloatArray, unit: str) -> float
         speed = 2 * np.pi / element.natural_time
         sizes = {"m": element.length, "m/s": element.length * speed, "rad/s": speed, "rad": 1.0}
         natural = max(natural, sizes.get(unit, 0.0))
-    size = (largest_distance if unit in {"m", "rad", "J"} else largest_magnitude)(true, reference.vectors(name))
-    whole = reference.sizes.get("energy_error", 0.0) if unit == "J" else 0.0
+    size = largest_distance(true, reference.vectors(name))
+    if unit not in {"m", "rad", "J"}:
+        size = max(size, largest_magnitude(true, reference.vectors(name)))
+    laws = {key: item for key, item in reference.scene.observables.items() if item.role is Role.RESIDUAL}
+    whole = max((reference.sizes.get(key, 0.0) for key, item in laws.items() if item.unit == unit == "J"), default=0.0)
     return max(reference.sizes.get(name, 0.0), size, whole, _LEAST * natural) or 1.0
 
 

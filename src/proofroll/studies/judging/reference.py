@@ -86,10 +86,9 @@ class Reference:
     @property
     def untouched(self) -> bool:
         """True if bodies may touch and none does: no event, and no force of a contact."""
-        forces = [
-            part(self.scene, element, self.dataset).variables.get("contact_forces") for element in self.scene.elements
-        ]
-        known = [item.values for item in forces if item is not None and item.size]
+        variables = self.dataset.variables
+        forces = [name for name, item in self.scene.observables.items() if not item.at_impacts and name in variables]
+        known = [variables[name].values for name in forces]
         return bool(known) and not self.events and not any(np.any(values != 0) for values in known)
 
     def shared(self, routes: Collection[str]) -> str:

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 def scales(element: MechanismElement, truth: xr.Dataset, least: float) -> dict[str, float]:
-    """Size of each observable: ways of places and angles, largest values of rates and reactions, and natural sizes.
+    """Size of each observable: ways of places and angles, sizes of rates, largest reactions, and natural sizes.
 
     Ways and speeds are the largest of all origins and centres of mass. A mechanism without a length of its own has its
     natural sizes from these.
@@ -34,8 +34,8 @@ def scales(element: MechanismElement, truth: xr.Dataset, least: float) -> dict[s
     bodies = mechanism.bodies if np.isfinite(placed.q_WB).all() else ()
     centres = [(placed.point(body.name, body.com), placed.velocity(body.name, body.com)) for body in bodies]
     ways = max([_way(placed.p_WB), *(_way(place) for place, _ in centres)])
-    speed = max([_largest(placed.v_WB), *(_largest(rate) for _, rate in centres)])
-    sizes = {"p_WB": ways, "v_WB": speed, "w_WB": _largest(placed.w_WB)}
+    speed = max([_rate(placed.v_WB), *(_rate(rate) for _, rate in centres)])
+    sizes = {"p_WB": ways, "v_WB": speed, "w_WB": _rate(placed.w_WB)}
     reach, alone = _way(variables["positions"].values), not element.own_length
     natural_sizes = mechanism.natural_sizes(reach, speed) if alone and reach and speed else element.sizes
     natural = {"attitudes": 1.0, "energy_error": natural_sizes["J"], "drift": natural_sizes["m"]}
@@ -46,8 +46,10 @@ def scales(element: MechanismElement, truth: xr.Dataset, least: float) -> dict[s
         name, variable = item.name, variables.get(item.name)
         values = np.zeros(1) if variable is None else variable.values
         vectors = item.vectors or (_triples(values) if variable is not None and variable.dims[-1] == "xyz" else None)
-        rate = item.role == Role.REACTION or item.unit.endswith("/s")
-        own = largest_magnitude(np.nan_to_num(values), vectors) if rate else largest_distance(values, vectors)
+        known = np.nan_to_num(values)
+        own = 0.0 if item.role == Role.REACTION else largest_distance(known, vectors)
+        if item.role == Role.REACTION or item.unit.endswith("/s"):
+            own = max(own, largest_magnitude(known, vectors))
         sizes[name] = sizes.get(name) or natural.get(name) or own
         if alone:
             sizes[name] = max(sizes[name], least * natural_sizes.get(item.unit, 0.0))
@@ -63,5 +65,7 @@ def _way(places: FloatArray) -> float:
     return largest_distance(places, _triples(places))
 
 
-def _largest(rates: FloatArray) -> float:
-    return largest_magnitude(np.nan_to_num(rates), _triples(rates))
+def _rate(rates: FloatArray) -> float:
+    """Largest value or change of a rate: a steady one has its size, and one that swings has twice its amplitude."""
+    known = np.nan_to_num(rates)
+    return max(largest_magnitude(known, _triples(rates)), largest_distance(known, _triples(rates)))
