@@ -97,6 +97,10 @@ def contact_forces(
     bounds = np.zeros(len(friction)) if bounds is None else bounds
     pressing = [None] * len(friction) if pressed_by is None else pressed_by
     turns = any(by is not None for by in pressing)
+    if not (np.isfinite(G).all() and np.isfinite(c).all()):
+        raise Refused(
+            f"contacts {', '.join(names)} at t = {time:.6g} s: one of them has no direction: centres or axes coincide"
+        )
     f = np.zeros(len(c)) if turns else _guessed(G, c, friction, sliding, bounds, guess)
     static = friction if static is None else static
     least = _RESTS * float(np.abs(c).max())

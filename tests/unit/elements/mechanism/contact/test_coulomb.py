@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from proofroll.core.errors import NotUnique
+from proofroll.core.errors import NotUnique, Refused
 from proofroll.elements.mechanism.contact.coulomb import contact_forces, robust_forces
 
 SMALL = 1e-9  # of the loads: where the sweeps end
@@ -93,3 +93,9 @@ def test_a_contact_and_joints_that_rub_hold_together_in_any_distribution() -> No
     assert np.abs(c + J @ J.T @ f.ravel()).max() < 1e-12
     assert np.linalg.norm(f[0, 1:]) <= mu * f[0, 0]
     assert (np.linalg.norm(f[1:], axis=1) <= bounds[1:]).all()
+
+
+def test_a_contact_without_a_direction_is_refused() -> None:
+    """Where centres of two spheres coincide no direction of their force is defined, which is said in one line."""
+    with pytest.raises(Refused, match="contacts a, b at t = 0 s: one of them has no direction"):
+        contact_forces(np.full((6, 6), np.nan), np.zeros(6), np.ones(2), [None, None], ["a", "b"])
