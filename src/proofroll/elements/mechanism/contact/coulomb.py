@@ -97,10 +97,7 @@ def contact_forces(
     bounds = np.zeros(len(friction)) if bounds is None else bounds
     pressing = [None] * len(friction) if pressed_by is None else pressed_by
     turns = any(by is not None for by in pressing)
-    if not (np.isfinite(G).all() and np.isfinite(c).all()):
-        raise Refused(
-            f"contacts {', '.join(names)} at t = {time:.6g} s: one of them has no direction: centres or axes coincide"
-        )
+    _check_directions(G, c, names, time)
     f = np.zeros(len(c)) if turns else _guessed(G, c, friction, sliding, bounds, guess)
     static = friction if static is None else static
     least = _RESTS * float(np.abs(c).max())
@@ -134,6 +131,14 @@ def contact_forces(
     if together is not None:
         return together
     raise Refused(f"forces of the contacts {', '.join(names)} at t = {time:.6g} s are not found in {_SWEEPS} sweeps")
+
+
+def _check_directions(G: Array, c: Array, names: Sequence[str], time: float) -> None:
+    """Refuse contacts whose normal is not defined."""
+    if not (np.isfinite(G).all() and np.isfinite(c).all()):
+        raise Refused(
+            f"contacts {', '.join(names)} at t = {time:.6g} s: one of them has no direction: centres or axes coincide"
+        )
 
 
 def _guessed(
