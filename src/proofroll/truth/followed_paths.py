@@ -25,6 +25,10 @@ TOLERANCES = 1e-14, 3e-14
 # Relative margin of a decision below which uncertainties of the parameters may change it.
 CLOSE = 1e-9
 
+# Fields whose error at a single sample is of that sample alone, as that of friction just before a slip stops: its
+# direction is known to the error of the slip by its speed.
+_FORCES = {"wrench", "links", "pressed", "sums"}
+
 # Accuracies of a time by which the second route is followed beyond an early end of the first, to see its reason, too.
 _BEHIND = 10
 
@@ -164,7 +168,10 @@ def two_route_motion(
     bars, differences, least, step = {}, {}, round_off(fields, placed), _of_a_step(mechanism, masked, units)
     for field, values in fields.items():
         difference = largest(np.where(np.isnan(values), np.nan, others[field]) - values)
-        bars[field] = np.maximum.accumulate(SAFETY * difference + left[field] + least[field]) + step[field]
+        size = left[field] + least[field]
+        lasting = np.minimum(difference, [*difference[:1], *difference[:-1]]) if field in _FORCES else difference
+        errors = np.maximum.accumulate(SAFETY * lasting + size)
+        bars[field] = np.maximum(SAFETY * difference + size, errors) + step[field]
         differences[field] = float(difference[one.time < parted].max(initial=0.0))
     bars["work"] += unresolved
     reach = np.maximum(units.length, np.maximum(largest(placed.p_WB), largest(placed.points)))

@@ -55,6 +55,7 @@ from proofroll.truth.switching.stopping_slip import StoppingSlip
 
 # Least deceleration of rebounds whose time is summed, in natural units; below it is round-off.
 _PULL = 1e-9
+_GRIP = 2e-14  # error of the margin of a grip in both routes, by its barriers: of times, 1e-14 is seen
 _SOON = 1e-3  # natural time by which a Runge-Kutta step shows a motion that begins smoothly: its error is below 1e-15
 
 
@@ -182,7 +183,7 @@ class ContactStretches(ContactWalks):
             lifted = EventKind.LIFT_OFF, self.contacts[k].name
             return Transition(stretch.last, opened(self.contacts, stretch.mode, k), (lifted,))
         if kind in {"break", "grip"}:
-            return self._broken(stretch, k)
+            return replace(self._broken(stretch, k), blur=_GRIP * max(1.0, stretch.end) * (kind == "grip"))
         return self._stopped(stretch, k) if kind == "still" else self._impact(stretch, k)
 
     def jumped(self, stretch: Stretch[ContactMode]) -> Transition[ContactMode]:
