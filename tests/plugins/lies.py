@@ -86,7 +86,8 @@ def _times() -> Iterator[Lie]:
     yield Lie("a clock 1 % slow from the start", (*BALLS, *MECHANISMS), _FIRST, slow, begins=AT_ONCE)
     yield Lie("a clock 1 % slow from the start of a slide", ("sled",), _PLACES, slow, known, begins=AT_ONCE)
     yield Lie("a clock 1 % slow", ALL, _PLACES, slow, known)
-    yield Lie("frozen at the start", ALL, _PLACES, lambda m: m.at(0.0), _OMITTED)  # all was at rest
+    # as all would be that began at rest where nothing pulls
+    yield Lie("frozen at the start", ALL, _PLACES, lambda m: m.at(0.0), (*_OMITTED, "the start was not taken"))
     yield Lie("frozen from the middle on", ALL, _PLACES, lambda m: m.at(min(m.t, m.until / 2)))
     yield Lie("every other sample repeated", ALL, _PLACES, lambda m: m.at(int(m.t / EVERY / 2 + 1e-9) * 2 * EVERY))
     yield Lie("back again from the middle on", ALL, _PLACES, lambda m: m.at(min(m.t, m.until - m.t)))

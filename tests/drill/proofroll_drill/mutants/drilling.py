@@ -169,9 +169,11 @@ def _built(kind: type[Mutant], scene: Scene) -> tuple[Any, list[Line]]:
 
 
 def _judged(reference: Reference, dataset: Any, plain: Sequence[Judgement]) -> list[Judgement]:
-    """Verdicts of all observables that a run has; ``plain``: of the engine without the fault."""
+    """Verdicts of what a run has, but of sums over its samples; ``plain``: of the engine without the fault."""
     found, of_method = [], {item.observable: item.error for item in plain}
     for name, values in run_values.observables_of(reference, dataset).items():
+        if reference.scene.observables[name].sums_samples:
+            continue
         true, size = reference.true(name, values), reference.sizes.get(name, 1.0)
         least = max(_TOLERANCE * size, _OF_METHOD * of_method.get(name, 0.0), 4 * true.error_bar)
         allowance = Allowance(name, reference.scene.observables[name].unit, least, size)
