@@ -102,7 +102,9 @@ def event_observables(mechanism: Mechanism) -> Iterator[Observable]:
     """Observables of the events of contacts, joints and efforts."""
     if mechanism.has_events:
         meaning = "times of all events of contacts, joints and efforts"
-        yield Observable("event_times", "s", meaning, Role.EVENT, asked_for=False, watched=True)
+        # of efforts at their limits no engine tells the times
+        watched = bool(mechanism.contacts)
+        yield Observable("event_times", "s", meaning, Role.EVENT, asked_for=False, watched=watched)
         meaning = "events of another kind than the truth's"
         yield Observable(EVENT_ORDER, "events", meaning, Role.EVENT, asked_for=False)
 
