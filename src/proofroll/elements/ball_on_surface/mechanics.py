@@ -12,7 +12,8 @@ from proofroll.core.arrays import FloatArray, cross
 from proofroll.core.bounces import Course
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.surfaces import Declared
-from proofroll.elements.mechanism.run.contacts.on_wall import energy, resistance_moment
+from proofroll.elements.mechanism.run.contacts.on_wall import energy
+from proofroll.elements.mechanism.run.contacts.on_wall import resistance_moment as resistance_moment  # noqa: PLC0414 -- public here
 
 # Speed of a ball about to move from rest, relative to that of a fall by one radius: it has a direction and no effect.
 _SETTING_OFF = 1e-12
