@@ -52,8 +52,10 @@ class ImpactSeries:
                 continue
             last, middle, first = (impacts[-1 - cycles * length] for cycles in range(3))
             period, before = last.time - middle.time, middle.time - first.time
+            if not 0 <= last.speed < middle.speed:
+                continue
             ratio = last.speed / middle.speed
-            if ratio < 1 and period < before and abs(period / before - ratio) <= _ALIKE:
+            if period < before and abs(period / before - ratio) <= _ALIKE:
                 hit = (each.contacts for each in self._all if each.time > middle.time)
                 return GeometricSeries(ratio, period * ratio / (1 - ratio), period, frozenset().union(*hit))
         return None

@@ -162,3 +162,9 @@ def test_the_error_of_impacts_cut_short_is_within_the_bars(monkeypatch: pytest.M
     assert off < float(rough.bars["p_WB"][-1])
     rests = [next(event for event in each.events if event.kind == "settle") for each in (rough, fine)]
     assert rests[0].time_low < rests[1].time < rests[0].time_high
+
+
+def test_contacts_that_meet_without_speed_form_no_series() -> None:
+    """Impacts of speed zero, as of bodies that start inside each other, have no ratio of speeds."""
+    impacts = ImpactSeries()
+    assert [impacts.after("", Impact(time, frozenset({0}), 0.0)) for time in (0.0, 0.1, 0.15, 0.175)] == [None] * 4
