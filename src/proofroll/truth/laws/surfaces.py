@@ -128,7 +128,8 @@ def near(shape: SurfaceShape, x: Array) -> tuple[Array, Array]:  # noqa: PLR0911
         return dot(y, shape.axis), np.broadcast_to(shape.axis, x.shape)
     if shape.kind in {"sphere", "bowl"}:
         away, sign = norm(y), 1.0 if shape.kind == "sphere" else -1.0
-        return sign * (away - shape.radius), none if not shape.radius else sign * y / away[..., None]
+        smooth = (away > 0) & (shape.radius > 0)
+        return sign * (away - shape.radius), np.divide(sign * y, away[..., None], out=none, where=smooth[..., None])
     if shape.kind == "ellipsoid":  # to first order: exact on the surface, where it is asked
         y = turned_back(shape.frame, y)
         level, slope = norm(y / shape.half), norm(y / shape.half**2)
