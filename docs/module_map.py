@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import sys
+from functools import cache
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -15,6 +16,7 @@ Each module of `src/proofroll/` and the first line of its docstring. `docs/modul
 """
 
 
+@cache
 def modules(source: Path = SOURCE) -> dict[str, str]:
     """First docstring line of each module, by its path below ``source``; empty for a module without a docstring."""
     paths = sorted(source.rglob("*.py"), key=lambda path: (path.parent.parts, path.name))

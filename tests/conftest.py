@@ -87,12 +87,14 @@ class _TogetherWhatShares(LoadScopeScheduling):
         # A browser and pages are shared by a whole folder, truths by the rows of a comparison and by the engines that
         # are held against them; the many other checks of conformance share nothing dear.
         check = nodeid.rpartition("-")[2] if "moves_as_the_truth" in nodeid else nodeid
+        # Files directly in tests/unit read the sources of the package, which are parsed once in a process.
+        source = path.count("/") == 2
         # The comparison accuracy runs many cases of the paper's, which are stored by then.
         rows = nodeid.partition("-")[0].replace("[accuracy", "[paper")
         # Where a mark chooses, tests of a unit share little beside what each of them takes, but with those that differ
         # in their last parameter; in one file they would keep one process busy.
         chosen = self.config.option.markexpr not in {"", "not drill", "not nightly"}
-        unit = nodeid.rpartition("-")[0] or nodeid if chosen else path
+        unit = "sources" if source else nodeid.rpartition("-")[0] or nodeid if chosen else path
         return {"report": folder, "agreement": rows, "conformance": check, "unit": unit}.get(folder, path)
 
 

@@ -8,7 +8,6 @@ import re
 import subprocess
 import sys
 from collections.abc import Callable
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -588,95 +587,6 @@ def test_regimes_of_a_file_without_a_map(proofroll: Proofroll, tmp_path: Path) -
     assert 'study = "regimes"' in err
     assert err.startswith("proofroll: ")
     assert err.count("\n") == 1
-
-
-def fresh(code: str) -> set[str]:
-    """Modules that are loaded after some code ran in a new interpreter."""
-    script = f"{code}\nimport sys, json\nprint('\\n@' + json.dumps(sorted(sys.modules)))"
-    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True, env=os.environ)
-    return set(json.loads(done.stdout.rpartition("\n@")[2]))
-
-
-HELP = """
-import sys
-from proofroll.cli import main
-for words in (["--help"], ["--version"], ["run", "--help"], ["compare", "--help"]):
-    sys.argv = ["proofroll", *words]
-    try:
-        main()
-    except SystemExit as end:
-        assert not end.code
-"""
-
-
-def test_help_is_light() -> None:
-    """Help and version load no engine, no array library and no plots."""
-    found = fresh(HELP)
-    assert {"xarray", "plotly", "numpy", "scipy", "mujoco", "pinocchio", "exudyn", "heyoka"} & found == set()
-    assert not any(name.startswith("proofroll.engines.") for name in found)
-
-
-def test_describing_an_engine_is_light() -> None:
-    """What an engine is is told without scipy, xarray and pandas, which take longer to load than all the rest."""
-    engines = ["projection", "reduced", *(name for name in ("exudyn", "mujoco") if find_spec(name))]
-    found = fresh(f"from proofroll.running.identity import describe\nfor name in {engines}:\n    describe(name)")
-    assert {f"proofroll.engines.{name}" for name in engines} <= found
-    assert {"xarray", "pandas", "scipy.integrate", "scipy.spatial", "scipy.optimize"} & found == set()
-
-
-WORKER = """
-import dataclasses
-from proofroll.files.scene_file import load_scene
-from proofroll.running.case import EngineFacts
-from proofroll.running.identity import resolve
-from proofroll.running.run_case import run
-from proofroll.studies.cases import case_of
-
-facts = EngineFacts(**resolve("reduced", {}))
-case = case_of("inclined_plane", load_scene("inclined_plane"), {}, facts, 0.1, 0.01)
-assert run(dataclasses.asdict(case), "run.npz")["status"] == "done"
-"""
-COMMAND = """
-import sys
-from proofroll.cli import main
-sys.argv = "proofroll run inclined_plane --engine reduced --until 0.1".split()
-try:
-    main()
-except SystemExit as end:
-    assert not end.code
-"""
-
-
-@pytest.mark.parametrize("code", [WORKER, COMMAND], ids=["worker", "command"])
-def test_a_run_is_light(code: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    """A run is made, written, read and shown without the libraries of datasets and netCDF, half of the imports."""
-    monkeypatch.chdir(tmp_path)
-    assert {"xarray", "pandas", "scipy.io"} & fresh(code) == set()
-
-
-MISTYPED = """
-import sys
-from proofroll.cli import main
-sys.argv = "proofroll {}".split()
-try:
-    main()
-except SystemExit as end:
-    assert end.code == 2
-"""
-
-
-@pytest.mark.parametrize(
-    ("words", "heavy"),
-    [
-        ("judge nofile.nc", {"proofroll.files.scene_file"}),
-        ("judge nosuch nofile.csv", {"proofroll.files.scene_file"}),
-        ("run nosuch --engine mujoco --set length=1", {"proofroll.report.run.run", "scipy"}),
-        ("run pendulum --engine mujoco --set lenth=1", {"proofroll.report.run.run"}),
-    ],
-)
-def test_a_wrong_name_is_answered_before_more_is_imported(words: str, heavy: set[str]) -> None:
-    """A file, scene or parameter that there is not costs a light start, not the libraries of runs and datasets."""
-    assert ({"xarray", "pandas", "rich.console"} | heavy) & fresh(MISTYPED.format(words)) == set()
 
 
 @pytest.mark.own_workers

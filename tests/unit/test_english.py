@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from source_code import statements, tree
 
 ROOT = Path(__file__).resolve().parents[2]
 FOLDERS = ("src", "benchmarks", "papers", "tests/drill", "tests/plugins", "examples/engines")
@@ -27,26 +28,18 @@ _ENTRY = re.compile(
 )
 
 
-def _statements(node: ast.AST) -> Iterator[ast.AST]:
-    """A module or a statement with all statements in it; expressions, which are most of a tree, have no docstring."""
-    yield node
-    for child in ast.iter_child_nodes(node):
-        if isinstance(child, ast.stmt | ast.ExceptHandler | ast.match_case):
-            yield from _statements(child)
-
-
-def _docstrings(source: str) -> Iterator[tuple[int, str]]:
+def _docstrings(module: ast.Module) -> Iterator[tuple[int, str]]:
     """Line and text of every docstring of a module."""
-    for node in _statements(ast.parse(source)):
+    for node in statements(module):
         if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef):
             text = ast.get_docstring(node)
             if text:
                 yield node.body[0].lineno, text
 
 
-def hard_to_read(source: str) -> Iterator[str]:
+def hard_to_read(module: ast.Module) -> Iterator[str]:
     """Line and reason of every docstring that opens with a clause or has a vague word."""
-    for line, text in _docstrings(source):
+    for line, text in _docstrings(module):
         first = text.splitlines()[0]
         if _OPENS.match(first):
             yield f"{line}: opens with a clause: {first}"
@@ -62,7 +55,7 @@ def test_docstrings_open_with_a_noun_or_a_verb(folder: str) -> None:
     found = [
         f"{path.relative_to(ROOT)}:{problem}"
         for path in sorted((ROOT / folder).rglob("*.py"))
-        for problem in hard_to_read(path.read_text(encoding="utf-8"))
+        for problem in hard_to_read(tree(path))
     ]
     assert found == []
 
@@ -88,7 +81,7 @@ def test_docstrings_open_with_a_noun_or_a_verb(folder: str) -> None:
 )
 def test_a_clause_is_seen(first: str, hard: bool) -> None:
     """A docstring that opens with a clause is found, and one that opens with a noun or a verb is not."""
-    assert bool(list(hard_to_read(f'"""{first}"""'))) is hard
+    assert bool(list(hard_to_read(ast.parse(f'"""{first}"""')))) is hard
 
 
 _REFERENCE = re.compile(r":(?:class|func|meth|mod|data|attr):`~?(proofroll[\w.]*)`")

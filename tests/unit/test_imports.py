@@ -11,13 +11,12 @@ from functools import cache
 from pathlib import Path
 
 import pytest
+from source_code import nodes, statements, tree
 
 import proofroll
 from proofroll.core.engine import Sample
 from proofroll.core.events import EVENT_ORDER
 from proofroll.core.plugins import load_element_kinds
-from proofroll.elements.ball_on_surface.surfaces import surface_kinds
-from proofroll.files.scene_file import scene_names
 
 ROOT = Path(proofroll.__file__).parent
 # What may import what. The harness knows neither a kind of element nor an engine nor a truth; these are plug-ins.
@@ -50,23 +49,18 @@ _WRITTEN = re.compile(rf"(?:from|import) (proofroll\.\w+|{'|'.join(OUTSIDE)})")
 
 
 @cache
-def _nodes(file: Path) -> list[ast.AST]:
-    return list(ast.walk(ast.parse(file.read_text(encoding="utf-8"))))
-
-
-@cache
 def _texts(file: Path) -> list[tuple[int, str]]:
     """Every text of a module that is no docstring, with its line."""
-    nodes = _nodes(file)
+    module = nodes(file)
     documented = {
         id(node.body[0].value)
-        for node in nodes
+        for node in module
         if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef) and node.body
         if isinstance(node.body[0], ast.Expr)
     }
     return [
         (node.lineno, node.value)
-        for node in nodes
+        for node in module
         if isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in documented
     ]
 
@@ -79,7 +73,7 @@ def _imported(file: Path, root: Path = ROOT) -> list[tuple[int, str]]:
         return [(number, name) for number, line in lines for name in _WRITTEN.findall(line)]
     found = []
     package = ("proofroll", *file.relative_to(root).parent.parts)
-    for node in _nodes(file):
+    for node in nodes(file):
         if isinstance(node, ast.ImportFrom):
             start = package[: len(package) - node.level + 1] if node.level else ()
             module = ".".join([*start, *([node.module] if node.module else [])])
@@ -145,23 +139,6 @@ def test_each_way_of_importing_is_seen(tmp_path: Path, place: str, text: str, li
     assert wrong.startswith(f"{place}:{line} imports ")
 
 
-def test_engines_know_no_scene_and_no_surface_by_name() -> None:
-    """An adapter that did would be fair on that one alone: it asks what any surface can say."""
-    surfaces = {kind.__name__ for kind in surface_kinds()}
-    scenes = {name for name in scene_names() if "_" in name}  # of one word are also words of mechanics: a friction cone
-    wrong = []
-    for file in (ROOT / "engines").rglob("*.py"):
-        where = file.relative_to(ROOT)
-        for node in _nodes(file):
-            if isinstance(node, ast.ImportFrom):
-                wrong += [f"{where} imports {alias.name}" for alias in node.names if alias.name in surfaces]
-            if isinstance(node, ast.Constant) and isinstance(node.value, str):
-                wrong += [f"{where}:{node.lineno} names {name}" for name in scenes if name in node.value]
-            if isinstance(node, ast.Compare) and ast.unparse(node.left).endswith("surface.kind"):
-                wrong.append(f"{where}:{node.lineno} asks for a kind of surface")
-    assert not wrong, "\n".join(wrong)
-
-
 # Engines that share a part with the truth, and for what.
 SHARED_WITH_TRUTH = {
     "engines/exudyn/contact/spheres.py imports proofroll.elements.mechanism.contact.dynamics",  # the start's load
@@ -185,7 +162,7 @@ def test_each_class_has_a_name_of_its_own() -> None:
     """No two public classes are called the same: a name says what it is wherever one reads it."""
     homes: dict[str, list[str]] = {}
     for file in ROOT.rglob("*.py"):
-        for node in _nodes(file):
+        for node in nodes(file):
             if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
                 homes.setdefault(node.name, []).append(f"{file.relative_to(ROOT)}:{node.lineno}")
     assert {name: where for name, where in homes.items() if len(where) > 1} == {}
@@ -228,7 +205,7 @@ def test_one_place_makes_cases() -> None:
     makers = {
         str(file.relative_to(ROOT))
         for file in ROOT.rglob("*.py")
-        for node in _nodes(file)
+        for node in nodes(file)
         if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == "Case"
     }
     assert makers == {"studies/cases.py"}
@@ -240,15 +217,16 @@ def test_modules_are_short_enough_to_be_read_at_once() -> None:
     assert long == []
 
 
-def _at_run_time(tree: ast.AST) -> Iterator[ast.ImportFrom]:
+def _for_types_alone(node: ast.AST) -> bool:
+    return isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING"
+
+
+def _at_run_time(module: ast.Module) -> Iterator[ast.ImportFrom]:
     """The imports of a module that it carries out, wherever in it they stand; those for types alone are none."""
-    for node in ast.iter_child_nodes(tree):
-        if isinstance(node, ast.ImportFrom):
-            yield node
-        elif not (isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING"):
-            yield from _at_run_time(node)
+    return (node for node in statements(module, _for_types_alone) if isinstance(node, ast.ImportFrom))
 
 
+@cache
 def leading(root: Path) -> dict[str, set[str]]:
     """Each module of a package below ``root`` -> those of the package that it imports when it runs."""
     modules = {
@@ -259,9 +237,7 @@ def leading(root: Path) -> dict[str, set[str]]:
     leads: dict[str, set[str]] = {}
     for name, file in modules.items():
         asked = [
-            (node.module, f"{node.module}.{alias.name}")
-            for node in _at_run_time(ast.parse(file.read_text(encoding="utf-8")))
-            for alias in node.names
+            (node.module, f"{node.module}.{alias.name}") for node in _at_run_time(tree(file)) for alias in node.names
         ]
         leads[name] = {inner if inner in modules else str(outer) for outer, inner in asked} & modules.keys() - {name}
     return leads
@@ -312,14 +288,16 @@ def test_the_map_says_what_a_folder_may_import(folder: str) -> None:
 
 def test_a_circle_is_seen(tmp_path: Path) -> None:
     """Two modules that import each other are named, and an import for types alone makes no circle."""
-    package = tmp_path / "pack"
-    package.mkdir()
-    (package / "__init__.py").write_text("")
-    (package / "a.py").write_text("from pack.b import f\n")
-    (package / "b.py").write_text("if TYPE_CHECKING:\n    from pack.a import g\n")
-    assert circle(leading(package)) == []
-    (package / "b.py").write_text("def f():\n    from pack import a\n")
-    assert set(circle(leading(package))) == {"pack.a", "pack.b"}
+    for folder, source in {
+        "types": "if TYPE_CHECKING:\n    from pack.a import g\n", "circle": "def f():\n    from pack import a\n",
+    }.items():  # fmt: skip
+        package = tmp_path / folder / "pack"
+        package.mkdir(parents=True)
+        (package / "__init__.py").write_text("")
+        (package / "a.py").write_text("from pack.b import f\n")
+        (package / "b.py").write_text(source)
+    assert circle(leading(tmp_path / "types" / "pack")) == []
+    assert set(circle(leading(tmp_path / "circle" / "pack"))) == {"pack.a", "pack.b"}
     inner = {"pack.x.a": {"pack.y.b"}, "pack.y.b": set(), "pack.y.c": {"pack.x.d"}, "pack.x.d": set()}
     assert set(circle(folders_of(inner, "pack"))) == {"x", "y"}, "of folders, though no two modules do"
 
@@ -331,7 +309,7 @@ def test_names_of_mechanisms_have_one_address() -> None:
     wrong = [
         f"{file.relative_to(ROOT)}:{node.lineno}"
         for file in ROOT.rglob("*.py")
-        for node in _nodes(file)
+        for node in nodes(file)
         if isinstance(node, ast.ImportFrom) and (node.module or "").startswith(package)
         if handed_on & {alias.name for alias in node.names}
         if (node.module == package) == (folder in file.parents)

@@ -3,24 +3,44 @@
 from __future__ import annotations
 
 import ast
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 import pytest
+from source_code import nodes
 
-SRC = Path(__file__).resolve().parents[2] / "src"
-# Determiners and adverbs that hide what a name holds.
+SRC = Path(__file__).resolve().parents[2] / "src" / "proofroll"
+# Determiners, adverbs and verbs that hide what a name holds.
 BARE = frozenset({
-    "after", "along", "at", "before", "each", "first", "found", "given", "known", "one", "other", "own", "wanted",
-    "where",
+    "after", "along", "at", "before", "changed", "each", "first", "found", "given", "known", "never", "one", "other",
+    "own", "still", "struck", "wanted", "was", "where",
 })  # fmt: skip
-# Largest part of functions with such a name; lower it whenever the part falls.
-MOST = 0.08
+# Largest part of a folder's functions with such a name, and of folders that were worse when they were counted first.
+LEAST = 0.1
+MOST = {
+    "elements/mechanism/contact": 0.48,
+    "truth/switching": 0.4,
+    "vocabulary": 0.39,
+    "elements/mechanism/bookkeeping": 0.33,
+    "engines/projection/contact": 0.33,
+    "elements/mechanism/scene/shapes": 0.27,
+    "truth": 0.27,
+    "truth/bodies": 0.24,
+    "truth/laws": 0.22,
+    "truth/tree": 0.19,
+    "engines/exudyn/contact": 0.19,
+    "elements/mechanism/run/contacts": 0.18,
+    "mechanism_studies": 0.17,
+    "engines/mujoco/contact": 0.14,
+    "elements/mechanism/dynamics": 0.13,
+    "studies/judging": 0.12,
+    "elements/mechanism/scene/shapes/walls": 0.12,
+}
 
 
-def _functions(tree: ast.Module) -> Iterator[ast.FunctionDef]:
+def _functions(module: Iterable[ast.AST]) -> Iterator[ast.FunctionDef]:
     """All functions but the methods of Python's data model, whose operands are called ``other`` by convention."""
-    for node in ast.walk(tree):
+    for node in module:
         if isinstance(node, ast.FunctionDef) and not (node.name.startswith("__") and node.name != "__init__"):
             yield node
 
@@ -41,12 +61,20 @@ def bare_names(function: ast.FunctionDef) -> set[str]:
     return names & BARE
 
 
-@pytest.mark.drill
-def test_few_functions_have_a_local_that_is_no_noun() -> None:
-    """The part of functions with a local or argument that is a bare determiner or adverb stays below a bound."""
-    functions = [item for path in SRC.rglob("*.py") for item in _functions(ast.parse(path.read_text(encoding="utf-8")))]
-    part = sum(bool(bare_names(item)) for item in functions) / len(functions)
-    assert part <= MOST
+def parts() -> dict[str, float]:
+    """Folder of src -> part of its functions with a local or argument that is a bare determiner or adverb."""
+    functions: dict[str, list[bool]] = {}
+    for path in SRC.rglob("*.py"):
+        bare = [bool(bare_names(item)) for item in _functions(nodes(path))]
+        functions.setdefault(path.parent.relative_to(SRC).as_posix(), []).extend(bare)
+    return {folder: sum(bare) / len(bare) for folder, bare in functions.items() if bare}
+
+
+def test_few_functions_of_a_folder_have_a_local_that_is_no_noun() -> None:
+    """No folder of src has more such functions than its bound, and no bound is far above what its folder has."""
+    found = parts()
+    assert {folder: part for folder, part in found.items() if part > MOST.get(folder, LEAST)} == {}
+    assert {folder: bound for folder, bound in MOST.items() if found.get(folder, 0) < bound - 0.05} == {}
 
 
 @pytest.mark.parametrize(

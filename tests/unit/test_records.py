@@ -3,21 +3,22 @@
 from __future__ import annotations
 
 import ast
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 import pytest
+from source_code import nodes
 
 SRC = Path(__file__).resolve().parents[2] / "src"
 MOST = 4  # positional arguments of a record
 
 
-def records_of(trees: list[ast.Module]) -> set[str]:
-    """Names of the dataclasses and named tuples of modules."""
+def records_of(modules: Iterable[list[ast.AST]]) -> set[str]:
+    """Names of the dataclasses and named tuples of modules, each a list of its nodes."""
     return {
         node.name
-        for tree in trees
-        for node in ast.walk(tree)
+        for module in modules
+        for node in module
         if isinstance(node, ast.ClassDef)
         and (
             any("dataclass" in ast.unparse(decorator) for decorator in node.decorator_list)
@@ -26,21 +27,20 @@ def records_of(trees: list[ast.Module]) -> set[str]:
     }
 
 
-def long_calls(tree: ast.Module, records: set[str]) -> Iterator[ast.Call]:
+def long_calls(module: list[ast.AST], records: set[str]) -> Iterator[ast.Call]:
     """Calls that build one of the records with more than four positional arguments."""
-    for node in ast.walk(tree):
+    for node in module:
         if isinstance(node, ast.Call) and len(node.args) > MOST:
             name = node.func.attr if isinstance(node.func, ast.Attribute) else getattr(node.func, "id", "")
             if name in records:
                 yield node
 
 
-@pytest.mark.drill
 def test_records_are_built_by_keyword() -> None:
     """No call in src builds a record with more than four positional arguments."""
-    trees = {path.relative_to(SRC): ast.parse(path.read_text(encoding="utf-8")) for path in SRC.rglob("*.py")}
-    records = records_of(list(trees.values()))
-    calls = [f"{path}:{call.lineno}" for path, tree in trees.items() for call in long_calls(tree, records)]
+    modules = {path.relative_to(SRC): nodes(path) for path in SRC.rglob("*.py")}
+    records = records_of(modules.values())
+    calls = [f"{path}:{call.lineno}" for path, module in modules.items() for call in long_calls(module, records)]
     assert len(records) > 400
     assert calls == []
 
@@ -50,5 +50,5 @@ def test_records_are_built_by_keyword() -> None:
 )
 def test_a_long_call_is_seen(call: str, long: bool) -> None:
     """Positional arguments of records are counted; those of functions are not."""
-    tree = ast.parse(f"@dataclass\nclass R:\n    a: int\n\n{call}")
-    assert bool(list(long_calls(tree, records_of([tree])))) is long
+    module = list(ast.walk(ast.parse(f"@dataclass\nclass R:\n    a: int\n\n{call}")))
+    assert bool(list(long_calls(module, records_of([module])))) is long

@@ -53,6 +53,15 @@ class DoubtsNumbers(Protocol):
 
 
 @runtime_checkable
+class MovesFreely(Protocol):
+    """Ability of an element that knows which of its tracked points no joint and no contact accelerates."""
+
+    @property
+    def free_points(self) -> Sequence[str]:
+        """Names of tracked points of bodies that nothing holds or touches."""
+
+
+@runtime_checkable
 class BoundsSteps(Protocol):
     """Ability of an element whose laws bound the step of explicit schemes, known before any run.
 

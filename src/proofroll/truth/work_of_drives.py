@@ -75,7 +75,8 @@ class WorkAlong:
         for moments, powers, work, rest in zip(time, power, summed, unresolved, strict=True):
             start, end = float(moments[0]), float(moments[-1])
             self._over_a_gap(stretch, start, powers[0])
-            self._parts.append(_Part(stretch, start, end, TO_SERIES @ moments, TO_SERIES @ (self._total + work)))
+            series = TO_SERIES @ moments, TO_SERIES @ (self._total + work)
+            self._parts.append(_Part(stretch, start, end, time=series[0], work=series[1]))
             self._total = self._total + work[-1]
             self.unresolved = self.unresolved + rest
             self._last = end, powers[-1]

@@ -7,6 +7,7 @@ import re
 from pathlib import Path
 
 import pytest
+from source_code import nodes
 
 import proofroll.engines
 from proofroll.elements.ball_on_surface.surfaces import surface_kinds
@@ -15,16 +16,16 @@ from proofroll.files.scene_file import scene_names
 ENGINES = Path(proofroll.engines.__path__[0])
 
 
-def without_docstrings(tree: ast.Module) -> list[ast.AST]:
+def without_docstrings(module: list[ast.AST]) -> list[ast.AST]:
     """The nodes of a module but for its sentences about itself."""
     sentences = {
         id(node.body[0].value)
-        for node in ast.walk(tree)
+        for node in module
         if isinstance(node, (ast.Module, ast.ClassDef, ast.FunctionDef))
         and node.body
         and isinstance(node.body[0], ast.Expr)
     }
-    return [node for node in ast.walk(tree) if id(node) not in sentences]
+    return [node for node in module if id(node) not in sentences]
 
 
 def setting(node: ast.expr) -> bool:
@@ -39,7 +40,7 @@ def test_no_adapter_knows_a_scene_or_a_surface(engine: str) -> None:
     # One word alone may mean anything else, as MuJoCo's cone of friction; compared with something it does not.
     scene = re.compile(rf"\b({'|'.join(name for name in scene_names() if '_' in name)})\b")
     for path in sorted((ENGINES / engine).rglob("*.py")):
-        for node in without_docstrings(ast.parse(path.read_text())):
+        for node in without_docstrings(nodes(path)):
             where = f"{path.name}:{getattr(node, 'lineno', 0)}"
             if isinstance(node, (ast.Name, ast.Attribute, ast.alias)):
                 name = next(getattr(node, key) for key in ("id", "attr", "name") if hasattr(node, key))

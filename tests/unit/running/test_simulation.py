@@ -5,8 +5,6 @@ import json
 import math
 import pydoc
 import re
-import subprocess
-import sys
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -142,17 +140,6 @@ def test_a_setting_for_the_truth() -> None:
         proofroll.simulate(proofroll.load_scene("inclined_plane"), "truth", until=0.1, dt=1e-3)
 
 
-def test_importing_proofroll_is_light() -> None:
-    """Importing proofroll loads no engine, no xarray, no plotly and no scipy."""
-    code = (
-        "import sys, proofroll;"
-        "heavy = {'xarray', 'scipy', 'plotly', 'pydantic', 'mujoco', 'pinocchio', 'exudyn', 'numpy'};"
-        "print(sorted(heavy & set(sys.modules)))"
-    )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout == "[]\n"
-
-
 def test_public_names() -> None:
     """The public names are those that are announced, and no others are made up."""
     errors = {"Diverged", "InputError", "Missing", "ProofrollError", "Refused"}
@@ -161,15 +148,6 @@ def test_public_names() -> None:
     assert all(callable(getattr(proofroll, name)) for name in proofroll.__all__)
     with pytest.raises(AttributeError, match="no attribute 'simulat'"):
         _ = proofroll.simulat  # type: ignore[attr-defined]  # that is the point
-
-
-def test_simulate_stays_a_function() -> None:
-    """The function's name is not taken over by a module that is imported later."""
-    code = (
-        "import proofroll; first = proofroll.simulate; from proofroll import simulate;"
-        "assert callable(first) and callable(simulate) and callable(proofroll.simulate)"
-    )
-    subprocess.run([sys.executable, "-c", code], check=True)
 
 
 def test_data_folders() -> None:

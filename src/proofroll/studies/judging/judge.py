@@ -13,7 +13,7 @@ from proofroll.core.columns import UNCERTAIN
 from proofroll.core.comparison import Tolerance
 from proofroll.core.dataset import BETWEEN, off_impacts
 from proofroll.core.diagnosis.scene_diagnosis import diagnose_scene
-from proofroll.core.element_abilities import step_bound
+from proofroll.core.element_abilities import MovesFreely, step_bound
 from proofroll.core.errors import InputError, require_known
 from proofroll.core.multi_element import REQUIRED
 from proofroll.core.number_format import number, spaced
@@ -258,23 +258,12 @@ def _given(run: xr.Dataset, true: xr.Dataset) -> dict[str, GivenVariable]:
 
 def _causes(scene: Scene, run: xr.Dataset, true: xr.Dataset) -> list[str]:
     """Clauses on typical mistakes in a trajectory that differs, and on causes that its whole state proves."""
-    free = [f"{name}.{axis}" for name in _free_points(scene) for axis in "xyz"]
+    points = [name for element in scene.elements if isinstance(element, MovesFreely) for name in element.free_points]
+    free = [f"{name}.{axis}" for name in points for axis in "xyz"]
     causes = causes_of(_given(run, true), run["time"].to_numpy(), free)
     if causes or any(name not in run for name in (*REQUIRED, "w_WB", "q_WB")):
         return causes
     return [item.sentence for item in diagnose_scene(scene, [], run, true)]
-
-
-def _free_points(scene: Scene) -> list[str]:
-    """Names of tracked points of bodies that nothing holds or touches."""
-    mechanisms = [element.mechanism for element in scene.elements if hasattr(element, "mechanism")]
-    return [
-        point.name
-        for mechanism in mechanisms
-        for point in mechanism.points
-        if not (mechanism.contacts or mechanism.links or mechanism.loops)
-        and any(joint.child == point.body and joint.kind == "free" for joint in mechanism.joints)
-    ]
 
 
 def _unjudged(user_run: GivenRun, reference: Reference, judged: Mapping[str, Tolerance]) -> dict[str, str]:

@@ -135,6 +135,15 @@ class MechanismElement:
         """See :class:`proofroll.core.element_abilities.DoubtsNumbers`."""
         return implausible(self.mechanism)
 
+    @property
+    def free_points(self) -> Sequence[str]:
+        """See :class:`proofroll.core.element_abilities.MovesFreely`."""
+        scene = self.mechanism
+        if scene.contacts or scene.links or scene.loops:
+            return ()
+        free = {joint.child for joint in scene.joints if joint.kind == JointKind.FREE}
+        return tuple(point.name for point in scene.points if point.body in free)
+
     @cached_property
     def _equations(self) -> JointCoordinates:
         return JointCoordinates(at_start(self.mechanism))
