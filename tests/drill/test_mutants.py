@@ -34,6 +34,7 @@ def _drilled() -> dict[str, object]:
 
 
 @pytest.mark.drill
+@pytest.mark.nightly
 @pytest.mark.slow
 @pytest.mark.timeout(900)  # 20 s of processor time, on a machine that may have much else to do
 def test_every_mutant_is_detected_and_most_are_named() -> None:

@@ -125,7 +125,11 @@ def test_elimination_joint_by_joint_is_that_by_sums(violated):
 
 @pytest.mark.skipif(not available(), reason="heyoka is not installed")
 @pytest.mark.parametrize(
-    "mechanism", [replace(sprung_tree(), bushings=()), runs.model("heavy_top")], ids=["every kind", "top"]
+    "mechanism",
+    [
+        pytest.param(replace(sprung_tree(), bushings=()), id="every kind", marks=pytest.mark.drill),
+        pytest.param(runs.model("heavy_top"), id="top"),
+    ],
 )
 def test_compiled_equations_end_where_others_do(mechanism):
     """A run in machine code gives the motion and the reactions of one in numpy."""

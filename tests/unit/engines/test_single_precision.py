@@ -34,6 +34,7 @@ SCENES = ("pendulum", "double_pendulum", "free_body")
 TIMES = np.linspace(0, 1, 21)
 # Round-off that is told of runs with some noise, which is as large as has been seen beside it.
 SCATTER = 16
+_NIGHTLY = (pytest.mark.drill, pytest.mark.nightly)
 
 
 def first_lie(name: str, **changes: Any) -> str | None:
@@ -204,6 +205,7 @@ def test_a_comparison_tells_precision_and_floor(
 
 
 @pytest.mark.drill
+@pytest.mark.nightly
 @pytest.mark.usefixtures("single")
 def test_a_tradeoff_tells_the_best_step(command_line: Callable[..., tuple[int, str, str]], tmp_path: Path) -> None:
     """The study names the best step and the floor, fits no order through it, and advice knows both."""
@@ -254,7 +256,7 @@ def test_growing_round_off_takes_nothing_from_the_best_step() -> None:
 @pytest.mark.parametrize(
     "check",
     [
-        pytest.param(check, id=check.name, marks=pytest.mark.drill if "[rk4" in check.name else ())
+        pytest.param(check, id=check.name, marks=_NIGHTLY if "[rk4" in check.name else ())
         for check in checks(Single)
         if "entry_point" not in check.name
         # what is built hangs on no formulation

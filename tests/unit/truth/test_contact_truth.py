@@ -1003,6 +1003,7 @@ def test_a_box_that_lands_on_an_edge_tips_on_its_face_and_rests() -> None:
     assert found.record.q_WB[2, 0] == pytest.approx([1, 0, 0, 0], abs=DIGITS)
 
 
+@pytest.mark.drill
 def test_a_box_that_lands_on_a_cart_moves_on_with_it() -> None:
     """Momentum along the rail is shared: four corners stick on a plate that moves."""
     box = dropped_box()

@@ -14,12 +14,15 @@ from proofroll.files.scene_file import load_scene
 from proofroll_drill.published import of_scene, tables
 
 QUICK = {"falling_screw"}
+# Those whose truths take longest.
+NIGHTLY = {"spatial_slider_crank", "car_axis"}
+MARKS = {True: (pytest.mark.drill, pytest.mark.nightly), False: pytest.mark.drill}
 # Meijaard, Papadopoulos, Ruina, Schwab 2007: the roots at 5 m/s.
 ROOTS = np.array([-14.0783896927982, -0.3228664296, -0.7753418818 - 4.4648677130j, -0.7753418818 + 4.4648677130j])
 
 
 @pytest.mark.parametrize(
-    "name", [name if name in QUICK else pytest.param(name, marks=pytest.mark.drill) for name in tables()]
+    "name", [name if name in QUICK else pytest.param(name, marks=MARKS[name in NIGHTLY]) for name in tables()]
 )
 def test_a_truth_meets_what_peers_published(name: str) -> None:
     """Each published number of the scene, of an instant or a series, is the true one to its digits."""

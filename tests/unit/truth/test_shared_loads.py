@@ -29,6 +29,7 @@ def _skid_steered() -> Mechanism:
     )
 
 
+@pytest.mark.drill
 def test_forces_of_joints_and_drives_that_hang_on_a_split_are_not_given() -> None:
     """Four wheels share the load: axles and drives have no values, the free joint has, and bars stay small."""
     found = truth_of(_skid_steered(), np.array([0.0, 0.01]))
