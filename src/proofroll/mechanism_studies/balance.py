@@ -121,10 +121,10 @@ def balance(
     (element,) = scene.elements if len(scene.elements) == 1 else (None,)
     if not isinstance(element, MechanismElement):
         raise InputError("scene", name, "a balance is of one mechanism; name a scene of bodies and joints")
-    still = stilled(element.mechanism, hold)
-    equations = JointCoordinates(still)
+    resting = stilled(element.mechanism, hold)
+    equations = JointCoordinates(resting)
     q = at_rest(equations)
-    posed = at_pose(still, q, np.zeros(still.nv))
+    posed = at_pose(resting, q, np.zeros(resting.nv))
     if analyse(posed).singular_start:
         raise Refused(
             "the equilibrium is a singular pose of the loops, where no forces are determinate; start elsewhere"
@@ -146,7 +146,7 @@ def balance(
         eigenvalue_error=bar,
         stable=bool((eigenvalues.real <= least).all()),
         engines=tuple(
-            _asked(text, scene, element, (still, q), truth, (equations, posed), tolerance, progress) for text in asked
+            _asked(text, scene, element, (resting, q), truth, (equations, posed), tolerance, progress) for text in asked
         ),
     )
 
@@ -236,14 +236,14 @@ def _asked(
     text: str,
     scene: Scene,
     element: MechanismElement,
-    still: tuple[Mechanism, Array],
+    resting: tuple[Mechanism, Array],
     truth: Spectrum,
     solved: tuple[JointCoordinates, Mechanism],
     tolerance: float,
     progress: Callable[[str], None],
 ) -> EngineBalance:
     """Balance of one engine at the truth's equilibrium."""
-    (mechanism, q), (equations, posed) = still, solved
+    (mechanism, q), (equations, posed) = resting, solved
     progress(text)
 
     def made(pose: Mechanism) -> Any:

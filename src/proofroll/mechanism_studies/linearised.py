@@ -43,8 +43,8 @@ class InTree:
 
     def pose(self, displaced: Array) -> Array:
         """Coordinates after a displacement, with all loops closed, (nq)."""
-        nq, still = self._equations.mechanism.nq, np.zeros(self._equations.mechanism.nv)
-        state = np.concatenate([self._equations.tree.moved(self._q, displaced), still])
+        nq, rest = self._equations.mechanism.nq, np.zeros(self._equations.mechanism.nv)
+        state = np.concatenate([self._equations.tree.moved(self._q, displaced), rest])
         for _ in range(3):  # Newton's method doubles the number of digits
             state = self._equations.eliminated(state)
         return np.asarray(state[:nq])
@@ -100,14 +100,14 @@ class Spectrum(NamedTuple):
 def spectrum(place: Displaced, step: float = _STEP) -> Spectrum:
     """Eigenvalues of small motions by central differences of accelerations."""
     D = place.directions()
-    count, still = D.shape[1], np.zeros(len(D))
-    left = np.abs(place.accelerations(still, still)).max(initial=0.0)
+    count, rest = D.shape[1], np.zeros(len(D))
+    left = np.abs(place.accelerations(rest, rest)).max(initial=0.0)
 
     def slopes(size: float) -> Array:
         columns = []
         for which in range(2):
             for way in size * D.T:
-                ends = [(s * way, still) if which == 0 else (still, s * way) for s in (1.0, -1.0)]
+                ends = [(s * way, rest) if which == 0 else (rest, s * way) for s in (1.0, -1.0)]
                 ahead, back = (place.accelerations(*end) for end in ends)
                 columns.append(D.T @ (ahead - back) / (2 * size))
         return np.reshape(columns, (2 * count, count)).T
@@ -132,11 +132,11 @@ def at_rest(equations: JointCoordinates) -> Array:
         Refused: none is found; the text has what accelerations are left.
     """
     mechanism = equations.mechanism
-    q, still = mechanism.start()[0], np.zeros(mechanism.nv)
+    q, rest = mechanism.start()[0], np.zeros(mechanism.nv)
 
     def pulled(pose: Array) -> tuple[Array, Array]:
         D = InTree(equations, pose).directions()
-        return D, D.T @ equations.solve(pose, still).acceleration
+        return D, D.T @ equations.solve(pose, rest).acceleration
 
     free = _natural(mechanism, equations, q)
     D, pull = pulled(q)
@@ -145,7 +145,7 @@ def at_rest(equations: JointCoordinates) -> Array:
             return q
         place = InTree(equations, q)
         columns = [
-            D.T @ (place.accelerations(_STEP * way, still) - place.accelerations(-_STEP * way, still)) for way in D.T
+            D.T @ (place.accelerations(_STEP * way, rest) - place.accelerations(-_STEP * way, rest)) for way in D.T
         ]
         slope = np.array(columns).T / (2 * _STEP)
         change = -D @ np.linalg.lstsq(slope, pull, rcond=RANK)[0]

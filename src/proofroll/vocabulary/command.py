@@ -89,8 +89,8 @@ def entries_about(word: str, entries: list[KeyEntry]) -> list[KeyEntry]:
         texts = ((entry, f"{entry.meaning} {entry.type} {entry.table}".lower()) for entry in entries)
         named = [entry for entry, text in texts if asked in text]
     if not named:
-        known = dict.fromkeys(name for entry in entries for name in (entry.key, *_names(entry.table)) if name)
-        require_known("word", word, known, "no key or meaning has it; the keys are")
+        names = dict.fromkeys(name for entry in entries for name in (entry.key, *_names(entry.table)) if name)
+        require_known("word", word, names, "no key or meaning has it; the keys are")
     return named
 
 

@@ -148,11 +148,11 @@ product.
 
 def meanings(read_by: type[Any]) -> dict[str, str]:
     """Meaning of each field: its line under ``Attributes:`` in the docstring of the class."""
-    found: dict[str, str] = {}
+    texts: dict[str, str] = {}
     section = (inspect.getdoc(read_by) or "").partition("Attributes:\n")[2].split("\n\n")[0]
     for names, text in re.findall(r"^    ([\w, ]+): (.*(?:\n        .*)*)", section, flags=re.MULTILINE):
-        found |= dict.fromkeys(re.split(r", ", names), " ".join(text.split()))
-    return found
+        texts |= dict.fromkeys(re.split(r", ", names), " ".join(text.split()))
+    return texts
 
 
 def keys(table: KeyTable) -> Iterator[tuple[str, str, str, str]]:
@@ -172,15 +172,15 @@ def _unit(unit: Any) -> str:
     """The unit of a key, with the kinds that have it where it hangs on the kind."""
     if isinstance(unit, dict):
         kinds: dict[str, list[str]] = {}
-        for kind, own in unit.items():
-            kinds.setdefault(_unit(own), []).append(kind)
-        return "; ".join(f"{own}: {', '.join(names)}" for own, names in kinds.items())
+        for kind, inner in unit.items():
+            kinds.setdefault(_unit(inner), []).append(kind)
+        return "; ".join(f"{inner}: {', '.join(names)}" for inner, names in kinds.items())
     return unit if isinstance(unit, str) else ", ".join(unit or ())
 
 
 def _type(annotation: Any) -> str:
     text = annotation if isinstance(annotation, str) else getattr(annotation, "__name__", str(annotation))
-    known = {
+    words = {
         "Vector": "[x, y, z]",
         "Vector | None": "[x, y, z]",
         "Inertia": "3×3 or [Ixx, Iyy, Izz]",
@@ -194,10 +194,10 @@ def _type(annotation: Any) -> str:
         "Axes": " or ".join(get_args(Axes)),
         "ActuatorKind": " or ".join(get_args(ActuatorKind)),
     }
-    text = re.sub(r"JointKind\.(\w+)", lambda found: found[1].lower(), text)
-    text = re.sub(r"Literal\[([^]]*)\]", lambda found: found[1].replace(", ", " or "), text)
+    text = re.sub(r"JointKind\.(\w+)", lambda match: match[1].lower(), text)
+    text = re.sub(r"Literal\[([^]]*)\]", lambda match: match[1].replace(", ", " or "), text)
     text = re.sub(r"\b(?:tuple|list)\[", "[", re.sub(r"\bstr\b", "text", text)).replace("FloatOrInf", "float")
-    return known.get(text, text.replace(" | None", "").replace("Tolerance", '"1e-3 m"').replace("|", "or"))
+    return words.get(text, text.replace(" | None", "").replace("Tolerance", '"1e-3 m"').replace("|", "or"))
 
 
 def _default(item: dataclasses.Field[Any]) -> str:
@@ -221,8 +221,8 @@ def example(header: str, chapter: str, kind: str) -> str:
     start = re.escape(header.partition(",")[0]).replace("NAME", r"[\w./\"]+")
     for path in sorted(data_folder(folder).glob(pattern)):
         only = rf'kind = "{kind}"\n' if kind else ""
-        if found := re.search(rf"^{start}\n{only}(?:.+\n?)+", path.read_text(encoding="utf-8"), flags=re.MULTILINE):
-            return f"From `{folder}/{path.relative_to(data_folder(folder))}`:\n\n```toml\n{found[0].rstrip()}\n```\n"
+        if match := re.search(rf"^{start}\n{only}(?:.+\n?)+", path.read_text(encoding="utf-8"), flags=re.MULTILINE):
+            return f"From `{folder}/{path.relative_to(data_folder(folder))}`:\n\n```toml\n{match[0].rstrip()}\n```\n"
     return ""
 
 

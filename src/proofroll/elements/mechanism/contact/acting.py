@@ -47,27 +47,27 @@ OPEN = Acting("open")
 
 def kinds(mode: ContactMode) -> tuple[tuple[str, int], ...]:
     """Kind and nearest features of each contact's mode, without directions."""
-    return tuple((own.kind, own.feature) for own in mode)
+    return tuple((acting.kind, acting.feature) for acting in mode)
 
 
 def features_of(mode: ContactMode) -> Features:
     """Number of the nearest features of each contact."""
-    return tuple(own.feature for own in mode)
+    return tuple(acting.feature for acting in mode)
 
 
 def closed_in(mode: ContactMode) -> list[bool]:
     """True for each contact that is not open."""
-    return [own.kind != "open" for own in mode]
+    return [acting.kind != "open" for acting in mode]
 
 
 def with_features(mode: ContactMode, features: Features) -> ContactMode:
     """The mode with other nearest features."""
-    return tuple(own._replace(feature=feature) for own, feature in zip(mode, features, strict=True))
+    return tuple(acting._replace(feature=feature) for acting, feature in zip(mode, features, strict=True))
 
 
-def slip_velocity(found: Touching) -> Array:
+def slip_velocity(touch: Touching) -> Array:
     """Slip velocity of a contact, tangential to its surfaces [m/s], shape (3,)."""
-    return np.asarray(found.slide - found.normal * (found.normal @ found.slide))
+    return np.asarray(touch.slide - touch.normal * (touch.normal @ touch.slide))
 
 
 def forbidding_rows(mode: ContactMode, touching: Sequence[Touching], J: Array, presses: Sequence[bool]) -> Array:
@@ -76,59 +76,59 @@ def forbidding_rows(mode: ContactMode, touching: Sequence[Touching], J: Array, p
     One that sticks forbids all three components of its slide; one that ``presses`` and slips, that along its normal.
     """
     rows = [np.zeros((0, J.shape[-1]))]
-    for own, found, of_slide, pressing in zip(mode, touching, J, presses, strict=True):
-        if own.kind == "stick" or (own.kind == "slip" and pressing):
-            rows.append(of_slide if own.kind == "stick" else found.normal[None] @ of_slide)
+    for acting, touch, of_slide, pressing in zip(mode, touching, J, presses, strict=True):
+        if acting.kind == "stick" or (acting.kind == "slip" and pressing):
+            rows.append(of_slide if acting.kind == "stick" else touch.normal[None] @ of_slide)
     return np.concatenate(rows)
 
 
-def heading_of(own: Acting, found: Touching) -> Array:
+def heading_of(acting: Acting, touch: Touching) -> Array:
     """Unit direction of a slip, shape (3,); friction acts against it.
 
     Of a slip in the plane below FAINT it is the first one, unless the surface has turned since.
     """
-    slip = slip_velocity(found)
+    slip = slip_velocity(touch)
     speed = float(np.linalg.norm(slip))
-    if own.along is None and not own.leads and speed > FAINT / 2:
+    if acting.along is None and not acting.leads and speed > FAINT / 2:
         return np.asarray(slip / speed)
-    given = np.array(own.heading if own.along is None else own.along)
-    given = given - found.normal * (found.normal @ given)
-    length = float(np.linalg.norm(given))
-    if own.along is None and length < _TURNED and speed:
+    heading = np.array(acting.heading if acting.along is None else acting.along)
+    heading = heading - touch.normal * (touch.normal @ heading)
+    length = float(np.linalg.norm(heading))
+    if acting.along is None and length < _TURNED and speed:
         return np.asarray(slip / speed)
-    return np.asarray(given / (length or 1.0))
+    return np.asarray(heading / (length or 1.0))
 
 
-def turned(own: Acting, found: Touching, G: Array) -> Acting:
+def turned(acting: Acting, touch: Touching, G: Array) -> Acting:
     """Mode of a contact with its line as it lies now; ``G``: rates of its slide by unit forces, (3, 3).
 
     A tip on a turning arm, and a ball in a pipe that rolls in a plane, carry their lines with them.
     """
-    if own.along is None:
-        return own
-    across = np.eye(3) - np.outer(found.normal, found.normal)
+    if acting.along is None:
+        return acting
+    across = np.eye(3) - np.outer(touch.normal, touch.normal)
     values, vectors = np.linalg.eigh(across @ G @ across)
     if values[-1] <= _LINE * np.trace(G):  # it slides along no line at all
-        return own
-    line = direction_of(vectors[:, -1] if vectors[:, -1] @ own.along >= 0 else -vectors[:, -1])
-    return own._replace(along=line, heading=own.heading and line)
+        return acting
+    line = direction_of(vectors[:, -1] if vectors[:, -1] @ acting.along >= 0 else -vectors[:, -1])
+    return acting._replace(along=line, heading=acting.heading and line)
 
 
-def held_directions(own: Acting, found: Touching, presses: bool) -> Array:
+def held_directions(acting: Acting, touch: Touching, presses: bool) -> Array:
     """Directions in which a contact permits no motion, (directions, 3).
 
     A slip holds its normal, if it ``presses`` (dry friction of a joint and of turning do not). A sticking contact holds
     all directions, those of its surface if it does not press, or its normal and its line if it can slide along one line
     only.
     """
-    if own.kind == "open":
+    if acting.kind == "open":
         return np.zeros((0, 3))
-    normal = found.normal[None] if presses else np.zeros((0, 3))
-    if own.kind == "slip":
+    normal = touch.normal[None] if presses else np.zeros((0, 3))
+    if acting.kind == "slip":
         return normal
-    if own.along is None:
-        return np.eye(3) if presses else frame_of_axis(found.normal)[:, :2].T
-    line = np.array(own.along) - found.normal * (found.normal @ np.array(own.along))
+    if acting.along is None:
+        return np.eye(3) if presses else frame_of_axis(touch.normal)[:, :2].T
+    line = np.array(acting.along) - touch.normal * (touch.normal @ np.array(acting.along))
     return np.vstack([normal, line / np.linalg.norm(line)])
 
 
@@ -148,27 +148,27 @@ def first_mode(kind: ModeKind, frame: Array, heading: Array, G: Array) -> Acting
     line = vectors[:, 1] if values[0] <= _LINE * values[1] and values[1] > 0 else None
     if line is not None and line @ heading < 0:
         line = -line
-    along = None if line is None else direction_of(frame[:, 1:] @ line)
+    line_in_space = None if line is None else direction_of(frame[:, 1:] @ line)
     if kind == "stick":
-        return Acting("stick", along)
+        return Acting("stick", line_in_space)
     size = float(np.linalg.norm(heading)) or 1.0
-    return Acting("slip", along, direction_of(frame[:, 1:] @ (heading / size)))
+    return Acting("slip", line_in_space, direction_of(frame[:, 1:] @ (heading / size)))
 
 
-def following(own: Acting, way: Array, still: bool, least: float) -> Acting:
+def following(acting: Acting, way: Array, resting: bool, least: float) -> Acting:
     """Mode of a closed contact whose body moves it along its surface.
 
     Args:
-        own: mode at rest, with its line.
-        way: slide, or its rate where the contact is ``still``, along the surface.
-        still: True for a contact at rest.
+        acting: mode at rest, with its line.
+        way: slide, or its rate where the contact is ``resting``, along the surface.
+        resting: True for a contact at rest.
         least: size of a rate that counts as none.
     """
     speed = float(np.linalg.norm(way))
-    if still and speed <= least:
-        return own
-    if own.along is not None:
-        line = np.array(own.along)
+    if resting and speed <= least:
+        return acting
+    if acting.along is not None:
+        line = np.array(acting.along)
         heading = direction_of(line if way @ line >= 0 else -line)
         return Acting("slip", heading, heading)
     return Acting("slip", None, direction_of(way / (speed or 1.0)))
@@ -189,29 +189,29 @@ class _Contact(Protocol):
 
 
 def changes(
-    contacts: Sequence[_Contact], before: ContactMode, after: ContactMode, stands: bool
+    contacts: Sequence[_Contact], old_mode: ContactMode, new_mode: ContactMode, stands: bool
 ) -> tuple[tuple[str, str], ...]:
     """Kind and contact of each event of a change of mode; ``stands``: nothing moves any more.
 
     Friction against turning changes without events.
     """
-    found: list[tuple[str, str]] = []
-    for contact, was, now in zip(contacts, before, after, strict=True):
+    events: list[tuple[str, str]] = []
+    for contact, earlier, now in zip(contacts, old_mode, new_mode, strict=True):
         if contact.pressed_by is not None:
             continue
-        if now.kind == "stick" and was.kind != "stick":
-            found.append((EventKind.REST if stands and not contact.bound else EventKind.STICK, contact.name))
-        elif was.kind == "stick" and now.kind == "slip":
-            found.append((EventKind.SLIP, contact.name))
-        elif was.kind != "open" and now.kind == "open":
-            found.append((EventKind.LIFT_OFF, contact.name))
-        elif was.kind == now.kind == "slip" and (contact.friction or contact.bound) and _opposite(was, now):
-            found.append((EventKind.TURN, contact.name))
-    return tuple(found)
+        if now.kind == "stick" and earlier.kind != "stick":
+            events.append((EventKind.REST if stands and not contact.bound else EventKind.STICK, contact.name))
+        elif earlier.kind == "stick" and now.kind == "slip":
+            events.append((EventKind.SLIP, contact.name))
+        elif earlier.kind != "open" and now.kind == "open":
+            events.append((EventKind.LIFT_OFF, contact.name))
+        elif earlier.kind == now.kind == "slip" and (contact.friction or contact.bound) and _opposite(earlier, now):
+            events.append((EventKind.TURN, contact.name))
+    return tuple(events)
 
 
-def _opposite(was: Acting, now: Acting) -> bool:
-    return was.along is not None and now.heading is not None and float(np.dot(was.along, now.heading)) < 0
+def _opposite(earlier: Acting, now: Acting) -> bool:
+    return earlier.along is not None and now.heading is not None and float(np.dot(earlier.along, now.heading)) < 0
 
 
 def direction_of(vector: Array) -> Direction:
@@ -220,18 +220,18 @@ def direction_of(vector: Array) -> Direction:
     return x, y, z
 
 
-def headed(own: Acting, touch: Touching) -> Acting:
+def headed(acting: Acting, touch: Touching) -> Acting:
     """Mode of a contact with the present direction of its slip in the plane, however slow."""
     slip = slip_velocity(touch)
-    if own.kind != "slip" or own.along is not None or not slip.any():
-        return own
+    if acting.kind != "slip" or acting.along is not None or not slip.any():
+        return acting
     x, y, z = (slip / np.linalg.norm(slip)).tolist()
-    return own._replace(heading=(x, y, z))
+    return acting._replace(heading=(x, y, z))
 
 
-def modes_of(closed: Sequence[bool], still: Sequence[bool], features: Features) -> ContactMode:
+def modes_of(closed: Sequence[bool], resting: Sequence[bool], features: Features) -> ContactMode:
     """Modes of contacts: stick if closed and still, slip if only closed, else open."""
     return tuple(
         Acting("open" if not shut else "stick" if stands else "slip", feature=feature)
-        for shut, stands, feature in zip(closed, still, features, strict=True)
+        for shut, stands, feature in zip(closed, resting, features, strict=True)
     )

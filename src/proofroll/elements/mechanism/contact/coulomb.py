@@ -40,8 +40,8 @@ def largest_friction(friction: Any, normal: Any) -> Any:
 
 def natural_rows(G: Array) -> Array:
     """Natural unit of each row of responses, the root of the force that it needs: bodies of any mass may touch."""
-    own = np.diag(G)
-    return np.asarray(1 / np.sqrt(np.where(own > 0, own, 1.0)))
+    diagonal = np.diag(G)
+    return np.asarray(1 / np.sqrt(np.where(diagonal > 0, diagonal, 1.0)))
 
 
 def returning(slides: Array, restitution: Array, sideways: Array) -> Array:
@@ -106,25 +106,27 @@ def contact_forces(
         if held is not None:
             return held.reshape(-1, 3), ["stick"] * len(friction)
     for _ in range(_SWEEPS):
-        before = f.copy()
+        last_forces = f.copy()
         for k, mu in enumerate(friction):
-            own = slice(3 * k, 3 * k + 3)
-            free = c[own] + G[own] @ f - G[own, own] @ f[own]
+            part = slice(3 * k, 3 * k + 3)
+            free = c[part] + G[part] @ f - G[part, part] @ f[part]
             by = pressing[k]
             bound = bounds[k] if by is None else mu * max(float(f[3 * by]), 0.0)
             if by is not None and not bound:
-                f[own], done[k] = 0.0, "open"
+                f[part], done[k] = 0.0, "open"
             elif bound:
-                f[own], done[k] = rubbing(G[own, own], free, bound, sliding[k])
+                f[part], done[k] = rubbing(G[part, part], free, bound, sliding[k])
             else:
-                f[own], done[k] = force_of_one(G[own, own], free, (mu, static[k]), sliding[k], (names[k], time), least)
-        if len(friction) == 1 or np.abs(f - before).max() <= _SETTLED * np.abs(f).max():
+                f[part], done[k] = force_of_one(
+                    G[part, part], free, (mu, static[k]), sliding[k], (names[k], time), least
+                )
+        if len(friction) == 1 or np.abs(f - last_forces).max() <= _SETTLED * np.abs(f).max():
             w = (c + G @ f).reshape(-1, 3)
             for k in [] if turns else _idle(G, w, friction, sliding, done, least):
                 done[k] = "slip"
-            for k, along in enumerate(sliding):
+            for k, way in enumerate(sliding):
                 rubs = friction[k] or bounds[k]
-                if done[k] == "slip" and along is None and rubs and np.linalg.norm(w[k, 1:]) <= least:
+                if done[k] == "slip" and way is None and rubs and np.linalg.norm(w[k, 1:]) <= least:
                     done[k] = "stick"  # one of several holding contacts may reach its bound while nothing moves
             return f.reshape(-1, 3), done
     together = None if bounds.any() or turns else _together(G, c, friction, sliding, least)
@@ -150,17 +152,17 @@ def _guessed(
     guess: Sequence[ModeKind] | None,
 ) -> Array:
     """Forces for a guess of outcomes, from which sweeps start; zero where a direction of slip is not known."""
-    rows, along, f = list[int](), list[Array](), np.zeros(len(c))
+    rows, pushes, f = list[int](), list[Array](), np.zeros(len(c))
     for k, slip in enumerate(sliding):
-        own = "stick" if slip is None else "slip"
+        kind = "stick" if slip is None else "slip"
         if guess is not None:
-            own = guess[k]
-        if own == "open":
+            kind = guess[k]
+        if kind == "open":
             continue
-        if own == "stick" and slip is None and (friction[k] or bounds[k]):
+        if kind == "stick" and slip is None and (friction[k] or bounds[k]):
             ways = [1, 2] if bounds[k] else [0, 1, 2]
             rows += [3 * k + way for way in ways]
-            along += [np.eye(len(c))[3 * k + way] for way in ways]
+            pushes += [np.eye(len(c))[3 * k + way] for way in ways]
         elif slip is None and (friction[k] or bounds[k]):
             return np.zeros(len(c))
         elif bounds[k]:
@@ -170,12 +172,12 @@ def _guessed(
             push = np.zeros(len(c))
             push[3 * k : 3 * k + 3] = [1.0, *(-friction[k] * (np.zeros(2) if slip is None else slip))]
             rows.append(3 * k)
-            along.append(push)
+            pushes.append(push)
     if not rows:
         return f
-    D = np.array(along).T
-    found = f + D @ np.linalg.lstsq((G @ D)[rows], -(c + G @ f)[rows], rcond=_SHARES)[0]
-    return np.asarray(found) if (found[::3] >= 0).all() else np.zeros(len(c))
+    D = np.array(pushes).T
+    forces = f + D @ np.linalg.lstsq((G @ D)[rows], -(c + G @ f)[rows], rcond=_SHARES)[0]
+    return np.asarray(forces) if (forces[::3] >= 0).all() else np.zeros(len(c))
 
 
 def _all_sliding(G: Array, c: Array, friction: Array, ways: Sequence[Array]) -> Array | None:
@@ -183,26 +185,26 @@ def _all_sliding(G: Array, c: Array, friction: Array, ways: Sequence[Array]) -> 
 
     Sweeps converge slowly, or not at all, where many contacts share a load.
     """
-    along = np.array([[1.0, *(-mu * way)] for mu, way in zip(friction, ways, strict=True)])
-    pushes = np.zeros((len(c), len(along)))
-    for k, push in enumerate(along):
+    directions = np.array([[1.0, *(-mu * way)] for mu, way in zip(friction, ways, strict=True)])
+    pushes = np.zeros((len(c), len(directions)))
+    for k, push in enumerate(directions):
         pushes[3 * k : 3 * k + 3, k] = push
     normals = lemke((G @ pushes)[::3], c[::3])
-    return None if normals is None else normals[:, None] * along
+    return None if normals is None else normals[:, None] * directions
 
 
 def _together(
     G: Array, c: Array, friction: Array, sliding: Sequence[Array | None], least: float
 ) -> tuple[Array, list[ModeKind]] | None:
     """Forces and outcomes of contacts that all slide already, or set off in one direction; None: neither."""
-    if all(along is not None or not mu for along, mu in zip(sliding, friction, strict=True)):
-        ways = [np.zeros(2) if along is None else along for along in sliding]
+    if all(way is not None or not mu for way, mu in zip(sliding, friction, strict=True)):
+        ways = [np.zeros(2) if way is None else way for way in sliding]
         pressed = _all_sliding(G, c, friction, ways)
         if pressed is None:
             return None
         leaving = (c + G @ pressed.ravel())[::3] > least  # one that shares a load may carry none of it, and stay
         return pressed, ["open" if leaves else "slip" for leaves in leaving]
-    if np.isfinite(friction).all() and all(along is None for along in sliding):
+    if np.isfinite(friction).all() and all(way is None for way in sliding):
         pressed = _all_setting_off(G, c, friction, least)
         return None if pressed is None else (pressed, ["slip"] * len(friction))
     return None
@@ -243,17 +245,17 @@ def _idle(
         done: outcomes so far.
         least: motion that counts as none.
     """
-    idle = [k for k, own in enumerate(done) if own == "open" and w[k, 0] <= least]
+    idle = [k for k, kind in enumerate(done) if kind == "open" and w[k, 0] <= least]
     if not (idle and least):
         return []
-    closed = [k for k, own in enumerate(done) if own != "open" or k in idle]
+    closed = [k for k, kind in enumerate(done) if kind != "open" or k in idle]
     pushes = np.zeros((len(G), len(closed)))  # unit normal forces with their friction
     for place, k in enumerate(closed):
         speed = float(np.linalg.norm(w[k, 1:]))
         way = w[k, 1:] / speed if speed > least else np.zeros(2)
-        along = sliding[k]
+        slip = sliding[k]
         mu = friction[k] if np.isfinite(friction[k]) else 0.0  # what never slips has no friction of a slip
-        pushes[3 * k : 3 * k + 3, place] = [1.0, *(-mu * (way if along is None else along))]
+        pushes[3 * k : 3 * k + 3, place] = [1.0, *(-mu * (way if slip is None else slip))]
     normals = [3 * k for k in closed]
     _, sizes, ways = np.linalg.svd(G[np.ix_(normals, normals)])
     splits = ways[(sizes > _SHARES * sizes[0]).sum() :]
@@ -317,14 +319,14 @@ def robust_forces(
     static = friction if static is None else static
     force, done = contact_forces(G, c, friction, sliding, names, bounds, time, static=static, pressed_by=pressed_by)
     # as a force at each contact that presses, which the holds of the other contacts balance
-    along, pressing = np.diag(G)[::3], [None] * len(friction) if pressed_by is None else pressed_by
-    presses = (along > 0) & (bounds == 0) & np.array([by is None for by in pressing])
-    lift = np.where(presses, (1 + _APART * np.arange(len(along))) / np.where(presses, along, 1), 0.0)
+    diagonal, pressing = np.diag(G)[::3], [None] * len(friction) if pressed_by is None else pressed_by
+    presses = (diagonal > 0) & (bounds == 0) & np.array([by is None for by in pressing])
+    lift = np.where(presses, (1 + _APART * np.arange(len(diagonal))) / np.where(presses, diagonal, 1), 0.0)
     nudge = _NUDGE * float(np.abs(c).max()) * G[:, ::3] @ lift
 
     def outcome(force: Array, done: Sequence[ModeKind]) -> list[ModeKind]:
         little = least * float(np.abs(force).max())
-        return ["open" if each[0] <= little and least else own for each, own in zip(force, done, strict=True)]
+        return ["open" if push[0] <= little and least else kind for push, kind in zip(force, done, strict=True)]
 
     nominal = outcome(force, done)
     same = all(

@@ -70,35 +70,35 @@ def force_of_one(
     c: Array,
     friction: tuple[float, float],
     sliding: Array | None,
-    where: tuple[str, float],
+    place: tuple[str, float],
     least: float,
 ) -> tuple[Array, ModeKind]:
     """Force and outcome of one contact while the other forces stay; a motion up to ``least`` counts as none.
 
-    ``friction``: coefficients while it slips and sticks; ``where``: its name and the time [s], for messages.
+    ``friction``: coefficients while it slips and sticks; ``place``: its name and the time [s], for messages.
     """
     mu, static = friction
     if c[0] >= 0:
         return np.zeros(3), "open"
     if np.isinf(mu):
-        return _held(G, c, sliding, where, least), "stick"
+        return _held(G, c, sliding, place, least), "stick"
     if sliding is not None or not mu:
-        return _pressing(G, c, mu, np.zeros(2) if sliding is None else sliding, where), "slip"
+        return _pressing(G, c, mu, np.zeros(2) if sliding is None else sliding, place), "slip"
     held = -np.linalg.pinv(G, 1e-12, hermitian=True) @ c
     rests = float(np.abs(c + G @ held).max()) <= least  # joints may let a contact that rebounds do nothing but slide
     if rests and np.linalg.norm(held[1:]) <= static * held[0] * (1 + AT_BOUND):
         return held, "stick"
 
     def moved(t: Array) -> Array:
-        return np.asarray((c + G @ _pressing(G, c, mu, t, where))[1:])
+        return np.asarray((c + G @ _pressing(G, c, mu, t, place))[1:])
 
-    for t in _parallel(moved, _across(G, c, mu, where)):
+    for t in _parallel(moved, _across(G, c, mu, place)):
         if moved(t) @ t > 0:
-            return _pressing(G, c, mu, t, where), "slip"
-    raise Refused("no direction of slip at {} at t = {:.6g} s is against its friction".format(*where))
+            return _pressing(G, c, mu, t, place), "slip"
+    raise Refused("no direction of slip at {} at t = {:.6g} s is against its friction".format(*place))
 
 
-def _held(G: Array, c: Array, sliding: Array | None, where: tuple[str, float], least: float) -> Array:
+def _held(G: Array, c: Array, sliding: Array | None, place: tuple[str, float], least: float) -> Array:
     """Force of a contact that never slips.
 
     Raises:
@@ -107,26 +107,26 @@ def _held(G: Array, c: Array, sliding: Array | None, where: tuple[str, float], l
     """
     held = np.asarray(-np.linalg.pinv(G, 1e-12, hermitian=True) @ c)
     if sliding is not None or float(np.abs(c + G @ held).max()) > least:
-        raise Refused("{} at t = {:.6g} s would slip, but has friction = inf; give it a number".format(*where))
+        raise Refused("{} at t = {:.6g} s would slip, but has friction = inf; give it a number".format(*place))
     if held[0] <= 0:
-        raise torn(*where)
+        raise torn(*place)
     return held
 
 
-def _across(G: Array, c: Array, mu: float, where: tuple[str, float]) -> Array:
+def _across(G: Array, c: Array, mu: float, place: tuple[str, float]) -> Array:
     """Component of the slip perpendicular to what friction opposes, for each of the searched directions."""
-    along = np.vstack([np.ones(len(_DIRECTIONS)), -mu * _WAYS])
-    response = G[0] @ along
+    directions = np.vstack([np.ones(len(_DIRECTIONS)), -mu * _WAYS])
+    response = G[0] @ directions
     if response.min() <= 0:
-        raise torn(*where)
-    w = c[1:, None] + G[1:] @ (along * (-c[0] / response))
+        raise torn(*place)
+    w = c[1:, None] + G[1:] @ (directions * (-c[0] / response))
     return _cross(w, _WAYS)
 
 
-def _pressing(G: Array, c: Array, mu: float, t: Array, where: tuple[str, float]) -> Array:
+def _pressing(G: Array, c: Array, mu: float, t: Array, place: tuple[str, float]) -> Array:
     """Force of a contact that slides along t with its gap kept closed. Raises NotUnique in Painlevé's paradox."""
-    along = np.array([1.0, *(-mu * t)])
-    response = float(G[0] @ along)
+    direction = np.array([1.0, *(-mu * t)])
+    response = float(G[0] @ direction)
     if response <= 0:
-        raise torn(*where)
-    return np.asarray(-c[0] / response * along)
+        raise torn(*place)
+    return np.asarray(-c[0] / response * direction)

@@ -75,14 +75,14 @@ def sequences(G: Array, slides: Array, groups: Sequence[list[int]], strike: Stri
         groups: indices of contacts that are struck together.
         strike: law of the impact of one group.
     """
-    found: list[Array] = []
+    results: list[Array] = []
     complete = True
     for order, round_robin in _orders(groups):
         impulses = _sequence(G, slides, strike, order, round_robin=round_robin)
         complete &= impulses is not None
-        if impulses is not None and not any(np.array_equal(impulses, known) for known in found):
-            found.append(impulses)
-    return Outcomes(np.array(found).reshape(-1, len(slides)), complete)
+        if impulses is not None and not any(np.array_equal(impulses, result) for result in results):
+            results.append(impulses)
+    return Outcomes(np.array(results).reshape(-1, len(slides)), complete)
 
 
 def left_by(slides: Array, least: float) -> list[str]:
@@ -120,7 +120,7 @@ def refuse_spread(
     """
     both = jumps if at_once is None else np.column_stack([at_once, jumps])
     size = float(np.abs(both).max(initial=0.0)) or 1.0
-    by_order, by_law = (float(np.ptp(each, axis=1).max(initial=0.0)) / size for each in (jumps, both))
+    by_order, by_law = (float(np.ptp(spread, axis=1).max(initial=0.0)) / size for spread in (jumps, both))
     if not outcomes.complete:
         why = "one after the other they hit each other infinitely often"
     elif by_order > SPREAD:

@@ -15,15 +15,15 @@ def turning_row(motion: BodyMotion, bodies: tuple[int, int]) -> tuple[Array, Arr
     return turning, J, rate
 
 
-def slide_row(motion: BodyMotion, bodies: tuple[int, int], found: Touching) -> tuple[Array, Array]:
+def slide_row(motion: BodyMotion, bodies: tuple[int, int], touch: Touching) -> tuple[Array, Array]:
     """Derivative of a contact's slide by the velocities, (3, nv), and rate of the slide at v̇ = 0, (3,); 0: absent."""
     J, bias = np.zeros((3, motion.J.shape[2])), np.zeros(3)
-    if found.absent:
+    if touch.absent:
         return J, bias
     for body, sign in zip(bodies, (1.0, -1.0), strict=True):
-        arm, w = found.place - motion.p_WB[body], motion.w_WB[body]
+        arm, w = touch.place - motion.p_WB[body], motion.w_WB[body]
         J += sign * (motion.J[body, :3] - skew(arm) @ motion.J[body, 3:])
         turning = motion.bias[body, :3] + cross(motion.bias[body, 3:], arm)
         # the point of contact moves over the body, to places with other velocities
-        bias += sign * (turning + cross(w, found.place_rate - motion.v_WB[body]))
+        bias += sign * (turning + cross(w, touch.place_rate - motion.v_WB[body]))
     return J, bias

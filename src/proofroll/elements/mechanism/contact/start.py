@@ -32,22 +32,22 @@ _STANDS = 1e-12
 def touches(mechanism: Mechanism, motion: BodyMotion, features: Sequence[int] | None = None) -> tuple[Touching, ...]:
     """Gap, normal and slide of all contacts at one instant; ``features``: that touch; None: the nearest."""
     index = mechanism.body_index
-    bodies = [Moving(*each) for each in zip(motion.p_WB, motion.R_WB, motion.v_WB, motion.w_WB, strict=True)]
-    given = [None] * len(mechanism.contacts) if features is None else features[: len(mechanism.contacts)]
-    pairs = zip(mechanism.contacts, given, strict=True)
+    bodies = [Moving(*values) for values in zip(motion.p_WB, motion.R_WB, motion.v_WB, motion.w_WB, strict=True)]
+    asked = [None] * len(mechanism.contacts) if features is None else features[: len(mechanism.contacts)]
+    pairs = zip(mechanism.contacts, asked, strict=True)
     return tuple(touch(c, bodies[index[c.body_a]], bodies[index[c.body_b]], feature) for c, feature in pairs)
 
 
 def extent(mechanism: Mechanism, motion: BodyMotion) -> float:
     """Largest distance between joints, loops, springs, centres of mass, points and contacts at one instant [m]."""
-    own = [(joint.child, joint.child_position) for joint in mechanism.joints]
-    own += [(body.name, body.com) for body in mechanism.bodies]
-    own += [(point.body, point.position) for point in mechanism.points]
+    points = [(joint.child, joint.child_position) for joint in mechanism.joints]
+    points += [(body.name, body.com) for body in mechanism.bodies]
+    points += [(point.body, point.position) for point in mechanism.points]
     for part in (*mechanism.loops, *mechanism.links):
-        own += [(part.body_a, part.position_a), (part.body_b, part.position_b)]
+        points += [(part.body_a, part.position_a), (part.body_b, part.position_b)]
     index = mechanism.body_index
-    places = [motion.p_WB[index[body]] + motion.R_WB[index[body]] @ np.array(at) for body, at in own]
-    places += [each.place for each in touches(mechanism, motion)]
+    places = [motion.p_WB[index[body]] + motion.R_WB[index[body]] @ np.array(position) for body, position in points]
+    places += [touch.place for touch in touches(mechanism, motion)]
     return float(np.max(np.linalg.norm(np.array(places)[:, None] - np.array(places)[None], axis=-1)))
 
 
@@ -78,18 +78,18 @@ class Scale(NamedTuple):
         return STILL * self.length * self.rate
 
 
-def natural_length(mechanism: Mechanism, found: Solution) -> float:
+def natural_length(mechanism: Mechanism, solution: Solution) -> float:
     """Largest of extent, prismatic travel and radii of gyration at one instant [m]; 0: it has none.
 
     That of a point at its place is the way to its nearest stop, or how far its speed carries it against its
     acceleration.
     """
-    motion = found.motion
+    motion = solution.motion
     slides = [joint for joint in mechanism.joints if joint.kind == JointKind.PRISMATIC]
     ways = [abs(way) for joint in slides for way in (*joint.q0, joint.rest)]
     radii = [np.sqrt(np.trace(body.inertia) / body.mass) for body in mechanism.bodies if body.mass]
-    length, pull = max([extent(mechanism, motion), *ways, *radii]), _largest(_rates(found)[:, :3])
-    stops = [abs(at - j.q0[0]) for j in slides for at in j.limits or () if abs(at - j.q0[0]) > j.stop_digits]
+    length, pull = max([extent(mechanism, motion), *ways, *radii]), _largest(_rates(solution)[:, :3])
+    stops = [abs(stop - j.q0[0]) for j in slides for stop in j.limits or () if abs(stop - j.q0[0]) > j.stop_digits]
     nearest = min(stops, default=0.0)
     return float(length or nearest or (pull and _largest(motion.v_WB) ** 2 / pull))
 
@@ -100,16 +100,16 @@ def natural_scale(mechanism: Mechanism) -> Scale:
 
     Both are powers of two, so that a change of units causes no round-off.
     """
-    found = JointCoordinates(mechanism).solve(*mechanism.start())
-    motion, rates, length = found.motion, _rates(found), natural_length(mechanism, found) or 1.0
+    solution = JointCoordinates(mechanism).solve(*mechanism.start())
+    motion, rates, length = solution.motion, _rates(solution), natural_length(mechanism, solution) or 1.0
     pulls = _largest(mechanism.gravity) / length, _largest(rates[:, :3]) / length, _largest(rates[:, 3:])
     rate = max(np.sqrt(max(pulls)), _largest(motion.v_WB) / length, _largest(motion.w_WB)) or 1.0
     return Scale(*(2.0 ** round(np.log2(size)) for size in (length, rate)))
 
 
-def _rates(found: Solution) -> FloatArray:
+def _rates(solution: Solution) -> FloatArray:
     """Accelerations and angular accelerations of the bodies, shape (body, 6)."""
-    return found.motion.J @ found.acceleration + found.motion.bias
+    return solution.motion.J @ solution.acceleration + solution.motion.bias
 
 
 def _largest(values: ArrayLike) -> float:
@@ -122,38 +122,40 @@ def start_digits(contacts: Sequence[object]) -> FloatArray:
 
 
 def closed_and_still(
-    found: Sequence[Touching], lengths: FloatArray, rate: float, digits: FloatArray | float = TOUCHING
+    touching: Sequence[Touching], lengths: FloatArray, rate: float, digits: FloatArray | float = TOUCHING
 ) -> tuple[list[bool], list[bool]]:
     """Two lists over the contacts: True if closed at the start and not opening, True if also at rest.
 
     Args:
-        found: the contacts.
+        touching: the contacts.
         lengths: natural length along each, 1 for an angle.
         rate: natural rate [1/s].
         digits: gap and speed of each that count as none, relative to its natural ones.
     """
-    rate = max([rate, *(float(np.linalg.norm(each.slide)) / size for each, size in zip(found, lengths, strict=True))])
+    rate = max(
+        [rate, *(float(np.linalg.norm(touch.slide)) / size for touch, size in zip(touching, lengths, strict=True))]
+    )
     least = lengths * digits
     closed = [
-        not each.absent and each.gap <= size and abs(float(each.normal @ each.slide)) <= size * rate
-        for each, size in zip(found, least, strict=True)
+        not touch.absent and touch.gap <= size and abs(float(touch.normal @ touch.slide)) <= size * rate
+        for touch, size in zip(touching, least, strict=True)
     ]
-    still = [
-        shut and bool(np.linalg.norm(each.slide) <= size * rate)
-        for shut, each, size in zip(closed, found, least, strict=True)
+    resting = [
+        shut and bool(np.linalg.norm(touch.slide) <= size * rate)
+        for shut, touch, size in zip(closed, touching, least, strict=True)
     ]
-    return closed, still
+    return closed, resting
 
 
 def at_start(
-    mechanism: Mechanism, contacts: Sequence[JointContact | BodyContact | TurningFriction], found: Sequence[Touching]
+    mechanism: Mechanism, contacts: Sequence[JointContact | BodyContact | TurningFriction], touching: Sequence[Touching]
 ) -> ContactMode:
-    """Modes of all contacts, ``found`` at the start: open, slip where a closed one slides, else stick."""
+    """Modes of all contacts, ``touching`` at the start: open, slip where a closed one slides, else stick."""
     scale, kinds = natural_scale(mechanism), [joint.kind for joint in mechanism.joints]
     turns = [isinstance(c, JointContact) and kinds[c.joint.number] != JointKind.PRISMATIC for c in contacts]
     lengths = np.where(turns, 1.0, scale.length)
-    closed, still = closed_and_still(found, lengths, scale.rate, start_digits(contacts))
-    return modes_of(shut_by_pressing(contacts, closed), still, tuple(each.feature for each in found))
+    closed, resting = closed_and_still(touching, lengths, scale.rate, start_digits(contacts))
+    return modes_of(shut_by_pressing(contacts, closed), resting, tuple(touch.feature for touch in touching))
 
 
 def check_contacts(mechanism: Mechanism) -> None:
@@ -168,33 +170,36 @@ def check_contacts(mechanism: Mechanism) -> None:
     for joint in stopped:
         assert joint.limits is not None
         (low, high), (q,), (v,) = joint.limits, joint.q0, joint.v0
-        digits, still = joint.stop_digits, scale.speed if joint.kind == JointKind.PRISMATIC else STILL * scale.rate
-        if (q <= low + digits and v < -still) or (q >= high - digits and v > still):
+        digits, least_speed = (
+            joint.stop_digits,
+            scale.speed if joint.kind == JointKind.PRISMATIC else STILL * scale.rate,
+        )
+        if (q <= low + digits and v < -least_speed) or (q >= high - digits and v > least_speed):
             advice = "the joint starts on its stop and moves into it, an impact at time 0; correct v0 or start it apart"
             raise InputError(f"joints.{joint.name}.v0", v, advice)
     round_ends = {shape.name for shape in mechanism.geometries if shape.kind == "cylinder"}
     cylinders = {pair.name for pair in mechanism.pairs if round_ends & set(pair.geometries)}
-    for contact, each in zip(mechanism.contacts, touches(mechanism, motion), strict=True):
+    for contact, touching in zip(mechanism.contacts, touches(mechanism, motion), strict=True):
         between = f"{contact.body_a} and {contact.body_b}"
-        if each.gap < -scale.gap:
-            advice = f"they overlap by {-each.gap:.3g} m at the start; move one"
+        if touching.gap < -scale.gap:
+            advice = f"they overlap by {-touching.gap:.3g} m at the start; move one"
             raise InputError(f"pairs.{contact.name}", between, advice)
-        if each.gap <= scale.gap and not each.normal.any():
+        if touching.gap <= scale.gap and not touching.normal.any():
             advice = "they touch at several points at once, without one normal; move one"
             raise InputError(f"pairs.{contact.name}", between, advice)
-        slip = float(np.linalg.norm(each.slide - each.normal * (each.normal @ each.slide)))
-        if each.gap <= scale.gap and slip > scale.speed and np.isinf(contact.friction):
+        slip = float(np.linalg.norm(touching.slide - touching.normal * (touching.normal @ touching.slide)))
+        if touching.gap <= scale.gap and slip > scale.speed and np.isinf(contact.friction):
             advice = (
                 f"they touch and slip at {slip:.3g} m/s, which friction = inf excludes; correct v0 or give a number"
             )
             raise InputError(f"pairs.{contact.name}.friction", contact.friction, advice)
-        if each.flat and each.gap <= scale.gap and contact.pair not in cylinders:
+        if touching.flat and touching.gap <= scale.gap and contact.pair not in cylinders:
             advice = "the disc lies flat and touches along its whole edge, not at one point; give it three spheres"
             if contact.features is not None:
                 advice = f"the capsules touch along a line: {PARALLEL}; turn one"
             raise InputError(f"pairs.{contact.name}", between, advice)
-        closing = -float(each.normal @ each.slide)
-        if each.gap <= scale.gap and closing > scale.speed:
+        closing = -float(touching.normal @ touching.slide)
+        if touching.gap <= scale.gap and closing > scale.speed:
             advice = (
                 f"they touch and approach at {closing:.3g} m/s, an impact at time 0; correct v0 or start them apart"
             )

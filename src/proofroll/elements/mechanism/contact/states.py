@@ -39,9 +39,9 @@ class ContactsNow:
     @cached_property
     def free_slides(self) -> FreeSlides:
         """Slides of the contacts without their forces."""
-        found = self.solution
-        held = found.C.T @ found.multipliers
-        return free_slides(self.touching, self.J, self.bias, found.acceleration, self.W, self.loose, held)
+        solution = self.solution
+        held = solution.C.T @ solution.multipliers
+        return free_slides(self.touching, self.J, self.bias, solution.acceleration, self.W, self.loose, held)
 
 
 @dataclass(frozen=True)
@@ -75,7 +75,7 @@ class ContactSolution:
     @property
     def undetermined(self) -> Array:
         """Changes of the forces that cause no motion, (contacts, 3, ways); across a line joints hold, too."""
-        lines = [k for k, own in enumerate(self.mode) if own.kind == "stick" and own.along is not None]
+        lines = [k for k, acting in enumerate(self.mode) if acting.kind == "stick" and acting.along is not None]
         across = np.zeros((*self.force.shape, len(lines)))
         for way, k in enumerate(lines):
             across[k, :, way] = cross(self.state.touching[k].normal, np.array(self.mode[k].along))
@@ -95,8 +95,8 @@ class ContactSolution:
     def lasts(self, mode: ContactMode) -> float:
         """Time until an open contact closes at constant acceleration [s]; infinite: never."""
         times = [np.inf]
-        for own, touch, rate in zip(mode, self.state.touching, self.slide_rate, strict=True):
-            if own.kind == "open":
+        for acting, touch, rate in zip(mode, self.state.touching, self.slide_rate, strict=True):
+            if acting.kind == "open":
                 opening = touch.normal @ rate + touch.normal_rate @ touch.slide
                 roots = np.roots([opening / 2, touch.normal @ touch.slide, touch.gap])
                 times += [root.real for root in roots if root.imag == 0 < root.real]

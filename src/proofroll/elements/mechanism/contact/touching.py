@@ -110,22 +110,22 @@ def touch(contact: BodyContact, a: Moving, b: Moving, feature: int | None = None
             return _touch_boxes(contact.box_slot, a, b, feature)
         return _touch_capsule(contact.box_slot, a, b, feature)
     if features is None:
-        found = _touch(contact.shape_a, a, contact.shape_b, b)
+        result = _touch(contact.shape_a, a, contact.shape_b, b)
         discs = ((contact.shape_a, a), (contact.shape_b, b))
         tilts = (
-            float(np.linalg.norm(cross(of.R @ disc.normal, found.normal)))
+            float(np.linalg.norm(cross(of.R @ disc.normal, result.normal)))
             for disc, of in discs
             if isinstance(disc, CircleShape)
         )
-        return found._replace(tilt=next(tilts, 1.0))
+        return result._replace(tilt=next(tilts, 1.0))
     *measures, tilt = _measures(features, a, b)
     feature = features.nearest(*measures) if feature is None else feature
-    one, two = features.shapes(feature)
-    found = _touch(one, a, two, b)
-    if isinstance(one, Wall) and not isinstance(two, Wall):
-        found = _on_first(found, a, b)
+    shape_a, shape_b = features.shapes(feature)
+    result = _touch(shape_a, a, shape_b, b)
+    if isinstance(shape_a, Wall) and not isinstance(shape_b, Wall):
+        result = _on_first(result, a, b)
     tilt = tilt if features.needs_angle(feature) else 1.0
-    return found._replace(tilt=tilt, feature=feature, borders=tuple(features.borders(feature, *measures)))
+    return result._replace(tilt=tilt, feature=feature, borders=tuple(features.borders(feature, *measures)))
 
 
 def _touch_boxes(slot: BoxSlot, a: Moving, b: Moving, feature: int | None) -> Touching:
@@ -139,23 +139,23 @@ def _touch_boxes(slot: BoxSlot, a: Moving, b: Moving, feature: int | None) -> To
     borders = [Border(-beyond if absent else beyond, feature ^ 1)]
     borders += [Border(lying.turned_away(*faces), feature)] if slot.leads else []
     if not absent:
-        one, two = slot.shapes(feature)
-        return _touch(one, a, two, b)._replace(feature=feature, borders=tuple(borders))
+        shape_a, shape_b = slot.shapes(feature)
+        return _touch(shape_a, a, shape_b, b)._replace(feature=feature, borders=tuple(borders))
     gap = beyond if slot.of_edges else max(beyond, float(heights[slot.slot]))
-    found = _absent(gap, lying.normal(False, faces[1]), lying.place_a, a, b)
-    return found._replace(feature=feature, borders=tuple(borders))
+    apart = _absent(gap, lying.normal(False, faces[1]), lying.place_a, a, b)
+    return apart._replace(feature=feature, borders=tuple(borders))
 
 
 def _absent(gap: float, normal: Array, place: Array, a: Moving, b: Moving) -> Touching:
     """Contact beyond its border, with a place of its bodies, as edges may be parallel."""
-    speed, other = a.velocity(place), b.velocity(place)
+    speed, other_speed = a.velocity(place), b.velocity(place)
     return Touching(
         gap=gap,
         normal=normal,
         normal_rate=np.zeros(3),
         place=place,
         place_rate=speed,
-        slide=speed - other,
+        slide=speed - other_speed,
         absent=True,
     )
 
@@ -164,9 +164,9 @@ def _touch_capsule(slot: CapsuleBoxSlot, a: Moving, b: Moving, feature: int | No
     """One contact of a capsule and a box; see :func:`touch`."""
     of_a, of_b = slot.centres
     places = a.p + a.R @ of_a, b.p + b.R @ of_b
-    (capsule, box), (place, other) = ((a, b), places) if slot.capsule_first else ((b, a), places[::-1])
+    (capsule, box), (place, other_place) = ((a, b), places) if slot.capsule_first else ((b, a), places[::-1])
     axes = box.R @ slot.box.frame
-    seen = axes.T @ (place - other), axes.T @ (capsule.R @ slot.capsule.axis)
+    seen = axes.T @ (place - other_place), axes.T @ (capsule.R @ slot.capsule.axis)
     feature = slot.nearest(*seen) if feature is None else feature
     left_by = slot.left_by(feature, *seen)
     borders = (Border(left_by, feature ^ 1),)
@@ -174,30 +174,30 @@ def _touch_capsule(slot: CapsuleBoxSlot, a: Moving, b: Moving, feature: int | No
         apart = places[0] - places[1]
         normal = apart / (float(np.linalg.norm(apart)) or 1.0)
         return _absent(-left_by, normal, places[0], a, b)._replace(feature=feature, borders=borders)
-    one, two = slot.shapes(feature)
-    found = _touch(one, a, two, b)
-    if isinstance(one, Wall) and not isinstance(two, Wall):
-        found = _on_first(found, a, b)
-    return found._replace(feature=feature, borders=borders)
+    shape_a, shape_b = slot.shapes(feature)
+    touching = _touch(shape_a, a, shape_b, b)
+    if isinstance(shape_a, Wall) and not isinstance(shape_b, Wall):
+        touching = _on_first(touching, a, b)
+    return touching._replace(feature=feature, borders=borders)
 
 
 _LYING: list[tuple[Moving, Moving, BoxShape, BoxShape, Lying]] = []  # of the last boxes, which have many contacts
 
 
 def _lying_of(slot: BoxSlot, a: Moving, b: Moving) -> Lying:
-    one, two = slot.first, slot.second
+    box_a, box_b = slot.first, slot.second
     for last in _LYING[:1]:
-        if last[0] is a and last[1] is b and last[2] is one and last[3] is two:
+        if last[0] is a and last[1] is b and last[2] is box_a and last[3] is box_b:
             return last[4]
     lying = Lying(
-        place_a=a.p + a.R @ one.centre,
-        axes_a=a.R @ one.frame,
-        half_a=one.half,
-        place_b=b.p + b.R @ two.centre,
-        axes_b=b.R @ two.frame,
-        half_b=two.half,
+        place_a=a.p + a.R @ box_a.centre,
+        axes_a=a.R @ box_a.frame,
+        half_a=box_a.half,
+        place_b=b.p + b.R @ box_b.centre,
+        axes_b=b.R @ box_b.frame,
+        half_b=box_b.half,
     )
-    _LYING[:] = [(a, b, one, two, lying)]
+    _LYING[:] = [(a, b, box_a, box_b, lying)]
     return lying
 
 
@@ -213,20 +213,20 @@ def _measures(features: SolidFeatures, a: Moving, b: Moving) -> tuple[float, flo
     return x, y, z, 1.0
 
 
-def _touch(one: Shape, a: Moving, two: Shape, b: Moving) -> Touching:
+def _touch(shape_a: Shape, a: Moving, shape_b: Shape, b: Moving) -> Touching:
     """Contact of two shapes with one rule."""
-    if isinstance(one, Shaft) and isinstance(two, Shaft):
-        gap, n, n_rate, place, rate = _two_shafts(one, a, two, b)
-    elif isinstance(two, Wall):
-        assert not isinstance(one, Wall)  # two walls are no contact
-        gap, n, n_rate, place, rate = _on_wall(one, a, two, b)
-    elif isinstance(one, Wall):
-        gap, n, n_rate, place, rate = _on_wall(two, b, one, a)
+    if isinstance(shape_a, Shaft) and isinstance(shape_b, Shaft):
+        gap, n, n_rate, place, rate = _two_shafts(shape_a, a, shape_b, b)
+    elif isinstance(shape_b, Wall):
+        assert not isinstance(shape_a, Wall)  # two walls are no contact
+        gap, n, n_rate, place, rate = _on_wall(shape_a, a, shape_b, b)
+    elif isinstance(shape_a, Wall):
+        gap, n, n_rate, place, rate = _on_wall(shape_b, b, shape_a, a)
         n, n_rate = -n, -n_rate
     else:
-        assert isinstance(one, SphereShape)
-        assert isinstance(two, SphereShape)
-        gap, n, n_rate, place, rate = _two_spheres(one, a, two, b)
+        assert isinstance(shape_a, SphereShape)
+        assert isinstance(shape_b, SphereShape)
+        gap, n, n_rate, place, rate = _two_spheres(shape_a, a, shape_b, b)
     return Touching(
         gap=gap,
         normal=n,
@@ -237,68 +237,72 @@ def _touch(one: Shape, a: Moving, two: Shape, b: Moving) -> Touching:
     )
 
 
-def _on_first(found: Touching, a: Moving, b: Moving) -> Touching:
+def _on_first(touching: Touching, a: Moving, b: Moving) -> Touching:
     """The contact with its place moved from the second shape to the first."""
-    place = found.place + found.gap * found.normal
-    rate = found.place_rate + float(found.normal @ found.slide) * found.normal + found.gap * found.normal_rate
-    return found._replace(place=place, place_rate=rate, slide=a.velocity(place) - b.velocity(place))
+    place = touching.place + touching.gap * touching.normal
+    rate = (
+        touching.place_rate
+        + float(touching.normal @ touching.slide) * touching.normal
+        + touching.gap * touching.normal_rate
+    )
+    return touching._replace(place=place, place_rate=rate, slide=a.velocity(place) - b.velocity(place))
 
 
 _Lying = tuple[float, Array, Array, Array, Array]
 
 
-def _on_wall(shape: ConvexShape, own: Moving, wall: Wall, other: Moving) -> _Lying:
+def _on_wall(shape: ConvexShape, body: Moving, wall: Wall, wall_body: Moving) -> _Lying:
     """Gap, normal, its rate, point of contact and its rate of a convex shape on a wall, with the wall's normal."""
     if isinstance(wall, HalfSpace):
-        return _on_plane(shape, own, wall, other)
+        return _on_plane(shape, body, wall, wall_body)
     assert isinstance(shape, SphereShape)  # alone has a rule
-    return _on_curve(shape, own, wall, other)
+    return _on_curve(shape, body, wall, wall_body)
 
 
-def _on_curve(sphere: SphereShape, own: Moving, wall: CurvedWall, other: Moving) -> _Lying:
+def _on_curve(sphere: SphereShape, body: Moving, wall: CurvedWall, wall_body: Moving) -> _Lying:
     """Numbers of :func:`_on_wall` on a curved wall."""
-    centre, axes = own.p + own.R @ sphere.centre, other.R @ wall.frame
-    near = wall.near(axes.T @ (centre - other.p - other.R @ wall.point))
+    centre, axes = body.p + body.R @ sphere.centre, wall_body.R @ wall.frame
+    near = wall.near(axes.T @ (centre - wall_body.p - wall_body.R @ wall.point))
     n = axes @ near.normal
-    slides = own.velocity(centre) - other.velocity(centre)  # of the centre over the wall's body
-    n_rate = cross(other.w, n) + axes @ (near.bend @ (axes.T @ slides))
-    place, rate = centre - sphere.radius * n, own.velocity(centre) - sphere.radius * n_rate
+    slides = body.velocity(centre) - wall_body.velocity(centre)  # of the centre over the wall's body
+    n_rate = cross(wall_body.w, n) + axes @ (near.bend @ (axes.T @ slides))
+    place, rate = centre - sphere.radius * n, body.velocity(centre) - sphere.radius * n_rate
     return near.distance - sphere.radius, n, n_rate, place, rate
 
 
-def _on_plane(shape: ConvexShape, own: Moving, plane: HalfSpace, other: Moving) -> _Lying:
+def _on_plane(shape: ConvexShape, body: Moving, plane: HalfSpace, wall_body: Moving) -> _Lying:
     """Numbers of :func:`_on_wall` on a plane, of any convex shape."""
-    n = other.R @ plane.normal
-    n_rate = cross(other.w, n)
-    point, by_direction = shape.support(-(own.R.T @ n))
-    arm = own.R @ point
-    turning = cross(own.w, n) - n_rate  # rate of the direction in the body's frame
-    place = own.p + arm
-    rate = own.v + cross(own.w, arm) + own.R @ (by_direction @ (own.R.T @ turning))
-    gap = float(n @ (place - other.p - other.R @ plane.point))
+    n = wall_body.R @ plane.normal
+    n_rate = cross(wall_body.w, n)
+    point, by_direction = shape.support(-(body.R.T @ n))
+    arm = body.R @ point
+    turning = cross(body.w, n) - n_rate  # rate of the direction in the body's frame
+    place = body.p + arm
+    rate = body.v + cross(body.w, arm) + body.R @ (by_direction @ (body.R.T @ turning))
+    gap = float(n @ (place - wall_body.p - wall_body.R @ plane.point))
     return gap, n, n_rate, place, rate
 
 
-def _two_spheres(one: SphereShape, a: Moving, two: SphereShape, b: Moving) -> _Lying:
-    centre_a, centre_b = a.p + a.R @ one.centre, b.p + b.R @ two.centre
+def _two_spheres(sphere_a: SphereShape, a: Moving, sphere_b: SphereShape, b: Moving) -> _Lying:
+    centre_a, centre_b = a.p + a.R @ sphere_a.centre, b.p + b.R @ sphere_b.centre
     d, d_rate = centre_a - centre_b, a.velocity(centre_a) - b.velocity(centre_b)
     distance = float(np.linalg.norm(d))
     length = distance or 1.0  # a trial step may lay one centre on the other, where the normal is zero
     n = d / length
     n_rate = (d_rate - n * (n @ d_rate)) / length
-    place, rate = centre_a - one.radius * n, a.velocity(centre_a) - one.radius * n_rate
-    return distance - one.radius - two.radius, n, n_rate, place, rate
+    place, rate = centre_a - sphere_a.radius * n, a.velocity(centre_a) - sphere_a.radius * n_rate
+    return distance - sphere_a.radius - sphere_b.radius, n, n_rate, place, rate
 
 
-def _two_shafts(one: Shaft, a: Moving, two: Shaft, b: Moving) -> _Lying:
+def _two_shafts(shaft_a: Shaft, a: Moving, shaft_b: Shaft, b: Moving) -> _Lying:
     """Numbers of :func:`_on_wall` of two round shafts that cross, where their axes are nearest."""
-    u, w = a.R @ one.axis, b.R @ two.axis
+    u, w = a.R @ shaft_a.axis, b.R @ shaft_b.axis
     u_rate, w_rate = cross(a.w, u), cross(b.w, w)
-    foot_a, foot_b = a.p + a.R @ one.point, b.p + b.R @ two.point
+    foot_a, foot_b = a.p + a.R @ shaft_a.point, b.p + b.R @ shaft_b.point
     d, d_rate = foot_a - foot_b, a.velocity(foot_a) - b.velocity(foot_b)
     across, across_rate = cross(u, w), cross(u_rate, w) + cross(u, w_rate)
     square = float(across @ across) or 1.0  # of parallel shafts, which have no normal
-    ahead = b.R @ two.outward if isinstance(two, EdgeLine) else d
+    ahead = b.R @ shaft_b.outward if isinstance(shaft_b, EdgeLine) else d
     sign = np.copysign(1.0, float(ahead @ across)) / np.sqrt(square)
     n, n_rate = sign * across, sign * across_rate
     n_rate = n_rate - n * (n @ n_rate)
@@ -307,6 +311,6 @@ def _two_shafts(one: Shaft, a: Moving, two: Shaft, b: Moving) -> _Lying:
     rate_a, rate_b = float(d_rate @ u + d @ u_rate), float(d_rate @ w + d @ w_rate)
     s = (cosine * along_b - along_a) / square
     s_rate = (cosine_rate * along_b + cosine * rate_b - rate_a + 2 * s * cosine * cosine_rate) / square
-    place = foot_a + s * u - one.radius * n
-    rate = a.velocity(foot_a) + s_rate * u + s * u_rate - one.radius * n_rate
-    return float(n @ d) - one.radius - two.radius, n, n_rate, place, rate
+    place = foot_a + s * u - shaft_a.radius * n
+    rate = a.velocity(foot_a) + s_rate * u + s * u_rate - shaft_a.radius * n_rate
+    return float(n @ d) - shaft_a.radius - shaft_b.radius, n, n_rate, place, rate

@@ -58,13 +58,13 @@ def analyse(mechanism: Mechanism) -> Analysis:
     rows = tree.loop_rows(motion)
     values = singular_values(rows.C)
     at_start = rank_of(values)
-    still = np.zeros(mechanism.nv)
+    rest = np.zeros(mechanism.nv)
 
     def of_loops(q: Array) -> tuple[Array, Array]:
-        rows = tree.loop_rows(tree.at(q, still))
+        rows = tree.loop_rows(tree.at(q, rest))
         return rows.residual, rows.C
 
-    near = tree.at(general_place(q, of_loops, tree.moved), still)
+    near = tree.at(general_place(q, of_loops, tree.moved), rest)
     near_rows = tree.loop_rows(near)
     near_values = singular_values(near_rows.C)
     rank = max(at_start, rank_of(near_values))

@@ -290,10 +290,10 @@ class Commands:
 
     def _observed(self, t: float, q: FloatArray, v: FloatArray, placed: Placed) -> Observation:
         index = self._mechanism.body_index[self._base]
-        still = np.zeros(3)
+        rest = np.zeros(3)
         R = placed.R_WB[0, index].copy()
         p, velocity, spin = (
-            still if index < 0 else np.array(array[0, index]) for array in (placed.p_WB, placed.v_WB, placed.w_WB)
+            rest if index < 0 else np.array(array[0, index]) for array in (placed.p_WB, placed.v_WB, placed.w_WB)
         )
         return Observation(
             time=t,

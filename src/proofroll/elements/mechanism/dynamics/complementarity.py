@@ -125,25 +125,25 @@ def decided_mode(joints: Sequence[SwitchedJoint], q: Array, v: Array, responses:
         joint.resting(q[joint.coordinate]) if v[joint.velocity] == 0 else joint.moving(v[joint.velocity])
         for joint in joints
     ]
-    still = held_joints(tuple(mode))
+    resting = held_joints(tuple(mode))
 
     def released() -> RestResponse:
         """RestResponse of the joints at rest, which are free for it."""
-        of_rest: Mode = tuple("free" if number in still else own for number, own in enumerate(mode))
-        return responses(of_rest, [joints[number].velocity for number in still])
+        of_rest: Mode = tuple("free" if number in resting else kind for number, kind in enumerate(mode))
+        return responses(of_rest, [joints[number].velocity for number in resting])
 
-    found = released() if still else None
-    if found is not None and found.moved.any():
-        for number, moved, rate, least in zip(still, found.moved, found.free, found.least, strict=True):
+    response = released() if resting else None
+    if response is not None and response.moved.any():
+        for number, moved, rate, least in zip(resting, response.moved, response.free, response.least, strict=True):
             if moved:
                 mode[number] = joints[number].moving(rate) if abs(rate) > least else "free"
-        still = held_joints(tuple(mode))
-        found = released() if still else None
-    if found is None:
+        resting = held_joints(tuple(mode))
+        response = released() if resting else None
+    if response is None:
         return tuple(mode)
-    low, high = np.array([joints[number].bounds(mode[number]) for number in still]).T
-    state = complementary(found.free, found.by_force, low, high)[0]
-    for number, side in zip(still, state, strict=True):
+    low, high = np.array([joints[number].bounds(mode[number]) for number in resting]).T
+    state = complementary(response.free, response.by_force, low, high)[0]
+    for number, side in zip(resting, state, strict=True):
         if side:
             mode[number] = joints[number].moving(-side)
     return tuple(mode)

@@ -80,7 +80,7 @@ class JointCoordinates:
         self._damping = np.array([joint.damping for joint in by_velocity])
         self._torque = np.array([joint.constant_drive for joint in by_velocity])
         joints = zip(mechanism.joints, mechanism.v_slices, strict=True)
-        self._driven = [(joint.torque, at.start) for joint, at in joints if varies(joint.torque)]
+        self._driven = [(joint.torque, columns.start) for joint, columns in joints if varies(joint.torque)]
         self.actuators = [(actuator, *mechanism.place_of(actuator.joint)) for actuator in mechanism.actuators]
         self.limited = [place for place in self.actuators if place[0].limit is not None]
         self._clamped = [actuator.limit is not None for actuator in mechanism.actuators]
@@ -117,11 +117,11 @@ class JointCoordinates:
             b += load_of(self.switched, mode, len(v))
         if load is not None:
             b += load
-        for signal, at in self._driven:
-            b[at] += value_at(signal, time, self.functions)
+        for signal, column in self._driven:
+            b[column] += value_at(signal, time, self.functions)
         if self.actuators:
-            for (_, _, at), effort in zip(self.actuators, self.efforts(time, q, v, mode), strict=True):
-                b[at] += effort
+            for (_, _, column), effort in zip(self.actuators, self.efforts(time, q, v, mode), strict=True):
+                b[column] += effort
         rows = self.tree.loop_rows(motion, time, self.functions)
         C, bias, rank = rows.C, rows.bias, self.rank
         if held := [self.switched[number].velocity for number in held_joints(mode)]:
@@ -192,17 +192,17 @@ class JointCoordinates:
         """Mode of joints, by complementarity."""
         return decided_mode(self.switched, q, v, partial(self._responses, time, q, v))
 
-    def _responses(self, time: float, q: Array, v: Array, mode: Mode, at: Sequence[int]) -> RestResponse:
-        """Responses of the joints in a mode to unit forces along the velocities ``at``; see :data:`.Responses`."""
+    def _responses(self, time: float, q: Array, v: Array, mode: Mode, columns: Sequence[int]) -> RestResponse:
+        """Responses of the joints in a mode to unit forces along the velocities ``columns``; see :data:`.Responses`."""
         free = self.solve(q, v, mode, time=time)
         M = self.weighted(self.inertial(free.motion)[1], np.zeros(len(v)), free.C, np.zeros(len(free.C)))[0]
         loose: Array = np.asarray(np.linalg.inv(M), dtype=np.float64)
         W = loose if free.split is None else loose - free.split[0] @ free.split[0].T
         held, rates = free.C.T @ np.append(free.multipliers, free.holding), free.acceleration
         # in the norm of kinetic energy, which has one unit for all velocities
-        strength, most = np.sqrt(rates @ M @ rates) + np.sqrt(held @ loose @ held), np.diag(loose)[list(at)]
-        moved, least = np.diag(W)[list(at)] <= NO_RESPONSE * most, ROUND_OFF * np.sqrt(most) * strength
-        return RestResponse(free=rates[list(at)], by_force=W[np.ix_(at, at)], moved=moved, least=least)
+        strength, most = np.sqrt(rates @ M @ rates) + np.sqrt(held @ loose @ held), np.diag(loose)[list(columns)]
+        moved, least = np.diag(W)[list(columns)] <= NO_RESPONSE * most, ROUND_OFF * np.sqrt(most) * strength
+        return RestResponse(free=rates[list(columns)], by_force=W[np.ix_(columns, columns)], moved=moved, least=least)
 
     def run(self, times: Array, tolerance: float = 1e-14, visited: list[tuple[float, Array]] | None = None) -> Record:
         """Record of the motion at the given times [s], by DOP853; ``visited`` takes times and states before steps.
@@ -256,7 +256,7 @@ class JointCoordinates:
         moved = [self.solve(self.tree.moved(q, _NEAR * way), v).acceleration for way in ways]
         nudged = [self.solve(self.tree.moved(q, np.spacing(1.0) * way), v + np.spacing(v) * way) for way in ways]
         slope = float(np.abs(np.array(moved) - acceleration).max(initial=0.0)) / _NEAR
-        noise = max(float(np.abs(each.acceleration - acceleration).max(initial=0.0)) for each in nudged)
+        noise = max(float(np.abs(solution.acceleration - acceleration).max(initial=0.0)) for solution in nudged)
         return max(1.0, float(np.sqrt(slope))), noise
 
     def joint_gains(self) -> tuple[Array, Array]:
@@ -269,8 +269,8 @@ class JointCoordinates:
     def servo_gains(self) -> tuple[Array, Array]:
         """Gains kd and kp of actuators at their joints, along the velocities, (nv) each."""
         gains = np.zeros((2, self.mechanism.nv))
-        for actuator, _, at in self.actuators:
-            gains[:, at] += actuator.gear**2 * np.array([actuator.kd, actuator.kp])
+        for actuator, _, column in self.actuators:
+            gains[:, column] += actuator.gear**2 * np.array([actuator.kd, actuator.kp])
         return gains[0], gains[1]
 
     def _least(self, tolerance: float) -> Array:
@@ -318,12 +318,12 @@ class JointCoordinates:
         nq = self.mechanism.nq
         q, v = self.tree.normalised(y[:nq]), y[nq:]
         if self.rank or self.switched:
-            found = self.solve(q, v, mode)
-            if found.split is not None:
-                into, back = found.split
-                opening = np.append(found.rows.opening(v), found.C[len(found.rows.residual) :] @ v)
+            solution = self.solve(q, v, mode)
+            if solution.split is not None:
+                into, back = solution.split
+                opening = np.append(solution.rows.opening(v), solution.C[len(solution.rows.residual) :] @ v)
                 v = v - into @ (back @ opening)
-                residual = np.append(found.rows.residual, np.zeros(len(found.C) - len(found.rows.residual)))
+                residual = np.append(solution.rows.residual, np.zeros(len(solution.C) - len(solution.rows.residual)))
                 q = self.tree.moved(q, -into @ (back @ residual))
         return np.concatenate([q, v])
 
@@ -343,11 +343,11 @@ class JointCoordinates:
         """
         if mode is None and self.switched:
             mode = self.decided(q, v, time)
-        found = self.solve(q, v, mode, load, time)
-        motion, rows, mechanism = found.motion, found.rows, self.mechanism
+        solution = self.solve(q, v, mode, load, time)
+        motion, rows, mechanism = solution.motion, solution.rows, self.mechanism
         n = len(mechanism.bodies)
-        needed = self._needed(found, time) - (0.0 if applied is None else applied)
-        wrench = np.concatenate(reactions(self.tree, motion, rows, found.multipliers, needed))
+        needed = self._needed(solution, time) - (0.0 if applied is None else applied)
+        wrench = np.concatenate(reactions(self.tree, motion, rows, solution.multipliers, needed))
         largest = [np.abs(rows.residual).max(initial=0.0), np.abs(rows.opening(v)).max(initial=0.0)]
         return {
             "p_WB": motion.p_WB[:n],
@@ -357,21 +357,21 @@ class JointCoordinates:
             "q": q,
             "v": v,
             "wrench": wrench,
-            "named": self._named(found, q, v, mode or (), time),
+            "named": self._named(solution, q, v, mode or (), time),
             "residual": np.array(largest),
         }
 
-    def _named(self, found: Solution, q: Array, v: Array, mode: Mode, time: float) -> Array:
+    def _named(self, solution: Solution, q: Array, v: Array, mode: Mode, time: float) -> Array:
         fields = {name: np.zeros(count) for name, count in lengths(self.mechanism).items()}
         fields["effort"][:] = self.efforts(time, q, v, mode)
-        moved = len(found.multipliers) - found.rows.moved
-        fields["coupling"][:] = found.multipliers[moved - len(fields["coupling"]) : moved]
+        moved = len(solution.multipliers) - solution.rows.moved
+        fields["coupling"][:] = solution.multipliers[moved - len(fields["coupling"]) : moved]
         driven = [self.mechanism.joint_index[joint.name] for joint, _, _ in self.mechanism.prescribed]
-        fields["drive"][driven] = found.multipliers[moved:]
-        holding = dict(zip(held_joints(mode), found.holding, strict=True))
-        for number, (joint, own) in enumerate(zip(self.switched, mode, strict=False)):
-            force = holding.get(number, joint.push(own))
-            on = joint_force_shares(own in STOPPED, joint.friction, force)
+        fields["drive"][driven] = solution.multipliers[moved:]
+        holding = dict(zip(held_joints(mode), solution.holding, strict=True))
+        for number, (joint, kind) in enumerate(zip(self.switched, mode, strict=False)):
+            force = holding.get(number, joint.push(kind))
+            on = joint_force_shares(kind in STOPPED, joint.friction, force)
             fields["friction"][joint.number], fields["stop"][joint.number] = on
         return pick_named(self.mechanism, fields)
 
@@ -395,12 +395,12 @@ class JointCoordinates:
         moment = inertia @ alpha + turn @ (inertia @ w[:, :, None])
         return np.concatenate([self._mass[:, None] * (at_com - self._gravity), moment[..., 0]], axis=1)
 
-    def _needed(self, found: Solution, time: float) -> Array:
+    def _needed(self, solution: Solution, time: float) -> Array:
         """Wrenches about the world's origin that joints and loops bring to the bodies; the last is the world's."""
-        motion, n = found.motion, len(self._mass)
+        motion, n = solution.motion, len(self._mass)
         R = motion.R_WB[:n]
         arm = (R @ self._com[:, :, None])[..., 0]
-        acceleration = motion.J[:n] @ found.acceleration + motion.bias[:n]
+        acceleration = motion.J[:n] @ solution.acceleration + motion.bias[:n]
         inertia = R @ self._inertia @ R.transpose(0, 2, 1)
         wrenches = self._wrenches(acceleration, arm, inertia, motion.w_WB[:n])
         needed = np.zeros((n + 1, 6))

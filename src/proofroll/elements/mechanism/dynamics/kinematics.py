@@ -85,22 +85,22 @@ class Tree:
         self._static = [
             (
                 joint.kind,
-                at,
+                columns,
                 np.array(joint.position),
                 joint.parent_frame,
                 joint.child_frame.T,
                 np.array(joint.child_position),
             )
-            for joint, at in zip(joints, mechanism.q_slices, strict=True)
+            for joint, columns in zip(joints, mechanism.q_slices, strict=True)
         ]
         axes = [(k, *axis) for k, joint in enumerate(joints) for axis in AXES[joint.kind]]
         self._joint, self._in_child, self._axis, turns, by_child = np.array(axes, dtype=int).reshape(nv, 5).T
         self._turns = turns.astype(float)
         self._carrier = np.array([self.parents, self.children])[by_child, self._joint]
         self._moves = np.zeros((len(mechanism.bodies) + 1, nv))  # 1 where a velocity moves a body
-        for parent, child, at in zip(self.parents, self.children, mechanism.v_slices, strict=True):
+        for parent, child, columns in zip(self.parents, self.children, mechanism.v_slices, strict=True):
             self._moves[child] = self._moves[parent]
-            self._moves[child, at] = 1.0
+            self._moves[child, columns] = 1.0
 
     def rate(self, q: Array, v: Array) -> Array:
         """Time derivative of the coordinates (nq) for velocities (nv)."""
@@ -130,10 +130,10 @@ class Tree:
         p, R = np.zeros((n + 1, 3)), np.zeros((n + 1, 3, 3))
         p_joint, frames = np.zeros((nj, 3)), np.zeros((2, nj, 3, 3))
         R[n] = _UNIT
-        for k, (kind, at, position, frame, back, child_position) in enumerate(self._static):
+        for k, (kind, columns, position, frame, back, child_position) in enumerate(self._static):
             i, c = self.parents[k], self.children[k]
             A = R[i] @ frame
-            d, S = child_in_parent(kind, q[at])
+            d, S = child_in_parent(kind, q[columns])
             B = A @ S
             R[c] = B @ back
             p_joint[k] = p[i] + R[i] @ position + A @ d

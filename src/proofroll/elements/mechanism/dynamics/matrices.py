@@ -35,8 +35,8 @@ def matrices_of(mechanism: Mechanism) -> Matrices:
         J, M, wrenches = equations.inertial(equations.tree.at(q, velocities))
         return M, wrenches.ravel() @ J.reshape(-1, mechanism.nv)
 
-    (M, both), (_, still) = loads(v), loads(np.zeros(mechanism.nv))
-    return Matrices(M, both - still, still)
+    (M, both), (_, resting) = loads(v), loads(np.zeros(mechanism.nv))
+    return Matrices(M, both - resting, resting)
 
 
 def velocity_names(mechanism: Mechanism) -> list[str]:

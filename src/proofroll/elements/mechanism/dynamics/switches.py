@@ -150,12 +150,12 @@ def end_event(mode: str) -> str:
 def changes(joints: Sequence[SwitchedJoint], old: Mode, new: Mode) -> tuple[tuple[str, str], ...]:
     """Events (kind, joint) of joints that become held, reverse, or are set free by a change of mode."""
     events: list[tuple[str, str]] = []
-    for joint, was, now in zip(joints, old, new, strict=False):
-        if now in HOLDING and was not in HOLDING:
+    for joint, earlier, now in zip(joints, old, new, strict=False):
+        if now in HOLDING and earlier not in HOLDING:
             events.append((EventKind.STICK if now == "stick" else EventKind.REST, joint.name))
-        elif was in HOLDING and now not in HOLDING:
-            events.append((end_event(was), joint.name))
-        elif was != now and was not in HOLDING:
+        elif earlier in HOLDING and now not in HOLDING:
+            events.append((end_event(earlier), joint.name))
+        elif earlier != now and earlier not in HOLDING:
             events.append((EventKind.TURN, joint.name))
     return tuple(events)
 

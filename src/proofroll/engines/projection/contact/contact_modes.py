@@ -86,7 +86,7 @@ class ContactMotion(AlternatingMotion[ContactMode]):
         self._still, self._rate, self._length = scale.speed, scale.rate, scale.length
         # overlap of each contact when it opened, an error of the method: it is no impact
         self._overlap = np.zeros(len(self.contacts))
-        turns = [mechanism.joints[each.joint.number].kind != JointKind.PRISMATIC for each in self._joints]
+        turns = [mechanism.joints[switch.joint.number].kind != JointKind.PRISMATIC for switch in self._joints]
         # length of each contact's motion by 1 m, or by 1 rad
         self._arms = np.array([1.0] * len(self._bodies) + [scale.length if turn else 1.0 for turn in turns])
         self._slipping = SlipDirections(step, self._still / self._arms)
@@ -96,17 +96,17 @@ class ContactMotion(AlternatingMotion[ContactMode]):
         start = np.append(equations.start, 0.0)
         self._limit_efforts(start)
         now = self.at(start)
-        closed, still = closed_and_still(
+        closed, resting = closed_and_still(
             now.touching, scale.length / self._arms, scale.rate, start_digits(self.contacts)
         )
         refuse_rubbing_stops(self.contacts, closed, 0.0)
         self.mode = tuple(OPEN for _ in self.contacts)
-        self._enter(0.0, start, self._decided(now, closed, still))
+        self._enter(0.0, start, self._decided(now, closed, resting))
 
     def _limit_efforts(self, y: Array) -> None:
         """Sets the mode of each effort with a limit: linear, or clamped if the state requires more."""
-        wanted = zip(self._limited.items(), self._equations.wanted(self._at(y)), strict=True)
-        self._equations.applied.modes = {k: actuator.mode_of(effort) for (k, actuator), effort in wanted}
+        pairs = zip(self._limited.items(), self._equations.wanted(self._at(y)), strict=True)
+        self._equations.applied.modes = {k: actuator.mode_of(effort) for (k, actuator), effort in pairs}
 
     def at(self, y: Array) -> ContactsThere:
         """Contacts at a state, with their response to forces."""
@@ -121,23 +121,23 @@ class ContactMotion(AlternatingMotion[ContactMode]):
         S, origin = spaces[0].S.reshape(-1, 4, 4), free.bodies.origin
         J, rate = np.zeros((len(touching), 3, len(S))), np.zeros((len(touching), 3))
         for k, (contact, there) in enumerate(zip(self._bodies, touching, strict=False)):
-            along = S[:, :3, :3] @ (there.place - origin) + S[:, :3, 3]
+            lever = S[:, :3, :3] @ (there.place - origin) + S[:, :3, 3]
             for body, sign in ((contact.body_a, 1.0), (contact.body_b, -1.0)):
                 i = self._index[body]
                 if i >= 0:
-                    J[k] += sign * (equations.tree.moves[i][:, None] * along).T
+                    J[k] += sign * (equations.tree.moves[i][:, None] * lever).T
                     rate[k] += sign * self._material(x, free, i, moving[body], there)
-        for k, each in enumerate(self._joints, len(self._bodies)):
-            J[k, :, each.joint.velocity] = each.direction
-            rate[k] = each.direction * free.rates[each.joint.velocity]
+        for k, switch in enumerate(self._joints, len(self._bodies)):
+            J[k, :, switch.joint.velocity] = switch.direction
+            rate[k] = switch.direction * free.rates[switch.joint.velocity]
         flat = J.reshape(-1, J.shape[2]).T
         return ContactsThere(touching, J, divided(spaces[0].H, flat).reshape(-1, *J.shape[:2]), rate)
 
     def _touching(self, x: Array) -> tuple[Touching, ...]:
         """Gap, normal and sliding velocity of each contact."""
-        moving, along = self._moving(x), self._equations.watched(x) if self._joints else {}
-        bodies = (touch(each, moving[each.body_a], moving[each.body_b]) for each in self._bodies)
-        return (*bodies, *(each.touching(*along[each.joint.number]) for each in self._joints))
+        moving, joints = self._moving(x), self._equations.watched(x) if self._joints else {}
+        bodies = (touch(contact, moving[contact.body_a], moving[contact.body_b]) for contact in self._bodies)
+        return (*bodies, *(contact.touching(*joints[contact.joint.number]) for contact in self._joints))
 
     def _moving(self, x: Array) -> dict[str, Moving]:
         """Motion of the frames of all bodies, and of the world."""
@@ -162,8 +162,8 @@ class ContactMotion(AlternatingMotion[ContactMode]):
         """Directions in which closed contacts are constrained, with their contact."""
         return [
             (k, direction)
-            for k, (own, each) in enumerate(zip(mode, now.touching, strict=True))
-            for direction in held_directions(own, each, presses=not self._bounds[k])
+            for k, (acting, touching) in enumerate(zip(mode, now.touching, strict=True))
+            for direction in held_directions(acting, touching, presses=not self._bounds[k])
         ]
 
     def forces(self, now: ContactsThere, mode: ContactMode) -> Array:
@@ -178,21 +178,21 @@ class ContactMotion(AlternatingMotion[ContactMode]):
                 force[k] = -self._bounds[k] * self._slipping.heading(k, now.touching[k])
         if not rows:
             return force
-        along = [
+        directions = [
             row - self.friction[k] * self._slipping.heading(k, now.touching[k]) if mode[k].kind == "slip" else row
             for k, row in rows
         ]
         rate = now.rate + now.J @ np.einsum("nki,ki->n", now.response, force)
         K = np.array([row @ now.J[k] for k, row in rows])
-        D = np.array([now.response[:, k] @ direction for (k, _), direction in zip(rows, along, strict=True)])
-        wanted = [-row @ rate[k] for k, row in rows]
+        D = np.array([now.response[:, k] @ direction for (k, _), direction in zip(rows, directions, strict=True)])
+        targets = [-row @ rate[k] for k, row in rows]
         for i, (k, row) in enumerate(rows):
             if mode[k].kind == "slip":
-                wanted[i] -= now.touching[k].normal_rate @ now.touching[k].slide
+                targets[i] -= now.touching[k].normal_rate @ now.touching[k].slide
                 if row @ now.J[k] @ D[i] <= 0:
                     raise Diverged(str(torn(self.contacts[k].name, self.t)))
-        sizes = np.linalg.lstsq(K @ D.T, np.array(wanted), rcond=_RANK)[0]
-        for size, (k, _), direction in zip(sizes, rows, along, strict=True):
+        sizes = np.linalg.lstsq(K @ D.T, np.array(targets), rcond=_RANK)[0]
+        for size, (k, _), direction in zip(sizes, rows, directions, strict=True):
             force[k] += size * direction
         return force
 
@@ -219,12 +219,12 @@ class ContactMotion(AlternatingMotion[ContactMode]):
 
     def sampled(self, joints: int) -> dict[str, Array]:
         """Contact forces [N], (contacts, 3); forces of dry friction and stops along the coordinates of all joints."""
-        force, along = self.solve()[1], np.full((2, joints), np.nan)
-        for each in self._joints:
-            along[:, each.joint.number] = 0.0
-        for each, push in zip(self._joints, force[len(self._bodies) :], strict=True):
-            along[int(each.side != 0), each.joint.number] += each.direction @ push
-        return {"contact_force": force[: len(self._bodies)], "friction": along[0], "stop": along[1]}
+        force, forces = self.solve()[1], np.full((2, joints), np.nan)
+        for contact in self._joints:
+            forces[:, contact.joint.number] = 0.0
+        for contact, push in zip(self._joints, force[len(self._bodies) :], strict=True):
+            forces[int(contact.side != 0), contact.joint.number] += contact.direction @ push
+        return {"contact_force": force[: len(self._bodies)], "friction": forces[0], "stop": forces[1]}
 
     def read(self) -> dict[str, Any]:
         """Geometry and laws of the contacts now, for :class:`.MechanismBuilt`."""
@@ -232,9 +232,9 @@ class ContactMotion(AlternatingMotion[ContactMode]):
         count = len(self._bodies)
         touching = now.touching[:count]
         return {
-            "contact_gap": np.array([each.gap for each in touching]),
-            "contact_normal": np.array([each.normal for each in touching]),
-            "contact_place": np.array([each.place for each in touching]),
+            "contact_gap": np.array([contact.gap for contact in touching]),
+            "contact_normal": np.array([contact.normal for contact in touching]),
+            "contact_place": np.array([contact.place for contact in touching]),
             **coefficients_of(self._bodies),
             "contact_response": np.einsum("kin,nlj->kilj", now.J[:count], now.response[:, :count]),
         }
@@ -249,9 +249,9 @@ class ContactMotion(AlternatingMotion[ContactMode]):
         self._slipping.look(float(y[-1]), self.mode, self._touching(y[:-1]))
 
     def _enter(self, t: float, x: Array, mode: ContactMode) -> None:
-        opened = [k for k, own in enumerate(mode) if own.kind == "open" and self.mode[k].kind != "open"]
+        opened = [k for k, acting in enumerate(mode) if acting.kind == "open" and self.mode[k].kind != "open"]
         if opened:
-            gaps = np.array([each.gap for each in self.at(x).touching])
+            gaps = np.array([touching.gap for touching in self.at(x).touching])
             self._overlap[opened] = np.maximum(-gaps[opened], 0.0) + _OVERLAP * self._length
         x, self.mode = self._settled(x, mode), mode
         self._slipping.begin(mode)
@@ -262,64 +262,68 @@ class ContactMotion(AlternatingMotion[ContactMode]):
         now = self.at(x)
         force, ends = self.forces(now, self.mode), list[Excess]()
         held: ContactMode = ()
-        stops = [isinstance(each, JointContact) and not each.bound for each in self.contacts]
-        shared = sum(own.kind == "stick" or (own.kind == "slip" and s) for own, s in zip(self.mode, stops, strict=True))
-        for k, (own, each) in enumerate(zip(self.mode, now.touching, strict=True)):
-            if own.kind == "open":
-                ends.append(Excess(k, EventKind.IMPACT, -each.gap - self._overlap[k], -float(each.normal @ each.slide)))
+        stops = [isinstance(item, JointContact) and not item.bound for item in self.contacts]
+        shared = sum(
+            acting.kind == "stick" or (acting.kind == "slip" and s) for acting, s in zip(self.mode, stops, strict=True)
+        )
+        for k, (acting, item) in enumerate(zip(self.mode, now.touching, strict=True)):
+            if acting.kind == "open":
+                ends.append(Excess(k, EventKind.IMPACT, -item.gap - self._overlap[k], -float(item.normal @ item.slide)))
                 continue
-            N = float(each.normal @ force[k])
+            N = float(item.normal @ force[k])
             if not self._bounds[k]:
                 ends.append(Excess(k, EventKind.LIFT_OFF, -N))
-            if own.kind == "slip" and self._rubs[k]:
-                ends.append(Excess(k, "still", self._slipping.passed(k, each)))
-            elif own.kind == "stick":
+            if acting.kind == "slip" and self._rubs[k]:
+                ends.append(Excess(k, "still", self._slipping.passed(k, item)))
+            elif acting.kind == "stick":
                 bound = float(self._bounds[k] or largest_friction(self._static[k], N))
-                beyond = float(np.linalg.norm(force[k] - N * each.normal)) - bound if np.isfinite(bound) else -1.0
+                beyond = float(np.linalg.norm(force[k] - N * item.normal)) - bound if np.isfinite(bound) else -1.0
                 if beyond > 0 and shared > 1:
                     # forces shared by several contacts are not unique: others may hold what this one cannot
                     held = held or self._decided(
-                        now, [one.kind != "open" for one in self.mode], [one.kind == "stick" for one in self.mode]
+                        now, [part.kind != "open" for part in self.mode], [part.kind == "stick" for part in self.mode]
                     )
                     beyond = -beyond if held[k].kind == "stick" else beyond
                 ends.append(Excess(k, EventKind.SLIP, beyond))
-        modes, wanted = list(self._equations.applied.modes.values()), self._equations.wanted(self._at(x))
-        return ends + ends_of_efforts(self._limited.values(), modes, wanted, len(self.mode))
+        modes, efforts = list(self._equations.applied.modes.values()), self._equations.wanted(self._at(x))
+        return ends + ends_of_efforts(self._limited.values(), modes, efforts, len(self.mode))
 
     def _next(self, x: Array, k: int, kind: str) -> tuple[Array, ContactMode, list[tuple[str, str]]]:
-        was, happened = self.mode, list[tuple[str, str]]()
-        if k >= len(was):
-            number = list(self._limited)[k - len(was)]
+        old_mode, happened = self.mode, list[tuple[str, str]]()
+        if k >= len(old_mode):
+            number = list(self._limited)[k - len(old_mode)]
             self._equations.applied.modes = {**self._equations.applied.modes, number: kind}
-            return x, was, happened
+            return x, old_mode, happened
         if kind == EventKind.LIFT_OFF:
-            x = self._settled(x, was)  # a closing speed that the method left would hit at once
-        now, closed = self.at(x), [own.kind != "open" for own in was]
-        still = [own.kind == "stick" for own in was]
+            x = self._settled(x, old_mode)  # a closing speed that the method left would hit at once
+        now, closed = self.at(x), [acting.kind != "open" for acting in old_mode]
+        resting = [acting.kind == "stick" for acting in old_mode]
         if kind == EventKind.IMPACT:
             x, closed, settles = self._struck(x, now, k)
             self._limit_efforts(x)  # the effort that a servo requires jumps with the velocity
             happened = [(EventKind.SETTLE if settles else EventKind.IMPACT, self.contacts[k].name)]
             now = self.at(x)
-            still = [slip <= self._still for slip in self._slips(now)]
+            resting = [slip <= self._still for slip in self._slips(now)]
         elif kind == "still":
             slips = self._slips(now)
-            still = [stuck or own == k or slips[own] <= self._faint for own, stuck in enumerate(still)]
-        mode = self._leaving(now, k) if kind == EventKind.SLIP else self._decided(now, closed, still)
+            resting = [stuck or number == k or slips[number] <= self._faint for number, stuck in enumerate(resting)]
+        mode = self._leaving(now, k) if kind == EventKind.SLIP else self._decided(now, closed, resting)
         if kind == "still" and slips[k] > self._still and mode[k].kind == "slip":  # it has turned, not stopped
-            mode = self._decided(now, closed, [stands and own != k for own, stands in enumerate(still)])
-        struck = {name for _, name in happened}
-        happened += [one for one in changes(self.contacts, was, mode, self._stands(x, mode)) if one[1] not in struck]
+            mode = self._decided(now, closed, [stands and number != k for number, stands in enumerate(resting)])
+        names = {name for _, name in happened}
+        happened += [
+            event for event in changes(self.contacts, old_mode, mode, self._stands(x, mode)) if event[1] not in names
+        ]
         return x, mode, happened
 
     def _slips(self, now: ContactsThere) -> list[float]:
         """Slip speed of each contact [m/s]; of turning joints at the natural length."""
         pairs = zip(self._arms, now.touching, strict=True)
-        return [float(arm * np.linalg.norm(slip_velocity(each))) for arm, each in pairs]
+        return [float(arm * np.linalg.norm(slip_velocity(touching))) for arm, touching in pairs]
 
     def _stands(self, y: Array, mode: ContactMode) -> bool:
         """True if velocities and accelerations in a mode are zero within round-off."""
-        if self._timed or any(own.kind == "slip" for own in mode):
+        if self._timed or any(acting.kind == "slip" for acting in mode):
             return False
         now = self.at(y := self._settled(y, mode))
         load = np.einsum("kin,ki->n", now.J, self.forces(now, mode))
@@ -338,7 +342,7 @@ class ContactMotion(AlternatingMotion[ContactMode]):
 
     def _struck(self, x: Array, now: ContactsThere, hit: int) -> tuple[Array, list[bool], bool]:
         """State after an impact by Newton's and Coulomb's laws; which contacts stay closed; True if it is the last."""
-        which = [k for k, own in enumerate(self.mode) if (own.kind != "open" or k == hit) and not self._bounds[k]]
+        which = [k for k, acting in enumerate(self.mode) if (acting.kind != "open" or k == hit) and not self._bounds[k]]
         frames, J, response = self._framed(now, which)
         c = np.concatenate([frame.T @ now.touching[k].slide for frame, k in zip(frames, which, strict=True)])
         place, law = 3 * which.index(hit), self.contacts[hit]
@@ -349,7 +353,7 @@ class ContactMotion(AlternatingMotion[ContactMode]):
         impulse, _ = self._law(J @ response, c, which, [None] * len(which))
         x = self._pushed(x, response @ impulse.ravel())
         # by the speed, not the impulse: of a contact that the impact leaves alone that is round-off, of either sign
-        parts = [float(each.normal @ each.slide) for each in self.at(x).touching] * self._arms
+        parts = [float(touching.normal @ touching.slide) for touching in self.at(x).touching] * self._arms
         closed = [
             bool(self._bounds[k]) or (k in which and parts[k] <= self._still and not (k == hit and e))
             for k in range(len(self.mode))
@@ -370,13 +374,15 @@ class ContactMotion(AlternatingMotion[ContactMode]):
     def _law(self, G: Array, c: Array, which: Sequence[int], sliding: Sequence[Array | None]) -> tuple[Array, Any]:
         time = self.t if hasattr(self._stepper, "t") else 0.0
         try:
-            at, names = list(which), [self.contacts[k].name for k in which]
-            return contact_forces(G, c, self.friction[at], sliding, names, self._bounds[at], time, 0, self._static[at])
+            numbers, names = list(which), [self.contacts[k].name for k in which]
+            return contact_forces(
+                G, c, self.friction[numbers], sliding, names, self._bounds[numbers], time, 0, self._static[numbers]
+            )
         except Refused as error:
             raise Diverged(str(error)) from None
 
-    def _decided(self, now: ContactsThere, closed: Sequence[bool], still: Sequence[bool]) -> ContactMode:
-        """Mode that follows from the forces, for contacts that are closed, and at rest where ``still``."""
+    def _decided(self, now: ContactsThere, closed: Sequence[bool], resting: Sequence[bool]) -> ContactMode:
+        """Mode that follows from the forces, for contacts that are closed, and at rest where ``resting``."""
         which, mode = [k for k, shut in enumerate(closed) if shut], [OPEN for _ in closed]
         if not which:
             return tuple(mode)
@@ -387,10 +393,10 @@ class ContactMotion(AlternatingMotion[ContactMode]):
             c[3 * place : 3 * place + 3] = frame.T @ now.rate[k]
             c[3 * place] += there.normal_rate @ there.slide
             slip = frame[:, 1:].T @ there.slide
-            sliding.append(slip / np.linalg.norm(slip) if self._rubs[k] and not still[k] else None)
+            sliding.append(slip / np.linalg.norm(slip) if self._rubs[k] and not resting[k] else None)
         G = J @ response
         force, done = self._law(G, c, which, sliding)
         for place, (frame, k) in enumerate(zip(frames, which, strict=True)):
-            own, slides = slice(3 * place, 3 * place + 3), sliding[place]
-            mode[k] = first_mode(done[place], frame, -force[place, 1:] if slides is None else slides, G[own, own])
+            part, slides = slice(3 * place, 3 * place + 3), sliding[place]
+            mode[k] = first_mode(done[place], frame, -force[place, 1:] if slides is None else slides, G[part, part])
         return tuple(mode)

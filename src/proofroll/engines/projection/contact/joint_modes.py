@@ -69,11 +69,11 @@ class SwitchedMotion(AlternatingMotion[Mode]):
 
     def renew(self) -> None:
         """Decides the mode anew, now, after forces have jumped."""
-        y, was = self._stepper.x, self.mode
+        y, old_mode = self._stepper.x, self.mode
         q, v = self._joint_state(y)
         mode, count, t = self._decided(y, q, v), len(self._joints), self.t
-        happened = [*changes(self._joints, was, mode)]
-        pairs = zip(self._limited.values(), was[count:], mode[count:], strict=True)
+        happened = [*changes(self._joints, old_mode, mode)]
+        pairs = zip(self._limited.values(), old_mode[count:], mode[count:], strict=True)
         happened += [
             (EventKind.RELEASE if now == "linear" else EventKind.SATURATE, item.name)
             for item, old, now in pairs
@@ -142,13 +142,13 @@ class SwitchedMotion(AlternatingMotion[Mode]):
             joint.moving(rate) if rate else joint.resting(place)
             for joint, place, rate in zip(self._joints, q.tolist(), v.tolist(), strict=True)
         ]
-        still = self._moved_on(x, mode)
-        if still:
-            moving = tuple("free" if k in still else joint_mode for k, joint_mode in enumerate(mode))
-            velocities = [self._joints[k].velocity for k in still]
+        resting = self._moved_on(x, mode)
+        if resting:
+            moving = tuple("free" if k in resting else joint_mode for k, joint_mode in enumerate(mode))
+            velocities = [self._joints[k].velocity for k in resting]
             free, response = equations.responses(x, self._load(moving), velocities)
-            low, high = np.array([self._joints[k].bounds(mode[k]) for k in still]).T
-            for k, side in zip(still, _bounded(free[velocities], response[velocities], low, high)[1], strict=True):
+            low, high = np.array([self._joints[k].bounds(mode[k]) for k in resting]).T
+            for k, side in zip(resting, _bounded(free[velocities], response[velocities], low, high)[1], strict=True):
                 if side:
                     mode[k] = self._joints[k].moving(-side)
         return (*mode, *efforts)
@@ -159,22 +159,22 @@ class SwitchedMotion(AlternatingMotion[Mode]):
         Raises:
             Refused: one stands because of these, so that the force of its friction is any within its bound.
         """
-        still = held_joints(tuple(mode))
-        if not still:
-            return still
-        moving = tuple("free" if k in still else joint_mode for k, joint_mode in enumerate(mode))
-        velocities = [self._joints[k].velocity for k in still]
+        resting = held_joints(tuple(mode))
+        if not resting:
+            return resting
+        moving = tuple("free" if k in resting else joint_mode for k, joint_mode in enumerate(mode))
+        velocities = [self._joints[k].velocity for k in resting]
         load = self._load(moving)
         rates, split = self._equations.solve(x, load).rates, self._equations.split
         if split is None:
-            return still
+            return resting
         least = _ROUND_OFF * (split.reach(rates) + split.reach(self._equations.solve(x, load, without_rows).rates))
-        for k, at, mobility in zip(still, velocities, split.mobility()[velocities].tolist(), strict=True):
+        for k, column, mobility in zip(resting, velocities, split.mobility()[velocities].tolist(), strict=True):
             if mobility > NO_RESPONSE:
                 continue
-            if abs(rates[at]) <= least[at]:
+            if abs(rates[column]) <= least[column]:
                 raise Refused(REDUNDANT)
-            mode[k] = self._joints[k].moving(rates[at])
+            mode[k] = self._joints[k].moving(rates[column])
         return held_joints(tuple(mode))
 
     def _struck(self, y: Array, q: Array, v: Array, hit: int) -> Array:
@@ -227,19 +227,19 @@ class SwitchedMotion(AlternatingMotion[Mode]):
         return ends + ends_of_efforts(self._limited.values(), self.mode[count:], efforts, count)
 
     def _next(self, y: Array, k: int, kind: str) -> tuple[Array, Mode, list[tuple[str, str]]]:
-        was, happened = self.mode, list[tuple[str, str]]()
+        old_mode, happened = self.mode, list[tuple[str, str]]()
         if k >= len(self._joints):
             actuator = list(self._limited.values())[k - len(self._joints)]
             happened = [(EventKind.RELEASE if kind == "linear" else EventKind.SATURATE, actuator.name)]
-            mode = (*was[:k], kind, *was[k + 1 :])
+            mode = (*old_mode[:k], kind, *old_mode[k + 1 :])
         elif kind in {"up", "down"}:
-            mode = (*was[:k], self._joints[k].moving(1.0 if kind == "up" else -1.0), *was[k + 1 :])
+            mode = (*old_mode[:k], self._joints[k].moving(1.0 if kind == "up" else -1.0), *old_mode[k + 1 :])
         else:
             y, mode = self._stopped(y, k, kind)
             happened = [(EventKind.IMPACT, self._joints[k].name)] if kind != "still" else []
         # a joint that stays where it hit has come to rest by its impact
         named = {name for _, name in happened}
-        happened += [item for item in changes(self._joints, was, mode) if item[1] not in named]
+        happened += [item for item in changes(self._joints, old_mode, mode) if item[1] not in named]
         return y, mode, happened
 
     def _stopped(self, y: Array, k: int, kind: str) -> tuple[Array, Mode]:

@@ -16,9 +16,9 @@ class SlipDirections:
     circle about zero for good. A slip that a fixed step ends, by the rate of the step before, keeps its direction.
     """
 
-    def __init__(self, step: float, still: Array) -> None:
+    def __init__(self, step: float, least: Array) -> None:
         """Takes the size of a fixed step [s], 0 if it adapts, and speeds of each contact that count as rest [m/s]."""
-        self._step, self._still = step, still
+        self._step, self._still = step, least
         self._toward: list[Array] = []
         self._speeds: list[float] = []
         self._time = 0.0

@@ -52,14 +52,14 @@ class Lying:
         sizes = np.linalg.norm(across, axis=0)
         crossing = sizes > _BEHIND
         ways = np.concatenate([A, B, across[:, crossing] / sizes[crossing]], axis=1)
-        along = apart @ ways
-        ways = ways * np.where(along < 0, -1.0, 1.0)
+        distances = apart @ ways
+        ways = ways * np.where(distances < 0, -1.0, 1.0)
         wide = self.half_a @ np.abs(A.T @ ways) + self.half_b @ np.abs(B.T @ ways)
-        return ways, np.abs(along) - wide
+        return ways, np.abs(distances) - wide
 
-    def normal(self, first: bool, face: int) -> Array:
+    def normal(self, of_first: bool, face: int) -> Array:
         """Outward normal of a face in the world."""
-        axes, side = self.axes_a if first else self.axes_b, 1.0 if face % 2 == 0 else -1.0
+        axes, side = self.axes_a if of_first else self.axes_b, 1.0 if face % 2 == 0 else -1.0
         return np.asarray(side * axes[:, face // 2])
 
     @cached_property
@@ -75,13 +75,13 @@ class Lying:
         """Length by which the boxes are farther apart in a direction to which other faces are turned [m]."""
         ways, apart = self.separations
         turned = [
-            np.abs(axes.T @ ways).max(axis=0) - sign * self.normal(first, face) @ ways
-            for axes, first, face, sign in ((self.axes_a, True, face_a, -1.0), (self.axes_b, False, face_b, 1.0))
+            np.abs(axes.T @ ways).max(axis=0) - sign * self.normal(of_first, face) @ ways
+            for axes, of_first, face, sign in ((self.axes_a, True, face_a, -1.0), (self.axes_b, False, face_b, 1.0))
         ]
-        own = np.maximum(*turned) <= _BEHIND
-        if own.all() or not own.any():
-            return float(self.half_a.max()) * (-1.0 if own.all() else 1.0)
-        return float(apart[~own].max() - apart[own].max())
+        hidden = np.maximum(*turned) <= _BEHIND
+        if hidden.all() or not hidden.any():
+            return float(self.half_a.max()) * (-1.0 if hidden.all() else 1.0)
+        return float(apart[~hidden].max() - apart[hidden].max())
 
     def beyond(self, faces: tuple[int, int]) -> tuple[Array, Array]:
         """Lengths by which all contacts lie beyond their borders [m], (SLOTS), and heights of corners, (2 CORNERS)."""
@@ -108,9 +108,9 @@ class Lying:
         return np.concatenate([corners, edges]), np.concatenate(heights)
 
     @staticmethod
-    def _seen(place: Array, axes: Array, other: Array, other_axes: Array, face: int, half: Array) -> Array:
+    def _seen(place: Array, axes: Array, other_place: Array, other_axes: Array, face: int, half: Array) -> Array:
         """Corners of a face of another box in the axes of one, (CORNERS, 3)."""
-        return np.asarray((other + (_corners_of(face) * half) @ other_axes.T - place) @ axes)
+        return np.asarray((other_place + (_corners_of(face) * half) @ other_axes.T - place) @ axes)
 
     def _of_edges(self, face_a: int, face_b: int, size: float) -> Array:
         (along_a, signs_a, sides_a), (along_b, signs_b, sides_b) = _edges_of(face_a), _edges_of(face_b)
@@ -191,8 +191,8 @@ class BoxSlot:
             elif self.slot < 2 * CORNERS:
                 self._shapes[faces] = _face(self.first, faces[0]), _corner(self.second, faces[1], b)
             else:
-                one, two = divmod(self.slot - 2 * CORNERS, CORNERS)
-                self._shapes[faces] = _edge(self.first, faces[0], one), _edge(self.second, faces[1], two)
+                edge_a, edge_b = divmod(self.slot - 2 * CORNERS, CORNERS)
+                self._shapes[faces] = _edge(self.first, faces[0], edge_a), _edge(self.second, faces[1], edge_b)
         return self._shapes[faces]
 
 
@@ -213,13 +213,13 @@ def _corners_of(face: int) -> Array:
 @cache
 def _edges_of(face: int) -> tuple[list[int], Array, Array]:
     """Axes along the edges of a face, sides of their middles, normals of the other faces there, in the box's axes."""
-    along, signs, sides = [], np.zeros((CORNERS, 3)), np.zeros((CORNERS, 3))
+    directions, signs, sides = [], np.zeros((CORNERS, 3)), np.zeros((CORNERS, 3))
     signs[:, face // 2] = 1.0 if face % 2 == 0 else -1.0
     for number in range(CORNERS):
-        axis, other = _in_plane(face) if number < 2 else _in_plane(face)[::-1]
-        along.append(axis)
-        signs[number, other] = sides[number, other] = 1.0 if number % 2 == 0 else -1.0
-    return along, signs, sides
+        axis, across = _in_plane(face) if number < 2 else _in_plane(face)[::-1]
+        directions.append(axis)
+        signs[number, across] = sides[number, across] = 1.0 if number % 2 == 0 else -1.0
+    return directions, signs, sides
 
 
 def _corner(box: BoxShape, face: int, number: int) -> SphereShape:
@@ -232,7 +232,7 @@ def _face(box: BoxShape, face: int) -> HalfSpace:
 
 
 def _edge(box: BoxShape, face: int, number: int) -> EdgeLine:
-    along, signs, _ = _edges_of(face)
+    directions, signs, _ = _edges_of(face)
     outward = (1.0 if face % 2 == 0 else -1.0) * box.frame[:, face // 2]
     middle = box.centre + box.frame @ (signs[number] * box.half)
-    return EdgeLine(middle, box.frame[:, along[number]].copy(), 0.0, outward)
+    return EdgeLine(middle, box.frame[:, directions[number]].copy(), 0.0, outward)

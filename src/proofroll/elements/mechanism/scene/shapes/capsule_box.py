@@ -106,17 +106,17 @@ class CapsuleBoxSlot:
             on_face = np.count_nonzero(away) <= 1  # both ends of a capsule that lies on it
             return side * float(away @ axis) - (_BEHIND * float(np.linalg.norm(away)) if on_face else 0.0) - least
         if number < len(EDGES):
-            along, signs = _edge(number)
-            d, cosine = centre - signs * half, float(axis[along])
+            direction, signs = _edge(number)
+            d, cosine = centre - signs * half, float(axis[direction])
             square = 1.0 - cosine * cosine
             if square < _PARALLEL:
                 return size
-            s = (cosine * float(d[along]) - float(d @ axis)) / square
-            t = float(d[along]) + s * cosine
+            s = (cosine * float(d[direction]) - float(d @ axis)) / square
+            t = float(d[direction]) + s * cosine
             away = d + s * axis
-            away[along] -= t
-            sides = np.delete(signs * away, along)
-            ends = max(abs(s) - self.capsule.half, abs(t) - float(half[along])) + least
+            away[direction] -= t
+            sides = np.delete(signs * away, direction)
+            ends = max(abs(s) - self.capsule.half, abs(t) - float(half[direction])) + least
             return min(max(ends, -float(sides.min()) - _BEHIND * size), size)
         corner = np.array(CORNERS[number - len(EDGES)])
         d = centre - corner * half
@@ -127,7 +127,7 @@ class CapsuleBoxSlot:
 
 def _edge(number: int) -> tuple[int, Array]:
     """Axis along an edge of a box, and sides of its middle along the axes of the box."""
-    axis, one, two = EDGES[number]
+    axis, sign_1, sign_2 = EDGES[number]
     signs = np.zeros(3)
-    signs[[(axis + 1) % 3, (axis + 2) % 3]] = one, two
+    signs[[(axis + 1) % 3, (axis + 2) % 3]] = sign_1, sign_2
     return axis, signs

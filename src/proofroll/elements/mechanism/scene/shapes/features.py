@@ -86,8 +86,8 @@ class BallFeatures:
 
     def shapes(self, feature: int) -> tuple[Shape, Shape]:
         """See :class:`PairFeatures`."""
-        other = self._shapes[feature]
-        return (self.ball, other) if self.ball_first else (other, self.ball)
+        part = self._shapes[feature]
+        return (self.ball, part) if self.ball_first else (part, self.ball)
 
     @cached_property
     def _shapes(self) -> dict[int, Shape]:
@@ -97,15 +97,15 @@ class BallFeatures:
                 _number(sides): _of_box(solid, np.array(sides)) for sides in itertools.product(_SIDES, repeat=3)
                 if any(sides)
             }  # fmt: skip
-        found: dict[int, Shape] = {0: Shaft(solid.centre, solid.axis, solid.radius)}
+        parts: dict[int, Shape] = {0: Shaft(solid.centre, solid.axis, solid.radius)}
         for side in (-1, 1):
             end = solid.centre + side * solid.half * solid.axis
             if isinstance(solid, CapsuleShape):
-                found[side] = SphereShape(end, solid.radius)
+                parts[side] = SphereShape(end, solid.radius)
             else:
-                found[side] = HalfSpace(end, side * solid.axis)
-                found[2 * side] = TorusWall(end, solid.axis, solid.radius, 0.0)
-        return found
+                parts[side] = HalfSpace(end, side * solid.axis)
+                parts[2 * side] = TorusWall(end, solid.axis, solid.radius, 0.0)
+        return parts
 
     def nearest(self, x: float, y: float, z: float) -> int:
         """See :class:`PairFeatures`; of a centre within the solid, the face that is nearest."""
@@ -127,16 +127,16 @@ class BallFeatures:
 
     def borders(self, feature: int, x: Any, y: Any, z: Any) -> list[Border]:
         """See :class:`PairFeatures`; a face is not left through itself."""
-        solid, found = self.solid, list[Border]()
+        solid, borders = self.solid, list[Border]()
         if isinstance(solid, BoxShape):
             sides = _sides(feature)
             alone = sum(side != 0 for side in sides) == 1
-            for side, at, half, step in zip(sides, (x, y, z), solid.half.tolist(), (9, 3, 1), strict=True):
+            for side, coordinate, half, step in zip(sides, (x, y, z), solid.half.tolist(), (9, 3, 1), strict=True):
                 if not side:
-                    found += [Border(at - half, feature + step), Border(-half - at, feature - step)]
+                    borders += [Border(coordinate - half, feature + step), Border(-half - coordinate, feature - step)]
                 elif not alone:
-                    found.append(Border(half - side * at, feature - side * step))
-            return found
+                    borders.append(Border(half - side * coordinate, feature - side * step))
+            return borders
         if not feature:
             ends = (1, -1)
             return [Border(end * z - solid.half, end) for end in ends]
@@ -180,8 +180,8 @@ class CapsuleFeatures:
             return Shaft(capsule.centre, capsule.axis, capsule.radius)
 
         return {
-            _number((0, one, two)): (part(self.first, one), part(self.second, two))
-            for one, two in itertools.product(_SIDES, repeat=2)
+            _number((0, side_a, side_b)): (part(self.first, side_a), part(self.second, side_b))
+            for side_a, side_b in itertools.product(_SIDES, repeat=2)
         }
 
     def nearest(self, x: float, y: float, z: float) -> int:
@@ -192,40 +192,40 @@ class CapsuleFeatures:
         if abs(t) > b:
             t = b if t > 0 else -b
             s = min(max(t * z - x, -a), a)
-        one = 0 if abs(s) < a else (-1 if s < 0 else 1)
-        two = 0 if abs(t) < b else (-1 if t < 0 else 1)
-        return _number((0, one, two))
+        side_a = 0 if abs(s) < a else (-1 if s < 0 else 1)
+        side_b = 0 if abs(t) < b else (-1 if t < 0 else 1)
+        return _number((0, side_a, side_b))
 
     def borders(self, feature: int, x: Any, y: Any, z: Any) -> list[Border]:
         """See :class:`PairFeatures`: a nearest point reaches the end of its segment, or leaves it."""
-        (_, one, two), a, b = _sides(feature), self.first.half, self.second.half
-        s, t, sine = one * a, two * b, 1.0 - z * z
-        if not (one or two):
+        (_, side_a, side_b), a, b = _sides(feature), self.first.half, self.second.half
+        s, t, sine = side_a * a, side_b * b, 1.0 - z * z
+        if not (side_a or side_b):
             s, t = z * y - x, y - z * x  # times the square of the sine, as what follows
             a, b = a * sine, b * sine
-        elif not two:
+        elif not side_b:
             t = y + s * z
-        elif not one:
+        elif not side_a:
             s = t * z - x
-        inwards = [Border(one * (x + s - t * z), feature - 3 * one)] if one else []
-        inwards += [Border(two * (t - y - s * z), feature - two)] if two else []
-        outwards = [] if one else [Border(s - a, feature + 3), Border(-1.0 * s - a, feature - 3)]
-        outwards += [] if two else [Border(t - b, feature + 1), Border(-1.0 * t - b, feature - 1)]
+        inwards = [Border(side_a * (x + s - t * z), feature - 3 * side_a)] if side_a else []
+        inwards += [Border(side_b * (t - y - s * z), feature - side_b)] if side_b else []
+        outwards = [] if side_a else [Border(s - a, feature + 3), Border(-1.0 * s - a, feature - 3)]
+        outwards += [] if side_b else [Border(t - b, feature + 1), Border(-1.0 * t - b, feature - 1)]
         return inwards + outwards
 
 
 SolidFeatures = BallFeatures | CapsuleFeatures
 
 
-def features_between(one: Shape | Solid, two: Shape | Solid) -> SolidFeatures | None:
+def features_between(shape_a: Shape | Solid, shape_b: Shape | Solid) -> SolidFeatures | None:
     """Features by which two shapes meet; None: they have one rule, or none."""
     solids = BoxShape | CapsuleShape | CylinderShape
-    if isinstance(one, CapsuleShape) and isinstance(two, CapsuleShape):
-        return CapsuleFeatures(one, two)
-    if isinstance(one, SphereShape) and isinstance(two, solids):
-        return BallFeatures(one, two, ball_first=True)
-    if isinstance(one, solids) and isinstance(two, SphereShape):
-        return BallFeatures(two, one, ball_first=False)
+    if isinstance(shape_a, CapsuleShape) and isinstance(shape_b, CapsuleShape):
+        return CapsuleFeatures(shape_a, shape_b)
+    if isinstance(shape_a, SphereShape) and isinstance(shape_b, solids):
+        return BallFeatures(shape_a, shape_b, ball_first=True)
+    if isinstance(shape_a, solids) and isinstance(shape_b, SphereShape):
+        return BallFeatures(shape_b, shape_a, ball_first=False)
     return None
 
 

@@ -131,17 +131,17 @@ class Geometry:
             advice = f"the largest may be at most {_FLATTEST:g} times the smallest; a flat disc is a circle"
             raise InputError(f"{where}.axes", self.axes, advice)
 
-    def _check_walls(self, where: str) -> None:
+    def _check_walls(self, key: str) -> None:
         """Raises InputError for the numbers of a cone or torus that no such wall has."""
         if self.slope is not None:
-            slope = checks.number(f"{where}.slope", self.slope, at_least=0)
+            slope = checks.number(f"{key}.slope", self.slope, at_least=0)
             if not 0 < slope < np.pi / 2:
-                raise InputError(f"{where}.slope", slope, "must lie between 0 and a right angle, pi/2")
+                raise InputError(f"{key}.slope", slope, "must lie between 0 and a right angle, pi/2")
             checks.assign(self, slope=slope)
         if self.ring_radius is not None:
-            ring = checks.number(f"{where}.ring_radius", self.ring_radius)
+            ring = checks.number(f"{key}.ring_radius", self.ring_radius)
             if not ring > (self.radius or 0.0):
-                raise InputError(f"{where}.ring_radius", ring, f"must be above that of the wire, {self.radius:g}")
+                raise InputError(f"{key}.ring_radius", ring, f"must be above that of the wire, {self.radius:g}")
             checks.assign(self, ring_radius=ring)
 
     @cached_property
@@ -317,35 +317,35 @@ class BodyContact:
 
 def contacts_of(geometries: Sequence[Geometry], pairs: Sequence[Pair]) -> tuple[BodyContact, ...]:
     """Contacts of all pairs, in their order. Raises InputError if a pair cannot touch or is listed twice."""
-    known = {geometry.name: geometry for geometry in geometries}
-    found: list[BodyContact] = []
+    by_name = {geometry.name: geometry for geometry in geometries}
+    contacts: list[BodyContact] = []
     listed: dict[frozenset[str], str] = {}
     for pair in pairs:
-        where = f"pairs.{pair.name}.geometries"
+        key = f"pairs.{pair.name}.geometries"
         for name in pair.geometries:
-            require_known(where, name, known, "there is no such geometry; choose from")
-        a, b = (known[name] for name in pair.geometries)
+            require_known(key, name, by_name, "there is no such geometry; choose from")
+        a, b = (by_name[name] for name in pair.geometries)
         if a.body == b.body:
             owner = "the world" if a.body == WORLD else f"the body {a.body}"
-            raise InputError(where, pair.geometries, f"both belong to {owner}, which cannot touch itself")
+            raise InputError(key, pair.geometries, f"both belong to {owner}, which cannot touch itself")
         if frozenset(pair.geometries) in listed:
             advice = f"these are the pair {listed[frozenset(pair.geometries)]} already; remove one"
-            raise InputError(where, pair.geometries, advice)
+            raise InputError(key, pair.geometries, advice)
         listed[frozenset(pair.geometries)] = pair.name
-        require_rule(where, pair, a, b)
+        require_rule(key, pair, a, b)
         slots = {("box",): BoxSlot.count, ("box", "capsule"): CapsuleBoxSlot.count}
         touching = [(a.solid, b.solid)] * slots.get(tuple(sorted({a.kind, b.kind})), 1)
         if "plane" in {a.kind, b.kind}:
             touching = list(itertools.product(a.shapes, b.shapes))
-        for number, (one, other) in enumerate(touching, 1):
+        for number, (shape_a, shape_b) in enumerate(touching, 1):
             name = pair.name if len(touching) == 1 else f"{pair.name}.{number}"
-            found.append(
+            contacts.append(
                 BodyContact(
                     name=name,
                     body_a=a.body,
                     body_b=b.body,
-                    shape_a=one,
-                    shape_b=other,
+                    shape_a=shape_a,
+                    shape_b=shape_b,
                     friction=pair.friction,
                     restitution=pair.restitution,
                     pair=pair.name,
@@ -356,7 +356,7 @@ def contacts_of(geometries: Sequence[Geometry], pairs: Sequence[Pair]) -> tuple[
                     slot=number - 1,
                 )
             )
-    return tuple(found)
+    return tuple(contacts)
 
 
 def coefficients_of(contacts: Sequence[BodyContact]) -> dict[str, Array]:
@@ -368,10 +368,10 @@ def coefficients_of(contacts: Sequence[BodyContact]) -> dict[str, Array]:
 
 def shared_pairs(contacts: Sequence[BodyContact]) -> dict[str, list[int]]:
     """Indices of the contacts of each pair that has several, by its name."""
-    found: dict[str, list[int]] = {}
+    by_pair: dict[str, list[int]] = {}
     for k, contact in enumerate(contacts):
-        found.setdefault(contact.pair, []).append(k)
-    return {name: numbers for name, numbers in found.items() if len(numbers) > 1}
+        by_pair.setdefault(contact.pair, []).append(k)
+    return {name: numbers for name, numbers in by_pair.items() if len(numbers) > 1}
 
 
 def carried_bodies(contacts: Sequence[BodyContact]) -> tuple[str, ...]:

@@ -22,24 +22,24 @@ _RULES = (
 )
 
 
-def require_rule(where: str, pair: Pair, a: Geometry, b: Geometry) -> None:
+def require_rule(key: str, pair: Pair, a: Geometry, b: Geometry) -> None:
     """Raises InputError if no rule says how two geometries touch."""
     kinds: set[GeometryKind] = {a.kind, b.kind}
     wall = next((geometry for geometry in (a, b) if geometry.kind in CURVED), None)
     if wall is not None:
         ruled = kinds == {wall.kind, "sphere"}
-        _require_room(where, pair, wall, b if wall is a else a)
+        _require_room(key, pair, wall, b if wall is a else a)
     elif "plane" in kinds:
         ruled = kinds != {"plane"}
     else:
         ruled = kinds <= {"capsule", "box"} or ("sphere" in kinds and kinds <= {"sphere", *_SOLID})
     if not ruled:
-        raise InputError(where, pair.geometries, _RULES)
+        raise InputError(key, pair.geometries, _RULES)
     balls = [geometry for geometry in (a, b) if geometry.kind == "sphere"]
     if len(balls) == 2 and not any(ball.radius for ball in balls):
-        raise InputError(where, pair.geometries, "two points have no direction between them; give one a radius")
+        raise InputError(key, pair.geometries, "two points have no direction between them; give one a radius")
     if kinds & {"box", "cylinder"} and any(not ball.radius for ball in balls):
-        raise InputError(where, pair.geometries, "a point has no direction from an edge; give the sphere a radius")
+        raise InputError(key, pair.geometries, "a point has no direction from an edge; give the sphere a radius")
     _require_one_place(pair, kinds)
 
 
@@ -54,10 +54,10 @@ def _require_one_place(pair: Pair, kinds: set[GeometryKind]) -> None:
             raise InputError(f"pairs.{pair.name}.{key}", getattr(pair, key), advice)
 
 
-def _require_room(where: str, pair: Pair, wall: Geometry, ball: Geometry) -> None:
+def _require_room(key: str, pair: Pair, wall: Geometry, ball: Geometry) -> None:
     """Raises InputError if a sphere has no room in a curved wall."""
     inner = {"bore": wall.radius, "bowl": wall.radius, "torus": (wall.ring_radius or 0.0) - (wall.radius or 0.0)}
     room = inner.get(wall.kind)
     if room is not None and (ball.radius or 0.0) >= (1 - _ROOM) * room:
         size = f"a sphere of radius {ball.radius:g} m has no room in a {wall.kind} of {room:g} m"
-        raise InputError(where, pair.geometries, f"{size}; make it smaller")
+        raise InputError(key, pair.geometries, f"{size}; make it smaller")

@@ -49,9 +49,9 @@ class EllipsoidShape:
     def support(self, d: Array) -> tuple[Array, Array]:
         """See :class:`ConvexShape`; with Q = F diag(axes²) Fᵀ the point is Q d/√(d·Q d)."""
         Q = (self.frame * self.axes**2) @ self.frame.T
-        along = Q @ d
-        h = np.sqrt(d @ along)
-        return self.centre + along / h, Q / h - np.outer(along, along) / h**3
+        image = Q @ d
+        h = np.sqrt(d @ image)
+        return self.centre + image / h, Q / h - np.outer(image, image) / h**3
 
 
 @dataclass(frozen=True, eq=False)

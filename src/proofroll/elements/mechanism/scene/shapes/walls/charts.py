@@ -254,8 +254,8 @@ class WallCoordinates:
 
     def frame(self, u: npt.ArrayLike) -> Array:
         """Local frame with columns e1, e2, e3, shape (..., 3, 3)."""
-        along = self.tangents(u)[..., 0]
-        e1, e2 = self.normal(self.position(u)), along / np.linalg.norm(along, axis=-1, keepdims=True)
+        tangent = self.tangents(u)[..., 0]
+        e1, e2 = self.normal(self.position(u)), tangent / np.linalg.norm(tangent, axis=-1, keepdims=True)
         return np.stack([e1, e2, cross(e1, e2)], axis=-1)
 
     def locate(self, p_WB: npt.ArrayLike) -> Array:
@@ -282,8 +282,8 @@ class WallCoordinates:
         """Derivatives of the centre in the wall's axes: value, two first, three second; shape (..., 3, count)."""
         u = np.asarray(u, dtype=np.float64)
         parts = _point(self.chart)(u[..., 0], u[..., 1])
-        wanted = [parts[6 * axis + number] for axis in range(3) for number in range(lowest, lowest + count)]
-        return _stacked(wanted, u.shape[:-1]).reshape(*u.shape[:-1], 3, count)
+        columns = [parts[6 * axis + number] for axis in range(3) for number in range(lowest, lowest + count)]
+        return _stacked(columns, u.shape[:-1]).reshape(*u.shape[:-1], 3, count)
 
     def _gradients(self, p_WB: npt.ArrayLike, lowest: int, count: int) -> Array:
         """Derivatives of the gap in the wall's axes: value, gradient, upper half of the Hessian; shape (..., count)."""

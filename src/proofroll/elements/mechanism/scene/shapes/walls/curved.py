@@ -57,12 +57,12 @@ class CurvedWall:
     def near(self, place: Array) -> Near:
         """The wall as seen from a place; without a normal, zero, where several points of it are nearest."""
         parts = _field(self)(*place.tolist())
-        found = np.array(parts)
-        if not np.isfinite(found).all():
+        values = np.array(parts)
+        if not np.isfinite(values).all():
             with np.errstate(invalid="ignore"):
                 distance = float(self.away(*place.tolist()))
             return Near(distance, np.zeros(3), np.zeros((3, 3)))
-        return Near(float(found[0]), found[1:4], found[4:][_UPPER])
+        return Near(float(values[0]), values[1:4], values[4:][_UPPER])
 
     def near_in_scalars(self, place: Any) -> tuple[Any, list[Any], list[list[Any]]]:
         """Distance, normal and rows of the normal's gradient in any scalars."""

@@ -45,11 +45,11 @@ class Jet:
     def through(self, value: Any, slope: Any, bend: Any) -> Jet:
         """Function of this jet (chain rule), from the function's value, slope and second derivative at it."""
         first, index, second = self.first, 0, []
-        for i, one in enumerate(first):
-            for other in first[i:]:
-                second.append(slope * self.second[index] + bend * one * other)
+        for i, slope_i in enumerate(first):
+            for slope_j in first[i:]:
+                second.append(slope * self.second[index] + bend * slope_i * slope_j)
                 index += 1
-        return Jet(value, [slope * one for one in first], second)
+        return Jet(value, [slope * slope_i for slope_i in first], second)
 
     def call(self, name: str, apply: Callable[[str, Any], Any]) -> Jet:
         """Elementary function ``name`` of this jet; ``apply`` evaluates a function by name at a value."""
@@ -200,27 +200,27 @@ def differentiated(formula: Callable[..., Any], count: int) -> tuple[Callable[..
     ``formula`` takes ``count`` numbers and returns one or a tuple of them. Where it is undefined, the values are NaN.
     """
     program: dict[str, str] = {}
-    given = [f"x{i}" for i in range(count)]
-    results = formula(*variables(*(_Symbol(program, name) for name in given)))
+    symbols = [f"x{i}" for i in range(count)]
+    results = formula(*variables(*(_Symbol(program, name) for name in symbols)))
     parts = []
     for result in results if isinstance(results, tuple) else (results,):
         flat = result.parts if isinstance(result, Jet) else [result] + [0.0] * (count + count * (count + 1) // 2)
         parts += [_text(part) for part in flat]
     steps = "".join(f"    {name} = {text}\n" for text, name in program.items())
-    source = f"def calculated({', '.join(given)}):\n{steps}    return {', '.join(parts)},\n"
+    source = f"def calculated({', '.join(symbols)}):\n{steps}    return {', '.join(parts)},\n"
     of_floats, of_arrays = ({name: getattr(kind, name) for name in ("sqrt", "sin", "cos")} for kind in (math, np))
     for names in (of_floats, of_arrays):
         exec(source, names)  # only the arithmetic recorded above
     plain, missing = of_floats["calculated"], (math.nan,) * len(parts)
 
-    def floats(*at: float) -> Any:
+    def floats(*place: float) -> Any:
         try:
-            return plain(*at)
+            return plain(*place)
         except (ValueError, ArithmeticError):  # numpy gives NaN there
             return missing
 
-    def arrays(*at: Any) -> Any:
+    def arrays(*place: Any) -> Any:
         with np.errstate(invalid="ignore", divide="ignore"):
-            return of_arrays["calculated"](*at)
+            return of_arrays["calculated"](*place)
 
     return floats, arrays
