@@ -37,10 +37,10 @@ def contact_bounces(
     """
     if not any(event.kind in IMPACTS for event in events):
         return ()
-    bodies, found = bouncing_bodies(mechanism), []
+    bodies, by_route = bouncing_bodies(mechanism), []
     for route, path in routes:
         happened = path.happenings[: len(events)]
-        own = [
+        moments = [
             Event(kind=event.kind, time=event.time, time_low=event.time, time_high=event.time, name=event.name)
             for event in happened
         ]
@@ -54,8 +54,8 @@ def contact_bounces(
             p, v, q, w = map(np.array, zip(*map(route.bodies, states), strict=True))
             return course_of(Placed(mechanism=mechanism, time=times, p_WB=p, v_WB=v, w_WB=w, q_WB=q))
 
-        found.append(exact_bounces(sampled, own, bodies, end))
-    one, two = found
+        by_route.append(exact_bounces(sampled, moments, bodies, end))
+    by_tree, by_bodies = by_route
     joule, impacts = units.force * units.length, [event for event in events if event.kind in IMPACTS]
     return tuple(
         Bounce(
@@ -67,5 +67,5 @@ def contact_bounces(
             energy_bar=None if item.energy_bar is None else item.energy_bar * joule,
             height_bar=None if item.height_bar is None else item.height_bar * units.length,
         )
-        for event, item in zip(impacts, with_bars(one, two, SAFETY, 4 * ROUND_OFF), strict=False)
+        for event, item in zip(impacts, with_bars(by_tree, by_bodies, SAFETY, 4 * ROUND_OFF), strict=False)
     )

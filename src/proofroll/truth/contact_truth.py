@@ -13,7 +13,7 @@ import numpy as np
 from proofroll.core.errors import Refused
 from proofroll.core.events import JUMPS, EventKind
 from proofroll.elements.mechanism import Mechanism
-from proofroll.elements.mechanism.contact.acting import ContactMode
+from proofroll.elements.mechanism.contact.acting import Acting, ContactMode
 from proofroll.elements.mechanism.contact.dynamics import ContactDynamics
 from proofroll.elements.mechanism.contact.joint_laws import JointContact
 from proofroll.elements.mechanism.dynamics.analysis import RANK
@@ -80,18 +80,18 @@ def _of(mechanism: Mechanism, times: Array, faces: Sequence[Face] = ()) -> TwoRo
 
 def _in_units(mechanism: Mechanism, units: Units, times: Array, faces: Sequence[Face]) -> TwoRouteMotion:
     """Truth at times in natural units, by routes in these units."""
-    own = units.mechanism(mechanism)
-    held = tuple(HeldPath(mechanism, units, own) for _ in range(2)) if has_held(mechanism) else ()
-    plain = [values.own for values in held] or [own, own]
+    scaled = units.mechanism(mechanism)
+    held = tuple(HeldPath(mechanism, units, scaled) for _ in range(2)) if has_held(mechanism) else ()
+    plain = [values.own for values in held] or [scaled, scaled]
     dynamics, second = ContactDynamics(plain[0]), MaximalCoordinates(plain[1])
     check_start(dynamics.equations, second, units.length)
     size = _size(dynamics)
     tree, equations = ContactTree(dynamics, TOLERANCES[0], size), ContactEquations(plain[1], second.lean)
     bodies = ContactBodies(equations, TOLERANCES[1], size)
     tree.faces = bodies.faces = faces
-    until, breaking, kinds = float(times[-1]), breaks(own.signals), partial(_kinds, dynamics)
+    until, breaking, kinds = float(times[-1]), breaks(scaled.signals), partial(_kinds, dynamics)
     paths, routes = _followed(tree, bodies, held, until, breaking)
-    paths, laws, along = held_to_laws(mechanism, units, (tree, bodies), paths, second, held)
+    paths, laws, work_paths = held_to_laws(mechanism, units, (tree, bodies), paths, second, held)
     asked = times_known(paths, times)
     times = held[1].on_instants(held[0].on_instants(asked)) if held else asked
     stretches = stretches_at(paths, times)
@@ -100,47 +100,49 @@ def _in_units(mechanism: Mechanism, units: Units, times: Array, faces: Sequence[
     for values in held:
         values.finish()
     seconds = times * units.time
-    works = along[0].at(seconds, stretches), along[1].at(seconds, others)
-    first = _by_the_tree(tree, paths[0], times, states[0], stretches, works[0])
-    one, cut = first.record, None if held else cut_early(tree.early(), paths[0], until, breaking, times, kinds)
+    works = work_paths[0].at(seconds, stretches), work_paths[1].at(seconds, others)
+    tree_states = _by_the_tree(tree, paths[0], times, states[0], stretches, works[0])
+    by_tree = tree_states.record
+    cut = None if held else cut_early(tree.early(), paths[0], until, breaking, times, kinds)
     modes = [bodies.acting(paths[1].stretches[number], state) for number, state in zip(others, states[1], strict=True)]
     applied = [bodies.forces(state, mode) for state, mode in zip(states[1], modes, strict=True)]
     switched = [equations.switched(state, mode) for state, mode in zip(states[1], modes, strict=True)]
     wrenches = [wrench for _, wrench in applied]
-    two = on_same_turns(own, one, second.recorded(times, states[1][:, :-1], switched, wrenches))
-    other = np.array([force for force, _ in applied])
-    others_sums = np.einsum("pk,tki->tpi", contact_sums(own.contacts), other) * units.force
+    by_bodies = on_same_turns(scaled, by_tree, second.recorded(times, states[1][:, :-1], switched, wrenches))
+    forces_of_bodies = np.array([force for force, _ in applied])
+    others_sums = np.einsum("pk,tki->tpi", contact_sums(scaled.contacts), forces_of_bodies) * units.force
     # samples at instants are at the times that were asked for, to the last bit
-    one, two = (units.record(mechanism, replace(record, time=asked)) for record in (one, two))
+    by_tree, by_bodies = (units.record(mechanism, replace(record, time=asked)) for record in (by_tree, by_bodies))
     left = None
     if cut is not None:
         earlier = cut[0].stretch_at(times)
         early_works = work_along(mechanism, units, tree, cut[0]).at(seconds, earlier)
         early = _by_the_tree(tree, cut[0], times, states_of(tree, cut[0], times, earlier), earlier, early_works)
-        early = early._replace(record=on_same_turns(own, first.record, early.record))
+        early = early._replace(record=on_same_turns(scaled, tree_states.record, early.record))
         left = _in_si(mechanism, units, early), cut[1]
     motion = two_route_motion(
         mechanism,
         paths,
-        one,
-        two,
+        by_tree,
+        by_bodies,
         _names(tree, bodies),
         _reason(dynamics, paths),
         units,
         works,
-        unresolved=max(float(work.unresolved.max(initial=0.0)) for work in along),
+        unresolved=max(float(work.unresolved.max(initial=0.0)) for work in work_paths),
         kinds=kinds,
-        pressed=(first.pressed * units.force, other * units.force) if own.contacts else None,
-        sums=(first.sums * units.force, others_sums) if own.contacts else None,
+        pressed=(tree_states.pressed * units.force, forces_of_bodies * units.force) if scaled.contacts else None,
+        sums=(tree_states.sums * units.force, others_sums) if scaled.contacts else None,
         until=until * units.time,
         cut=left,
     )
     motion = replace(motion, laws=laws)
-    if not own.contacts:
+    if not scaled.contacts:
         return motion
     last = min(until, *(path.stretches[-1].end for path in paths))
     return replace(
-        motion, bounces=contact_bounces(own, list(zip((tree, bodies), paths, strict=True)), motion.events, units, last)
+        motion,
+        bounces=contact_bounces(scaled, list(zip((tree, bodies), paths, strict=True)), motion.events, units, last),
     )
 
 
@@ -153,19 +155,23 @@ def _followed(
     """
     if not held:
         return followed(tree, bodies, until, breaking), (tree, bodies)
-    first, second = HeldRoute(tree, held[0]), HeldRoute(bodies, held[1])
-    one, two = followed(first, second, until, sorted({*breaking, *held[0].breaks(until)}))
-    if any(item.kind == EventKind.SETTLE for item in one.happenings):
+    tree_route, body_route = HeldRoute(tree, held[0]), HeldRoute(bodies, held[1])
+    tree_path, body_path = followed(tree_route, body_route, until, sorted({*breaking, *held[0].breaks(until)}))
+    if any(item.kind == EventKind.SETTLE for item in tree_path.happenings):
         raise Refused("no route of the truth follows rebounds to their end under held targets yet")
-    return (first.completed(one), second.completed(two)), (first, second)
+    return (tree_route.completed(tree_path), body_route.completed(body_path)), (tree_route, body_route)
 
 
 def _kinds(dynamics: ContactDynamics, mode: ContactMode) -> tuple[tuple[str, bool], ...]:
     """Part of a mode in which both routes must agree: kinds, and the sense of a joint that slides against friction."""
     return tuple(
-        (own.kind, isinstance(law, JointContact) and own.kind == "slip" and own.along is not None and own.along[1] > 0)
-        for own, law in zip(mode, dynamics.contacts, strict=True)
+        (acting.kind, isinstance(law, JointContact) and acting.kind == "slip" and _rises(acting))
+        for acting, law in zip(mode, dynamics.contacts, strict=True)
     )
+
+
+def _rises(acting: Acting) -> bool:
+    return acting.along is not None and acting.along[1] > 0
 
 
 def _names(tree: ContactTree, bodies: ContactBodies) -> tuple[str, str]:
@@ -185,10 +191,10 @@ def _reason(dynamics: ContactDynamics, paths: tuple[_Path, _Path]) -> str:
     """Reason why the motion is not unique from its horizon or its end on."""
     if not dynamics.mechanism.contacts:
         return "a change of the parameters within their accuracy changes which joints hold or hit a stop"
-    ended, first = first_close(paths, CLOSE), paths[0]
-    last = first.stretches[-1].start if not first.known and first.margins[-1][1] < CLOSE else ended
-    reason = _shared_load(dynamics, first, last) if ended == 0 or not first.known else ""
-    reason = reason or _crowded(first, ended)
+    ended, path = first_close(paths, CLOSE), paths[0]
+    last = path.stretches[-1].start if not path.known and path.margins[-1][1] < CLOSE else ended
+    reason = _shared_load(dynamics, path, last) if ended == 0 or not path.known else ""
+    reason = reason or _crowded(path, ended)
     return reason or "a change of the parameters within their accuracy changes which contacts stick, slide or open"
 
 
@@ -221,10 +227,10 @@ def _by_the_tree(
     return Routed(record_of(times, records), np.array(forces), np.array(sums), works)
 
 
-def _in_si(mechanism: Mechanism, units: Units, own: Routed) -> Routed:
+def _in_si(mechanism: Mechanism, units: Units, states: Routed) -> Routed:
     """Motion and forces in SI units."""
-    pressed, sums = own.pressed * units.force, own.sums * units.force
-    return Routed(units.record(mechanism, own.record), pressed, sums, own.works)
+    pressed, sums = states.pressed * units.force, states.sums * units.force
+    return Routed(units.record(mechanism, states.record), pressed, sums, states.works)
 
 
 def _shared_load(dynamics: ContactDynamics, path: _Path, time: float) -> str:
@@ -234,9 +240,11 @@ def _shared_load(dynamics: ContactDynamics, path: _Path, time: float) -> str:
     """
     stretch = path.stretches[path.stretch_at(np.array([time]))[0]]
     q, v, begun = dynamics.parts(stretch.first)
-    found = dynamics.solve(q, v, stretch.mode, begun)
-    pairs = zip(dynamics.contacts, found.determinate, found.state.touching, strict=True)
-    names = [contact.name for contact, known, each in pairs if not known[np.abs(each.normal) > RANK].all()]
+    solution = dynamics.solve(q, v, stretch.mode, begun)
+    pairs = zip(dynamics.contacts, solution.determinate, solution.state.touching, strict=True)
+    names = [
+        contact.name for contact, determinate, touch in pairs if not determinate[np.abs(touch.normal) > RANK].all()
+    ]
     if not names:
         return ""
     return (
@@ -248,4 +256,4 @@ def _shared_load(dynamics: ContactDynamics, path: _Path, time: float) -> str:
 def _size(dynamics: ContactDynamics) -> float:
     """Largest distance of a contact from the origin at the start, at least the natural length, which is 1."""
     touching = dynamics.at(*dynamics.mechanism.start()).touching
-    return max([1.0, *(float(np.abs(each.place).max()) for each in touching)])
+    return max([1.0, *(float(np.abs(touch.place).max()) for touch in touching)])

@@ -48,16 +48,16 @@ def refuse_uncovered(mechanism: Mechanism) -> None:
 
 
 def followed(
-    first: HybridRoute[ModeT], second: HybridRoute[ModeT], until: float, kinks: Sequence[float]
+    tree_route: HybridRoute[ModeT], body_route: HybridRoute[ModeT], until: float, kinks: Sequence[float]
 ) -> tuple[HybridPath[Stretch[ModeT]], HybridPath[Stretch[ModeT]]]:
     """Paths of two routes to ``until``, in natural units; ``kinks``: times at which the rates are not smooth.
 
     Where the first ends early the second is not followed beyond that end, for the truth ends there, too.
     """
-    one = follow(first, until, kinks, CLOSE)
-    end = until if one.known else one.stretches[-1].end
+    path = follow(tree_route, until, kinks, CLOSE)
+    end = until if path.known else path.stretches[-1].end
     last = min(until, end + _BEHIND * time_accuracy(end))
-    return one, follow(second, last, kinks, CLOSE, first_close([one], CLOSE))
+    return path, follow(body_route, last, kinks, CLOSE, first_close([path], CLOSE))
 
 
 class Routed(NamedTuple):
@@ -92,8 +92,8 @@ def cut_early(
     if not any(item.kind == EventKind.SETTLE for item in path.happenings):
         return None
     early = follow(route, until, kinks, CLOSE)
-    modes = ([kinds(each.stretches[k].mode) for k in each.stretch_at(times)] for each in (path, early))
-    alike = np.array([one == other for one, other in zip(*modes, strict=True)])
+    modes = ([kinds(item.stretches[k].mode) for k in item.stretch_at(times)] for item in (path, early))
+    alike = np.array([mode_of_path == early_mode for mode_of_path, early_mode in zip(*modes, strict=True)])
     return early, alike & (early.known | (times < early.stretches[-1].end))
 
 
@@ -106,25 +106,25 @@ def end_of(paths: tuple[FollowedPath, FollowedPath]) -> tuple[float, str]:
     early = [path for path in paths if not path.known]
     if not early:
         return np.inf, ""
-    first = min(early, key=lambda path: path.stretches[-1].end)
-    end = first.stretches[-1].end
+    shortest = min(early, key=lambda path: path.stretches[-1].end)
+    end = shortest.stretches[-1].end
     together = (path.ended for path in early if path.stretches[-1].end <= end + time_accuracy(end))
-    return end, first.ended or next(filter(None, together), "")
+    return end, shortest.ended or next(filter(None, together), "")
 
 
 def times_known(paths: tuple[FollowedPath, FollowedPath], times: Array) -> Array:
     """Times, in natural units, at which both paths are known, of rising ones whose first always is."""
     end = end_of(paths)[0]
-    known = times < end - time_accuracy(end) if np.isfinite(end) else np.ones(len(times), dtype=bool)
-    known[0] = True
-    return np.asarray(times[known])
+    in_time = times < end - time_accuracy(end) if np.isfinite(end) else np.ones(len(times), dtype=bool)
+    in_time[0] = True
+    return np.asarray(times[in_time])
 
 
 def two_route_motion(
     mechanism: Mechanism,
     paths: tuple[FollowedPath, FollowedPath],
-    one: Record,
-    two: Record,
+    by_tree: Record,
+    by_bodies: Record,
     routes: tuple[str, str],
     reason: str,
     units: Units,
@@ -142,8 +142,8 @@ def two_route_motion(
     Args:
         mechanism: bodies and joints, in SI units.
         paths: of both routes, in natural units.
-        one: record of the first route, taken as the truth, in SI units.
-        two: record of the second, matched to the first, in SI units.
+        by_tree: record of the first route, taken as the truth, in SI units.
+        by_bodies: record of the second, matched to the first, in SI units.
         routes: their names.
         reason: cause why the question is ill-posed from the horizon on.
         units: natural units of the paths.
@@ -156,8 +156,8 @@ def two_route_motion(
         cut: motion of the first route with rebounds cut early, and at which times it counts.
     """
     parted, determinate = _parted(*paths, kinds) * units.time, analyse(mechanism).determinate
-    masked = replace(one, wrench=np.where(determinate, one.wrench, np.nan))
-    fields, others = fields_with_bars(mechanism, masked), fields_with_bars(mechanism, two)
+    masked = replace(by_tree, wrench=np.where(determinate, by_tree.wrench, np.nan))
+    fields, others = fields_with_bars(mechanism, masked), fields_with_bars(mechanism, by_bodies)
     fields["work"], others["work"] = works
     if pressed is not None:
         fields["pressed"], others["pressed"] = pressed
@@ -172,7 +172,7 @@ def two_route_motion(
         lasting = np.minimum(difference, [*difference[:1], *difference[:-1]]) if field in _FORCES else difference
         errors = np.maximum.accumulate(SAFETY * lasting + size)
         bars[field] = np.maximum(SAFETY * difference + size, errors) + step[field]
-        differences[field] = float(difference[one.time < parted].max(initial=0.0))
+        differences[field] = float(difference[by_tree.time < parted].max(initial=0.0))
     bars["work"] += unresolved
     reach = np.maximum(units.length, np.maximum(largest(placed.p_WB), largest(placed.points)))
     bars["drift"] = np.maximum.accumulate(placed.drift() + ROUND_OFF * reach)
@@ -236,7 +236,7 @@ def _of_a_step(mechanism: Mechanism, record: Record, units: Units) -> dict[str, 
     natural = units.record(mechanism, replace(record, time=record.time[:1], residual=record.residual[:1], **ones))
     sizes = {name: float(largest(getattr(natural, name))[0]) for name in ones}
     sizes |= dict.fromkeys(("energy", "work"), units.force * units.length) | {"points": units.length}
-    spin, speed = (float(np.abs(each).max(initial=0.0)) for each in (record.w_WB, record.v_WB))
+    spin, speed = (float(np.abs(velocities).max(initial=0.0)) for velocities in (record.w_WB, record.v_WB))
     quadratic = 2 * max(1.0, units.time * spin, units.time * speed / units.length)
     sizes |= {
         "wrench": quadratic * sizes["wrench"],
@@ -266,11 +266,11 @@ def counterparts(
 ) -> list[int]:
     """Numbers of the second route's stretches in which it is while the first is in these stretches."""
     pairs, last = _alike(*paths, kinds)[0], len(paths[1].stretches) - 1
-    found = []
+    numbers = []
     for stretch in stretches:
-        before = pairs[max(bisect_right(pairs, (stretch, last)) - 1, 0)] if pairs else (0, 0)
-        found.append(min(max(before[1] + stretch - before[0], 0), last))
-    return found
+        last_pair = pairs[max(bisect_right(pairs, (stretch, last)) - 1, 0)] if pairs else (0, 0)
+        numbers.append(min(max(last_pair[1] + stretch - last_pair[0], 0), last))
+    return numbers
 
 
 def at_times(
@@ -281,7 +281,7 @@ def at_times(
     A route may divide what the other follows in one stretch at another time, as the beginning of a slip. No time is
     taken across a jump of the state, as at an impact, where both routes give the value on the same side.
     """
-    found = []
+    states = []
     for number, time in zip(stretches, times, strict=True):
         kind, near = kinds(path.stretches[number].mode), number
         for step in (-1, 1):
@@ -292,23 +292,23 @@ def at_times(
                 if not np.array_equal(path.stretches[earlier].last, path.stretches[earlier + 1].first):
                     break
                 near += step
-        found.append(near)
-    return found
+        states.append(near)
+    return states
 
 
 def _alike(
-    one: FollowedPath, two: FollowedPath, kinds: Callable[[Any], Any]
+    path_a: FollowedPath, path_b: FollowedPath, kinds: Callable[[Any], Any]
 ) -> tuple[list[tuple[int, int]], list[Stretch[Any]]]:
     """Numbers of stretches of both routes that are in the same mode in turn, and the stretches from where they part.
 
     Changes at the same instant may come in either order; if that order matters, the margin of a decision is small. A
     route may divide what the other follows in one stretch.
     """
-    pairs, left = list[tuple[int, int]](), [list(path.stretches) for path in (one, two)]
+    pairs, left = list[tuple[int, int]](), [list(path.stretches) for path in (path_a, path_b)]
     last: Any = None
     while all(left):
         if kinds(left[0][0].mode) == kinds(left[1][0].mode):
-            pairs.append((len(one.stretches) - len(left[0]), len(two.stretches) - len(left[1])))
+            pairs.append((len(path_a.stretches) - len(left[0]), len(path_b.stretches) - len(left[1])))
             last = kinds(left[0][0].mode)
             del left[0][0], left[1][0]
         elif passing := next(filter(lambda ones: _instant(ones[0]), left), None):
@@ -321,14 +321,14 @@ def _alike(
     if all(left):
         return pairs, apart
     apart = [stretch for stretch in apart if not _instant(stretch)]
-    while pairs and apart and kinds(apart[0].mode) == kinds(one.stretches[pairs[-1][0]].mode):
+    while pairs and apart and kinds(apart[0].mode) == kinds(path_a.stretches[pairs[-1][0]].mode):
         del apart[0]  # one route divides what the other follows in one stretch to the last time
     return pairs, apart
 
 
-def _parted(one: FollowedPath, two: FollowedPath, kinds: Callable[[Any], Any]) -> float:
+def _parted(path_a: FollowedPath, path_b: FollowedPath, kinds: Callable[[Any], Any]) -> float:
     """Start of the first stretch in which the two routes are in different modes [s]; inf: there is none."""
-    return min((stretch.start for stretch in _alike(one, two, kinds)[1]), default=np.inf)
+    return min((stretch.start for stretch in _alike(path_a, path_b, kinds)[1]), default=np.inf)
 
 
 def _instant(stretch: Stretch[Any]) -> bool:
@@ -341,10 +341,11 @@ def time_accuracy(time: float) -> float:
     return CLOSE * max(1.0, time)
 
 
-def _events(one: FollowedPath, two: FollowedPath, unit: float) -> Sequence[Event]:
+def _events(path_a: FollowedPath, path_b: FollowedPath, unit: float) -> Sequence[Event]:
     """Events of both routes, each with a bracket that contains both times, a step's error and blur; ``unit`` [s]."""
     events, least = [], ROUND_OFF + TOLERANCES[0]  # closer agreement of the routes is chance
-    for a, b in zip(one.happenings, two.happenings, strict=False):  # one route may have more events after they part
+    # One route may have more events after they part.
+    for a, b in zip(path_a.happenings, path_b.happenings, strict=False):
         time, wide = (
             unit * float(a.time),
             unit * (SAFETY * abs(a.time - b.time) + least * max(1.0, a.time) + a.blur),

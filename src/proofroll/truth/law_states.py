@@ -26,8 +26,8 @@ def _present(mode: ContactMode, touching: Sequence[Touching]) -> ContactMode:
     """Mode with present directions of slips: those by which a slip is integrated, however slow."""
     pairs = zip(mode, touching, strict=True)
     return tuple(
-        headed(own, touch) if not own.leads and float(np.linalg.norm(slip_velocity(touch))) > _KNOWN else own
-        for own, touch in pairs
+        headed(acting, touch) if not acting.leads and float(np.linalg.norm(slip_velocity(touch))) > _KNOWN else acting
+        for acting, touch in pairs
     )
 
 

@@ -121,7 +121,7 @@ class _Walk:
 
         ``most``: pieces of a stretch whose forces are found in numbers; None: all.
         """
-        before: Pieces | None = None
+        last_pieces: Pieces | None = None
         judged = self._check.residuals
         for number, stretch in enumerate(self._path.stretches):
             if stretch.start >= end and self._check.residuals is judged:
@@ -132,8 +132,8 @@ class _Walk:
             if self._held is not None:
                 self._held.recall(stretch.start)
             pieces = self._recorder.pieces(stretch, most)
-            if before is not None:
-                passage = self._recorder.passage(self._path, number, before, self._recorder.start(stretch, pieces))
+            if last_pieces is not None:
+                passage = self._recorder.passage(self._path, number, last_pieces, self._recorder.start(stretch, pieces))
                 if passage.happens:
                     self._take_waiting()
                 impulses = self._check.passes(passage)
@@ -145,7 +145,7 @@ class _Walk:
                 self._waiting.append(part)
             if self._working:
                 self.work.take(number, pieces)
-            before = self._recorder.end(stretch, pieces)
+            last_pieces = self._recorder.end(stretch, pieces)
         self._take_waiting()
         return judged
 

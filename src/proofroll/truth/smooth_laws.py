@@ -100,7 +100,7 @@ def works_along(mechanism: Mechanism, route: KeptRoute, times: Array) -> tuple[A
     It is integrated over all steps, halved until their points resolve the powers.
     """
     scale = natural_scale(mechanism)
-    along = WorkAlong(mechanism, scale.length, scale.rate)
+    works = WorkAlong(mechanism, scale.length, scale.rate)
     if route.powers is not None and working(mechanism):
         windows, parts = (
             [(step, step.start, step.end) for step in route.steps if step.end > step.start],
@@ -114,13 +114,13 @@ def works_along(mechanism: Mechanism, route: KeptRoute, times: Array) -> tuple[A
             power = route.powers(time.ravel(), np.concatenate(states)).reshape(*time.shape, -1)
             series = np.abs(np.einsum("kn,snd->skd", TO_SERIES, power))
             rough = (series[:, -2:].max((1, 2)) > _RESOLVED * series.max()) & (not last)
-            parts += [(moments, each) for moments, each, again in zip(time, power, rough, strict=True) if not again]
+            parts += [(moments, powers) for moments, powers, again in zip(time, power, rough, strict=True) if not again]
             halves = [window for window, again in zip(windows, rough, strict=True) if again]
             windows = [half for step, start, end in halves for half in _halved(step, start, end)]
         parts.sort(key=lambda part: float(part[0][0]))
-        time, power = np.array([moments for moments, _ in parts]), np.array([each for _, each in parts])
-        along.add(0, time, np.broadcast_to((time[:, -1:] - time[:, :1]) / 2, time.shape), power)
-    return along.at(times, [0] * len(times)), along.unresolved
+        time, power = np.array([moments for moments, _ in parts]), np.array([powers for _, powers in parts])
+        works.add(0, time, np.broadcast_to((time[:, -1:] - time[:, :1]) / 2, time.shape), power)
+    return works.at(times, [0] * len(times)), works.unresolved
 
 
 def _halved(step: KeptStep, start: float, end: float) -> list[tuple[KeptStep, float, float]]:

@@ -110,7 +110,7 @@ def find_truth(mechanism: Mechanism, times: Array, tolerance: float = 1e-15) -> 
         bars[field] = np.maximum.accumulate(bar)
         differences[field] = float(difference[times < horizon].max(initial=0.0))
     powers_of = [powers(record.placed(mechanism), record.named) for record in (best, by_tree, by_bodies, precise)]
-    apart = np.max([largest(other - powers_of[0]) for other in powers_of[1:]], axis=0, initial=0.0)
+    apart = np.max([largest(powers_of_route - powers_of[0]) for powers_of_route in powers_of[1:]], axis=0, initial=0.0)
     works, unresolved = _works(mechanism, steps, times)
     # routes whose powers differ by less than a bound have works that differ by less than its integral
     lasting = np.cumsum(np.maximum.accumulate(SAFETY * apart) * np.diff(times, prepend=0.0))
@@ -149,7 +149,7 @@ def _followed(
     mechanism, early = tree.mechanism, EarlyEnd()
     bodies = MaximalCoordinates(mechanism)
     check_start(tree, bodies)
-    known = (
+    conserved = (
         {f"closed form: {form.title}": _of_form(tree, form, times)} if exact is not None and form is not None else {}
     )
     try:
@@ -161,8 +161,8 @@ def _followed(
             nearby = early.run(partial(_first_growth, tree, by_tree), times)
             chaotic = chaotic[: len(nearby)] & (nearby * NUDGE > CHAOS)
         _check_branch(by_tree, precise, chaotic, early)
-        checked = law_check(mechanism, {**known, **dict(zip(names, kept, strict=True))}, names[1])
-        laws = sentence(checked, len(names) + len(known))
+        checked = law_check(mechanism, {**conserved, **dict(zip(names, kept, strict=True))}, names[1])
+        laws = sentence(checked, len(names) + len(conserved))
         if checked.violation is not None:
             early.at(checked.violation.time, laws)
             laws = ""
@@ -173,14 +173,14 @@ def _followed(
     if exact is not None and np.isfinite(early.time):
         witness = on_same_turns(mechanism, exact, tree.run_rk4(times))
         name = "joint coordinates, RK4"
-        never, early = np.zeros(len(times), dtype=bool), EarlyEnd()
-        checked = law_check(mechanism, known, next(iter(known)))
-        laws = sentence(checked, len(known))
+        nowhere, early = np.zeros(len(times), dtype=bool), EarlyEnd()
+        checked = law_check(mechanism, conserved, next(iter(conserved)))
+        laws = sentence(checked, len(conserved))
         if checked.violation is not None:
             early.at(checked.violation.time, laws)
             laws = ""
         routes = _Routes(
-            best=exact, by_tree=witness, by_bodies=witness, precise=witness, chaotic=never, names=(name,), laws=laws
+            best=exact, by_tree=witness, by_bodies=witness, precise=witness, chaotic=nowhere, names=(name,), laws=laws
         )
         return routes, early
     if np.isfinite(early.time):
@@ -237,12 +237,12 @@ def _runs(
         best = on_same_turns(mechanism, runs.one, runs.precise)
         return runs.one, best, best, runs.growth, names, runs.kept[::-1]
     by_tree, kept = early.run(partial(_by_tree, tree, tolerance=tolerance), times)
-    by_bodies, precise, name, other = early.run(partial(_second, second, tolerance=tolerance), times)
+    by_bodies, precise, name, second_path = early.run(partial(_second, second, tolerance=tolerance), times)
     growth = early.run(second.growth, times)
     by_tree, by_bodies, precise = (record.first(len(growth)) for record in (by_tree, by_bodies, precise))
     # route 1 alone counts turns; angles of the others are put on the same turns
     by_bodies, precise = on_same_turns(mechanism, by_tree, by_bodies), on_same_turns(mechanism, by_tree, precise)
-    return by_tree, by_bodies, precise, growth, (name, "joint coordinates, DOP853"), (other, kept)
+    return by_tree, by_bodies, precise, growth, (name, "joint coordinates, DOP853"), (second_path, kept)
 
 
 def _by_tree(tree: JointCoordinates, times: Array, tolerance: float) -> tuple[Record, KeptRoute]:

@@ -78,18 +78,18 @@ class StandingEnds:
 
     def _once(self, items: Sequence[Any]) -> tuple[Any, ...]:
         """Events or bounces by the names of ends, one of those of all corners of an end."""
-        found: dict[tuple[Any, ...], Any] = {}
+        items_by_key: dict[tuple[Any, ...], Any] = {}
         for item in items:
             name = self.names.get(item.name, item.name)
-            found.setdefault((getattr(item, "kind", ""), name, item.time), replace(item, name=name))
-        return tuple(found.values())
+            items_by_key.setdefault((getattr(item, "kind", ""), name, item.time), replace(item, name=name))
+        return tuple(items_by_key.values())
 
     def _told(self, text: str) -> str:
         """Sentence with the names of ends, each once in a list."""
         name = "(?:" + "|".join(map(re.escape, self.names)) + r")(?!\d)"
 
         def ends(listed: re.Match[str]) -> str:
-            return " and ".join(dict.fromkeys(self.names[each] for each in re.findall(name, listed[0])))
+            return " and ".join(dict.fromkeys(self.names[ball] for ball in re.findall(name, listed[0])))
 
         return re.sub(rf"{name}(?:(?:, | and ){name})*", ends, text)
 
@@ -101,7 +101,11 @@ def standing_ends(mechanism: Mechanism) -> StandingEnds | None:
     if {"cylinder", "plane"} not in kinds:
         return None
     motion = Tree(mechanism).at(*mechanism.start())
-    touching, index, still = touches(mechanism, motion), mechanism.body_index, STILL * natural_scale(mechanism).rate
+    touching, index, least_speed = (
+        touches(mechanism, motion),
+        mechanism.body_index,
+        STILL * natural_scale(mechanism).rate,
+    )
     added, pairs, cornered = list[Geometry](), list[Pair](), set[str]()
     for pair, kind in zip(mechanism.pairs, kinds, strict=True):
         pairs.append(pair)
@@ -109,16 +113,18 @@ def standing_ends(mechanism: Mechanism) -> StandingEnds | None:
             continue
         solid, plane = sorted((shapes[name] for name in pair.geometries), key=lambda shape: shape.kind)
         body = index[solid.body]
-        own = [each for each, contact in zip(touching, mechanism.contacts, strict=True) if contact.pair == pair.name]
-        turning = cross(motion.w_WB[body] - motion.w_WB[index[plane.body]], own[0].normal)
-        if not all(each.flat for each in own) or np.abs(turning).max() > still:
+        touches_of_pair = [
+            touch for touch, contact in zip(touching, mechanism.contacts, strict=True) if contact.pair == pair.name
+        ]
+        turning = cross(motion.w_WB[body] - motion.w_WB[index[plane.body]], touches_of_pair[0].normal)
+        if not all(touch.flat for touch in touches_of_pair) or np.abs(turning).max() > least_speed:
             continue
-        slip = slip_velocity(own[0])
-        pull = slip if np.linalg.norm(slip) > still else np.array(mechanism.gravity)
-        box = _box(solid, motion.R_WB[body].T @ pull, {*shapes, *(each.name for each in added)})
+        slip = slip_velocity(touches_of_pair[0])
+        pull = slip if np.linalg.norm(slip) > least_speed else np.array(mechanism.gravity)
+        box = _box(solid, motion.R_WB[body].T @ pull, {*shapes, *(touch.name for touch in added)})
         added.append(box)
-        one, two = (box.name if name == solid.name else name for name in pair.geometries)
-        pairs[-1] = replace(pair, geometries=(one, two))
+        name_a, name_b = (box.name if name == solid.name else name for name in pair.geometries)
+        pairs[-1] = replace(pair, geometries=(name_a, name_b))
         cornered.add(pair.name)
     if not cornered:
         return None
@@ -130,11 +136,11 @@ def standing_ends(mechanism: Mechanism) -> StandingEnds | None:
             place += 1
             continue
         second = contact.name.endswith(".2")
-        first = place - _CORNERS if second else place
-        parts.append(tuple(range(first + second, first + _CORNERS, 2)))
+        number = place - _CORNERS if second else place
+        parts.append(tuple(range(number + second, number + _CORNERS, 2)))
         names |= {with_corners.contacts[k].name: contact.name for k in parts[-1]}
         faces.append(Face(parts[-1], contact.pair))
-        place = first + _CORNERS
+        place = number + _CORNERS
     return StandingEnds(with_corners, tuple(faces), tuple(parts), names)
 
 
@@ -158,19 +164,19 @@ def _box(solid: Geometry, pull: Array, names: set[str]) -> Geometry:
     )
 
 
-def check_faces(faces: Sequence[Face], before: ContactMode, after: ContactMode, time: float) -> None:
-    """Refuses what an end of a cylinder does when only some of its corners are closed; ``before``: the last mode.
+def check_faces(faces: Sequence[Face], old_mode: ContactMode, new_mode: ContactMode, time: float) -> None:
+    """Refuses what an end of a cylinder does when only some of its corners are closed; ``old_mode``: the last mode.
 
     Raises:
         NotUnique: the cylinder begins to tip.
         RollingLanding: the cylinder lands on its rim.
     """
-    was, closed = closed_in(before), closed_in(after)
+    was_closed, closed = closed_in(old_mode), closed_in(new_mode)
     for face in faces:
         held = [closed[k] for k in face.contacts]
         if not any(held) or all(held):
             continue
-        if not any(was[k] for k in face.contacts):
+        if not any(was_closed[k] for k in face.contacts):
             raise RollingLanding(f"a cylinder of {face.pair} lands on its rim at t = {time:.6g} s")
         raise NotUnique(
             f"a cylinder of {face.pair} does not stand on its whole end from t = {time:.6g} s on: it tips, or its load "
@@ -194,9 +200,9 @@ def check_spin(
         NotUnique: friction resists the spin of an end.
     """
     for face in faces:
-        first = face.contacts[0]
+        contact = face.contacts[0]
         slips = np.array([slip_velocity(touching[k]) for k in face.contacts])
-        if closed[first] and friction[first] and np.ptp(slips, axis=0).max() > STILL:
+        if closed[contact] and friction[contact] and np.ptp(slips, axis=0).max() > STILL:
             raise NotUnique(
                 f"a cylinder of {face.pair} spins on its end at t = {time:.6g} s: the moment of its friction depends "
                 "on where along the end the load acts, which is not determinate; end before"

@@ -68,32 +68,32 @@ def run_stiff(mechanism: Mechanism, rank: int, times: Array) -> StiffRuns:
         Diverged: no step is small enough, or one passes a singular pose.
     """
     units = natural_units(mechanism)
-    own, moments = units.mechanism(mechanism), times / units.time
-    tree, bodies = JointCoordinates(own, rank), MaximalCoordinates(own)
-    lean, nq, start = bodies.lean, own.nq, np.concatenate(own.start())
-    near = np.concatenate([tree.tree.moved(start[:nq], np.full(own.nv, BESIDE)), start[nq:] * (1 + BESIDE)])
+    scaled, moments = units.mechanism(mechanism), times / units.time
+    tree, bodies = JointCoordinates(scaled, rank), MaximalCoordinates(scaled)
+    lean, nq, start = bodies.lean, scaled.nq, np.concatenate(scaled.start())
+    near = np.concatenate([tree.tree.moved(start[:nq], np.full(scaled.nv, BESIDE)), start[nq:] * (1 + BESIDE)])
 
     def joints(y: Array) -> Array:
-        return np.array([tree.rate(each[-1], each[:-1]) for each in y])
+        return np.array([tree.rate(state[-1], state[:-1]) for state in y])
 
     steps: tuple[list[Step], list[Step]] = [], []
     with units.errors_in_seconds():
         joined, beside = (
-            _collocated(joints, each, moments, _TOLERANCES[0], tree.followed(), kept)
-            for each, kept in ((start, steps[0]), (tree.eliminated(near), None))
+            _collocated(joints, state, moments, _TOLERANCES[0], tree.followed(), kept)
+            for state, kept in ((start, steps[0]), (tree.eliminated(near), None))
         )
         lone = lean.equations.start()
         alone = _collocated(_rates(lean), lone, moments, _TOLERANCES[1], lean.eliminated, steps[1])
-    one = tree.recorded(moments, joined)
+    by_tree = tree.recorded(moments, joined)
     growth = np.abs(beside - joined)[:, :nq].max(axis=1) / BESIDE
-    one, precise = (units.record(mechanism, each) for each in (one, bodies.recorded(moments, alone)))
+    by_tree, precise = (units.record(mechanism, state) for state in (by_tree, bodies.recorded(moments, alone)))
     kept = (
         _kept(steps[0], units, lambda t, y: units.record(mechanism, tree.recorded(t, y)), tree.spin),
         _kept(steps[1], units, lambda t, y: units.record(mechanism, bodies.recorded(t, y)), bodies.spin)._replace(
             powers=lambda t, y: bodies.powers(t / units.time, y) * (units.force * units.length / units.time)
         ),
     )
-    return StiffRuns(one, precise, growth, kept)
+    return StiffRuns(by_tree, precise, growth, kept)
 
 
 def _kept(

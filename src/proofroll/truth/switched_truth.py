@@ -35,10 +35,10 @@ def truth_of(mechanism: Mechanism, times: Array) -> TwoRouteMotion:
     times, mechanism = np.asarray(times, dtype=float), _with_stops_at_start(mechanism)
     if (pole := first_pole(mechanism, float(times[-1]))) is None:
         return _truth_of(mechanism, times)
-    known = times[times < (1 - NEAR) * pole.time]
-    if not len(known):
+    known_times = times[times < (1 - NEAR) * pole.time]
+    if not len(known_times):
         raise Refused(pole.clause)
-    motion = _truth_of(mechanism, known)
+    motion = _truth_of(mechanism, known_times)
     return motion if motion.ended else replace(motion, end=pole.time, ended=pole.clause)
 
 
@@ -66,13 +66,13 @@ def _without_contacts(mechanism: Mechanism, times: Array) -> TwoRouteMotion:
 def _reaches_none(mechanism: Mechanism, times: Array) -> bool:
     """True if no stop is passed and no limit of an effort reached, by a run of the first route alone."""
     units = natural_units(mechanism)
-    own = units.mechanism(mechanism)
-    if not all(joint.limits is None or _inside(joint) for joint in own.joints):
+    scaled = units.mechanism(mechanism)
+    if not all(joint.limits is None or _inside(joint) for joint in scaled.joints):
         return False
-    scout = ContactTree(ContactDynamics(_narrower(own)), _SCOUT, 1.0)
+    scout = ContactTree(ContactDynamics(_narrower(scaled)), _SCOUT, 1.0)
     begun = scout.begin()
     assert begun.mode is not None  # every start has a mode
-    if any(own.kind != "open" for own in begun.mode) or np.any(np.abs(scout.dynamics.drawn(begun.state)) > 1):
+    if any(scaled.kind != "open" for scaled in begun.mode) or np.any(np.abs(scout.dynamics.drawn(begun.state)) > 1):
         return False
     with units.errors_in_seconds():
         return scout.walk(0.0, begun.state, begun.mode, float(times[-1]) / units.time).guard is None

@@ -83,35 +83,37 @@ class WorkAlong:
 
     def passes(self, passage: Passage, impulses: Mapping[int, float]) -> None:
         """Adds the work of impulses of driven joints, by their numbers; an effort is finite and has none."""
-        before, after = passage.before, passage.after
+        pieces_before, pieces_after = passage.before, passage.after
         self._over_a_gap(
-            self._parts[-1].stretch if self._parts else 0, float(before.time[0, 0]), self._power(before)[0, 0]
+            self._parts[-1].stretch if self._parts else 0,
+            float(pieces_before.time[0, 0]),
+            self._power(pieces_before)[0, 0],
         )
         for k, (drive, joint) in enumerate(zip(self._drives, self._joints, strict=True)):
             if drive.field == "drive" and joint in impulses:
-                rate = (self._rate(joint, before) + self._rate(joint, after))[0, 0] / 2
+                rate = (self._rate(joint, pieces_before) + self._rate(joint, pieces_after))[0, 0] / 2
                 # a joint that a motion holds at rest does no work, whatever its impulse
                 self._total[k] += impulses[joint] * rate if rate else 0.0
-        self._last = float(after.time[0, 0]), self._power(after)[0, 0]
+        self._last = float(pieces_after.time[0, 0]), self._power(pieces_after)[0, 0]
 
     def at(self, times: Array, stretches: Sequence[int]) -> Array:
         """Work at times [s] in stretches, (times, drives)."""
-        found = []
+        works = []
         for time, stretch in zip(times.tolist(), stretches, strict=True):
             last = [part for part in self._parts if part.stretch <= stretch]
             inside = [part for part in last if part.stretch == stretch] or last
             part = next((part for part in reversed(inside) if part.start <= time), inside[0] if inside else None)
-            found.append(np.zeros(len(self._drives)) if part is None else part.at(time))
-        return np.array(found).reshape(len(times), len(self._drives))
+            works.append(np.zeros(len(self._drives)) if part is None else part.at(time))
+        return np.array(works).reshape(len(times), len(self._drives))
 
     def _over_a_gap(self, stretch: int, time: float, power: Array) -> None:
         """Adds the mean of the powers on both sides of a gap, as in the last instants of a slip."""
         if self._last is None or not time > self._last[0]:
             return
-        (begun, before), ended = self._last, self._total
+        (begun, last_power), ended = self._last, self._total
         span = time - begun
-        self._total = ended + span * (before + power) / 2
-        self.unresolved = self.unresolved + span * np.abs(before - power) / 2
+        self._total = ended + span * (last_power + power) / 2
+        self.unresolved = self.unresolved + span * np.abs(last_power - power) / 2
         line = np.array([[1.0, 1.0], [-1.0, 1.0]]) / 2
         series = np.array([(begun + time) / 2, span / 2]), line @ np.array([ended, self._total])
         self._parts.append(_Part(stretch, begun, time, *series))

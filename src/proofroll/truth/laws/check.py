@@ -76,13 +76,17 @@ class LawVerdict(NamedTuple):
 
 def verdict(checked: Mapping[str, LawResiduals]) -> LawVerdict:
     """LawVerdict from the residuals of each route, by its name."""
-    largest = [(part, law, time, name) for each in checked.values() for law, (part, time, name) in each.largest.items()]
-    broken = {route: each.first for route, each in checked.items() if each.first is not None}
+    largest = [
+        (part, law, time, name)
+        for residuals in checked.values()
+        for law, (part, time, name) in residuals.largest.items()
+    ]
+    broken = {route: residuals.first for route, residuals in checked.items() if residuals.first is not None}
     violation = min(broken.values(), key=lambda item: item.time, default=None)
     return LawVerdict(
-        laws=len({law for each in checked.values() for law in each.largest}),
-        points=max((each.points for each in checked.values()), default=0),
-        events=max((each.events for each in checked.values()), default=0),
+        laws=len({law for residuals in checked.values() for law in residuals.largest}),
+        points=max((residuals.points for residuals in checked.values()), default=0),
+        events=max((residuals.events for residuals in checked.values()), default=0),
         largest=max(largest, default=(0.0, "", 0.0, "")),
         violation=violation,
         routes=tuple(broken),

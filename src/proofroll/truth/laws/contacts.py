@@ -153,11 +153,11 @@ def _presses(pieces: Pieces, residuals: LawResiduals, touches: Sequence[ClosedCo
         if len(held) > 1 and len(excess) == len(held):
             bound = sum(touch.contact.pair.static * np.maximum(touch.normal_force, 0) for touch in held)
             whole = np.maximum(norm(np.sum([touch.friction for touch in held], 0)) - bound, 0)
-            excess = [np.minimum(each, whole) for each in excess]
-        for touch, each in zip(
+            excess = [np.minimum(part, whole) for part in excess]
+        for touch, part in zip(
             (touch for touch in held if np.isfinite(touch.contact.pair.static)), excess, strict=True
         ):
-            residuals.note("cone", touch.contact.name, each, largest, pieces.time)
+            residuals.note("cone", touch.contact.name, part, largest, pieces.time)
 
 
 def _least_pull(pieces: Pieces, group: Sequence[ClosedContact], pulls: Array) -> Array:
@@ -165,13 +165,13 @@ def _least_pull(pieces: Pieces, group: Sequence[ClosedContact], pulls: Array) ->
     from scipy.optimize import nnls
 
     left = np.zeros(pulls.shape[1:])
-    for at in zip(*np.nonzero(pulls.max(0) > 0), strict=True):
-        normals = [pieces.normal[(*at, touch.number)] for touch in group]
-        places = np.array([pieces.place[(*at, touch.number)] for touch in group])
+    for index in zip(*np.nonzero(pulls.max(0) > 0), strict=True):
+        normals = [pieces.normal[(*index, touch.number)] for touch in group]
+        places = np.array([pieces.place[(*index, touch.number)] for touch in group])
         reach = np.abs(places - places.mean(0)).max() or 1.0
         arms = (places - places.mean(0)) / reach
         rows = np.array([[*normal, *np.cross(arm, normal)] for normal, arm in zip(normals, arms, strict=True)]).T
-        left[at] = nnls(rows, rows @ np.array([touch.normal_force[at] for touch in group]))[1]
+        left[index] = nnls(rows, rows @ np.array([touch.normal_force[index] for touch in group]))[1]
     return left
 
 

@@ -59,14 +59,14 @@ def impact(
 
     ``fastest``: largest speed of impact of each contact and stop so far.
     """
-    before, after, time = passage.before, passage.after, passage.before.time
-    m, fast = scene.mechanism, scene.speed + float(np.abs(before.v).max())
+    pieces_before, pieces_after, time = passage.before, passage.after, passage.before.time
+    m, fast = scene.mechanism, scene.speed + float(np.abs(pieces_before.v).max())
     columns, moving, stops, driven = list[Array](), dict[str, Coordinate](), list[Stop](), dict[int, int]()
     for number, connection in enumerate(scene.connections):
-        columns += _held(scene, before, connection)
+        columns += _held(scene, pieces_before, connection)
         if number < len(m.joints) and m.joints[number].nq == 1:
             moving[connection.name] = _coordinate(scene, passage, number)
-            reached = _reached(scene, before, coordinates, number, moving[connection.name])
+            reached = _reached(scene, pieces_before, coordinates, number, moving[connection.name])
             if m.joints[number].motion is not None:
                 driven[number] = len(columns)
             if reached or number in driven:
@@ -76,16 +76,21 @@ def impact(
         columns.append(np.sum([factor * moving[name].column for name, factor in scene.terms(coupling)[0]], 0))
     joints, hits = len(columns), list[Hit]()
     for k, contact in enumerate(scene.contacts):
-        is_struck, distance = contact.name in passage.impacts, float(gap_of(contact, before)[0, 0])
+        is_struck, distance = contact.name in passage.impacts, float(gap_of(contact, pieces_before)[0, 0])
         if is_struck and contact.alone:
             residuals.note("event", contact.name, np.array([[abs(distance) / scene.length]]), 1.0, time)
-        place = before.place[0, 0, k]
+        place = pieces_before.place[0, 0, k]
         touches = contact.alone and abs(distance) < _CLOSED * (scene.length + float(norm(place)))
-        if is_struck or touches or before.modes.contacts[k] != "open":
-            slides = [slide_of(contact, each, before.place[..., k, :])[0, 0] for each in (before, after)]
-            hits.append(Hit(k, contact, before.normal[0, 0, k], (slides[0], slides[1])))
-            columns += [_column(scene, before, (contact.a, contact.b), place, axis, 0 * axis) for axis in np.eye(3)]
-    jump = _momentum(scene, before, after)
+        if is_struck or touches or pieces_before.modes.contacts[k] != "open":
+            slides = [
+                slide_of(contact, pieces, pieces_before.place[..., k, :])[0, 0]
+                for pieces in (pieces_before, pieces_after)
+            ]
+            hits.append(Hit(k, contact, pieces_before.normal[0, 0, k], (slides[0], slides[1])))
+            columns += [
+                _column(scene, pieces_before, (contact.a, contact.b), place, axis, 0 * axis) for axis in np.eye(3)
+            ]
+    jump = _momentum(scene, pieces_before, pieces_after)
     for coordinate in moving.values():
         jump = jump + coordinate.armature * (coordinate.rates[1] - coordinate.rates[0]) * coordinate.column
     pulses, left = _explained(columns, jump)
@@ -98,50 +103,54 @@ def impact(
     return {number: float(pulses[k]) if alone[number] else np.nan for number, k in driven.items()}
 
 
-def _column(scene: LawScene, before: Pieces, ends: tuple[int, int], place: Array, force: Array, moment: Array) -> Array:
+def _column(
+    scene: LawScene, pieces_before: Pieces, ends: tuple[int, int], place: Array, force: Array, moment: Array
+) -> Array:
     """Momenta (linear, about the centre of mass) of all bodies by an impulse on the first of two, its opposite on b."""
-    centres, momenta = scene.centres(before)[0][0, 0], np.zeros((len(scene.mass), 6))
+    centres, momenta = scene.centres(pieces_before)[0][0, 0], np.zeros((len(scene.mass), 6))
     for body, sign in zip(ends, (1.0, -1.0), strict=True):
         momenta[body, :3] += sign * force
         momenta[body, 3:] += sign * (np.cross(place - centres[body], force) + moment)
     return momenta[:-1].ravel()
 
 
-def _held(scene: LawScene, before: Pieces, connection: JointFrames) -> list[Array]:
+def _held(scene: LawScene, pieces_before: Pieces, connection: JointFrames) -> list[Array]:
     """Columns of the impulses that a connection can give."""
-    placed = scene.placed(connection, before)
+    placed = scene.placed(connection, pieces_before)
     A, B, place = placed.A[0, 0], placed.B[0, 0], placed.origin_b[0, 0]
     ends, none = (connection.b, connection.a), np.zeros(3)
     if connection.kind == DISTANCE:
         apart = place - placed.origin_a[0, 0]
-        return [_column(scene, before, ends, place, apart / np.linalg.norm(apart), none)]
+        return [_column(scene, pieces_before, ends, place, apart / np.linalg.norm(apart), none)]
     forces = [A[:, k] for k in HELD_PLACES.get(connection.kind, (0, 1, 2))]
     moments = [np.cross(A[:, i], B[:, k]) for i, k in HELD_TURNS.get(connection.kind, ())]
-    columns = [_column(scene, before, ends, place, force, none) for force in forces]
-    return columns + [_column(scene, before, ends, place, none, moment) for moment in moments]
+    columns = [_column(scene, pieces_before, ends, place, force, none) for force in forces]
+    return columns + [_column(scene, pieces_before, ends, place, none, moment) for moment in moments]
 
 
 def _coordinate(scene: LawScene, passage: Passage, number: int) -> Coordinate:
     """A joint with one coordinate in an impact."""
     connection, joint = scene.connections[number], scene.mechanism.joints[number]
     _, axis, turns = FREE[connection.kind][0]
-    placed = [scene.placed(connection, each) for each in (passage.before, passage.after)]
+    placed = [scene.placed(connection, frames) for frames in (passage.before, passage.after)]
     direction, none = placed[0].A[0, 0][:, axis], np.zeros(3)
     force, moment = (none, direction) if turns else (direction, none)
     place, ends = placed[0].origin_b[0, 0], (connection.b, connection.a)
-    rates = [float((each.spin if turns else each.slide)[0, 0] @ direction) for each in placed]
+    rates = [float((frames.spin if turns else frames.slide)[0, 0] @ direction) for frames in placed]
     column = _column(scene, passage.before, ends, place, force, moment)
     return Coordinate(column, (rates[0], rates[1]), joint.armature)
 
 
 def _reached(
-    scene: LawScene, before: Pieces, coordinates: Coordinates, number: int, coordinate: Coordinate
+    scene: LawScene, pieces_before: Pieces, coordinates: Coordinates, number: int, coordinate: Coordinate
 ) -> list[Stop]:
     """Stops of a joint at which it is just before the impact."""
     joint, connection = scene.mechanism.joints[number], scene.connections[number]
     if joint.limits is None:
         return []
-    place = float(coordinates.at(number, 0, before, scene.placed(connection, before), connection.kind)[0, 0])
+    place = float(
+        coordinates.at(number, 0, pieces_before, scene.placed(connection, pieces_before), connection.kind)[0, 0]
+    )
     length = 1.0 if joint.kind == JointKind.REVOLUTE else scene.length
     return [
         Stop(joint.name, joint.restitution, (sign * coordinate.rates[0], sign * coordinate.rates[1]))
@@ -150,10 +159,13 @@ def _reached(
     ]
 
 
-def _momentum(scene: LawScene, before: Pieces, after: Pieces) -> Array:
+def _momentum(scene: LawScene, pieces_before: Pieces, pieces_after: Pieces) -> Array:
     """Jump of linear momentum and of that about the centre of mass, of all bodies."""
-    velocities = [scene.centres(each)[1][0, 0] for each in (before, after)]
-    spin = turned(before.R[0, 0] @ scene.inertia @ before.R[0, 0].swapaxes(-1, -2), after.w[0, 0] - before.w[0, 0])
+    velocities = [scene.centres(pieces)[1][0, 0] for pieces in (pieces_before, pieces_after)]
+    spin = turned(
+        pieces_before.R[0, 0] @ scene.inertia @ pieces_before.R[0, 0].swapaxes(-1, -2),
+        pieces_after.w[0, 0] - pieces_before.w[0, 0],
+    )
     linear = scene.mass[:, None] * (velocities[1] - velocities[0])
     return np.concatenate([linear, spin], -1)[:-1].ravel()
 
@@ -188,13 +200,13 @@ def _newton(
 
     Of several each leaves with e of its speed at least, and one with no more: impulses that press have caused the jump.
     """
-    before, time = passage.before, passage.before.time
-    fast, strikes = scene.speed + float(np.abs(before.v).max()), list[Stop]()
+    pieces_before, time = passage.before, passage.before.time
+    fast, strikes = scene.speed + float(np.abs(pieces_before.v).max()), list[Stop]()
     happened = passage.impacts | passage.settles
     for hit in hits:
         speeds = [float(hit.normal @ slide) for slide in hit.slides]
         strikes.append(Stop(hit.contact.name, hit.contact.pair.restitution, (speeds[0], speeds[1])))
-        if before.modes.contacts[hit.number] != "open" or hit.contact.name in happened:
+        if pieces_before.modes.contacts[hit.number] != "open" or hit.contact.name in happened:
             residuals.note("restitution", hit.contact.name, np.array([[max(-speeds[1], 0.0)]]), fast, time)
     strikes += stops
     if len(strikes) != 1:
@@ -233,8 +245,8 @@ def _coulomb(scene: LawScene, passage: Passage, residuals: LawResiduals, hit: Hi
     # it sticks, and leaves with its part of the slip, or slips against mu N
     returned, opposed = float(norm(left + pair.tangential_restitution * came)), np.inf
     if np.isfinite(pair.friction) and slip > _SLIPS * fast:
-        along = left / slip if not pair.tangential_restitution else -friction / max(float(norm(friction)), _LEAST)
-        opposed = float(norm(friction + pair.friction * pressed * along))
+        direction = left / slip if not pair.tangential_restitution else -friction / max(float(norm(friction)), _LEAST)
+        opposed = float(norm(friction + pair.friction * pressed * direction))
     if returned / fast <= opposed / size:
         residuals.note("restitution", name, np.array([[returned]]), fast, time)
     else:

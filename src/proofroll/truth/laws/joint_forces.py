@@ -102,8 +102,8 @@ def _controlled(control: Control, data: Actuator, time: Array, effort: Array, pl
         clamped = control.policy is not None and np.abs(effort).max() >= limit
         return effort if clamped else law  # an effort at its limit does not tell the target
     begins = np.abs(time[:, :1] - instant / control.rate) <= _INSTANT / control.rate
-    known = begins & (control.policy is None)
-    return np.where(known, _law(data, target, place[:, :1], rate[:, :1]), effort[:, :1]) + 0.0 * effort
+    determinate = begins & (control.policy is None)
+    return np.where(determinate, _law(data, target, place[:, :1], rate[:, :1]), effort[:, :1]) + 0.0 * effort
 
 
 def _dry_friction(scene: LawScene, pieces: Pieces, residuals: LawResiduals, number: int, rate: Array) -> None:

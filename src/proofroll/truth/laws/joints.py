@@ -64,9 +64,9 @@ class Coordinates:
         if pieces.turns is not None:
             turn = pieces.turns[..., number, k] - angle
         else:
-            last, start, before = self._last[number, k]
+            last, start, last_rate = self._last[number, k]
             rate = dot(placed.spin, (placed.A if axes == "A" else placed.B)[..., axis]).ravel()
-            times, rates = np.append(last, pieces.time.ravel()), np.append(before, rate)
+            times, rates = np.append(last, pieces.time.ravel()), np.append(last_rate, rate)
             moved = np.diff(times) * (rates[1:] + rates[:-1]) / 2
             apart = np.diff(np.append(start, angle.ravel())) - moved
             path = start + np.cumsum(moved + apart - 2 * np.pi * np.round(apart / (2 * np.pi)))

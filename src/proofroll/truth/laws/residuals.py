@@ -109,7 +109,7 @@ class LawResiduals:
         residual = np.abs(residual)
         if not residual.size:
             return
-        size, extra, tail = (np.broadcast_to(np.asarray(each, float), residual.shape) for each in (size, extra, tail))
+        size, extra, tail = (np.broadcast_to(np.asarray(value, float), residual.shape) for value in (size, extra, tail))
         times = np.broadcast_to(time.reshape(time.shape + (1,) * (residual.ndim - time.ndim)), residual.shape)
         growth = 1.0 + self.rate * times if law in _DRIFTING else 1.0
         with np.errstate(all="ignore"):

@@ -119,15 +119,15 @@ class LawScene:
             )
         for loop in self.mechanism.loops:
             kind, frame = str(loop.kind), frame_of(np.array(loop.axis_a))
-            other = frame_of(np.array(loop.axis_b))
+            frame_b = frame_of(np.array(loop.axis_b))
             if kind in {JointKind.FIXED, JointKind.PRISMATIC}:
-                other = of_angles(np.array(loop.orientation)).T @ frame
+                frame_b = of_angles(np.array(loop.orientation)).T @ frame
             elif kind == JointKind.UNIVERSAL:  # z of A stays perpendicular to x of B
-                other = other[:, [2, 0, 1]]
+                frame_b = frame_b[:, [2, 0, 1]]
             ends = self.index[loop.body_a], self.index[loop.body_b]
             places = np.array(loop.position_a), np.array(loop.position_b)
             connections.append(
-                JointFrames(loop.name, kind, *ends, *places, frame_a=frame, frame_b=other, length=loop.length)
+                JointFrames(loop.name, kind, *ends, *places, frame_a=frame, frame_b=frame_b, length=loop.length)
             )
         return connections
 

@@ -97,8 +97,8 @@ def contacts_of(geometries: Sequence[Geometry], pairs: Sequence[Pair], index: di
     """Contacts of all pairs, in their order; ``index``: of each body."""
     by_name, contacts = {geometry.name: geometry for geometry in geometries}, list[PairContact]()
     for pair in pairs:
-        one, two = (by_name[name] for name in pair.geometries)
-        a, b = shape_of(one), shape_of(two)
+        geometry_a, geometry_b = (by_name[name] for name in pair.geometries)
+        a, b = shape_of(geometry_a), shape_of(geometry_b)
         count = _SLOTS.get((min(a.kind, b.kind), max(a.kind, b.kind)), 1)
         shapes = [(a, b)] * count
         if "plane" in {a.kind, b.kind}:
@@ -109,8 +109,8 @@ def contacts_of(geometries: Sequence[Geometry], pairs: Sequence[Pair], index: di
                 PairContact(
                     name=name,
                     pair=pair,
-                    a=index[one.body],
-                    b=index[two.body],
+                    a=index[geometry_a.body],
+                    b=index[geometry_b.body],
                     shape_a=part_a,
                     shape_b=part_b,
                     solid_a=a,

@@ -26,69 +26,79 @@ def transition(
 
     ``fastest``: largest speed of impact of each contact and stop so far, kept up to date.
     """
-    before, after = passage.before, passage.after
+    pieces_before, pieces_after = passage.before, passage.after
     residuals.note(
-        "joined", "", jump(scene, after, before, slice(None), slice(None), rates=False), 1.0, before.time[:, 0]
+        "joined",
+        "",
+        jump(scene, pieces_after, pieces_before, slice(None), slice(None), rates=False),
+        1.0,
+        pieces_before.time[:, 0],
     )
-    is_struck = bool(jump(scene, after, before, slice(None), slice(None))[0] > _STRUCK)
+    is_struck = bool(jump(scene, pieces_after, pieces_before, slice(None), slice(None))[0] > _STRUCK)
     if is_struck:
         return impact(scene, passage, residuals, coordinates, fastest)
     if not passage.decided:
         return {}
-    zeros = [*_of_contacts(scene, before, after), *_of_joints(scene, before, after)]
+    zeros = [*_of_contacts(scene, pieces_before, pieces_after), *_of_joints(scene, pieces_before, pieces_after)]
     if zeros:
         name, value = min(zeros, key=lambda item: item[1])
-        residuals.note("event", name, np.array([[value]]), 1.0, before.time)
+        residuals.note("event", name, np.array([[value]]), 1.0, pieces_before.time)
     return {}
 
 
-def _of_contacts(scene: LawScene, before: Pieces, after: Pieces) -> Iterator[tuple[str, float]]:
+def _of_contacts(scene: LawScene, pieces_before: Pieces, pieces_after: Pieces) -> Iterator[tuple[str, float]]:
     """Causes of changes of contacts, each relative to its natural size, just before them."""
-    largest = norm(before.force).max(initial=0.0) + scene.faint
-    fast = scene.speed + np.abs(before.v).max()
+    largest = norm(pieces_before.force).max(initial=0.0) + scene.faint
+    fast = scene.speed + np.abs(pieces_before.v).max()
     for k, contact in enumerate(scene.contacts):
-        mode, later = before.modes.contacts[k], after.modes.contacts[k]
-        force, normal = before.force[0, 0, k], before.normal[0, 0, k]
+        mode, later = pieces_before.modes.contacts[k], pieces_after.modes.contacts[k]
+        force, normal = pieces_before.force[0, 0, k], pieces_before.normal[0, 0, k]
         pressed = float(normal @ force)
         if mode != later and mode == "open":
-            yield contact.name, abs(float(gap_of(contact, before)[0, 0])) / scene.length
+            yield contact.name, abs(float(gap_of(contact, pieces_before)[0, 0])) / scene.length
         elif mode != later and later == "open":
             yield contact.name, abs(pressed) / largest
         elif mode != later and later == "stick":
-            slide = slide_of(contact, before, before.place[..., k, :])[0, 0]
+            slide = slide_of(contact, pieces_before, pieces_before.place[..., k, :])[0, 0]
             yield contact.name, float(norm(slide - (normal @ slide) * normal)) / fast
         elif mode != later:
-            yield contact.name, _beyond_bound(scene, before, k) / largest
+            yield contact.name, _beyond_bound(scene, pieces_before, k) / largest
         pair = contact.pair
-        for law, was, now, moment, turning in (
-            ("roll", before.modes.rolling[k], after.modes.rolling[k], before.rolling[0, 0, k], pair.rolling_resistance),
+        for law, old_mode, new_mode, moment, turning in (
+            (
+                "roll",
+                pieces_before.modes.rolling[k],
+                pieces_after.modes.rolling[k],
+                pieces_before.rolling[0, 0, k],
+                pair.rolling_resistance,
+            ),
             (
                 "spin",
-                before.modes.spinning[k],
-                after.modes.spinning[k],
-                before.spinning[0, 0, k],
+                pieces_before.modes.spinning[k],
+                pieces_after.modes.spinning[k],
+                pieces_before.spinning[0, 0, k],
                 pair.spinning_friction,
             ),
         ):
-            if was == now or "open" in {was, now}:
+            if old_mode == new_mode or "open" in {old_mode, new_mode}:
                 continue
-            relative = before.w[0, 0, contact.a] - before.w[0, 0, contact.b]
+            relative = pieces_before.w[0, 0, contact.a] - pieces_before.w[0, 0, contact.b]
             spin = (normal @ relative) * normal
             part = float(norm(spin if law == "spin" else relative - spin))
-            quick = scene.rate + float(np.abs(before.w).max())
+            quick = scene.rate + float(np.abs(pieces_before.w).max())
             excess = abs(float(norm(moment)) - turning * pressed) / (turning * largest)
-            yield contact.name, part / quick if now == "stick" else excess
+            yield contact.name, part / quick if new_mode == "stick" else excess
 
 
-def _beyond_bound(scene: LawScene, before: Pieces, k: int) -> float:
+def _beyond_bound(scene: LawScene, pieces_before: Pieces, k: int) -> float:
     """Distance of friction from its bound where a contact begins to slip, alone or with all of the same bodies."""
     ends = scene.contacts[k].a, scene.contacts[k].b
     mates = [
         j
         for j, contact in enumerate(scene.contacts)
-        if before.modes.contacts[j] == "stick" and (contact.a, contact.b) == ends
+        if pieces_before.modes.contacts[j] == "stick" and (contact.a, contact.b) == ends
     ]
-    force, normal = before.force[0, 0, mates], before.normal[0, 0, mates]
+    force, normal = pieces_before.force[0, 0, mates], pieces_before.normal[0, 0, mates]
     pressed = dot(normal, force)
     friction = force - pressed[:, None] * normal
     bounds = np.array([scene.contacts[j].pair.static for j in mates]) * pressed
@@ -96,22 +106,24 @@ def _beyond_bound(scene: LawScene, before: Pieces, k: int) -> float:
     return min(alone, abs(float(norm(friction.sum(0))) - float(bounds.sum())))
 
 
-def _of_joints(scene: LawScene, before: Pieces, after: Pieces) -> Iterator[tuple[str, float]]:
+def _of_joints(scene: LawScene, pieces_before: Pieces, pieces_after: Pieces) -> Iterator[tuple[str, float]]:
     """Causes of changes of stops and dry friction."""
     for number, joint in enumerate(scene.mechanism.joints):
         turns = joint.kind == JointKind.REVOLUTE
         natural = scene.force * (scene.length if turns else 1.0)
-        for k, (mode, later) in enumerate(zip(before.modes.stops[number], after.modes.stops[number], strict=True)):
+        for k, (mode, later) in enumerate(
+            zip(pieces_before.modes.stops[number], pieces_after.modes.stops[number], strict=True)
+        ):
             if mode != later and later == "open":
-                yield joint.name, abs(float(before.stops[0, 0, number, k])) / natural
+                yield joint.name, abs(float(pieces_before.stops[0, 0, number, k])) / natural
             elif mode != later:
                 yield joint.name, 0.0  # a joint that closes on its stop without a jump is checked there
-        mode, later = before.modes.friction[number], after.modes.friction[number]
+        mode, later = pieces_before.modes.friction[number], pieces_after.modes.friction[number]
         if mode == later or "open" in {mode, later}:
             continue
-        push = abs(float(before.friction[0, 0, number]))
+        push = abs(float(pieces_before.friction[0, 0, number]))
         if later == "stick":
-            rate = _rate(scene, before, number)
+            rate = _rate(scene, pieces_before, number)
             yield joint.name, abs(rate) / (scene.rate * (1.0 if turns else scene.length))
         else:
             yield joint.name, abs(push - joint.friction) / joint.friction

@@ -62,12 +62,12 @@ class ContactTree(ContactStretches):
         (q, v, time), features, closed = self.dynamics.parts(state), features_of(rough), closed_in(rough)
         which = np.flatnonzero(closed).tolist()
         normal, tangential = (np.array([law[k] for k in which]) for law in (laws, sideways))
-        after, impulse, margin = self.dynamics.struck(q, v, which, normal, time, tangential, features)
-        stays, touching = list(closed), self.dynamics.at(q, after, time, features).touching
+        velocity, impulse, margin = self.dynamics.struck(q, v, which, normal, time, tangential, features)
+        stays, touching = list(closed), self.dynamics.at(q, velocity, time, features).touching
         for pressed, k in zip(impulse[:, 0] > 0, which, strict=True):
             leaves = float(touching[k].normal @ touching[k].slide) > SLIP_ENDED
             stays[k] = not laws[k] if pressed else not leaves
-        return np.concatenate([q, after, [time]]), stays, margin
+        return np.concatenate([q, velocity, [time]]), stays, margin
 
     def _forces(self, state: Array, mode: ContactMode) -> ContactSolution:
         q, v, time = self.dynamics.parts(state)

@@ -88,20 +88,20 @@ def add_point_loads(
             body, arm = bodies[index[name]], clean(position)
             speed = turned(body.R, plus(body.v, cross(body.w, arm)))
             ends.append((body, arm, plus(body.p, turned(body.R, arm)), speed))
-        (first, _, from_a, slow), (second, _, to_b, fast) = ends
-        w_a, w_b = turned(first.R, first.w), turned(second.R, second.w)
+        (body_a, _, from_a, slow), (body_b, _, to_b, fast) = ends
+        w_a, w_b = turned(body_a.R, body_a.w), turned(body_b.R, body_b.w)
         motion = (minus(to_b, from_a), minus(fast, slow), minus(w_b, w_a), w_a)
-        push, moment = bushing_load(bushing, first.R, second.R, motion, functions)
-        for body, sign in ((second, 1.0), (first, -1.0)):
+        push, moment = bushing_load(bushing, body_a.R, body_b.R, motion, functions)
+        for body, sign in ((body_b, 1.0), (body_a, -1.0)):
             arm = turned_back(body.R, minus(to_b, body.p))
             _add(load, body.at(arm)[0], turned_back(body.R, scaled(sign, push)))
             _add(load, body.turn, turned_back(body.R, scaled(sign, moment)))
     for applied in mechanism.forces:
-        first, second = bodies[index[applied.body]], bodies[index[applied.reaction]]
+        body_a, body_b = bodies[index[applied.body]], bodies[index[applied.reaction]]
         size = applied.at(time, functions)
-        size = turned(first.R, size) if applied.frame == "body" else size
-        place = plus(first.p, turned(first.R, clean(applied.position)))
-        for body, sign in ((first, 1.0), (second, -1.0)):
+        size = turned(body_a.R, size) if applied.frame == "body" else size
+        place = plus(body_a.p, turned(body_a.R, clean(applied.position)))
+        for body, sign in ((body_a, 1.0), (body_b, -1.0)):
             acts = turned_back(body.R, scaled(sign, size))
             at_place = body.at(turned_back(body.R, minus(place, body.p)))[0] if applied.kind == "force" else body.turn
             _add(load, at_place, acts)
@@ -121,8 +121,8 @@ def bodies_of_tree(
     rates: list[Scalar] = []
     index = m.body_index
     for joint, at_q, at_v in zip(m.joints, m.q_slices, m.v_slices, strict=True):
-        parent, own = bodies[index[joint.parent]], q[at_q]
-        d, S = _pose(joint.kind, own, functions)
+        parent, coordinate = bodies[index[joint.parent]], q[at_q]
+        d, S = _pose(joint.kind, coordinate, functions)
         frame = [clean(row) for row in joint.parent_frame]
         back = [clean(row) for row in joint.child_frame.T]
         across = product(product(frame, S), back)  # child's axes in the parent's, by rows
@@ -130,9 +130,9 @@ def bodies_of_tree(
         from_joint = scaled(-1.0, clean(joint.child_position))
         in_child = {True: [clean(column) for column in joint.child_frame.T]}  # axes of B, then of A, in the child's
         in_child[False] = [turned_back(back, turned_back(S, axis)) for axis in _AXES]
-        before, a = parent.at(to_joint)
+        parent_move, a = parent.at(to_joint)
         w_parent, turning = turned_back(across, parent.w), turned_back(across, parent.turning)
-        move: dict[int, Vector] = {n: turned_back(across, way) for n, way in before.items()}
+        move: dict[int, Vector] = {n: turned_back(across, way) for n, way in parent_move.items()}
         turn: dict[int, Vector] = {n: turned_back(across, way) for n, way in parent.turn.items()}
         a = turned_back(across, a)
         velocity = turned_back(across, plus(parent.v, cross(parent.w, to_joint)))
@@ -169,7 +169,7 @@ def bodies_of_tree(
             move=moved,
             turn=turn,
         )
-        rates += _coordinate_rates(joint.kind, own, v[at_v], S)
+        rates += _coordinate_rates(joint.kind, coordinate, v[at_v], S)
     return bodies, rates
 
 

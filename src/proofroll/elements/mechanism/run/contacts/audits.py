@@ -189,8 +189,8 @@ def contact_audits(mechanism: Mechanism, dataset: xr.Dataset) -> dict[str, Float
     all bodies. Both are largest components in stretches between events, without the ends of these.
     """
     forces, rates = list[FloatArray](), list[FloatArray]()
-    known = all(np.isfinite(dataset[name].to_numpy()).all() for name in ("p_WB", "v_WB", "w_WB"))
-    if "contact_forces" not in dataset or not known:
+    complete = all(np.isfinite(dataset[name].to_numpy()).all() for name in ("p_WB", "v_WB", "w_WB"))
+    if "contact_forces" not in dataset or not complete:
         return {}
     alone = _moved_by_contacts(mechanism)
     for part in stretches(dataset):

@@ -85,25 +85,25 @@ class ContactWatch:
     def _reconciled(self, located: Sequence[Event], seen: Sequence[Event]) -> Sequence[Event]:
         """The engine's own events of contacts, unless its samples show one that is not among them."""
         names = {contact.name for contact in self._element.mechanism.contacts}
-        own = [event for event in located if event.name in names]
-        left = list(own)
+        events = [event for event in located if event.name in names]
+        left = list(events)
         for event in seen:
-            match = next((one for one in left if _alike(one, event)), None)
+            match = next((candidate for candidate in left if _alike(candidate, event)), None)
             if match is None:
                 return seen
             left.remove(match)
-        return own
+        return events
 
-    def _events(self, times: FloatArray, found: Followed, pressed: FloatArray, speeds: FloatArray) -> list[Event]:
-        presses = normal_forces(found, pressed) > PRESSES * self._element.force
+    def _events(self, times: FloatArray, followed: Followed, pressed: FloatArray, speeds: FloatArray) -> list[Event]:
+        presses = normal_forces(followed, pressed) > PRESSES * self._element.force
         # Several engines have forces only after a first step, and a slip from rest is slow at first
-        presses[0] |= presses[1] & (found.gap[0] <= _CLOSED * self._element.length)
+        presses[0] |= presses[1] & (followed.gap[0] <= _CLOSED * self._element.length)
         forces, presses = presses, _without_lone(presses)
-        u_n = np.sum(found.normal * found.slide, axis=-1)
+        u_n = np.sum(followed.normal * followed.slide, axis=-1)
         for c in range(presses.shape[1]):
             room, moves = _CLOSED * self._element.length, _CREEPS * self._element.speed
-            presses[:, c] |= _stays_closed(presses[:, c], found.gap[:, c], u_n[:, c], room, moves)
-        slips = presses & (found.slip > _CREEPS * self._element.speed)
+            presses[:, c] |= _stays_closed(presses[:, c], followed.gap[:, c], u_n[:, c], room, moves)
+        slips = presses & (followed.slip > _CREEPS * self._element.speed)
         slips[0] |= presses[0] & slips[1]
         slips = presses & _without_lone(slips)
         stands = (speeds <= _CREEPS * self._element.speed) & ~slips.any(axis=1)
@@ -111,22 +111,28 @@ class ContactWatch:
         for c, contact in enumerate(self._element.mechanism.contacts):
             states = forces[:, c], presses[:, c], slips[:, c]
             for k in range(len(times) - 1):
-                kind, at = _change(times, found, u_n[:, c], states, k, c)
+                kind, moment = _change(times, followed, u_n[:, c], states, k, c)
                 if kind == EventKind.STICK and stands[k + 1]:
                     kind = EventKind.REST
                 if kind:
                     low, high = float(times[k]), float(times[k + 1])
                     events.append(
-                        Event(kind=kind, time=min(max(at, low), high), time_low=low, time_high=high, name=contact.name)
+                        Event(
+                            kind=kind, time=min(max(moment, low), high), time_low=low, time_high=high, name=contact.name
+                        )
                     )
         return sorted(events, key=lambda event: event.time)
 
 
-def _alike(one: Event, seen: Event) -> bool:
+def _alike(located: Event, seen: Event) -> bool:
     """True if an event may be the one seen in the samples: same contact and kind, at most one interval off."""
     wide = seen.time_high - seen.time_low
-    near = seen.time_low - wide <= one.time <= seen.time_high + wide
-    return near and one.name == seen.name and _ALIKE.get(one.kind, one.kind) == _ALIKE.get(seen.kind, seen.kind)
+    near = seen.time_low - wide <= located.time <= seen.time_high + wide
+    return (
+        near
+        and located.name == seen.name
+        and _ALIKE.get(located.kind, located.kind) == _ALIKE.get(seen.kind, seen.kind)
+    )
 
 
 def _without_lone(states: _States) -> _States:
@@ -181,13 +187,13 @@ def _fall_time(gap: float, speed: float, acceleration: float) -> float:
 
 
 def _change(
-    times: FloatArray, found: Followed, u_n: FloatArray, states: tuple[_States, _States, _States], k: int, c: int
+    times: FloatArray, followed: Followed, u_n: FloatArray, states: tuple[_States, _States, _States], k: int, c: int
 ) -> tuple[str, float]:
     """Kind and time [s] of the event of contact c between samples k and k + 1; the kind is empty without an event.
 
     Args:
         times: of the samples [s].
-        found: the contacts along the motion.
+        followed: the contacts along the motion.
         u_n: rate of its gap [m/s], shape (time,).
         states: truth values (pressed, touching, slipping) at each sample, each of shape (time,).
         k: number of the sample before.
@@ -197,18 +203,18 @@ def _change(
     start, middle = float(times[k]), float(times[k] + times[k + 1]) / 2
     if not presses[k]:
         closing = float(u_n[k])
-        if presses[k + 1] or (closing < 0 < u_n[k + 1] and _strikes(times, found.gap[:, c], u_n, pressed, k)):
-            return EventKind.IMPACT, start + float(found.gap[k, c]) / -closing if closing < 0 else middle
+        if presses[k + 1] or (closing < 0 < u_n[k + 1] and _strikes(times, followed.gap[:, c], u_n, pressed, k)):
+            return EventKind.IMPACT, start + float(followed.gap[k, c]) / -closing if closing < 0 else middle
         return "", start
     if not presses[k + 1]:
         return EventKind.LIFT_OFF, middle
     if slips[k] and not slips[k + 1]:
-        before = float(found.slip[k - 1, c]) if k and slips[k - 1] else np.inf
-        slip, lost = float(found.slip[k, c]), before - float(found.slip[k, c])
+        last_slip = float(followed.slip[k - 1, c]) if k and slips[k - 1] else np.inf
+        slip, lost = float(followed.slip[k, c]), last_slip - float(followed.slip[k, c])
         whole = start + slip / lost * float(times[k] - times[k - 1]) if 0 < lost < np.inf else middle
         return EventKind.STICK, whole
     if slips[k + 1] and not slips[k]:
         return EventKind.SLIP, middle
-    along = float(found.slide[k, c] @ found.slide[k + 1, c])
-    turned = slips[k] and along < _REVERSED * float(found.slip[k, c] * found.slip[k + 1, c])
+    product = float(followed.slide[k, c] @ followed.slide[k + 1, c])
+    turned = slips[k] and product < _REVERSED * float(followed.slip[k, c] * followed.slip[k + 1, c])
     return (EventKind.TURN, middle) if turned else ("", start)

@@ -125,7 +125,7 @@ def table(body: OnWall, weight: float, lengths: Sequence[float]) -> tuple[Observ
     )
 
     bounded = np.isfinite(body.contact.mu_static)
-    never = "" if bounded else "without bounded friction the ball never slips; --set mu_static=…"
+    reason = "" if bounded else "without bounded friction the ball never slips; --set mu_static=…"
 
     apart = "m", "distance of the ball from the wall"
 
@@ -180,7 +180,7 @@ def table(body: OnWall, weight: float, lengths: Sequence[float]) -> tuple[Observ
             "time of the first slip",
             Role.EVENT,
             column=True,
-            absent=never,
+            absent=reason,
             watched=bool(bounded),
             always=always,
         ),
@@ -255,8 +255,8 @@ def scales(body: OnWall, truth: xr.Dataset) -> dict[str, float]:
 
 def local_observables(body: BodyOnWall, acceleration: FloatArray) -> tuple[Observable, ...]:
     """Observables of a ball of a mechanism, whose bodies start with accelerations [m/s²], shape (bodies, 3)."""
-    g, first = np.linalg.norm(body.gravity), np.linalg.norm(acceleration[body.index])
-    weight = float(max(g, first)) if np.isfinite(first) else float(g)
+    g, size = np.linalg.norm(body.gravity), np.linalg.norm(acceleration[body.index])
+    weight = float(max(g, size)) if np.isfinite(size) else float(g)
     return table(body, weight or 1.0, body.surface.chart.scales(*body.u0.tolist()))
 
 
@@ -270,21 +270,23 @@ def local_bars(body: BodyOnWall, dataset: xr.Dataset, bars: Mapping[str, float])
     bends = np.linalg.norm(body.surface.second(u), axis=-3) / (ways[:, :, None] * ways[:, None, :])
     turned, a, least = float(bends.max()) * bars["p_WB"], body.ball.radius, ways.min(axis=0).tolist()
     speed, spin = (longest(dataset[name].to_numpy()[:, body.index]) for name in ("v_WB", "w_WB"))
-    found = {"attitude": bars["q_WB"], "gap": bars["p_WB"]}
+    all_bars = {"attitude": bars["q_WB"], "gap": bars["p_WB"]}
     for name, way in zip(body.surface.coordinates, least, strict=True):
-        found |= {name: bars["p_WB"] / way, f"{name}_rate": (bars["v_WB"] + turned * speed) / way}
-    found |= {f"omega{number}": bars["w_WB"] + turned * spin for number in (1, 2, 3)}
+        all_bars |= {name: bars["p_WB"] / way, f"{name}_rate": (bars["v_WB"] + turned * speed) / way}
+    all_bars |= {f"omega{number}": bars["w_WB"] + turned * spin for number in (1, 2, 3)}
     moving = bars["v_WB"] + a * bars["w_WB"] + turned * (speed + a * spin)
-    found |= dict.fromkeys(("slip", "slip2", "slip3"), moving)
+    all_bars |= dict.fromkeys(("slip", "slip2", "slip3"), moving)
     if "N" in dataset:
         force = np.linalg.norm([dataset[name].to_numpy() for name in FORCES], axis=0)
-        found |= dict.fromkeys(FORCES, bars["pressed"] + turned * float(force.max()))
+        all_bars |= dict.fromkeys(FORCES, bars["pressed"] + turned * float(force.max()))
         normal, needed = dataset["N"].to_numpy(), dataset["needed_friction"].to_numpy()
-        presses = normal > _NOTHING * found["N"]
-        found["needed_friction"] = float(np.max(found["N"] * (1 + needed[presses]) / normal[presses], initial=0.0))
-    values = {name: dataset[name].to_numpy() for name in found}
+        presses = normal > _NOTHING * all_bars["N"]
+        all_bars["needed_friction"] = float(
+            np.max(all_bars["N"] * (1 + needed[presses]) / normal[presses], initial=0.0)
+        )
+    values = {name: dataset[name].to_numpy() for name in all_bars}
     sizes = {name: float(np.max(np.abs(value[np.isfinite(value)]), initial=0.0)) for name, value in values.items()}
-    return {name: bar + _ROUND_OFF * sizes[name] for name, bar in found.items()}
+    return {name: bar + _ROUND_OFF * sizes[name] for name, bar in all_bars.items()}
 
 
 def observe_locally(body: BodyOnWall, dataset: xr.Dataset) -> dict[str, FloatArray]:

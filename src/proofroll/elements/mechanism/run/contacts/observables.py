@@ -68,19 +68,19 @@ def follow_contacts(placed: Placed) -> Followed:
     mechanism = placed.mechanism
     shape = (len(placed.time), len(mechanism.contacts))
     gap, slip, normal, slide = np.zeros(shape), np.zeros(shape), np.zeros((*shape, 3)), np.zeros((*shape, 3))
-    still = np.zeros((len(placed.time), 3))
+    rest = np.zeros((len(placed.time), 3))
 
     def moving(body: str, k: int) -> Moving:
         i = mechanism.body_index[body]
-        p, v, w = (still if i < 0 else values[:, i] for values in (placed.p_WB, placed.v_WB, placed.w_WB))
+        p, v, w = (rest if i < 0 else values[:, i] for values in (placed.p_WB, placed.v_WB, placed.w_WB))
         return Moving(p[k], placed.R_WB[k, i], v[k], w[k])
 
     for c, contact in enumerate(mechanism.contacts):
         for k in range(shape[0]):
-            found = touch(contact, moving(contact.body_a, k), moving(contact.body_b, k))
-            across = found.slide - found.normal * (found.normal @ found.slide)
-            gap[k, c], slip[k, c], normal[k, c] = found.gap, np.linalg.norm(across), found.normal
-            slide[k, c] = found.slide
+            touching = touch(contact, moving(contact.body_a, k), moving(contact.body_b, k))
+            across = touching.slide - touching.normal * (touching.normal @ touching.slide)
+            gap[k, c], slip[k, c], normal[k, c] = touching.gap, np.linalg.norm(across), touching.normal
+            slide[k, c] = touching.slide
     return Followed(gap, slip, normal, slide)
 
 
@@ -145,7 +145,7 @@ def contact_observables(mechanism: Mechanism, sizes: Mapping[str, float], least:
 
 
 def residuals(
-    found: Followed,
+    followed: Followed,
     pressed: FloatArray,
     friction: FloatArray,
     weight: float,
@@ -157,50 +157,52 @@ def residuals(
     ``penetration`` always has values; the others are NaN where no component of the force is known.
 
     Args:
-        found: the contacts along the motion.
+        followed: the contacts along the motion.
         pressed: forces on their first bodies [N], shape (time, contacts, 3); NaN where not determinate.
         friction: their coefficients while they slip, shape (contacts,).
         weight: of the mechanism [N].
         speed: natural speed, which scales slip against weight in the natural map [m/s].
         static: coefficients while they stick; None: the same.
     """
-    friction = np.where(found.slip > SLIDES * speed, friction, friction if static is None else static)
-    n, u_n = found.normal, np.sum(found.normal * found.slide, axis=-1)
-    complete, given = np.all(np.isfinite(pressed), axis=-1), np.any(np.isfinite(pressed), axis=-1)
-    N = normal_forces(found, pressed)
-    u = found.slide - n * u_n[..., None]
+    friction = np.where(followed.slip > SLIDES * speed, friction, friction if static is None else static)
+    n, u_n = followed.normal, np.sum(followed.normal * followed.slide, axis=-1)
+    complete, has_force = np.all(np.isfinite(pressed), axis=-1), np.any(np.isfinite(pressed), axis=-1)
+    N = normal_forces(followed, pressed)
+    u = followed.slide - n * u_n[..., None]
     T = np.where(complete[..., None], pressed - N[..., None] * n, 0.0)
     presses = np.asarray(PRESSES * weight < N)
     t = np.linalg.norm(T, axis=-1)
     bound = largest_friction(friction, np.where(presses, N, 0.0))
-    slides = np.asarray(presses & complete & (found.slip > SLIDES * speed) & (friction > 0))
-    against = np.sum(T * u, axis=-1) / (np.where(slides, bound, 1.0) * np.where(slides, found.slip, 1.0))
+    slides = np.asarray(presses & complete & (followed.slip > SLIDES * speed) & (friction > 0))
+    against = np.sum(T * u, axis=-1) / (np.where(slides, bound, 1.0) * np.where(slides, followed.slip, 1.0))
     # De Saxcé's correction makes the law a projection onto the cone: λ = P(λ − r (u + μ|u_t| n))
     r = weight / speed
     slipping = np.where(np.isinf(friction), 0.0, friction)  # of what never slips the cone is a half space
-    pushed, pulled = N - r * (u_n + slipping * found.slip), T - r * u
+    pushed, pulled = N - r * (u_n + slipping * followed.slip), T - r * u
     length = np.linalg.norm(pulled, axis=-1)
     kept, holds = _onto_cone(pushed, length, friction)
     across = pulled * (holds / np.where(length > 0, length, 1.0))[..., None] - T
     off = np.maximum(np.abs(kept - N), np.linalg.norm(across, axis=-1))
     values = {
-        "penetration": np.maximum(-found.gap, 0.0),
+        "penetration": np.maximum(-followed.gap, 0.0),
         "contact_pull": np.maximum(-N, 0.0),
         "cone_excess": np.maximum(t - bound, 0.0),
         "friction_direction": np.where(slides, 1.0 + against, 0.0),
         "hop_speed": np.where(presses, np.abs(u_n), 0.0),
         "natural_map": np.where(presses, np.where(complete, off, 0.0), t),
     }
-    after = np.arange(len(N))[:, None]
-    values["unpressed"] = np.cumsum(np.where(after > 0, np.logical_not(presses), 0), axis=0) / np.maximum(after, 1)
-    own = {"penetration"}
-    return {name: value if name in own else np.where(given, value, np.nan) for name, value in values.items()}
+    counts = np.arange(len(N))[:, None]
+    values["unpressed"] = np.cumsum(np.where(counts > 0, np.logical_not(presses), 0), axis=0) / np.maximum(counts, 1)
+    without_forces = {"penetration"}
+    return {
+        name: value if name in without_forces else np.where(has_force, value, np.nan) for name, value in values.items()
+    }
 
 
-def normal_forces(found: Followed, pressed: FloatArray) -> FloatArray:
+def normal_forces(followed: Followed, pressed: FloatArray) -> FloatArray:
     """Normal force of each contact [N], shape (time, contacts); known from the normal component alone, others NaN."""
-    along = np.abs(found.normal) > _AXIS
-    return np.asarray(np.sum(np.where(along, pressed, 0.0) * found.normal, axis=-1))
+    in_use = np.abs(followed.normal) > _AXIS
+    return np.asarray(np.sum(np.where(in_use, pressed, 0.0) * followed.normal, axis=-1))
 
 
 def _onto_cone(N: FloatArray, T: FloatArray, friction: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -221,8 +223,8 @@ def given_forces(mechanism: Mechanism, samples: Sequence[MechanismSample]) -> Fl
     """
     count = len(mechanism.contacts)
     empty = np.full((count, 3), np.nan)
-    found = [empty if sample.contact_force is None else np.asarray(sample.contact_force) for sample in samples]
-    for given in found:
-        if given.size != 3 * count:
-            raise Diverged(f"the engine gave contact_force with shape {given.shape} instead of {(count, 3)}")
-    return np.array([given.reshape(count, 3) for given in found], dtype=np.float64)
+    forces = [empty if sample.contact_force is None else np.asarray(sample.contact_force) for sample in samples]
+    for force in forces:
+        if force.size != 3 * count:
+            raise Diverged(f"the engine gave contact_force with shape {force.shape} instead of {(count, 3)}")
+    return np.array([force.reshape(count, 3) for force in forces], dtype=np.float64)

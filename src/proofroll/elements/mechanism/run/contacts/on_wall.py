@@ -155,15 +155,15 @@ def body_on_wall(mechanism: Mechanism, local: LocalStart) -> BodyOnWall | None:
     if ball is None or len(touching) != 1:
         return None
     (contact,) = touching
-    first = contact.body_a == body
-    sphere, wall = (contact.shape_a, contact.shape_b) if first else (contact.shape_b, contact.shape_a)
-    carrier = contact.body_b if first else contact.body_a
+    is_a = contact.body_a == body
+    sphere, wall = (contact.shape_a, contact.shape_b) if is_a else (contact.shape_b, contact.shape_a)
+    carrier = contact.body_b if is_a else contact.body_a
     if not (isinstance(sphere, SphereShape) and isinstance(wall, HalfSpace | CurvedWall)) or np.any(sphere.centre):
         return None
     start = placed_start(mechanism)
-    index, other = mechanism.body_index[body], mechanism.body_index[carrier]
-    moved_to = np.zeros(3) if other < 0 else start.p_WB[0, other]
-    surface = wall_coordinates(wall, sphere.radius, start.R_WB[0, other], moved_to)
+    index, wall_body = mechanism.body_index[body], mechanism.body_index[carrier]
+    moved_to = np.zeros(3) if wall_body < 0 else start.p_WB[0, wall_body]
+    surface = wall_coordinates(wall, sphere.radius, start.R_WB[0, wall_body], moved_to)
     rate = _turning(mechanism, carrier, surface)
     if rate is None:
         return None
@@ -179,7 +179,7 @@ def body_on_wall(mechanism: Mechanism, local: LocalStart) -> BodyOnWall | None:
         wall_rate=rate if np.any(rate) else None,
         index=index,
         contact_index=mechanism.contacts.index(contact),
-        sign=1.0 if first else -1.0,
+        sign=1.0 if is_a else -1.0,
     )
 
 

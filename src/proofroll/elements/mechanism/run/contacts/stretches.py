@@ -33,9 +33,9 @@ def with_sticking(body: OnWall, dataset: xr.Dataset) -> xr.Dataset:
         return dataset
     kinds = {EventKind.SLIP: False, EventKind.STICK: True, EventKind.REST: True}
     changes = [(event.time, kinds[EventKind(event.kind)]) for event in events_of(dataset) if event.kind in kinds]
-    before = not changes or not changes[0][1]  # what sticks first has slipped
+    stuck = not changes or not changes[0][1]  # what sticks first has slipped
     reached = np.searchsorted([time for time, _ in changes], dataset["time"].to_numpy(), side="right")
-    sticks = np.array([before, *(sticks for _, sticks in changes)])[reached]
+    sticks = np.array([stuck, *(sticks for _, sticks in changes)])[reached]
     return dataset.assign(sticking=("time", sticks))
 
 
@@ -51,23 +51,23 @@ def stretches(dataset: xr.Dataset) -> list[xr.Dataset]:
 
 
 def accelerations(
-    surface: LocalCoordinates, dataset: xr.Dataset, at: FloatArray | None = None
+    surface: LocalCoordinates, dataset: xr.Dataset, moments: FloatArray | None = None
 ) -> tuple[FloatArray, FloatArray]:
     """Surface coordinates, (time, 2), and accelerations of the centre [m/s²], (time, 3), in a stretch without events.
 
     They come from the rates of the coordinates, which vary slowly, unlike velocities in the world. They are given at
-    the samples, or ``at`` other times [s].
+    the samples, or ``moments`` other times [s].
     """
     from scipy.interpolate import make_interp_spline
 
     t = dataset["time"].to_numpy()
-    at = t if at is None else at
+    moments = t if moments is None else moments
     u = np.stack([dataset[name].to_numpy() for name in surface.coordinates], axis=-1)
     rates = np.stack([dataset[f"{name}_rate"].to_numpy() for name in surface.coordinates], axis=-1)
     curve = make_interp_spline(t, rates, k=DEGREE)
-    second = curve.derivative()(at)
-    if at is not t:
-        u, rates = make_interp_spline(t, u, k=DEGREE)(at), curve(at)
+    second = curve.derivative()(moments)
+    if moments is not t:
+        u, rates = make_interp_spline(t, u, k=DEGREE)(moments), curve(moments)
     acceleration = np.einsum("tij,tj->ti", surface.tangents(u), second)
     acceleration += np.einsum("tijk,tj,tk->ti", surface.second(u), rates, rates)
     return u, acceleration
