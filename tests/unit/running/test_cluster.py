@@ -222,6 +222,7 @@ def test_results_are_those_of_home(dask: DaskCluster, shared: Cluster, tmp_path:
     assert (one.attrs["ran_on"], other.attrs["ran_on"]) == ("", HOST)
 
 
+@pytest.mark.drill
 def test_runs_one_after_another(dask: DaskCluster, tmp_path: Path) -> None:
     """Each run has its own results, though Dask tells of the last of a run when the next has begun."""
     dask.one_worker()
@@ -232,6 +233,7 @@ def test_runs_one_after_another(dask: DaskCluster, tmp_path: Path) -> None:
         assert runner.run(cases).keys() == {case.key for case in cases}
 
 
+@pytest.mark.drill
 def test_a_scene_that_cannot_be_read(
     dask: DaskCluster, shared: Cluster, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -249,6 +251,7 @@ def test_a_scene_that_cannot_be_read(
     assert re.search(r"scene.toml cannot be read: Too many", found[lost.key].message)
 
 
+@pytest.mark.drill
 def test_a_scheduler_that_ends(dask: DaskCluster, shared: Cluster, tmp_path: Path, room: Path) -> None:
     """One line says so; what was finished is stored, and the next run makes the rest alone."""
     dask.one_worker()

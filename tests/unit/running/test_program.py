@@ -162,7 +162,9 @@ def test_a_program_that_does_not_answer_is_asked_once(tmp_path: Path) -> None:
     assert not begun.exists() or begun.read_text().split() == ["begun"]
 
 
-@pytest.mark.parametrize("command", ["run", "compare", "tradeoff"])
+@pytest.mark.parametrize(
+    "command", ["run", *(pytest.param(name, marks=pytest.mark.drill) for name in ("compare", "tradeoff"))]
+)
 def test_a_program_that_is_waited_for(
     command: str, command_line: Callable[..., Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
