@@ -116,13 +116,14 @@ def test_no_order_is_fitted_through_a_floor() -> None:
 
 
 def test_far_above_round_off_all_is_judged_as_in_doubles() -> None:
-    """Curves of no single law and of a strange order have that order and a limit where round-off is far below them."""
+    """Curves of no single law and of a strange order are judged as in doubles where round-off is far below them."""
     strange = [np.cos(TIMES) + 0.1 * h**2.5 * np.sin((3 + h) * TIMES) for h in (1.0, 0.5, 0.25)]
     steps = (1.0, 0.5, 0.25)
     scatter = scatter_of("single", 1.0, 2000)
     found, double = richardson(strange, steps, 4, scatter), richardson(strange, steps, 4)
-    assert (found.order, found.error_bar, found.shown) == (double.order, double.error_bar, double.shown)
+    assert [found.order, found.error_bar] == pytest.approx([double.order, double.error_bar], rel=0, abs=0, nan_ok=True)
     assert found.shown
+    assert double.shown
     near = richardson(strange, steps, 4, 100 * scatter)
     assert near.rounded
     assert not near.shown

@@ -116,7 +116,8 @@ def _slips(pieces: Pieces, residuals: LawResiduals, touch: ClosedContact, larges
         residuals.note("slip", contact.name, speed, touch.fast, time)
         return
     direction = touch.slip / np.maximum(speed, _LEAST)[..., None]
-    error = ROUND * residuals.coarse * touch.fast / np.maximum(speed, _LEAST)
+    noise = ROUND * residuals.coarse * touch.fast
+    error = noise / np.maximum(speed, noise + _LEAST)  # of the direction [rad], at most 1
     left = norm(touch.friction + (friction * touch.normal_force)[..., None] * direction)
     size = norm(touch.friction) - friction * touch.normal_force  # without a direction its size is left
     residuals.note(
@@ -199,7 +200,8 @@ def _turning(
             residuals.note("turning", contact.name, np.maximum(norm(moment) - pressed, 0), bound, time)
             residuals.note("stick", contact.name, rate, quick, time)
             continue
-        error = ROUND * residuals.coarse * quick / np.maximum(rate, _LEAST)
+        noise = ROUND * residuals.coarse * quick
+        error = noise / np.maximum(rate, noise + _LEAST)
         direction = part / np.maximum(rate, _LEAST)[..., None]
         left = np.where(error < _KNOWN, norm(moment + pressed[..., None] * direction), norm(moment) - pressed)
         residuals.note("turning", contact.name, left, bound, time, _DIRECTION * error * bound)
