@@ -33,9 +33,11 @@ drills: MARK = drill
 test drills: install
 	$(BIN)/python -m pytest -n 2 -m "$(MARK)"
 
-# What .ci/run leaves out: the longest drills, and tests near round-off as two other kinds of processors compute.
+# What .ci/run leaves out: the longest drills, every comparison with all its rows, and tests near round-off as two other
+# kinds of processors compute.
 nightly: install
 	$(BIN)/python -m pytest -n 2 -m nightly
+	$(BIN)/proofroll report --out $(OUT)/nightly --budget 3600
 	$(BIN)/proofroll drill arithmetic --no-comparisons --tests nightly --kind haswell --kind prescott --jobs 2
 
 check: install
