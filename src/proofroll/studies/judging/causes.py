@@ -55,30 +55,30 @@ class GivenVariable:
         return self.off > _LIKE_ITS_TRUTH * float(np.max(np.abs(self.true), initial=0.0))
 
 
-def causes_of(given: Mapping[str, GivenVariable], times: FloatArray, falling: Collection[str]) -> list[str]:
+def causes_of(variables: Mapping[str, GivenVariable], times: FloatArray, falling: Collection[str]) -> list[str]:
     """Clauses on the mistakes that explain variables of a trajectory, and on a first row that is not the start.
 
     Args:
-        given: variables of one number for each time, by name.
+        variables: variables of one number for each time, by name.
         times: of the samples [s].
         falling: names of the coordinates of bodies that nothing holds.
     """
-    wrong = {name: item for name, item in given.items() if item.wrong}
-    found: dict[str, str] = {}
+    wrong = {name: item for name, item in variables.items() if item.wrong}
+    sentences: dict[str, str] = {}
     for name, item in wrong.items():
-        hypotheses = (*_scaled(item), *_combined(name, given), *(_damped(item, times) if name in falling else ()))
-        for says, other in hypotheses:
-            left = float(np.max(np.abs(item.values - other), initial=0.0))
-            if left <= CLOSES * item.off and name not in found:
+        hypotheses = (*_scaled(item), *_combined(name, variables), *(_damped(item, times) if name in falling else ()))
+        for says, values in hypotheses:
+            left = float(np.max(np.abs(item.values - values), initial=0.0))
+            if left <= CLOSES * item.off and name not in sentences:
                 unit = spaced(item.unit)
-                found[name] = (
+                sentences[name] = (
                     f"{name} is {says} (off by {number(item.off)}{unit}, by {number(left, 1)}{unit} with that)"
                 )
     for a, b in itertools.combinations(wrong, 2):
-        if _exchanged(given[a], given[b]):
-            found |= {a: f"{a} and {b} are each the other: swapped columns?", b: ""}
-    open_ones = {name: item for name, item in wrong.items() if name not in found}
-    return [*filter(None, found.values()), *_first_row(open_ones, times)]
+        if _exchanged(variables[a], variables[b]):
+            sentences |= {a: f"{a} and {b} are each the other: swapped columns?", b: ""}
+    open_ones = {name: item for name, item in wrong.items() if name not in sentences}
+    return [*filter(None, sentences.values()), *_first_row(open_ones, times)]
 
 
 def _scaled(item: GivenVariable) -> Iterator[tuple[str, FloatArray]]:
@@ -86,13 +86,16 @@ def _scaled(item: GivenVariable) -> Iterator[tuple[str, FloatArray]]:
         yield says, factor * item.true
 
 
-def _combined(name: str, given: Mapping[str, GivenVariable]) -> Iterator[tuple[str, FloatArray]]:
+def _combined(name: str, variables: Mapping[str, GivenVariable]) -> Iterator[tuple[str, FloatArray]]:
     """Sums and differences of angles: absolute where the scene's are relative, or the other way."""
-    own = given[name]
-    for other, item in given.items():
-        if other != name and item.unit == own.unit == "rad":
-            yield f"its sum with {other}: an absolute angle, where the scene's is relative?", own.true + item.true
-            yield f"less by {other}: a relative angle, where the scene's is absolute?", own.true - item.true
+    variable = variables[name]
+    for other_name, item in variables.items():
+        if other_name != name and item.unit == variable.unit == "rad":
+            yield (
+                f"its sum with {other_name}: an absolute angle, where the scene's is relative?",
+                variable.true + item.true,
+            )
+            yield f"less by {other_name}: a relative angle, where the scene's is absolute?", variable.true - item.true
 
 
 def _damped(item: GivenVariable, times: FloatArray) -> Iterator[tuple[str, FloatArray]]:
@@ -109,11 +112,14 @@ def _damped(item: GivenVariable, times: FloatArray) -> Iterator[tuple[str, Float
         yield says, item.true + basis @ [rate, delay]
 
 
-def _exchanged(one: GivenVariable, two: GivenVariable) -> bool:
-    if one.unit != two.unit or one.true.shape != two.true.shape:
+def _exchanged(variable_a: GivenVariable, variable_b: GivenVariable) -> bool:
+    if variable_a.unit != variable_b.unit or variable_a.true.shape != variable_b.true.shape:
         return False
-    left = max(float(np.max(np.abs(a.values - b.true), initial=0.0)) for a, b in ((one, two), (two, one)))
-    return left <= CLOSES * min(one.off, two.off)
+    left = max(
+        float(np.max(np.abs(a.values - b.true), initial=0.0))
+        for a, b in ((variable_a, variable_b), (variable_b, variable_a))
+    )
+    return left <= CLOSES * min(variable_a.off, variable_b.off)
 
 
 def _first_row(wrong: Mapping[str, GivenVariable], times: FloatArray) -> Iterator[str]:

@@ -238,8 +238,8 @@ def _require_seconds(scene: Scene, run: xr.Dataset) -> None:
     if len(times) < 2 or float(np.min(np.diff(times))) < scene.natural_time or "scene_digest" in run.attrs:
         return
     sooner = run.assign_coords(time=times / _MILLI)
-    given = _given(sooner, _truth(scene, times / _MILLI, np.zeros(0)))
-    if given and not any(item.wrong for item in given.values()):
+    variables = _given(sooner, _truth(scene, times / _MILLI, np.zeros(0)))
+    if variables and not any(item.wrong for item in variables.values()):
         advice = "with these times in milliseconds it follows the truth; say --map COLUMN=time[ms], or give seconds"
         raise InputError("run", f"times up to {times[-1]:g} s", advice)
 
@@ -248,11 +248,11 @@ def _given(run: xr.Dataset, true: xr.Dataset) -> dict[str, GivenVariable]:
     """Variables of one finite number for each time that a trajectory and the truth have."""
     variables = {}
     for name, item in run.data_vars.items():
-        known = true.variables.get(name)
-        if item.dims == ("time",) and known is not None and known.dims == ("time",) and known.shape == item.shape:
-            given, values = item.to_numpy(), known.values
-            if given.dtype.kind == "f" and np.isfinite(given).all() and np.isfinite(values).all():
-                variables[str(name)] = GivenVariable(given, values, str(known.attrs.get("units", "")))
+        exact = true.variables.get(name)
+        if item.dims == ("time",) and exact is not None and exact.dims == ("time",) and exact.shape == item.shape:
+            samples, values = item.to_numpy(), exact.values
+            if samples.dtype.kind == "f" and np.isfinite(samples).all() and np.isfinite(values).all():
+                variables[str(name)] = GivenVariable(samples, values, str(exact.attrs.get("units", "")))
     return variables
 
 

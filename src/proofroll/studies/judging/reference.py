@@ -88,8 +88,8 @@ class Reference:
         """True if bodies may touch and none does: no event, and no force of a contact."""
         variables = self.dataset.variables
         forces = [name for name, item in self.scene.observables.items() if not item.at_impacts and name in variables]
-        known = [variables[name].values for name in forces]
-        return bool(known) and not self.events and not any(np.any(values != 0) for values in known)
+        arrays = [variables[name].values for name in forces]
+        return bool(arrays) and not self.events and not any(np.any(values != 0) for values in arrays)
 
     def shared(self, routes: Collection[str]) -> str:
         """Sentence about a route of the truth that is among ``routes``, and its check; empty if none is."""
@@ -262,8 +262,8 @@ def _true_curves(scene: Scene, dataset: xr.Dataset) -> tuple[dict[str, FloatArra
 def _behind_impacts(scene: Scene, dataset: xr.Dataset) -> NDArray[np.bool_]:
     """Samples behind the first impact, shape (time,)."""
     happened = [event for element in scene.elements for event in events_of(part(scene, element, dataset))]
-    first = min((event.time_low for event in happened if event.kind in JUMPS), default=np.inf)
-    return np.asarray(dataset.variables["time"].values >= first)
+    impact = min((event.time_low for event in happened if event.kind in JUMPS), default=np.inf)
+    return np.asarray(dataset.variables["time"].values >= impact)
 
 
 def _unsteady(scene: Scene, dataset: xr.Dataset) -> NDArray[np.bool_]:

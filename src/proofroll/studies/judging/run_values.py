@@ -47,12 +47,12 @@ def contradicted_rates(
     """
     scene = reference.scene
     for name in [scene.label(element, key) for element in scene.elements for key in element.sample_type.widths]:
-        known = reference.dataset.variables.get(name)
-        if known is None or name not in variables or name in judged:
+        exact = reference.dataset.variables.get(name)
+        if exact is None or name not in variables or name in judged:
             continue
-        true, run, vectors = known.values, np.asarray(variables[name]), reference.vectors(name)
+        true, run, vectors = exact.values, np.asarray(variables[name]), reference.vectors(name)
         known_at = np.isfinite(true).reshape(len(true), -1).all(axis=1)
-        if run.shape != true.shape or not known_at.any() or not str(known.attrs.get("units", "")).endswith("/s"):
+        if run.shape != true.shape or not known_at.any() or not str(exact.attrs.get("units", "")).endswith("/s"):
             continue
         true, run = true[known_at], run[known_at]
         size = reference.sizes.get(name) or largest_magnitude(true, vectors) or 1.0

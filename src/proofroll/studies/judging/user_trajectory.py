@@ -76,8 +76,8 @@ def _require_numbers(name: str, item: xr.Variable) -> None:
     if item.dtype.kind not in "iuf":
         kinds = {"c": "complex numbers", "b": "truth values", "U": "text", "S": "text", "M": "dates", "m": "durations"}
         held = kinds.get(item.dtype.kind, f"values of type {item.dtype}")
-        wanted = "seconds as real numbers" if item.dtype.kind in "mM" else "real numbers"
-        raise InputError("run", name, f"it holds {held}; give {wanted}")
+        advice = "seconds as real numbers" if item.dtype.kind in "mM" else "real numbers"
+        raise InputError("run", name, f"it holds {held}; give {advice}")
 
 
 def _require_unit(name: str, unit: str, expected: str) -> None:

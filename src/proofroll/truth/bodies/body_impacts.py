@@ -52,9 +52,9 @@ def impulse_of_a_contact(
     aim = -(1 + restitution) * slide[0]
     if not friction:
         return np.array([aim / G[0, 0], 0.0, 0.0])
-    wanted = np.array([aim, *-slide[1:]])
-    held = np.asarray(np.linalg.lstsq(G, wanted, rcond=RANK)[0], dtype=np.float64)
-    rests = np.abs(G @ held - wanted).max() <= _HELD * np.abs(wanted).max()
+    change = np.array([aim, *-slide[1:]])
+    held = np.asarray(np.linalg.lstsq(G, change, rcond=RANK)[0], dtype=np.float64)
+    rests = np.abs(G @ held - change).max() <= _HELD * np.abs(change).max()
     if np.isinf(friction):
         return held if rests and held[0] >= 0 else None
     if rests and np.linalg.norm(held[1:]) <= static * held[0] * (1 + _HELD):
@@ -75,7 +75,7 @@ def impulse_of_a_contact(
         impulse: Array = aim / response * np.array([1.0, *(-friction * t)])
         slip = slide[1:] + G[1:] @ impulse
         across = abs(float(slip[0] * t[1] - slip[1] * t[0]))
-        if slip @ t > 0 and across <= _HELD * float(np.abs(wanted).max()):
+        if slip @ t > 0 and across <= _HELD * float(np.abs(change).max()):
             return impulse
     return None
 
@@ -154,13 +154,13 @@ def impulses_in_turn(
         NotUnique: the outcome depends on the order, or a contact would tear.
     """
 
-    def strike(response: Array, own: Array, group: list[int]) -> Array:
+    def strike(response: Array, changes: Array, group: list[int]) -> Array:
         if len(group) == 1:
             law = laws[group[0]]
             contact, e = law.contact, law.restitution
-            impulses = impulse_of_a_contact(response, own, contact.friction, e, contact.static, law.sideways)
+            impulses = impulse_of_a_contact(response, changes, contact.friction, e, contact.static, law.sideways)
         else:
-            impulses = impulses_of_a_group(response, own, [laws[k] for k in group])
+            impulses = impulses_of_a_group(response, changes, [laws[k] for k in group])
         if impulses is None:
             named = " and ".join(laws[k].contact.name for k in group)
             raise Refused(f"no impulses of {named} at t = {time:.6g} s keep all inequalities of an impact")

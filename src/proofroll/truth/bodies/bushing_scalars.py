@@ -76,18 +76,18 @@ def _gradient(R: Sequence[Vector], k: Sequence[float], root: Any) -> list[Scalar
         square = square / (sums[-1] * sums[-1])
     arc = _series(_ARCTANGENT, square)
     shrunk = 1.0 + cosine
-    for each in sums:
-        shrunk = shrunk * each
+    for total in sums:
+        shrunk = shrunk * total
     theta = scaled(2.0 ** (_HALVINGS + 2) * arc / shrunk, sines)
     # (1 - x cot x)/x² of half the angle, from that of half of half, and so on
     factor = _series(_COTANGENT, square * arc * arc)
     tangent = 1.0 / arc
-    for each in [None, *sums[::-1]]:
-        tangent = tangent if each is None else 0.5 * tangent * each
+    for total in [None, *sums[::-1]]:
+        tangent = tangent if total is None else 0.5 * tangent * total
         factor = 0.25 * (factor + tangent)
-    along = _times(k, theta)
-    across = cross(theta, along)
-    return plus(along, scaled(0.5, across), scaled(0.25 * factor, cross(theta, across)))
+    product = _times(k, theta)
+    across = cross(theta, product)
+    return plus(product, scaled(0.5, across), scaled(0.25 * factor, cross(theta, across)))
 
 
 def _series(coefficients: Sequence[float], x: Scalar) -> Scalar:

@@ -65,13 +65,13 @@ class ConstraintRow:
     torque: Sequence[Scalar]
     besides: tuple[tuple[int, Sequence[Scalar], Sequence[Scalar]], ...] = ()
 
-    def less(self, ratio: float, other: ConstraintRow) -> ConstraintRow:
+    def less(self, ratio: float, row: ConstraintRow) -> ConstraintRow:
         """Row of a coupling: this row minus ``ratio`` times another; on rates only, without a residual."""
         coefficients = dict(self.coefficients)
-        for index, value in other.coefficients.items():
+        for index, value in row.coefficients.items():
             coefficients[index] = sub(coefficients.get(index, 0.0), mul(ratio, value))
-        bias = sub(self.bias, mul(ratio, other.bias))
-        share = (other.connection, scaled(-ratio, other.force), scaled(-ratio, other.torque))
+        bias = sub(self.bias, mul(ratio, row.bias))
+        share = (row.connection, scaled(-ratio, row.force), scaled(-ratio, row.torque))
         besides = (*self.besides, share)
         return ConstraintRow(
             residual=0.0,
@@ -108,13 +108,18 @@ class ConstraintRows:
         c, a, b, arm_a, arm_b, d, towards = self._apart(number)
         if c.kind == DISTANCE:  # (d·d/L - L)/2
             slide = minus(speed_at(b, arm_b), speed_at(a, arm_a))
-            along = scaled(1.0 / c.length, d)
-            residual = mul(0.5, sub(dot(along, d), float(c.length)))
-            bias = add(mul(1.0 / c.length, dot(slide, slide)), dot(along, towards))
-            on_a = scaled(-1.0, cross(arm_a, along))
+            direction = scaled(1.0 / c.length, d)
+            residual = mul(0.5, sub(dot(direction, d), float(c.length)))
+            bias = add(mul(1.0 / c.length, dot(slide, slide)), dot(direction, towards))
+            on_a = scaled(-1.0, cross(arm_a, direction))
             return [
                 self.row(
-                    number, residual, bias, (along, cross(arm_b, along)), (scaled(-1.0, along), on_a), (along, NONE)
+                    number,
+                    residual,
+                    bias,
+                    (direction, cross(arm_b, direction)),
+                    (scaled(-1.0, direction), on_a),
+                    (direction, NONE),
                 )
             ]
         A, B = columns(product(a.R, c.frame_a)), columns(product(b.R, c.frame_b))

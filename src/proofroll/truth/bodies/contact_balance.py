@@ -18,13 +18,13 @@ def all_held(equations: ContactEquations, bodies: BodiesState, mode: ContactMode
     solution = equations.accelerated(bodies, mode)
     if not solution.loose and np.abs(bodies.u).max() > AT_REST:
         return False  # forces are determinate, and a trial among others
-    for own, slide, parting in zip(mode, solution.slide, solution.parting, strict=True):
-        left = float(np.abs(slide).max()) if own.kind == "stick" else abs(parting) if own.kind == "slip" else 0.0
+    for acting, slide, parting in zip(mode, solution.slide, solution.parting, strict=True):
+        left = float(np.abs(slide).max()) if acting.kind == "stick" else abs(parting) if acting.kind == "slip" else 0.0
         if left > SLACK * max(free, AT_REST):
             return False
     cones = cones_of(
-        kinds=[own.kind for own in mode],
-        normals=np.array([each.normal for each in bodies.touching]),
+        kinds=[acting.kind for acting in mode],
+        normals=np.array([touch.normal for touch in bodies.touching]),
         friction=equations.static,
         bounds=equations.bounds,
         pressed_by=[contact.pressed_by for contact in equations.contacts],

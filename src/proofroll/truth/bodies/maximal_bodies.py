@@ -181,7 +181,7 @@ def placed_bodies(mechanism: Mechanism, at_zero: bool = False) -> dict[str, Body
 
 def _moved(joint: Joint, q: Array, v: Array) -> tuple[Array, Rotation, Array, Array]:
     """Shift, rotation, velocity and angular velocity of the child, in the axes that it has at q = 0."""
-    none, still = np.zeros(3), Rotation.identity()
+    none, unturned = np.zeros(3), Rotation.identity()
     e1, e2, e3 = joint.child_frame.copy().T
     if joint.kind == JointKind.REVOLUTE:
         return none, Rotation.from_rotvec(q[0] * e3), none, v[0] * e3
@@ -194,8 +194,8 @@ def _moved(joint: Joint, q: Array, v: Array) -> tuple[Array, Rotation, Array, Ar
     if joint.kind == JointKind.PLANAR:
         return q[0] * e1 + q[1] * e2, Rotation.from_rotvec(q[2] * e3), v[0] * e1 + v[1] * e2, v[2] * e3
     if joint.kind == JointKind.FIXED:
-        return none, still, none, none
-    turn = Rotation.from_quat(q[-4:], scalar_first=True) if q[-4:].any() else still
+        return none, unturned, none, none
+    turn = Rotation.from_quat(q[-4:], scalar_first=True) if q[-4:].any() else unturned
     shift, slide = (q[:3], turn.apply(v[:3])) if joint.kind == JointKind.FREE else (none, none)
     return shift, turn, slide, turn.apply(v[-3:])
 

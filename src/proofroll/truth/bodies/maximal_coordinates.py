@@ -315,10 +315,10 @@ class MaximalCoordinates:
         lean, start = self.lean, self.lean.equations.start()
         starts = start, lean.beside(start, BESIDE)
         try:
-            one, other = (self.taylor_states(times, start=each) for each in starts)
+            states, nearby = (self.taylor_states(times, start=start) for start in starts)
         except Missing:
-            one, other = (self._dop853(each, times, BESIDE * 1e-4) for each in starts)
-        apart: Array = np.abs(other - one)[:, : lean.equations.nx].max(axis=1) / BESIDE
+            states, nearby = (self._dop853(start, times, BESIDE * 1e-4) for start in starts)
+        apart: Array = np.abs(nearby - states)[:, : lean.equations.nx].max(axis=1) / BESIDE
         return apart
 
     def _dop853(
@@ -352,8 +352,8 @@ class MaximalCoordinates:
         """
         modes = [None] * len(states) if switched is None else switched
         more = [None] * len(states) if applied is None else applied
-        each = zip(times, states, modes, more, strict=True)
-        record = record_of(times, [self._sample(float(t), self.lean.normalised(y), mode, w) for t, y, mode, w in each])
+        rows = zip(times, states, modes, more, strict=True)
+        record = record_of(times, [self._sample(float(t), self.lean.normalised(y), mode, w) for t, y, mode, w in rows])
         q, v = record.placed(self.mechanism).of_tree()
         return replace(record, q=q, v=v)
 

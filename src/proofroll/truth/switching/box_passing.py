@@ -41,7 +41,7 @@ def passed_boxes(
     group = [number for number, contact in enumerate(contacts) if contact.pair == contacts[k].pair]
     nearest = touching(ahead, None)
     if isinstance(contacts[k].box_slot, BoxSlot):
-        there = touching(ahead, tuple(each | (number in group) for number, each in enumerate(features)))
+        there = touching(ahead, tuple(bits | (number in group) for number, bits in enumerate(features)))
         inside = {number for number in group if there[number].borders[0].left_by > 0}
         if border and any(closed[number] for number in inside):
             raise NotUnique(
@@ -54,18 +54,18 @@ def passed_boxes(
         features[number] = same[number] if of_boxes else nearest[number].feature
     here = touching(state, tuple(features))
     for number in group:
-        each = here[number]
-        if each.absent:
+        touch = here[number]
+        if touch.absent:
             closed[number] = False
         elif not closed[number]:
             slot = contacts[number].box_slot
             assert slot is not None  # as of all of the pair
-            if not slot.strikes_sides and each.gap < -_TOUCHES * size:
+            if not slot.strikes_sides and touch.gap < -_TOUCHES * size:
                 raise NotUnique(
                     f"a corner of {contacts[k].pair} meets a side of the other box at t = {time:.6g} s, below its "
                     "edge, which is not followed; end before"
                 )
-            closed[number] = bool(max(abs(each.gap) / size, abs(float(each.normal @ each.slide))) <= _TOUCHES)
+            closed[number] = bool(max(abs(touch.gap) / size, abs(float(touch.normal @ touch.slide))) <= _TOUCHES)
     return list(np.array(closed, dtype=bool).tolist()), tuple(features)
 
 
@@ -78,6 +78,6 @@ def beside_border(
 ) -> bool:
     """True if a contact ``k`` of two boxes is absent at a state a little ahead, with the same faces."""
     if isinstance(contacts[k].box_slot, BoxSlot):
-        features = tuple(each | (number == k) for number, each in enumerate(features_of(mode)))
+        features = tuple(bits | (number == k) for number, bits in enumerate(features_of(mode)))
         return bool(touching(ahead, features)[k].borders[0].left_by <= 0)
     return touching(ahead, None)[k].absent

@@ -77,22 +77,22 @@ def touch_in_scalars(
     """Contact at given motions of its bodies; ``root``: square root for the scalars; ``feature``: of solids."""
     features = contact.features
     if features is None:
-        found = _touch(contact.shape_a, a, contact.shape_b, b, root)
+        touch = _touch(contact.shape_a, a, contact.shape_b, b, root)
         for disc, of in ((contact.shape_a, a), (contact.shape_b, b)):
             if isinstance(disc, CircleShape):
-                leaning = cross(turned(of.R, floats(disc.normal)), found.normal)
-                found = found._replace(tilt=root(dot(leaning, leaning)))
-        return found
+                leaning = cross(turned(of.R, floats(disc.normal)), touch.normal)
+                touch = touch._replace(tilt=root(dot(leaning, leaning)))
+        return touch
     *measures, tilt = _measures(features, a, b, root)
-    one, two = features.shapes(feature)
-    found = _touch(one, a, two, b, root)
-    if isinstance(one, Wall) and not isinstance(two, Wall):
-        place = plus(found.place, scaled(found.gap, found.normal))
-        rate = plus(found.place_rate, scaled(dot(found.normal, found.slide), found.normal))
-        rate = plus(rate, scaled(found.gap, found.normal_rate))
-        found = found._replace(place=place, place_rate=rate, slide=minus(a.velocity(place), b.velocity(place)))
+    shape_a, shape_b = features.shapes(feature)
+    touch = _touch(shape_a, a, shape_b, b, root)
+    if isinstance(shape_a, Wall) and not isinstance(shape_b, Wall):
+        place = plus(touch.place, scaled(touch.gap, touch.normal))
+        rate = plus(touch.place_rate, scaled(dot(touch.normal, touch.slide), touch.normal))
+        rate = plus(rate, scaled(touch.gap, touch.normal_rate))
+        touch = touch._replace(place=place, place_rate=rate, slide=minus(a.velocity(place), b.velocity(place)))
     tilt = tilt if features.needs_angle(feature) else 1.0
-    return found._replace(tilt=tilt, borders=features.borders(feature, *measures))
+    return touch._replace(tilt=tilt, borders=features.borders(feature, *measures))
 
 
 def _measures(features: SolidFeatures, a: ScalarMotion, b: ScalarMotion, root: Root) -> tuple[Scalar, ...]:
@@ -107,20 +107,20 @@ def _measures(features: SolidFeatures, a: ScalarMotion, b: ScalarMotion, root: R
     return *turned_back(product(R, [floats(row) for row in features.axes]), apart), 1.0
 
 
-def _touch(one: Shape, a: ScalarMotion, two: Shape, b: ScalarMotion, root: Root) -> ScalarTouch:
+def _touch(shape_a: Shape, a: ScalarMotion, shape_b: Shape, b: ScalarMotion, root: Root) -> ScalarTouch:
     """Contact of two shapes with one rule."""
-    if isinstance(one, Shaft) and isinstance(two, Shaft):
-        gap, n, n_rate, place, rate = _two_shafts(one, a, two, b, root)
-    elif isinstance(two, Wall):
-        assert not isinstance(one, Wall)  # two walls are no contact
-        gap, n, n_rate, place, rate = _on_wall(one, a, two, b, root)
-    elif isinstance(one, Wall):
-        gap, n, n_rate, place, rate = _on_wall(two, b, one, a, root)
+    if isinstance(shape_a, Shaft) and isinstance(shape_b, Shaft):
+        gap, n, n_rate, place, rate = _two_shafts(shape_a, a, shape_b, b, root)
+    elif isinstance(shape_b, Wall):
+        assert not isinstance(shape_a, Wall)  # two walls are no contact
+        gap, n, n_rate, place, rate = _on_wall(shape_a, a, shape_b, b, root)
+    elif isinstance(shape_a, Wall):
+        gap, n, n_rate, place, rate = _on_wall(shape_b, b, shape_a, a, root)
         n, n_rate = scaled(-1.0, n), scaled(-1.0, n_rate)
     else:
-        assert isinstance(one, SphereShape)
-        assert isinstance(two, SphereShape)
-        gap, n, n_rate, place, rate = _two_spheres(one, a, two, b, root)
+        assert isinstance(shape_a, SphereShape)
+        assert isinstance(shape_b, SphereShape)
+        gap, n, n_rate, place, rate = _two_spheres(shape_a, a, shape_b, b, root)
     return ScalarTouch(
         gap=gap,
         normal=n,
@@ -139,35 +139,35 @@ def floats(vector: Array) -> list[float]:
 _Lying = tuple[Scalar, Vector, Vector, Vector, Vector]
 
 
-def _on_wall(shape: ConvexShape, body: ScalarMotion, wall: Wall, other: ScalarMotion, root: Root) -> _Lying:
+def _on_wall(shape: ConvexShape, body: ScalarMotion, wall: Wall, wall_body: ScalarMotion, root: Root) -> _Lying:
     """Gap, normal, its rate, point of contact and its rate of a convex shape on a wall."""
     if isinstance(wall, HalfSpace):
-        return _on_plane(shape, body, wall, other, root)
+        return _on_plane(shape, body, wall, wall_body, root)
     assert isinstance(shape, SphereShape)  # alone has a rule
-    return _on_curve(shape, body, wall, other)
+    return _on_curve(shape, body, wall, wall_body)
 
 
-def _on_curve(sphere: SphereShape, body: ScalarMotion, wall: CurvedWall, other: ScalarMotion) -> _Lying:
+def _on_curve(sphere: SphereShape, body: ScalarMotion, wall: CurvedWall, wall_body: ScalarMotion) -> _Lying:
     centre = plus(body.p, turned(body.R, floats(sphere.centre)))
-    axes = product(other.R, [floats(row) for row in wall.frame])
-    foot = plus(other.p, turned(other.R, floats(wall.point)))
+    axes = product(wall_body.R, [floats(row) for row in wall.frame])
+    foot = plus(wall_body.p, turned(wall_body.R, floats(wall.point)))
     distance, normal, bend = wall.near_in_scalars(turned_back(axes, minus(centre, foot)))
     n = turned(axes, normal)
-    slides = minus(body.velocity(centre), other.velocity(centre))
-    n_rate = plus(cross(other.w, n), turned(axes, turned(bend, turned_back(axes, slides))))
+    slides = minus(body.velocity(centre), wall_body.velocity(centre))
+    n_rate = plus(cross(wall_body.w, n), turned(axes, turned(bend, turned_back(axes, slides))))
     place = minus(centre, scaled(sphere.radius, n))
     rate = minus(body.velocity(centre), scaled(sphere.radius, n_rate))
     return sub(distance, sphere.radius), n, n_rate, place, rate
 
 
-def _on_plane(shape: ConvexShape, body: ScalarMotion, plane: HalfSpace, other: ScalarMotion, root: Root) -> _Lying:
-    n = turned(other.R, floats(plane.normal))
-    n_rate = cross(other.w, n)
+def _on_plane(shape: ConvexShape, body: ScalarMotion, plane: HalfSpace, wall_body: ScalarMotion, root: Root) -> _Lying:
+    n = turned(wall_body.R, floats(plane.normal))
+    n_rate = cross(wall_body.w, n)
     turning = minus(cross(body.w, n), n_rate)  # minus the rate of the direction, as the body's axes turn with it
     arm, moved = _support(shape, body.R, n, turning, root)
     place = plus(body.p, arm)
     rate = plus(plus(body.v, cross(body.w, arm)), moved)
-    gap = dot(n, minus(place, plus(other.p, turned(other.R, floats(plane.point)))))
+    gap = dot(n, minus(place, plus(wall_body.p, turned(wall_body.R, floats(plane.point)))))
     return gap, n, n_rate, place, rate
 
 
@@ -189,29 +189,29 @@ def _support(
     assert isinstance(shape, EllipsoidShape)
     Q = [floats(row) for row in (shape.frame * shape.axes**2) @ shape.frame.T]
     d, way = scaled(-1.0, turned_back(R, n)), turned_back(R, turning)
-    along, other = turned(Q, d), turned(Q, way)
-    h = root(dot(d, along))
-    moved = minus(scaled(1.0 / h, other), scaled(dot(along, way) / (h * h * h), along))
-    return plus(centre, turned(R, scaled(1.0 / h, along))), turned(R, moved)
+    image, image_of_way = turned(Q, d), turned(Q, way)
+    h = root(dot(d, image))
+    moved = minus(scaled(1.0 / h, image_of_way), scaled(dot(image, way) / (h * h * h), image))
+    return plus(centre, turned(R, scaled(1.0 / h, image))), turned(R, moved)
 
 
-def _two_spheres(one: SphereShape, a: ScalarMotion, two: SphereShape, b: ScalarMotion, root: Root) -> _Lying:
-    centre_a = plus(a.p, turned(a.R, floats(one.centre)))
-    centre_b = plus(b.p, turned(b.R, floats(two.centre)))
+def _two_spheres(sphere_a: SphereShape, a: ScalarMotion, sphere_b: SphereShape, b: ScalarMotion, root: Root) -> _Lying:
+    centre_a = plus(a.p, turned(a.R, floats(sphere_a.centre)))
+    centre_b = plus(b.p, turned(b.R, floats(sphere_b.centre)))
     d, d_rate = minus(centre_a, centre_b), minus(a.velocity(centre_a), b.velocity(centre_b))
     distance = root(dot(d, d))
     n = scaled(1.0 / distance, d)
     n_rate = scaled(1.0 / distance, minus(d_rate, scaled(dot(n, d_rate), n)))
-    place = minus(centre_a, scaled(one.radius, n))
-    rate = minus(a.velocity(centre_a), scaled(one.radius, n_rate))
-    return sub(distance, one.radius + two.radius), n, n_rate, place, rate
+    place = minus(centre_a, scaled(sphere_a.radius, n))
+    rate = minus(a.velocity(centre_a), scaled(sphere_a.radius, n_rate))
+    return sub(distance, sphere_a.radius + sphere_b.radius), n, n_rate, place, rate
 
 
-def _two_shafts(one: Shaft, a: ScalarMotion, two: Shaft, b: ScalarMotion, root: Root) -> _Lying:
-    u, w = turned(a.R, floats(one.axis)), turned(b.R, floats(two.axis))
+def _two_shafts(shaft_a: Shaft, a: ScalarMotion, shaft_b: Shaft, b: ScalarMotion, root: Root) -> _Lying:
+    u, w = turned(a.R, floats(shaft_a.axis)), turned(b.R, floats(shaft_b.axis))
     u_rate, w_rate = cross(a.w, u), cross(b.w, w)
-    foot_a = plus(a.p, turned(a.R, floats(one.point)))
-    foot_b = plus(b.p, turned(b.R, floats(two.point)))
+    foot_a = plus(a.p, turned(a.R, floats(shaft_a.point)))
+    foot_b = plus(b.p, turned(b.R, floats(shaft_b.point)))
     d, d_rate = minus(foot_a, foot_b), minus(a.velocity(foot_a), b.velocity(foot_b))
     across, across_rate = cross(u, w), plus(cross(u_rate, w), cross(u, w_rate))
     square, apart = dot(across, across), dot(d, across)
@@ -224,9 +224,15 @@ def _two_shafts(one: Shaft, a: ScalarMotion, two: Shaft, b: ScalarMotion, root: 
     s = sub(mul(cosine, along_b), along_a) / square
     turning = mul(2.0, mul(s, mul(cosine, cosine_rate)))
     s_rate = add(sub(add(mul(cosine_rate, along_b), mul(cosine, rate_b)), rate_a), turning) / square
-    place = minus(plus(foot_a, scaled(s, u)), scaled(one.radius, n))
+    place = minus(plus(foot_a, scaled(s, u)), scaled(shaft_a.radius, n))
     rate = plus(plus(a.velocity(foot_a), scaled(s_rate, u)), scaled(s, u_rate))
-    return sub(dot(n, d), one.radius + two.radius), n, n_rate, place, minus(rate, scaled(one.radius, n_rate))
+    return (
+        sub(dot(n, d), shaft_a.radius + shaft_b.radius),
+        n,
+        n_rate,
+        place,
+        minus(rate, scaled(shaft_a.radius, n_rate)),
+    )
 
 
 def known_shapes(contact: BodyContact) -> bool:

@@ -52,9 +52,9 @@ class HeldPath:
         own: mechanism in natural units, whose held signals follow.
     """
 
-    def __init__(self, si: Mechanism, units: Units, own: Mechanism) -> None:
-        """Takes the mechanism in SI units, and ``own`` in natural units."""
-        self.own, self._si, self._units = celled(own), si, units
+    def __init__(self, si: Mechanism, units: Units, mechanism: Mechanism) -> None:
+        """Takes the mechanism in SI units, and in natural units."""
+        self.own, self._si, self._units = celled(mechanism), si, units
         ones = units.mechanism(with_values(si, [1.0] * count_of(si)))
         self._factors = np.array(values_of(si, ones))
         self._commands, self._times, self._past = Commands(si), list[float](), list[FloatArray]()
@@ -103,12 +103,15 @@ class HeldPath:
     def on_instants(self, times: Array) -> Array:
         """Times in natural units; those that are instants but for round-off are these instants."""
         return np.array(
-            [next((own for own in self._near(time) if same_instant(time, own)), time) for time in times.tolist()]
+            [
+                next((instant for instant in self._near(time) if same_instant(time, instant)), time)
+                for time in times.tolist()
+            ]
         )
 
     def _near(self, time: float) -> list[float]:
-        at = bisect_right(self._times, time)
-        return self._times[max(at - 1, 0) : at + 1]
+        place = bisect_right(self._times, time)
+        return self._times[max(place - 1, 0) : place + 1]
 
 
 class HeldRoute(Generic[ModeT]):
@@ -135,10 +138,10 @@ class HeldRoute(Generic[ModeT]):
         change = self.change(last)
         if change.mode is None:
             return path
-        after = Stretch(
+        stretch = Stretch(
             start=last.end, end=last.end, mode=change.mode, first=change.state, last=change.state, guard=None
         )
-        return replace(path, stretches=(*path.stretches, after))
+        return replace(path, stretches=(*path.stretches, stretch))
 
     def change(self, stretch: Stretch[ModeT]) -> Transition[ModeT]:
         """See the protocol."""

@@ -48,7 +48,7 @@ def sides_ahead(
     )
 
 
-def refuse_jolts(mechanism: Mechanism, time: float, before: Sequence[int], after: Sequence[int]) -> None:
+def refuse_jolts(mechanism: Mechanism, time: float, sides_before: Sequence[int], sides_after: Sequence[int]) -> None:
     """Refuses a motion whose prescribed rate jumps at a time [s], where kinks change their sides.
 
     Raises:
@@ -58,7 +58,7 @@ def refuse_jolts(mechanism: Mechanism, time: float, before: Sequence[int], after
         if isinstance(joint.motion, Formula) and joint.motion.kinks:
             rates = [
                 float(moved(joint.motion, time, held_sides(mechanism.kinks, sides, FUNCTIONS)).rate)
-                for sides in (before, after)
+                for sides in (sides_before, sides_after)
             ]
             if abs(rates[1] - rates[0]) > _JOLT * max(1.0, *map(abs, rates)):
                 raise Refused(
@@ -78,24 +78,24 @@ def _decided(
     decided = list(sides)
     near = list(range(len(sides)))
     for step in _AHEAD:
-        one = kinks(_stepped(state, step, sides, rates)) - start
+        after_one = kinks(_stepped(state, step, sides, rates)) - start
         if step == _AHEAD[0]:
-            near = [k for k in near if not abs(one[k]) <= abs(start[k]) / 2 or start[k] == 0.0]
+            near = [k for k in near if not abs(after_one[k]) <= abs(start[k]) / 2 or start[k] == 0.0]
         if not near:
             break
         two, four = (kinks(_stepped(state, times * step, sides, rates)) - start for times in (2, 4))
-        left = [k for k in near if _grows(one[k], two[k], four[k])]
+        left = [k for k in near if _grows(after_one[k], two[k], four[k])]
         for k in left:
             decided[k] = int(np.sign(four[k]))
         near = [k for k in near if k not in left]
     return decided
 
 
-def _grows(one: float, two: float, four: float) -> bool:
+def _grows(step_1: float, step_2: float, step_4: float) -> bool:
     """True if values after a step, two and four grow as a power does, which round-off does not."""
-    if not one or not two:
+    if not step_1 or not step_2:
         return False
-    growths = sorted((two / one, four / two))
+    growths = sorted((step_2 / step_1, step_4 / step_2))
     return growths[0] >= _LEAST and growths[1] <= min(_MOST, _ALIKE * growths[0])
 
 

@@ -28,8 +28,8 @@ def of_turning(friction: TurningFriction, touch: ScalarTouch, turning: Vector) -
 
 def resisted(friction: TurningFriction, touch: ScalarTouch, vector: Vector) -> Vector:
     """Part of an angular velocity, or of its rate, that a friction resists."""
-    along = scaled(dot(touch.normal, vector), touch.normal)
-    return along if friction.spins else minus(vector, along)
+    part = scaled(dot(touch.normal, vector), touch.normal)
+    return part if friction.spins else minus(vector, part)
 
 
 def resisted_rate(friction: TurningFriction, touch: ScalarTouch, turning: Vector) -> Vector:
@@ -42,8 +42,8 @@ def resisted_rate(friction: TurningFriction, touch: ScalarTouch, turning: Vector
 def follows(mode: ContactMode, contacts: Sequence[Touchable]) -> bool:
     """True if a mode has a rule in symbols: rolling that stands in its plane has none."""
     return not any(
-        own.kind == "stick" and own.along is None and contact.pressed_by is not None
-        for own, contact in zip(mode, contacts, strict=True)
+        acting.kind == "stick" and acting.along is None and contact.pressed_by is not None
+        for acting, contact in zip(mode, contacts, strict=True)
     )
 
 
@@ -60,28 +60,28 @@ class TurningMoments:
     ) -> None:
         self._touching, self._found = touching, list[tuple[int, int, Vector]]()
         self._acting: list[tuple[int, int, Vector]] = []  # friction, what presses, moment by a unit normal force
-        for k, (own, contact, touch, line) in enumerate(zip(mode, contacts, touching, lines, strict=True)):
-            if own.kind != "slip" or contact.pressed_by is None:
+        for k, (acting, contact, touch, line) in enumerate(zip(mode, contacts, touching, lines, strict=True)):
+            if acting.kind != "slip" or contact.pressed_by is None:
                 continue
             slip = touch.across(touch.slide)
             way = scaled(1.0 / root(dot(slip, slip)), slip) if line is None else line
             self._acting.append((k, contact.pressed_by, scaled(-float(contact.friction), way)))
 
-    def pushed(self, push: Row, place: int, k: int, along: Vector, row_of: Callable[[int, Vector], Row]) -> Row:
+    def pushed(self, push: Row, place: int, k: int, direction: Vector, row_of: Callable[[int, Vector], Row]) -> Row:
         """Loads by a unit of an unknown force, with those of the moments that it brings.
 
         Args:
             push: loads of the force alone.
             place: of the force among all unknown ones.
             k: its contact.
-            along: its direction.
+            direction: its direction.
             row_of: coefficients of a contact's slide in a direction.
         """
         push = dict(push)
         for number, by, moment in self._acting:
             if by != k:
                 continue
-            carried = scaled(dot(self._touching[k].normal, along), moment)
+            carried = scaled(dot(self._touching[k].normal, direction), moment)
             self._found.append((place, number, carried))
             for n, value in row_of(number, carried).items():
                 push[n] = add(push.get(n, 0.0), value)
