@@ -51,9 +51,17 @@ def test_every_mutant_is_detected_and_most_are_named() -> None:
 
 
 WITHOUT_FAULT = {(kind.__bases__, repr(kind.scene), kind.until): kind for kind in map(without_fault, mutants())}
+# Scenes whose truth takes little time.
+QUICK = {"sphere_in_cylinder", "two_bounces", "double_pendulum", "heavy_top", "free_body", "saturated_servo"}
 
 
-@pytest.mark.parametrize("kind", WITHOUT_FAULT.values(), ids=lambda kind: kind.__name__)
+@pytest.mark.parametrize(
+    "kind",
+    [
+        pytest.param(kind, id=kind.__name__, marks=() if kind.scene[0] in QUICK else pytest.mark.drill)
+        for kind in WITHOUT_FAULT.values()
+    ],
+)
 def test_an_engine_without_a_fault_is_not_detected(kind: type[Mutant]) -> None:
     """Errors of an engine without the fault are no sign of it, and are small on every scene."""
     found = tried(type("Harmless", (kind,), {"fault": "none"}))
@@ -61,7 +69,7 @@ def test_an_engine_without_a_fault_is_not_detected(kind: type[Mutant]) -> None:
     assert [item for item in judged_without_fault(kind) if item.error > 2e-3 * item.scale] == []
 
 
-@pytest.mark.parametrize("fault", ["PyramidForCone", "FrictionOfOneFoot"])
+@pytest.mark.parametrize("fault", [pytest.param("PyramidForCone", marks=pytest.mark.drill), "FrictionOfOneFoot"])
 def test_a_fault_of_contacts_is_detected_and_named(fault: str) -> None:
     """A law of friction that is not the scene's, or the coefficient of one of three feet, is found, and its cause."""
     found = tried(getattr(contact_models, fault))
@@ -93,9 +101,9 @@ def test_late_reactions_of_a_fast_rotor_are_named(scene: str) -> None:
         ("sphere_in_cylinder", {}, 0.3),
         ("sphere_in_cylinder", {"mu_static": 0.2, "mu_kinetic": 0.15}, 0.4),
         ("double_pendulum", {}, 0.3),
-        ("slider_crank", {}, 0.2),
-        ("arm_pd", {}, 0.3),
-        ("pendulum_friction", {}, 0.4),
+        pytest.param("slider_crank", {}, 0.2, marks=pytest.mark.drill),
+        pytest.param("arm_pd", {}, 0.3, marks=pytest.mark.drill),
+        pytest.param("pendulum_friction", {}, 0.4, marks=pytest.mark.drill),
     ],
 )
 def test_small_errors_of_an_honest_engine_have_no_cause(scene: str, parameters: dict[str, float], until: float) -> None:

@@ -264,7 +264,7 @@ HONEST += [
     for formulation in ORDERS
 ]
 # Springs, which implicit Euler damps by half of their stiffness times the step.
-HONEST.append(pytest.param("oscillators", "implicit_euler"))
+HONEST.append(pytest.param("oscillators", "implicit_euler", marks=pytest.mark.drill))
 
 
 def _honest_scene(name: str) -> tuple[Scene, Any]:
